@@ -1,0 +1,48 @@
+# make demo   lift the example clip to a VDB sequence, with pictures to look at, in demo/
+# make test   formatting, types and tests; nothing that needs a GPU
+# make bench  benchmarks against peers (see benchmarks/)
+# Both set up what they need in .venv first. Only Python 3.11 to 3.13 and a C++17 compiler are assumed.
+
+SHELL := /bin/bash
+.SHELLFLAGS := -euo pipefail -c
+VENV := .venv
+BIN := $(VENV)/bin
+# Blender's openvdb module exists for Python 3.11 and 3.13, so these come first.
+PYTHON ?= $(shell for p in python3.11 python3.13 python3.12 python3; do \
+	"$$p" -c 'import sys, venv, ensurepip; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' 2>/dev/null \
+	&& { echo "$$p"; break; }; done)
+CXX_FOUND := $(shell command -v "$${CXX:-c++}" || command -v g++ || command -v clang++)
+ENGINE_SOURCES := pyproject.toml CMakeLists.txt $(wildcard cpp/*) $(shell find engine -name '*.py' -o -name '*.pyi')
+QUIET_PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+
+.PHONY: demo test lint clean
+
+demo: $(VENV)/engine.stamp
+	rm -rf demo/sequence
+	$(BIN)/smokelift reconstruct examples/plume/scene.toml --out demo/sequence $(DEMO_OPTIONS)
+	$(BIN)/smokelift preview demo/sequence
+
+test: lint $(VENV)/engine.stamp
+	$(BIN)/python -m pytest
+
+lint: $(VENV)/engine.stamp
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/clang-format --dry-run --Werror cpp/*.cpp cpp/*.h
+
+$(VENV)/tools.stamp:
+	@[ -n "$(PYTHON)" ] || { echo "Smokelift needs Python 3.11, 3.12 or 3.13 with venv; install one, or say make PYTHON=/path/to/python3." >&2; exit 2; }
+	@[ -n "$(CXX_FOUND)" ] || { echo "Smokelift needs a C++17 compiler; install g++ or clang++ (Debian: apt install g++)." >&2; exit 2; }
+	$(PYTHON) -m venv $(VENV)
+	$(QUIET_PIP) --upgrade pip
+	$(QUIET_PIP) --group dev
+	touch $@
+
+# Installed as a wheel, not editable: what is tested is what is shipped.
+$(VENV)/engine.stamp: $(VENV)/tools.stamp $(ENGINE_SOURCES)
+	$(QUIET_PIP) '.[vdb]'
+	touch $@
+
+clean:
+	rm -rf $(VENV) build dist demo
