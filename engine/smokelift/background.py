@@ -1,0 +1,298 @@
+"""The background behind the smoke: a clean plate from the clip alone, and where a frame differs from it.
+
+Assumed: the camera and the background stand still, and a pixel is seen clear in some share of the frames. A
+clear pixel then keeps returning to one value within the noise, while smoke moves and scatters its values
+widely. So the plate is, pixel by pixel, the value with the most samples around it, in a window as wide as
+the noise. Where smoke only ever brightens what is behind it (white smoke before a darker wall, found by
+looking at the clip), the darkest well-supported value is taken instead, and the brightest where it only
+darkens: smoke that hangs about for long makes a second, sometimes larger, heap on the known side.
+
+Pixels that are never clear (over the source, as a rule) cannot be known. Their confidence is near 0 and they
+are filled smoothly from their neighbours. What never moves, a nozzle or a perfectly steady jet, is
+background.
+
+Noise is judged in sRGB values, where that of cameras and codecs is about the same at all brightnesses.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy import ndimage
+
+from smokelift.clip import Clip
+from smokelift.images import Picture, area_average, linear_to_srgb, srgb_to_linear
+
+CODE = np.float32(1 / 255)
+"""One step of 8 bit video: no noise is taken to be smaller."""
+
+_WINDOW = 6.0  # width of the window around a value, in noise: plus and minus three sigma
+_ONE_SIDED = (
+    0.9  # share of the deviations to one side from which on smoke is said to only brighten (or darken)
+)
+_WELL_SUPPORTED = 0.35  # of the samples that the best-supported value has
+_CLEAR = (
+    2,
+    6,
+)  # samples in a row at the chosen value: never clear up to the first, surely from the second on
+_FIXED_POINT = 8192  # samples are kept as 16 bit fixed point numbers: sRGB values up to 8
+_STORE_BYTES = 512 * 2**20
+_NOISE_STEP = 3  # every third pixel of every third row is enough to know the noise
+_SMOOTH = 1.5  # pixels
+_FAINT, _SURE = 4.0, 8.0  # noise; thresholds of the mask
+_LEAST_SURE = 1e-4  # share of the picture that must be surely smoke in a patch of the mask
+_WORST_FRAME = 2.0  # how many times more than the clip a frame may be taken to deviate as a whole
+
+
+@dataclass(frozen=True)
+class Plate:
+    """What the camera sees without smoke.
+
+    Attributes
+    ----------
+    image
+        Linear, shape (height, width, 3).
+    confidence
+        0 (filled from neighbours) to 1 (seen clear in many frames), shape (height, width).
+    noise
+        Standard deviation of a static pixel, sensor and compression together, per channel, in linear light,
+        at the plate's median brightness; at least one step of 8 bit video.
+    """
+
+    image: Picture
+    confidence: Picture
+    noise: Picture
+
+
+@dataclass(frozen=True)
+class Matte:
+    """Where a frame shows smoke.
+
+    Attributes
+    ----------
+    evidence
+        Deviation from the plate in units of noise, smoothed over two pixels, shape (height, width). About 1
+        or less without smoke; at least 8 where the plate is less than half certain, since such a pixel was
+        never seen without smoke.
+    mask
+        Patches of evidence above 4 in which 0.01 % of the picture exceeds 8, shape (height, width).
+    """
+
+    evidence: Picture
+    mask: npt.NDArray[np.bool_]
+
+
+def estimate_plate(clip: Clip, sample_count: int = 32) -> Plate:
+    """Estimate the background of a clip from its frames; the module says how, and what is assumed.
+
+    Parameters
+    ----------
+    clip
+        Camera and background stand still.
+    sample_count
+        Frames looked at, spread evenly; fewer of very large pictures, to stay below half a gigabyte.
+
+    Raises
+    ------
+    ClipError
+        If a frame cannot be read.
+    """
+    samples = _samples(clip, sample_count)
+    sigma = _temporal_noise(samples[:, ::_NOISE_STEP, ::_NOISE_STEP])
+    grey_sigma = float(np.sqrt((sigma**2).mean()))
+    side = _side(samples[:, ::4, ::4], grey_sigma)
+    height, width = samples.shape[1:3]
+    image = np.empty((height, width, 3), np.float32)
+    run = np.empty((height, width), np.int16)
+    for row in range(0, height, 64):  # in bands, for the sake of memory
+        band = slice(row, row + 64)
+        image[band], run[band] = _clear_value(samples[:, band], grey_sigma, side)
+    low, high = (min(bound, share * len(samples)) for bound, share in zip(_CLEAR, (0.3, 0.6), strict=True))
+    # A clear speck amid smoke is an accident of the samples.
+    run = np.minimum(run, ndimage.median_filter(run, 7))
+    confidence = np.clip((run - low) / (high - low), 0.0, 1.0)
+    # What is less than half certain is filled as a whole: a part of it would spread its smoke.
+    return _plate(
+        _filled(image, np.clip(2.0 * confidence - 1.0, 0.0, 1.0)), confidence.astype(np.float32), sigma
+    )
+
+
+def known_plate(background: npt.ArrayLike, clip: Clip, sample_count: int = 32) -> Plate:
+    """Return the plate of a background that is known, with the clip's noise.
+
+    Parameters
+    ----------
+    background
+        A linear colour, shape (3,), or a picture, shape (height, width, 3), resized to the clip if need be.
+    clip
+        For its size and its noise.
+    sample_count
+        Frames looked at.
+
+    Raises
+    ------
+    ClipError
+        If a frame cannot be read.
+    ValueError
+        If the background is neither, or not finite.
+    """
+    width, height = clip.size
+    linear = np.asarray(background, np.float32)
+    if linear.shape == (3,):
+        linear = np.broadcast_to(linear, (height, width, 3))
+    if linear.ndim != 3 or linear.shape[2] != 3 or not np.isfinite(linear).all():
+        raise ValueError(f"a background must be a finite colour or RGB picture, not of shape {linear.shape}")
+    sigma = _temporal_noise(_samples(clip, sample_count, _NOISE_STEP))
+    encoded = linear_to_srgb(area_average(linear, width, height))
+    return _plate(encoded, np.ones((height, width), np.float32), sigma)
+
+
+def matte(frame: npt.ArrayLike, plate: Plate) -> Matte:
+    """Find the smoke in a frame.
+
+    Parameters
+    ----------
+    frame
+        Linear, shape (height, width, 3).
+    plate
+        The background of the same size.
+
+    Raises
+    ------
+    ValueError
+        If the sizes differ or the frame is not finite.
+    """
+    linear = np.asarray(frame, np.float32)
+    if linear.shape != plate.image.shape:
+        raise ValueError(f"the frame {linear.shape} and the plate {plate.image.shape} must have one shape")
+    if not np.isfinite(linear).all():
+        raise ValueError("the frame must be finite")
+    behind = linear_to_srgb(plate.image)
+    sigma = plate.noise / _slope(np.median(behind, axis=(0, 1)))
+    deviation = (linear_to_srgb(linear) - behind) / sigma
+    smooth = ndimage.gaussian_filter(deviation, (_SMOOTH, _SMOOTH, 0.0))
+    evidence = np.sqrt((smooth**2).mean(axis=2))
+    # Exposure and codec drift: a frame that deviates everywhere is judged more mildly, up to a limit, since
+    # smoke may also fill the picture.
+    evidence /= np.clip(np.median(evidence), 1.0, _WORST_FRAME)
+    # A pixel that was never seen clear has smoke in every frame.
+    evidence = np.maximum(evidence, np.float32(2.0 * _SURE) * (1.0 - plate.confidence))
+    patches, count = ndimage.label(evidence > _FAINT, structure=np.ones((3, 3)))
+    certain = np.bincount(patches[evidence > _SURE], minlength=count + 1)
+    smoke = certain > _LEAST_SURE * patches.size
+    return Matte(evidence, smoke[patches])
+
+
+def _samples(clip: Clip, count: int, step: int = 1) -> npt.NDArray[np.uint16]:
+    """Return frames spread evenly over the clip as fixed point sRGB, shape (count, height, width, 3).
+
+    Of each frame every ``step``-th row and column is taken.
+    """
+    width, height = clip.size
+    most = max(3, step**2 * _STORE_BYTES // (width * height * 6))
+    numbers = np.unique(np.linspace(0, len(clip) - 1, min(count, most, len(clip))).round().astype(int))
+    rows, columns = len(range(0, height, step)), len(range(0, width, step))
+    samples = np.empty((len(numbers), rows, columns, 3), np.uint16)
+    for sample, number in zip(samples, numbers, strict=True):
+        encoded = linear_to_srgb(clip.frame(int(number))[::step, ::step])
+        sample[...] = np.clip(encoded * _FIXED_POINT + 0.5, 0, 65535)
+    return samples
+
+
+def _decoded(samples: npt.NDArray[np.uint16]) -> Picture:
+    return samples.astype(np.float32) / np.float32(_FIXED_POINT)
+
+
+def _temporal_noise(samples: npt.NDArray[np.uint16]) -> Picture:
+    """Return the noise of static pixels per channel, in sRGB values.
+
+    It is the median over pixels of the deviation over time, which smoke over less than half of the picture
+    does not disturb. (Differences of frames in a row would miss that codecs let static blocks stand, then
+    jump.)
+    """
+    spread = _decoded(samples).std(axis=0).reshape(-1, 3)
+    noise: Picture = np.maximum(np.median(spread, axis=0), CODE).astype(np.float32)
+    return noise
+
+
+def _slope(encoded: Picture) -> Picture:
+    """Return how much linear light one unit of sRGB is, at sRGB values."""
+    step = CODE / 2
+    return (srgb_to_linear(encoded + step) - srgb_to_linear(encoded - step)) / CODE
+
+
+def _plate(encoded: Picture, confidence: Picture, sigma: Picture) -> Plate:
+    noise = sigma * _slope(np.median(encoded, axis=(0, 1)))
+    return Plate(srgb_to_linear(encoded), confidence, noise.astype(np.float32))
+
+
+def _supports(ordered: Picture, width: float) -> npt.NDArray[np.int16]:
+    """Return how many samples lie from each one up to ``width`` above it; ordered along the first axis."""
+    counts = np.ones(ordered.shape, np.int16)
+    for lag in range(1, len(ordered)):
+        counts[:-lag] += ordered[lag:] - ordered[:-lag] <= width
+    return counts
+
+
+def _side(samples: npt.NDArray[np.uint16], sigma: float) -> int:
+    """Return 1 if smoke only brightens the background, -1 if it only darkens it, else 0."""
+    grey = _decoded(samples).mean(axis=-1)
+    ordered = np.sort(grey, axis=0)
+    counts = _supports(ordered, _WINDOW * sigma)
+    best = counts.argmax(axis=0)[None]
+    mode = np.take_along_axis(ordered, best, axis=0) + 0.5 * _WINDOW * sigma
+    # Where most samples agree, the mode is the background for certain; small deviations may be drift.
+    deviation = np.where(counts.max(axis=0) > 0.6 * len(grey), grey - mode, 0.0)
+    brighter, darker = (int((sign * deviation > 2.0 * _WINDOW * sigma).sum()) for sign in (1, -1))
+    if brighter > _ONE_SIDED * (brighter + darker):
+        return 1
+    return -1 if darker > _ONE_SIDED * (brighter + darker) else 0
+
+
+def _clear_value(
+    samples: npt.NDArray[np.uint16], sigma: float, side: int
+) -> tuple[Picture, npt.NDArray[np.int16]]:
+    """Return the background value of each pixel, in sRGB, and how many samples in a row have it at most."""
+    colours = _decoded(samples)
+    grey = colours.mean(axis=-1)
+    ordered = np.sort(grey, axis=0)
+    counts = _supports(ordered, _WINDOW * sigma)
+    good = counts >= _WELL_SUPPORTED * counts.max(axis=0)
+    if side > 0:
+        chosen = good.argmax(axis=0)
+    elif side < 0:
+        chosen = len(good) - 1 - good[::-1].argmax(axis=0)
+    else:
+        chosen = counts.argmax(axis=0)
+    centre = np.take_along_axis(ordered, chosen[None], axis=0) + 0.5 * _WINDOW * sigma
+    for _ in range(3):  # the window starts at a sample; let it settle around the mean of its samples
+        inside = np.abs(grey - centre) <= 0.5 * _WINDOW * sigma * 1.001
+        number = np.maximum(inside.sum(axis=0), 1)
+        centre = (grey * inside).sum(axis=0, keepdims=True) / number
+    value = np.einsum("tyxc,tyx->yxc", colours, inside.astype(np.float32)) / number[..., None]
+    run = longest = np.zeros(grey.shape[1:], np.int16)
+    for hit in inside:
+        run = (run + 1) * hit
+        longest = np.maximum(longest, run)
+    return value.astype(np.float32), longest
+
+
+def _filled(image: Picture, confidence: Picture) -> Picture:
+    """Blend pixels of low confidence with the smooth continuation of their surroundings.
+
+    Averages weighted by confidence over ever larger blocks: each level leaves what it knows and takes the
+    rest from the next coarser one.
+    """
+    height, width = confidence.shape
+    weight: Picture = confidence[..., None]
+    if min(height, width) == 1 or float(confidence.min()) >= 1.0:
+        return image
+    small = ((width + 1) // 2, (height + 1) // 2)
+    total = area_average(weight, *small)
+    mean = area_average(image * weight, *small) / np.maximum(total, 1e-6)
+    # A block of which a quarter is known is known: its mean is as good as any.
+    coarse = _filled(mean, np.minimum(4.0 * total[..., 0], 1.0))
+    blend: Picture = image * weight + area_average(coarse, width, height) * (np.float32(1.0) - weight)
+    return blend

@@ -1,0 +1,159 @@
+"""The clean plate and the matte, on clips whose background and smoke are known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from smokelift.background import estimate_plate, known_plate, matte
+from smokelift.clip import Clip
+from smokelift.images import linear_to_srgb, srgb_to_linear, write_image
+
+HEIGHT, WIDTH, COUNT = 72, 56, 24
+DATA = Path(__file__).parents[3] / "shared" / "data"
+
+
+def wall(low: float, high: float) -> np.ndarray:
+    """Return a textured linear background, the same each time."""
+    blocks = np.random.default_rng(0).uniform(low, high, (HEIGHT // 8, WIDTH // 8, 3))
+    return srgb_to_linear(np.kron(blocks, np.ones((8, 8, 1))))
+
+
+def puff(n: int) -> np.ndarray:
+    """Return the opacity of a round puff that rises through the picture."""
+    rows, columns = np.mgrid[:HEIGHT, :WIDTH]
+    centre = HEIGHT - 2.5 * n, WIDTH / 2 + 6 * np.sin(n / 3)
+    distance = np.hypot(rows - centre[0], columns - centre[1])
+    return 0.7 * np.clip(1.5 - distance / 9, 0.0, 1.0) * (1.0 + 0.2 * np.sin(0.9 * n + rows / 3))
+
+
+def film(
+    folder: Path, plate: np.ndarray, opacity: Callable[[int], np.ndarray], colour: float, noise: float = 1.0
+) -> Clip:
+    """Write and open a clip of smoke of a colour before a plate, with sensor noise in 8 bit codes."""
+    random = np.random.default_rng(1)
+    for n in range(COUNT):
+        alpha = np.clip(opacity(n), 0.0, 1.0)[..., None]
+        clean = plate * (1.0 - alpha) + colour * alpha
+        codes = linear_to_srgb(clean) + random.normal(0.0, noise / 255, clean.shape)
+        write_image(folder / f"frame_{n:03d}.png", srgb_to_linear(np.clip(codes, 0.0, 1.0)))
+    return Clip.open(folder / "frame_###.png", fps=24)
+
+
+def overlap(mask: np.ndarray, truth: np.ndarray) -> float:
+    return float((mask & truth).sum() / (mask | truth).sum())
+
+
+def codes_apart(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.abs(linear_to_srgb(a) - linear_to_srgb(b)).max(axis=2) * 255
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "colour"),
+    [(0.2, 0.5, 0.6), (0.6, 0.9, 0.02), (0.2, 0.9, 0.25)],
+    ids=["brightening", "darkening", "both"],
+)
+def test_plate_and_matte(tmp_path: Path, low: float, high: float, colour: float) -> None:
+    truth = wall(low, high)
+    clip = film(tmp_path, truth, puff, colour)
+    plate = estimate_plate(clip)
+    assert plate.image.shape == truth.shape
+    assert plate.confidence.shape == truth.shape[:2]
+    assert plate.confidence.min() > 0.9
+    apart = codes_apart(plate.image, truth)
+    assert np.median(apart) < 0.7
+    assert np.percentile(apart, 95) < 5.0
+    for n in (4, 12, 20):
+        result = matte(clip.frame(n), plate)
+        contrast = puff(n) * np.abs(linear_to_srgb(truth) - linear_to_srgb(colour)).mean(axis=2) * 255
+        assert result.evidence.dtype == np.float32
+        assert result.mask[contrast > 12].mean() > 0.95
+        assert result.mask[puff(n) == 0.0].mean() < 0.08
+        assert np.median(result.evidence[puff(n) == 0.0]) < 1.5
+
+
+def test_noise_is_measured(tmp_path: Path) -> None:
+    for name, codes in (("quiet", 0.0), ("noisy", 4.0)):
+        (tmp_path / name).mkdir()
+        flat = np.full((HEIGHT, WIDTH, 3), 0.2, np.float32)
+        plate = estimate_plate(film(tmp_path / name, flat, puff, 0.8, codes))
+        slope = (srgb_to_linear(linear_to_srgb(0.2) + 0.01) - 0.2) / 0.01
+        assert plate.noise.shape == (3,)
+        np.testing.assert_allclose(plate.noise, max(codes, 1.0) / 255 * slope, rtol=0.25)
+
+
+def test_pixels_that_are_never_clear_are_filled_and_marked(tmp_path: Path) -> None:
+    truth = np.linspace(0.1, 0.3, WIDTH, dtype=np.float32)[None, :, None].repeat(HEIGHT, 0).repeat(3, 2)
+    rows, columns = np.mgrid[:HEIGHT, :WIDTH]
+    jet = (np.abs(columns - WIDTH / 2) < 5) & (rows > 30)
+
+    def opacity(n: int) -> np.ndarray:
+        flicker = np.random.default_rng(n).uniform(0.3, 0.9)
+        return np.where(jet, flicker, 0.0)
+
+    clip = film(tmp_path, truth, opacity, 0.9, 0.5)
+    plate = estimate_plate(clip)
+    inner = (np.abs(columns - WIDTH / 2) < 3) & (rows > 34)
+    assert plate.confidence[inner].max() < 0.5
+    assert plate.confidence[np.abs(columns - WIDTH / 2) > 8].min() == 1.0
+    assert codes_apart(plate.image, truth)[inner].max() < 12
+    assert all(matte(clip.frame(n), plate).mask[inner].all() for n in (0, 11, 23))
+
+
+def test_an_empty_clip_has_no_smoke(tmp_path: Path) -> None:
+    truth = wall(0.2, 0.8)
+    clip = film(tmp_path, truth, lambda n: np.zeros((HEIGHT, WIDTH)), 1.0, 2.0)
+    plate = estimate_plate(clip)
+    assert plate.confidence.min() == 1.0
+    assert not any(matte(frame, plate).mask.any() for frame in clip)
+
+
+def test_a_known_black_background(tmp_path: Path) -> None:
+    black = np.zeros((HEIGHT, WIDTH, 3), np.float32)
+    clip = film(tmp_path, black, puff, 0.5, 0.0)
+    plate = known_plate((0.0, 0.0, 0.0), clip)
+    assert plate.confidence.min() == 1.0
+    np.testing.assert_allclose(plate.noise, 1 / 255 / 12.92, rtol=1e-3)
+    for n in (4, 12, 20):
+        assert overlap(matte(clip.frame(n), plate).mask, puff(n) > 0.002) > 0.75
+    estimated = estimate_plate(clip)
+    assert codes_apart(estimated.image, black).max() < 1.0
+    picture = known_plate(wall(0.2, 0.5)[::2, ::2], clip)
+    assert picture.image.shape == (HEIGHT, WIDTH, 3)
+
+
+def test_one_frame_is_its_own_plate(tmp_path: Path) -> None:
+    write_image(tmp_path / "still.png", wall(0.2, 0.8))
+    clip = Clip.open(tmp_path / "still.png")
+    plate = estimate_plate(clip)
+    assert codes_apart(plate.image, clip.frame(0)).max() < 0.1
+    assert not matte(clip.frame(0), plate).mask.any()
+
+
+def test_what_does_not_fit_is_refused(tmp_path: Path) -> None:
+    write_image(tmp_path / "still.png", wall(0.2, 0.8))
+    clip = Clip.open(tmp_path / "still.png")
+    plate = estimate_plate(clip)
+    with pytest.raises(ValueError, match="one shape"):
+        matte(clip.frame(0)[1:], plate)
+    with pytest.raises(ValueError, match="finite"):
+        matte(clip.frame(0) * np.nan, plate)
+    for background in ((1.0, 2.0), np.full((4, 4, 3), np.nan), np.ones((4, 4))):
+        with pytest.raises(ValueError, match="finite colour or RGB picture"):
+            known_plate(background, clip)
+
+
+@pytest.mark.skipif(not DATA.is_dir(), reason="needs the development data")
+def test_the_wall_behind_the_synthetic_puff() -> None:
+    folder = DATA / "synthetic" / "puff"
+    plate = estimate_plate(Clip.open(folder / "front.mp4"))
+    with np.load(folder / "background_plate.npz") as data:
+        truth = data[data.files[0]]
+    truth = truth if truth.ndim == 3 else truth[..., None].repeat(3, 2)
+    apart = np.abs(linear_to_srgb(plate.image) - linear_to_srgb(truth)).mean(axis=2) * 255
+    assert np.median(apart) < 1.5
+    assert np.percentile(apart, 95) < 4.0
+    assert (plate.confidence < 0.5).mean() < 0.01

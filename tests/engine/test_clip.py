@@ -1,0 +1,326 @@
+"""Clips: every frame is the right one, upright, in the right colours; what cannot be read is said."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+from PIL import Image
+
+from smokelift.clip import Clip, ClipError
+from smokelift.images import linear_to_srgb, srgb_to_linear, write_image
+from smokelift.scene import ClipSource
+
+
+def encode(
+    path: Path,
+    frames: Sequence[np.ndarray],
+    *,
+    codec: str = "libx264",
+    pixels: str = "yuv420p",
+    given: str = "rgb24",
+    colorspace: int | None = None,
+    rotation: int | None = None,
+    times: Sequence[int] | None = None,
+    container: dict[str, str] | None = None,
+    **options: str,
+) -> Path:
+    """Write a clip of 24 frames a second (or of times in 1/240 s)."""
+    with av.open(str(path), "w", options=container or {}) as out:
+        stream = out.add_stream(codec, rate=24)
+        stream.height, stream.width = frames[0].shape[:2]
+        stream.pix_fmt = pixels
+        stream.codec_context.time_base = Fraction(1, 240)
+        stream.options = {"qp": "0", **options} if codec == "libx264" else options
+        if colorspace is not None:
+            stream.codec_context.colorspace = colorspace
+        if rotation is not None:
+            stream.set_display_rotation(rotation)
+        for n, array in enumerate(frames):
+            frame = av.VideoFrame.from_ndarray(array, format=given)
+            frame = frame.reformat(format=pixels, dst_colorspace=colorspace)
+            frame.pts = times[n] if times is not None else 10 * n
+            frame.time_base = Fraction(1, 240)
+            out.mux(stream.encode(frame))
+        out.mux(stream.encode())
+    return path
+
+
+def flat(value: int | tuple[int, int, int], width: int = 32, height: int = 16) -> np.ndarray:
+    return np.full((height, width, 3), value, np.uint8)
+
+
+def codes(clip: Clip) -> list[int]:
+    """Return the level of each frame of a clip of flat grey frames."""
+    return [round(float(linear_to_srgb(image[8, 8, 1])) * 255) for image in clip]
+
+
+def near(found: Sequence[int], wanted: Sequence[int], by: int = 1) -> bool:
+    return len(found) == len(wanted) and all(abs(a - b) <= by for a, b in zip(found, wanted, strict=True))
+
+
+LEVELS = [20 + 7 * n for n in range(30)]
+
+
+@pytest.fixture(scope="module")
+def ramp(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A clip with B-frames and several key frames, whose frame n has the level 20 + 7 n."""
+    path = tmp_path_factory.mktemp("clip") / "ramp.mp4"
+    return encode(path, [flat(v) for v in LEVELS], g="8", bf="3", sc_threshold="0")
+
+
+def test_frames_are_linear_and_in_order(ramp: Path) -> None:
+    with Clip.open(ramp) as clip:
+        assert (clip.fps, clip.frame_count, len(clip), clip.size) == (24.0, 30, 30, (32, 16))
+        assert (clip.path, clip.warning, clip.first) == (ramp, None, 0)
+        assert near(codes(clip), LEVELS)
+        image = clip.frame(12)
+        assert image.dtype == np.float32
+        assert image.shape == (16, 32, 3)
+        assert not image.flags.writeable
+    with Clip.open(ramp, transfer="linear") as clip:
+        np.testing.assert_allclose(srgb_to_linear(clip.frame(12)), image, rtol=1e-5)
+
+
+def test_any_frame_can_be_had_in_any_order(ramp: Path) -> None:
+    with Clip.open(ramp) as clip:
+        in_order = [image.copy() for image in clip]
+    order = np.random.default_rng(0).permutation(30).tolist()
+    with Clip.open(ramp) as clip:
+        for n in [*order, 29, 0, 7, 8, 9, 7]:
+            np.testing.assert_array_equal(clip.frame(n), in_order[n])
+
+
+@pytest.mark.parametrize(
+    ("name", "codec", "pixels"),
+    [
+        ("a.mkv", "libx264", "yuv420p"),
+        ("a.mov", "prores_ks", "yuv422p10le"),
+        ("a.avi", "mpeg4", "yuv420p"),
+        ("a.webm", "libvpx-vp9", "yuv420p"),
+        ("a.mkv", "ffv1", "gray"),
+        ("a.ts", "libx264", "yuv420p"),
+        ("a.h264", "libx264", "yuv420p"),
+        ("a.gif", "gif", "rgb8"),
+    ],
+)
+def test_other_containers_and_codecs(tmp_path: Path, name: str, codec: str, pixels: str) -> None:
+    path = encode(tmp_path / name, [flat(v) for v in LEVELS[:12]], codec=codec, pixels=pixels)
+    slack = 40 if codec == "gif" else 4
+    with Clip.open(path) as clip:
+        assert near(codes(clip), LEVELS[:12], slack)
+        assert clip.fps == pytest.approx(24, rel=0.05)
+        assert near(codes(clip)[::-1], [codes_of(clip, n) for n in range(11, -1, -1)], 0)
+
+
+def codes_of(clip: Clip, n: int) -> int:
+    return round(float(linear_to_srgb(clip.frame(n)[8, 8, 1])) * 255)
+
+
+@pytest.mark.parametrize("colorspace", [1, 5])
+def test_the_colour_matrix_is_honoured(tmp_path: Path, colorspace: int) -> None:
+    colour = (200, 60, 30)
+    path = encode(tmp_path / "a.mp4", [flat(colour, 64, 64)] * 2, colorspace=colorspace, pixels="yuv444p")
+    found = linear_to_srgb(Clip.open(path).frame(0)[32, 32]) * 255
+    np.testing.assert_allclose(found, colour, atol=2.1)
+
+
+@pytest.mark.parametrize("full", [False, True])
+def test_the_colour_range_is_honoured_and_rounding_is_unbiased(tmp_path: Path, full: bool) -> None:
+    luma = np.arange(16, 236, dtype=np.uint8)
+    planes = np.full((6, 220), 128, np.uint8)  # four rows of luma over two of chroma, as yuv420p is packed
+    planes[:4] = luma
+    path = tmp_path / "a.mp4"
+    with av.open(str(path), "w") as out:
+        stream = out.add_stream("libx264", rate=24)
+        stream.width, stream.height, stream.pix_fmt = 220, 4, "yuv420p"
+        stream.options = {"qp": "0"}
+        stream.codec_context.color_range = 2 if full else 1
+        frame = av.VideoFrame.from_ndarray(planes, format="yuv420p")
+        frame.color_range = 2 if full else 1
+        out.mux(stream.encode(frame))
+        out.mux(stream.encode())
+    found = linear_to_srgb(Clip.open(path).frame(0)[2, :, 1]) * 255
+    exact = luma if full else (luma - 16.0) * 255 / 219
+    assert np.abs(found - exact).max() < 0.51
+    assert abs(np.mean(found - exact)) < 0.05
+
+
+def test_10_bits_are_kept(tmp_path: Path) -> None:
+    values = (np.arange(64, dtype=np.uint16) * 257 + 20000)[None, :, None].repeat(16, 0).repeat(3, 2)
+    path = encode(tmp_path / "a.mkv", [values], codec="ffv1", pixels="yuv444p10le", given="rgb48le")
+    found = Clip.open(path, transfer="linear").frame(0)[8, :, 1]
+    assert len(np.unique(found)) > 50
+    np.testing.assert_allclose(found, values[8, :, 1] / 65535, atol=1.5 / 1023)
+
+
+def test_alpha_is_shown_over_black(tmp_path: Path) -> None:
+    rgba = np.full((16, 16, 4), 255, np.uint8)
+    rgba[:, :8, 3] = 51
+    path = encode(tmp_path / "a.mov", [rgba], codec="qtrle", pixels="argb", given="rgba")
+    image = Clip.open(path).frame(0)
+    np.testing.assert_allclose(image[:, :8], 0.2, rtol=1e-5)
+    np.testing.assert_allclose(image[:, 8:], 1.0)
+
+
+@pytest.mark.parametrize("rotation", [None, 90, 180, -90])
+def test_rotated_clips_are_upright(tmp_path: Path, rotation: int | None) -> None:
+    picture = np.zeros((32, 64, 3), np.uint8)
+    picture[:16, :32] = 200  # a bright quarter at the top left, as stored
+    path = encode(tmp_path / "a.mp4", [picture] * 2, rotation=rotation)
+    with Clip.open(path) as clip:
+        wanted = np.rot90(picture, (rotation or 0) // 90)  # counterclockwise, as PyAV counts
+        assert clip.size == (wanted.shape[1], wanted.shape[0])
+        np.testing.assert_allclose(linear_to_srgb(clip.frame(1)), wanted / 255, atol=0.02)
+
+
+def test_odd_sizes(tmp_path: Path) -> None:
+    path = encode(tmp_path / "a.mp4", [flat(90, 35, 17)] * 2, pixels="yuv444p")
+    assert Clip.open(path).size == (35, 17)
+
+
+def test_a_varying_rate_is_evened_out(tmp_path: Path) -> None:
+    # Ten frames; the first five last four times as long as the others.
+    times = [0, 40, 80, 120, 160, 200, 210, 220, 230, 240]
+    path = encode(tmp_path / "a.mp4", [flat(v) for v in LEVELS[:10]], times=times, bf="0")
+    with Clip.open(path) as clip:
+        step = 240 / 9
+        assert clip.fps == pytest.approx(240 / step)
+        shown = [max(k for k, t in enumerate(times) if t <= n * step + 0.5) for n in range(10)]
+        assert near(codes(clip), [LEVELS[k] for k in shown])
+
+
+def test_a_range_of_frames(ramp: Path) -> None:
+    source = ClipSource(ramp, fps=60.0, frames=(5, 9))
+    with Clip.open(source) as clip:
+        assert (clip.fps, len(clip), clip.first) == (60.0, 5, 5)
+        assert near(codes(clip), LEVELS[5:10])
+        for outside in (-1, 5):
+            with pytest.raises(ClipError, match=f"there is no frame {outside}; there are 0 to 4"):
+                clip.frame(outside)
+    assert len(Clip.open(source, frames=(0, 29))) == 30
+    with pytest.raises(ClipError, match="frames 25 to 30 were asked for; it has 0 to 29"):
+        Clip.open(ramp, frames=(25, 30))
+    with pytest.raises(ClipError, match="fps must be"):
+        Clip.open(ramp, fps=0.0)
+
+
+def test_what_is_no_video_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ClipError, match=r"nothing\.mp4: no such file"):
+        Clip.open(tmp_path / "nothing.mp4")
+    (tmp_path / "junk.mp4").write_bytes(bytes(range(256)) * 40)
+    with pytest.raises(ClipError, match=r"junk\.mp4: is not a video, or is damaged"):
+        Clip.open(tmp_path / "junk.mp4")
+    (tmp_path / "empty.mp4").write_bytes(b"")
+    with pytest.raises(ClipError, match=r"empty\.mp4: is not a video, or is damaged"):
+        Clip.open(tmp_path / "empty.mp4")
+    with pytest.raises(ClipError, match="is a folder"):
+        Clip.open(tmp_path)
+    with av.open(str(tmp_path / "sound.mp4"), "w") as out:
+        stream = out.add_stream("aac", rate=44100)
+        frame = av.AudioFrame.from_ndarray(np.zeros((1, 1024), np.float32), format="fltp", layout="mono")
+        frame.sample_rate = 44100
+        out.mux(stream.encode(frame))
+        out.mux(stream.encode())
+    with pytest.raises(ClipError, match=r"sound\.mp4: holds no video stream"):
+        Clip.open(tmp_path / "sound.mp4")
+
+
+@pytest.mark.parametrize("name", ["a.mp4", "a.mkv"])
+def test_a_truncated_clip_offers_what_is_there(tmp_path: Path, name: str) -> None:
+    noise = np.random.default_rng(3).integers(0, 255, (30, 32, 64, 3), np.uint8)
+    front = {"movflags": "faststart"} if name == "a.mp4" else {}
+    whole = encode(tmp_path / name, list(noise), container=front, qp="30", g="6")
+    with Clip.open(whole) as clip:
+        assert (len(clip), clip.warning) == (30, None)
+        wanted = [image.copy() for image in clip]
+    data = whole.read_bytes()
+    whole.write_bytes(data[: len(data) * 6 // 10])
+    with Clip.open(whole) as clip:
+        assert 10 <= len(clip) <= 20
+        assert clip.warning is not None
+        assert f"is truncated; its first {len(clip)} frames can be used" in clip.warning
+        for n, image in enumerate(clip):
+            np.testing.assert_array_equal(image, wanted[n])
+    whole.write_bytes(data[:300])
+    with pytest.raises(ClipError, match=name):
+        Clip.open(whole)
+
+
+def test_longer_sound_is_no_truncation(tmp_path: Path) -> None:
+    silent = encode(tmp_path / "silent.mkv", [flat(v) for v in LEVELS[:6]])
+    with av.open(str(silent)) as video, av.open(str(tmp_path / "a.mkv"), "w") as out:
+        picture = out.add_stream_from_template(video.streams.video[0])
+        sound = out.add_stream("aac", rate=44100)
+        for packet in video.demux(video=0):
+            if packet.size:
+                packet.stream = picture
+                out.mux(packet)
+        for n in range(60):
+            frame = av.AudioFrame.from_ndarray(np.zeros((1, 1024), np.float32), "fltp", "mono")
+            frame.sample_rate, frame.pts = 44100, 1024 * n
+            out.mux(sound.encode(frame))
+        out.mux(sound.encode())
+    with Clip.open(tmp_path / "a.mkv") as clip:
+        assert (len(clip), clip.warning) == (6, None)
+
+
+def test_a_damaged_frame_is_named_and_the_others_can_be_had(tmp_path: Path) -> None:
+    path = encode(tmp_path / "a.mov", [flat(v) for v in LEVELS[:6]], codec="png", pixels="rgb24")
+    with av.open(str(path)) as container:
+        third = [packet for packet in container.demux(video=0) if packet.size][3]
+        place, size = third.pos, third.size
+    data = bytearray(path.read_bytes())
+    data[place : place + size] = bytes(size)
+    path.write_bytes(data)
+    with Clip.open(path) as clip:
+        assert codes_of(clip, 2) == LEVELS[2]
+        with pytest.raises(ClipError, match=r"a\.mov: frame 3 is damaged"):
+            clip.frame(3)
+        assert codes_of(clip, 4) == LEVELS[4]
+
+
+def pictures(folder: Path, numbers: Sequence[int], suffix: str = "png") -> None:
+    for n in numbers:
+        write_image(folder / f"frame_{n:04d}.{suffix}", srgb_to_linear(flat(10 * n) / 255))
+
+
+def test_picture_sequences(tmp_path: Path) -> None:
+    pictures(tmp_path, [3, 4, 5, 6])
+    (tmp_path / "frame_note.txt").write_text("not a picture")
+    with Clip.open(tmp_path / "frame_####.png", fps=30) as clip:
+        assert (len(clip), clip.fps, clip.size, clip.warning) == (4, 30.0, (32, 16), None)
+        assert codes(clip) == [30, 40, 50, 60]
+    with Clip.open(tmp_path / "frame_0004.png") as clip:
+        assert codes(clip) == [40, 50, 60]
+        assert clip.fps == 24.0
+        assert clip.warning is not None
+        assert "24 frames a second" in clip.warning
+    pictures(tmp_path, [1, 2], "exr")
+    with Clip.open(tmp_path / "frame_####.exr", frames=(1, 1)) as clip:
+        assert codes(clip) == [20]
+    Image.fromarray(flat(77)).save(tmp_path / "still.png")
+    assert codes(Clip.open(tmp_path / "still.png")) == [77]
+
+
+def test_gaps_in_picture_sequences_are_named(tmp_path: Path) -> None:
+    pictures(tmp_path, [1, 2, 4])
+    with pytest.raises(ClipError, match=r"frame_0003\.png: this picture is missing; .* frame_0004\.png"):
+        Clip.open(tmp_path / "frame_####.png")
+    with pytest.raises(ClipError, match=r"other_####\.png: no such pictures"):
+        Clip.open(tmp_path / "other_####.png")
+    for name in ("frame_0000.png", "still.png"):
+        with pytest.raises(ClipError, match=f"{name}: no such file"):
+            Clip.open(tmp_path / name)
+    with pytest.raises(ClipError, match="one row of #"):
+        Clip.open(tmp_path / "#_##.png")
+    Image.fromarray(flat(1, 8, 8)).save(tmp_path / "frame_0003.png")
+    with (
+        Clip.open(tmp_path / "frame_####.png") as clip,
+        pytest.raises(ClipError, match=r"frame_0003\.png: is 8 x 8 pixels, the first picture 32 x 16"),
+    ):
+        clip.frame(2)

@@ -1,0 +1,217 @@
+"""Pictures: what is written is what is read, in linear light, whatever the format."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import av
+import numpy as np
+import OpenEXR
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from PIL import Image
+
+from smokelift.images import (
+    ImageError,
+    area_average,
+    decode_integers,
+    linear_to_srgb,
+    read_image,
+    srgb_to_linear,
+    write_image,
+)
+
+
+def colours(height: int = 6, width: int = 5) -> np.ndarray:
+    return np.random.default_rng(1).random((height, width, 3), np.float32)
+
+
+def test_srgb_is_the_standard_curve() -> None:
+    codes = np.array([0, 10, 11, 128, 255]) / 255
+    np.testing.assert_allclose(
+        srgb_to_linear(codes), [0.0, 0.00303527, 0.00334654, 0.21586050, 1.0], rtol=2e-5
+    )
+    values = np.linspace(-0.1, 4.0, 1001, dtype=np.float32)
+    assert srgb_to_linear(values).dtype == np.float32
+    np.testing.assert_allclose(linear_to_srgb(srgb_to_linear(values)), values, atol=2e-6)
+    assert np.all(np.diff(linear_to_srgb(values)) > 0)
+
+
+def test_png_of_8_bits(tmp_path: Path) -> None:
+    codes = np.rint(colours() * 255).astype(np.uint8)
+    Image.fromarray(codes).save(tmp_path / "a.png")
+    image = read_image(tmp_path / "a.png")
+    assert image.dtype == np.float32
+    np.testing.assert_allclose(image, srgb_to_linear(codes / 255), rtol=1e-6)
+    np.testing.assert_allclose(read_image(tmp_path / "a.png", "linear"), codes / 255, rtol=1e-6)
+    write_image(tmp_path / "b.png", image)
+    np.testing.assert_array_equal(np.asarray(Image.open(tmp_path / "b.png")), codes)
+
+
+def test_png_of_16_bits_keeps_them(tmp_path: Path) -> None:
+    codes = np.random.default_rng(2).integers(0, 65536, (4, 6, 3), np.uint16)
+    frame = av.VideoFrame.from_ndarray(codes, format="rgb48le").reformat(format="rgb48be")
+    with av.open(str(tmp_path / "a.png"), "w", format="image2", options={"update": "1"}) as out:
+        stream = out.add_stream("png", rate=1)
+        stream.width, stream.height, stream.pix_fmt = 6, 4, "rgb48be"
+        out.mux(stream.encode(frame))
+        out.mux(stream.encode())
+    np.testing.assert_allclose(read_image(tmp_path / "a.png", "linear"), codes / 65535, atol=1e-6)
+
+
+def test_grey_palette_and_transparent_png(tmp_path: Path) -> None:
+    Image.fromarray(np.full((2, 3), 128, np.uint8)).save(tmp_path / "grey.png")
+    np.testing.assert_allclose(read_image(tmp_path / "grey.png"), np.full((2, 3, 3), 0.2158605), rtol=1e-5)
+    Image.fromarray(np.full((2, 3, 3), 255, np.uint8)).convert("P").save(tmp_path / "palette.png")
+    np.testing.assert_allclose(read_image(tmp_path / "palette.png"), np.ones((2, 3, 3)))
+    half = np.full((2, 3, 4), 255, np.uint8)
+    half[..., 3] = 51
+    Image.fromarray(half).save(tmp_path / "half.png")
+    np.testing.assert_allclose(read_image(tmp_path / "half.png"), np.full((2, 3, 3), 0.2), rtol=1e-6)
+
+
+def test_jpeg_is_turned_upright(tmp_path: Path) -> None:
+    codes = np.zeros((16, 32, 3), np.uint8)
+    codes[:, 16:] = 200
+    exif = Image.Exif()
+    exif[0x0112] = 6  # to be shown turned by 90 degrees clockwise
+    Image.fromarray(codes).save(tmp_path / "a.jpg", exif=exif, quality=95)
+    image = read_image(tmp_path / "a.jpg", "linear")
+    assert image.shape == (32, 16, 3)
+    assert image[:14].max() < 0.05
+    assert image[18:].min() > 0.7
+
+
+@pytest.mark.parametrize("half", [True, False])
+def test_exr_comes_back(tmp_path: Path, half: bool) -> None:
+    image = 30.0 * colours() - 1.0
+    write_image(tmp_path / "a.exr", image, half=half)
+    read = read_image(tmp_path / "a.exr")
+    assert read.dtype == np.float32
+    if half:
+        np.testing.assert_allclose(read, image, rtol=1e-3, atol=1e-3)
+    else:
+        np.testing.assert_array_equal(read, image)
+    assert [file.name for file in tmp_path.iterdir()] == ["a.exr"]
+
+
+def exr(path: Path, channels: dict[str, np.ndarray], **header: object) -> Path:
+    base = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    OpenEXR.File({**base, **header}, channels).write(str(path))
+    return path
+
+
+def test_exr_channels_and_tiles(tmp_path: Path) -> None:
+    rgb = colours(40, 50)
+    grey = rgb[..., 0].copy()
+    np.testing.assert_array_equal(
+        read_image(exr(tmp_path / "y.exr", {"Y": grey})), np.repeat(grey[..., None], 3, 2)
+    )
+    np.testing.assert_array_equal(
+        read_image(exr(tmp_path / "depth.exr", {"Z": grey})), np.repeat(grey[..., None], 3, 2)
+    )
+    alpha = np.full((40, 50), 0.25, np.float32)
+    premultiplied = np.dstack([rgb * 0.25, alpha])
+    np.testing.assert_array_equal(
+        read_image(exr(tmp_path / "a.exr", {"RGBA": premultiplied})), premultiplied[..., :3]
+    )
+    tiles = OpenEXR.TileDescription()
+    tiles.xSize = tiles.ySize = 16
+    tiled = exr(tmp_path / "tiled.exr", {"RGB": rgb}, type=OpenEXR.tiledimage, tiles=tiles)
+    np.testing.assert_array_equal(read_image(tiled), rgb)
+    layers = {f"{layer}.{c}": rgb[..., i] * k for k, layer in enumerate(("A.Mist", "View.Combined"))
+              for i, c in enumerate("RGB")}  # fmt: skip
+    layers = {name: np.ascontiguousarray(pixels) for name, pixels in layers.items()}
+    np.testing.assert_array_equal(read_image(exr(tmp_path / "layers.exr", layers)), rgb)
+    two = {"N.X": grey, "N.Y": grey}
+    with pytest.raises(ImageError, match=r"two\.exr: holds neither RGB nor Y channels, but N\.X, N\.Y"):
+        read_image(exr(tmp_path / "two.exr", two))
+
+
+def test_exr_gives_the_display_window(tmp_path: Path) -> None:
+    rgb = colours(4, 6)
+    window = (np.array([-1, 2], np.int32), np.array([4, 5], np.int32))
+    display = (np.array([0, 0], np.int32), np.array([7, 3], np.int32))
+    path = exr(tmp_path / "a.exr", {"RGB": rgb}, dataWindow=window, displayWindow=display)
+    wanted = np.zeros((4, 8, 3), np.float32)
+    wanted[2:, :5] = rgb[:2, 1:]
+    np.testing.assert_array_equal(read_image(path), wanted)
+
+
+def test_radiance_hdr(tmp_path: Path) -> None:
+    pixels = np.array([[[128, 64, 32, 129], [255, 0, 128, 136]]], np.uint8)
+    head = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n"
+    (tmp_path / "sky.hdr").write_bytes(head + pixels.tobytes())
+    image = read_image(tmp_path / "sky.hdr")
+    wanted = pixels[..., :3] / 256.0 * 2.0 ** (pixels[..., 3:].astype(float) - 128)
+    np.testing.assert_allclose(image, wanted, rtol=0.02)
+
+
+@pytest.mark.parametrize("name", ["a.png", "a.exr", "a.jpg", "a.hdr"])
+def test_damaged_and_missing_pictures_are_named(tmp_path: Path, name: str) -> None:
+    with pytest.raises(ImageError, match=f"{name}: no such file"):
+        read_image(tmp_path / name)
+    (tmp_path / name).write_bytes(b"not a picture at all")
+    with pytest.raises(ImageError, match=f"{name}: cannot be read"):
+        read_image(tmp_path / name)
+
+
+def test_truncated_pictures_are_refused(tmp_path: Path) -> None:
+    for name in ("a.png", "a.exr"):
+        write_image(tmp_path / name, colours(64, 64))
+        data = (tmp_path / name).read_bytes()
+        (tmp_path / name).write_bytes(data[: len(data) // 2])
+        with pytest.raises(ImageError, match="cannot be read"):
+            read_image(tmp_path / name)
+
+
+def test_what_cannot_be_written_leaves_the_old_file(tmp_path: Path) -> None:
+    path = tmp_path / "a.exr"
+    write_image(path, colours())
+    before = path.read_bytes()
+    with pytest.raises(ImageError, match="not finite"):
+        write_image(path, np.full((2, 2, 3), np.nan))
+    with pytest.raises(ImageError, match="shape"):
+        write_image(path, np.zeros((2, 2, 4)))
+    with pytest.raises(ImageError, match=r"only write \.exr and \.png"):
+        write_image(tmp_path / "a.bmp", colours())
+    with pytest.raises(ImageError, match="is none of"):
+        read_image(tmp_path / "a.bmp")
+    assert path.read_bytes() == before
+
+
+def test_wide_integers_and_alpha_are_decoded() -> None:
+    codes = np.array([[[65535, 0, 32768, 65535], [65535, 65535, 65535, 0]]], np.uint16)
+    np.testing.assert_allclose(
+        decode_integers(codes, "linear"), [[[1.0, 0.0, 32768 / 65535], [0.0, 0.0, 0.0]]], rtol=1e-6
+    )
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(st.integers(1, 40), st.integers(1, 40), st.integers(1, 40), st.integers(1, 40))
+def test_resizing_keeps_flat_pictures_flat(rows: int, columns: int, height: int, width: int) -> None:
+    small = area_average(np.full((rows, columns, 3), 0.7), width, height)
+    assert small.shape == (height, width, 3)
+    np.testing.assert_allclose(small, 0.7, rtol=1e-5)
+
+
+@settings(max_examples=40, deadline=None, derandomize=True)
+@given(st.integers(1, 40), st.data())
+def test_shrinking_keeps_the_mean(rows: int, data: st.DataObject) -> None:
+    height = data.draw(st.integers(1, rows))
+    image = np.random.default_rng(rows).random((rows, 3)).astype(np.float32)
+    assert area_average(image, 3, height).mean() == pytest.approx(image.mean(), rel=1e-5)
+
+
+def test_area_averages_are_exact() -> None:
+    image = np.arange(12, dtype=np.float32).reshape(1, 12)
+    np.testing.assert_allclose(area_average(image, 4, 1), [[1, 4, 7, 10]])
+    np.testing.assert_allclose(
+        area_average(np.array([[0.0, 1.0, 5.0]]), 2, 1), [[1 / 3, (0.5 + 5) / 1.5]], rtol=1e-6
+    )
+    np.testing.assert_allclose(
+        area_average(np.array([[0.0, 1.0]]), 4, 1), [[0.0, 0.25, 0.75, 1.0]], rtol=1e-6
+    )
+    with pytest.raises(ValueError, match="at least one pixel"):
+        area_average(image, 0, 1)
