@@ -1,0 +1,154 @@
+"""Camera rays in grid coordinates.
+
+Every ray is sampled where it crosses the planes of voxel centres of its own dominant axis, so a sample needs a
+bilinear look-up in one plane, and the position in the plane is linear in the plane's number:
+
+    position_b(k) = start_b + slope_b k,   |slope_b| <= 1.
+
+The distance between samples is between one voxel edge and sqrt(3) of it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smokelift.scene import Camera, Domain
+
+Array = NDArray[np.float64]
+
+LATERAL = ((1, 2), (0, 2), (0, 1))
+"""The two other axes of each axis."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rays:
+    """One ray a pixel, for one grid.
+
+    Attributes
+    ----------
+    lines : (rows, columns, 4) float32
+        start_b, slope_b, start_c, slope_c in voxel units, voxel centres at integers.
+    length : (rows, columns) float32
+        Distance between samples, m.
+    planes : (rows, columns, 4) int32
+        Dominant axis; +1 or -1, the direction of travel along it; first and last plane in ascending order
+        (last < first: the ray misses the grid).
+    axes
+        The dominant axes that occur.
+    to_pixel : (3, 4) float64
+        Homogeneous map from grid coordinates to pixel x, pixel y (both times depth), depth. Depth is 1 for an
+        orthographic camera.
+    """
+
+    lines: NDArray[np.float32]
+    length: NDArray[np.float32]
+    planes: NDArray[np.int32]
+    axes: tuple[int, ...]
+    to_pixel: Array
+
+
+def world_to_pixel(camera: Camera) -> Array:
+    """Homogeneous 3x4 map from world points (m) to (x depth, y depth, depth) in pixels."""
+    matrix = np.array(camera.matrix, np.float64)
+    rotation, eye = matrix[:3, :3], matrix[:3, 3]
+    to_camera = np.hstack([rotation.T, -rotation.T @ eye[:, None]])
+    if camera.type == "perspective":
+        intrinsics = np.array([[camera.fx, 0, -camera.cx], [0, -camera.fy, -camera.cy], [0, 0, -1.0]])
+        return np.asarray(intrinsics @ to_camera)
+    rows = np.array([[camera.fx, 0, 0], [0, -camera.fy, 0], [0, 0, 0]]) @ to_camera
+    rows[:, 3] += (camera.cx, camera.cy, 1.0)
+    return np.asarray(rows)
+
+
+def project(camera: Camera, points: Array) -> tuple[Array, Array]:
+    """Project world points (..., 3) to pixels.
+
+    Returns
+    -------
+    pixels : (..., 2)
+        x and y in pixels.
+    depth : (...)
+        Distance along the optical axis for a perspective camera (negative: behind it), 1 for an orthographic one.
+    """
+    matrix = world_to_pixel(camera)
+    homogeneous = points @ matrix[:, :3].T + matrix[:, 3]
+    depth = homogeneous[..., 2]
+    safe = np.where(np.abs(depth) < 1e-12, 1e-12, depth)
+    return homogeneous[..., :2] / safe[..., None], depth
+
+
+def ray_through_pixels(camera: Camera) -> tuple[Array, Array]:
+    """Origins and unit directions, each (rows, columns, 3), in world space, of the rays through pixel centres."""
+    width, height = camera.size
+    x = (np.arange(width) + 0.5 - camera.cx) / camera.fx
+    y = -(np.arange(height) + 0.5 - camera.cy) / camera.fy
+    grid_x, grid_y = np.meshgrid(x, y)
+    matrix = np.array(camera.matrix, np.float64)
+    rotation, eye = matrix[:3, :3], matrix[:3, 3]
+    if camera.type == "perspective":
+        local = np.stack([grid_x, grid_y, np.full_like(grid_x, -1.0)], -1)
+        direction = local @ rotation.T
+        direction /= np.linalg.norm(direction, axis=-1, keepdims=True)
+        return np.broadcast_to(eye, direction.shape), direction
+    local = np.stack([grid_x, grid_y, np.zeros_like(grid_x)], -1)
+    origin = local @ rotation.T + eye
+    return origin, np.broadcast_to(-rotation[:, 2], origin.shape)
+
+
+@lru_cache(maxsize=32)
+def camera_rays(camera: Camera, domain: Domain) -> Rays:
+    """The rays of all pixels of a camera through a domain's grid."""
+    origin, direction = ray_through_pixels(camera)
+    start = (origin - np.array(domain.min)) / domain.voxel_size - 0.5
+    axis = np.argmax(np.abs(direction), axis=-1)
+    lateral = np.array(LATERAL)[axis]
+    along = np.take_along_axis(direction, axis[..., None], -1)
+    slope = np.take_along_axis(direction, lateral, -1) / along
+    start_along = np.take_along_axis(start, axis[..., None], -1)
+    offset = np.take_along_axis(start, lateral, -1) - slope * start_along
+    resolution = np.array(domain.resolution)
+    first, last = _plane_range(offset, slope, resolution[lateral], resolution[axis])
+    travel = np.where(along[..., 0] > 0, 1, -1)
+    if camera.type == "perspective":  # nothing behind the eye
+        eye = start_along[..., 0]
+        first = np.where(travel > 0, np.maximum(first, np.floor(eye) + 1), first)
+        last = np.where(travel < 0, np.minimum(last, np.ceil(eye) - 1), last)
+    planes = np.stack([axis, travel, first, last], -1).astype(np.int32)
+    hit = planes[..., 2] <= planes[..., 3]
+    lines = np.stack([offset[..., 0], slope[..., 0], offset[..., 1], slope[..., 1]], -1)
+    to_grid = np.eye(4)
+    to_grid[:3, :3] *= domain.voxel_size
+    to_grid[:3, 3] = np.array(domain.min) + 0.5 * domain.voxel_size
+    return Rays(
+        lines=lines.astype(np.float32),
+        length=(domain.voxel_size / np.abs(along[..., 0])).astype(np.float32),
+        planes=planes,
+        axes=tuple(int(a) for a in np.unique(axis[hit])),
+        to_pixel=world_to_pixel(camera) @ to_grid,
+    )
+
+
+def _plane_range(offset: Array, slope: Array, lateral: Any, count: Any) -> tuple[Array, Array]:
+    """First and last plane, in ascending order, where the bilinear footprint meets the grid.
+
+    The footprint is open, so positions are kept a thousandth of a voxel inside (-1, n): float32 then rounds to
+    the same cell everywhere.
+    """
+    low = np.full(offset.shape, -0.999) - offset
+    high = lateral - 0.001 - offset
+    steep = np.where(np.abs(slope) < 1e-9, 1e-9, slope)
+    enter = np.where(slope == 0, np.where((low <= 0) & (high >= 0), -np.inf, np.inf), low / steep)
+    leave = np.where(slope == 0, np.where((low <= 0) & (high >= 0), np.inf, -np.inf), high / steep)
+    enter, leave = np.minimum(enter, leave), np.maximum(enter, leave)
+    missed = (slope == 0) & ((low > 0) | (high < 0))
+    enter = np.where(missed, np.inf, enter).max(-1)
+    leave = np.where(missed, -np.inf, leave).min(-1)
+    first = np.ceil(np.maximum(enter, 0))
+    last = np.floor(np.minimum(leave, count - 1))
+    empty = ~(first <= last)
+    return np.where(empty, 0, first), np.where(empty, -1, last)

@@ -1,0 +1,254 @@
+"""The renderer: its image against the same sums in float64, its derivative against finite differences."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import renderer_reference as reference
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from smokelift import render, render_gradient
+from smokelift.render import Renderer, device
+from smokelift.render.light import accumulate_columns, add_shadow_gradient, column_shape, light_sweep
+from smokelift.scene import Background, Camera, DirectionalLight, Domain, Medium, PointLight, Scene
+
+SHAPE = (14, 12, 16)
+DOMAIN = Domain((0.0, 0.0, 0.0), (1.4, 1.2, 1.6), SHAPE)
+SUN = DirectionalLight((0.57, 0.45, -0.68), (3.0, 2.0, 1.0))
+CENTRE = np.array([0.7, 0.6, 0.8])
+EYES = {
+    "along an axis": (0.3, -2.0, 0.9),
+    "along a diagonal": (2.5, -1.2, 2.4),
+    "from below": (-1.0, 2.2, -0.6),
+    "from above": (0.7, 0.65, 3.0),
+}
+MODELS = ("single", "unshadowed", "absorption")
+
+
+def make_camera(eye, kind="perspective", size=(20, 22)):
+    """A slightly rolled camera with its axis off the picture's centre."""
+    looking = Camera.look_at(eye, tuple(CENTRE), up=(0.1, 0.03, 1.0), fov_y_degrees=50, size=size)
+    if kind == "orthographic":
+        return replace(looking, type="orthographic", fx=11.0, fy=12.0, cx=10.3, cy=10.8)
+    return replace(looking, fx=30.0, fy=33.0, cx=10.3, cy=10.8)
+
+
+@pytest.fixture(scope="module")
+def density():
+    rng = np.random.default_rng(3)
+    axes = [(np.arange(n) + 0.5) / n * 2 - 1 for n in SHAPE]
+    x, y, z = np.meshgrid(*axes, indexing="ij")
+    values = np.exp(-4 * (x**2 + y**2 + z**2)) * (0.5 + rng.random(SHAPE))
+    values[values < 0.05] = 0
+    values[2, :, 5] += 0.3  # touches the sides of the box
+    return values.astype(np.float32)
+
+
+@pytest.fixture(scope="module")
+def wall():
+    return np.random.default_rng(4).random((22, 20, 3)).astype(np.float32)
+
+
+def medium_of_depth(density, depth):
+    """A medium through whose thickest column light passes ``depth`` mean free paths."""
+    return Medium(depth / (density.sum(1).max() * DOMAIN.voxel_size), 0.9, 0.3)
+
+
+def relative(a, b):
+    return np.linalg.norm(a - b) / np.linalg.norm(b)
+
+
+@pytest.mark.parametrize("kind", ["perspective", "orthographic"])
+@pytest.mark.parametrize("eye", EYES.values(), ids=EYES.keys())
+@pytest.mark.parametrize("scattering", MODELS)
+def test_image_equals_the_sums_in_double_precision(density, wall, kind, eye, scattering):
+    camera, medium = make_camera(eye, kind), medium_of_depth(density, 3)
+    image = Renderer(camera, DOMAIN, medium, SUN, wall, scattering).image(density)
+    expected = reference.render(density.astype(np.float64), camera, DOMAIN, medium, SUN, wall, scattering)
+    assert relative(image, expected) < 1e-6
+
+
+@pytest.mark.parametrize("kind", ["perspective", "orthographic"])
+@pytest.mark.parametrize("depth", [0.1, 3, 30])
+def test_gradient_equals_finite_differences(density, wall, kind, depth):
+    """Central differences where two pictures can resolve them, a complex step everywhere."""
+    camera, medium = make_camera(EYES["along a diagonal"], kind), medium_of_depth(density, depth)
+    weights = np.random.default_rng(5).random(wall.shape)
+    renderer = Renderer(camera, DOMAIN, medium, SUN, wall)
+    renderer.image(density, keep_record=True)
+    gradient = renderer.gradient(weights)
+    base = density.astype(np.float64)
+
+    def loss(values):
+        return np.sum(weights * reference.render(values, camera, DOMAIN, medium, SUN, wall))
+
+    resolved = 0
+    for voxel in voxels_of_three_kinds(density, camera, medium):
+        complex_base = base.astype(complex)
+        complex_base[voxel] += 1e-30j
+        exact = loss(complex_base).imag / 1e-30
+        assert gradient[voxel] == pytest.approx(exact, rel=1e-3, abs=0)
+        step = 1e-3 * base[voxel]
+        up, down = base.copy(), base.copy()
+        up[voxel] += step
+        down[voxel] -= step
+        if abs(exact) > 1e-6:
+            resolved += 1
+            assert gradient[voxel] == pytest.approx((loss(up) - loss(down)) / (2 * step), rel=1e-3, abs=0)
+    assert resolved >= 5
+
+
+def voxels_of_three_kinds(density, camera, medium):
+    """Random voxels of smoke, three each: lit, behind other smoke as the camera sees it, in its shadow."""
+    kappa = medium.extinction * density.astype(np.float64)
+    shadow = reference.light_optical_depth(kappa, DOMAIN.voxel_size, SUN.direction)
+    hidden = reference.light_optical_depth(kappa, DOMAIN.voxel_size, -np.array(camera.matrix)[:3, 2])
+    smoke = np.argwhere(density > 0.1)
+    at = tuple(smoke.T)
+    rng = np.random.default_rng(6)
+    kinds = (
+        shadow[at] < np.quantile(shadow[at], 0.3),
+        hidden[at] > np.quantile(hidden[at], 0.6),
+        shadow[at] > np.quantile(shadow[at], 0.6),
+    )
+    return [tuple(voxel) for kind in kinds for voxel in rng.choice(smoke[kind], 3, replace=False)]
+
+
+@pytest.mark.parametrize("scattering", MODELS)
+def test_render_gradient_of_every_model(density, wall, scattering):
+    """loss, gradient and image of the public function agree with each other and with finite differences."""
+    scene = Scene(camera=make_camera((0.3, -2.0, 0.9)), domain=DOMAIN, medium=Medium(4.0, 0.8, -0.4), lights=(SUN,))
+    target = wall
+    loss, gradient, image = render_gradient(density, scene, target, scattering=scattering)
+    assert loss == pytest.approx(np.sum((image.astype(np.float64) - target) ** 2), rel=1e-6)
+    np.testing.assert_array_equal(image, render(density, scene, scattering=scattering))
+    direction = np.random.default_rng(7).random(SHAPE) * (density > 0)
+
+    def at(step):
+        moved = reference.render(
+            density + step * direction, scene.camera, DOMAIN, scene.medium, SUN, np.zeros(3), scattering
+        )
+        return float(np.sum((moved - target) ** 2))
+
+    slope = (at(1e-5) - at(-1e-5)) / 2e-5
+    assert np.vdot(gradient, direction) == pytest.approx(slope, rel=1e-4)
+
+
+@pytest.mark.parametrize("direction", [(0.3, -0.9, 0.2), (-0.5, -0.5, 0.7), (1, 0, 0), (1, 1, 1), (0, 0.2, -1)])
+def test_light_sweep_passes_the_dot_product_test(direction):
+    """<S^T K S a, b> = <a, S^T K^T S b>, the adjoint being the sweep of the reversed light."""
+    rng = np.random.default_rng(8)
+    a, b = (rng.standard_normal(SHAPE).astype(np.float32) for _ in range(2))
+    left = sweep_field(a, np.array(direction, float))
+    right = sweep_field(b, -np.array(direction, float))
+    assert np.vdot(left, b) == pytest.approx(np.vdot(a, right), rel=1e-4)
+
+
+def sweep_field(field, direction):
+    device.start("cpu")
+    sweep = light_sweep(direction)
+    columns = device.zeros(column_shape(field.shape, sweep.axis))
+    accumulate_columns(field, columns, sweep.axis, sweep.travel, *sweep.slope)
+    out = device.zeros(field.shape)
+    add_shadow_gradient(columns, np.ones(field.shape, np.int32), out, sweep.axis, *sweep.slope, 1.0)
+    return out
+
+
+@given(
+    yaw=st.floats(0, 360),
+    pitch=st.floats(-80, 80),
+    light=st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda v: np.linalg.norm(v) > 0.1),
+    anisotropy=st.floats(-0.9, 0.9),
+    depth=st.sampled_from([0.001, 0.1, 3.0, 30.0, 100.0]),
+)
+@settings(max_examples=25, deadline=None)
+def test_image_is_finite_and_creates_no_light(density, yaw, pitch, light, anisotropy, depth):
+    """From any side, for any light: no NaN, nothing negative, never brighter than source plus background."""
+    yaw, pitch = np.radians([yaw, pitch])
+    eye = CENTRE + 3 * np.array([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)])
+    medium = replace(medium_of_depth(density, depth), anisotropy=anisotropy, albedo=1.0)
+    sun = DirectionalLight(tuple(light), (1.0, 1.0, 1.0))
+    image = Renderer(make_camera(tuple(eye)), DOMAIN, medium, sun, np.full(3, 0.5, np.float32)).image(density)
+    g = abs(anisotropy)
+    brightest = (1 - g * g) / (4 * np.pi * (1 - g) ** 3)
+    assert np.isfinite(image).all()
+    assert image.min() >= 0
+    assert image.max() <= max(brightest, 0.5) * (1 + 1e-5)
+
+
+def test_empty_grid_shows_the_background(wall):
+    image = Renderer(make_camera((0.3, -2.0, 0.9)), DOMAIN, Medium(), SUN, wall).image(np.zeros(SHAPE, np.float32))
+    np.testing.assert_allclose(image, wall, rtol=1e-6)
+
+
+def test_thin_smoke_is_the_first_order_term(density):
+    """Halving a very thin density halves its light to within its optical depth."""
+    camera, medium = make_camera((0.3, -2.0, 0.9)), medium_of_depth(density, 1e-4)
+    renderer = Renderer(camera, DOMAIN, medium, SUN, np.zeros(3, np.float32))
+    full, half = renderer.image(density).copy(), renderer.image(density / 2)
+    assert relative(2 * half, full) < 1e-4
+
+
+def test_orthographic_is_the_limit_of_a_far_perspective(density):
+    far = 1e4
+    eye = CENTRE + np.array([0, -far, 0])
+    perspective = Camera.look_at(tuple(eye), tuple(CENTRE), fov_y_degrees=1, size=(20, 22))
+    perspective = replace(perspective, fx=12.0 * far, fy=12.0 * far)
+    orthographic = replace(perspective, type="orthographic", fx=12.0, fy=12.0)
+    medium = medium_of_depth(density, 3)
+    images = [
+        Renderer(c, DOMAIN, medium, SUN, np.zeros(3, np.float32)).image(density) for c in (perspective, orthographic)
+    ]
+    assert relative(images[0], images[1]) < 2e-3
+
+
+def test_gradient_stays_on_the_support(density, wall):
+    """Outside the voxels that may hold smoke the gradient is zero; inside it is the same."""
+    support = density > 0.3
+    inside = np.where(support, density, 0)
+    camera, medium = make_camera((2.5, -1.2, 2.4)), medium_of_depth(density, 3)
+    gradients = []
+    for given_support in (None, support):
+        renderer = Renderer(camera, DOMAIN, medium, SUN, wall, support=given_support)
+        renderer.image(inside, keep_record=True)
+        gradients.append(renderer.gradient(wall))
+    np.testing.assert_allclose(gradients[1][support], gradients[0][support], rtol=1e-4, atol=1e-6)
+    assert not gradients[1][~support].any()
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda d: d.__setitem__((0, 0, 0), np.nan), "not finite"),
+        (lambda d: d.__setitem__((0, 0, 0), -1), "negative"),
+    ],
+)
+def test_bad_density_is_refused(density, change, words):
+    bad = density.copy()
+    change(bad)
+    with pytest.raises(ValueError, match=words):
+        render(bad, Scene(camera=make_camera((0.3, -2.0, 0.9)), domain=DOMAIN))
+
+
+def test_incomplete_or_unsupported_scenes_are_refused(density):
+    camera = make_camera((0.3, -2.0, 0.9))
+    with pytest.raises(ValueError, match="no camera"):
+        render(density, Scene(domain=DOMAIN))
+    with pytest.raises(ValueError, match="no domain"):
+        render(density, Scene(camera=camera))
+    with pytest.raises(ValueError, match="must agree"):
+        render(density[1:], Scene(camera=camera, domain=DOMAIN))
+    with pytest.raises(ValueError, match="directional"):
+        render(density, Scene(camera=camera, domain=DOMAIN, lights=(PointLight((5, 5, 5), (1, 1, 1)),)))
+    with pytest.raises(ValueError, match="target"):
+        render_gradient(density, Scene(camera=camera, domain=DOMAIN), np.zeros((3, 3, 3), np.float32))
+
+
+def test_background_colour_is_attenuated(density):
+    """Absorption only: what is left of the background is the transmittance."""
+    camera, medium = make_camera((0.3, -2.0, 0.9)), medium_of_depth(density, 3)
+    scene = Scene(camera=camera, domain=DOMAIN, medium=medium, background=Background(color=(1.0, 0.5, 0.25)))
+    image = render(density, scene, scattering="absorption")
+    np.testing.assert_allclose(image[..., 1], image[..., 0] / 2, rtol=1e-5)
+    assert image[..., 0].min() == pytest.approx(np.exp(-3), rel=0.5)
