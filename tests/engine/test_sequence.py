@@ -1,0 +1,331 @@
+"""Sequences: what was written opens; nothing is overwritten; a run that was cut off goes on exactly."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from smokelift import sequence, vdb
+from smokelift.scene import Camera, ClipSource, DirectionalLight, Domain, Scene
+from smokelift.sequence import ResumeState, Sequence, SequenceError, SequenceWriter
+from smokelift.transport import Velocity
+
+SCENE = Scene(
+    clip=ClipSource(Path("/footage/smoke.mp4"), 24.0),
+    camera=Camera.look_at((0, -7, 1.5), (0, 0, 1.5), fov_y_degrees=30, size=(32, 48)),
+    domain=Domain((-1, -1, 0), (1, 1, 3), (8, 8, 12)),
+    lights=(DirectionalLight((0, 0, -1), (1, 1, 1)),),
+)
+SETTINGS = {"quality": "draft", "density": {"iterations": 12}}
+
+
+def frame(number: int) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    random = np.random.default_rng(number)
+    rho = random.random((8, 8, 12)).astype(np.float32)
+    shapes = ((9, 8, 12), (8, 9, 12), (8, 8, 13))
+    x, y, z = (random.normal(size=shape).astype(np.float32) for shape in shapes)
+    return rho, (x, y, z)
+
+
+def write(directory: Path, numbers: Iterable[int], *, npz: bool = True, **options: Any) -> None:
+    with SequenceWriter(directory, SCENE, SETTINGS, npz=npz, **options) as writer:
+        for number in numbers:
+            writer.write(number, *frame(number), {"loss": 1.0 / number})
+
+
+class CutOffError(Exception):
+    """A run that ends before its last frame."""
+
+
+def cut_off(directory: Path, numbers: Iterable[int], *, npz: bool = True, **options: Any) -> None:
+    with (
+        pytest.raises(CutOffError),
+        SequenceWriter(directory, SCENE, SETTINGS, npz=npz, **options) as writer,
+    ):
+        for number in numbers:
+            writer.write(number, *frame(number), extra={"gain": np.float64(number)})
+        raise CutOffError
+
+
+@pytest.fixture
+def no_vdb(monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing() -> None:
+        raise vdb.VdbUnavailable("no OpenVDB module was found")
+
+    monkeypatch.setattr(sequence, "vdb_module", missing)
+
+
+def has_module() -> bool:
+    try:
+        vdb.vdb_module()
+    except vdb.VdbUnavailable:
+        return False
+    return True
+
+
+needs_vdb = pytest.mark.skipif(not has_module(), reason="needs an OpenVDB module")
+
+
+def names(directory: Path) -> list[str]:
+    return sorted(file.name for file in directory.iterdir())
+
+
+@needs_vdb
+def test_a_sequence_opens_as_it_was_written(tmp_path: Path) -> None:
+    write(tmp_path / "out", [1, 2, 3])
+    assert names(tmp_path / "out") == [
+        "sequence.json",
+        *(f"smoke_000{n}.{kind}" for n in (1, 2, 3) for kind in ("npz", "vdb")),
+    ]
+    opened = Sequence.open(tmp_path / "out")
+    assert opened.scene == SCENE
+    assert opened.settings == SETTINGS
+    assert opened.frames == (1, 2, 3)
+    assert opened.complete
+    assert opened.versions["numpy"] == np.__version__
+    rho, faces = frame(2)
+    np.testing.assert_array_equal(opened.density(2), rho)
+    np.testing.assert_allclose(opened.velocity(2), Velocity(faces, 1.0).centres())
+    assert opened.figures(2) == {"loss": 0.5}
+    assert vdb.read_settings(tmp_path / "out" / "smoke_0002.vdb") == SETTINGS
+    for n in (1, 2, 3):
+        (tmp_path / "out" / f"smoke_000{n}.npz").unlink()
+    np.testing.assert_allclose(opened.density(2), rho, rtol=1e-3)
+    np.testing.assert_allclose(opened.velocity(2), Velocity(faces, 1.0).centres(), rtol=1e-3, atol=1e-6)
+
+
+def test_numpy_files_alone_need_no_vdb_module(tmp_path: Path, no_vdb: None) -> None:
+    write(tmp_path / "out", [1])
+    assert names(tmp_path / "out") == ["sequence.json", "smoke_0001.npz"]
+    np.testing.assert_array_equal(Sequence.open(tmp_path / "out").density(1), frame(1)[0])
+    with pytest.raises(SequenceError, match="no OpenVDB module"):
+        write(tmp_path / "other", [1], npz=False)
+    assert not (tmp_path / "other").exists()
+
+
+def test_finished_frames_are_not_overwritten(tmp_path: Path, no_vdb: None) -> None:
+    write(tmp_path, [1, 2])
+    before = {file.name: file.read_bytes() for file in tmp_path.iterdir()}
+    with pytest.raises(
+        SequenceError, match=r"holds 2 finished frames; go on with --resume, or choose another"
+    ):
+        write(tmp_path, [1])
+    assert {file.name: file.read_bytes() for file in tmp_path.iterdir()} == before
+
+
+def test_a_directory_of_other_files_is_refused(tmp_path: Path, no_vdb: None) -> None:
+    (tmp_path / "holiday.jpg").write_bytes(b"precious")
+    for resume in (False, True):
+        with pytest.raises(
+            SequenceError, match=r"holds other files \(holiday\.jpg\); nothing was overwritten"
+        ):
+            write(tmp_path, [1], resume=resume)
+    assert names(tmp_path) == ["holiday.jpg"]
+    (tmp_path / "holiday.jpg").rename(tmp_path / "smoke_0001.vdb")
+    with pytest.raises(SequenceError, match=r"other files \(smoke_0001\.vdb\)"):
+        write(tmp_path, [1])
+    (tmp_path / "smoke_0001.vdb").unlink()
+    (tmp_path / ".DS_Store").write_bytes(b"the file manager's")
+    write(tmp_path, [1])
+
+
+def test_a_file_in_the_place_of_the_directory_is_refused(tmp_path: Path, no_vdb: None) -> None:
+    (tmp_path / "out").write_text("a file")
+    with pytest.raises(SequenceError, match="cannot be written to"):
+        write(tmp_path / "out", [1])
+
+
+def test_a_run_goes_on_where_it_was_cut_off(tmp_path: Path) -> None:
+    npz = not has_module()
+    cut_off(tmp_path, [1, 2, 3], npz=npz)
+    assert "resume.npz" in names(tmp_path)
+    assert not Sequence.open(tmp_path).complete
+    with SequenceWriter(tmp_path, SCENE, SETTINGS, npz=npz, resume=True) as writer:
+        assert writer.finished == (1, 2, 3)
+        state = writer.state
+        assert isinstance(state, ResumeState)
+        assert state.number == 3
+        np.testing.assert_array_equal(state.density, frame(3)[0])
+        assert state.before is not None
+        np.testing.assert_array_equal(state.before, frame(2)[0])
+        for kept, given in zip(state.velocity, frame(3)[1], strict=True):
+            np.testing.assert_array_equal(kept, given)
+        assert state.extra["gain"] == 3.0
+        writer.write(4, *frame(4))
+        assert writer.finished == (1, 2, 3, 4)
+    assert "resume.npz" not in names(tmp_path)
+    assert Sequence.open(tmp_path).frames == (1, 2, 3, 4)
+
+
+def test_resuming_a_complete_run_has_nothing_to_do(tmp_path: Path, no_vdb: None) -> None:
+    write(tmp_path, [1, 2])
+    with SequenceWriter(tmp_path, SCENE, SETTINGS, npz=True, resume=True) as writer:
+        assert writer.finished == (1, 2)
+        assert writer.state is None
+    assert Sequence.open(tmp_path).complete
+
+
+def test_resuming_before_the_first_frame_starts(tmp_path: Path, no_vdb: None) -> None:
+    cut_off(tmp_path, [])
+    with SequenceWriter(tmp_path, SCENE, SETTINGS, npz=True, resume=True) as writer:
+        assert writer.finished == ()
+        assert writer.state is None
+        writer.write(1, *frame(1))
+    write(tmp_path / "new", [1], resume=True)
+
+
+def test_a_frame_without_its_state_is_made_again(tmp_path: Path, no_vdb: None) -> None:
+    """A kill between the index and the state of frame 3 leaves the state of frame 2."""
+    cut_off(tmp_path, [1, 2])
+    older = (tmp_path / "resume.npz").read_bytes()
+    (tmp_path / ".smoke_0003.npz.77.tmp").write_bytes(b"half a fra")
+    with (
+        pytest.raises(CutOffError),
+        SequenceWriter(tmp_path, SCENE, SETTINGS, npz=True, resume=True) as writer,
+    ):
+        assert ".smoke_0003.npz.77.tmp" not in names(tmp_path)
+        writer.write(3, *frame(3))
+        raise CutOffError
+    (tmp_path / "resume.npz").write_bytes(older)
+    with SequenceWriter(tmp_path, SCENE, SETTINGS, npz=True, resume=True) as writer:
+        assert writer.finished == (1, 2)
+        assert writer.state is not None
+        assert writer.state.number == 2
+        writer.write(3, *frame(3))
+    assert Sequence.open(tmp_path).frames == (1, 2, 3)
+
+
+def test_another_run_is_not_resumed(tmp_path: Path, no_vdb: None) -> None:
+    cut_off(tmp_path, [1])
+    other = {**SETTINGS, "density": {"iterations": 13}}
+    message = r"density\.iterations was 12 and is now 13; choose another directory"
+    with pytest.raises(SequenceError, match=r"begun differently .*settings\." + message):
+        SequenceWriter(tmp_path, SCENE, other, npz=True, resume=True).__enter__()
+    scene = Scene(clip=SCENE.clip, camera=SCENE.camera, domain=SCENE.domain)
+    with pytest.raises(SequenceError, match=r"scene\.lights was .* and is now null"):
+        SequenceWriter(tmp_path, scene, SETTINGS, npz=True, resume=True).__enter__()
+    with SequenceWriter(tmp_path, SCENE, SETTINGS, npz=True, resume=True) as writer:
+        assert writer.finished == (1,)  # the refusals left no lock behind
+
+
+def test_lost_files_and_damaged_states_are_not_resumed(tmp_path: Path, no_vdb: None) -> None:
+    cut_off(tmp_path, [1, 2])
+    state = (tmp_path / "resume.npz").read_bytes()
+    (tmp_path / "resume.npz").write_bytes(state[:100])
+    with pytest.raises(SequenceError, match=r"resume\.npz: is damaged"):
+        write(tmp_path, [3], resume=True)
+    (tmp_path / "resume.npz").write_bytes(state)
+    (tmp_path / "smoke_0001.npz").unlink()
+    with pytest.raises(SequenceError, match=r"smoke_0001\.npz: is missing"):
+        write(tmp_path, [3], resume=True)
+
+
+def test_two_runs_in_one_directory_are_kept_apart(tmp_path: Path, no_vdb: None) -> None:
+    with SequenceWriter(tmp_path, SCENE, SETTINGS, npz=True) as writer:
+        for resume in (False, True):
+            with pytest.raises(SequenceError, match="another run is writing into this directory"):
+                write(tmp_path, [1], resume=resume)
+        writer.write(1, *frame(1))
+    assert names(tmp_path) == ["sequence.json", "smoke_0001.npz"]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX signals")
+def test_a_killed_run_leaves_frames_and_no_lock(tmp_path: Path) -> None:
+    code = f"""
+import sys, time
+sys.path.insert(0, {str(Path(__file__).parent)!r})
+from test_sequence import SCENE, SETTINGS, SequenceWriter, frame
+with SequenceWriter({str(tmp_path / "out")!r}, SCENE, SETTINGS, npz=True) as writer:
+    writer.write(1, *frame(1))
+    print("written", flush=True)
+    time.sleep(60)
+"""
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as run:
+        assert run.stdout is not None
+        assert any(line == "written\n" for line in run.stdout)
+        with pytest.raises(SequenceError, match="another run"):
+            write(tmp_path / "out", [2], resume=True)
+        os.kill(run.pid, signal.SIGKILL)
+    assert Sequence.open(tmp_path / "out").frames == (1,)
+    with SequenceWriter(tmp_path / "out", SCENE, SETTINGS, npz=True, resume=True) as writer:
+        assert writer.finished == (1,)
+
+
+def test_a_full_disk_is_one_sentence(tmp_path: Path, no_vdb: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*arguments: Any) -> None:
+        raise OSError(28, "No space left on device")
+
+    with (
+        pytest.raises(
+            SequenceError, match=r"frame 2 could not be written: the disk is full; 1 finished frame"
+        ),
+        SequenceWriter(tmp_path, SCENE, SETTINGS, npz=True) as writer,
+    ):
+        writer.write(1, *frame(1))
+        monkeypatch.setattr(sequence, "_save_arrays", full)
+        writer.write(2, *frame(2))
+    monkeypatch.undo()
+    assert Sequence.open(tmp_path).frames == (1,)
+
+
+def test_frames_must_fit_and_follow(tmp_path: Path, no_vdb: None) -> None:
+    rho, (x, y, z) = frame(1)
+    with SequenceWriter(tmp_path, SCENE, SETTINGS, npz=True) as writer:
+        writer.write(5, rho, (x, y, z))
+        for bad in (
+            (7, rho, (x, y, z)),
+            (5, rho, (x, y, z)),
+            (6, -rho, (x, y, z)),
+            (6, rho * np.nan, (x, y, z)),
+            (6, rho, (x * np.inf, y, z)),
+            (6, rho[1:], (x, y, z)),
+            (6, rho, (y, x, z)),
+        ):
+            with pytest.raises(ValueError, match=r"follow|negative|finite|shapes"):
+                writer.write(*bad)
+    assert Sequence.open(tmp_path).frames == (5,)
+    with pytest.raises(SequenceError, match="domain"):
+        SequenceWriter(tmp_path, Scene(), SETTINGS)
+
+
+def test_figures_are_json(tmp_path: Path, no_vdb: None) -> None:
+    with SequenceWriter(tmp_path, SCENE, SETTINGS, npz=True) as writer:
+        figures = {"loss": np.float32(0.5), "psnr": math.inf, "each": np.array([1, 2]), "note": "thin"}
+        writer.write(1, *frame(1), figures)
+    assert Sequence.open(tmp_path).figures(1) == {
+        "loss": 0.5, "psnr": None, "each": [1, 2], "note": "thin",
+    }  # fmt: skip
+
+
+def test_what_is_no_sequence_is_named(tmp_path: Path, no_vdb: None) -> None:
+    with pytest.raises(SequenceError, match=r"holds no sequence \(sequence\.json is missing\)"):
+        Sequence.open(tmp_path)
+    write(tmp_path, [1])
+    with pytest.raises(SequenceError, match="there is no frame 2; it has 1 to 1"):
+        Sequence.open(tmp_path).density(2)
+    (tmp_path / "smoke_0001.npz").write_bytes(b"half")
+    with pytest.raises(SequenceError, match=r"smoke_0001\.npz: cannot be read"):
+        Sequence.open(tmp_path).density(1)
+    (tmp_path / "smoke_0001.npz").unlink()
+    with pytest.raises(SequenceError, match="is missing"):
+        Sequence.open(tmp_path).velocity(1)
+    index = json.loads((tmp_path / "sequence.json").read_text())
+    for text, message in (
+        ("{", "cannot be read"),
+        ("{}", "is not a sequence of format 1"),
+        (json.dumps({**index, "frames": 3}), "is damaged: frames"),
+        (json.dumps({**index, "scene": {"medium": {"albedo": 3}}}), "albedo must be"),
+    ):
+        (tmp_path / "sequence.json").write_text(text)
+        with pytest.raises(SequenceError, match=message):
+            Sequence.open(tmp_path)

@@ -1,0 +1,151 @@
+"""OpenVDB files: values and places survive, as Blender will see them."""
+
+from __future__ import annotations
+
+import importlib.util
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from smokelift import vdb
+from smokelift.scene import Domain
+
+DOMAIN = Domain((-1.0, 0.5, 2.0), (-0.5, 0.75, 2.75), (20, 10, 30))
+
+
+def has_module() -> bool:
+    try:
+        vdb.vdb_module()
+    except vdb.VdbUnavailable:
+        return False
+    return True
+
+
+needs_vdb = pytest.mark.skipif(not has_module(), reason="needs an OpenVDB module")
+
+
+def frame() -> tuple[np.ndarray, np.ndarray]:
+    random = np.random.default_rng(5)
+    density = np.zeros(DOMAIN.shape, np.float32)
+    density[3:9, 2:7, 10:20] = random.random((6, 5, 10))
+    return density, random.normal(size=(*DOMAIN.shape, 3)).astype(np.float32)
+
+
+@needs_vdb
+@pytest.mark.parametrize("order", ["C", "F"])
+def test_a_frame_comes_back(tmp_path: Path, order: Any) -> None:
+    density, velocity = frame()
+    vdb.write_vdb(
+        tmp_path / "a.vdb", np.asarray(density, order=order), np.asarray(velocity, np.float64, order), DOMAIN
+    )
+    rho, u = vdb.read_vdb(tmp_path / "a.vdb", DOMAIN.shape)
+    np.testing.assert_allclose(rho, density, rtol=1e-3, atol=1e-7)
+    near = np.zeros(DOMAIN.shape, bool)
+    near[1:11, 0:9, 8:22] = True
+    np.testing.assert_allclose(u[near], velocity[near], rtol=1e-3, atol=1e-7)
+    assert not u[~near].any()
+    assert [file.name for file in tmp_path.iterdir()] == ["a.vdb"]
+
+
+@needs_vdb
+def test_grids_are_what_blender_expects(tmp_path: Path) -> None:
+    density, velocity = frame()
+    vdb.write_vdb(tmp_path / "a.vdb", density, velocity, DOMAIN, {"quality": "draft", "steps": 3})
+    grids = {grid.name: grid for grid in vdb.vdb_module().readAll(str(tmp_path / "a.vdb"))[0]}
+    assert set(grids) == {"density", "velocity"}
+    assert grids["density"].metadata["class"] == "fog volume"
+    assert grids["density"].background == 0.0
+    assert grids["density"].activeVoxelCount() == np.count_nonzero(density)
+    assert grids["velocity"].activeVoxelCount() < density.size / 2
+    assert vdb.read_settings(tmp_path / "a.vdb") == {"quality": "draft", "steps": 3}
+    for grid in grids.values():
+        for voxel in ((0, 0, 0), (3, 4, 5)):
+            centre = [low + (i + 0.5) * DOMAIN.voxel_size for low, i in zip(DOMAIN.min, voxel, strict=True)]
+            assert grid.transform.indexToWorld(voxel) == pytest.approx(centre)
+
+
+@needs_vdb
+def test_a_frame_without_smoke_holds_both_grids_empty(tmp_path: Path) -> None:
+    vdb.write_vdb(tmp_path / "a.vdb", np.zeros(DOMAIN.shape), np.ones((*DOMAIN.shape, 3)), DOMAIN)
+    grids = vdb.vdb_module().readAll(str(tmp_path / "a.vdb"))[0]
+    assert sorted((grid.name, grid.activeVoxelCount()) for grid in grids) == [("density", 0), ("velocity", 0)]
+    rho, u = vdb.read_vdb(tmp_path / "a.vdb", DOMAIN.shape)
+    assert not rho.any()
+    assert not u.any()
+
+
+@needs_vdb
+def test_what_cannot_be_written_is_refused_and_leaves_the_old_file(tmp_path: Path) -> None:
+    density, velocity = frame()
+    path = tmp_path / "a.vdb"
+    vdb.write_vdb(path, density, velocity, DOMAIN)
+    before = path.read_bytes()
+    with pytest.raises(ValueError, match="negative"):
+        vdb.write_vdb(path, -density, velocity, DOMAIN)
+    with pytest.raises(ValueError, match="finite"):
+        vdb.write_vdb(path, density * np.nan, velocity, DOMAIN)
+    with pytest.raises(ValueError, match="do not fit"):
+        vdb.write_vdb(path, density[1:], velocity, DOMAIN)
+    with pytest.raises(OSError, match="nowhere"):
+        vdb.write_vdb(tmp_path / "nowhere" / "a.vdb", density, velocity, DOMAIN)
+    assert path.read_bytes() == before
+
+
+@needs_vdb
+@pytest.mark.skipif(sys.platform == "win32", reason="needs a limit on file sizes")
+def test_a_full_disk_is_noticed(tmp_path: Path) -> None:
+    """OpenVDB itself cuts the file short without a word."""
+    code = f"""
+import resource, signal, numpy as np
+from smokelift.scene import Domain
+from smokelift.vdb import write_vdb
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (9000, 9000))
+rho = np.random.default_rng(0).random((20, 10, 30), np.float32)
+try:
+    write_vdb({str(tmp_path / "a.vdb")!r}, rho, np.ones((20, 10, 30, 3)), {DOMAIN!r})
+except OSError as error:
+    print("noticed", error.errno)
+"""
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "noticed 27" in run.stdout
+    assert list(tmp_path.iterdir()) == []
+
+
+@needs_vdb
+def test_damaged_files_are_named(tmp_path: Path) -> None:
+    with pytest.raises(OSError, match=r"a\.vdb: no such file"):
+        vdb.read_vdb(tmp_path / "a.vdb", DOMAIN.shape)
+    vdb.write_vdb(tmp_path / "a.vdb", *frame(), DOMAIN)
+    data = (tmp_path / "a.vdb").read_bytes()
+    for size in (20, len(data) // 2):
+        (tmp_path / "a.vdb").write_bytes(data[:size])
+        with pytest.raises(OSError, match=r"a\.vdb: is damaged"):
+            vdb.read_vdb(tmp_path / "a.vdb", DOMAIN.shape)
+
+
+@needs_vdb
+def test_bpy_is_not_imported_for_it() -> None:
+    code = "import sys; from smokelift.vdb import vdb_module; vdb_module(); print('bpy' in sys.modules)"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout.split()[-1] == "False"
+
+
+def test_without_a_module_it_is_said_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing(name: str, *rest: Any) -> Any:
+        raise ImportError(name)
+
+    vdb.vdb_module.cache_clear()
+    monkeypatch.setattr(vdb.importlib, "import_module", missing)
+    try:
+        with pytest.raises(vdb.VdbUnavailable, match=r"smokelift\[vdb\].*3\.11 and 3\.13.*--npz"):
+            vdb.vdb_module()
+        monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+        with pytest.raises(vdb.VdbUnavailable):
+            vdb.vdb_module()
+    finally:
+        vdb.vdb_module.cache_clear()
