@@ -1,0 +1,31 @@
+// Poisson's equation on a box of unit cells, solved directly by fast diagonalisation (Lynch, Rice, Thomas
+// 1964).
+#pragma once
+
+#include "dense.h"
+#include "grid.h"
+#include "threads.h"
+
+namespace smokelift {
+
+// -laplace p = f at cell centres, each side closed (no flux) or open (p = 0 on the side itself). Eigenvectors
+// along y and z decouple the equations into one tridiagonal system along x for each pair of them.
+class Poisson {
+public:
+    Poisson(const Shape &n, const Closed &closed);
+
+    // Overwrites f with p. With all sides closed p is known up to a constant: the mean of f is removed first.
+    void solve(Out f, Workers &workers) const;
+
+    const Shape &shape() const { return n_; }
+    const Closed &closed() const { return closed_; }
+
+private:
+    Shape n_;
+    Closed closed_;
+    bool singular_;
+    Basis y_, z_;
+    Field pivots_; // reciprocal pivots of the tridiagonal systems
+};
+
+} // namespace smokelift

@@ -1,0 +1,13 @@
+// Conjugate gradients on the velocities without divergence.
+#pragma once
+
+#include "least_squares.h"
+
+namespace smokelift {
+
+// Minimises the quadratic from u, which has to be free of divergence and stays so. Stops when the projected
+// gradient has fallen to `tolerance` times that of the fluid at rest, after `limit` iterations, or when
+// rounding keeps it from falling any further.
+Figures projected_cg(LeastSquares &problem, double tolerance, int limit, const Out3 &u, Workers &workers);
+
+} // namespace smokelift

@@ -1,0 +1,97 @@
+#include "projection.h"
+
+#include "operators.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace smokelift {
+namespace {
+
+SMOKELIFT_CLONES
+void subtract_gradient_slab(In p, const Out3 &u, const Closed &closed, int i) {
+    const auto [nx, ny, nz] = p.n;
+    for (int j = 0; j < ny; ++j) {
+        float *__restrict x = u[0].row(i, j);
+        if (i > 0 && i < nx) {
+            const float *__restrict p0 = p.row(i - 1, j), *__restrict p1 = p.row(i, j);
+            for (int k = 0; k < nz; ++k)
+                x[k] += p1[k] - p0[k];
+        } else if (!closed[i > 0]) {
+            // Pressure is zero on the side itself, half a cell away.
+            const float *__restrict p0 = p.row(i > 0 ? nx - 1 : 0, j);
+            const float sign = i > 0 ? -2.0f : 2.0f;
+            for (int k = 0; k < nz; ++k)
+                x[k] += sign * p0[k];
+        }
+    }
+    if (i == nx)
+        return;
+    for (int j = 0; j <= ny; ++j) {
+        float *__restrict y = u[1].row(i, j);
+        if (j > 0 && j < ny) {
+            const float *__restrict p0 = p.row(i, j - 1), *__restrict p1 = p.row(i, j);
+            for (int k = 0; k < nz; ++k)
+                y[k] += p1[k] - p0[k];
+        } else if (!closed[2 + (j > 0)]) {
+            const float *__restrict p0 = p.row(i, j > 0 ? ny - 1 : 0);
+            const float sign = j > 0 ? -2.0f : 2.0f;
+            for (int k = 0; k < nz; ++k)
+                y[k] += sign * p0[k];
+        }
+    }
+    for (int j = 0; j < ny; ++j) {
+        float *__restrict z = u[2].row(i, j);
+        const float *__restrict q = p.row(i, j);
+        for (int k = 1; k < nz; ++k)
+            z[k] += q[k] - q[k - 1];
+        if (!closed[4])
+            z[0] += 2 * q[0];
+        if (!closed[5])
+            z[nz] -= 2 * q[nz - 1];
+    }
+}
+
+double largest(const float *p, std::size_t n) {
+    float value = 0;
+    for (std::size_t i = 0; i < n; ++i)
+        value = std::max(value, std::abs(p[i]));
+    return value;
+}
+
+} // namespace
+
+void scale_sides(const Out3 &u, const Closed &closed, float open, float wall) {
+    for (int axis = 0; axis < 3; ++axis)
+        for (int high = 0; high < 2; ++high) {
+            const float factor = closed[2 * axis + high] ? wall : open;
+            if (factor == 1)
+                continue;
+            Shape first{}, last = u[axis].n;
+            first[axis] = high ? last[axis] - 1 : 0;
+            last[axis] = first[axis] + 1;
+            for (int i = first[0]; i < last[0]; ++i)
+                for (int j = first[1]; j < last[1]; ++j)
+                    for (int k = first[2]; k < last[2]; ++k)
+                        u[axis].row(i, j)[k] *= factor;
+        }
+}
+
+void Projection::apply(const Out3 &u, Workers &workers) {
+    scale_sides(u, poisson_.closed(), 1, 0);
+    divergence(read(u), pressure_, workers);
+    // div u = -laplace p here, so that u - (-grad p) loses its divergence.
+    poisson_.solve(pressure_, workers);
+    workers.run(shape()[0] + 1, [&](int i) { subtract_gradient_slab(pressure_, u, poisson_.closed(), i); });
+}
+
+double relative_divergence(const In3 &u, Workers &workers) {
+    Field cells(Shape{u[1].n[0], u[0].n[1], u[0].n[2]});
+    divergence(u, cells, workers);
+    double speed = 0;
+    for (const In &component : u)
+        speed = std::max(speed, largest(component.data, volume(component.n)));
+    return speed > 0 ? largest(cells.in().data, cells.data().size()) / speed : 0;
+}
+
+} // namespace smokelift

@@ -1,0 +1,29 @@
+// Orthogonal projection of face velocities on those without divergence.
+#pragma once
+
+#include "poisson.h"
+
+namespace smokelift {
+
+// The inner product is sum of w u v over the faces with w = 1 inside the box and w = 1/2 on open sides, where
+// a face belongs to half a cell only. Closed sides have no normal velocity.
+class Projection {
+public:
+    Projection(const Shape &n, const Closed &closed) : poisson_(n, closed), pressure_(n) {}
+
+    void apply(const Out3 &u, Workers &workers);
+
+    const Shape &shape() const { return poisson_.shape(); }
+
+private:
+    Poisson poisson_;
+    Field pressure_;
+};
+
+// Multiplies the normal velocities on the sides of the box, by `open` or by `wall`.
+void scale_sides(const Out3 &u, const Closed &closed, float open, float wall);
+
+// max |div u| / max |u|, both in units of one cell; zero for a fluid at rest.
+double relative_divergence(const In3 &u, Workers &workers);
+
+} // namespace smokelift

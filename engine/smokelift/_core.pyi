@@ -1,0 +1,64 @@
+"""Transport and velocity of smoke on a box of unit cells, compiled from ``cpp/``.
+
+Arrays are float32, C-contiguous, ``[x, y, z]``; others are converted. Velocities are displacements in cells
+per frame on the faces of the cells. ``closed`` says which sides are walls, in the order x-, x+, y-, y+, z-, z+.
+``threads`` = 0 takes all cores; results do not depend on it.
+"""
+
+from typing import TypedDict
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float32]
+Arrays = tuple[Array, Array, Array] | list[Array]
+Closed = tuple[bool, bool, bool, bool, bool, bool] | list[bool]
+
+class Figures(TypedDict):
+    iterations: int
+    products: int
+    projections: int
+    residual: float
+
+def solve_poisson(f: Array, closed: Closed, threads: int = 0) -> Array: ...
+def project(faces: Arrays, closed: Closed, passes: int = 2, threads: int = 0) -> tuple[list[Array], float]: ...
+def divergence(faces: Arrays, threads: int = 0) -> Array: ...
+def gradient(cells: Array, threads: int = 0) -> list[Array]: ...
+def advect_cells(
+    field: Array, displacement: Arrays, maccormack: bool, extend: bool = False, threads: int = 0
+) -> Array: ...
+def advect_faces(field: Arrays, displacement: Arrays, maccormack: bool, threads: int = 0) -> list[Array]: ...
+
+class LeastSquares:
+    def __init__(
+        self,
+        *,
+        direction: Arrays,
+        offset: Array,
+        weight: Array,
+        irrotational: Array,
+        centre: Arrays,
+        first_order: float,
+        second_order: float,
+        kinetic: float,
+        closed: Closed,
+    ) -> None: ...
+    def apply(self, u: Arrays, threads: int = 0) -> list[Array]: ...
+    def right_hand_side(self, threads: int = 0) -> list[Array]: ...
+    def projected_cg(
+        self, start: Arrays, *, tolerance: float, limit: int, threads: int = 0
+    ) -> tuple[list[Array], Figures]: ...
+    def primal_dual(
+        self,
+        start: Arrays,
+        *,
+        sigma: float,
+        tau: float,
+        theta: float,
+        absolute: float,
+        relative: float,
+        limit: int,
+        inner_tolerance: float,
+        inner_limit: int,
+        threads: int = 0,
+    ) -> tuple[list[Array], Figures]: ...

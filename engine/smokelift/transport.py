@@ -1,0 +1,201 @@
+"""Velocities on the faces of voxels, and what they carry along.
+
+The box is divided into cubes (voxels) of edge `voxel_size`. A velocity is stored on their faces (a MAC grid:
+Harlow and Welch 1965), where its divergence and the pressure projection are exact. A velocity belongs to the
+point of arrival: what is at x after a time step dt came from x - u(x) dt.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from smokelift import _core
+
+Array = npt.NDArray[np.float32]
+Faces = tuple[Array, Array, Array]
+Side = Literal["x-", "x+", "y-", "y+", "z-", "z+"]
+SIDES: tuple[Side, ...] = ("x-", "x+", "y-", "y+", "z-", "z+")
+
+
+@dataclass(frozen=True, eq=False)
+class Velocity:
+    """A velocity on the faces of voxels.
+
+    Attributes
+    ----------
+    faces
+        Normal velocities in m/s on x, y and z faces: float32 arrays of shape (nx+1, ny, nz),
+        (nx, ny+1, nz) and (nx, ny, nz+1).
+    voxel_size
+        Edge of a voxel in metres.
+    figures
+        How it was found, if it was estimated: see `smokelift.velocity.estimate_velocity`.
+
+    Raises
+    ------
+    ValueError
+        If the shapes do not belong together, a value is not finite or the voxel size is not positive.
+    """
+
+    faces: Faces
+    voxel_size: float
+    figures: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        require_positive("voxel_size", self.voxel_size)
+        faces = tuple(np.ascontiguousarray(component, np.float32) for component in self.faces)
+        if len(faces) != 3 or any(component.ndim != 3 for component in faces):
+            raise ValueError("faces must be three three-dimensional arrays.")
+        nx, ny, nz = faces[0].shape[0] - 1, *faces[0].shape[1:]
+        shapes = tuple(component.shape for component in faces)
+        if min(nx, ny, nz) < 1 or shapes != face_shapes((nx, ny, nz)):
+            raise ValueError(
+                f"faces of shapes {shapes} do not belong to one box: "
+                "expected (nx+1, ny, nz), (nx, ny+1, nz) and (nx, ny, nz+1)."
+            )
+        if not all(np.isfinite(component).all() for component in faces):
+            raise ValueError("the velocity holds values that are not finite.")
+        object.__setattr__(self, "faces", faces)
+
+    @staticmethod
+    def zero(shape: tuple[int, int, int], voxel_size: float) -> Velocity:
+        """Smoke at rest in a box of `shape` voxels."""
+        x, y, z = (np.zeros(n, np.float32) for n in face_shapes(shape))
+        return Velocity((x, y, z), voxel_size)
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Voxels along x, y and z."""
+        ny, nz = self.faces[0].shape[1:]
+        return self.faces[1].shape[0], ny, nz
+
+    def centres(self) -> Array:
+        """Velocity at voxel centres in m/s, shape (nx, ny, nz, 3): the mean of opposite faces."""
+        return np.stack(at_centres(self.faces), axis=-1)
+
+    def displacement(self, dt: float) -> Faces:
+        """The way that smoke goes in `dt` seconds, in voxels, on faces."""
+        x, y, z = (component * np.float32(dt / self.voxel_size) for component in self.faces)
+        return x, y, z
+
+
+Carried = TypeVar("Carried", npt.NDArray[np.floating[Any]], Velocity)
+
+
+def advect(
+    field: Carried,
+    velocity: Velocity,
+    dt: float,
+    *,
+    scheme: Literal["maccormack", "semi-lagrangian"] = "maccormack",
+) -> Carried:
+    """Carry a density or a velocity along for one time step.
+
+    Parameters
+    ----------
+    field
+        A scalar at voxel centres, shape (nx, ny, nz), or a velocity, each component of which is carried from
+        its own positions.
+    velocity
+        What carries it, at the points of arrival.
+    dt
+        Time step in seconds. Steps of more than one voxel are fine.
+    scheme
+        ``"semi-lagrangian"`` is smooth and loses detail; ``"maccormack"`` (Selle et al. 2008) corrects the
+        error of interpolation and keeps it. Both stay within the values around the point of origin.
+
+    Returns
+    -------
+    numpy.ndarray or Velocity
+        Of the same shape. Scalars that come from outside the box are zero; a velocity continues beyond the
+        box as on its side.
+
+    Raises
+    ------
+    ValueError
+        If the shapes differ, a value is not finite, `dt` is not positive or the scheme is unknown.
+    """
+    require_positive("dt", dt)
+    if scheme not in ("maccormack", "semi-lagrangian"):
+        raise ValueError(f"unknown scheme {scheme!r}: expected 'maccormack' or 'semi-lagrangian'.")
+    displacement = velocity.displacement(dt)
+    corrected = scheme == "maccormack"
+    if isinstance(field, Velocity):
+        require_same_shape("the field", field.shape, velocity.shape)
+        x, y, z = _core.advect_faces(field.faces, displacement, corrected)
+        return Velocity((x, y, z), field.voxel_size)
+    require_same_shape("the field", field.shape, velocity.shape)
+    if not np.isfinite(field).all():
+        raise ValueError("the field holds values that are not finite.")
+    return _core.advect_cells(field, displacement, corrected)
+
+
+def project(velocity: Velocity, closed: Iterable[Side] = ()) -> Velocity:
+    """The nearest velocity without divergence (pressure projection).
+
+    Nearest in the sum of squares over faces, those on open sides counted half, as they belong to half a
+    voxel. Pressure is zero on open sides; closed sides (walls) let nothing through.
+
+    Parameters
+    ----------
+    velocity
+        Any velocity.
+    closed
+        Names of the sides that are walls: "x-", "x+", "y-", "y+", "z-", "z+".
+
+    Returns
+    -------
+    Velocity
+        Its figure ``"divergence"`` is max |div u| times voxel size over max |u|, around 1e-7.
+
+    Raises
+    ------
+    ValueError
+        If a side is unknown.
+    """
+    (x, y, z), divergence = _core.project(velocity.faces, closed_flags(closed))
+    return Velocity((x, y, z), velocity.voxel_size, {"divergence": divergence})
+
+
+def divergence(velocity: Velocity) -> Array:
+    """Net outflow of every voxel per volume, in 1/s, shape (nx, ny, nz)."""
+    return _core.divergence(velocity.faces) / np.float32(velocity.voxel_size)
+
+
+def face_shapes(shape: tuple[int, ...]) -> tuple[tuple[int, int, int], ...]:
+    """Shapes of the three arrays of face velocities of a box of `shape` voxels."""
+    nx, ny, nz = shape
+    return (nx + 1, ny, nz), (nx, ny + 1, nz), (nx, ny, nz + 1)
+
+
+def at_centres(faces: Faces) -> Faces:
+    """The three components of a face velocity at voxel centres: the mean of opposite faces."""
+    half = np.float32(0.5)
+    x, y, z = faces
+    return half * (x[1:] + x[:-1]), half * (y[:, 1:] + y[:, :-1]), half * (z[:, :, 1:] + z[:, :, :-1])
+
+
+def closed_flags(closed: Iterable[Side]) -> list[bool]:
+    """Names of walls as one flag a side, in the order of `SIDES`; ValueError for an unknown name."""
+    names = set(closed)
+    if unknown := names - set(SIDES):
+        raise ValueError(f"unknown side {sorted(unknown)[0]!r}: expected some of {', '.join(SIDES)}.")
+    return [side in names for side in SIDES]
+
+
+def require_positive(name: str, value: float) -> None:
+    """Refuse what is not a positive finite number."""
+    if not (value > 0 and math.isfinite(value)):
+        raise ValueError(f"{name} must be positive and finite, not {value}.")
+
+
+def require_same_shape(what: str, shape: tuple[int, ...], expected: tuple[int, ...]) -> None:
+    """Refuse an array that does not fit the box."""
+    if tuple(shape) != tuple(expected):
+        raise ValueError(f"{what} has shape {tuple(shape)}, but the box has {tuple(expected)} voxels.")

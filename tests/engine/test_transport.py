@@ -1,0 +1,237 @@
+"""Transport, projection and the Poisson solver under it."""
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from smokelift import _core
+from smokelift.transport import SIDES, Velocity, advect, divergence, project
+
+SHAPE = (13, 10, 17)
+ALL_SIDES = list(itertools.product([False, True], repeat=6))
+SCHEMES = ["maccormack", "semi-lagrangian"]
+
+
+def random_faces(rng, shape=SHAPE, scale=1.0):
+    zero = Velocity.zero(shape, 1.0).faces
+    return tuple((scale * rng.standard_normal(a.shape)).astype(np.float32) for a in zero)
+
+
+def random_velocity(seed, scale=1.0, voxel_size=1.0, shape=SHAPE):
+    return Velocity(random_faces(np.random.default_rng(seed), shape, scale), voxel_size)
+
+
+def uniform(motion, shape=SHAPE, voxel_size=1.0):
+    zero = Velocity.zero(shape, voxel_size).faces
+    return Velocity(tuple(np.full_like(a, v) for a, v in zip(zero, motion, strict=True)), voxel_size)
+
+
+def names(flags):
+    return tuple(side for side, flag in zip(SIDES, flags, strict=True) if flag)
+
+
+def inner_product(a, b, closed):
+    """Faces on open sides belong to half a voxel."""
+    total = 0.0
+    for axis, (p, q) in enumerate(zip(a, b, strict=True)):
+        product = np.moveaxis(p.astype(float) * q, axis, 0)
+        total += product[1:-1].sum() + sum(
+            product[-high].sum() * (1.0 if closed[2 * axis + high] else 0.5) for high in (0, 1)
+        )
+    return total
+
+
+def minus_laplacian(p, closed):
+    result = np.zeros_like(p)
+    for axis, high in itertools.product(range(3), (0, 1)):
+        neighbour = np.roll(p, -1 if high else 1, axis)
+        side = tuple(-high if d == axis else slice(None) for d in range(3))
+        neighbour[side] = p[side] if closed[2 * axis + high] else -p[side]
+        result += p - neighbour
+    return result
+
+
+@pytest.mark.parametrize("shape", [SHAPE, (8, 12, 16), (3, 2, 1), (1, 5, 4)])
+def test_poisson_on_every_mix_of_sides(shape):
+    rng = np.random.default_rng(3)
+    for closed in ALL_SIDES:
+        truth = rng.standard_normal(shape)
+        solution = _core.solve_poisson(minus_laplacian(truth, closed), closed)
+        if all(closed):  # known up to a constant
+            truth, solution = truth - truth.mean(), solution - solution.mean()
+        np.testing.assert_allclose(solution, truth, atol=2e-5)
+
+
+def test_poisson_with_closed_sides_removes_the_mean():
+    rng = np.random.default_rng(4)
+    f = rng.standard_normal(SHAPE).astype(np.float32)
+    closed = [True] * 6
+    p, q = (_core.solve_poisson(a, closed) for a in (f, f - f.mean()))
+    np.testing.assert_allclose(p - p.mean(), q - q.mean(), atol=1e-4)
+    assert np.isfinite(p).all()
+
+
+@pytest.mark.parametrize("closed", [*ALL_SIDES[::7], ALL_SIDES[-1]])
+def test_projection(closed):
+    velocity = random_velocity(5)
+    sides = names(closed)
+    once = project(velocity, sides)
+    assert np.abs(divergence(once)).max() < 1e-5 * max(np.abs(a).max() for a in once.faces)
+    for axis, high in itertools.product(range(3), (0, 1)):
+        if closed[2 * axis + high]:
+            assert not np.take(once.faces[axis], -high, axis).any()
+
+    twice = project(once, sides)
+    for a, b in zip(once.faces, twice.faces, strict=True):
+        np.testing.assert_allclose(a, b, atol=1e-5)
+
+    # What is taken away is orthogonal to every velocity without divergence.
+    other = project(random_velocity(6), sides)
+    removed = [a - b for a, b in zip(velocity.faces, once.faces, strict=True)]
+    size = inner_product(velocity.faces, velocity.faces, closed)
+    assert abs(inner_product(removed, other.faces, closed)) < 1e-5 * size
+
+
+@pytest.mark.parametrize("closed", [*ALL_SIDES[::7], ALL_SIDES[-1]])
+def test_linear_operators_pass_the_dot_product_test(closed):
+    """The Poisson solve and the projection are their own adjoints, the projection in its own inner product."""
+    rng = np.random.default_rng(11)
+    a, b = (rng.standard_normal(SHAPE).astype(np.float32) for _ in range(2))
+    a, b = a - a.mean(), b - b.mean()  # between walls a constant has no solution
+    left, right = np.vdot(_core.solve_poisson(a, closed), b), np.vdot(a, _core.solve_poisson(b, closed))
+    assert left == pytest.approx(right, rel=1e-3, abs=1e-3 * np.linalg.norm(a))
+    u, v = random_velocity(12), random_velocity(13)
+    left = inner_product(project(u, names(closed)).faces, v.faces, closed)
+    right = inner_product(u.faces, project(v, names(closed)).faces, closed)
+    assert left == pytest.approx(right, abs=1e-5 * inner_product(u.faces, u.faces, closed))
+
+
+def test_projection_keeps_units():
+    velocity = random_velocity(7)
+    small = Velocity(tuple(1e-3 * a for a in velocity.faces), 0.01)
+    for a, b in zip(project(velocity).faces, project(small).faces, strict=True):
+        np.testing.assert_allclose(1e-3 * a, b, rtol=1e-4, atol=1e-8)
+
+
+def test_divergence_is_per_volume():
+    faces = Velocity.zero(SHAPE, 0.1).faces
+    faces[0][1:] = 2.0
+    result = divergence(Velocity(faces, 0.1))
+    np.testing.assert_allclose(result[0], 20.0)
+    assert not result[1:].any()
+
+
+@pytest.mark.parametrize("threads", [1, 2, 3])
+def test_results_do_not_depend_on_threads(threads):
+    rng = np.random.default_rng(8)
+    field, faces = rng.random(SHAPE).astype(np.float32), random_faces(rng)
+    many, one = (_core.advect_cells(field, faces, True, threads=count) for count in (threads, 1))
+    np.testing.assert_array_equal(many, one)
+    many, one = (_core.project(faces, [True] * 6, threads=count)[0] for count in (threads, 1))
+    for a, b in zip(many, one, strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+def test_gradient_of_a_plane_is_exact():
+    x, y, z = np.indices(SHAPE).astype(np.float32)
+    for found, expected in zip(_core.gradient(2 * x - y + 0.5 * z), (2, -1, 0.5), strict=True):
+        np.testing.assert_allclose(found, expected)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_whole_voxels_are_shifted_exactly(scheme):
+    density = np.random.default_rng(9).random(SHAPE).astype(np.float32)
+    moved = advect(density, uniform((0.2, -0.1, 0.3), voxel_size=0.05), 0.5, scheme=scheme)
+    np.testing.assert_allclose(moved[2:, :-1, 3:], density[:-2, 1:, :-3], atol=1e-4)
+    # Nothing comes in from outside.
+    assert not moved[:2].any()
+    assert not moved[:, -1:].any()
+    assert not moved[:, :, :3].any()
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_a_constant_stays_constant_between_walls(scheme):
+    velocity = project(random_velocity(10), SIDES)
+    moved = advect(np.full(SHAPE, 0.7, np.float32), velocity, 0.2, scheme=scheme)
+    np.testing.assert_allclose(moved, 0.7, rtol=1e-5)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_mass_is_nearly_kept(scheme):
+    x, y, z = np.indices((24, 24, 24)) - 11.5
+    blob = np.exp(-((x / 4) ** 2 + (y / 4) ** 2 + (z / 4) ** 2)).astype(np.float32)
+    faces = Velocity.zero(blob.shape, 1.0).faces
+    faces[0][:] = -0.05 * y[:1, :, :]
+    faces[1][:] = 0.05 * x[:, :1, :]
+    moved = blob
+    for _ in range(10):
+        moved = advect(moved, Velocity(faces, 1.0), 1.0, scheme=scheme)
+    assert moved.sum() == pytest.approx(blob.sum(), rel=0.05)
+
+
+def test_maccormack_keeps_more_detail():
+    x, y, z = np.indices((32, 16, 16)) - np.array([8, 7.5, 7.5])[:, None, None, None]
+    blob = np.exp(-(x**2 + y**2 + z**2) / 8).astype(np.float32)
+    sharp = smooth = blob
+    flow = uniform((0.4, 0, 0), blob.shape)
+    for _ in range(10):
+        sharp, smooth = advect(sharp, flow, 1.0), advect(smooth, flow, 1.0, scheme="semi-lagrangian")
+    truth = np.roll(blob, 4, 0)
+    assert np.linalg.norm(sharp - truth) < 0.5 * np.linalg.norm(smooth - truth)
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    field=arrays(np.float32, (5, 4, 6), elements=st.floats(0, 1e3, width=32)),
+    seed=st.integers(0, 2**16),
+    scale=st.floats(0, 10),
+    scheme=st.sampled_from(SCHEMES),
+)
+def test_transport_makes_no_new_extremes(field, seed, scale, scheme):
+    moved = advect(field, random_velocity(seed, scale, shape=field.shape), 1.0, scheme=scheme)
+    assert moved.min() >= 0
+    assert moved.max() <= field.max() * (1 + 1e-6)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_a_velocity_is_carried_from_its_own_positions(scheme):
+    field = random_velocity(11)
+    moved = advect(field, uniform((1, 0, -2)), 1.0, scheme=scheme)
+    for a, b in zip(moved.faces, field.faces, strict=True):
+        np.testing.assert_allclose(a[1:, :, :-2], b[:-1, :, 2:], atol=1e-5)
+    still = uniform((0.3, 0.1, -0.7))
+    for a, b in zip(advect(still, field, 1.0, scheme=scheme).faces, still.faces, strict=True):
+        np.testing.assert_allclose(a, b, rtol=1e-6)
+
+
+def test_centres_are_means_of_faces():
+    velocity = uniform((1, 2, 3))
+    np.testing.assert_array_equal(velocity.centres(), np.broadcast_to(np.float32([1, 2, 3]), (*SHAPE, 3)))
+    assert velocity.shape == SHAPE
+
+
+def test_bad_input_is_refused():
+    velocity = Velocity.zero(SHAPE, 1.0)
+    density = np.zeros(SHAPE, np.float32)
+    with pytest.raises(ValueError, match="shape"):
+        advect(density[1:], velocity, 1.0)
+    with pytest.raises(ValueError, match="dt must be positive"):
+        advect(density, velocity, 0.0)
+    with pytest.raises(ValueError, match="unknown scheme"):
+        advect(density, velocity, 1.0, scheme="cubic")
+    with pytest.raises(ValueError, match="not finite"):
+        advect(density + np.nan, velocity, 1.0)
+    with pytest.raises(ValueError, match="unknown side 'up'"):
+        project(velocity, ("up",))
+    with pytest.raises(ValueError, match="voxel_size must be positive"):
+        Velocity.zero(SHAPE, 0.0)
+    with pytest.raises(ValueError, match="do not belong to one box"):
+        Velocity((density, density, density), 1.0)
+    with pytest.raises(ValueError, match="not finite"):
+        Velocity(tuple(a + np.nan for a in velocity.faces), 1.0)
+    with pytest.raises(ValueError, match="not have shapes"):
+        _core.divergence([density, density, density])

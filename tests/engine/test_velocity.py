@@ -1,0 +1,321 @@
+"""The velocity estimate: what it recovers, what it does not depend on, what it refuses."""
+
+import dataclasses
+import itertools
+
+import numpy as np
+import pytest
+from scipy import ndimage
+
+from smokelift import _core
+from smokelift.transport import divergence
+from smokelift.velocity import Velocity, VelocitySettings, estimate_velocity, predict_velocity
+
+OPEN = [False] * 6
+SHAPE = (32, 28, 40)
+DT, VOXEL = 1 / 24, 0.03
+PAPER = VelocitySettings(method="paper")
+
+# For what moves as a whole and without noise: the default weights are those of turbulent smoke.
+LARGE = {"shape": (48, 48, 48), "radius": 10.5}
+SMOOTH = VelocitySettings(smoothness=3.0, irrotational=0.003, kinetic=1e-4, blur=0.0, tolerance=0.003)
+
+
+def structured_density(x, y, z, radius=6.0):
+    """A smooth blob, structured in all directions (else a turn could not be seen); arguments in voxels."""
+    envelope = np.exp(-(x**2 + y**2 + z**2) / radius**2)
+    waves = (
+        np.sin(0.4 * x + 0.16 * y) * np.cos(0.32 * z)
+        + np.cos(0.32 * y - 0.24 * z + 0.12 * x)
+        + np.sin(0.36 * z + 0.08 * y - 0.12 * x)
+    )
+    return envelope * np.exp(0.6 * waves)
+
+
+def positions(shape):
+    return [i - (n - 1) / 2 for i, n in zip(np.indices(shape, dtype=float), shape, strict=True)]
+
+
+def translation(motion, shape=SHAPE, radius=6.0):
+    """Two densities and the displacement between them, in voxels."""
+    x, y, z = positions(shape)
+    after = structured_density(x - motion[0], y - motion[1], z - motion[2], radius)
+    return structured_density(x, y, z, radius), after, np.broadcast_to(motion, (*shape, 3))
+
+
+def rotation(angle, shape=SHAPE, radius=6.0):
+    """A turn about the middle, displacement at arrival."""
+    x, y, z = positions(shape)
+    c, s = np.cos(angle), np.sin(angle)
+    from_x, from_z = c * x + s * z, c * z - s * x
+    after = structured_density(from_x, y, from_z, radius)
+    return structured_density(x, y, z, radius), after, np.stack([x - from_x, 0 * y, z - from_z], axis=-1)
+
+
+def error_in_smoke(velocity, density, displacement, dt=DT, voxel_size=VOXEL):
+    inside = density > 0.1 * density.max()
+    found = velocity.centres()[inside] * dt / voxel_size
+    return np.linalg.norm(found - displacement[inside]) / np.linalg.norm(displacement[inside])
+
+
+@pytest.mark.parametrize("motion", [(0.7, 0.0, 0.0), (0.3, -0.5, 1.2), (-0.6, 1.0, -0.9), (1.5, -1.0, 3.5)])
+def test_recovers_a_translation(motion):
+    before, after, truth = translation(np.array(motion), **LARGE)
+    velocity = estimate_velocity(before, after, DT, VOXEL, SMOOTH)
+    assert error_in_smoke(velocity, after, truth) < 0.05
+    assert velocity.figures["divergence"] < 1e-5
+
+
+@pytest.mark.parametrize("angle", [0.12, -0.12])
+def test_recovers_a_rotation(angle):
+    before, after, truth = rotation(angle, **LARGE)
+    velocity = estimate_velocity(before, after, DT, VOXEL, SMOOTH)
+    assert error_in_smoke(velocity, after, truth) < 0.05
+
+
+@pytest.mark.parametrize("motion", [(0.7, -0.4, 0.9), (2.1, -1.2, 2.7)])
+def test_default_weights_recover_the_translation_of_a_smooth_blob(motion):
+    """The weights of turbulent smoke, solved to the end: an early stop leaves a tenth."""
+    x, y, z = positions((48, 48, 48))
+
+    def blob(x, y, z):
+        centres = ((3, -2, 1, 70, 1.0), (-4, -3, 5, 50, 0.8), (1, 6, -4, 60, 0.6))
+        return sum(a * np.exp(-((x - i) ** 2 + (y - j) ** 2 + (z - k) ** 2) / s) for i, j, k, s, a in centres)
+
+    before, after = blob(x, y, z), blob(x - motion[0], y - motion[1], z - motion[2])
+    truth = np.broadcast_to(motion, (48, 48, 48, 3))
+    velocity = estimate_velocity(before, after, DT, VOXEL, VelocitySettings(tolerance=1e-3))
+    assert error_in_smoke(velocity, after, truth) < 0.05
+
+
+def test_paper_mode_recovers_small_motion():
+    before, after, truth = translation(np.array([0.1, 0.2, 0.3]))
+    velocity = estimate_velocity(before, after, DT, VOXEL, PAPER)
+    assert error_in_smoke(velocity, after, truth) < 0.15
+    assert velocity.figures["divergence"] < 1e-5
+
+
+@pytest.mark.parametrize("settings", [VelocitySettings(), PAPER], ids=["default", "paper"])
+@pytest.mark.parametrize("scale", [0.01, 100])
+def test_scale_of_density_does_not_matter(settings, scale):
+    before, after, _ = translation(np.array([0.4, 0.2, 0.6]))
+    reference = estimate_velocity(before, after, DT, VOXEL, settings).centres()
+    scaled = estimate_velocity(scale * before, scale * after, DT, VOXEL, settings).centres()
+    assert np.linalg.norm(scaled - reference) < 0.01 * np.linalg.norm(reference)
+
+
+@pytest.mark.parametrize("settings", [VelocitySettings(), PAPER], ids=["default", "paper"])
+def test_units_of_space_and_time_do_not_matter(settings):
+    before, after, _ = translation(np.array([0.4, 0.2, 0.6]))
+    reference = estimate_velocity(before, after, DT, VOXEL, settings).centres()
+    centimetres = estimate_velocity(before, after, DT, 100 * VOXEL, settings).centres()
+    slower = estimate_velocity(before, after, 10 * DT, VOXEL, settings).centres()
+    assert np.linalg.norm(centimetres / 100 - reference) < 0.01 * np.linalg.norm(reference)
+    assert np.linalg.norm(slower * 10 - reference) < 0.01 * np.linalg.norm(reference)
+
+
+@pytest.mark.parametrize("settings", [VelocitySettings(), PAPER], ids=["default", "paper"])
+def test_number_of_threads_does_not_matter(settings):
+    before, after, _ = rotation(0.1)
+    one, two = (
+        estimate_velocity(before, after, DT, VOXEL, dataclasses.replace(settings, threads=threads))
+        for threads in (1, 2)
+    )
+    for a, b in zip(one.faces, two.faces, strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+def test_walls_let_nothing_through():
+    before, after, _ = translation(np.array([0.5, 0.5, 0.5]))
+    settings = VelocitySettings(closed=("x-", "z+"))
+    x, _, z = estimate_velocity(before, after, DT, VOXEL, settings).faces
+    assert not x[0].any()
+    assert not z[:, :, -1].any()
+    assert x[-1].any()
+
+
+def test_inflow_is_not_taken_for_motion():
+    x, y, z = positions(SHAPE)
+    before = structured_density(x, y, z)
+    source = (x**2 + y**2 < 16) & (abs(z) < 3)
+    after = before + 0.5 * source
+    plain = estimate_velocity(before, after, DT, VOXEL)
+    told = estimate_velocity(before, after, DT, VOXEL, inflow=ndimage.binary_dilation(source, iterations=2))
+    assert np.linalg.norm(told.centres()) < 0.05 * np.linalg.norm(plain.centres())
+
+
+def test_a_prediction_helps():
+    before, after, truth = rotation(0.25)
+    faces = estimate_velocity(before, after, DT, VOXEL, VelocitySettings(tolerance=0.1, warps=1))
+    refined = estimate_velocity(before, after, DT, VOXEL, prediction=faces)
+    assert error_in_smoke(refined, after, truth) < error_in_smoke(faces, after, truth)
+
+
+@pytest.mark.parametrize("method", ["default", "paper"])
+@pytest.mark.parametrize("density", [np.zeros(SHAPE), np.ones(SHAPE)])
+def test_nothing_to_see_gives_zero(method, density):
+    velocity = estimate_velocity(density, density, DT, VOXEL, VelocitySettings(method=method))
+    assert not velocity.centres().any()
+
+
+@pytest.mark.parametrize("method", ["default", "paper"])
+def test_smoke_at_rest_has_no_velocity(method):
+    before, _, _ = translation(np.zeros(3))
+    velocity = estimate_velocity(before, before, DT, VOXEL, VelocitySettings(method=method))
+    assert not velocity.centres().any()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"before": np.full(SHAPE, np.nan)}, "before holds densities that are not finite"),
+        ({"after": np.full(SHAPE, -1.0)}, "after holds negative densities"),
+        ({"after": np.ones((4, 4, 4))}, "after has shape"),
+        ({"before": np.ones((4, 4))}, "three-dimensional"),
+        ({"dt": 0.0}, "dt must be positive"),
+        ({"dt": float("nan")}, "dt must be positive"),
+        ({"voxel_size": -1.0}, "voxel_size must be positive"),
+        ({"inflow": np.ones((3, 3, 3), bool)}, "inflow has shape"),
+        ({"prediction": Velocity.zero((3, 3, 3), VOXEL)}, "prediction has shape"),
+        ({"settings": VelocitySettings(closed=("top",))}, "unknown side 'top'"),
+    ],
+)
+def test_bad_input_is_refused(change, message):
+    before, after, _ = translation(np.array([0.1, 0.0, 0.0]))
+    arguments = {"before": before, "after": after, "dt": DT, "voxel_size": VOXEL} | change
+    with pytest.raises(ValueError, match=message):
+        estimate_velocity(**arguments)
+
+
+@pytest.mark.parametrize("steps", [{"sigma": 1.0, "tau": 1.01}, {"sigma": -0.1}, {"theta": 1.5}, {"tau": float("nan")}])
+def test_steps_that_do_not_converge_are_refused(steps):
+    before, after, _ = translation(np.array([0.1, 0.0, 0.0]))
+    settings = dataclasses.replace(PAPER, **steps)
+    with pytest.raises(ValueError, match=r"sigma = .*tau = .*theta = .*do not converge"):
+        estimate_velocity(before, after, DT, VOXEL, settings)
+
+
+def test_prediction_is_free_of_divergence_and_keeps_a_uniform_flow():
+    zero = Velocity.zero(SHAPE, VOXEL).faces
+    uniform = Velocity([np.full_like(a, v) for a, v in zip(zero, (0.3, -0.2, 0.5), strict=True)], VOXEL)
+    for a, b in zip(predict_velocity(uniform, DT).faces, uniform.faces, strict=True):
+        np.testing.assert_allclose(a, b, atol=1e-5)
+    turning = estimate_velocity(*rotation(0.2)[:2], DT, VOXEL)
+    predicted = predict_velocity(turning, DT)
+    assert np.abs(divergence(predicted)).max() * VOXEL < 1e-4 * np.abs(predicted.centres()).max()
+
+
+# The linear problem itself, on a grid so small that its matrix can be written out.
+
+TINY = (5, 4, 6)
+
+
+def tiny_faces(rng):
+    nx, ny, nz = TINY
+    shapes = [(nx + 1, ny, nz), (nx, ny + 1, nz), (nx, ny, nz + 1)]
+    return [rng.standard_normal(shape).astype(np.float32) for shape in shapes]
+
+
+def tiny_problem(rng, first_order=0.05, second_order=0.03, closed=OPEN):
+    cells = [rng.standard_normal(TINY).astype(np.float32) for _ in range(4)]
+    return _core.LeastSquares(
+        direction=cells[:3],
+        offset=cells[3],
+        weight=rng.random(TINY).astype(np.float32),
+        irrotational=rng.random(TINY).astype(np.float32),
+        centre=tiny_faces(rng),
+        first_order=first_order,
+        second_order=second_order,
+        kinetic=0.01,
+        closed=closed,
+    )
+
+
+def flat(faces):
+    return np.concatenate([a.ravel() for a in faces]).astype(float)
+
+
+def split(vector):
+    nx, ny, nz = TINY
+    shapes = [(nx + 1, ny, nz), (nx, ny + 1, nz), (nx, ny, nz + 1)]
+    ends = np.cumsum([np.prod(s) for s in shapes])[:-1]
+    return [a.reshape(s).astype(np.float32) for a, s in zip(np.split(vector, ends), shapes, strict=True)]
+
+
+def matrix_of(linear, size):
+    return np.stack([linear(split(row)) for row in np.eye(size)], axis=-1)
+
+
+def constrained_minimum(problem, closed):
+    """By a dense solve of the optimality conditions."""
+    size = sum(a.size for a in tiny_faces(np.random.default_rng(0)))
+    quadratic = matrix_of(lambda u: flat(problem.apply(u)), size)
+    constraint = matrix_of(lambda u: _core.divergence(u).ravel().astype(float), size)
+    walls = []
+    for axis, high in itertools.product(range(3), range(2)):
+        marks = split(np.zeros(size))
+        marks[axis][tuple(-high if d == axis else slice(None) for d in range(3))] = 1
+        if closed[2 * axis + high]:
+            walls.append(np.eye(size)[flat(marks) > 0])
+    constraint = np.concatenate([constraint, *walls])
+    right = np.concatenate([flat(problem.right_hand_side()), np.zeros(len(constraint))])
+    zeros = np.zeros((len(constraint), len(constraint)))
+    system = np.block([[quadratic, constraint.T], [constraint, zeros]])
+    return np.linalg.lstsq(system, right, rcond=None)[0][:size]
+
+
+@pytest.mark.parametrize("orders", [(0.05, 0.0), (0.0, 0.03)])
+@pytest.mark.parametrize("closed", [OPEN, [True, False, False, False, True, True], [True] * 6])
+def test_both_solvers_reach_the_constrained_minimum(orders, closed):
+    problem = tiny_problem(np.random.default_rng(1), *orders, closed)
+    truth = constrained_minimum(problem, closed)
+    start = split(np.zeros(truth.size))
+    cg, _ = problem.projected_cg(start, tolerance=2e-5, limit=500)
+    endless, _ = problem.projected_cg(start, tolerance=0.0, limit=500)
+    pd, figures = problem.primal_dual(
+        start,
+        sigma=0.3,
+        tau=3.0,
+        theta=1.0,
+        absolute=0.0,
+        relative=1e-5,
+        limit=2000,
+        inner_tolerance=0.01,
+        inner_limit=100,
+    )
+    assert np.linalg.norm(flat(cg) - truth) < 3e-3 * np.linalg.norm(truth)
+    assert np.linalg.norm(flat(pd) - truth) < 1e-3 * np.linalg.norm(truth)
+    # A tolerance out of reach of single precision does not lead away from the minimum again.
+    assert np.linalg.norm(flat(endless) - truth) < 0.03 * np.linalg.norm(truth)
+    assert figures["iterations"] < 2000
+
+
+def test_the_quadratic_is_symmetric_and_positive():
+    rng = np.random.default_rng(2)
+    problem = tiny_problem(rng)
+    a, b = tiny_faces(rng), tiny_faces(rng)
+    ab, ba = flat(problem.apply(a)) @ flat(b), flat(problem.apply(b)) @ flat(a)
+    assert ab == pytest.approx(ba, rel=1e-5)
+    assert flat(problem.apply(a)) @ flat(a) > 0
+
+
+def test_a_uniform_flow_and_a_solid_turn_cost_no_second_order_smoothness():
+    zero = np.zeros(TINY, np.float32)
+    problem = _core.LeastSquares(
+        direction=[zero] * 3,
+        offset=zero,
+        weight=zero,
+        irrotational=zero,
+        centre=split(np.zeros(flat(tiny_faces(np.random.default_rng(0))).size)),
+        first_order=0.0,
+        second_order=1.0,
+        kinetic=0.0,
+        closed=OPEN,
+    )
+    nx, ny, nz = TINY
+    turn = [
+        np.broadcast_to(np.arange(ny, dtype=np.float32)[None, :, None], (nx + 1, ny, nz)),
+        np.broadcast_to(-np.arange(nx, dtype=np.float32)[:, None, None], (nx, ny + 1, nz)),
+        np.full((nx, ny, nz + 1), 3, np.float32),
+    ]
+    np.testing.assert_allclose(flat(problem.apply(turn)), 0, atol=1e-5)
