@@ -1,0 +1,114 @@
+"""Cameras made from other cameras: orbiting a domain, and the small picture that a grid is fitted to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smokelift.images import area_average
+from smokelift.render.rays import project
+from smokelift.scene import Camera, Domain, Matrix
+
+
+def as_matrix(values: NDArray[np.float64]) -> Matrix:
+    """A 4x4 array as the nested tuples that a frozen camera holds."""
+    rows = [tuple(float(v) for v in row) for row in values]
+    return tuple((r[0], r[1], r[2], r[3]) for r in rows)
+
+
+def orbit(camera: Camera, domain: Domain, yaw_degrees: float, pitch_degrees: float = 0.0) -> Camera:
+    """The camera carried around the domain's centre, still looking at it from the same distance.
+
+    Parameters
+    ----------
+    yaw_degrees
+        Turn about the world's Z, counter-clockwise seen from above: 90 looks from the right side.
+    pitch_degrees
+        Then raise the camera by so much; negative lowers it.
+    """
+    centre = (np.array(domain.min) + np.array(domain.max)) / 2
+    matrix = np.array(camera.matrix, np.float64)
+    right = matrix[:3, 0]
+    turn = _rotation(np.array([0.0, 0.0, 1.0]), yaw_degrees) @ _rotation(right, -pitch_degrees)
+    moved = matrix.copy()
+    moved[:3, :3] = turn @ matrix[:3, :3]
+    moved[:3, 3] = centre + turn @ (matrix[:3, 3] - centre)
+    return replace(camera, matrix=as_matrix(moved))
+
+
+def _rotation(axis: NDArray[np.float64], degrees: float) -> NDArray[np.float64]:
+    """Rotation matrix about a unit axis (Rodrigues)."""
+    angle = np.radians(degrees)
+    cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    return np.asarray(np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross)
+
+
+@dataclass(frozen=True)
+class WorkingPicture:
+    """The part of the camera's picture that the domain covers, at a resolution that fits the grid.
+
+    Attributes
+    ----------
+    camera
+        Camera of the small picture.
+    left, top, width, height
+        The part of the full picture, in its pixels.
+    """
+
+    camera: Camera
+    left: int
+    top: int
+    width: int
+    height: int
+
+    def cut(self, picture: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The small picture, area-averaged from a full one (rows, columns, ...)."""
+        part = picture[self.top : self.top + self.height, self.left : self.left + self.width]
+        columns, rows = self.camera.size
+        return area_average(part, columns, rows)
+
+
+class CameraError(ValueError):
+    """The camera does not see the domain."""
+
+
+def working_picture(camera: Camera, domain: Domain, pixels_per_voxel: float = 1.0) -> WorkingPicture:
+    """Choose the picture that a grid is fitted to.
+
+    Finer pixels than voxels hold detail that the grid cannot show, coarser ones lose some that it can, so a pixel
+    is as wide as a voxel at the domain's centre (unless the footage is coarser than that).
+
+    Raises
+    ------
+    CameraError
+        If no part of the domain is in the picture.
+    """
+    corners = np.array(np.meshgrid(*zip(domain.min, domain.max, strict=True), indexing="ij")).reshape(3, -1).T
+    pixels, depth = project(camera, corners)
+    width, height = camera.size
+    low, high = np.zeros(2), np.array([width, height], np.float64)
+    if (depth > 0).all():
+        low, high = np.maximum(pixels.min(0), low), np.minimum(pixels.max(0), high)
+    if (depth <= 0).all() or (high - low < 1).any():
+        raise CameraError("The camera does not see the domain; move the domain into the picture or turn the camera.")
+    left, top = (int(v) for v in np.floor(low))
+    right, bottom = (int(v) for v in np.ceil(high))
+    centre = corners.mean(0)
+    _, centre_depth = project(camera, centre)
+    near = domain.voxel_size if camera.type == "perspective" else 1.0
+    scale = max(camera.fx, camera.fy) * domain.voxel_size / max(float(centre_depth), near)
+    shrink = max(1.0, scale / pixels_per_voxel)
+    columns = max(1, round((right - left) / shrink))
+    rows = max(1, round((bottom - top) / shrink))
+    x, y = columns / (right - left), rows / (bottom - top)
+    small = replace(
+        camera,
+        size=(columns, rows),
+        fx=camera.fx * x,
+        fy=camera.fy * y,
+        cx=(camera.cx - left) * x,
+        cy=(camera.cy - top) * y,
+    )
+    return WorkingPicture(small, left, top, right - left, bottom - top)

@@ -1,0 +1,211 @@
+"""Density from one image (algorithm 3): a picture and a scene in, a volume that renders to the picture out.
+
+``hull`` says where smoke can be, ``profile`` gives a start with a plausible depth, ``multiplicative`` scales it ray
+by ray until it is nearly right, ``descent`` follows the exact gradient from there. ``paper`` is the paper's own way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smokelift.background import CODE, Plate, matte
+from smokelift.cameras import orbit
+from smokelift.density.descent import descend
+from smokelift.density.hull import project_voxels, visual_hull
+from smokelift.density.multiplicative import fit_multiplicative
+from smokelift.density.paper import fit_paper
+from smokelift.density.profile import spread_along_depth
+from smokelift.images import srgb_to_linear
+from smokelift.render import Renderer, scene_background, scene_sun
+from smokelift.render.renderer import Image, Scattering, Volume
+from smokelift.scene import Camera, DirectionalLight, Domain, Medium, Scene
+
+__all__ = ["Density", "DensitySettings", "depth_guess", "reconstruct_density"]
+
+
+@dataclass(frozen=True)
+class DensitySettings:
+    """How a density is fitted to a picture.
+
+    Attributes
+    ----------
+    method
+        ``"default"``, or ``"paper"``: fixed-rate gradient descent, the picture imposed at 90 degrees as well.
+    scattering
+        ``"single"`` (self-shadowed), ``"unshadowed"`` or ``"absorption"``.
+    fit_iterations
+        Multiplicative iterations at most; the fit is within a few per cent after six, and each further one gains
+        less than a step of descent costs.
+    descent_iterations
+        Steps of descent at most; for the paper's method, all its iterations.
+    tolerance
+        An iteration that lowers the loss by less than this share is the last.
+    paper_rate
+        Paper's method: change of density that one step makes in the steepest voxel of thin fog. The paper gives
+        no figure; see docs/measurements.md for what more and less do.
+    """
+
+    method: Literal["default", "paper"] = "default"
+    scattering: Scattering = "single"
+    fit_iterations: int = 6
+    descent_iterations: int = 12
+    tolerance: float = 0.02
+    paper_rate: float = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class Density:
+    """A reconstructed density.
+
+    Attributes
+    ----------
+    values : (nx, ny, nz) float32
+    hull : (nx, ny, nz) bool
+        Voxels that the picture allows to hold smoke.
+    figures
+        ``loss`` (sum of squares), ``psnr`` (dB, linear radiance over the picture, peak 1), ``iterations``,
+        ``hull_share``.
+    """
+
+    values: Volume
+    hull: NDArray[np.bool_]
+    figures: Mapping[str, float] = field(default_factory=dict)
+
+
+def reconstruct_density(
+    image: Image,
+    scene: Scene,
+    initial: Volume | None = None,
+    settings: DensitySettings | None = None,
+    *,
+    plate: Plate | None = None,
+) -> Density:
+    """Find a density that renders to a picture (algorithm 3).
+
+    Parameters
+    ----------
+    image : (rows, columns, 3)
+        Linear radiance, of the size of the scene's camera.
+    scene
+        Needs camera and domain.
+    initial : (nx, ny, nz), optional
+        First guess; by default the depth profile of `profile`.
+    settings
+        How to fit.
+    plate
+        Background with its noise; by default the scene's background and the noise of 8 bits.
+
+    Raises
+    ------
+    ValueError
+        If the picture is not finite or has another size than the camera, if the initial density is negative, not
+        finite or of another shape than the domain, or if the scene lacks a camera or a domain.
+    """
+    settings = settings or DensitySettings()
+    if scene.camera is None or scene.domain is None:
+        raise ValueError("A reconstruction needs a scene with a camera and a domain.")
+    camera, domain, medium = scene.camera, scene.domain, scene.medium or Medium()
+    image = _checked_image(image, camera)
+    plate = plate or _clean_plate(scene, camera)
+    sun = scene_sun(scene.lights)
+    mask = matte(image, plate).mask
+    projection = project_voxels(camera, domain)
+    hull = visual_hull(mask, projection)
+    if initial is not None:
+        initial = _checked_initial(initial, domain)
+    if not hull.any():
+        return Density(np.zeros(domain.resolution, np.float32), hull, _figures(0.0, image, 0, hull))
+    if settings.method == "paper":
+        return _paper(image, plate.image, scene, initial, settings)
+    renderer = Renderer(camera, domain, medium, sun, plate.image, settings.scattering, hull)
+    weight = np.ones(mask.shape, np.float32)
+    noise = float(np.sqrt(np.mean(plate.noise**2)))
+    if initial is None:
+        initial = depth_guess(image, scene, settings, plate)
+    start = np.where(hull, initial, 0).astype(np.float32)
+    fit = fit_multiplicative(
+        renderer, image, plate.image, start, projection, weight, noise,
+        settings.fit_iterations, settings.tolerance,
+    )  # fmt: skip
+    enough = 3 * noise**2 * float(np.sum(mask))
+    final = descend(renderer, image, fit.density, hull, weight, enough, settings.descent_iterations, settings.tolerance)
+    return Density(final.density, hull, _figures(final.loss, image, fit.iterations + final.iterations, hull))
+
+
+def depth_guess(image: Image, scene: Scene, settings: DensitySettings, plate: Plate) -> Volume:
+    """Density (nx, ny, nz) from one picture alone: unshadowed optical depths, spread by the depth profile."""
+    assert scene.camera is not None and scene.domain is not None
+    medium = scene.medium or Medium()
+    depth = _optical_depth(image, plate.image, scene_sun(scene.lights), medium, settings.scattering)
+    amount = np.where(matte(image, plate).mask, depth, 0).astype(np.float32)
+    projection = project_voxels(scene.camera, scene.domain)
+    return spread_along_depth(amount, scene.camera, scene.domain, projection) / np.float32(medium.extinction)
+
+
+def _paper(image: Image, background: Image, scene: Scene, initial: Volume | None, settings: DensitySettings) -> Density:
+    assert scene.camera is not None and scene.domain is not None
+    camera, domain, medium = scene.camera, scene.domain, scene.medium or Medium()
+    sun = scene_sun(scene.lights)
+    views = (camera, orbit(camera, domain, 90))
+    renderers = [Renderer(view, domain, medium, sun, background, settings.scattering) for view in views]
+    # fog of optical depth 0.1 across the domain: thin, because dense media have local minima
+    thin = 0.1 / (medium.extinction * (domain.max[0] - domain.min[0]))
+    fog = np.full(domain.resolution, thin, np.float32)
+    start = fog if initial is None else initial
+    fit = fit_paper(renderers, image, start, fog, settings.paper_rate, 1e-4, settings.descent_iterations)
+    loss = float(np.sum(np.square(renderers[0].image(fit.density) - image, dtype=np.float64)))
+    everywhere = np.ones(domain.resolution, np.bool_)
+    return Density(fit.density, everywhere, _figures(loss, image, fit.iterations, everywhere))
+
+
+def _optical_depth(
+    image: Image, background: Image, sun: DirectionalLight | None, medium: Medium, scattering: Scattering
+) -> NDArray[np.float64]:
+    """Optical depth (rows, columns) of unshadowed smoke that explains the picture: I = J (1 - t) + t B."""
+    source = np.zeros(3)
+    if sun is not None and scattering != "absorption":
+        source = medium.albedo / (4 * np.pi) * np.array(sun.irradiance)
+    contrast = background - source
+    power = np.sum(contrast**2, -1)
+    clear = np.sum((image - source) * contrast, -1) / np.maximum(power, 1e-12)
+    return np.asarray(-np.log(np.clip(clear, 0.05, 1.0)))
+
+
+def _clean_plate(scene: Scene, camera: Camera) -> Plate:
+    width, height = camera.size
+    picture = np.broadcast_to(scene_background(scene), (height, width, 3)).astype(np.float32)
+    return Plate(picture, np.ones((height, width), np.float32), srgb_to_linear(np.full(3, CODE)))
+
+
+def _figures(loss: float, image: Image, iterations: int, hull: NDArray[np.bool_]) -> dict[str, float]:
+    error = loss / image.size
+    return {
+        "loss": loss,
+        "psnr": float(-10 * np.log10(max(error, 1e-12))),
+        "iterations": float(iterations),
+        "hull_share": float(hull.mean()),
+    }
+
+
+def _checked_image(image: Image, camera: Camera) -> Image:
+    image = np.asarray(image, np.float32)
+    width, height = camera.size
+    if image.shape != (height, width, 3):
+        raise ValueError(f"The picture must have the shape {(height, width, 3)} of the camera, not {image.shape}.")
+    if not np.isfinite(image).all():
+        raise ValueError("The picture holds values that are not finite.")
+    return image
+
+
+def _checked_initial(initial: Volume, domain: Domain) -> Volume:
+    initial = np.asarray(initial, np.float32)
+    if initial.shape != domain.resolution:
+        raise ValueError(f"The initial density must have the shape {domain.resolution}, not {initial.shape}.")
+    if not np.isfinite(initial).all() or initial.min() < 0:
+        raise ValueError("The initial density must be finite and not negative.")
+    return initial

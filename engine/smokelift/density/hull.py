@@ -1,0 +1,69 @@
+"""Which voxels can hold smoke: those whose every calibrated picture shows smoke where they lie."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from smokelift.render.rays import project
+from smokelift.scene import Camera, Domain
+
+
+@dataclass(frozen=True, eq=False)
+class Projection:
+    """Where the voxels of a grid lie in a picture.
+
+    Attributes
+    ----------
+    rows, columns : (nx, ny, nz) float32
+        Picture coordinates of the voxel centres, pixel centres at integers.
+    visible : (nx, ny, nz) bool
+        Voxels before the camera whose centre falls into the picture.
+    footprint : float
+        Largest width of a voxel in the picture, in pixels.
+    """
+
+    rows: NDArray[np.float32]
+    columns: NDArray[np.float32]
+    visible: NDArray[np.bool_]
+    footprint: float
+
+    def read(self, picture: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The picture (rows, columns) read bilinearly at every voxel; the nearest pixel's value outside."""
+        return np.asarray(
+            ndimage.map_coordinates(picture, (self.rows, self.columns), order=1, mode="nearest"), np.float32
+        )
+
+
+def voxel_centres(domain: Domain) -> NDArray[np.float64]:
+    """World positions (nx, ny, nz, 3) of the voxel centres."""
+    h = domain.voxel_size
+    axes = [low + (np.arange(n) + 0.5) * h for low, n in zip(domain.min, domain.resolution, strict=True)]
+    return np.stack(np.meshgrid(*axes, indexing="ij"), -1)
+
+
+@lru_cache(maxsize=8)
+def project_voxels(camera: Camera, domain: Domain) -> Projection:
+    """Project every voxel centre of a domain."""
+    pixels, depth = project(camera, voxel_centres(domain))
+    columns, rows = pixels[..., 0] - 0.5, pixels[..., 1] - 0.5
+    width, height = camera.size
+    inside = (columns > -0.5) & (columns < width - 0.5) & (rows > -0.5) & (rows < height - 0.5)
+    near = np.min(depth[depth > 0], initial=np.inf) if camera.type == "perspective" else 1.0
+    # the diagonal of a voxel is its largest width from any side
+    footprint = max(camera.fx, camera.fy) * domain.voxel_size * np.sqrt(3) / near
+    return Projection(rows.astype(np.float32), columns.astype(np.float32), inside & (depth > 0), float(footprint))
+
+
+def visual_hull(mask: NDArray[np.bool_], projection: Projection) -> NDArray[np.bool_]:
+    """Voxels (nx, ny, nz) whose footprint meets the mask (rows, columns) of a picture's smoke pixels."""
+    radius = max(1, round(projection.footprint / 2))
+    grown = ndimage.binary_dilation(mask, iterations=radius)
+    height, width = mask.shape
+    rows = np.clip(np.rint(projection.rows), 0, height - 1).astype(np.intp)
+    columns = np.clip(np.rint(projection.columns), 0, width - 1).astype(np.intp)
+    return np.asarray(grown[rows, columns] & projection.visible)

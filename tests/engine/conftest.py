@@ -1,0 +1,85 @@
+"""One tiny plume for the tests of everything that needs footage: known volumes, and the pictures of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from smokelift.images import write_image
+from smokelift.render import render
+from smokelift.scene import Background, Camera, ClipSource, DirectionalLight, Domain, Medium, Scene
+from smokelift.settings import Settings
+
+FRAMES = 5
+FIRST_HEIGHT = 0.45
+RISE = 0.075
+"""Metres a frame: one and a half voxels."""
+
+
+@dataclass(frozen=True)
+class Plume:
+    """A blob of smoke that rises before black.
+
+    Attributes
+    ----------
+    scene
+        Complete; its clip is the rising blob.
+    densities
+        The true volumes, a frame each.
+    """
+
+    scene: Scene
+    densities: tuple[np.ndarray, ...]
+
+    @staticmethod
+    def blob(scene: Scene, height: float) -> np.ndarray:
+        """The volume of a structured blob whose centre is so many metres high; exactly 0 outside."""
+        domain = scene.domain
+        assert domain is not None
+        axes = [
+            low + (np.arange(n) + 0.5) * domain.voxel_size for low, n in zip(domain.min, domain.resolution, strict=True)
+        ]
+        x, y, z = np.meshgrid(*axes, indexing="ij")
+        z = z - height
+        ball = np.exp(-((x / 0.17) ** 2 + (y / 0.17) ** 2 + (z / 0.2) ** 2))
+        structure = 1 + 0.5 * np.sin(19 * x) * np.cos(17 * y) * np.sin(15 * z)
+        return np.maximum(ball * structure - 0.04, 0).astype(np.float32)
+
+    def write(
+        self,
+        folder: Path,
+        densities: Sequence[np.ndarray],
+        scene: Scene | None = None,
+        suffix: str = ".png",
+    ) -> Scene:
+        """Render volumes into a picture sequence; the scene with that clip."""
+        scene = scene or self.scene
+        folder.mkdir(parents=True, exist_ok=True)
+        for number, density in enumerate(densities):
+            write_image(folder / f"frame_{number:04d}{suffix}", render(density, scene))
+        return replace(scene, clip=ClipSource(folder / f"frame_####{suffix}", fps=24.0))
+
+
+@pytest.fixture(scope="session")
+def plume(tmp_path_factory: pytest.TempPathFactory) -> Plume:
+    """The rising blob with its clip."""
+    scene = Scene(
+        camera=Camera.look_at((0, -4, 0.8), (0, 0, 0.8), fov_y_degrees=27, size=(40, 56)),
+        domain=Domain((-0.6, -0.6, 0), (0.6, 0.6, 1.6), (24, 24, 32)),
+        medium=Medium(extinction=8.0, albedo=0.9),
+        lights=(DirectionalLight((0.3, 0.5, -0.8), (12.0, 11.0, 10.0)),),
+        background=Background(color=(0.0, 0.0, 0.0)),
+    )
+    densities = tuple(Plume.blob(scene, FIRST_HEIGHT + RISE * n) for n in range(FRAMES))
+    empty = Plume(scene, densities)
+    return replace(empty, scene=empty.write(tmp_path_factory.mktemp("plume"), densities))
+
+
+@pytest.fixture(scope="session")
+def draft() -> Settings:
+    """Settings that are quick."""
+    return Settings.preset("draft")

@@ -1,0 +1,150 @@
+"""Cameras made from cameras: an orbit keeps looking at the domain, a working picture fits its grid."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from smokelift.cameras import CameraError, orbit, working_picture
+from smokelift.render.rays import project
+from smokelift.scene import Camera, Domain
+
+DOMAIN = Domain((-0.6, -0.6, 0), (0.6, 0.6, 1.6), (24, 24, 32))
+CENTRE = np.array([0, 0, 0.8])
+PERSPECTIVE = Camera.look_at((0, -4, 0.8), (0, 0, 0.8), fov_y_degrees=30, size=(160, 224))
+ORTHOGRAPHIC = Camera("orthographic", PERSPECTIVE.matrix, (160, 224), 103.0, 103.0, 80.0, 112.0)
+TILTED = Camera.look_at((1, -4, 2.0), (0, 0, 0.8), fov_y_degrees=30, size=(160, 224))
+
+both = pytest.mark.parametrize("camera", [PERSPECTIVE, ORTHOGRAPHIC], ids=["perspective", "orthographic"])
+all_three = pytest.mark.parametrize(
+    "camera", [PERSPECTIVE, ORTHOGRAPHIC, TILTED], ids=["perspective", "orthographic", "tilted"]
+)
+
+
+def points(count: int = 50) -> np.ndarray:
+    """World points inside the domain."""
+    return np.random.default_rng(1).uniform(DOMAIN.min, DOMAIN.max, (count, 3))
+
+
+@all_three
+@pytest.mark.parametrize(("yaw", "pitch"), [(33, 0), (0, 25), (-120, -10)])
+def test_an_orbit_keeps_distance_and_aim(camera: Camera, yaw: float, pitch: float) -> None:
+    """The camera stays as far away, and the domain's centre at the same pixel and depth."""
+    moved = orbit(camera, DOMAIN, yaw, pitch)
+    distance = [np.linalg.norm(np.array(c.position) - CENTRE) for c in (camera, moved)]
+    assert distance[1] == pytest.approx(distance[0])
+    for before, after in zip(project(camera, CENTRE), project(moved, CENTRE), strict=True):
+        np.testing.assert_allclose(after, before, atol=1e-9)
+    assert (moved.size, moved.fx, moved.fy, moved.type) == (camera.size, camera.fx, camera.fy, camera.type)
+
+
+@all_three
+def test_once_around_is_where_it_began(camera: Camera) -> None:
+    """360 degrees is no turn at all."""
+    np.testing.assert_allclose(orbit(camera, DOMAIN, 360).matrix, camera.matrix, atol=1e-12)
+
+
+@both
+def test_ninety_degrees_look_from_the_right_side(camera: Camera) -> None:
+    """What was at the picture's right is now near: the camera stands at +X and looks along -X, upright."""
+    side = orbit(camera, DOMAIN, 90)
+    np.testing.assert_allclose(side.position, (4, 0, 0.8), atol=1e-12)
+    matrix = np.array(side.matrix)
+    np.testing.assert_allclose(-matrix[:3, 2], (-1, 0, 0), atol=1e-12)
+    np.testing.assert_allclose(matrix[:3, 1], (0, 0, 1), atol=1e-12)
+
+
+@all_three
+def test_pitch_raises_the_camera(camera: Camera) -> None:
+    """Positive pitch goes up by so many degrees, negative down."""
+    x, y, z = np.array(camera.position) - CENTRE
+    elevation = np.degrees(np.arctan2(z, np.hypot(x, y)))
+    for pitch in (20.0, -20.0):
+        x, y, z = np.array(orbit(camera, DOMAIN, 70, pitch).position) - CENTRE
+        assert np.degrees(np.arctan2(z, np.hypot(x, y))) == pytest.approx(elevation + pitch)
+
+
+@both
+@pytest.mark.parametrize("pixels_per_voxel", [1.0, 2.0])
+def test_a_working_pixel_is_a_voxel_wide_at_the_centre(camera: Camera, pixels_per_voxel: float) -> None:
+    """One voxel across or up at the domain's centre is about one pixel (or as many as asked for)."""
+    small = working_picture(camera, DOMAIN, pixels_per_voxel).camera
+    h = DOMAIN.voxel_size
+    origin, _ = project(small, CENTRE)
+    for step in ((h, 0, 0), (0, 0, h)):
+        moved, _ = project(small, CENTRE + np.array(step))
+        assert np.linalg.norm(moved - origin) == pytest.approx(pixels_per_voxel, rel=0.05)
+
+
+def test_a_working_pixel_is_a_voxel_wide_for_voxels_of_metres() -> None:
+    """The width of a working pixel does not depend on the unit: an orthographic view of a volcano's plume."""
+    scale = 40.0
+    domain = Domain((-24, -24, 0), (24, 24, 64), DOMAIN.resolution)
+    rows = np.array(ORTHOGRAPHIC.matrix)
+    rows[:3, 3] *= scale
+    camera = replace(ORTHOGRAPHIC, matrix=rows.tolist(), fx=103 / scale, fy=103 / scale)
+    small, large = working_picture(ORTHOGRAPHIC, DOMAIN).camera, working_picture(camera, domain).camera
+    assert large.size == small.size
+
+
+@all_three
+def test_points_fall_to_the_same_place_of_both_pictures(camera: Camera) -> None:
+    """A full picture's pixel, moved and scaled like the cut, is the small camera's pixel."""
+    work = working_picture(camera, DOMAIN)
+    full, depth = project(camera, points())
+    small, small_depth = project(work.camera, points())
+    shrink = np.array(work.camera.size) / (work.width, work.height)
+    np.testing.assert_allclose(small, (full - (work.left, work.top)) * shrink, atol=1e-9)
+    np.testing.assert_allclose(small_depth, depth)
+    assert (small >= 0).all()
+    assert (small <= work.camera.size).all()
+
+
+@both
+def test_the_cut_shows_what_the_small_camera_sees(camera: Camera) -> None:
+    """A picture whose values are its own coordinates, cut, reads right at the projections of world points."""
+    work = working_picture(camera, DOMAIN)
+    width, height = camera.size
+    y, x = np.mgrid[:height, :width] + 0.5
+    cut = work.cut(np.stack([x, y], -1).astype(np.float32))
+    columns, rows = work.camera.size
+    assert cut.shape == (rows, columns, 2)
+    small_y, small_x = np.mgrid[:rows, :columns] + 0.5
+    across, down = work.width / columns, work.height / rows
+    np.testing.assert_allclose(cut[..., 0], work.left + small_x * across, atol=0.05)
+    np.testing.assert_allclose(cut[..., 1], work.top + small_y * down, atol=0.05)
+
+
+@both
+def test_coarse_footage_is_not_enlarged(camera: Camera) -> None:
+    """Pixels wider than voxels stay as they are."""
+    work = working_picture(camera.resized(20, 28), DOMAIN)
+    assert work.camera.size == (work.width, work.height)
+    assert work.width <= 20
+
+
+@both
+def test_a_part_outside_the_picture_is_left_out(camera: Camera) -> None:
+    """A domain that reaches beyond the picture gives a working picture inside it."""
+    half = replace(camera, cx=camera.cx + 70)
+    work = working_picture(half, DOMAIN)
+    assert work.left >= 0
+    assert work.left + work.width <= camera.size[0]
+    assert work.width < working_picture(camera, DOMAIN).width
+
+
+@both
+def test_a_domain_outside_the_view_is_refused(camera: Camera) -> None:
+    """Beside the picture: a sentence that says so."""
+    beside = Domain((9.4, -0.6, 0), (10.6, 0.6, 1.6), (24, 24, 32))
+    with pytest.raises(CameraError, match="does not see the domain"):
+        working_picture(camera, beside)
+
+
+def test_a_domain_behind_the_camera_is_refused() -> None:
+    """Behind a perspective camera there is nothing to see."""
+    behind = Domain((-0.6, -9.6, 0), (0.6, -8.4, 1.6), (24, 24, 32))
+    with pytest.raises(CameraError, match="does not see the domain"):
+        working_picture(PERSPECTIVE, behind)

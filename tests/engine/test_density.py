@@ -1,0 +1,298 @@
+"""Density from one picture: hull, depth profile, fit and descent, and what is refused."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from smokelift.background import Plate
+from smokelift.density import Density, DensitySettings, reconstruct_density
+from smokelift.density.hull import project_voxels, visual_hull
+from smokelift.density.multiplicative import fit_multiplicative
+from smokelift.density.profile import depth_profile
+from smokelift.render import Renderer, render, scene_sun
+from smokelift.scene import Background, Camera, Medium, Scene
+
+QUICK = DensitySettings(fit_iterations=4, descent_iterations=6)
+FRONT = Camera.look_at((0, -4, 0.8), (0, 0, 0.8), fov_y_degrees=30, size=(24, 32)).matrix
+GRID = Camera("orthographic", FRONT, (24, 32), 20.0, 20.0, 12.0, 16.0)
+"""Sees each column of voxels along y in one pixel of its own."""
+
+
+@pytest.fixture(scope="module")
+def small(plume) -> Scene:
+    """The plume's scene with a picture as fine as the grid."""
+    return replace(plume.scene, camera=plume.scene.camera.resized(30, 42), clip=None)
+
+
+def noisy_plate(picture: np.ndarray) -> Plate:
+    """A background known to one step of 8 bits."""
+    rows, columns = picture.shape[:2]
+    return Plate(picture.astype(np.float32), np.ones((rows, columns), np.float32), np.full(3, 1e-3, np.float32))
+
+
+# hull
+
+
+def test_voxels_seen_by_no_smoke_pixel_are_out(plume) -> None:
+    """A single smoky pixel allows its own columns of voxels and the nearest, and nothing else."""
+    projection = project_voxels(GRID, plume.scene.domain)
+    mask = np.zeros((32, 24), np.bool_)
+    mask[10, 7] = True
+    hull = visual_hull(mask, projection)
+    column = hull.any(1)
+    assert column[7, 31 - 10]
+    assert hull[7, :, 31 - 10].all()
+    x, z = np.nonzero(column)
+    assert (np.abs(x - 7) <= 2).all()
+    assert (np.abs(z - 21) <= 2).all()
+
+
+def test_no_smoke_pixel_no_hull(plume) -> None:
+    """An empty mask rules all voxels out."""
+    projection = project_voxels(GRID, plume.scene.domain)
+    assert not visual_hull(np.zeros((32, 24), np.bool_), projection).any()
+
+
+@pytest.mark.parametrize("camera", ["grid", "scene"])
+def test_every_voxel_of_the_smoke_is_in(plume, small, camera) -> None:
+    """The picture's own smoke never falls out of the hull that its mask allows."""
+    scene = replace(small, camera=GRID) if camera == "grid" else small
+    density = plume.densities[1]
+    mask = render(density, scene).max(-1) > 0
+    hull = visual_hull(mask, project_voxels(scene.camera, scene.domain))
+    assert hull[density > 0].all()
+    assert hull.mean() < 0.7
+
+
+def test_voxels_outside_the_picture_are_out(plume) -> None:
+    """What no picture shows cannot be reconstructed, whatever the mask."""
+    half = replace(GRID, size=(12, 32))
+    hull = visual_hull(np.ones((32, 12), np.bool_), project_voxels(half, plume.scene.domain))
+    assert hull[:12].all()
+    assert not hull[12:].any()
+
+
+# profile
+
+
+def amount_of(width: int) -> np.ndarray:
+    """A picture of a pillar so many pixels wide."""
+    amount = np.zeros((32, 24), np.float32)
+    amount[:, 12 - width // 2 : 12 + width // 2] = 1
+    return amount
+
+
+def test_the_profile_has_unit_integral(plume) -> None:
+    """Along the depth the profile adds up to one, so that the picture's amounts are kept."""
+    domain = plume.scene.domain
+    total = depth_profile(amount_of(8), GRID, domain).sum(1) * domain.voxel_size
+    np.testing.assert_allclose(total, 1, rtol=0.03)
+
+
+def test_wider_rows_are_deeper(plume) -> None:
+    """The smoke's depth at each height follows its width there."""
+    domain = plume.scene.domain
+    amount = amount_of(4)
+    amount[:16] = amount_of(12)[:16]
+    profile = depth_profile(amount, GRID, domain)
+    y = (np.arange(24) - 11.5) * domain.voxel_size
+    depth = np.sqrt((profile * y[None, :, None] ** 2).sum(1) / profile.sum(1))[12]
+    # rows count from the top, voxels from the bottom; the spread is blurred near the step
+    low, high = depth[:10].mean(), depth[-10:].mean()
+    assert high == pytest.approx(3 * low, rel=0.2)
+    assert low == pytest.approx(4 * domain.voxel_size / np.sqrt(12), rel=0.2)
+
+
+def test_the_profile_does_not_mind_the_amount(plume) -> None:
+    """Thicker smoke of the same outline has the same profile."""
+    profiles = [depth_profile(amount_of(8) * scale, GRID, plume.scene.domain) for scale in (1, 50)]
+    np.testing.assert_allclose(profiles[1], profiles[0], rtol=1e-4)
+
+
+# fit and descent
+
+
+def test_the_multiplicative_fit_gets_better(plume, small) -> None:
+    """More iterations never make the picture worse, and a start of half the density is nearly mended."""
+    target = render(plume.densities[1], small)
+    background = np.zeros((42, 30, 3), np.float32)
+    renderer = Renderer(small.camera, small.domain, small.medium, scene_sun(small.lights), background, "single")
+    losses = [
+        fit_multiplicative(
+            renderer, target, background, 0.5 * plume.densities[1],
+            project_voxels(small.camera, small.domain), np.ones((42, 30), np.float32), 1e-3, count, 0.0,
+        ).loss
+        for count in range(6)
+    ]  # fmt: skip
+    assert all(after <= before for before, after in itertools.pairwise(losses))
+    assert losses[-1] < 0.1 * losses[0]
+
+
+def test_descent_never_raises_the_loss(plume, small) -> None:
+    """Each further step leaves the picture as near or nearer."""
+    target = render(plume.densities[1], small)
+    settings = replace(QUICK, fit_iterations=1, tolerance=0.0)
+    results = [
+        reconstruct_density(target, small, settings=replace(settings, descent_iterations=count)).figures
+        for count in range(8)
+    ]
+    losses = [figures["loss"] for figures in results]
+    assert [figures["iterations"] for figures in results] == list(range(1, 9))
+    assert all(after <= before for before, after in itertools.pairwise(losses))
+    assert losses[-1] < 0.5 * losses[0]
+
+
+def test_the_figures_are_those_of_the_density(plume, small) -> None:
+    """Loss and PSNR are what a render of the result shows."""
+    target = render(plume.densities[1], small)
+    found = reconstruct_density(target, small, settings=QUICK)
+    error = np.square(render(found.values, small) - target, dtype=np.float64)
+    assert found.figures["loss"] == pytest.approx(error.sum(), rel=1e-3)
+    assert found.figures["psnr"] == pytest.approx(-10 * np.log10(error.mean()), abs=0.01)
+    assert found.figures["hull_share"] == pytest.approx(found.hull.mean())
+
+
+@pytest.mark.parametrize("factor", [10.0, 0.1])
+def test_the_unit_of_density_does_not_matter(plume, small, factor) -> None:
+    """Ten times the extinction gives a tenth of the density, to a hundredth of its peak."""
+    target = render(plume.densities[1], small)
+    medium = small.medium
+    other = replace(small, medium=replace(medium, extinction=factor * medium.extinction))
+    usual = reconstruct_density(target, small, settings=QUICK).values
+    scaled = reconstruct_density(target, other, settings=QUICK).values
+    assert np.abs(scaled * factor - usual).max() <= 0.01 * usual.max()
+
+
+@pytest.mark.parametrize("scattering", ["single", "unshadowed", "absorption"])
+def test_every_model_of_scattering_is_met(plume, small, scattering) -> None:
+    """A picture made with a model is found again with it, before a dark wall."""
+    scene = replace(small, medium=Medium(extinction=4.0), background=Background(color=(0.1, 0.1, 0.1)))
+    target = render(plume.densities[1], scene, scattering=scattering)
+    found = reconstruct_density(target, scene, settings=replace(QUICK, scattering=scattering))
+    assert found.figures["psnr"] >= 35
+    assert found.values.sum() == pytest.approx(plume.densities[1].sum(), rel=0.15)
+
+
+def test_an_initial_density_is_used(plume, small) -> None:
+    """From the truth, nothing moves far; the depth that one picture cannot know survives."""
+    truth = plume.densities[1]
+    target = render(truth, small)
+    found = reconstruct_density(target, small, truth, QUICK).values
+    assert np.abs(found - truth).max() < 0.1 * truth.max()
+
+
+def test_the_result_is_inside_the_hull(plume, small) -> None:
+    """Not negative, finite, and zero outside the hull."""
+    found = reconstruct_density(render(plume.densities[1], small), small, settings=QUICK)
+    assert found.values.dtype == np.float32
+    assert np.isfinite(found.values).all()
+    assert found.values.min() >= 0
+    assert not found.values[~found.hull].any()
+
+
+@pytest.mark.parametrize("method", ["default", "paper"])
+def test_an_empty_picture_gives_zeros(small, method) -> None:
+    """No smoke, no density, even from a first guess that has some."""
+    nothing = np.zeros((42, 30, 3), np.float32)
+    guess = np.ones(small.domain.resolution, np.float32)
+    for initial in (None, guess):
+        found = reconstruct_density(nothing, small, initial, DensitySettings(method=method))
+        assert not found.values.any()
+        assert found.figures["hull_share"] == 0
+
+
+def test_the_papers_descent_goes_on_from_its_own_result(plume, small) -> None:
+    """A second run that starts where the first ended does not lead away from the picture."""
+    target = render(plume.densities[1], small)
+    settings = DensitySettings(method="paper", descent_iterations=20)
+    first = reconstruct_density(target, small, settings=settings)
+    second = reconstruct_density(target, small, first.values, settings)
+    assert second.figures["loss"] <= first.figures["loss"]
+
+
+def test_the_papers_descent_lowers_the_loss(plume, small) -> None:
+    """The faithful loop gets nearer and stays non-negative."""
+    target = render(plume.densities[1], small)
+    found = [
+        reconstruct_density(target, small, settings=DensitySettings(method="paper", descent_iterations=count))
+        for count in (0, 5, 15)
+    ]
+    losses = [density.figures["loss"] for density in found]
+    assert losses[0] > losses[1] > losses[2]
+    assert found[-1].values.min() >= 0
+
+
+# textured background
+
+
+def recovered_depth(density: np.ndarray, scene: Scene) -> np.ndarray:
+    """Optical depth of every pixel's ray."""
+    clear = replace(scene, lights=(), background=Background(color=(1.0, 1.0, 1.0)))
+    return -np.log(render(density, clear, scattering="absorption")[..., 0])
+
+
+@pytest.mark.parametrize("scattering", ["single", "unshadowed", "absorption"])
+def test_a_pattern_behind_the_smoke_does_not_print_through(plume, small, scattering) -> None:
+    """The error of the optical depth found before a striped wall has hardly anything to do with the stripes.
+
+    The stripes are darker than the smoke: where both look alike, one picture cannot tell them apart.
+    """
+    rows, columns = np.mgrid[:42, :30]
+    pattern = 0.1 + 0.08 * np.sign(np.sin(1.3 * columns + 0.4 * rows))
+    plate = noisy_plate(np.repeat(pattern[..., None], 3, 2))
+    medium = Medium(extinction=4.0, albedo=0.9)
+    scene = replace(small, medium=medium, background=None)
+    renderer = Renderer(scene.camera, scene.domain, medium, scene_sun(scene.lights), plate.image, scattering)
+    target = renderer.image(plume.densities[1])
+    found: Density = reconstruct_density(target, scene, settings=replace(QUICK, scattering=scattering), plate=plate)
+    assert found.figures["psnr"] >= 35
+    truth = recovered_depth(plume.densities[1], scene)
+    inside = truth > 0.1
+    error = (recovered_depth(found.values, scene) - truth)[inside]
+    assert abs(np.corrcoef(error, pattern[inside])[0, 1]) < 0.25
+    # and the error is small against the smoke itself
+    assert error.std() < 0.2 * truth[inside].mean()
+
+
+# what is refused
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_picture_that_is_not_finite_is_refused(small, value) -> None:
+    """A NaN would spread through everything."""
+    picture = np.zeros((42, 30, 3), np.float32)
+    picture[3, 4, 1] = value
+    with pytest.raises(ValueError, match="not finite"):
+        reconstruct_density(picture, small)
+
+
+@pytest.mark.parametrize("shape", [(30, 42, 3), (42, 30), (42, 30, 4)])
+def test_a_picture_of_another_shape_is_refused(small, shape) -> None:
+    """The sentence names both shapes."""
+    with pytest.raises(ValueError, match=r"\(42, 30, 3\)"):
+        reconstruct_density(np.zeros(shape, np.float32), small)
+
+
+@pytest.mark.parametrize(
+    ("initial", "words"),
+    [
+        (np.full((24, 24, 32), -1e-3), "not negative"),
+        (np.full((24, 24, 32), np.nan), "finite"),
+        (np.zeros((24, 24, 31)), "shape"),
+    ],
+)
+def test_a_bad_first_guess_is_refused(small, initial, words) -> None:
+    """Negative, not finite, or of another shape."""
+    with pytest.raises(ValueError, match=words):
+        reconstruct_density(np.zeros((42, 30, 3), np.float32), small, initial)
+
+
+@pytest.mark.parametrize("missing", ["camera", "domain"])
+def test_a_scene_without_camera_or_domain_is_refused(small, missing) -> None:
+    """There is nothing to reconstruct into, or from."""
+    with pytest.raises(ValueError, match="camera and a domain"):
+        reconstruct_density(np.zeros((42, 30, 3), np.float32), replace(small, **{missing: None}))
