@@ -1,0 +1,58 @@
+"""Smokelift: one ordinary video of smoke in, a 3D, moving, relightable volume out.
+
+The data flows clip -> shot -> density (renderer) <-> velocity, transport -> sequence.
+"""
+
+from smokelift import metrics
+from smokelift.clip import Clip
+from smokelift.density import Density, DensitySettings, reconstruct_density
+from smokelift.reconstruct import Frame, reconstruct
+from smokelift.render import render, render_gradient
+from smokelift.scene import (
+    Background,
+    Camera,
+    ClipSource,
+    DirectionalLight,
+    Domain,
+    EnvironmentLight,
+    Medium,
+    PointLight,
+    Scene,
+    View,
+)
+from smokelift.sequence import Sequence
+from smokelift.settings import Settings
+from smokelift.transport import Velocity, advect, project
+from smokelift.velocity import VelocitySettings, estimate_velocity
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "Background",
+    "Camera",
+    "Clip",
+    "ClipSource",
+    "Density",
+    "DensitySettings",
+    "DirectionalLight",
+    "Domain",
+    "EnvironmentLight",
+    "Frame",
+    "Medium",
+    "PointLight",
+    "Scene",
+    "Sequence",
+    "Settings",
+    "Velocity",
+    "VelocitySettings",
+    "View",
+    "__version__",
+    "advect",
+    "estimate_velocity",
+    "metrics",
+    "project",
+    "reconstruct",
+    "reconstruct_density",
+    "render",
+    "render_gradient",
+]

@@ -1,0 +1,158 @@
+"""The main job (algorithms 1 and 4): a clip in, one frame of density and velocity after the other out.
+
+rho_1, rho_2 from their pictures alone; then for t = 3, 4, ...
+    u~_t   = Project(advect(u_t-1, u_t-1))          prediction of the velocity
+    rho~_t = advect(rho_t-1, u~_t)                  prediction of the density
+    rho_t  = Reconstruction(picture_t, rho~_t)      correction by the renderer
+    u_t    = VelRecon(rho_t-1, rho_t)               correction of the velocity
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from smokelift.clip import Clip
+from smokelift.density import Density, depth_guess, reconstruct_density
+from smokelift.render.renderer import Image, Volume
+from smokelift.scene import Scene
+from smokelift.sequence import SequenceWriter
+from smokelift.settings import Settings
+from smokelift.shot import Shot, prepare_shot
+from smokelift.transport import Velocity, advect
+from smokelift.velocity import estimate_velocity, predict_velocity
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """One reconstructed frame.
+
+    Attributes
+    ----------
+    number
+        1 for the clip's first frame.
+    density : (nx, ny, nz) float32
+    velocity
+        In m/s, of the smoke that arrives in this frame (the first frame has the second's).
+    figures
+        Measures of the fit and seconds spent.
+    """
+
+    number: int
+    density: Volume
+    velocity: Velocity
+    figures: Mapping[str, Any]
+
+
+def reconstruct(
+    clip: Clip,
+    scene: Scene,
+    settings: Settings | None = None,
+    out: str | Path | None = None,
+    *,
+    npz: bool = False,
+    resume: bool = False,
+    shot: Shot | None = None,
+) -> Iterator[Frame]:
+    """Reconstruct a clip frame by frame.
+
+    Parameters
+    ----------
+    clip
+        The footage.
+    scene
+        Whatever is known of the shot; the rest is estimated (see `prepare_shot`).
+    settings
+        `Settings.preset` of a quality and a method; balanced by default.
+    out
+        Directory for the sequence; without it frames are only yielded.
+    npz
+        Write NumPy twins as well.
+    resume
+        Go on from the frames in ``out``. The frames that are there are not yielded again.
+    shot
+        The result of `prepare_shot`, if it has been computed already.
+
+    Yields
+    ------
+    Frame
+        In the clip's order, each already written when it is yielded.
+
+    Raises
+    ------
+    ValueError
+        For bad input (`SceneError`, `ClipError`, `SequenceError` are ValueErrors too).
+    """
+    settings = settings or Settings.preset()
+    shot = shot or prepare_shot(clip, scene, settings)
+    settings = replace(settings, density=replace(settings.density, scattering=shot.scattering))
+    if out is None:
+        yield from _frames(clip, shot, settings, None)
+        return
+    with SequenceWriter(
+        out, shot.scene, settings.as_dict(), npz=npz, resume=resume, background=shot.estimated_background
+    ) as writer:
+        state = writer.state
+        start = None
+        if state is not None:
+            assert shot.scene.domain is not None
+            velocity = Velocity(state.velocity, shot.scene.domain.voxel_size)
+            start = Frame(state.number, state.density, velocity, {})
+        elif writer.finished:
+            return
+        for frame in _frames(clip, shot, settings, start):
+            if frame.number not in writer.finished:
+                writer.write(frame.number, frame.density, frame.velocity.faces, frame.figures)
+                yield frame
+
+
+def _frames(clip: Clip, shot: Shot, settings: Settings, start: Frame | None) -> Iterator[Frame]:
+    """Frames after ``start``; the first is held back until the second gives it a velocity."""
+    assert shot.scene.domain is not None
+    domain = shot.scene.domain
+    dt = 1.0 / clip.fps
+    before = start
+    for index in range(start.number if start else 0, len(clip)):
+        began = time.perf_counter()
+        image = shot.working.cut(clip.frame(index))
+        predicted = None
+        initial = None
+        if before is not None and index >= 2:
+            predicted = predict_velocity(before.velocity, dt, settings.velocity.closed)
+            initial = advect(before.density, predicted, dt)
+        density = _corrected(image, shot, settings, initial)
+        fitted = time.perf_counter()
+        velocity = Velocity.zero(domain.resolution, domain.voxel_size)
+        if before is not None:
+            prediction = predicted if settings.method == "default" else None
+            velocity = estimate_velocity(
+                before.density, density.values, dt, domain.voxel_size, settings.velocity, prediction=prediction
+            )
+        done = time.perf_counter()
+        figures = {
+            **density.figures,
+            "mass": float(density.values.sum(dtype=np.float64)) * domain.voxel_size**3,
+            "velocity": dict(velocity.figures),
+            "seconds_density": fitted - began,
+            "seconds_velocity": done - fitted,
+        }
+        frame = Frame(index + 1, density.values, velocity, figures)
+        if index == 1 and before is not None:
+            yield replace(before, velocity=velocity)
+        if index > 0 or len(clip) == 1:
+            yield frame
+        before = frame
+
+
+def _corrected(image: Image, shot: Shot, settings: Settings, transported: Volume | None) -> Density:
+    """The frame's density from its picture and the density carried along."""
+    scene, share = shot.small_scene, settings.transport
+    if settings.method == "default" and transported is not None and share < 1:
+        guess = depth_guess(image, scene, settings.density, shot.plate)
+        transported = np.float32(1 - share) * guess + np.float32(share) * transported
+    return reconstruct_density(image, scene, transported, settings.density, plate=shot.plate)

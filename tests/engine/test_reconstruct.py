@@ -1,0 +1,258 @@
+"""The whole loop on a tiny plume: it fits its footage, moves upward, and can be cut off and gone on with."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from smokelift.clip import Clip
+from smokelift.density import DensitySettings
+from smokelift.density.hull import project_voxels
+from smokelift.metrics import psnr
+from smokelift.reconstruct import Frame, reconstruct
+from smokelift.render import render
+from smokelift.scene import Scene
+from smokelift.sequence import Sequence, SequenceError
+from smokelift.settings import Settings
+from smokelift.vdb import VdbUnavailable, read_vdb, vdb_module
+
+
+def frames_of(scene: Scene, settings: Settings, out: Path | None = None, **options: bool) -> list[Frame]:
+    assert scene.clip is not None
+    with Clip.open(scene.clip) as clip:
+        return list(reconstruct(clip, scene, settings, out, **options))
+
+
+def cut_off(scene: Scene, settings: Settings, out: Path, count: int) -> None:
+    """A run that ends after so many frames."""
+    assert scene.clip is not None
+    with Clip.open(scene.clip) as clip:
+        frames = reconstruct(clip, scene, settings, out, npz=True)
+        for _ in range(count):
+            next(frames)
+        assert inspect.isgenerator(frames)
+        frames.close()
+
+
+def saved(directory: Path) -> Iterator[tuple[str, np.ndarray]]:
+    """Every array of every NumPy file, by name."""
+    for path in sorted(directory.glob("*.npz")):
+        with np.load(path) as data:
+            for name in data.files:
+                yield f"{path.name}/{name}", data[name]
+
+
+@pytest.fixture(scope="module")
+def run(plume, draft, tmp_path_factory) -> tuple[list[Frame], Path]:
+    """An uninterrupted run: its frames, and where they were written."""
+    out = tmp_path_factory.mktemp("run") / "out"
+    return frames_of(plume.scene, draft, out, npz=True), out
+
+
+def test_frames_come_in_order(run, plume) -> None:
+    """Numbers from 1, none left out, arrays of the domain's shape."""
+    frames, _ = run
+    assert [frame.number for frame in frames] == [1, 2, 3, 4, 5]
+    for frame in frames:
+        assert frame.density.shape == plume.scene.domain.resolution
+        assert frame.density.dtype == np.float32
+        assert frame.velocity.shape == plume.scene.domain.resolution
+        assert frame.velocity.voxel_size == pytest.approx(plume.scene.domain.voxel_size)
+
+
+def test_the_picture_is_met(run, plume) -> None:
+    """Seen from the camera the reconstruction is the footage, to 35 dB at least in linear light."""
+    frames, _ = run
+    with Clip.open(plume.scene.clip) as clip:
+        for index, frame in enumerate(frames):
+            assert psnr(render(frame.density, plume.scene), clip.frame(index)) >= 35
+            assert frame.figures["psnr"] >= 35
+
+
+def test_the_amount_of_smoke_is_about_right(run, plume) -> None:
+    """One picture bounds the smoke's mass within a factor of two, and the figure says the volume's."""
+    frames, _ = run
+    cell = plume.scene.domain.voxel_size**3
+    for frame, truth in zip(frames, plume.densities, strict=True):
+        assert frame.density.sum() == pytest.approx(truth.sum(), rel=0.5)
+        assert frame.figures["mass"] == pytest.approx(float(frame.density.sum()) * cell, rel=1e-4)
+
+
+def test_there_is_no_smoke_where_the_camera_sees_none(run, plume) -> None:
+    """Density is nowhere negative, and zero in voxels well beside everything that the clip shows."""
+    frames, _ = run
+    projection = project_voxels(plume.scene.camera, plume.scene.domain)
+    with Clip.open(plume.scene.clip) as clip:
+        for index, frame in enumerate(frames):
+            assert frame.density.min() >= 0
+            rows, columns = np.nonzero(clip.frame(index).max(-1) > 0)
+            beside = (
+                (projection.rows < rows.min() - 6)
+                | (projection.rows > rows.max() + 6)
+                | (projection.columns < columns.min() - 6)
+                | (projection.columns > columns.max() + 6)
+            )
+            assert beside.any()
+            assert frame.density[beside].max() == 0
+
+
+def test_the_first_frame_has_the_seconds_velocity(run) -> None:
+    """Nothing comes before the first frame, so it moves as the second does."""
+    frames, _ = run
+    for first, second in zip(frames[0].velocity.faces, frames[1].velocity.faces, strict=True):
+        np.testing.assert_array_equal(first, second)
+
+
+def test_rising_smoke_has_upward_velocity(run, plume) -> None:
+    """The mean velocity of the smoke points up, at about the blob's speed."""
+    frames, _ = run
+    with Clip.open(plume.scene.clip) as clip:
+        speed = 0.075 * clip.fps
+    for frame in frames:
+        mean = np.average(frame.velocity.centres().reshape(-1, 3), axis=0, weights=frame.density.ravel())
+        assert 0.5 * speed < mean[2] < 1.5 * speed
+        assert np.abs(mean[:2]).max() < 0.3 * speed
+
+
+def test_what_is_written_is_what_was_yielded(run, plume) -> None:
+    """The directory opens as a complete sequence with the same arrays, scene and settings."""
+    frames, out = run
+    sequence = Sequence.open(out)
+    assert sequence.complete
+    assert sequence.frames == (1, 2, 3, 4, 5)
+    assert sequence.scene == plume.scene
+    assert sequence.settings["quality"] == "draft"
+    for frame in frames:
+        assert (out / f"smoke_{frame.number:04d}.npz").is_file()
+        np.testing.assert_array_equal(sequence.density(frame.number), frame.density)
+        np.testing.assert_allclose(sequence.velocity(frame.number), frame.velocity.centres())
+        assert sequence.figures(frame.number)["psnr"] == pytest.approx(frame.figures["psnr"])
+
+
+def test_vdb_files_hold_the_same(run, plume) -> None:
+    """The OpenVDB files hold the densities at 16 bits."""
+    try:
+        vdb_module()
+    except VdbUnavailable as missing:
+        pytest.skip(str(missing))
+    frames, out = run
+    for frame in frames:
+        density, _ = read_vdb(out / f"smoke_{frame.number:04d}.vdb", plume.scene.domain.resolution)
+        np.testing.assert_allclose(density, frame.density, rtol=1e-3, atol=1e-6)
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_a_run_that_was_cut_off_goes_on_exactly(run, plume, draft, tmp_path, count) -> None:
+    """Resuming gives the rest, and the files are those of an uninterrupted run bit for bit."""
+    _, uninterrupted = run
+    out = tmp_path / "out"
+    cut_off(plume.scene, draft, out, count)
+    assert Sequence.open(out).frames == tuple(range(1, count + 1))
+    assert not Sequence.open(out).complete
+    rest = frames_of(plume.scene, draft, out, npz=True, resume=True)
+    assert [frame.number for frame in rest] == list(range(count + 1, 6))
+    wanted, found = list(saved(uninterrupted)), list(saved(out))
+    assert [name for name, _ in found] == [name for name, _ in wanted]
+    for (name, value), (_, other) in zip(wanted, found, strict=True):
+        np.testing.assert_array_equal(other, value, err_msg=name)
+
+
+def test_an_estimated_background_resumes_and_moves(plume, draft, tmp_path) -> None:
+    """What was estimated is kept with the sequence: the run goes on, and the directory can be moved."""
+    heights = np.linspace(-0.3, 1.9, 8)
+    filmed = plume.write(tmp_path / "clip", [plume.blob(plume.scene, height) for height in heights])
+    scene = Scene(clip=filmed.clip)
+    settings = replace(draft, resolution=(16, 16, 24))
+    whole = frames_of(scene, settings, tmp_path / "whole", npz=True)
+    cut_off(scene, settings, tmp_path / "out", 3)
+    assert [f.number for f in frames_of(scene, settings, tmp_path / "out", npz=True, resume=True)] == [4, 5, 6, 7, 8]
+    (tmp_path / "out").rename(tmp_path / "moved")
+    sequence = Sequence.open(tmp_path / "moved")
+    for frame in whole:
+        np.testing.assert_array_equal(sequence.density(frame.number), frame.density)
+    assert render(sequence.density(4), sequence.scene).shape == (56, 40, 3)
+
+
+def test_an_exception_of_the_caller_leaves_what_can_be_resumed(plume, draft, tmp_path) -> None:
+    """Whoever uses the frames may fail: the finished ones stay, and the directory is free again."""
+    out = tmp_path / "out"
+    with Clip.open(plume.scene.clip) as clip:
+        frames = reconstruct(clip, plume.scene, draft, out, npz=True)
+        try:
+            for _ in frames:
+                raise RuntimeError
+        except RuntimeError:
+            assert inspect.isgenerator(frames)
+            frames.close()
+    assert Sequence.open(out).frames == (1,)
+    assert frames_of(plume.scene, draft, out, npz=True, resume=True)[-1].number == 5
+
+
+def test_resuming_what_is_complete_yields_nothing(run, plume, draft) -> None:
+    """There is nothing left to do, and nothing is changed."""
+    _, out = run
+    before = {path.name: path.read_bytes() for path in out.glob("smoke_*")}
+    assert frames_of(plume.scene, draft, out, npz=True, resume=True) == []
+    assert {path.name: path.read_bytes() for path in out.glob("smoke_*")} == before
+    assert Sequence.open(out).complete
+
+
+def test_a_second_run_needs_resume(run, plume, draft) -> None:
+    """Finished frames are not overwritten."""
+    _, out = run
+    with pytest.raises(SequenceError, match="--resume"):
+        frames_of(plume.scene, draft, out, npz=True)
+
+
+def test_other_settings_do_not_resume(run, plume, draft) -> None:
+    """A run goes on only as it began; the sentence names the difference."""
+    _, out = run
+    with pytest.raises(SequenceError, match=r"transport was .* and is now 0\.125"):
+        frames_of(plume.scene, replace(draft, transport=0.125), out, npz=True, resume=True)
+
+
+def test_frames_without_smoke_are_empty(plume, draft, tmp_path) -> None:
+    """Smoke that comes, goes and comes again: zeros in between, and no failure."""
+    nothing = np.zeros_like(plume.densities[0])
+    clip = [nothing, nothing, plume.densities[0], nothing, nothing, plume.densities[1], plume.densities[2]]
+    frames = frames_of(plume.write(tmp_path / "clip", clip), draft, tmp_path / "out", npz=True)
+    assert [bool(frame.density.any()) for frame in frames] == [bool(density.any()) for density in clip]
+    for frame in frames:
+        assert all(np.isfinite(face).all() for face in frame.velocity.faces)
+        assert (frame.figures["hull_share"] > 0) == bool(clip[frame.number - 1].any())
+
+
+def test_a_clip_of_one_frame_works(plume, draft, tmp_path) -> None:
+    """One picture gives one frame at rest."""
+    scene = plume.write(tmp_path / "clip", plume.densities[:1])
+    (frame,) = frames_of(scene, draft, tmp_path / "out", npz=True)
+    assert frame.number == 1
+    assert frame.figures["psnr"] >= 35
+    assert not any(face.any() for face in frame.velocity.faces)
+    assert Sequence.open(tmp_path / "out").frames == (1,)
+
+
+def test_a_clip_of_two_frames_works(plume, draft, tmp_path) -> None:
+    """The shortest clip with a velocity."""
+    frames = frames_of(plume.write(tmp_path / "clip", plume.densities[:2]), draft)
+    assert [frame.number for frame in frames] == [1, 2]
+    np.testing.assert_array_equal(frames[0].velocity.faces[2], frames[1].velocity.faces[2])
+
+
+def test_the_papers_method_lowers_the_loss(plume, tmp_path) -> None:
+    """Each frame's picture is nearer after the paper's descent than after its first step."""
+    scene = plume.write(tmp_path / "clip", plume.densities[:3])
+    paper = Settings.preset("draft", "paper")
+    losses = {}
+    for steps in (1, 12):
+        settings = replace(paper, density=DensitySettings(method="paper", descent_iterations=steps))
+        frames = frames_of(scene, settings)
+        assert [frame.number for frame in frames] == [1, 2, 3]
+        losses[steps] = [frame.figures["loss"] for frame in frames]
+        assert all(frame.density.min() >= 0 for frame in frames)
+    assert all(late < early for early, late in zip(losses[1], losses[12], strict=True))

@@ -1,0 +1,69 @@
+"""Settings: presets differ as they say, bad values are refused, and JSON can hold them."""
+
+from __future__ import annotations
+
+import itertools
+import json
+from dataclasses import FrozenInstanceError
+from typing import Any
+
+import pytest
+
+from smokelift.settings import LONGEST_SIDE, METHODS, QUALITIES, Settings
+
+
+def test_better_qualities_cost_more() -> None:
+    """Resolution and iterations rise from draft to fine."""
+    presets = [Settings.preset(quality) for quality in QUALITIES]
+    costs = [(LONGEST_SIDE[p.quality], p.density.fit_iterations, p.density.descent_iterations) for p in presets]
+    for less, more in itertools.pairwise(costs):
+        assert all(a < b for a, b in zip(less, more, strict=True))
+
+
+def test_the_default_is_balanced() -> None:
+    """What nobody chooses is the middle."""
+    assert (Settings.preset().quality, Settings.preset().method) == ("balanced", "default")
+    assert Settings.preset().resolution is None
+
+
+def test_paper_means_all_parts() -> None:
+    """The paper's method is used for density and velocity, with nothing but the transported first guess."""
+    paper = Settings.preset("draft", "paper")
+    assert paper.method == paper.density.method == paper.velocity.method == "paper"
+    assert paper.transport == 1.0
+    usual = Settings.preset("draft")
+    assert usual.method == usual.density.method == usual.velocity.method == "default"
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("quality", QUALITIES)
+def test_json_holds_all_settings(quality: Any, method: Any) -> None:
+    """A sequence keeps its settings as JSON, nested and complete."""
+    settings = Settings.preset(quality, method, (16, 16, 24))
+    read = json.loads(json.dumps(settings.as_dict(), allow_nan=False))
+    assert (read["quality"], read["method"], read["resolution"]) == (quality, method, [16, 16, 24])
+    assert read["density"]["descent_iterations"] == settings.density.descent_iterations
+    assert read["velocity"]["smoothness"] == settings.velocity.smoothness
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"method": "best"}, "method must be one of default, paper"),
+        ({"quality": "ultra"}, "quality must be one of draft, balanced, fine"),
+        ({"transport": 1.5}, "transport must be a number from 0 to 1"),
+        ({"transport": float("nan")}, "transport must be a number from 0 to 1"),
+        ({"resolution": (7, 64, 64)}, "at least 8 voxels"),
+        ({"resolution": (64, 64)}, "three numbers"),
+    ],
+)
+def test_bad_values_are_refused(values: dict[str, Any], words: str) -> None:
+    """Where they are made, with what was expected."""
+    with pytest.raises(ValueError, match=words):
+        Settings(**values)
+
+
+def test_settings_do_not_change() -> None:
+    """They are frozen."""
+    with pytest.raises(FrozenInstanceError):
+        Settings().transport = 0.1  # type: ignore[misc]

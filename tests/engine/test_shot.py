@@ -1,0 +1,211 @@
+"""Shots: what is given stays, what is missing is estimated with a note each, contradictions are refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from smokelift.clip import Clip
+from smokelift.render.rays import project
+from smokelift.scene import Background, Camera, DirectionalLight, Domain, Medium, Scene
+from smokelift.settings import LONGEST_SIDE, Settings
+from smokelift.shot import Shot, prepare_shot
+
+
+def shot_of(scene: Scene, settings: Settings) -> Shot:
+    assert scene.clip is not None
+    with Clip.open(scene.clip) as clip:
+        return prepare_shot(clip, scene, settings)
+
+
+def bare(scene: Scene) -> Scene:
+    """Nothing but the clip."""
+    return Scene(clip=scene.clip)
+
+
+@pytest.fixture(scope="module")
+def passing(plume, tmp_path_factory) -> Scene:
+    """A clip in which a blob passes so far that every pixel is clear for a while."""
+    heights = np.linspace(-0.3, 1.9, 14)
+    densities = [plume.blob(plume.scene, height) for height in heights]
+    return plume.write(tmp_path_factory.mktemp("passing"), densities)
+
+
+@pytest.fixture(scope="module")
+def guessed(passing, draft) -> Shot:
+    """The shot of the clip alone."""
+    return shot_of(bare(passing), draft)
+
+
+def test_a_complete_scene_stays_as_it_is(plume, draft) -> None:
+    """Everything given: nothing is assumed, nothing noted, nothing changed."""
+    shot = shot_of(plume.scene, draft)
+    assert shot.notes == ()
+    assert shot.scene == plume.scene
+    assert shot.scattering == "single"
+
+
+def test_the_plate_belongs_to_the_small_picture(plume, draft) -> None:
+    """Background and small camera have one size, and the small scene is the scene with that camera."""
+    shot = shot_of(plume.scene, draft)
+    columns, rows = shot.working.camera.size
+    assert shot.plate.image.shape == (rows, columns, 3)
+    assert shot.plate.confidence.shape == (rows, columns)
+    assert shot.small_scene == replace(plume.scene, camera=shot.working.camera)
+
+
+def test_another_resolution_is_taken(plume, draft) -> None:
+    """The settings' resolution comes before the scene's, in the same box."""
+    domain = shot_of(plume.scene, replace(draft, resolution=(12, 12, 16))).scene.domain
+    assert domain == replace(plume.scene.domain, resolution=(12, 12, 16))
+
+
+def test_a_camera_of_other_size_but_same_shape_is_scaled(plume, draft) -> None:
+    """A camera calibrated at half the clip's size means the same view."""
+    scene = replace(plume.scene, camera=plume.scene.camera.resized(20, 28))
+    assert shot_of(scene, draft).scene.camera == plume.scene.camera
+
+
+@pytest.mark.parametrize("word", ["Camera not given", "Domain", "Medium not given", "Light not given", "Background"])
+def test_all_that_a_clip_lacks_is_noted(guessed, word) -> None:
+    """One note for each thing that was assumed."""
+    assert sum(note.startswith(word) for note in guessed.notes) == 1
+    assert len(guessed.notes) == 5
+
+
+def test_a_clip_alone_gives_a_complete_scene(guessed, passing) -> None:
+    """Nothing is left open, and light without a direction casts no shadows."""
+    scene = guessed.scene
+    assert None not in (scene.camera, scene.domain, scene.medium)
+    assert len(scene.lights) == 1
+    assert guessed.scattering == "unshadowed"
+    assert scene.clip == passing.clip
+    with Clip.open(passing.clip) as clip:
+        assert scene.camera.size == clip.size
+
+
+def test_the_background_is_found(guessed) -> None:
+    """The plume passes before black, and every pixel is clear for a while."""
+    assert guessed.plate.image.max() < 0.02
+
+
+def test_the_domain_holds_the_smoke(guessed, passing, draft) -> None:
+    """Every clearly smoky pixel lies in the domain's picture; voxels are cubes, as many as the quality says."""
+    domain = guessed.scene.domain
+    edges = (np.array(domain.max) - domain.min) / domain.resolution
+    np.testing.assert_allclose(edges, edges[0], rtol=1e-6)
+    assert LONGEST_SIDE[draft.quality] <= max(domain.resolution) <= LONGEST_SIDE[draft.quality] + 4
+    pixels, depth = project(guessed.scene.camera, domain.corners())
+    assert (depth > 0).all()
+    with Clip.open(passing.clip) as clip:
+        smoky = np.max([frame.max(-1) for frame in clip], axis=0) > 0.1
+    rows, columns = np.nonzero(smoky)
+    width, height = guessed.scene.camera.size
+    low, high = np.maximum(pixels.min(0), 0), np.minimum(pixels.max(0), (width, height))
+    assert low[0] <= columns.min() + 1
+    assert high[0] >= columns.max()
+    assert low[1] <= rows.min() + 1
+    assert high[1] >= rows.max()
+
+
+def test_a_resolution_shapes_the_guessed_domain(passing, draft) -> None:
+    """Given voxels are kept to the last one, and stay cubes."""
+    domain = shot_of(bare(passing), replace(draft, resolution=(16, 20, 48))).scene.domain
+    assert domain.resolution == (16, 20, 48)
+
+
+def test_only_what_is_missing_is_noted(plume, draft) -> None:
+    """Without medium and light there are two notes."""
+    notes = shot_of(replace(plume.scene, medium=None, lights=()), draft).notes
+    assert [note.split(" not given")[0] for note in notes] == ["Medium", "Light"]
+
+
+def test_pictures_without_a_rate_are_noted(plume, draft) -> None:
+    """The clip's own warning is passed on."""
+    scene = replace(plume.scene, clip=replace(plume.scene.clip, fps=None))
+    (note,) = shot_of(scene, draft).notes
+    assert "24 frames a second" in note
+
+
+def test_a_camera_needs_a_domain(plume, draft) -> None:
+    """A calibrated camera says where the smoke is only together with its box."""
+    with pytest.raises(ValueError, match=r"camera but no \[domain\]"):
+        shot_of(replace(plume.scene, domain=None), draft)
+
+
+def test_a_domain_needs_a_camera(plume, draft) -> None:
+    """A box says nothing about who looks at it."""
+    with pytest.raises(ValueError, match=r"\[domain\] but no \[camera\]"):
+        shot_of(replace(plume.scene, camera=None), draft)
+
+
+def test_a_camera_of_another_shape_is_refused(plume, draft) -> None:
+    """The sentence names both sizes."""
+    camera = Camera.look_at((0, -4, 0.8), (0, 0, 0.8), fov_y_degrees=30, size=(64, 48))
+    with pytest.raises(ValueError, match="64 x 48, the clip's 40 x 56"):
+        shot_of(replace(plume.scene, camera=camera), draft)
+
+
+def test_a_domain_beside_the_picture_is_refused(plume, draft) -> None:
+    """Even one that only passes by a corner of the picture."""
+    domain = Domain((-0.6, -12, 0), (0.6, -10.8, 1.6), (24, 24, 32))
+    with pytest.raises(ValueError, match="see the domain"):
+        shot_of(replace(plume.scene, domain=domain), draft)
+
+
+@pytest.mark.parametrize("given", [True, False])
+def test_a_clip_without_smoke_gives_a_shot(plume, draft, tmp_path, given) -> None:
+    """There is nothing to guess from, and no failure."""
+    scene = plume.write(tmp_path / "clip", [np.zeros_like(plume.densities[0])] * 3)
+    if given:
+        scene = replace(scene, lights=(), medium=None)
+    shot = shot_of(scene if given else bare(scene), draft)
+    assert shot.scene.domain is not None
+    assert np.isfinite(shot.scene.lights[0].irradiance).all()
+
+
+def test_a_single_picture_gives_a_shot(plume, draft, tmp_path) -> None:
+    """One frame is all background, if nobody says otherwise."""
+    scene = plume.write(tmp_path / "clip", plume.densities[:1])
+    assert shot_of(bare(scene), draft).scene.domain is not None
+
+
+def test_brightening_smoke_has_a_bright_source(plume, draft) -> None:
+    """Thick smoke looks at least as bright as the brightest smoke in the clip."""
+    shot = shot_of(replace(plume.scene, lights=()), draft)
+    with Clip.open(plume.scene.clip) as clip:
+        brightest = max(float(frame.max()) for frame in clip)
+    source = shot.scene.medium.albedo / (4 * np.pi) * np.array(shot.scene.lights[0].irradiance)
+    assert 0.7 * brightest < source.max() < 1.5 * brightest
+
+
+def test_darkening_smoke_has_a_dark_source(plume, draft, tmp_path) -> None:
+    """Before a bright wall, thick dark smoke looks no brighter than the darkest smoke in the clip."""
+    sooty = replace(
+        plume.scene,
+        medium=Medium(extinction=8.0, albedo=0.3),
+        lights=(DirectionalLight((0, 0.5, -0.8), (2.0, 2.0, 2.0)),),
+        background=Background(color=(0.8, 0.8, 0.8)),
+    )
+    scene = plume.write(tmp_path / "clip", plume.densities, sooty)
+    shot = shot_of(replace(scene, lights=()), draft)
+    with Clip.open(scene.clip) as clip:
+        darkest = min(float(frame.min()) for frame in clip)
+    source = 0.3 / (4 * np.pi) * np.array(shot.scene.lights[0].irradiance)
+    assert source.max() <= 1.1 * darkest
+    assert source.max() < 0.4
+
+
+def test_smoke_that_scatters_nothing_needs_no_light(plume, draft, tmp_path) -> None:
+    """Albedo 0 is soot: whatever the light, it only darkens, so none has to be guessed."""
+    black = replace(
+        plume.scene,
+        medium=Medium(extinction=8.0, albedo=0.0),
+        lights=(),
+        background=Background(color=(0.8, 0.8, 0.8)),
+    )
+    scene = plume.write(tmp_path / "clip", plume.densities, black)
+    shot = shot_of(scene, draft)
+    assert shot.scene.medium == black.medium
