@@ -29,9 +29,7 @@ CODE = np.float32(1 / 255)
 """One step of 8 bit video: no noise is taken to be smaller."""
 
 _WINDOW = 6.0  # width of the window around a value, in noise: plus and minus three sigma
-_ONE_SIDED = (
-    0.9  # share of the deviations to one side from which on smoke is said to only brighten (or darken)
-)
+_ONE_SIDED = 0.9  # share of the deviations to one side from which on smoke is said to only brighten (or darken)
 _WELL_SUPPORTED = 0.35  # of the samples that the best-supported value has
 _CLEAR = (
     2,
@@ -114,9 +112,7 @@ def estimate_plate(clip: Clip, sample_count: int = 32) -> Plate:
     run = np.minimum(run, ndimage.median_filter(run, 7))
     confidence = np.clip((run - low) / (high - low), 0.0, 1.0)
     # What is less than half certain is filled as a whole: a part of it would spread its smoke.
-    return _plate(
-        _filled(image, np.clip(2.0 * confidence - 1.0, 0.0, 1.0)), confidence.astype(np.float32), sigma
-    )
+    return _plate(_filled(image, np.clip(2.0 * confidence - 1.0, 0.0, 1.0)), confidence.astype(np.float32), sigma)
 
 
 def known_plate(background: npt.ArrayLike, clip: Clip, sample_count: int = 32) -> Plate:
@@ -251,9 +247,7 @@ def _side(samples: npt.NDArray[np.uint16], sigma: float) -> int:
     return -1 if darker > _ONE_SIDED * (brighter + darker) else 0
 
 
-def _clear_value(
-    samples: npt.NDArray[np.uint16], sigma: float, side: int
-) -> tuple[Picture, npt.NDArray[np.int16]]:
+def _clear_value(samples: npt.NDArray[np.uint16], sigma: float, side: int) -> tuple[Picture, npt.NDArray[np.int16]]:
     """Return the background value of each pixel, in sRGB, and how many samples in a row have it at most."""
     colours = _decoded(samples)
     grey = colours.mean(axis=-1)

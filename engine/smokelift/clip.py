@@ -37,10 +37,7 @@ PICTURES_FPS = 24.0
 
 _CACHE_BYTES = 128 * 2**20
 _EXACT = int(
-    Interpolation.BICUBIC
-    | Interpolation.ACCURATE_RND
-    | Interpolation.FULL_CHR_H_INT
-    | Interpolation.FULL_CHR_H_INP
+    Interpolation.BICUBIC | Interpolation.ACCURATE_RND | Interpolation.FULL_CHR_H_INT | Interpolation.FULL_CHR_H_INP
 )
 
 
@@ -81,18 +78,14 @@ class Clip:
         A sentence about what is amiss (a truncated file, say), else None.
     """
 
-    def __init__(
-        self, path: Path, source: _Source, fps: float | None, frames: tuple[int, int] | None
-    ) -> None:
+    def __init__(self, path: Path, source: _Source, fps: float | None, frames: tuple[int, int] | None) -> None:
         self.path = path
         self.fps = source.fps if fps is None else float(fps)
         self.warning = source.warning
         self._source = source
         first, last = (0, source.count - 1) if frames is None else frames
         if not 0 <= first <= last < source.count:
-            raise ClipError(
-                f"{path}: frames {first} to {last} were asked for; it has 0 to {source.count - 1}"
-            )
+            raise ClipError(f"{path}: frames {first} to {last} were asked for; it has 0 to {source.count - 1}")
         self.first = first
         self.frame_count = last - first + 1
         self._cache: OrderedDict[int, Picture] = OrderedDict()
@@ -425,8 +418,7 @@ class _Video:
         size = (self._stream.width, self._stream.height)
         if (frame.width, frame.height) != size:
             raise ClipError(
-                f"{self._path}: changes its picture size from {size[0]} x {size[1]} to "
-                f"{frame.width} x {frame.height}"
+                f"{self._path}: changes its picture size from {size[0]} x {size[1]} to {frame.width} x {frame.height}"
             )
         codes = frame.reformat(format=layout, interpolation=_EXACT).to_ndarray()
         return decode_integers(_upright(codes, frame), self._transfer)

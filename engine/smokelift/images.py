@@ -45,9 +45,7 @@ def linear_to_srgb(linear: npt.ArrayLike) -> Picture:
     return encoded
 
 
-def decode_integers(
-    codes: npt.NDArray[np.uint8] | npt.NDArray[np.uint16], transfer: Transfer | None = None
-) -> Picture:
+def decode_integers(codes: npt.NDArray[np.uint8] | npt.NDArray[np.uint16], transfer: Transfer | None = None) -> Picture:
     """Return integer pixels [row, column, rgb or rgba] as linear RGB, alpha over black.
 
     Parameters

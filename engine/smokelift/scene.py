@@ -129,9 +129,7 @@ class Camera:
     def __post_init__(self) -> None:
         """Check every value and store plain tuples."""
         if self.type not in ("perspective", "orthographic"):
-            raise SceneError(
-                f'type must be "perspective" or "orthographic", not {shown(self.type)}', key="type"
-            )
+            raise SceneError(f'type must be "perspective" or "orthographic", not {shown(self.type)}', key="type")
         _set(self, matrix=_rigid(self.matrix), size=picture_size(self.size))
         for key in ("fx", "fy"):
             value = number(getattr(self, key), key, "a number above 0")
@@ -275,9 +273,7 @@ class Domain:
         """Check every value and store plain tuples."""
         _set(self, min=vector(self.min, "min"), max=vector(self.max, "max"))
         expected = "three whole numbers [nx, ny, nz], all at least 1"
-        counts = tuple(
-            integer(v, "resolution", expected) for v in items(self.resolution, 3, "resolution", expected)
-        )
+        counts = tuple(integer(v, "resolution", expected) for v in items(self.resolution, 3, "resolution", expected))
         if min(counts) < 1:
             raise SceneError(f"resolution must be {expected}, not {shown(list(counts))}", key="resolution")
         _set(self, resolution=counts)
@@ -467,9 +463,7 @@ class ClipSource:
                 raise SceneError(f"frames must be {expected}, not {shown([first, last])}", key="frames")
             _set(self, frames=(first, last))
         if self.transfer not in (None, "srgb", "linear"):
-            raise SceneError(
-                f'transfer must be "srgb" or "linear", not {shown(self.transfer)}', key="transfer"
-            )
+            raise SceneError(f'transfer must be "srgb" or "linear", not {shown(self.transfer)}', key="transfer")
 
 
 @dataclass(frozen=True)

@@ -129,8 +129,7 @@ def scene_to_dict(scene: Scene, base: Path | None = None) -> dict[str, Any]:
         data["background"] = table
     if scene.views:
         data["views"] = [
-            {"camera": _camera_to_dict(view.camera), "clip": _clip_to_dict(view.clip, base)}
-            for view in scene.views
+            {"camera": _camera_to_dict(view.camera), "clip": _clip_to_dict(view.clip, base)} for view in scene.views
         ]
     return data
 

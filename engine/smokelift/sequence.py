@@ -12,6 +12,7 @@ when its process ends, however it ends, so there are no stale locks to judge.
 from __future__ import annotations
 
 import errno
+import io
 import json
 import math
 import os
@@ -19,13 +20,13 @@ import platform
 import re
 import sys
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import TracebackType
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -205,9 +206,7 @@ class SequenceWriter:
             If the frame cannot be written; the finished ones stay.
         """
         if self._frames and number != max(self._frames) + 1:
-            raise ValueError(
-                f"frame {number} cannot follow frame {max(self._frames)}: a sequence has no gaps"
-            )
+            raise ValueError(f"frame {number} cannot follow frame {max(self._frames)}: a sequence has no gaps")
         if number < 0:
             raise ValueError(f"a frame's number must not be negative, as {number} is")
         rho, faces = _checked(density, velocity_faces, self._domain.shape)
@@ -253,8 +252,7 @@ class SequenceWriter:
         if foreign or (not has_index and any(name != _LOCK and _OURS.fullmatch(name) for name in names)):
             example = foreign[0] if foreign else next(name for name in names if name != _LOCK)
             raise SequenceError(
-                f"{self.directory}: holds other files ({example}); nothing was overwritten, "
-                "choose an empty directory"
+                f"{self.directory}: holds other files ({example}); nothing was overwritten, choose an empty directory"
             )
         if not has_index:
             return
@@ -269,8 +267,7 @@ class SequenceWriter:
         difference = _difference("", {name: index[name] for name in self._run}, self._run)
         if difference:
             raise SequenceError(
-                f"{self.directory}: was begun differently and cannot be resumed: {difference}; "
-                "choose another directory"
+                f"{self.directory}: was begun differently and cannot be resumed: {difference}; choose another directory"
             )
         for leftover in self.directory.glob(".*.tmp"):
             leftover.unlink(missing_ok=True)
@@ -292,8 +289,7 @@ class SequenceWriter:
                 path = _frame_path(self.directory, number, kind)
                 if not path.is_file():
                     raise SequenceError(
-                        f"{path}: is missing, so this run cannot be resumed with this output; "
-                        "choose another directory"
+                        f"{path}: is missing, so this run cannot be resumed with this output; choose another directory"
                     )
         return frames
 
@@ -358,9 +354,7 @@ class Sequence:
         except ValueError as error:
             raise SequenceError(str(error)) from error
         frames = tuple(sorted(int(number) for number in index["frames"]))
-        return cls(
-            directory, scene, index["settings"], index["versions"], frames, index["complete"], index["frames"]
-        )
+        return cls(directory, scene, index["settings"], index["versions"], frames, index["complete"], index["frames"])
 
     def density(self, number: int) -> Array:
         """Return the density of a frame, shape (nx, ny, nz): the NumPy twin's if there is one.
@@ -503,8 +497,7 @@ def _read_index(directory: Path) -> dict[str, Any]:
 
 
 def _save_arrays(path: Path, arrays: Mapping[str, npt.NDArray[Any]]) -> None:
-    with atomic_path(path) as aside, aside.open("wb") as file:
-        np.savez_compressed(file, **cast(Any, arrays))
+    _write_archive(path, arrays, np.savez_compressed)
 
 
 def _load_arrays(path: Path, names: tuple[str, ...]) -> list[Array]:
@@ -523,8 +516,15 @@ def _save_state(path: Path, state: ResumeState) -> None:
         **{f"velocity_{axis}": face for axis, face in zip("xyz", state.velocity, strict=True)},
         **{f"extra_{name}": value for name, value in state.extra.items()},
     }
-    with atomic_path(path) as aside, aside.open("wb") as file:
-        np.savez(file, **cast(Any, arrays))
+    _write_archive(path, arrays, np.savez)
+
+
+def _write_archive(path: Path, arrays: Mapping[str, npt.NDArray[Any]], save: Callable[..., None]) -> None:
+    # An interrupt in the middle of a zip file that is open on disk would be complained about once more at its end.
+    buffer = io.BytesIO()
+    save(buffer, **arrays)
+    with atomic_path(path) as aside:
+        aside.write_bytes(buffer.getvalue())
 
 
 def _load_state(path: Path) -> ResumeState | None:

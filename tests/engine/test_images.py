@@ -29,9 +29,7 @@ def colours(height: int = 6, width: int = 5) -> np.ndarray:
 
 def test_srgb_is_the_standard_curve() -> None:
     codes = np.array([0, 10, 11, 128, 255]) / 255
-    np.testing.assert_allclose(
-        srgb_to_linear(codes), [0.0, 0.00303527, 0.00334654, 0.21586050, 1.0], rtol=2e-5
-    )
+    np.testing.assert_allclose(srgb_to_linear(codes), [0.0, 0.00303527, 0.00334654, 0.21586050, 1.0], rtol=2e-5)
     values = np.linspace(-0.1, 4.0, 1001, dtype=np.float32)
     assert srgb_to_linear(values).dtype == np.float32
     np.testing.assert_allclose(linear_to_srgb(srgb_to_linear(values)), values, atol=2e-6)
@@ -105,17 +103,13 @@ def exr(path: Path, channels: dict[str, np.ndarray], **header: object) -> Path:
 def test_exr_channels_and_tiles(tmp_path: Path) -> None:
     rgb = colours(40, 50)
     grey = rgb[..., 0].copy()
-    np.testing.assert_array_equal(
-        read_image(exr(tmp_path / "y.exr", {"Y": grey})), np.repeat(grey[..., None], 3, 2)
-    )
+    np.testing.assert_array_equal(read_image(exr(tmp_path / "y.exr", {"Y": grey})), np.repeat(grey[..., None], 3, 2))
     np.testing.assert_array_equal(
         read_image(exr(tmp_path / "depth.exr", {"Z": grey})), np.repeat(grey[..., None], 3, 2)
     )
     alpha = np.full((40, 50), 0.25, np.float32)
     premultiplied = np.dstack([rgb * 0.25, alpha])
-    np.testing.assert_array_equal(
-        read_image(exr(tmp_path / "a.exr", {"RGBA": premultiplied})), premultiplied[..., :3]
-    )
+    np.testing.assert_array_equal(read_image(exr(tmp_path / "a.exr", {"RGBA": premultiplied})), premultiplied[..., :3])
     tiles = OpenEXR.TileDescription()
     tiles.xSize = tiles.ySize = 16
     tiled = exr(tmp_path / "tiled.exr", {"RGB": rgb}, type=OpenEXR.tiledimage, tiles=tiles)
@@ -207,11 +201,7 @@ def test_shrinking_keeps_the_mean(rows: int, data: st.DataObject) -> None:
 def test_area_averages_are_exact() -> None:
     image = np.arange(12, dtype=np.float32).reshape(1, 12)
     np.testing.assert_allclose(area_average(image, 4, 1), [[1, 4, 7, 10]])
-    np.testing.assert_allclose(
-        area_average(np.array([[0.0, 1.0, 5.0]]), 2, 1), [[1 / 3, (0.5 + 5) / 1.5]], rtol=1e-6
-    )
-    np.testing.assert_allclose(
-        area_average(np.array([[0.0, 1.0]]), 4, 1), [[0.0, 0.25, 0.75, 1.0]], rtol=1e-6
-    )
+    np.testing.assert_allclose(area_average(np.array([[0.0, 1.0, 5.0]]), 2, 1), [[1 / 3, (0.5 + 5) / 1.5]], rtol=1e-6)
+    np.testing.assert_allclose(area_average(np.array([[0.0, 1.0]]), 4, 1), [[0.0, 0.25, 0.75, 1.0]], rtol=1e-6)
     with pytest.raises(ValueError, match="at least one pixel"):
         area_average(image, 0, 1)

@@ -106,9 +106,7 @@ def test_every_table_is_read(tmp_path: Path) -> None:
 def test_a_file_may_hold_any_one_table(tmp_path: Path) -> None:
     assert load(tmp_path, "") == Scene()
     assert load(tmp_path, "[medium]\n") == Scene(medium=Medium())
-    assert load(tmp_path, "[background]\nimage = 'plate.png'\n").background == Background(
-        image=tmp_path / "plate.png"
-    )
+    assert load(tmp_path, "[background]\nimage = 'plate.png'\n").background == Background(image=tmp_path / "plate.png")
 
 
 @pytest.mark.parametrize(
@@ -191,9 +189,7 @@ def test_a_file_may_hold_any_one_table(tmp_path: Path) -> None:
         ("albedo = 0.5", "albedo = ", "scene.toml: is not valid TOML: "),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_named_with_its_line(
-    tmp_path: Path, old: str, new: str, message: str | None
-) -> None:
+def test_what_is_wrong_is_named_with_its_line(tmp_path: Path, old: str, new: str, message: str | None) -> None:
     assert old in GOOD
     text = GOOD.replace(old, new, 1)
     if message is None:
@@ -282,10 +278,10 @@ def test_a_camera_that_passes_the_domain_by_is_refused() -> None:
     assert Scene(camera=inside, domain=domain).camera == inside
 
 
-numbers = st.floats(-1e6, 1e6)
+numbers = st.floats(-1e6, 1e6, allow_subnormal=False)
 positive = st.floats(1e-6, 1e6)
 vectors = st.tuples(numbers, numbers, numbers)
-colours = st.tuples(*[st.floats(0, 1e6)] * 3)
+colours = st.tuples(*[st.floats(0, 1e6, allow_subnormal=False)] * 3)
 paths = st.text(st.characters(codec="utf-8", exclude_characters="/\\\0"), min_size=1, max_size=12).filter(
     lambda name: name not in (".", "..") and name == name.strip()
 )
@@ -300,7 +296,7 @@ clips = st.builds(
 
 @st.composite
 def cameras(draw: st.DrawFn) -> Camera:
-    angles = draw(st.tuples(*[st.floats(-3, 3)] * 3))
+    angles = draw(st.tuples(*[st.floats(-3, 3, allow_subnormal=False)] * 3))
     (cx, cy, cz), (sx, sy, sz) = np.cos(angles), np.sin(angles)
     about_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
     about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
@@ -321,10 +317,8 @@ lights = st.one_of(
 
 
 domains = st.builds(
-    lambda low, edge, counts: Domain(
-        low, tuple(a + edge * n for a, n in zip(low, counts, strict=True)), counts
-    ),
-    st.tuples(*[st.floats(-100, 100)] * 3),
+    lambda low, edge, counts: Domain(low, tuple(a + edge * n for a, n in zip(low, counts, strict=True)), counts),
+    st.tuples(*[st.floats(-100, 100, allow_subnormal=False)] * 3),
     st.floats(0.01, 10),
     st.tuples(*[st.integers(1, 500)] * 3),
 )
@@ -337,7 +331,12 @@ def scenes(draw: st.DrawFn) -> Scene:
     return Scene(
         clip=draw(st.none() | clips),
         camera=draw(st.none() | cameras()),
-        medium=draw(st.none() | st.builds(Medium, positive, st.floats(0, 1), st.floats(-0.99, 0.99))),
+        medium=draw(
+            st.none()
+            | st.builds(
+                Medium, positive, st.floats(0, 1, allow_subnormal=False), st.floats(-0.99, 0.99, allow_subnormal=False)
+            )
+        ),
         lights=tuple(draw(st.lists(lights, max_size=3))),
         background=draw(st.none() | st.just(Background()) | st.builds(Background, color=colours)),
         views=tuple(draw(st.lists(st.builds(View, cameras(), clips), max_size=2))),

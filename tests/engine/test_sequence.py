@@ -116,9 +116,7 @@ def test_numpy_files_alone_need_no_vdb_module(tmp_path: Path, no_vdb: None) -> N
 def test_finished_frames_are_not_overwritten(tmp_path: Path, no_vdb: None) -> None:
     write(tmp_path, [1, 2])
     before = {file.name: file.read_bytes() for file in tmp_path.iterdir()}
-    with pytest.raises(
-        SequenceError, match=r"holds 2 finished frames; go on with --resume, or choose another"
-    ):
+    with pytest.raises(SequenceError, match=r"holds 2 finished frames; go on with --resume, or choose another"):
         write(tmp_path, [1])
     assert {file.name: file.read_bytes() for file in tmp_path.iterdir()} == before
 
@@ -126,9 +124,7 @@ def test_finished_frames_are_not_overwritten(tmp_path: Path, no_vdb: None) -> No
 def test_a_directory_of_other_files_is_refused(tmp_path: Path, no_vdb: None) -> None:
     (tmp_path / "holiday.jpg").write_bytes(b"precious")
     for resume in (False, True):
-        with pytest.raises(
-            SequenceError, match=r"holds other files \(holiday\.jpg\); nothing was overwritten"
-        ):
+        with pytest.raises(SequenceError, match=r"holds other files \(holiday\.jpg\); nothing was overwritten"):
             write(tmp_path, [1], resume=resume)
     assert names(tmp_path) == ["holiday.jpg"]
     (tmp_path / "holiday.jpg").rename(tmp_path / "smoke_0001.vdb")
@@ -266,9 +262,7 @@ def test_a_full_disk_is_one_sentence(tmp_path: Path, no_vdb: None, monkeypatch: 
         raise OSError(28, "No space left on device")
 
     with (
-        pytest.raises(
-            SequenceError, match=r"frame 2 could not be written: the disk is full; 1 finished frame"
-        ),
+        pytest.raises(SequenceError, match=r"frame 2 could not be written: the disk is full; 1 finished frame"),
         SequenceWriter(tmp_path, SCENE, SETTINGS, npz=True) as writer,
     ):
         writer.write(1, *frame(1))

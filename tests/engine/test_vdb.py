@@ -39,9 +39,7 @@ def frame() -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize("order", ["C", "F"])
 def test_a_frame_comes_back(tmp_path: Path, order: Any) -> None:
     density, velocity = frame()
-    vdb.write_vdb(
-        tmp_path / "a.vdb", np.asarray(density, order=order), np.asarray(velocity, np.float64, order), DOMAIN
-    )
+    vdb.write_vdb(tmp_path / "a.vdb", np.asarray(density, order=order), np.asarray(velocity, np.float64, order), DOMAIN)
     rho, u = vdb.read_vdb(tmp_path / "a.vdb", DOMAIN.shape)
     np.testing.assert_allclose(rho, density, rtol=1e-3, atol=1e-7)
     near = np.zeros(DOMAIN.shape, bool)

@@ -158,16 +158,19 @@ def at_voxel(columns: ti.template(), axis: ti.template(), slope_b, slope_c, inde
 @ti.kernel
 def shade(
     columns: ndarray3,
+    phase: ndarray3,
+    near: mask3,
     inscatter: ndarray3,
     axis: ti.template(),
     slope_b: ti.f32,
     slope_c: ti.f32,
     optical_length: ti.f32,
 ):
-    """inscatter *= exp(-optical depth to the light): the transmittance V_l of every voxel."""
+    """inscatter = phase x V_l, V_l = exp(-optical depth to the light), in and next to voxels that may hold smoke."""
     for index in ti.grouped(ti.ndrange(*inscatter.shape)):
-        depth = optical_length * at_voxel(columns, axis, slope_b, slope_c, index)
-        inscatter[index] *= ti.exp(-depth)
+        if near[index] != 0:
+            depth = optical_length * at_voxel(columns, axis, slope_b, slope_c, index)
+            inscatter[index] = phase[index] * ti.exp(-depth)
 
 
 @ti.kernel
@@ -188,27 +191,24 @@ def add_shadow_gradient(
 
 @ti.kernel
 def fill_phase(
-    inscatter: ndarray3,
+    phase: ndarray3,
     to_eye: ti.types.matrix(3, 4, ti.f32),
     light: ti.types.vector(3, ti.f32),
     anisotropy: ti.f32,
     albedo: ti.f32,
 ):
-    """inscatter = albedo x Henyey-Greenstein phase function towards the camera, 1/sr.
+    """phase = albedo x Henyey-Greenstein phase function towards the camera, 1/sr.
 
     ``to_eye`` maps a voxel index to the (not normalised) direction towards the eye; ``light`` is the unit direction
     of travel.
     """
     g2 = anisotropy * anisotropy
-    for index in ti.grouped(ti.ndrange(*inscatter.shape)):
+    for index in ti.grouped(ti.ndrange(*phase.shape)):
         out = ti.Vector([0.0, 0.0, 0.0])
         for row in ti.static(range(3)):
             out[row] = (
-                to_eye[row, 0] * index[0]
-                + to_eye[row, 1] * index[1]
-                + to_eye[row, 2] * index[2]
-                + to_eye[row, 3]
+                to_eye[row, 0] * index[0] + to_eye[row, 1] * index[1] + to_eye[row, 2] * index[2] + to_eye[row, 3]
             )
         cosine = light.dot(out) / ti.max(out.norm(), 1e-20)
         base = ti.max(1.0 + g2 - 2.0 * anisotropy * cosine, 1e-6)
-        inscatter[index] = albedo * (1.0 - g2) / (4.0 * np.pi * base * ti.sqrt(base))
+        phase[index] = albedo * (1.0 - g2) / (4.0 * np.pi * base * ti.sqrt(base))

@@ -73,21 +73,25 @@ class Renderer:
         self._record: Any = None
         # one voxel where nothing is scattered: kernels want an array
         self._inscatter = device.zeros(shape if self._scatters else (1, 1, 1))
+        if self._scatters and sun is not None:
+            direction = np.array(sun.direction, np.float64)
+            light.fill_phase(
+                self._inscatter, device.matrix(self._to_eye()), device.vector(direction / np.linalg.norm(direction)),
+                medium.anisotropy, medium.albedo,
+            )  # fmt: skip
         if self._shadows and sun is not None:
+            self._phase = self._inscatter
+            self._inscatter = device.zeros(shape)
             self._sweep = light.light_sweep(np.array(sun.direction, np.float64))
             self._columns = device.zeros(light.column_shape(shape, self._sweep.axis))
             self._optical_length = medium.extinction * domain.voxel_size * self._sweep.length
-        if self._scatters and sun is not None:
-            self._sun_direction = np.array(sun.direction, np.float64) / np.linalg.norm(sun.direction)
 
     def image(self, density: Volume, *, keep_record: bool = False) -> Image:
         """Render a density (nx, ny, nz); linear radiance (rows, columns, 3)."""
         self._density = device.upload(density)
-        if self._scatters:
+        if self._shadows:
             self._light_pass()
-        view.pack(
-            self._density, self._inscatter, self._medium, self.medium.extinction, int(self._scatters)
-        )
+        view.pack(self._density, self._inscatter, self._medium, self.medium.extinction, int(self._scatters))
         if keep_record and self._record is None:
             planes = max(self.domain.resolution)
             self._record = device.zeros((planes, *self._rays.length.shape, 2))
@@ -98,9 +102,7 @@ class Renderer:
                 self._scattered, self._depth, record, axis, keep_record,
             )  # fmt: skip
         scattered = device.download(self._scattered)[..., None]
-        return np.asarray(
-            self._irradiance * scattered + self.transmittance[..., None] * self._background, np.float32
-        )
+        return np.asarray(self._irradiance * scattered + self.transmittance[..., None] * self._background, np.float32)
 
     @property
     def transmittance(self) -> Image:
@@ -138,14 +140,11 @@ class Renderer:
         return result
 
     def _light_pass(self) -> None:
-        light.fill_phase(
-            self._inscatter, device.matrix(self._to_eye()), device.vector(self._sun_direction),
-            self.medium.anisotropy, self.medium.albedo,
-        )  # fmt: skip
-        if self._shadows:
-            sweep = self._sweep
-            light.accumulate_columns(self._density, self._columns, sweep.axis, sweep.travel, *sweep.slope)
-            light.shade(self._columns, self._inscatter, sweep.axis, *sweep.slope, self._optical_length)
+        sweep = self._sweep
+        light.accumulate_columns(self._density, self._columns, sweep.axis, sweep.travel, *sweep.slope)
+        light.shade(
+            self._columns, self._phase, self._near, self._inscatter, sweep.axis, *sweep.slope, self._optical_length
+        )
 
     def _to_eye(self) -> NDArray[np.float64]:
         """Affine map from a voxel's index to the direction from there to the eye, 3x4."""

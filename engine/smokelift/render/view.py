@@ -88,10 +88,7 @@ def march(
                 g = c - j
                 sample = (1 - f) * (
                     (1 - g) * _at(medium, cell(axis, k, i, j)) + g * _at(medium, cell(axis, k, i, j + 1))
-                ) + f * (
-                    (1 - g) * _at(medium, cell(axis, k, i + 1, j))
-                    + g * _at(medium, cell(axis, k, i + 1, j + 1))
-                )
+                ) + f * ((1 - g) * _at(medium, cell(axis, k, i + 1, j)) + g * _at(medium, cell(axis, k, i + 1, j + 1)))
                 x = sample[0] * d
                 if x > 0:
                     opacity = _opacity(x)
@@ -166,9 +163,7 @@ def gather_gradient(
                 at = cell(axis, k, i - 1 + 2 * (corner % 2), j - 1 + 2 * (corner // 2))
                 p = ti.Vector([0.0, 0.0, 0.0])
                 for m in ti.static(range(3)):
-                    p[m] = (
-                        to_pixel[m, 0] * at[0] + to_pixel[m, 1] * at[1] + to_pixel[m, 2] * at[2] + to_pixel[m, 3]
-                    )
+                    p[m] = to_pixel[m, 0] * at[0] + to_pixel[m, 1] * at[1] + to_pixel[m, 2] * at[2] + to_pixel[m, 3]
                 # a corner behind the eye stands for one far out to its side
                 w = ti.max(p[2], 1e-6)
                 low_x, high_x = ti.min(low_x, p[0] / w), ti.max(high_x, p[0] / w)
@@ -181,11 +176,7 @@ def gather_gradient(
             of_inscatter = 0.0
             for row in range(ti.max(first_row, 0), last_row + 1):
                 for column in range(ti.max(first_column, 0), last_column + 1):
-                    if (
-                        planes[row, column, 0] == axis
-                        and planes[row, column, 2] <= k
-                        and k <= planes[row, column, 3]
-                    ):
+                    if planes[row, column, 0] == axis and planes[row, column, 2] <= k and k <= planes[row, column, 3]:
                         b = lines[row, column, 0] + lines[row, column, 1] * k
                         c = lines[row, column, 2] + lines[row, column, 3] * k
                         of_kappa += _hat(b - i) * _hat(c - j) * record[k, row, column, 0]

@@ -1,0 +1,220 @@
+"""The command line: ``smokelift reconstruct | render | preview | doctor``.
+
+Exit status: 0 done, 2 bad input, 3 device or memory, 130 cancelled (and resumable).
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import math
+import signal
+import sys
+import time
+from collections.abc import Sequence as Many
+from dataclasses import replace
+from pathlib import Path
+
+from smokelift import pictures
+from smokelift.cameras import orbit
+from smokelift.clip import Clip
+from smokelift.doctor import report
+from smokelift.images import write_image
+from smokelift.memory import require_memory
+from smokelift.progress import Reporter, reporter
+from smokelift.reconstruct import reconstruct
+from smokelift.render import DeviceError, device
+from smokelift.scene import Camera, ClipSource, Scene
+from smokelift.sequence import Sequence
+from smokelift.settings import METHODS, QUALITIES, Settings
+from smokelift.shot import prepare_shot
+from smokelift.vdb import VdbUnavailable
+
+DONE, BAD_INPUT, NO_DEVICE, CANCELLED = 0, 2, 3, 130
+
+SIDE_YAW = 90.0
+
+
+def main(arguments: Many[str] | None = None) -> int:
+    """Run a command and return the exit status."""
+    options = _parser().parse_args(arguments)
+    say = reporter(getattr(options, "progress", "text"))
+    # a terminal's Ctrl-C and a parent's polite end are the same wish
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        with say:
+            _COMMANDS[options.command](options, say)
+    except KeyboardInterrupt:
+        hint = "; finished frames stay, --resume goes on from them" if options.command == "reconstruct" else ""
+        say.fail(f"Cancelled{hint}.", CANCELLED)
+        return CANCELLED
+    except (DeviceError, MemoryError) as error:
+        say.fail(str(error) or "Out of memory; choose a lower --resolution.", NO_DEVICE)
+        return NO_DEVICE
+    except (ValueError, VdbUnavailable, OSError) as error:
+        say.fail(str(error), BAD_INPUT)
+        return BAD_INPUT
+    return DONE
+
+
+def _reconstruct(options: argparse.Namespace, say: Reporter) -> None:
+    began = time.monotonic()
+    settings = Settings.preset(options.quality, options.method, options.resolution)
+    scene = _scene(options.input, options.frames)
+    assert scene.clip is not None
+    device.start(options.device)
+    with Clip.open(scene.clip) as clip:
+        shot = prepare_shot(clip, scene, settings)
+        assert shot.scene.domain is not None
+        require_memory(shot.scene.domain)
+        for note in shot.notes:
+            say.note(note)
+        frames = reconstruct(clip, scene, settings, options.out, npz=options.npz, resume=options.resume, shot=shot)
+        for first in frames:
+            say.start(len(clip), first.number - 1)
+            for frame in itertools.chain([first], frames):
+                say.frame(frame.number, frame.figures)
+    sequence = Sequence.open(options.out)
+    if not any((sequence.figures(number).get("hull_share") or 0) > 0 for number in sequence.frames):
+        say.note(
+            "No smoke found: in no frame does a patch differ from the background by six times the clip's noise. "
+            "Check the clean plate, or give one with [background] in a scene file."
+        )
+    seconds = time.monotonic() - began
+    say.finish(
+        f"{len(sequence.frames)} frames in {options.out} ({seconds:.0f} s).",
+        {"directory": str(options.out), "frames": len(sequence.frames), "seconds": round(seconds, 1)},
+    )
+
+
+def _render(options: argparse.Namespace, say: Reporter) -> None:
+    sequence = Sequence.open(options.directory)
+    camera = _camera(options.camera, sequence.scene)
+    suffix = options.out.suffix.lower()
+    if suffix not in (".exr", ".png", *pictures.VIDEO_KINDS):
+        raise ValueError(f"{options.out}: write an image (.exr, .png) or a video ({', '.join(pictures.VIDEO_KINDS)}).")
+    if not sequence.frames:
+        raise ValueError(f"{options.directory}: there are no finished frames to render yet.")
+    if not options.out.absolute().parent.is_dir():
+        raise ValueError(f"{options.out}: the folder {options.out.parent} does not exist.")
+    device.start(options.device)
+    renderer = pictures.sequence_renderer(sequence, camera)
+    if suffix in pictures.VIDEO_KINDS:
+        numbers = sequence.frames if options.frame is None else (options.frame,)
+        fps = sequence.scene.clip.fps if sequence.scene.clip and sequence.scene.clip.fps else 24.0
+        pictures.write_video(options.out, (renderer.image(sequence.density(n)) for n in numbers), fps)
+    else:
+        number = sequence.frames[0] if options.frame is None else options.frame
+        write_image(options.out, renderer.image(sequence.density(number)))
+    say.finish(f"{options.out} written.", {"file": str(options.out)})
+
+
+def _preview(options: argparse.Namespace, say: Reporter) -> None:
+    sequence = Sequence.open(options.directory)
+    if sequence.scene.clip is None or not sequence.frames:
+        raise ValueError(f"{options.directory}: there are no finished frames of a clip to show yet.")
+    device.start(options.device)
+    out = options.out or sequence.directory.parent
+    out.mkdir(parents=True, exist_ok=True)
+    with Clip.open(sequence.scene.clip) as clip:
+        pictures.write_contact_sheet(out / "contact_sheet.png", sequence, clip)
+        pictures.write_preview(out / "preview.mp4", sequence, clip)
+    say.finish(
+        f"{out / 'contact_sheet.png'} and {out / 'preview.mp4'} written.",
+        {"files": [str(out / "contact_sheet.png"), str(out / "preview.mp4")]},
+    )
+
+
+def _doctor(options: argparse.Namespace, say: Reporter) -> None:
+    for line in report():
+        say.note(line)
+
+
+_COMMANDS = {"reconstruct": _reconstruct, "render": _render, "preview": _preview, "doctor": _doctor}
+
+
+def _scene(path: Path, frames: tuple[int, int] | None) -> Scene:
+    if path.suffix.lower() == ".toml":
+        scene = Scene.load(path)
+        if scene.clip is None:
+            raise ValueError(f"{path}: has no [clip]; give the path of the video there.")
+    else:
+        scene = Scene(clip=ClipSource(path))
+    assert scene.clip is not None
+    return scene if frames is None else replace(scene, clip=replace(scene.clip, frames=frames))
+
+
+def _camera(name: str, scene: Scene) -> Camera | None:
+    """The camera that a word, two angles or a file stand for; None is the scene's own."""
+    assert scene.camera is not None and scene.domain is not None
+    if name == "front":
+        return None
+    if name == "side":
+        return orbit(scene.camera, scene.domain, SIDE_YAW)
+    if name.endswith(".toml"):
+        camera = Scene.load(name).camera
+        if camera is None:
+            raise ValueError(f"{name}: has no [camera].")
+        return camera
+    try:
+        yaw, pitch = (float(part) for part in name.split(","))
+        if not (math.isfinite(yaw) and math.isfinite(pitch)):
+            raise ValueError
+    except ValueError:
+        raise ValueError(
+            f"--camera {name}: expected front, side, two angles YAW,PITCH in degrees, or a camera.toml."
+        ) from None
+    return orbit(scene.camera, scene.domain, yaw, pitch)
+
+
+def _three_counts(text: str) -> tuple[int, int, int]:
+    try:
+        x, y, z = (int(part) for part in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected three whole numbers X,Y,Z") from None
+    return x, y, z
+
+
+def _frame_range(text: str) -> tuple[int, int]:
+    try:
+        first, last = (int(part) for part in text.split(":"))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected the first and last frame A:B, from 0") from None
+    return first, last
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="smokelift", description="Turn a video of smoke into an OpenVDB sequence of density and velocity."
+    )
+    commands = parser.add_subparsers(dest="command", required=True)
+    common = argparse.ArgumentParser(add_help=False)
+    common.add_argument("--device", choices=("auto", "cpu", "gpu"), default="auto", help="where to render")
+    common.add_argument("--progress", choices=("text", "json"), default="text", help="a bar, or one JSON object a line")
+
+    job = commands.add_parser("reconstruct", parents=[common], help="a clip or scene file to a VDB sequence")
+    job.add_argument("input", type=Path, help="scene.toml, or a video, or frame_####.png")
+    job.add_argument("--out", type=Path, required=True, help="directory for the sequence")
+    job.add_argument("--quality", choices=QUALITIES, default="balanced")
+    job.add_argument("--method", choices=METHODS, default="default", help="paper: the published loop, for comparison")
+    job.add_argument("--resolution", type=_three_counts, metavar="X,Y,Z", help="voxels, if not the scene's")
+    job.add_argument("--frames", type=_frame_range, metavar="A:B", help="first and last frame, from 0")
+    job.add_argument("--npz", action="store_true", help="write NumPy twins as well")
+    job.add_argument("--resume", action="store_true", help="go on from the frames that are there")
+
+    picture = commands.add_parser("render", parents=[common], help="an image or video of a sequence")
+    picture.add_argument("directory", type=Path)
+    picture.add_argument("--frame", type=int, help="one frame; the first for an image, all for a video by default")
+    picture.add_argument("--camera", default="front", help="front, side, YAW,PITCH in degrees, or camera.toml")
+    picture.add_argument("--out", type=Path, required=True, help="image.exr, image.png or video.mp4")
+
+    look = commands.add_parser("preview", parents=[common], help="a contact sheet and a preview video")
+    look.add_argument("directory", type=Path)
+    look.add_argument("--out", type=Path, help="directory for them; by default the one that holds the sequence")
+
+    commands.add_parser("doctor", parents=[common], help="versions, devices and what is missing")
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())

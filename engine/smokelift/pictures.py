@@ -1,0 +1,153 @@
+"""Pictures to look at: a sequence seen from a camera, a contact sheet, a preview video."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from collections.abc import Sequence as Many
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image as Pillow
+from PIL import ImageDraw
+
+from smokelift.cameras import orbit
+from smokelift.clip import Clip
+from smokelift.files import atomic_path
+from smokelift.images import area_average, linear_to_srgb
+from smokelift.render import Renderer, scene_background, scene_sun
+from smokelift.render.renderer import Image
+from smokelift.scene import Camera, Medium
+from smokelift.sequence import Sequence
+
+SHEET_ANGLES = (0, 20, 45, 90)
+SHEET_ROWS = 5
+TILE_HEIGHT = 320
+PREVIEW_HEIGHT = 480
+
+VIDEO_KINDS = {
+    ".mp4": ("mp4", "libx264"),
+    ".mov": ("mov", "libx264"),
+    ".mkv": ("matroska", "libx264"),
+    ".webm": ("webm", "libvpx-vp9"),
+}
+"""Container and codec of each suffix."""
+
+
+def sequence_renderer(sequence: Sequence, camera: Camera | None = None) -> Renderer:
+    """The renderer of a sequence's own scene, or of another camera before the scene's mean background."""
+    scene = sequence.scene
+    assert scene.camera is not None and scene.domain is not None
+    return Renderer(
+        camera or scene.camera,
+        scene.domain,
+        scene.medium or Medium(),
+        scene_sun(scene.lights),
+        scene_background(scene, camera),
+        sequence.settings["density"]["scattering"],
+    )
+
+
+def eight_bit(image: Image) -> NDArray[np.uint8]:
+    """Linear radiance as 8 bit sRGB."""
+    return np.asarray(np.rint(255 * linear_to_srgb(np.clip(image, 0, 1))), np.uint8)
+
+
+def write_video(path: Path, frames: Iterable[Image], fps: float) -> None:
+    """Write linear frames (rows, columns, 3) of one size as a video of the kind that the suffix says."""
+    container_format, codec = VIDEO_KINDS[path.suffix.lower()]
+    with atomic_path(path) as aside, av.open(str(aside), "w", format=container_format) as container:
+        stream: Any = None
+        for frame in frames:
+            picture = eight_bit(frame)
+            picture = picture[: picture.shape[0] // 2 * 2, : picture.shape[1] // 2 * 2]  # codecs want even sides
+            if stream is None:
+                stream = container.add_stream(codec, rate=Fraction(fps).limit_denominator(1001))
+                stream.height, stream.width = picture.shape[:2]
+                stream.pix_fmt = "yuv420p"
+                stream.options = {"crf": "18"}
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
+        if stream is not None:
+            container.mux(stream.encode())
+
+
+def write_contact_sheet(path: Path, sequence: Sequence, clip: Clip) -> None:
+    """Input, reconstruction and turned views of some frames, side by side."""
+    frames = sequence.frames
+    chosen = [frames[i] for i in np.unique(np.linspace(0, len(frames) - 1, SHEET_ROWS + 2).round().astype(int))[1:-1]]
+    renderers = _turned(sequence, TILE_HEIGHT)
+    rows = []
+    for number in chosen or frames:
+        density = sequence.density(number)
+        tiles = [_fitted(clip.frame(number - 1), renderers[0].camera)]
+        tiles += [renderer.image(density) for renderer in renderers]
+        rows.append([eight_bit(tile) for tile in tiles])
+    titles = ["input", *(f"{angle}\N{DEGREE SIGN}" for angle in SHEET_ANGLES)]
+    titles[1] = "reconstruction"
+    with atomic_path(path) as aside:
+        _sheet(rows, titles, [f"frame {number}" for number in chosen or frames]).save(aside, format="PNG")
+
+
+def write_preview(path: Path, sequence: Sequence, clip: Clip) -> None:
+    """The input beside the reconstruction from the front and from 45 degrees, as a video."""
+    front, _, turned, _ = _turned(sequence, PREVIEW_HEIGHT)
+
+    def frames() -> Iterable[Image]:
+        for number in sequence.frames:
+            density = sequence.density(number)
+            yield np.concatenate(
+                [_fitted(clip.frame(number - 1), front.camera), front.image(density), turned.image(density)], 1
+            )
+
+    write_video(path, frames(), clip.fps)
+
+
+def _turned(sequence: Sequence, height: int) -> list[Renderer]:
+    scene = sequence.scene
+    assert scene.camera is not None and scene.domain is not None
+    camera = scene.camera
+    small = camera.resized(max(2, round(camera.size[0] * height / camera.size[1])), height)
+    renderers = [sequence_renderer(sequence, small)]
+    if scene.background is not None and scene.background.image is not None:
+        picture = scene_background(scene)
+        renderers = [_with_background(sequence, small, area_average(picture, *small.size))]
+    return renderers + [
+        sequence_renderer(sequence, orbit(small, scene.domain, angle)) for angle in SHEET_ANGLES if angle
+    ]
+
+
+def _with_background(sequence: Sequence, camera: Camera, background: Image) -> Renderer:
+    scene = sequence.scene
+    assert scene.domain is not None
+    return Renderer(
+        camera,
+        scene.domain,
+        scene.medium or Medium(),
+        scene_sun(scene.lights),
+        background,
+        sequence.settings["density"]["scattering"],
+    )
+
+
+def _fitted(frame: Image, camera: Camera) -> Image:
+    return area_average(frame, *camera.size)
+
+
+def _sheet(rows: Many[Many[NDArray[np.uint8]]], titles: Many[str], labels: Many[str]) -> Pillow.Image:
+    gap, line = 4, 16
+    height, width = rows[0][0].shape[:2]
+    sheet = Pillow.new(
+        "RGB", (gap + len(titles) * (width + gap), line + len(rows) * (height + line + gap)), (32, 32, 32)
+    )
+    draw = ImageDraw.Draw(sheet)
+    for column, title in enumerate(titles):
+        draw.text((gap + column * (width + gap), 2), title, fill=(230, 230, 230))
+    for row, (tiles, label) in enumerate(zip(rows, labels, strict=True)):
+        top = line + row * (height + line + gap)
+        draw.text((gap, top + 2), label, fill=(170, 170, 170))
+        for column, tile in enumerate(tiles):
+            sheet.paste(Pillow.fromarray(tile), (gap + column * (width + gap), top + line))
+    return sheet

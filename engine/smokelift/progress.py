@@ -1,0 +1,138 @@
+"""What a long job says while it runs: a bar for people, one JSON object a line for programs."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Mapping
+from types import TracebackType
+from typing import Any, Literal, Protocol
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+
+Style = Literal["text", "json"]
+
+
+class Reporter(Protocol):
+    """Receives what happens; a context manager around the frames."""
+
+    def __enter__(self) -> Reporter: ...
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None: ...
+
+    def note(self, text: str) -> None:
+        """Something that was assumed or noticed."""
+
+    def start(self, total: int, done: int) -> None:
+        """So many frames in all, so many there already."""
+
+    def frame(self, number: int, figures: Mapping[str, Any]) -> None:
+        """One more frame is finished."""
+
+    def finish(self, text: str, details: Mapping[str, Any]) -> None:
+        """The job is done."""
+
+    def fail(self, text: str, status: int) -> None:
+        """The job ended otherwise."""
+
+
+def reporter(style: Style) -> Reporter:
+    """The reporter of a style."""
+    return _Json() if style == "json" else _Text()
+
+
+class _Text:
+    def __init__(self) -> None:
+        self._console = Console(highlight=False)
+        self._errors = Console(stderr=True, highlight=False)
+        self._bar = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeRemainingColumn(),
+            TextColumn("{task.fields[fit]}"),
+            console=self._console,
+            speed_estimate_period=120,
+        )
+        self._task: TaskID | None = None
+
+    def __enter__(self) -> _Text:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._stop()
+
+    def _stop(self) -> None:
+        if self._task is not None:  # a bar that never started would leave an empty line
+            self._bar.stop()
+
+    def note(self, text: str) -> None:
+        self._console.print(text, markup=False, soft_wrap=True)
+
+    def start(self, total: int, done: int) -> None:
+        self._bar.start()
+        self._task = self._bar.add_task("frames", total=total, completed=done, fit="")
+
+    def frame(self, number: int, figures: Mapping[str, Any]) -> None:
+        assert self._task is not None
+        fit = f"fit {figures['psnr']:.1f} dB" if figures["hull_share"] > 0 else "no smoke"
+        self._bar.update(self._task, advance=1, fit=fit)
+
+    def finish(self, text: str, details: Mapping[str, Any]) -> None:
+        self._stop()
+        self._console.print(text, markup=False, soft_wrap=True)
+
+    def fail(self, text: str, status: int) -> None:
+        self._stop()
+        self._errors.print(text, markup=False, soft_wrap=True)
+
+
+class _Json:
+    """Events ``note``, ``start``, ``frame``, ``done`` and ``error``, each with its fields, one a line."""
+
+    def __init__(self) -> None:
+        self._total = self._done = 0
+        self._spent: list[float] = []
+
+    def __enter__(self) -> _Json:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        return None
+
+    def note(self, text: str) -> None:
+        self._say("note", text=text)
+
+    def start(self, total: int, done: int) -> None:
+        self._total, self._done = total, done
+        self._say("start", total=total, done=done)
+
+    def frame(self, number: int, figures: Mapping[str, Any]) -> None:
+        self._done += 1
+        self._spent.append(figures["seconds_density"] + figures["seconds_velocity"])
+        recent = self._spent[-10:]
+        left = (self._total - self._done) * sum(recent) / len(recent)
+        self._say(
+            "frame",
+            frame=number,
+            done=self._done,
+            total=self._total,
+            seconds_left=round(left, 1),
+            figures=dict(figures),
+        )
+
+    def finish(self, text: str, details: Mapping[str, Any]) -> None:
+        self._say("done", text=text, **details)
+
+    def fail(self, text: str, status: int) -> None:
+        self._say("error", text=text, status=status)
+
+    def _say(self, event: str, **fields: Any) -> None:
+        print(json.dumps({"event": event, **fields}), file=sys.stdout, flush=True)

@@ -1,0 +1,78 @@
+"""Memory: a grid that does not fit is refused before it is made, with one that fits."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from types import SimpleNamespace
+
+import pytest
+
+from smokelift import memory
+from smokelift.memory import NotEnoughMemoryError, needed, require_memory
+from smokelift.scene import Domain
+
+DOMAINS = {
+    "cube": Domain((-1, -1, 0), (1, 1, 2), (128, 128, 128)),
+    "paper": Domain((-1, -1, 0), (1, 1, 3), (128, 128, 192)),
+    "odd": Domain((0, 0, 0), (1, 1.2, 2.2), (100, 120, 220)),
+}
+
+
+def free(monkeypatch: pytest.MonkeyPatch, gigabytes: float) -> None:
+    there = SimpleNamespace(available=int(gigabytes * 2**30))
+    monkeypatch.setattr(memory.psutil, "virtual_memory", lambda: there)
+
+
+def suggestion(domain: Domain) -> tuple[int, int, int]:
+    with pytest.raises(NotEnoughMemoryError) as caught:
+        require_memory(domain)
+    found = re.search(r"--resolution (\d+),(\d+),(\d+)", str(caught.value))
+    assert found
+    x, y, z = (int(count) for count in found.groups())
+    return x, y, z
+
+
+def test_more_voxels_need_more() -> None:
+    """Eight times the voxels need up to eight times the memory, and nothing is free."""
+    assert needed((8, 8, 8)) > 0
+    assert 4 * needed((128, 128, 128)) < needed((256, 256, 256)) < 8 * needed((128, 128, 128))
+
+
+def test_what_fits_is_accepted(monkeypatch) -> None:
+    """No word if there is room."""
+    free(monkeypatch, 64)
+    require_memory(DOMAINS["paper"])
+
+
+@pytest.mark.parametrize("domain", DOMAINS.values(), ids=DOMAINS.keys())
+@pytest.mark.parametrize("gigabytes", [0.7, 0.85, 1.0])
+def test_the_suggestion_fits(monkeypatch, domain, gigabytes) -> None:
+    """The named resolution is accepted at once, and is smaller than what was refused."""
+    free(monkeypatch, gigabytes)
+    smaller = suggestion(domain)
+    assert needed(smaller) <= gigabytes * 2**30
+    assert all(a < b for a, b in zip(smaller, domain.resolution, strict=True))
+
+
+@pytest.mark.parametrize("domain", DOMAINS.values(), ids=DOMAINS.keys())
+@pytest.mark.parametrize("gigabytes", [0.7, 0.85, 1.0])
+def test_the_suggestion_has_the_same_shape(monkeypatch, domain, gigabytes) -> None:
+    """It can be given as it is: the voxels of a calibrated domain stay cubes."""
+    free(monkeypatch, gigabytes)
+    assert replace(domain, resolution=suggestion(domain)).voxel_size > domain.voxel_size
+
+
+def test_the_sentence_says_how_much(monkeypatch) -> None:
+    """What is wanted, what is needed and what is free."""
+    free(monkeypatch, 0.7)
+    with pytest.raises(MemoryError, match=r"128 x 128 x 192 voxels need about 1\.3 GiB .* 0\.7 GiB are free"):
+        require_memory(DOMAINS["paper"])
+
+
+def test_nothing_fits_is_said_too(monkeypatch) -> None:
+    """With less memory than the bare program takes no resolution is promised to fit."""
+    free(monkeypatch, 0.3)
+    with pytest.raises(NotEnoughMemoryError) as caught:
+        require_memory(DOMAINS["cube"])
+    assert "the largest that fits" not in str(caught.value)

@@ -1,0 +1,79 @@
+"""Progress: lines of JSON for programs, plain words for people, errors apart from results."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+
+from smokelift.progress import reporter
+
+
+def figures(seconds: float, hull_share: float = 0.1) -> dict[str, Any]:
+    return {
+        "psnr": 41.23,
+        "hull_share": hull_share,
+        "seconds_density": seconds / 2,
+        "seconds_velocity": seconds / 2,
+        "velocity": {"iterations": 3},
+    }
+
+
+def lines(capsys: pytest.CaptureFixture[str]) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+
+
+def test_json_events_are_a_line_each(capsys) -> None:
+    """Every event with its fields, in order, even with line breaks and quotes in a text."""
+    with reporter("json") as say:
+        say.note('two\nlines and "quotes"')
+        say.start(4, 1)
+        say.frame(2, figures(2.0))
+        say.finish("done.", {"directory": "out"})
+        say.fail("no.", 2)
+    note, start, frame, done, error = lines(capsys)
+    assert note == {"event": "note", "text": 'two\nlines and "quotes"'}
+    assert start == {"event": "start", "total": 4, "done": 1}
+    assert (frame["event"], frame["frame"], frame["done"], frame["total"]) == ("frame", 2, 2, 4)
+    assert frame["figures"] == figures(2.0)
+    assert done == {"event": "done", "text": "done.", "directory": "out"}
+    assert error == {"event": "error", "text": "no.", "status": 2}
+
+
+def test_json_is_told_how_long_it_takes(capsys) -> None:
+    """Time left is the mean of the latest frames, for those still to come; none at the end."""
+    with reporter("json") as say:
+        say.start(13, 0)
+        for number in range(1, 14):
+            say.frame(number, figures(30.0 if number == 1 else 2.0))
+    left = [line["seconds_left"] for line in lines(capsys)[1:]]
+    assert left[0] == pytest.approx(12 * 30)
+    assert left[1] == pytest.approx(11 * 16)
+    assert left[11] == pytest.approx(2.0)
+    assert left[12] == 0
+
+
+def test_text_names_what_matters(capsys) -> None:
+    """Notes, the fit, frames without smoke and the end are readable; nothing is taken for markup."""
+    with reporter("text") as say:
+        say.note("Light [not] given: /a/[bold]path")
+        say.start(2, 0)
+        say.frame(1, figures(1.0))
+        say.frame(2, figures(1.0, hull_share=0.0))
+        say.finish("2 frames in out.", {})
+    out = capsys.readouterr().out
+    assert "Light [not] given: /a/[bold]path" in out
+    assert "2/2" in out
+    assert "no smoke" in out
+    assert "2 frames in out." in out
+
+
+def test_text_errors_go_to_standard_error(capsys) -> None:
+    """A failure is one unbroken line there, and nothing on standard output."""
+    sentence = "shot.toml: " + "a very long sentence about what went wrong " * 5 + "[in brackets]."
+    with reporter("text") as say:
+        say.fail(sentence, 2)
+    captured = capsys.readouterr()
+    assert captured.err == sentence + "\n"
+    assert captured.out == ""
