@@ -1,0 +1,63 @@
+"""Seconds a frame of the whole run, in units of one cosine-transform Poisson solve of the same grid, and peak memory.
+
+    python benchmarks/pipeline.py scene.toml [--quality balanced] [--method default] [--frames A:B]
+
+The unit is measured in the same run, between the frames: scipy.fft.dctn there and idctn back, float32, two workers.
+"""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import time
+from dataclasses import replace
+
+import numpy as np
+import scipy.fft
+
+import smokelift
+
+
+def poisson_seconds(shape: tuple[int, int, int]) -> float:
+    """Fastest of five forward and inverse cosine transforms of a grid, the division in between included."""
+    field = np.random.default_rng(0).standard_normal(shape).astype(np.float32)
+    waves = [2 - 2 * np.cos(np.pi * np.arange(n) / n) for n in shape]
+    symbol = (waves[0][:, None, None] + waves[1][None, :, None] + waves[2]).astype(np.float32)
+    symbol[0, 0, 0] = 1
+    spent = []
+    for _ in range(5):
+        began = time.perf_counter()
+        scipy.fft.idctn(scipy.fft.dctn(field, workers=2) / symbol, workers=2)
+        spent.append(time.perf_counter() - began)
+    return min(spent)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("scene")
+    parser.add_argument("--quality", default="balanced")
+    parser.add_argument("--method", default="default")
+    parser.add_argument("--frames", type=lambda text: tuple(map(int, text.split(":"))))
+    options = parser.parse_args()
+    scene = smokelift.Scene.load(options.scene)
+    source = scene.clip if options.frames is None else replace(scene.clip, frames=options.frames)
+    settings = smokelift.Settings.preset(options.quality, options.method)
+    seconds, units, fits = [], [], []
+    with smokelift.Clip.open(source) as clip:
+        frames = smokelift.reconstruct(clip, scene, settings)
+        for frame in frames:
+            seconds.append(frame.figures["seconds_density"] + frame.figures["seconds_velocity"])
+            units.append(poisson_seconds(frame.density.shape))
+            if frame.figures["hull_share"] > 0:
+                fits.append(frame.figures["psnr"])
+    unit = float(np.median(units))
+    median = float(np.median(seconds))
+    print(f"{len(seconds)} frames of {' x '.join(map(str, frame.density.shape))} voxels")
+    print(f"median {median:.2f} s a frame (from {min(seconds):.2f} to {max(seconds):.2f})")
+    print(f"Poisson solve {1e3 * unit:.1f} ms; a frame is {median / unit:.0f} of them")
+    print(f"input view {np.mean(fits):.1f} dB over {len(fits)} frames with smoke")
+    print(f"peak memory {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MiB")
+
+
+if __name__ == "__main__":
+    main()
