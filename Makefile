@@ -1,6 +1,5 @@
 # make demo   lift the example clip to a VDB sequence, with pictures to look at, in demo/
 # make test   formatting, types and tests; nothing that needs a GPU
-# make bench  benchmarks against peers (see benchmarks/)
 # Both set up what they need in .venv first. Only Python 3.11 to 3.13 and a C++17 compiler are assumed.
 
 SHELL := /bin/bash
@@ -15,14 +14,18 @@ CXX_FOUND := $(shell command -v "$${CXX:-c++}" || command -v g++ || command -v c
 ENGINE_SOURCES := pyproject.toml CMakeLists.txt $(wildcard cpp/*) $(shell find engine -name '*.py' -o -name '*.pyi')
 QUIET_PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test lint clean
+HAS_VDB = $(shell $(BIN)/python -c 'import importlib.util as u; print("yes" if u.find_spec("bpy") else "")')
+
+.PHONY: demo test pytest lint clean
 
 demo: $(VENV)/engine.stamp
 	rm -rf demo/sequence
-	$(BIN)/smokelift reconstruct examples/plume/scene.toml --out demo/sequence $(DEMO_OPTIONS)
+	$(BIN)/smokelift reconstruct examples/plume/scene.toml --out demo/sequence $(if $(HAS_VDB),,--npz)
 	$(BIN)/smokelift preview demo/sequence
 
-test: lint $(VENV)/engine.stamp
+test: lint pytest
+
+pytest: $(VENV)/engine.stamp
 	$(BIN)/python -m pytest
 
 lint: $(VENV)/engine.stamp
@@ -31,7 +34,7 @@ lint: $(VENV)/engine.stamp
 	$(BIN)/mypy
 	$(BIN)/clang-format --dry-run --Werror cpp/*.cpp cpp/*.h
 
-$(VENV)/tools.stamp:
+$(VENV)/tools.stamp: pyproject.toml
 	@[ -n "$(PYTHON)" ] || { echo "Smokelift needs Python 3.11, 3.12 or 3.13 with venv; install one, or say make PYTHON=/path/to/python3." >&2; exit 2; }
 	@[ -n "$(CXX_FOUND)" ] || { echo "Smokelift needs a C++17 compiler; install g++ or clang++ (Debian: apt install g++)." >&2; exit 2; }
 	$(PYTHON) -m venv $(VENV)
