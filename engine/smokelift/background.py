@@ -165,9 +165,7 @@ def matte(frame: npt.ArrayLike, plate: Plate) -> Matte:
         raise ValueError(f"the frame {linear.shape} and the plate {plate.image.shape} must have one shape")
     if not np.isfinite(linear).all():
         raise ValueError("the frame must be finite")
-    behind = linear_to_srgb(plate.image)
-    sigma = plate.noise / _slope(np.median(behind, axis=(0, 1)))
-    deviation = (linear_to_srgb(linear) - behind) / sigma
+    deviation = (linear_to_srgb(linear) - linear_to_srgb(plate.image)) / _encoded_noise(plate)
     smooth = ndimage.gaussian_filter(deviation, (_SMOOTH, _SMOOTH, 0.0))
     evidence = np.sqrt((smooth**2).mean(axis=2))
     # Exposure and codec drift: a frame that deviates everywhere is judged more mildly, up to a limit, since
@@ -179,6 +177,25 @@ def matte(frame: npt.ArrayLike, plate: Plate) -> Matte:
     certain = np.bincount(patches[evidence > _SURE], minlength=count + 1)
     smoke = certain > _LEAST_SURE * patches.size
     return Matte(evidence, smoke[patches])
+
+
+def noise_at(picture: npt.ArrayLike, plate: Plate) -> Picture:
+    """Return the clip's noise, linear, shape (height, width, 3), at a picture's own brightness.
+
+    Noise is even in sRGB values (see the module), so in linear light it grows with brightness.
+
+    Parameters
+    ----------
+    picture
+        Linear, shape (height, width, 3).
+    plate
+        For its noise, which is that at its median brightness.
+    """
+    return _encoded_noise(plate) * _slope(linear_to_srgb(np.asarray(picture, np.float32)))
+
+
+def _encoded_noise(plate: Plate) -> Picture:
+    return plate.noise / _slope(np.median(linear_to_srgb(plate.image), axis=(0, 1)))
 
 
 def _samples(clip: Clip, count: int, step: int = 1) -> npt.NDArray[np.uint16]:

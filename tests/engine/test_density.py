@@ -79,6 +79,12 @@ def test_voxels_outside_the_picture_are_out(plume) -> None:
 # profile
 
 
+def profile_of(amount, domain):
+    """The profile at every voxel."""
+    everywhere = np.ones(domain.resolution, np.bool_)
+    return depth_profile(amount, GRID, domain, everywhere).reshape(domain.resolution)
+
+
 def amount_of(width: int) -> np.ndarray:
     """A picture of a pillar so many pixels wide."""
     amount = np.zeros((32, 24), np.float32)
@@ -89,7 +95,7 @@ def amount_of(width: int) -> np.ndarray:
 def test_the_profile_has_unit_integral(plume) -> None:
     """Along the depth the profile adds up to one, so that the picture's amounts are kept."""
     domain = plume.scene.domain
-    total = depth_profile(amount_of(8), GRID, domain).sum(1) * domain.voxel_size
+    total = profile_of(amount_of(8), domain).sum(1) * domain.voxel_size
     np.testing.assert_allclose(total, 1, rtol=0.03)
 
 
@@ -98,7 +104,7 @@ def test_wider_rows_are_deeper(plume) -> None:
     domain = plume.scene.domain
     amount = amount_of(4)
     amount[:16] = amount_of(12)[:16]
-    profile = depth_profile(amount, GRID, domain)
+    profile = profile_of(amount, domain)
     y = (np.arange(24) - 11.5) * domain.voxel_size
     depth = np.sqrt((profile * y[None, :, None] ** 2).sum(1) / profile.sum(1))[12]
     # rows count from the top, voxels from the bottom; the spread is blurred near the step
@@ -109,7 +115,7 @@ def test_wider_rows_are_deeper(plume) -> None:
 
 def test_the_profile_does_not_mind_the_amount(plume) -> None:
     """Thicker smoke of the same outline has the same profile."""
-    profiles = [depth_profile(amount_of(8) * scale, GRID, plume.scene.domain) for scale in (1, 50)]
+    profiles = [profile_of(amount_of(8) * scale, plume.scene.domain) for scale in (1, 50)]
     np.testing.assert_allclose(profiles[1], profiles[0], rtol=1e-4)
 
 
@@ -121,10 +127,12 @@ def test_the_multiplicative_fit_gets_better(plume, small) -> None:
     target = render(plume.densities[1], small)
     background = np.zeros((42, 30, 3), np.float32)
     renderer = Renderer(small.camera, small.domain, small.medium, scene_sun(small.lights), background, "single")
+    projection = project_voxels(small.camera, small.domain)
+    start, weight = 0.5 * plume.densities[1], np.ones((42, 30), np.float32)
+    noise = np.full((42, 30, 3), 1e-3, np.float32)
     losses = [
         fit_multiplicative(
-            renderer, target, background, 0.5 * plume.densities[1],
-            project_voxels(small.camera, small.domain), np.ones((42, 30), np.float32), 1e-3, count, 0.0,
+            renderer, target, background, start, projection, weight, noise, 0.0, count, 0.0
         ).loss
         for count in range(6)
     ]  # fmt: skip

@@ -149,9 +149,9 @@ def sweep_field(field, direction):
     device.start("cpu")
     sweep = light_sweep(direction)
     columns = device.zeros(column_shape(field.shape, sweep.axis))
-    accumulate_columns(field, columns, sweep.axis, sweep.travel, *sweep.slope)
+    accumulate_columns(field, columns, sweep.axis, sweep.travel, *sweep.slope, sweep.first)
     out = device.zeros(field.shape)
-    add_shadow_gradient(columns, np.ones(field.shape, np.int32), out, sweep.axis, *sweep.slope, 1.0)
+    add_shadow_gradient(columns, np.ones(field.shape, np.int32), out, sweep.axis, *sweep.slope, sweep.first, 1.0)
     return out
 
 

@@ -13,10 +13,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.background import CODE, Plate, matte
+from smokelift.background import CODE, Plate, matte, noise_at
 from smokelift.cameras import orbit
 from smokelift.density.descent import descend
-from smokelift.density.hull import project_voxels, visual_hull
+from smokelift.density.hull import project_voxels, reached, visual_hull
 from smokelift.density.multiplicative import fit_multiplicative
 from smokelift.density.paper import fit_paper
 from smokelift.density.profile import spread_along_depth
@@ -123,16 +123,18 @@ def reconstruct_density(
     if settings.method == "paper":
         return _paper(image, plate.image, scene, initial, settings)
     renderer = Renderer(camera, domain, medium, sun, plate.image, settings.scattering, hull)
-    weight = np.ones(mask.shape, np.float32)
-    noise = float(np.sqrt(np.mean(plate.noise**2)))
+    counts = reached(mask, projection)
+    weight = counts.astype(np.float32)
+    noise = noise_at(image, plate)
+    # beyond this the fit would reproduce noise (discrepancy principle)
+    enough = float(np.sum(np.square(noise[counts], dtype=np.float64)))
     if initial is None:
         initial = depth_guess(image, scene, settings, plate)
     start = np.where(hull, initial, 0).astype(np.float32)
     fit = fit_multiplicative(
-        renderer, image, plate.image, start, projection, weight, noise,
+        renderer, image, plate.image, start, projection, weight, noise, enough,
         settings.fit_iterations, settings.tolerance,
     )  # fmt: skip
-    enough = 3 * noise**2 * float(np.sum(mask))
     final = descend(renderer, image, fit.density, hull, weight, enough, settings.descent_iterations, settings.tolerance)
     return Density(final.density, hull, _figures(final.loss, image, fit.iterations + final.iterations, hull))
 
@@ -142,9 +144,12 @@ def depth_guess(image: Image, scene: Scene, settings: DensitySettings, plate: Pl
     assert scene.camera is not None and scene.domain is not None
     medium = scene.medium or Medium()
     depth = _optical_depth(image, plate.image, scene_sun(scene.lights), medium, settings.scattering)
-    amount = np.where(matte(image, plate).mask, depth, 0).astype(np.float32)
+    mask = matte(image, plate).mask
+    amount = np.where(mask, depth, 0).astype(np.float32)
     projection = project_voxels(scene.camera, scene.domain)
-    return spread_along_depth(amount, scene.camera, scene.domain, projection) / np.float32(medium.extinction)
+    hull = visual_hull(mask, projection)
+    extinction = spread_along_depth(amount, scene.camera, scene.domain, projection, hull)
+    return extinction / np.float32(medium.extinction)
 
 
 def _paper(image: Image, background: Image, scene: Scene, initial: Volume | None, settings: DensitySettings) -> Density:

@@ -54,46 +54,49 @@ def descend(
     tolerance
         Stop when a step lowers the loss by less than this share.
     """
-    filled = density[hull]
-    scale = np.zeros_like(density)
-    scale[hull] = filled + FLOOR * (filled.mean() if filled.size else 0.0)
-    inverse = np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 0)
+    where = np.flatnonzero(hull)
+    volume = np.zeros_like(density)
+    current = density.ravel()[where]
+    scale = current + np.float32(FLOOR * (current.mean() if current.size else 0.0))
 
-    def evaluate(candidate: Volume) -> tuple[float, Image]:
-        residual = weight[..., None] * (renderer.image(candidate, keep_record=True) - target)
+    def evaluate(candidate: NDArray[np.float32]) -> tuple[float, Image]:
+        volume.ravel()[where] = candidate
+        residual = weight[..., None] * (renderer.image(volume, keep_record=True) - target)
         return float(np.sum(np.square(residual, dtype=np.float64))), residual
 
-    current = np.where(hull, density, 0).astype(np.float32)
+    def gradient_of(residual: Image) -> NDArray[np.float32]:
+        """Derivative of the loss in units of the scale, for the last density evaluated."""
+        return renderer.gradient(2 * weight[..., None] * residual).ravel()[where] * scale
+
     loss, residual = evaluate(current)
+    gradient = gradient_of(residual)
     step: float | None = None
     done = 0
-    gradient = renderer.gradient(2 * weight[..., None] * residual)
     while done < iterations and loss > enough:
-        direction = scale * scale * gradient
-        slope = _dot(gradient, direction)
+        slope = _dot(gradient, gradient)
         if slope <= 0:
             break
         trial = step or 0.1 * loss / slope
         while True:
-            candidate = np.maximum(current - np.float32(trial) * direction, 0)
-            change = candidate - current
-            new_loss, new_residual = evaluate(candidate)
-            if new_loss <= loss + SUFFICIENT * _dot(gradient, change):
+            candidate = np.maximum(current - np.float32(trial) * scale * gradient, 0)
+            moved = (candidate - current) / scale
+            new_loss, residual = evaluate(candidate)
+            if new_loss <= loss + SUFFICIENT * _dot(gradient, moved):
                 break
             trial *= SHORTEN
             if trial * slope < 1e-9 * loss:
-                return Fit(current, loss, done)
-        new_gradient = renderer.gradient(2 * weight[..., None] * new_residual)
-        moved, turned = change * inverse, (new_gradient - gradient) * scale
-        curvature = _dot(moved, turned)
+                volume.ravel()[where] = current
+                return Fit(volume, loss, done)
+        new_gradient = gradient_of(residual)
+        curvature = _dot(moved, new_gradient - gradient)
         step = _dot(moved, moved) / curvature if curvature > 0 else 4 * trial
         gained = loss - new_loss
         current, loss, gradient = candidate, new_loss, new_gradient
         done += 1
         if gained < tolerance * loss:
             break
-    return Fit(current, loss, done)
+    return Fit(volume, loss, done)
 
 
-def _dot(a: Volume, b: Volume) -> float:
+def _dot(a: NDArray[np.float32], b: NDArray[np.float32]) -> float:
     return float(np.vdot(a, b))

@@ -32,11 +32,10 @@ class Projection:
     visible: NDArray[np.bool_]
     footprint: float
 
-    def read(self, picture: NDArray[np.float32]) -> NDArray[np.float32]:
-        """The picture (rows, columns) read bilinearly at every voxel; the nearest pixel's value outside."""
-        return np.asarray(
-            ndimage.map_coordinates(picture, (self.rows, self.columns), order=1, mode="nearest"), np.float32
-        )
+    def read(self, picture: NDArray[np.float32], voxels: NDArray[np.bool_]) -> NDArray[np.float32]:
+        """The picture (rows, columns) read bilinearly at some voxels (n,); the nearest pixel's value outside."""
+        at = (self.rows[voxels], self.columns[voxels])
+        return np.asarray(ndimage.map_coordinates(picture, at, order=1, mode="nearest"), np.float32)
 
 
 def voxel_centres(domain: Domain) -> NDArray[np.float64]:
@@ -59,10 +58,19 @@ def project_voxels(camera: Camera, domain: Domain) -> Projection:
     return Projection(rows.astype(np.float32), columns.astype(np.float32), inside & (depth > 0), float(footprint))
 
 
+def reached(mask: NDArray[np.bool_], projection: Projection) -> NDArray[np.bool_]:
+    """Pixels (rows, columns) that the voxels of the mask's hull can change."""
+    return np.asarray(ndimage.binary_dilation(mask, iterations=2 * _radius(projection) + 1))
+
+
+def _radius(projection: Projection) -> int:
+    """Half a voxel's footprint in whole pixels."""
+    return max(1, round(projection.footprint / 2))
+
+
 def visual_hull(mask: NDArray[np.bool_], projection: Projection) -> NDArray[np.bool_]:
     """Voxels (nx, ny, nz) whose footprint meets the mask (rows, columns) of a picture's smoke pixels."""
-    radius = max(1, round(projection.footprint / 2))
-    grown = ndimage.binary_dilation(mask, iterations=radius)
+    grown = ndimage.binary_dilation(mask, iterations=_radius(projection))
     height, width = mask.shape
     rows = np.clip(np.rint(projection.rows), 0, height - 1).astype(np.intp)
     columns = np.clip(np.rint(projection.columns), 0, width - 1).astype(np.intp)

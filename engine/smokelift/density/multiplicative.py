@@ -55,7 +55,8 @@ def fit_multiplicative(
     density: Volume,
     projection: Projection,
     weight: NDArray[np.float32],
-    noise: float,
+    noise: Image,
+    enough: float,
     iterations: int,
     tolerance: float,
 ) -> Fit:
@@ -72,14 +73,17 @@ def fit_multiplicative(
         Where voxels lie in the picture.
     weight : (rows, columns)
         1 where the picture counts, 0 elsewhere.
-    noise
+    noise : (rows, columns, 3)
         Standard deviation of the target's noise, linear radiance.
+    enough
+        Loss at which the target's noise begins to be fitted; nothing is done below it.
     iterations
         At most so many.
     tolerance
         Stop when an iteration lowers the loss by less than this share.
     """
     best, best_loss, current, done = density, np.inf, density, 0
+    filled = density > 0
     for done in range(iterations + 1):
         image = renderer.image(current)
         transmittance = renderer.transmittance
@@ -87,11 +91,13 @@ def fit_multiplicative(
         gained = best_loss - loss
         if loss < best_loss:
             best, best_loss = current, loss
-        if done == iterations or (done > 2 and gained < tolerance * loss):
+        if done == iterations or loss <= enough or (done > 2 and gained < tolerance * loss):
             break
         secant = (renderer.image(current * np.float32(PROBE)) - image) / np.log(PROBE)
         step = _log_scale(image, transmittance, secant, target, background, weight, noise)
-        current = current * np.exp(RELAXATION * projection.read(step))
+        scaled = current.copy()
+        scaled[filled] *= np.exp(RELAXATION * projection.read(step, filled))
+        current = scaled
     return Fit(best, best_loss, done)
 
 
@@ -102,7 +108,7 @@ def _log_scale(
     target: Image,
     background: Image,
     weight: NDArray[np.float32],
-    noise: float,
+    noise: Image,
 ) -> NDArray[np.float32]:
     """Logarithm of each pixel's scale, damped and smoothed, (rows, columns)."""
     clear = transmittance[..., None]
@@ -110,7 +116,7 @@ def _log_scale(
     source = (image - clear * background) / solid
     contrast = background - source
     power = np.sum(contrast**2, -1)
-    floor = noise**2 + 1e-12
+    floor = np.mean(noise**2, -1)
     wanted = np.clip(np.sum((target - source) * contrast, -1) / (power + 1e-20), 1e-4, 1.0)
     scale = np.log(wanted) / np.minimum(np.log(np.maximum(transmittance, 1e-30)), -1e-6)
     change = np.sqrt(np.sum((image - background) ** 2, -1))

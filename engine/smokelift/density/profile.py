@@ -80,19 +80,23 @@ def lateral_spread(
     return up, np.sqrt(np.maximum(smooth, h**2))
 
 
-def depth_profile(amount: NDArray[np.float32], camera: Camera, domain: Domain) -> NDArray[np.float32]:
-    """Unit-integral profile g along the depth (1/m), (nx, ny, nz), centred on the domain's axis."""
+def depth_profile(
+    amount: NDArray[np.float32], camera: Camera, domain: Domain, voxels: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """Profile g (1/m) along the depth at the marked voxels (n,): unit integral, centred on the domain's axis."""
     _, depth, height = view_frame(camera)
     centre = (np.array(domain.min) + np.array(domain.max)) / 2
     heights, spread = lateral_spread(amount, camera, domain)
-    offset = voxel_centres(domain) - centre
+    offset = voxel_centres(domain)[voxels] - centre
     width = np.interp(offset @ height, heights, spread) * np.sqrt(gamma(1 / FLATNESS) / gamma(3 / FLATNESS))
     profile = np.exp(-((np.abs(offset @ depth) / width) ** FLATNESS))
-    return np.asarray(profile / (2 * width * gamma(1 + 1 / FLATNESS)), np.float32)
+    return np.asarray(profile / (2 * width * gamma(1 + 1 / FLATNESS)))
 
 
 def spread_along_depth(
-    amount: NDArray[np.float32], camera: Camera, domain: Domain, projection: Projection
+    amount: NDArray[np.float32], camera: Camera, domain: Domain, projection: Projection, hull: NDArray[np.bool_]
 ) -> NDArray[np.float32]:
-    """Extinction (1/m), (nx, ny, nz), whose rays have about the optical depths of the picture ``amount``."""
-    return projection.read(amount) * depth_profile(amount, camera, domain)
+    """Extinction (1/m), (nx, ny, nz), zero outside the hull, whose rays have about the optical depths ``amount``."""
+    extinction = np.zeros(domain.resolution, np.float32)
+    extinction[hull] = projection.read(amount, hull) * depth_profile(amount, camera, domain, hull)
+    return extinction

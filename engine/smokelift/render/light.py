@@ -16,7 +16,7 @@ Columns are stored where they meet the planes: slot i of plane k lies at lateral
 so a plane of n voxels has n + 1 slots and the storage is hardly larger than the grid, at any angle.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import taichi as ti
@@ -42,21 +42,24 @@ class Sweep:
         Lateral shift a plane along the two other axes, in voxels, -1 to 1.
     length
         Length of the ray between two planes, in voxels.
+    first
+        Number of the first plane: where the grid is a part of a larger one, its columns are the larger one's.
     """
 
     axis: int
     travel: int
     slope: tuple[float, float]
     length: float
+    first: int = 0
 
     @property
     def reversed(self) -> "Sweep":
         """The sweep of the light that travels the other way: the adjoint."""
-        return Sweep(self.axis, -self.travel, self.slope, self.length)
+        return replace(self, travel=-self.travel)
 
 
-def light_sweep(direction: NDArray[np.float64]) -> Sweep:
-    """The sweep for a direction of travel (3,), of any length but zero."""
+def light_sweep(direction: NDArray[np.float64], corner: tuple[int, int, int] = (0, 0, 0)) -> Sweep:
+    """The sweep for a direction of travel (3,), not zero, over a grid that begins at a voxel of a larger one."""
     axis = int(np.argmax(np.abs(direction)))
     along = float(direction[axis])
     b, c = LATERAL[axis]
@@ -65,6 +68,7 @@ def light_sweep(direction: NDArray[np.float64]) -> Sweep:
         travel=1 if along > 0 else -1,
         slope=(float(direction[b]) / along, float(direction[c]) / along),
         length=float(np.linalg.norm(direction)) / abs(along),
+        first=corner[axis],
     )
 
 
@@ -112,26 +116,27 @@ def accumulate_columns(
     travel: ti.i32,
     slope_b: ti.f32,
     slope_c: ti.f32,
+    first: ti.i32,
 ):
     """columns = K S field, in units of (value of the field) x planes."""
     size = planar(axis, ti.Vector([field.shape[0], field.shape[1], field.shape[2]]))
     planes, count_b, count_c = size[0], size[1], size[2]
-    end_b = ti.floor(slope_b * (planes - 1), ti.i32)
-    end_c = ti.floor(slope_c * (planes - 1), ti.i32)
-    first_b, first_c = -ti.max(0, end_b), -ti.max(0, end_c)
-    total_b = count_b + 1 + ti.abs(end_b)
-    total_c = count_c + 1 + ti.abs(end_c)
+    begin_b, end_b = ti.floor(slope_b * first, ti.i32), ti.floor(slope_b * (first + planes - 1), ti.i32)
+    begin_c, end_c = ti.floor(slope_c * first, ti.i32), ti.floor(slope_c * (first + planes - 1), ti.i32)
+    most_b, most_c = ti.max(begin_b, end_b), ti.max(begin_c, end_c)
+    total_b = count_b + 1 + ti.abs(end_b - begin_b)
+    total_c = count_c + 1 + ti.abs(end_c - begin_c)
     for column_b, column_c in ti.ndrange(total_b, total_c):
         depth = 0.0
         for step in range(planes):
             k = step if travel > 0 else planes - 1 - step
-            shift_b = ti.floor(slope_b * k, ti.i32)
-            shift_c = ti.floor(slope_c * k, ti.i32)
-            i = column_b + first_b + shift_b
-            j = column_c + first_c + shift_c
+            shift_b = ti.floor(slope_b * (first + k), ti.i32)
+            shift_c = ti.floor(slope_c * (first + k), ti.i32)
+            i = column_b - most_b + shift_b
+            j = column_c - most_c + shift_c
             if 0 <= i <= count_b and 0 <= j <= count_c:
-                f = slope_b * k - shift_b
-                g = slope_c * k - shift_c
+                f = slope_b * (first + k) - shift_b
+                g = slope_c * (first + k) - shift_c
                 value = (1 - f) * (
                     (1 - g) * _voxel_value(field, axis, k, i - 1, j - 1, count_b, count_c)
                     + g * _voxel_value(field, axis, k, i - 1, j, count_b, count_c)
@@ -144,12 +149,12 @@ def accumulate_columns(
 
 
 @ti.func
-def at_voxel(columns: ti.template(), axis: ti.template(), slope_b, slope_c, index):
+def at_voxel(columns: ti.template(), axis: ti.template(), slope_b, slope_c, first, index):
     """(S^T columns) at one voxel."""
     kij = planar(axis, index)
     k, i, j = kij[0], kij[1], kij[2]
-    f = slope_b * k - ti.floor(slope_b * k)
-    g = slope_c * k - ti.floor(slope_c * k)
+    f = slope_b * (first + k) - ti.floor(slope_b * (first + k))
+    g = slope_c * (first + k) - ti.floor(slope_c * (first + k))
     return f * (g * columns[cell(axis, k, i, j)] + (1 - g) * columns[cell(axis, k, i, j + 1)]) + (1 - f) * (
         g * columns[cell(axis, k, i + 1, j)] + (1 - g) * columns[cell(axis, k, i + 1, j + 1)]
     )
@@ -164,12 +169,13 @@ def shade(
     axis: ti.template(),
     slope_b: ti.f32,
     slope_c: ti.f32,
+    first: ti.i32,
     optical_length: ti.f32,
 ):
     """inscatter = phase x V_l, V_l = exp(-optical depth to the light), in and next to voxels that may hold smoke."""
     for index in ti.grouped(ti.ndrange(*inscatter.shape)):
         if near[index] != 0:
-            depth = optical_length * at_voxel(columns, axis, slope_b, slope_c, index)
+            depth = optical_length * at_voxel(columns, axis, slope_b, slope_c, first, index)
             inscatter[index] = phase[index] * ti.exp(-depth)
 
 
@@ -181,12 +187,13 @@ def add_shadow_gradient(
     axis: ti.template(),
     slope_b: ti.f32,
     slope_c: ti.f32,
+    first: ti.i32,
     optical_length: ti.f32,
 ):
     """gradient += optical_length S^T columns, with the columns of the reversed sweep of dL / d(optical depth)."""
     for index in ti.grouped(ti.ndrange(*gradient.shape)):
         if support[index] != 0:
-            gradient[index] += optical_length * at_voxel(columns, axis, slope_b, slope_c, index)
+            gradient[index] += optical_length * at_voxel(columns, axis, slope_b, slope_c, first, index)
 
 
 @ti.kernel

@@ -38,7 +38,7 @@ class Renderer:
         ``"single"``: single scattering with self-shadowing; ``"unshadowed"``: light reaches every voxel
         unattenuated; ``"absorption"``: the background attenuated, nothing else.
     support : (nx, ny, nz) bool, optional
-        Voxels that may hold smoke; the gradient is computed there and zero elsewhere.
+        Voxels that may hold smoke: only the box around them is rendered, and the gradient is zero elsewhere.
     """
 
     def __init__(
@@ -57,16 +57,19 @@ class Renderer:
         self._shadows = self._scatters and scattering == "single"
         self._irradiance = np.array(sun.irradiance if sun else (0, 0, 0), np.float64)
         self._background = np.asarray(background, np.float64)
-        self._rays = camera_rays(camera, domain)
+        inside = np.ones(domain.resolution, np.bool_) if support is None else support
+        near = ndimage.binary_dilation(inside, np.ones((3, 3, 3)))
+        corner, self._crop = _bounding_box(near)
+        box = _part(domain, self._crop)
+        self._inside = inside[self._crop]
+        self._rays = camera_rays(camera, box)
         self._lines = device.upload(self._rays.lines)
         self._length = device.upload(self._rays.length)
         self._planes = device.upload(self._rays.planes)
-        shape = domain.resolution
+        self._shape = shape = box.resolution
         rows, columns = camera.size[1], camera.size[0]
-        self._outside = None if support is None else ~support
-        inside = np.ones(shape, np.bool_) if support is None else support
-        near = ndimage.binary_dilation(inside, np.ones((3, 3, 3)))
-        self._support, self._near = device.upload(inside.astype(np.int32)), device.upload(near.astype(np.int32))
+        self._support = device.upload(self._inside.astype(np.int32))
+        self._near = device.upload(near[self._crop].astype(np.int32))
         self._medium = device.zeros((shape[0] + 2, shape[1] + 2, shape[2] + 2, 2))
         self._scattered = device.zeros((rows, columns))
         self._depth = device.zeros((rows, columns))
@@ -75,26 +78,26 @@ class Renderer:
         self._inscatter = device.zeros(shape if self._scatters else (1, 1, 1))
         if self._scatters and sun is not None:
             direction = np.array(sun.direction, np.float64)
+            direction /= np.linalg.norm(direction)
             light.fill_phase(
-                self._inscatter, device.matrix(self._to_eye()), device.vector(direction / np.linalg.norm(direction)),
+                self._inscatter, device.matrix(_to_eye(camera, box)), device.vector(direction),
                 medium.anisotropy, medium.albedo,
             )  # fmt: skip
         if self._shadows and sun is not None:
             self._phase = self._inscatter
             self._inscatter = device.zeros(shape)
-            self._sweep = light.light_sweep(np.array(sun.direction, np.float64))
+            self._sweep = light.light_sweep(np.array(sun.direction, np.float64), corner)
             self._columns = device.zeros(light.column_shape(shape, self._sweep.axis))
             self._optical_length = medium.extinction * domain.voxel_size * self._sweep.length
 
     def image(self, density: Volume, *, keep_record: bool = False) -> Image:
         """Render a density (nx, ny, nz); linear radiance (rows, columns, 3)."""
-        self._density = device.upload(density)
+        self._density = device.upload(density[self._crop])
         if self._shadows:
             self._light_pass()
-        view.pack(self._density, self._inscatter, self._medium, self.medium.extinction, int(self._scatters))
+        view.pack(self._density, self._inscatter, self._near, self._medium, self.medium.extinction, int(self._scatters))
         if keep_record and self._record is None:
-            planes = max(self.domain.resolution)
-            self._record = device.zeros((planes, *self._rays.length.shape, 2))
+            self._record = device.zeros((max(self._shape), *self._rays.length.shape, 2))
         record = self._record if keep_record else self._medium
         for axis in self._rays.axes:
             view.march(
@@ -120,8 +123,8 @@ class Renderer:
             device.upload(of_image @ self._irradiance),
             device.upload((of_image * self._background).sum(-1)),
         )  # fmt: skip
-        gradient = device.zeros(self.domain.resolution)
-        depth_gradient = device.zeros(self.domain.resolution if self._shadows else (1, 1, 1))
+        gradient = device.zeros(self._shape)
+        depth_gradient = device.zeros(self._shape if self._shadows else (1, 1, 1))
         to_pixel = device.matrix(self._rays.to_pixel)
         for axis in self._rays.axes:
             view.gather_gradient(
@@ -130,30 +133,49 @@ class Renderer:
             )  # fmt: skip
         if self._shadows:
             back = self._sweep.reversed
-            light.accumulate_columns(depth_gradient, self._columns, back.axis, back.travel, *back.slope)
+            light.accumulate_columns(depth_gradient, self._columns, back.axis, back.travel, *back.slope, back.first)
             light.add_shadow_gradient(
-                self._columns, self._support, gradient, back.axis, *back.slope, self._optical_length
+                self._columns, self._support, gradient, back.axis, *back.slope, back.first, self._optical_length
             )
-        result = device.download(gradient)
-        if self._outside is not None:
-            result[self._outside] = 0
+        result = np.zeros(self.domain.resolution, np.float32)
+        result[self._crop] = np.where(self._inside, device.download(gradient), 0)
         return result
 
     def _light_pass(self) -> None:
         sweep = self._sweep
-        light.accumulate_columns(self._density, self._columns, sweep.axis, sweep.travel, *sweep.slope)
+        light.accumulate_columns(self._density, self._columns, sweep.axis, sweep.travel, *sweep.slope, sweep.first)
         light.shade(
-            self._columns, self._phase, self._near, self._inscatter, sweep.axis, *sweep.slope, self._optical_length
-        )
+            self._columns, self._phase, self._near, self._inscatter,
+            sweep.axis, *sweep.slope, sweep.first, self._optical_length,
+        )  # fmt: skip
 
-    def _to_eye(self) -> NDArray[np.float64]:
-        """Affine map from a voxel's index to the direction from there to the eye, 3x4."""
-        matrix = np.array(self.camera.matrix, np.float64)
-        affine = np.zeros((3, 4))
-        if self.camera.type == "orthographic":
-            affine[:, 3] = matrix[:3, 2]
-            return affine
-        h = self.domain.voxel_size
-        affine[:, :3] = -h * np.eye(3)
-        affine[:, 3] = matrix[:3, 3] - (np.array(self.domain.min) + 0.5 * h)
+
+def _bounding_box(near: NDArray[np.bool_]) -> tuple[tuple[int, int, int], tuple[slice, slice, slice]]:
+    """First voxel and slices of the box around the marked voxels; one voxel if there are none."""
+    spans = []
+    for axis in range(3):
+        marked = np.nonzero(near.any(tuple(other for other in range(3) if other != axis)))[0]
+        spans.append((int(marked[0]), int(marked[-1]) + 1) if marked.size else (0, 1))
+    x, y, z = spans
+    return (x[0], y[0], z[0]), (slice(*x), slice(*y), slice(*z))
+
+
+def _part(domain: Domain, crop: tuple[slice, slice, slice]) -> Domain:
+    h = domain.voxel_size
+    low = [start + h * part.start for start, part in zip(domain.min, crop, strict=True)]
+    high = [start + h * part.stop for start, part in zip(domain.min, crop, strict=True)]
+    x, y, z = (part.stop - part.start for part in crop)
+    return Domain((low[0], low[1], low[2]), (high[0], high[1], high[2]), (x, y, z))
+
+
+def _to_eye(camera: Camera, domain: Domain) -> NDArray[np.float64]:
+    """Affine map from a voxel's index to the direction from there to the eye, 3x4."""
+    matrix = np.array(camera.matrix, np.float64)
+    affine = np.zeros((3, 4))
+    if camera.type == "orthographic":
+        affine[:, 3] = matrix[:3, 2]
         return affine
+    h = domain.voxel_size
+    affine[:, :3] = -h * np.eye(3)
+    affine[:, 3] = matrix[:3, 3] - (np.array(domain.min) + 0.5 * h)
+    return affine

@@ -24,18 +24,33 @@ planes_type = ti.types.ndarray(dtype=ti.i32, ndim=3)
 
 
 @ti.kernel
-def pack(density: ndarray3, inscatter: ndarray3, medium: ndarray4, extinction: ti.f32, scatters: ti.i32):
-    """medium[1 + index] = (kappa, J), with the border."""
+def pack(
+    density: ndarray3,
+    inscatter: ndarray3,
+    near: mask3,
+    medium: ndarray4,
+    extinction: ti.f32,
+    scatters: ti.i32,
+):
+    """medium[1 + index] = (kappa, J) in and next to voxels that may hold smoke, with the border."""
     size = ti.Vector([density.shape[0], density.shape[1], density.shape[2]])
-    for i, j, k in ti.ndrange(medium.shape[0], medium.shape[1], medium.shape[2]):
-        index = ti.Vector([i - 1, j - 1, k - 1])
-        nearest = ti.min(ti.max(index, 0), size - 1)
-        kappa = 0.0
-        if all(index == nearest):
-            kappa = extinction * density[index]
-        medium[i, j, k, 0] = kappa
-        if scatters != 0:
-            medium[i, j, k, 1] = inscatter[nearest]
+    for index in ti.grouped(ti.ndrange(*density.shape)):
+        if near[index] != 0:
+            i, j, k = index[0] + 1, index[1] + 1, index[2] + 1
+            medium[i, j, k, 0] = extinction * density[index]
+            if scatters != 0:
+                medium[i, j, k, 1] = inscatter[index]
+                if any(index == 0) or any(index == size - 1):
+                    _continue_into_border(medium, index, size, inscatter[index])
+
+
+@ti.func
+def _continue_into_border(medium: ti.template(), index, size, value):
+    low = ti.Vector([ti.select(index[a] == 0, -1, 0) for a in ti.static(range(3))])
+    high = ti.Vector([ti.select(index[a] == size[a] - 1, 2, 1) for a in ti.static(range(3))])
+    for offset in ti.grouped(ti.ndrange((low[0], high[0]), (low[1], high[1]), (low[2], high[2]))):
+        at = index + offset + 1
+        medium[at[0], at[1], at[2], 1] = value
 
 
 @ti.func
