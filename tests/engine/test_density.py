@@ -10,7 +10,7 @@ import pytest
 
 from smokelift.background import Plate
 from smokelift.density import Density, DensitySettings, reconstruct_density
-from smokelift.density.hull import project_voxels, visual_hull
+from smokelift.density.hull import project_voxels, reached, visual_hull
 from smokelift.density.multiplicative import fit_multiplicative
 from smokelift.density.profile import depth_profile
 from smokelift.render import Renderer, render, scene_sun
@@ -155,12 +155,14 @@ def test_descent_never_raises_the_loss(plume, small) -> None:
 
 
 def test_the_figures_are_those_of_the_density(plume, small) -> None:
-    """Loss and PSNR are what a render of the result shows."""
+    """The loss is what a render of the result shows, the PSNR that of the pixels that the hull can change."""
     target = render(plume.densities[1], small)
     found = reconstruct_density(target, small, settings=QUICK)
     error = np.square(render(found.values, small) - target, dtype=np.float64)
     assert found.figures["loss"] == pytest.approx(error.sum(), rel=1e-3)
-    assert found.figures["psnr"] == pytest.approx(-10 * np.log10(error.mean()), abs=0.01)
+    projection = project_voxels(small.camera, small.domain)
+    touched = reached(target.max(-1) > 0.002, projection)
+    assert found.figures["psnr"] == pytest.approx(-10 * np.log10(error[touched].mean()), abs=0.3)
     assert found.figures["hull_share"] == pytest.approx(found.hull.mean())
 
 

@@ -68,8 +68,8 @@ class Density:
     hull : (nx, ny, nz) bool
         Voxels that the picture allows to hold smoke.
     figures
-        ``loss`` (sum of squares), ``psnr`` (dB, linear radiance over the picture, peak 1), ``iterations``,
-        ``hull_share``.
+        ``loss`` (sum of squares) and ``psnr`` (dB, peak 1) of the picture, in linear radiance, over the pixels that
+        voxels of the hull can change; ``iterations``; ``hull_share``, the hull's share of the voxels.
     """
 
     values: Volume
@@ -119,7 +119,7 @@ def reconstruct_density(
     if initial is not None:
         initial = _checked_initial(initial, domain)
     if not hull.any():
-        return Density(np.zeros(domain.resolution, np.float32), hull, _figures(0.0, image, 0, hull))
+        return Density(np.zeros(domain.resolution, np.float32), hull, _figures(0.0, 1, 0, hull))
     if settings.method == "paper":
         return _paper(image, plate.image, scene, initial, settings)
     renderer = Renderer(camera, domain, medium, sun, plate.image, settings.scattering, hull)
@@ -136,7 +136,9 @@ def reconstruct_density(
         settings.fit_iterations, settings.tolerance,
     )  # fmt: skip
     final = descend(renderer, image, fit.density, hull, weight, enough, settings.descent_iterations, settings.tolerance)
-    return Density(final.density, hull, _figures(final.loss, image, fit.iterations + final.iterations, hull))
+    return Density(
+        final.density, hull, _figures(final.loss, int(counts.sum()), fit.iterations + final.iterations, hull)
+    )
 
 
 def depth_guess(image: Image, scene: Scene, settings: DensitySettings, plate: Plate) -> Volume:
@@ -165,7 +167,7 @@ def _paper(image: Image, background: Image, scene: Scene, initial: Volume | None
     fit = fit_paper(renderers, image, start, fog, settings.paper_rate, 1e-4, settings.descent_iterations)
     loss = float(np.sum(np.square(renderers[0].image(fit.density) - image, dtype=np.float64)))
     everywhere = np.ones(domain.resolution, np.bool_)
-    return Density(fit.density, everywhere, _figures(loss, image, fit.iterations, everywhere))
+    return Density(fit.density, everywhere, _figures(loss, image.size // 3, fit.iterations, everywhere))
 
 
 def _optical_depth(
@@ -187,8 +189,8 @@ def _clean_plate(scene: Scene, camera: Camera) -> Plate:
     return Plate(picture, np.ones((height, width), np.float32), srgb_to_linear(np.full(3, CODE)))
 
 
-def _figures(loss: float, image: Image, iterations: int, hull: NDArray[np.bool_]) -> dict[str, float]:
-    error = loss / image.size
+def _figures(loss: float, pixels: int, iterations: int, hull: NDArray[np.bool_]) -> dict[str, float]:
+    error = loss / (3 * pixels)
     return {
         "loss": loss,
         "psnr": float(-10 * np.log10(max(error, 1e-12))),
