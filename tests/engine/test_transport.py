@@ -103,11 +103,11 @@ def test_linear_operators_pass_the_dot_product_test(closed):
     a, b = (rng.standard_normal(SHAPE).astype(np.float32) for _ in range(2))
     a, b = a - a.mean(), b - b.mean()  # between walls a constant has no solution
     left, right = np.vdot(_core.solve_poisson(a, closed), b), np.vdot(a, _core.solve_poisson(b, closed))
-    assert left == pytest.approx(right, rel=1e-3, abs=1e-3 * np.linalg.norm(a))
+    assert left == pytest.approx(right, rel=1e-3, abs=1e-3 * float(np.linalg.norm(a)))
     u, v = random_velocity(12), random_velocity(13)
     left = inner_product(project(u, names(closed)).faces, v.faces, closed)
     right = inner_product(u.faces, project(v, names(closed)).faces, closed)
-    assert left == pytest.approx(right, abs=1e-5 * inner_product(u.faces, u.faces, closed))
+    assert left == pytest.approx(right, abs=1e-5 * float(inner_product(u.faces, u.faces, closed)))
 
 
 def test_projection_keeps_units():
