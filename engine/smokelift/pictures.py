@@ -37,7 +37,7 @@ VIDEO_KINDS = {
 """Container and codec of each suffix."""
 
 
-def sequence_renderer(sequence: Sequence, camera: Camera | None = None) -> Renderer:
+def sequence_renderer(sequence: Sequence, camera: Camera | None = None, background: Image | None = None) -> Renderer:
     """The renderer of a sequence's own scene, or of another camera before the scene's mean background."""
     scene = sequence.scene
     assert scene.camera is not None and scene.domain is not None
@@ -46,7 +46,7 @@ def sequence_renderer(sequence: Sequence, camera: Camera | None = None) -> Rende
         scene.domain,
         scene.medium or Medium(),
         scene_sun(scene.lights),
-        scene_background(scene, camera),
+        scene_background(scene, camera) if background is None else background,
         sequence.settings["density"]["scattering"],
     )
 
@@ -106,30 +106,15 @@ def write_preview(path: Path, sequence: Sequence, clip: Clip) -> None:
 
 
 def _turned(sequence: Sequence, height: int) -> list[Renderer]:
+    """Renderers of small pictures from the front and from the sheet's other angles."""
     scene = sequence.scene
     assert scene.camera is not None and scene.domain is not None
-    camera = scene.camera
-    small = camera.resized(max(2, round(camera.size[0] * height / camera.size[1])), height)
-    renderers = [sequence_renderer(sequence, small)]
-    if scene.background is not None and scene.background.image is not None:
-        picture = scene_background(scene)
-        renderers = [_with_background(sequence, small, area_average(picture, *small.size))]
-    return renderers + [
-        sequence_renderer(sequence, orbit(small, scene.domain, angle)) for angle in SHEET_ANGLES if angle
-    ]
-
-
-def _with_background(sequence: Sequence, camera: Camera, background: Image) -> Renderer:
-    scene = sequence.scene
-    assert scene.domain is not None
-    return Renderer(
-        camera,
-        scene.domain,
-        scene.medium or Medium(),
-        scene_sun(scene.lights),
-        background,
-        sequence.settings["density"]["scattering"],
-    )
+    width = max(2, round(scene.camera.size[0] * height / scene.camera.size[1]))
+    small = scene.camera.resized(width, height)
+    behind = scene_background(scene)
+    front = sequence_renderer(sequence, small, area_average(behind, width, height) if behind.ndim == 3 else behind)
+    turned = [orbit(small, scene.domain, angle) for angle in SHEET_ANGLES if angle]
+    return [front, *(sequence_renderer(sequence, camera) for camera in turned)]
 
 
 def _fitted(frame: Image, camera: Camera) -> Image:
