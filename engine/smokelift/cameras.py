@@ -28,7 +28,7 @@ def orbit(camera: Camera, domain: Domain, yaw_degrees: float, pitch_degrees: flo
     pitch_degrees
         Then raise the camera by so much; negative lowers it.
     """
-    centre = (np.array(domain.min) + np.array(domain.max)) / 2
+    centre = np.array(domain.centre)
     matrix = np.array(camera.matrix, np.float64)
     right = matrix[:3, 0]
     turn = _rotation(np.array([0.0, 0.0, 1.0]), yaw_degrees) @ _rotation(right, -pitch_degrees)
@@ -74,7 +74,7 @@ class CameraError(ValueError):
     """The camera does not see the domain."""
 
 
-def working_picture(camera: Camera, domain: Domain, pixels_per_voxel: float = 1.0) -> WorkingPicture:
+def working_picture(camera: Camera, domain: Domain) -> WorkingPicture:
     """Choose the picture that a grid is fitted to.
 
     Finer pixels than voxels hold detail that the grid cannot show, coarser ones lose some that it can, so a pixel
@@ -85,7 +85,7 @@ def working_picture(camera: Camera, domain: Domain, pixels_per_voxel: float = 1.
     CameraError
         If no part of the domain is in the picture.
     """
-    corners = np.array(np.meshgrid(*zip(domain.min, domain.max, strict=True), indexing="ij")).reshape(3, -1).T
+    corners = domain.corners()
     pixels, depth = project(camera, corners)
     width, height = camera.size
     low, high = np.zeros(2), np.array([width, height], np.float64)
@@ -95,20 +95,11 @@ def working_picture(camera: Camera, domain: Domain, pixels_per_voxel: float = 1.
         raise CameraError("The camera does not see the domain; move the domain into the picture or turn the camera.")
     left, top = (int(v) for v in np.floor(low))
     right, bottom = (int(v) for v in np.ceil(high))
-    centre = corners.mean(0)
-    _, centre_depth = project(camera, centre)
+    _, centre_depth = project(camera, np.array(domain.centre))
     near = domain.voxel_size if camera.type == "perspective" else 1.0
-    scale = max(camera.fx, camera.fy) * domain.voxel_size / max(float(centre_depth), near)
-    shrink = max(1.0, scale / pixels_per_voxel)
+    voxel_in_pixels = max(camera.fx, camera.fy) * domain.voxel_size / max(float(centre_depth), near)
+    shrink = max(1.0, voxel_in_pixels)
     columns = max(1, round((right - left) / shrink))
     rows = max(1, round((bottom - top) / shrink))
-    x, y = columns / (right - left), rows / (bottom - top)
-    small = replace(
-        camera,
-        size=(columns, rows),
-        fx=camera.fx * x,
-        fy=camera.fy * y,
-        cx=(camera.cx - left) * x,
-        cy=(camera.cy - top) * y,
-    )
+    small = camera.cropped(left, top, right - left, bottom - top).resized(columns, rows)
     return WorkingPicture(small, left, top, right - left, bottom - top)

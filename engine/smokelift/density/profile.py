@@ -56,7 +56,7 @@ def lateral_spread(
         from the neighbours where there is no smoke and smoothed over two voxels.
     """
     lateral, _, height = view_frame(camera)
-    centre = (np.array(domain.min) + np.array(domain.max)) / 2
+    centre = np.array(domain.centre)
     h = domain.voxel_size
     half = np.abs(np.array(domain.max) - centre)
     reach_across, reach_up = np.abs(lateral) @ half, np.abs(height) @ half
@@ -85,7 +85,7 @@ def depth_profile(
 ) -> NDArray[np.float64]:
     """Profile g (1/m) along the depth at the marked voxels (n,): unit integral, centred on the domain's axis."""
     _, depth, height = view_frame(camera)
-    centre = (np.array(domain.min) + np.array(domain.max)) / 2
+    centre = np.array(domain.centre)
     heights, spread = lateral_spread(amount, camera, domain)
     offset = voxel_centres(domain)[voxels] - centre
     width = np.interp(offset @ height, heights, spread) * np.sqrt(gamma(1 / FLATNESS) / gamma(3 / FLATNESS))
