@@ -50,6 +50,9 @@ from smokelift.transport import (
 
 __all__ = ["Velocity", "VelocitySettings", "estimate_velocity", "predict_velocity"]
 
+REACH = np.float32(1.0)
+"""Voxels of the grid at hand up to which a linearisation of the density holds."""
+
 
 @dataclass(frozen=True)
 class VelocitySettings:
@@ -192,7 +195,8 @@ def estimate_velocity(
             problem = _linearise(level, u, settings)
             if problem is None:
                 return Velocity.zero((nx, ny, nz), voxel_size)
-            u, figures = _solve(problem, u, settings)
+            solution, figures = _solve(problem, u, settings)
+            u = solution if settings.method == "paper" else _within_reach(solution, u, settings)
             for name in ("iterations", "products", "projections"):
                 totals[name] += figures[name]
             totals["residual"] = figures["residual"]
@@ -300,6 +304,19 @@ def _solve(problem: _core.LeastSquares, u: Faces, settings: VelocitySettings) ->
             threads=settings.threads,
         )
     return (x, y, z), figures
+
+
+def _within_reach(solution: Faces, u: Faces, settings: VelocitySettings) -> Faces:
+    """The solution, with increments cut to what the linearisation around `u` can know.
+
+    Beyond that the data term says nothing, and thin or noisy smoke would throw single wisps many voxels far.
+    """
+    increments = [new - old for new, old in zip(solution, u, strict=True)]
+    if max(float(np.abs(a).max()) for a in increments) <= REACH:
+        return solution
+    cut = [old + np.clip(a, -REACH, REACH) for old, a in zip(u, increments, strict=True)]
+    (x, y, z), _ = _core.project(cut, closed_flags(settings.closed), passes=1, threads=settings.threads)
+    return x, y, z
 
 
 def _finer(u: Faces, shape: tuple[int, ...], settings: VelocitySettings) -> Faces:

@@ -88,6 +88,17 @@ def test_default_weights_recover_the_translation_of_a_smooth_blob(motion):
     assert error_in_smoke(velocity, after, truth) < 0.05
 
 
+@pytest.mark.parametrize("seed", [0, 3, 6])
+def test_smoke_without_a_history_is_not_thrown_far(seed):
+    """Two densities that have nothing to do with each other: no motion beyond what linearisations can know."""
+    rng = np.random.default_rng(seed)
+    before, after = (np.maximum(ndimage.gaussian_filter(rng.standard_normal(SHAPE), 2), 0) for _ in range(2))
+    found = estimate_velocity(before, after, DT, VOXEL).centres() * DT / VOXEL
+    settings = VelocitySettings()
+    reach = settings.warps * sum(2**level for level in range(settings.levels))
+    assert np.abs(found).max() < 1.5 * reach
+
+
 def test_paper_mode_recovers_small_motion():
     before, after, truth = translation(np.array([0.1, 0.2, 0.3]))
     velocity = estimate_velocity(before, after, DT, VOXEL, PAPER)
