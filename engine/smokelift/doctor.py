@@ -23,8 +23,12 @@ def report() -> list[str]:
         f"core: {_core.__name__}, {os.cpu_count()} processor cores, "
         f"{psutil.virtual_memory().available / 2**30:.1f} of {psutil.virtual_memory().total / 2**30:.1f} GiB free",
     ]
-    gpu = device.available_gpu()
-    lines.append(f"GPU: {gpu}" if gpu else "GPU: none that Taichi can use; the renderer runs on the processor")
+    running = device.start()
+    lines.append(
+        "GPU: none that Taichi can use well; the renderer runs on the processor"
+        if running == "cpu"
+        else f"GPU: {running}; the renderer runs on it"
+    )
     try:
         module = vdb_module()
         lines.append(f"OpenVDB: {module.__name__} {'.'.join(map(str, module.LIBRARY_VERSION))}")

@@ -298,11 +298,11 @@ def test_errors_as_json(tmp_path, capsys) -> None:
 
 def test_a_gpu_that_is_not_there(shot, tmp_path) -> None:
     """Status 3, and what can be done."""
-    if device.available_gpu():
-        pytest.skip("there is a GPU here")
+    if device.available_gpu() in ("cuda", "metal"):
+        pytest.skip("there is a GPU here that cannot be hidden")
     done = subprocess.run(
         [*MODULE, "reconstruct", str(shot), "--out", str(tmp_path / "out"), "--device", "gpu"],
-        env=ENVIRONMENT,
+        env={**ENVIRONMENT, "VK_DRIVER_FILES": "/none", "VK_ICD_FILENAMES": "/none"},
         capture_output=True,
         text=True,
         timeout=60,

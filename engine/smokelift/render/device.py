@@ -6,12 +6,13 @@ On the CPU a device array is a NumPy array, which kernels use in place; on a GPU
 from __future__ import annotations
 
 import os
+import re
 import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Literal
+from typing import IO, Any, Literal
 
 import numpy as np
 
@@ -22,6 +23,9 @@ DeviceName = Literal["auto", "cpu", "gpu"]
 
 _GPU_BACKENDS = {"cuda": ti.cuda, "metal": ti.metal, "vulkan": ti.vulkan}
 
+
+_SOFTWARE = ("llvmpipe", "lavapipe", "swiftshader")
+"""Vulkan devices that are programs on the processor, where Taichi's own CPU code is much faster."""
 
 _running: str | None = None  # Taichi itself is one per process
 
@@ -37,22 +41,21 @@ def _cache_directory() -> Path:
 
 def available_gpu() -> str | None:
     """Name of the first GPU back end that Taichi can use here, or None."""
-    with _quiet():
+    with Path(os.devnull).open("wb") as nowhere, _diverted(nowhere):
         for name, arch in _GPU_BACKENDS.items():
             if ti.lang.misc.is_arch_supported(arch):
                 return name
     return None
 
 
-def start(device: DeviceName = "auto", threads: int | None = None) -> str:
+def start(device: DeviceName = "auto") -> str:
     """Start Taichi once for this process and say which back end runs.
 
     Parameters
     ----------
     device
-        ``"auto"`` takes a GPU if there is one, else the CPU.
-    threads
-        CPU threads; None takes all.
+        ``"auto"`` takes a GPU if there is one, else the CPU. A Vulkan device in software is taken for
+        ``"gpu"`` only.
 
     Returns
     -------
@@ -76,24 +79,38 @@ def start(device: DeviceName = "auto", threads: int | None = None) -> str:
         raise DeviceError(
             "No GPU that Taichi can use was found (CUDA, Metal or Vulkan); use --device cpu or update the driver."
         )
+    if gpu is not None:
+        chip = _initialise(_GPU_BACKENDS[gpu])
+        if device == "auto" and any(name in chip.lower() for name in _SOFTWARE):
+            ti.reset()
+            gpu = None
+    if gpu is None:
+        _initialise(ti.cpu)
+    _running = gpu or "cpu"
+    return _running
+
+
+def _initialise(arch: Any) -> str:
+    """Start Taichi on a back end; the name of its Vulkan device, if it has one."""
     cache = _cache_directory()
     try:
         cache.mkdir(parents=True, exist_ok=True)
     except OSError:
         cache = Path(tempfile.gettempdir()) / "smokelift-taichi"
-    options: dict[str, Any] = {"cpu_max_num_threads": threads} if threads else {}
-    with _quiet():
-        ti.init(
-            arch=_GPU_BACKENDS[gpu] if gpu else ti.cpu,
-            default_fp=ti.f32,
-            # exact operations: x != x must stay a test for NaN, and CPU and GPU should agree
-            fast_math=False,
-            offline_cache_file_path=str(cache),
-            log_level=ti.ERROR,
-            **options,
-        )
-    _running = gpu or "cpu"
-    return _running
+    with tempfile.TemporaryFile() as log:
+        with _diverted(log):
+            ti.init(
+                arch=arch,
+                default_fp=ti.f32,
+                # exact operations: x != x must stay a test for NaN, and CPU and GPU should agree
+                fast_math=False,
+                offline_cache_file_path=str(cache),
+                log_level=ti.TRACE,  # nothing else tells the device's name
+            )
+            ti.set_logging_level(ti.ERROR)
+        log.seek(0)
+        found = re.search(rb'Vulkan Device "([^"]*)"', log.read())
+    return found.group(1).decode(errors="replace") if found else ""
 
 
 def current() -> str | None:
@@ -137,16 +154,15 @@ def download(array: Any) -> np.ndarray[Any, Any]:
 
 
 @contextmanager
-def _quiet() -> Iterator[None]:
-    """Keep Taichi's greeting and its drivers' complaints away: output may carry JSON, errors come as exceptions."""
+def _diverted(file: IO[bytes]) -> Iterator[None]:
+    """Taichi's greeting and its drivers' complaints go to a file: output may carry JSON, errors are exceptions."""
     streams = (sys.stdout, sys.stderr)
     for stream in streams:
         stream.flush()
     saved = [os.dup(number) for number in (1, 2)]
-    nowhere = os.open(os.devnull, os.O_WRONLY)
     try:
         for number in (1, 2):
-            os.dup2(nowhere, number)
+            os.dup2(file.fileno(), number)
         yield
     finally:
         for stream in streams:
@@ -154,4 +170,3 @@ def _quiet() -> Iterator[None]:
         for number, copy in zip((1, 2), saved, strict=True):
             os.dup2(copy, number)
             os.close(copy)
-        os.close(nowhere)

@@ -1,0 +1,53 @@
+"""The renderer's back ends: the CPU by itself, and a GPU, or Vulkan in software, on request."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from smokelift import render_gradient
+from smokelift.render import DeviceError, device
+from smokelift.scene import Camera, DirectionalLight, Domain, Medium, Scene
+
+SCENE = Scene(
+    camera=Camera.look_at((1.0, -4.0, 2.0), (0.0, 0.0, 0.5), fov_y_degrees=30, size=(24, 32)),
+    domain=Domain((-0.5, -0.5, 0.0), (0.5, 0.5, 1.0), (12, 12, 12)),
+    medium=Medium(4.0, 0.9, 0.3),
+    lights=(DirectionalLight((0.5, 0.4, -0.7), (3.0, 2.0, 1.0)),),
+)
+
+
+def loss_gradient_and_image():
+    density = np.random.default_rng(0).random((12, 12, 12)).astype(np.float32)
+    return render_gradient(density, SCENE, np.full((32, 24, 3), 0.1, np.float32))
+
+
+def test_gpu_and_cpu_agree():
+    """One code: the same picture and derivative from kernels compiled for a GPU."""
+    if device.available_gpu() is None:
+        pytest.skip("neither a GPU nor Vulkan in software (Debian: mesa-vulkan-drivers) here")
+    device.start("cpu")
+    loss, gradient, image = loss_gradient_and_image()
+    done = subprocess.run([sys.executable, __file__], capture_output=True, text=True, check=True)
+    other = json.loads(done.stdout)  # nothing else may stand on standard output
+    assert other["device"] != "cpu"
+    assert other["loss"] == pytest.approx(loss, rel=1e-5)
+    np.testing.assert_allclose(other["gradient"], gradient, rtol=1e-4, atol=1e-4 * float(np.abs(gradient).max()))
+    np.testing.assert_allclose(other["image"], image, rtol=1e-5, atol=1e-7)
+
+
+def test_one_process_has_one_device():
+    """A second back end in the same process is refused with a sentence."""
+    assert device.start("cpu") == "cpu"
+    assert device.start("auto") == "cpu"
+    if device.available_gpu() is not None:
+        with pytest.raises(DeviceError, match="already runs on cpu"):
+            device.start("gpu")
+
+
+if __name__ == "__main__":
+    name = device.start("gpu")
+    loss, gradient, image = loss_gradient_and_image()
+    print(json.dumps({"device": name, "loss": loss, "gradient": gradient.tolist(), "image": image.tolist()}))
