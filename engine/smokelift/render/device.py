@@ -5,12 +5,13 @@ On the CPU a device array is a NumPy array, which kernels use in place; on a GPU
 
 from __future__ import annotations
 
+import io
 import os
 import re
 import sys
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import IO, Any, Literal
 
@@ -156,17 +157,16 @@ def download(array: Any) -> np.ndarray[Any, Any]:
 @contextmanager
 def _diverted(file: IO[bytes]) -> Iterator[None]:
     """Taichi's greeting and its drivers' complaints go to a file: output may carry JSON, errors are exceptions."""
-    streams = (sys.stdout, sys.stderr)
-    for stream in streams:
+    for stream in (sys.stdout, sys.stderr):
         stream.flush()
     saved = [os.dup(number) for number in (1, 2)]
     try:
         for number in (1, 2):
             os.dup2(file.fileno(), number)
-        yield
+        # Python's streams need not be those two: a notebook or a test has put others in their place
+        with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
+            yield
     finally:
-        for stream in streams:
-            stream.flush()
         for number, copy in zip((1, 2), saved, strict=True):
             os.dup2(copy, number)
             os.close(copy)
