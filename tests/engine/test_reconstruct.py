@@ -54,6 +54,14 @@ def run(plume, draft, tmp_path_factory) -> tuple[list[Frame], Path]:
     return frames_of(plume.scene, draft, out, npz=True), out
 
 
+def test_density_is_carried_from_the_third_frame_on(plume, draft) -> None:
+    """The carried density is a part of the first guess, so its share matters once there is a velocity."""
+    frames = {share: frames_of(plume.scene, replace(draft, transport=share)) for share in (0.0, 1.0)}
+    for alone, carried in zip(frames[0.0], frames[1.0], strict=True):
+        same = np.array_equal(alone.density, carried.density)
+        assert same == (alone.number <= 2)
+
+
 def test_frames_come_in_order(run, plume) -> None:
     """Numbers from 1, none left out, arrays of the domain's shape."""
     frames, _ = run
