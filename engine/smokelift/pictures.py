@@ -18,9 +18,9 @@ from smokelift.cameras import orbit
 from smokelift.clip import Clip
 from smokelift.files import atomic_path
 from smokelift.images import area_average, linear_to_srgb
-from smokelift.render import Renderer, scene_background, scene_sun
+from smokelift.render import Renderer, scene_background, scene_renderer
 from smokelift.render.renderer import Image
-from smokelift.scene import Camera, Medium
+from smokelift.scene import Camera
 from smokelift.sequence import Sequence
 
 SHEET_ANGLES = (0, 20, 45, 90)
@@ -39,16 +39,7 @@ VIDEO_KINDS = {
 
 def sequence_renderer(sequence: Sequence, camera: Camera | None = None, background: Image | None = None) -> Renderer:
     """The renderer of a sequence's own scene, or of another camera before the scene's mean background."""
-    scene = sequence.scene
-    assert scene.camera is not None and scene.domain is not None
-    return Renderer(
-        camera or scene.camera,
-        scene.domain,
-        scene.medium or Medium(),
-        scene_sun(scene.lights),
-        scene_background(scene, camera) if background is None else background,
-        sequence.settings["density"]["scattering"],
-    )
+    return scene_renderer(sequence.scene, camera, sequence.settings["density"]["scattering"], background)
 
 
 def eight_bit(image: Image) -> NDArray[np.uint8]:

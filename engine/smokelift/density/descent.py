@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.density.multiplicative import Fit
+from smokelift.density.fit import Fit
 from smokelift.render.renderer import Image, Renderer, Volume
 
 FLOOR = 0.1

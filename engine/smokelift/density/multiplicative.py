@@ -11,12 +11,11 @@ and where smoke and background look alike the picture says little, so the neighb
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from smokelift.density.fit import Fit
 from smokelift.density.hull import Projection
 from smokelift.render.renderer import Image, Renderer, Volume
 
@@ -29,23 +28,6 @@ DAMPING = 0.4
 
 PROBE = 1.05
 """Scale of the density for the secant dL / d ln s."""
-
-
-@dataclass(frozen=True, eq=False)
-class Fit:
-    """A density with its picture.
-
-    Attributes
-    ----------
-    density : (nx, ny, nz)
-    loss
-        Sum of squared differences to the target over the smoke's pixels.
-    iterations
-    """
-
-    density: Volume
-    loss: float
-    iterations: int
 
 
 def fit_multiplicative(

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from smokelift.density.multiplicative import Fit
+from smokelift.density.fit import Fit
 from smokelift.render.renderer import Image, Renderer, Volume
 
 

@@ -6,7 +6,7 @@ One picture says how much smoke lies along a ray, not where. The profile
 
 keeps the picture m as it is and gives every height its own depth A(z), from the lateral spread sigma(z) of the
 smoke in the picture: for a distribution of that form A = sigma sqrt(Gamma(1/q) / Gamma(3/q)). Among the priors
-compared in the design's findings it gives the best new views of any that knows one picture only.
+compared on four simulated scenes it gives the best new views of any that knows one picture only.
 """
 
 from __future__ import annotations

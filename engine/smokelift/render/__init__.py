@@ -42,7 +42,7 @@ def render(density: Volume, scene: Scene, camera: Camera | None = None, scatteri
     ValueError
         If the density is not finite, is negative or does not fit the domain, or if the scene lacks something.
     """
-    return _renderer(scene, camera, scattering).image(_checked(density, scene))
+    return scene_renderer(scene, camera, scattering).image(_checked(density, scene))
 
 
 def render_gradient(
@@ -74,7 +74,7 @@ def render_gradient(
     ValueError
         As in `render`, or if the target is not finite or has another shape than the image.
     """
-    renderer = _renderer(scene, camera, scattering)
+    renderer = scene_renderer(scene, camera, scattering)
     width, height = renderer.camera.size
     target = np.asarray(target, np.float32)
     if target.shape != (height, width, 3):
@@ -118,7 +118,16 @@ def scene_background(scene: Scene, camera: Camera | None = None) -> Image:
     return images.area_average(picture, width, height)
 
 
-def _renderer(scene: Scene, camera: Camera | None, scattering: Scattering) -> Renderer:
+def scene_renderer(
+    scene: Scene, camera: Camera | None, scattering: Scattering, background: Image | None = None
+) -> Renderer:
+    """The renderer of a scene, or of another camera, before its own background or another.
+
+    Raises
+    ------
+    ValueError
+        If there is no camera or no domain, or for lights that are not rendered.
+    """
     view = camera or scene.camera
     if view is None:
         raise ValueError("The scene has no camera; give one.")
@@ -127,7 +136,7 @@ def _renderer(scene: Scene, camera: Camera | None, scattering: Scattering) -> Re
         _domain(scene),
         scene.medium or Medium(),
         scene_sun(scene.lights),
-        scene_background(scene, camera),
+        scene_background(scene, camera) if background is None else background,
         scattering,
     )
 

@@ -114,14 +114,9 @@ def _initialise(arch: Any) -> str:
     return found.group(1).decode(errors="replace") if found else ""
 
 
-def current() -> str | None:
-    """The running back end, or None before `start`."""
-    return _running
-
-
 def zeros(shape: tuple[int, ...]) -> Any:
     """A float32 array of zeros on the device."""
-    if current() == "cpu":
+    if _running == "cpu":
         return np.zeros(shape, np.float32)
     array = ti.ndarray(ti.f32, shape)
     array.fill(0.0)
@@ -132,7 +127,7 @@ def upload(values: np.ndarray[Any, Any]) -> Any:
     """A device array (float32 or int32) with these values; on the CPU the same memory where possible."""
     dtype = np.int32 if np.issubdtype(values.dtype, np.integer) else np.float32
     values = np.ascontiguousarray(values, dtype)
-    if current() == "cpu":
+    if _running == "cpu":
         return values
     array = ti.ndarray(ti.i32 if dtype is np.int32 else ti.f32, values.shape)
     array.from_numpy(values)
