@@ -15,12 +15,13 @@
 #include "exponential.h"
 
 #include <algorithm>
+#include <array>
 
 namespace smokelift {
 namespace {
 
 constexpr int LANES = Rays::LANES, CHANNELS = 4;
-constexpr int RUNS_PER_TASK = 64, PLANES_PER_TASK = 8;
+constexpr int RUNS_PER_TASK = 64, PLANES_PER_TASK = 16, TILE_ROWS = 16, AHEAD = 3;
 
 template <int N> struct Floats {
     typedef float type __attribute__((vector_size(4 * N), aligned(4), may_alias));
@@ -150,6 +151,20 @@ SMOKELIFT_INLINE bool sample_plane(const Voxels &medium, const Lanes &lanes, int
     return any;
 }
 
+// Asks for the voxels that the lanes will look up in a plane some steps ahead.
+SMOKELIFT_INLINE void prefetch_plane(const Voxels &voxels, const Lanes &lanes, int k) {
+#if defined(__GNUC__)
+    const float *const plane = voxels.data + (k + 1) * lanes.along_k;
+    const Footprint at(lanes, k);
+    for (int lane = 0; lane < LANES; ++lane) {
+        if (lanes.crosses(lane, k)) {
+            __builtin_prefetch(plane + at.cell[lane]);
+            __builtin_prefetch(plane + at.cell[lane] + lanes.along_b);
+        }
+    }
+#endif
+}
+
 template <int W>
 SMOKELIFT_INLINE bool sample_lanes(const Voxels &medium, const Lanes &lanes, int k, float (*sample)[LANES]) {
     return lanes.axis == 2 ? sample_plane<W, false>(medium, lanes, k, sample)
@@ -164,6 +179,7 @@ SMOKELIFT_INLINE void march_run(const Voxels &medium, const Rays &rays, const Ru
     std::fill_n(tau, LANES, 1.0f);
     for (int step = 0; step <= run.last - run.first; ++step) {
         const int k = run.travel > 0 ? run.first + step : run.last - step;
+        prefetch_plane(medium, lanes, k + AHEAD * run.travel);
         const bool any = sample_lanes<W>(medium, lanes, k, sample);
         if (record.data)
             for (int w = 0; w < W; ++w)
@@ -237,6 +253,7 @@ SMOKELIFT_INLINE void scatter_planes(const Rays &rays, const Run &run, const Rec
     const Lanes lanes(gradient, rays, run);
     for (int k = std::max(first, run.first); k < std::min(end, run.last + 1); ++k) {
         float *const plane = gradient.data + (k + 1) * lanes.along_k;
+        prefetch_plane(gradient, lanes, k + AHEAD);
         const Footprint at(lanes, k);
         float derivative[LANES][W];
         for (int w = 0; w < W; ++w) {
@@ -364,6 +381,13 @@ void Rays::find_runs() {
         }
         close();
     }
+    // Tile by tile: rays of neighbouring rows look up the same cache lines.
+    std::sort(runs.begin(), runs.end(), [](const Run &a, const Run &b) {
+        const auto place = [](const Run &r) {
+            return std::array<int, 4>{r.row / TILE_ROWS, r.column / LANES, r.row, r.column};
+        };
+        return place(a) < place(b);
+    });
 }
 
 void clip(const Voxels &medium, Rays &rays, Workers &workers) {

@@ -2,7 +2,12 @@
 #include "camera.h"
 #include "lighting.h"
 
+#include <cstdint>
 #include <memory>
+
+#if defined(__linux__)
+#include <sys/mman.h>
+#endif
 
 namespace smokelift {
 namespace {
@@ -74,6 +79,37 @@ const float *corner_of(const Floats &a, const Support &support, const std::array
     return a.data(corner[0], corner[1], corner[2]);
 }
 
+// Zeros that get memory where they are touched, in large pages where the system has them: the rays' look-ups
+// are spread over so many small ones that finding the pages would cost as much as the look-ups.
+Floats large_zeros(const std::vector<py::ssize_t> &shape) {
+    std::size_t bytes = sizeof(float);
+    for (const py::ssize_t n : shape)
+        bytes *= n;
+#if defined(__linux__)
+    constexpr std::size_t PAGE = std::size_t(1) << 21;
+    if (bytes >= PAGE) {
+        const std::size_t whole = bytes + PAGE; // room to begin at a large page's boundary
+        void *memory = mmap(nullptr, whole, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+        if (memory == MAP_FAILED)
+            throw std::bad_alloc();
+        madvise(memory, whole, MADV_HUGEPAGE);
+        struct Mapping {
+            void *memory;
+            std::size_t size;
+        };
+        const py::capsule owner(new Mapping{memory, whole}, [](void *p) {
+            const std::unique_ptr<Mapping> mapping(static_cast<Mapping *>(p));
+            munmap(mapping->memory, mapping->size);
+        });
+        const std::uintptr_t first = (reinterpret_cast<std::uintptr_t>(memory) + PAGE - 1) / PAGE * PAGE;
+        return Floats(shape, reinterpret_cast<const float *>(first), owner);
+    }
+#endif
+    Floats result(shape);
+    std::fill_n(result.mutable_data(), result.size(), 0.0f);
+    return result;
+}
+
 template <class Work> void unlocked(int threads, const Work &work) {
     py::gil_scoped_release release;
     Workers workers(threads);
@@ -84,6 +120,8 @@ template <class Work> void unlocked(int threads, const Work &work) {
 
 void register_render(py::module_ &module) {
     using namespace py::literals;
+
+    module.def("zeros", &large_zeros, "shape"_a);
 
     py::class_<Support>(module, "Support").def(py::init<const Marks &>(), "marked"_a);
 

@@ -65,6 +65,8 @@ class LeastSquares:
 
 Volume = npt.NDArray[np.float32]
 
+def zeros(shape: tuple[int, ...]) -> Array: ...
+
 class Support:
     """Where there can be smoke; ``marked`` is (nx, ny, nz)."""
 

@@ -20,8 +20,8 @@ class CpuPipeline:
         channels = setup.lighting.channels
         x, y, z = setup.shape
         self._support = _core.Support(setup.marked)
-        # pages that no sweep touches are never given memory
-        self._medium = np.zeros((x + 2, y + 2, z + 2, channels + 1), np.float32)
+        # what no sweep touches is never given memory
+        self._medium = _core.zeros((x + 2, y + 2, z + 2, channels + 1))
         self._gradient: Floats | None = None
         self._scratch: Floats | None = None
         self._record: Floats | None = None
@@ -47,7 +47,7 @@ class CpuPipeline:
             _core.shade(self._medium, self._support, self._phase, self._lights)
         if keep_record and self._record is None:
             planes = max(setup.shape)
-            self._record = np.empty((setup.lighting.channels + 1, planes, *self._depth.shape), np.float32)
+            self._record = _core.zeros((setup.lighting.channels + 1, planes, *self._depth.shape))
         record = self._record if keep_record else None
         _core.march(self._medium, self._support, self._rays, self._scattered, self._depth, record)
         return self._scattered, self._depth
@@ -56,15 +56,15 @@ class CpuPipeline:
         """Pull derivatives by the last recorded picture back to the density (nx, ny, nz); uses the record up."""
         setup = self._setup
         if self._gradient is None:
-            self._gradient = np.zeros_like(self._medium)
+            self._gradient = _core.zeros(self._medium.shape)
         _core.march_adjoint(
             self._rays, self._depth, of_scattered, of_transmittance, self._record, self._gradient, self._support
         )
         if setup.shadows:
             if self._scratch is None:
-                self._scratch = np.zeros((*self._medium.shape[:3], 1), np.float32)
+                self._scratch = _core.zeros((*self._medium.shape[:3], 1))
             _core.shade_adjoint(self._medium, self._gradient, self._scratch, self._support, self._phase, self._lights)
-        result = np.zeros(setup.domain.resolution, np.float32)
+        result = _core.zeros(setup.domain.resolution)
         _core.unpack(self._gradient, self._support, setup.medium.extinction, result, setup.corner)
         return result
 
