@@ -1,4 +1,4 @@
-"""The command line: ``smokelift reconstruct | render | preview | doctor``.
+"""The command line: ``smokelift reconstruct | render | preview | doctor | bench``.
 
 Exit status: 0 done, 2 bad input, 3 device or memory, 130 cancelled (and resumable).
 """
@@ -16,6 +16,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from smokelift import pictures
+from smokelift.bench import command
 from smokelift.cameras import orbit
 from smokelift.clip import Clip
 from smokelift.doctor import report
@@ -130,7 +131,13 @@ def _doctor(options: argparse.Namespace, say: Reporter) -> None:
         say.note(line)
 
 
-_COMMANDS = {"reconstruct": _reconstruct, "render": _render, "preview": _preview, "doctor": _doctor}
+_COMMANDS = {
+    "reconstruct": _reconstruct,
+    "render": _render,
+    "preview": _preview,
+    "doctor": _doctor,
+    "bench": command.bench,
+}
 
 
 def _scene(path: Path, frames: tuple[int, int] | None) -> Scene:
@@ -213,6 +220,7 @@ def _parser() -> argparse.ArgumentParser:
     look.add_argument("--out", type=Path, help="directory for them; by default the one that holds the sequence")
 
     commands.add_parser("doctor", parents=[common], help="versions, devices and what is missing")
+    command.add_parser(commands)
     return parser
 
 

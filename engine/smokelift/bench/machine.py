@@ -1,0 +1,62 @@
+"""The machine that a benchmark ran on: what it is, and how fast it copies memory."""
+
+from __future__ import annotations
+
+import os
+import platform
+import time
+from concurrent.futures import ThreadPoolExecutor
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psutil
+
+import smokelift
+
+LIBRARIES = ("numpy", "taichi", "drjit", "torch", "jax", "mitsuba")
+COPY_THREADS = 2
+
+
+def describe() -> dict[str, Any]:
+    """Return processor, cores that may be used, memory and systems."""
+    return {
+        "processor": _processor(),
+        "cores": len(psutil.Process().cpu_affinity()) if hasattr(psutil.Process, "cpu_affinity") else os.cpu_count(),
+        "memory_gib": round(psutil.virtual_memory().total / 2**30, 1),
+        "system": f"{platform.system()} {platform.release()} {platform.machine()}",
+        "python": platform.python_version(),
+    }
+
+
+def versions() -> dict[str, str]:
+    """Return the version of everything that is installed and takes part."""
+    found = {"smokelift": smokelift.__version__}
+    for name in LIBRARIES:
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            continue
+    return found
+
+
+def copy_milliseconds(size: int) -> float:
+    """Median time to copy ten volumes of size^3 floats, with two threads: the floor of an iteration."""
+    source = np.ones((COPY_THREADS, 10 * size**3 // COPY_THREADS), np.float32)
+    target = np.zeros_like(source)
+    spent = []
+    with ThreadPoolExecutor(COPY_THREADS) as threads:
+        for _ in range(9):
+            began = time.perf_counter()
+            list(threads.map(np.copyto, target, source))
+            spent.append(time.perf_counter() - began)
+    return 1e3 * float(np.median(spent[2:]))
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        return platform.processor()
+    return next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), platform.machine())

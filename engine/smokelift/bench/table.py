@@ -1,0 +1,101 @@
+"""The results as a table to read."""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from smokelift.bench.peers import OURS, PEERS
+from smokelift.bench.renderer import EXACT
+
+WIDTH = 150
+
+
+def text(results: dict[str, Any]) -> str:
+    """Return the table, how to read it, what failed, and what was measured about us alone."""
+    table = Table(title=_title(results), title_justify="left")
+    table.add_column("peer")
+    for heading in ("ms", "from .. to", "x ours", "x floor", "MiB", "volumes", "set-up s", "image", "gradient"):
+        table.add_column(heading, justify="right")
+    table.add_column("")
+    block = None
+    for row in results["rows"]:
+        if block != (row["size"], row["scene"]):
+            block = row["size"], row["scene"]
+            table.add_section()
+            floor = results["floor_ms"][str(row["size"])]
+            table.add_row(f"[bold]{row['size']}^3, smoke in {100 * row['share']:.0f} %", f"({floor:.3g})")
+        table.add_row(*_cells(row))
+    output = io.StringIO()
+    console = Console(file=output, width=WIDTH)
+    console.print(table)
+    console.print(
+        "ms: median of an iteration, image and gradient; in brackets the floor, a copy of ten volumes. x ours: paired "
+        "with ours just before and after. MiB, volumes: peak of memory beyond imports, compiler and density. set-up: "
+        "compiler, tables and warm-up. image, gradient: relative L2 error against float64; above "
+        f"{EXACT:g} a peer is not exact."
+    )
+    for line in (*_failures(results), *_about_us(results)):
+        console.print(line)
+    return output.getvalue().rstrip()
+
+
+def _title(results: dict[str, Any]) -> str:
+    computer = results["machine"]
+    libraries = ", ".join(f"{name} {version}" for name, version in results["versions"].items())
+    where = "" if results["device"] == "cpu" else f", ours on the {results['device'].upper()}"
+    return f"{computer['processor']}, {computer['cores']} cores{where}, {results['date']}\n{libraries}"
+
+
+def _cells(row: dict[str, Any]) -> list[str]:
+    name = PEERS[row["peer"]].title
+    if row["failure"]:
+        return [name, *[""] * 9, "see below"]
+    times = row["milliseconds"]
+    return [
+        name,
+        _number(row["median"]),
+        f"{_number(min(times))} .. {_number(max(times))}",
+        "" if row["peer"] == OURS else _number(row["ratio"]),
+        _number(row["floors"]),
+        _number(row["peak_mib"]),
+        _number(row["peak_volumes"]),
+        _number(row["compile_seconds"] + row["setup_seconds"]),
+        f"{row['image_error']:.0e}",
+        f"{row['gradient_error']:.0e}",
+        "" if row["exact"] else "not exact",
+    ]
+
+
+def _failures(results: dict[str, Any]) -> list[str]:
+    """Every peer and reason once, with the sizes."""
+    sizes: dict[tuple[str, str], list[str]] = {}
+    for row in results["rows"]:
+        if row["failure"]:
+            sizes.setdefault((PEERS[row["peer"]].title, row["failure"]), []).append(f"{row['size']}^3")
+    return [f"{title}, {', '.join(dict.fromkeys(where))}: {why}" for (title, why), where in sizes.items()]
+
+
+def _number(value: float | None) -> str:
+    if value is None:
+        return "?"
+    return f"{value:.0f}" if value >= 100 else f"{value:.3g}"
+
+
+def _about_us(results: dict[str, Any]) -> list[str]:
+    lines = []
+    shares = [row for row in results["shares"] if row["median"]]
+    if shares:
+        times = ", ".join(f"{100 * row['share']:.0f} %: {_number(row['median'])}" for row in shares)
+        lines.append(f"Ours at {shares[0]['size']}^3 by share of voxels that can hold smoke, ms: {times}.")
+    lights = {row["lights"]: row["median"] for row in results["lights"] if row["median"]}
+    if len(lights) > 1:
+        few, many = min(lights), max(lights)
+        lines.append(
+            f"Ours with {many} directional lights: {_number(lights[many])} ms, "
+            f"{_number(lights[many] / lights[few])} times that of one."
+        )
+    return lines
