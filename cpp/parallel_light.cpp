@@ -202,6 +202,23 @@ void depth_gradient(const Columns &columns, const Voxels &medium, const Voxels &
           });
 }
 
+// The same where one light has made all of J: -J dJ.
+SMOKELIFT_CLONES
+void depth_gradient_of_all(const Voxels &medium, const Voxels &gradient, const Voxels &scratch,
+                           const Spans &spans, int x) {
+    for (int y = 0; y < medium.n[1]; ++y) {
+        const auto &span = spans.along_z[std::size_t(x) * medium.n[1] + y];
+        const float *inscatter = medium.at(x, y, 0), *of_inscatter = gradient.at(x, y, 0);
+        float *out = scratch.at(x, y, 0);
+        for (int z = span[0]; z < span[1]; ++z) {
+            float sum = 0;
+            for (int channel = 1; channel < medium.width; ++channel)
+                sum -= inscatter[z * medium.width + channel] * of_inscatter[z * medium.width + channel];
+            out[z] = sum;
+        }
+    }
+}
+
 SMOKELIFT_CLONES
 void add_columns(const Columns &columns, const Voxels &scratch, const Voxels &gradient, int task) {
     const ParallelLight &light = columns.light;
@@ -223,10 +240,14 @@ void shade(const Voxels &medium, const Spans &spans, const Phase &phase, const P
 }
 
 void shade_adjoint(const Voxels &medium, const Voxels &gradient, const Voxels &scratch, const Spans &spans,
-                   const Phase &phase, const ParallelLight &light, Workers &workers) {
-    const Columns columns(light, spans);
-    workers.run(columns.tasks(),
-                [&](int task) { depth_gradient(columns, medium, gradient, scratch, phase, task); });
+                   const Phase &phase, const ParallelLight &light, bool alone, Workers &workers) {
+    if (alone) {
+        workers.run(medium.n[0], [&](int x) { depth_gradient_of_all(medium, gradient, scratch, spans, x); });
+    } else {
+        const Columns columns(light, spans);
+        workers.run(columns.tasks(),
+                    [&](int task) { depth_gradient(columns, medium, gradient, scratch, phase, task); });
+    }
     ParallelLight reversed = light;
     reversed.travel = -light.travel;
     const Columns back(reversed, spans);

@@ -71,12 +71,18 @@ struct OwnedRays {
     }
 };
 
-// First voxel of the box of an array that a support stands for.
-const float *corner_of(const Floats &a, const Support &support, const std::array<int, 3> &corner) {
+// The box of an array that a support stands for.
+template <class T, class Data>
+Strided<T> box_of(const py::array_t<float> &a, Data data, const Support &support,
+                  const std::array<int, 3> &corner) {
     require(a.ndim() == 3);
-    for (int axis = 0; axis < 3; ++axis)
+    std::array<Stride, 3> stride{};
+    for (int axis = 0; axis < 3; ++axis) {
         require(corner[axis] >= 0 && corner[axis] + support.shape()[axis] <= a.shape(axis));
-    return a.data(corner[0], corner[1], corner[2]);
+        stride[axis] = a.strides(axis) / Stride(sizeof(float));
+        data += corner[axis] * stride[axis];
+    }
+    return {data, stride};
 }
 
 // Zeros that get memory where they are touched, in large pages where the system has them: the rays' look-ups
@@ -173,13 +179,12 @@ void register_render(py::module_ &module) {
 
     module.def(
         "pack",
-        [](const Floats &density, const std::array<int, 3> &corner, const Support &support, float extinction,
-           Floats medium, int threads) {
-            const float *first = corner_of(density, support, corner);
+        [](const py::array_t<float> &density, const std::array<int, 3> &corner, const Support &support,
+           float extinction, Floats medium, int threads) {
+            const auto box = box_of<const float>(density, density.data(), support, corner);
             const Voxels voxels = voxels_of(medium, support);
-            const Stride y = density.shape(2), x = y * density.shape(1);
             unlocked(threads, [&](Workers &workers) {
-                pack(first, x, y, support.marked.data(), extinction, support.spans, voxels, workers);
+                pack(box, support.marked.data(), extinction, support.spans, voxels, workers);
             });
         },
         "density"_a.noconvert(), "corner"_a, "support"_a, "extinction"_a, "medium"_a.noconvert(),
@@ -187,14 +192,12 @@ void register_render(py::module_ &module) {
 
     module.def(
         "unpack",
-        [](Floats gradient, const Support &support, float extinction, Floats result,
+        [](Floats gradient, const Support &support, float extinction, py::array_t<float> result,
            const std::array<int, 3> &corner, int threads) {
             const Voxels voxels = voxels_of(gradient, support);
-            corner_of(result, support, corner);
-            float *first = result.mutable_data(corner[0], corner[1], corner[2]);
-            const Stride y = result.shape(2), x = y * result.shape(1);
+            const auto box = box_of<float>(result, result.mutable_data(), support, corner);
             unlocked(threads, [&](Workers &workers) {
-                unpack(voxels, support.marked.data(), extinction, first, x, y, workers);
+                unpack(voxels, support.marked.data(), extinction, box, workers);
             });
         },
         "gradient"_a.noconvert(), "support"_a, "extinction"_a, "result"_a.noconvert(), "corner"_a,
@@ -227,12 +230,13 @@ void register_render(py::module_ &module) {
             require(space.width == 1 && slopes.width == voxels.width);
             unlocked(threads, [&](Workers &workers) {
                 fold_border(slopes);
+                const bool alone = lights.size() == 1;
                 for (const Light &light : lights) {
                     if (const auto *point = std::get_if<PointLight>(&light))
                         shade_adjoint(voxels, slopes, support.spans, phase, *point, workers);
                     else
                         shade_adjoint(voxels, slopes, space, support.spans, phase,
-                                      std::get<ParallelLight>(light), workers);
+                                      std::get<ParallelLight>(light), alone, workers);
                 }
             });
         },

@@ -53,32 +53,32 @@ Spans spans_around(const unsigned char *marked, const Shape &n) {
     return {around(along_z, n[0], n[1], n[2]), around(along_y, n[0], n[2], n[1]), n};
 }
 
-void pack(const float *density, Stride stride_x, Stride stride_y, const unsigned char *marked,
-          float extinction, const Spans &spans, const Voxels &medium, Workers &workers) {
+void pack(const Strided<const float> &density, const unsigned char *marked, float extinction,
+          const Spans &spans, const Voxels &medium, Workers &workers) {
     const Shape &n = medium.n;
     workers.run(n[0], [&](int x) {
         for (int y = 0; y < n[1]; ++y) {
             const Span &span = spans.along_z[std::size_t(x) * n[1] + y];
-            const float *in = density + x * stride_x + y * stride_y;
+            const float *in = density.row(x, y);
             const unsigned char *mark = marked + (std::size_t(x) * n[1] + y) * n[2];
             float *out = medium.at(x, y, 0);
             for (int z = span[0]; z < span[1]; ++z)
-                out[z * medium.width] = mark[z] ? extinction * in[z] : 0;
+                out[z * medium.width] = mark[z] ? extinction * in[z * density.stride[2]] : 0;
         }
     });
 }
 
-void unpack(const Voxels &gradient, const unsigned char *marked, float extinction, float *result,
-            Stride stride_x, Stride stride_y, Workers &workers) {
+void unpack(const Voxels &gradient, const unsigned char *marked, float extinction,
+            const Strided<float> &result, Workers &workers) {
     const Shape &n = gradient.n;
     workers.run(n[0], [&](int x) {
         for (int y = 0; y < n[1]; ++y) {
             const unsigned char *mark = marked + (std::size_t(x) * n[1] + y) * n[2];
             const float *in = gradient.at(x, y, 0);
-            float *out = result + x * stride_x + y * stride_y;
+            float *out = result.row(x, y);
             for (int z = 0; z < n[2]; ++z)
                 if (mark[z])
-                    out[z] = extinction * in[z * gradient.width];
+                    out[z * result.stride[2]] = extinction * in[z * gradient.width];
         }
     });
 }

@@ -51,15 +51,21 @@ struct Spans {
 // For every row the range in which voxels are marked, or lie beside a marked one, corners included.
 Spans spans_around(const unsigned char *marked, const Shape &n);
 
-// Extinction of the marked voxels from their density. The density is a box of a larger array; `density`
-// points to its first voxel.
-void pack(const float *density, Stride stride_x, Stride stride_y, const unsigned char *marked,
-          float extinction, const Spans &spans, const Voxels &medium, Workers &workers);
+// A box of somebody's array, with its strides.
+template <class T> struct Strided {
+    T *data;
+    std::array<Stride, 3> stride;
 
-// result = extinction x first channel at the marked voxels, 0 elsewhere. The result is a box of a larger
-// array.
-void unpack(const Voxels &gradient, const unsigned char *marked, float extinction, float *result,
-            Stride stride_x, Stride stride_y, Workers &workers);
+    T *row(int x, int y) const { return data + x * stride[0] + y * stride[1]; }
+};
+
+// Extinction of the marked voxels from their density.
+void pack(const Strided<const float> &density, const unsigned char *marked, float extinction,
+          const Spans &spans, const Voxels &medium, Workers &workers);
+
+// result = extinction x first channel at the marked voxels; the others are left as they are.
+void unpack(const Voxels &gradient, const unsigned char *marked, float extinction,
+            const Strided<float> &result, Workers &workers);
 
 void clear(const Voxels &voxels, Workers &workers);
 

@@ -1,6 +1,12 @@
-"""The renderer on the processor: compiled sweeps over the voxels that may hold smoke (``cpp/``)."""
+"""The renderer on the processor: compiled sweeps over the voxels that may hold smoke (``cpp/``).
+
+Sweeps of light are fastest along rows of memory, and slow where the light travels along them. So where most of the
+light comes from above or below, y and z change places: the voxels are copied into the sweeps' own grid anyway.
+"""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +22,10 @@ class CpuPipeline:
     """Picture and derivative of one `Setup` in channels; `Renderer` makes colours of them."""
 
     def __init__(self, setup: Setup) -> None:
+        self._resolution = setup.domain.resolution
+        self._axes = (0, 2, 1) if _light_travels_along_rows(setup) else (0, 1, 2)
+        if self._axes != (0, 1, 2):
+            setup = _with_y_and_z_swapped(setup)
         self._setup = setup
         channels = setup.lighting.channels
         x, y, z = setup.shape
@@ -41,7 +51,7 @@ class CpuPipeline:
     def image(self, density: Floats, keep_record: bool) -> tuple[Floats, Floats]:
         """Scattered radiance (rows, columns, channels) and optical depth (rows, columns)."""
         setup = self._setup
-        density = np.ascontiguousarray(density, np.float32)
+        density = np.asarray(density, np.float32).transpose(self._axes)
         _core.pack(density, setup.corner, self._support, setup.medium.extinction, self._medium)
         if setup.shadows:
             _core.shade(self._medium, self._support, self._phase, self._lights)
@@ -64,8 +74,9 @@ class CpuPipeline:
             if self._scratch is None:
                 self._scratch = _core.zeros((*self._medium.shape[:3], 1))
             _core.shade_adjoint(self._medium, self._gradient, self._scratch, self._support, self._phase, self._lights)
-        result = _core.zeros(setup.domain.resolution)
-        _core.unpack(self._gradient, self._support, setup.medium.extinction, result, setup.corner)
+        result = _core.zeros(self._resolution)
+        swapped = result.transpose(self._axes)
+        _core.unpack(self._gradient, self._support, setup.medium.extinction, swapped, setup.corner)
         return result
 
     def _light(self, light: Parallel | Point) -> _core.ParallelLight | _core.PointLight:
@@ -75,3 +86,34 @@ class CpuPipeline:
             faces = [_core.Face(**vars(face)) for face in light.faces]
             return _core.PointLight(position=light.position, energy=energy, voxel_size=light.voxel_size, faces=faces)
         return _core.ParallelLight(**{**vars(light), "energy": energy})
+
+
+def _light_travels_along_rows(setup: Setup) -> bool:
+    lights = setup.lighting.lights
+    along = [light for light in lights if isinstance(light, Parallel) and light.axis == 2]
+    # a point light's voxels belong to the first of its faces, an order that a swap would change
+    return 2 * len(along) > len(lights) and all(isinstance(light, Parallel) for light in lights)
+
+
+def _with_y_and_z_swapped(setup: Setup) -> Setup:
+    """The same setup for arrays of voxels [x, z, y]."""
+    x, y, z = setup.corner
+    rays = setup.rays
+    lines, planes = rays.lines.copy(), rays.planes.copy()
+    # across x the two other axes change places; the others keep x first
+    across_x = planes[..., 0] == 0
+    lines[across_x] = lines[across_x][:, [2, 3, 0, 1]]
+    planes[..., 0] = np.array([0, 2, 1])[planes[..., 0]]
+    lights = []
+    for light in setup.lighting.lights:
+        assert isinstance(light, Parallel)
+        slope = light.slope[::-1] if light.axis == 0 else light.slope
+        lights.append(replace(light, axis=(0, 2, 1)[light.axis], slope=(slope[0], slope[1])))
+    return replace(
+        setup,
+        corner=(x, z, y),
+        marked=np.ascontiguousarray(setup.marked.transpose(0, 2, 1)),
+        rays=replace(rays, lines=lines, planes=planes),
+        to_eye=setup.to_eye[:, [0, 2, 1, 3]],
+        lighting=replace(setup.lighting, lights=tuple(lights)),
+    )

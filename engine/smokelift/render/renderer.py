@@ -58,15 +58,15 @@ class Renderer:
     ) -> None:
         self.camera, self.domain, self.medium = camera, domain, medium
         setup = make_setup(camera, domain, medium, lights, scattering, support)
-        self._colour = setup.lighting.colour
-        self._background = np.asarray(background, np.float64)
+        self._colour = np.asarray(setup.lighting.colour, np.float32)
+        self._background = np.asarray(background, np.float32)
         self._pipeline = device.pipeline(setup)
         self._depth: Image = np.zeros(camera.size[::-1], np.float32)
 
     def image(self, density: Volume, *, keep_record: bool = False) -> Image:
         """Render a density (nx, ny, nz); linear radiance (rows, columns, 3)."""
         scattered, self._depth = self._pipeline.image(density, keep_record)
-        return np.asarray(scattered @ self._colour + self.transmittance[..., None] * self._background, np.float32)
+        return np.asarray(scattered @ self._colour + self.transmittance[..., None] * self._background)
 
     @property
     def transmittance(self) -> Image:
@@ -78,7 +78,6 @@ class Renderer:
 
         Belongs to the last `image` made with ``keep_record``, and uses its record up.
         """
-        of_image = np.asarray(image_gradient, np.float64)
-        of_scattered = np.ascontiguousarray(of_image @ self._colour.T, np.float32)
-        of_transmittance = np.ascontiguousarray((of_image * self._background).sum(-1), np.float32)
-        return self._pipeline.gradient(of_scattered, of_transmittance)
+        of_image = np.asarray(image_gradient, np.float32)
+        of_transmittance = np.einsum("...c,...c", of_image, np.broadcast_to(self._background, of_image.shape))
+        return self._pipeline.gradient(np.ascontiguousarray(of_image @ self._colour.T), of_transmittance)
