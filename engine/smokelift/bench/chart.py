@@ -28,9 +28,9 @@ def draw(results: dict[str, Any], path: Path) -> None:
 
     figure = Figure(figsize=(15, 5.2), layout="constrained")
     plume, full, shares = figure.subplots(1, 3, width_ratios=(3, 3, 2))
+    full.sharey(plume)
     _sizes(plume, results, "plume", "smoke in 18 % of the voxels")
     _sizes(full, results, "full", "smoke everywhere")
-    full.sharey(plume)
     plume.set_ylabel("ms an iteration (image and gradient)")
     handles, labels = plume.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=8, frameon=False)

@@ -34,9 +34,9 @@ def text(results: dict[str, Any]) -> str:
     console.print(table)
     console.print(
         "ms: median of an iteration, image and gradient; in brackets the floor, a copy of ten volumes. x ours: paired "
-        "with ours just before and after. MiB, volumes: peak of memory beyond imports, compiler and density. set-up: "
-        "compiler, tables and warm-up. image, gradient: relative L2 error against float64; above "
-        f"{EXACT:g} a peer is not exact."
+        "with ours just before and after. MiB, volumes: peak of memory beyond imports, compiler (but JAX compiles anew "
+        "for each size) and density. set-up: compiler, tables and warm-up. image, gradient: relative L2 error against "
+        f"float64; above {EXACT:g} a peer is not exact."
     )
     for line in (*_failures(results), *_about_us(results)):
         console.print(line)
