@@ -7,6 +7,7 @@ PNG colours are multiplied by it in linear light.
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any, Literal
 
@@ -91,7 +92,7 @@ def read_image(path: str | Path, transfer: Transfer | None = None) -> Picture:
         raise ImageError(f"{path}: no such file")
     try:
         if suffix in (".exr", ".hdr"):
-            values = _read_exr(path) if suffix == ".exr" else _read_with_ffmpeg(path, "gbrpf32le")
+            values = _read_exr(path) if suffix == ".exr" else _read_radiance(path)
             return srgb_to_linear(values) if transfer == "srgb" else values
         return decode_integers(_read_integers(path), transfer)
     except ImageError:
@@ -104,6 +105,15 @@ def read_image(path: str | Path, transfer: Transfer | None = None) -> Picture:
 def _read_with_ffmpeg(path: Path, pixels: str) -> npt.NDArray[Any]:
     with av.open(str(path)) as container:
         return next(container.decode(video=0)).to_ndarray(format=pixels)
+
+
+def _read_radiance(path: Path) -> npt.NDArray[Any]:
+    """A Radiance .hdr of the ordinary kind; FFmpeg takes the rare others for that, upside down or in wrong colours."""
+    with path.open("rb") as file:
+        head = file.read(4096)
+    if b"FORMAT=32-bit_rle_xyze" in head or re.search(rb"\n(\+Y|[+-]X) \d+ [+-][XY] \d+\n|\n-Y \d+ -X \d+\n", head):
+        raise ImageError(f"{path}: is turned, mirrored or in XYZ colours; save it as an ordinary .hdr, or as .exr")
+    return _read_with_ffmpeg(path, "gbrpf32le")
 
 
 def _read_integers(path: Path) -> npt.NDArray[Any]:

@@ -205,3 +205,21 @@ def test_area_averages_are_exact() -> None:
     np.testing.assert_allclose(area_average(np.array([[0.0, 1.0]]), 4, 1), [[0.0, 0.25, 0.75, 1.0]], rtol=1e-6)
     with pytest.raises(ValueError, match="at least one pixel"):
         area_average(image, 0, 1)
+
+
+@pytest.mark.parametrize(
+    ("kind", "size"),
+    [("xyze", "-Y 1 +X 1"), ("rgbe", "+Y 1 +X 1"), ("rgbe", "-Y 1 -X 1"), ("rgbe", "+X 1 -Y 1")],
+)
+def test_radiance_pictures_of_a_rare_kind_are_refused(tmp_path, kind, size):
+    """They would come out upside down, mirrored or in wrong colours."""
+    path = tmp_path / "map.hdr"
+    path.write_bytes(f"#?RADIANCE\nFORMAT=32-bit_rle_{kind}\n\n{size}\n".encode() + bytes([128, 64, 32, 129]))
+    with pytest.raises(ImageError, match="ordinary"):
+        read_image(path)
+
+
+def test_radiance_picture(tmp_path):
+    path = tmp_path / "map.hdr"
+    path.write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 1\n" + bytes([128, 64, 32, 129, 0, 0, 0, 0]))
+    np.testing.assert_allclose(read_image(path), [[[1.0, 0.5, 0.25]], [[0, 0, 0]]], rtol=0.01)
