@@ -26,9 +26,10 @@ constexpr int ROWS_PER_TASK = 12;
 struct Columns {
     const ParallelLight &light;
     const Spans &spans;
-    int planes, count_b, count_c; // of the grid: along the axis, along the two others
-    int first_p, end_p;           // rows of columns that meet the grid
-    int first_q, count_q;         // columns in a row
+    int planes, count_b, count_c;                // of the grid: along the axis, along the two others
+    int first_p, end_p;                          // rows of columns that meet the grid
+    int first_q, count_q;                        // columns in a row
+    std::vector<std::array<int, 2>> filled_rows; // of voxels, by plane: first and end of those with a span
 
     Columns(const ParallelLight &l, const Spans &s) : light(l), spans(s) {
         planes = s.n[l.axis];
@@ -40,6 +41,14 @@ struct Columns {
         end_p = count_b - low_b;
         first_q = -1 - high_c;
         count_q = count_c - low_c - first_q;
+        filled_rows.assign(planes, {count_b, 0});
+        for (int k = 0; k < planes; ++k) {
+            for (int i = 0; i < count_b; ++i) {
+                const auto &span = spans.row(light.axis, k, i);
+                if (span[0] < span[1])
+                    filled_rows[k] = {std::min(filled_rows[k][0], i), i + 1};
+            }
+        }
     }
     int shift(int lateral, int k) const {
         return static_cast<int>(std::floor(light.slope[lateral] * (light.first + k)));
@@ -101,15 +110,15 @@ SMOKELIFT_INLINE void sweep(const Columns &columns, const Voxels &field, int tas
         const int k = light.travel > 0 ? step : columns.planes - 1 - step;
         const int shift_b = columns.shift(0, k), shift_c = columns.shift(1, k);
         const float f = columns.fraction(0, k), g = columns.fraction(1, k);
-        if (begin + shift_b >= columns.count_b || begin + rows + shift_b < 0)
+        // rows of voxels that are not empty, counted like the rows of columns before them
+        const int first_row = std::max(0, columns.filled_rows[k][0] - begin - shift_b),
+                  end_row = std::min(rows + 1, columns.filled_rows[k][1] - begin - shift_b);
+        if (first_row >= end_row)
             continue;
-        // rows of voxels, slid along themselves to where the columns are: slid[1 + c] lies between c and c +
-        // 1
-        for (int r = 0; r <= rows; ++r) {
+        const int first_column = std::max(0, first_row - 1), end_column = std::min(rows, end_row);
+        // rows of voxels, slid along themselves to where the columns are: slid[1 + c] is between c and c + 1
+        for (int r = first_row; r < end_row; ++r) {
             const int i = begin + r + shift_b;
-            slid_range[r] = {0, 0};
-            if (i < 0 || i >= columns.count_b)
-                continue;
             const auto &span = columns.spans.row(light.axis, k, i);
             const int count = span[1] - span[0];
             if (count <= 0)
@@ -122,7 +131,7 @@ SMOKELIFT_INLINE void sweep(const Columns &columns, const Voxels &field, int tas
             slid_range[r] = {span[0], span[1] + 1};
         }
         const int to_q = -1 - shift_c - columns.first_q; // number of the column at slid[0]
-        for (int r = 0; r < rows; ++r) {
+        for (int r = first_column; r < end_column; ++r) {
             const auto [first, end] = joined(slid_range[r], slid_range[r + 1]);
             const float *__restrict near = slid + std::size_t(r) * width, *__restrict far = near + width;
             float *__restrict value = values + std::size_t(r) * pitch + to_q;
@@ -130,13 +139,13 @@ SMOKELIFT_INLINE void sweep(const Columns &columns, const Voxels &field, int tas
                 value[c] = near[c] + f * (far[c] - near[c]);
             filled[r] = {first + to_q, end + to_q};
         }
-        for (int r = 0; r <= rows; ++r)
+        for (int r = first_row; r < end_row; ++r) {
             std::fill(slid + std::size_t(r) * width + slid_range[r][0],
                       slid + std::size_t(r) * width + slid_range[r][1], 0.0f);
-        for (int r = 0; r + 1 < rows; ++r) {
+            slid_range[r] = {0, 0};
+        }
+        for (int r = first_column; r < std::min(rows - 1, end_row - 1); ++r) {
             const int i = begin + r + shift_b + 1; // the row of voxels between columns r and r + 1
-            if (i < 0 || i >= columns.count_b)
-                continue;
             const auto &span = columns.spans.row(light.axis, k, i);
             const int first = span[0], count = span[1] - span[0];
             if (count <= 0)
@@ -150,7 +159,7 @@ SMOKELIFT_INLINE void sweep(const Columns &columns, const Voxels &field, int tas
                 depth[c] = g * mixed[c] + (1 - g) * mixed[c + 1];
             visit(k, i, first, span[1], depth);
         }
-        for (int r = 0; r < rows; ++r) {
+        for (int r = first_column; r < end_column; ++r) {
             float *__restrict sum = sums + std::size_t(r) * pitch;
             float *__restrict value = values + std::size_t(r) * pitch;
             for (int q = filled[r][0]; q < filled[r][1]; ++q) {
