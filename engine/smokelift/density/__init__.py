@@ -57,7 +57,7 @@ class DensitySettings:
     fit_iterations: int = 6
     descent_iterations: int = 12
     tolerance: float = 0.02
-    paper_rate: float = 0.1
+    paper_rate: float = 0.03
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,11 +160,13 @@ def depth_guess(image: Image, scene: Scene, settings: DensitySettings, plate: Pl
 
 
 def _paper(image: Image, background: Image, scene: Scene, initial: Volume | None, settings: DensitySettings) -> Density:
+    from smokelift.render.paper import PaperRenderer  # here, because Taichi takes long to import
+
     assert scene.camera is not None and scene.domain is not None
     camera, domain, medium = scene.camera, scene.domain, scene.medium or Medium()
     lights = scene_lights(scene)
     views = (camera, orbit(camera, domain, 90))
-    renderers = [Renderer(view, domain, medium, lights, background, settings.scattering) for view in views]
+    renderers = [PaperRenderer(view, domain, medium, lights, background, settings.scattering) for view in views]
     # fog of optical depth 0.1 across the domain: thin, because dense media have local minima
     thin = 0.1 / (medium.extinction * (domain.max[0] - domain.min[0]))
     fog = np.full(domain.resolution, thin, np.float32)

@@ -1,0 +1,214 @@
+# mypy: ignore-errors
+# Taichi compiles what stands here; its annotations are no Python types.
+"""The paper's light volume, algorithm 2 with its record, and algorithm 3's accumulation; `paper` has the formulas.
+
+Extinction is [x + 1, y + 1, z + 1, 0] with a border of one voxel, as the light sweeps read it; in-scattered radiance
+is [x, y, z, value]: J of every channel, then J x way of the light of every channel. Positions are in voxels, voxel
+centres at integers. Volumes are read trilinearly, and beyond the outermost centres as the nearest voxel, so that the
+weights of a sample always add up to one.
+"""
+
+import taichi as ti
+
+from smokelift.render.gpu_light import _at_voxel as parallel_at_voxel
+from smokelift.render.gpu_light import _faces_voxel as faces_voxel
+from smokelift.render.gpu_light import _from_columns as point_at_voxel
+from smokelift.render.gpu_light import _phase as phase
+from smokelift.render.gpu_light import affine, ndarray3, ndarray4, vec2, vec3
+
+ndarray2 = ti.types.ndarray(dtype=ti.f32, ndim=2)
+samples_type = ti.types.ndarray(dtype=ti.i32, ndim=3)
+
+
+@ti.kernel
+def pack(density: ndarray3, extinction: ndarray4, per_density: ti.f32):
+    """Extinction of every voxel."""
+    for index in ti.grouped(ti.ndrange(*density.shape)):
+        extinction[index[0] + 1, index[1] + 1, index[2] + 1, 0] = per_density * density[index]
+
+
+@ti.func
+def _way(index, size, travel, voxel_size):
+    """Length of the way in the box of light that arrives at a voxel, m."""
+    shortest = 1e30
+    for a in ti.static(range(3)):
+        behind = index[a] + 0.5 if travel[a] > 0 else size[a] - 0.5 - index[a]
+        shortest = ti.min(shortest, behind / ti.max(ti.abs(travel[a]), 1e-20))
+    return voxel_size * shortest * travel.norm()
+
+
+@ti.func
+def _write(inscatter: ti.template(), index, energy, lit, way, channels: ti.template(), add):
+    for c in ti.static(range(channels)):
+        here = energy[c] * lit
+        shadowed = here * way
+        if add != 0:
+            here += inscatter[index[0], index[1], index[2], c]
+            shadowed += inscatter[index[0], index[1], index[2], channels + c]
+        inscatter[index[0], index[1], index[2], c] = here
+        inscatter[index[0], index[1], index[2], channels + c] = shadowed
+
+
+@ti.kernel
+def shade_parallel(
+    columns: ndarray3,
+    inscatter: ndarray4,
+    axis: ti.template(),
+    slope_b: ti.f32,
+    slope_c: ti.f32,
+    first: ti.i32,
+    step: ti.f32,
+    direction: vec3,
+    energy: vec3,
+    to_eye: affine,
+    anisotropy: ti.f32,
+    albedo: ti.f32,
+    voxel_size: ti.f32,
+    channels: ti.template(),
+    add: ti.i32,
+):
+    """J = albedo p E V and J x way of a parallel light, from its sweep; instead of or added to what is there."""
+    size = ti.Vector([inscatter.shape[0], inscatter.shape[1], inscatter.shape[2]])
+    for index in ti.grouped(ti.ndrange(inscatter.shape[0], inscatter.shape[1], inscatter.shape[2])):
+        lit = phase(index, to_eye, direction, anisotropy, albedo)
+        lit *= ti.exp(-step * parallel_at_voxel(columns, axis, slope_b, slope_c, first, index))
+        _write(inscatter, index, energy, lit, _way(index, size, direction, voxel_size), channels, add)
+
+
+@ti.kernel
+def shade_point(
+    columns: ndarray3,
+    inscatter: ndarray4,
+    axis: ti.template(),
+    travel: ti.i32,
+    first: ti.i32,
+    far: ti.f32,
+    begin: vec2,
+    position: vec3,
+    energy: vec3,
+    to_eye: affine,
+    anisotropy: ti.f32,
+    albedo: ti.f32,
+    voxel_size: ti.f32,
+    channels: ti.template(),
+    add: ti.i32,
+):
+    """The same of a point light, for the voxels seen through one face."""
+    size = ti.Vector([inscatter.shape[0], inscatter.shape[1], inscatter.shape[2]])
+    for index in ti.grouped(ti.ndrange(inscatter.shape[0], inscatter.shape[1], inscatter.shape[2])):
+        if faces_voxel(axis, travel, position, index):
+            away = index - position
+            lit = phase(index, to_eye, away, anisotropy, albedo) / away.norm_sqr()
+            lit *= ti.exp(-point_at_voxel(columns, axis, travel, first, far, begin, position, index))
+            _write(inscatter, index, energy, lit, _way(index, size, away, voxel_size), channels, add)
+
+
+@ti.func
+def _cell(position, size):
+    """The voxels below and above a position, and how far it lies between them."""
+    low, high = ti.Vector([0, 0, 0]), ti.Vector([0, 0, 0])
+    fraction = ti.Vector([0.0, 0.0, 0.0])
+    for a in ti.static(range(3)):
+        clamped = ti.min(ti.max(position[a], 0.0), size[a] - 1.0)
+        low[a] = ti.floor(clamped, ti.i32)
+        high[a] = ti.min(low[a] + 1, size[a] - 1)
+        fraction[a] = clamped - low[a]
+    return low, high, fraction
+
+
+@ti.func
+def _corner(low, high, fraction, corner: ti.template()):
+    """One of the eight voxels around a position, and its weight."""
+    index = ti.Vector([0, 0, 0])
+    weight = 1.0
+    for a in ti.static(range(3)):
+        if ti.static((corner >> a) & 1):
+            index[a] = high[a]
+            weight *= fraction[a]
+        else:
+            index[a] = low[a]
+            weight *= 1.0 - fraction[a]
+    return index, weight
+
+
+@ti.kernel
+def march(
+    extinction: ndarray4,
+    inscatter: ndarray4,
+    first: ndarray3,
+    step: ndarray3,
+    samples: samples_type,
+    position: ndarray2,
+    grad: ndarray2,
+    scattered: ndarray3,
+    depth: ndarray2,
+    per_density: ti.f32,
+    d: ti.f32,
+    shadows: ti.template(),
+    channels: ti.template(),
+):
+    """Algorithm 2: the picture of every ray, and the terms of eq. 9 in its part of the record.
+
+    ``samples[row, column]`` holds where the ray's part begins, and how many samples it has; they go away from the
+    camera.
+    """
+    size = ti.Vector([inscatter.shape[0], inscatter.shape[1], inscatter.shape[2]])
+    for row, column in ti.ndrange(samples.shape[0], samples.shape[1]):
+        begin, count = samples[row, column, 0], samples[row, column, 1]
+        p = ti.Vector([first[row, column, 0], first[row, column, 1], first[row, column, 2]])
+        along = ti.Vector([step[row, column, 0], step[row, column, 1], step[row, column, 2]])
+        optical_depth = 0.0
+        radiance = ti.Vector.zero(ti.f32, channels)
+        for s in range(count):
+            kappa = 0.0
+            glow = ti.Vector.zero(ti.f32, 2 * channels)
+            low, high, fraction = _cell(p, size)
+            for corner in ti.static(range(8)):
+                index, weight = _corner(low, high, fraction, corner)
+                kappa += weight * extinction[index[0] + 1, index[1] + 1, index[2] + 1, 0]
+                for m in ti.static(range(2 * channels if shadows else channels)):
+                    glow[m] += weight * inscatter[index[0], index[1], index[2], m]
+            tau = ti.exp(-optical_depth)
+            # eq. 8: tau' = -tau sigma_t (s d), kappa' = sigma_t; eq. 10: J' = -sigma_t (J x way)
+            reach = 1.0 - kappa * d * s
+            for c in ti.static(range(channels)):
+                radiance[c] += tau * kappa * glow[c] * d
+                change = reach * glow[c]
+                if ti.static(shadows):
+                    change -= kappa * glow[channels + c]
+                grad[begin + s, c] = per_density * tau * d * change
+            for a in ti.static(range(3)):
+                position[begin + s, a] = p[a]
+            optical_depth += kappa * d
+            p += along
+        depth[row, column] = optical_depth
+        for c in ti.static(range(channels)):
+            scattered[row, column, c] = radiance[c]
+
+
+@ti.kernel
+def accumulate(
+    position: ndarray2,
+    grad: ndarray2,
+    samples: samples_type,
+    of_scattered: ndarray3,
+    of_every_sample: ndarray2,
+    gradient: ndarray3,
+    channels: ti.template(),
+):
+    """Algorithm 3, lines 5 to 13: densityGrad from the record, weighted with dloss / dL of each ray.
+
+    ``of_every_sample[row, column]`` is what eq. 7 gives every sample of the ray alike.
+    """
+    size = ti.Vector([gradient.shape[0], gradient.shape[1], gradient.shape[2]])
+    for row, column in ti.ndrange(samples.shape[0], samples.shape[1]):
+        begin, count = samples[row, column, 0], samples[row, column, 1]
+        for s in range(begin, begin + count):
+            change = of_every_sample[row, column]
+            for c in ti.static(range(channels)):
+                change += of_scattered[row, column, c] * grad[s, c]
+            p = ti.Vector([position[s, 0], position[s, 1], position[s, 2]])
+            low, high, fraction = _cell(p, size)
+            for corner in ti.static(range(8)):
+                index, weight = _corner(low, high, fraction, corner)
+                gradient[index] += weight * change
