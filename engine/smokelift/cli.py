@@ -73,6 +73,8 @@ def _reconstruct(options: argparse.Namespace, say: Reporter) -> None:
         for first in frames:
             say.start(len(clip), first.number - 1)
             for frame in itertools.chain([first], frames):
+                if options.thumbnail:
+                    pictures.write_thumbnail(options.thumbnail, clip, shot, frame)
                 say.frame(frame.number, frame.figures)
     sequence = Sequence.open(options.out)
     if not any((sequence.figures(number).get("hull_share") or 0) > 0 for number in sequence.frames):
@@ -200,6 +202,7 @@ def _parser() -> argparse.ArgumentParser:
     job.add_argument("--resolution", type=_three_counts, metavar="X,Y,Z", help="voxels, if not the scene's")
     job.add_argument("--frames", type=_frame_range, metavar="A:B", help="first and last frame, from 0")
     job.add_argument("--npz", action="store_true", help="write NumPy twins as well")
+    job.add_argument("--thumbnail", type=Path, metavar="FILE.png", help="keep a small picture of the last frame there")
     job.add_argument("--resume", action="store_true", help="go on from the frames that are there")
 
     picture = commands.add_parser("render", parents=[common], help="an image or video of a sequence")
