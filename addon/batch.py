@@ -25,7 +25,7 @@ POLL_SECONDS = 0.05
 
 def main(words: Sequence[str]) -> int:
     """Make the smoke of the scene and return the exit status."""
-    from . import operators, volume
+    from . import run, volume
     from .job import EngineMissingError, Job, engine_command
     from .scene import ShotError
     from .take import TakeError
@@ -36,8 +36,8 @@ def main(words: Sequence[str]) -> int:
         return int(leaving.code or 0)
     try:
         scene = _scene(choices)
-        take = operators.unfinished(scene) if choices.resume else None
-        take = take or operators.begin(scene)
+        take = run.unfinished(scene) if choices.resume else None
+        take = take or run.begin(scene)
         job = Job(engine_command(take.arguments()), take.log_file)
     except (ShotError, TakeError, EngineMissingError) as error:
         print(f"smokelift: {error}", file=sys.stderr, flush=True)

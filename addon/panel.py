@@ -1,8 +1,15 @@
 """The sidebar's tab Smokelift, in the 3D View and in the Movie Clip Editor."""
 
+import textwrap
+
 import bpy
 
-from . import operators
+from . import run, volume
+from .scene import clip_path, frame_rate
+from .take import takes
+
+POINTS_A_LETTER = 6.5
+"""Mean width of a letter of Blender's interface font at scale 1; labels do not wrap by themselves."""
 
 
 class _Main:
@@ -17,57 +24,121 @@ class _Main:
         layout.use_property_decorate = False
         settings = context.scene.smokelift
         layout.template_ID(settings, "clip", open="clip.open")
-        if settings.clip is not None:
-            row = layout.row(align=True)
-            row.prop(settings, "first", text="Frames")
-            row.prop(settings, "last", text="")
-        _draw_shot(layout, settings)
-        layout.prop(settings, "quality")
-        layout.prop(settings, "output")
+        if settings.clip is None:
+            _say(
+                layout,
+                context,
+                "Choose a video or a picture sequence of smoke, filmed with a camera that stands still.",
+            )
+            return
+        _draw_clip(layout, context)
+        _draw_shot(layout, context)
+        column = layout.column()
+        column.prop(settings, "quality")
+        _draw_cost(column, context)
+        layout.prop(settings, "output", placeholder=str(run.output_folder(context.scene)))
         _draw_run(layout, context)
 
 
-def _draw_shot(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+def _draw_clip(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    scene = context.scene
+    settings, clip = scene.smokelift, scene.smokelift.clip
+    if not clip_path(clip).is_file():
+        _say(layout, context, f"{clip_path(clip)} is not there: choose the clip again.", "ERROR")
+    row = layout.row(align=True)
+    row.prop(settings, "first", text="Frames")
+    row.prop(settings, "last", text="")
+    size = (scene.render.resolution_x, scene.render.resolution_y)
+    other_rate = clip.source == "MOVIE" and abs(clip.fps - frame_rate(scene)) > 0.01
+    if size != tuple(clip.size) or other_rate:
+        column = layout.column(align=True)
+        _say(
+            column,
+            context,
+            f"The clip has {clip.size[0]} x {clip.size[1]} pixels at {clip.fps:g} frames a second, "
+            f"the scene {size[0]} x {size[1]} at {frame_rate(scene):g}.",
+            "INFO",
+        )
+        column.operator("smokelift.match_clip")
+
+
+def _draw_shot(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    settings = context.scene.smokelift
     layout.prop(settings, "plate_mode")
     if settings.plate_mode == "FILE":
         layout.prop(settings, "plate", text=" ")
     layout.prop(settings, "camera_mode")
     if settings.camera_mode == "SCENE":
-        row = layout.row(align=True)
-        row.prop(settings, "box")
-        row.operator("smokelift.make_box", text="", icon="MESH_CUBE")
+        if context.scene.camera is None:
+            _say(layout, context, "The scene has no camera: add one where the clip was filmed from.", "ERROR")
+        else:
+            layout.prop(settings, "box")
+            layout.operator("smokelift.make_box", text="Frame Box" if settings.box else "Make Box", icon="MESH_CUBE")
     layout.prop(settings, "light_mode")
 
 
+def _draw_cost(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """What the run will take, if the engine has looked at this scene."""
+    state = context.window_manager.smokelift
+    if state.check_scene != context.scene.session_uid:
+        layout.operator("smokelift.check", icon="VIEWZOOM")
+        return
+    if state.check_error:
+        _say(layout, context, state.check_error, "ERROR")
+    elif state.check_done:
+        column = layout.column(align=True)
+        column.label(text=f"About {duration(state.seconds)}", icon="TIME")
+        column.label(text=f"{state.memory:.1f} GB of memory, up to {size(state.disk)} on disk", icon="BLANK1")
+        if state.memory > state.memory_free:
+            _say(column, context, f"Only {state.memory_free:.1f} GB are free: choose a lower quality.", "ERROR")
+    else:
+        layout.label(text="Looking at the clip", icon="TIME")
+
+
 def _draw_run(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    scene = context.scene
+    jobs = context.window_manager.smokelift.jobs
+    own = [row for row in jobs if row.scene_uid == scene.session_uid]
     column = layout.column()
     column.scale_y = 1.5
-    column.operator("smokelift.run", icon="PLAY")
-    for row in context.window_manager.smokelift.jobs:
-        _draw_job(layout, row)
-    if not context.window_manager.smokelift.jobs and operators.unfinished(context.scene) is not None:
-        layout.operator("smokelift.resume", icon="FILE_REFRESH")
+    if all(row.outcome in run.ENDED for row in own):
+        begun = run.unfinished(scene)
+        if begun is not None and begun.frames():
+            column.operator("smokelift.resume", text=f"Resume after Frame {begun.frames()}", icon="FILE_REFRESH")
+            column.operator("smokelift.run", text="Make Smoke Anew", icon="PLAY")
+        else:
+            column.operator("smokelift.run", text="Make Smoke", icon="PLAY")
+    for row in jobs:
+        _draw_job(layout, context, row)
+    if volume.shown_take(scene) is not None:
+        layout.operator("smokelift.set_up", icon="CAMERA_DATA")
 
 
-def _draw_job(layout: bpy.types.UILayout, row: bpy.types.PropertyGroup) -> None:
+def _draw_job(layout: bpy.types.UILayout, context: bpy.types.Context, row: bpy.types.PropertyGroup) -> None:
     box = layout.box()
+    scene = run.find_scene(row)
+    if scene is not None and scene != context.scene:
+        box.label(text=scene.name, icon="SCENE_DATA")
     if row.outcome == "waiting":
-        box.label(text="Waiting", icon="SORTTIME")
+        box.label(text="Waits for the one before", icon="SORTTIME")
     elif row.outcome == "running":
-        factor = row.done / row.total if row.total else 0.0
-        box.progress(factor=factor, text=_progress(row))
+        box.progress(factor=row.done / row.total if row.total else 0.0, text=_progress(row))
     else:
-        box.label(text=row.sentence, icon="ERROR" if row.outcome == "failed" else "INFO")
+        _say(box, context, row.sentence, "ERROR" if row.outcome == "failed" else "INFO")
+    if row.icon:
+        box.template_icon(icon_value=row.icon, scale=8.0)
+    for note in filter(None, row.notes.split("\n")):
+        _say(box, context, note)
     buttons = box.row(align=True)
-    if row.outcome in ("waiting", "running"):
-        button = buttons.operator("smokelift.cancel", text="Cancel", icon="CANCEL")
-        button.take = row.take
+    if row.outcome in run.ENDED:
+        buttons.operator("smokelift.open_log", icon="TEXT").take = row.take
     else:
-        button = buttons.operator("smokelift.open_log", icon="TEXT")
-        button.take = row.take
+        buttons.operator("smokelift.cancel", text="Cancel", icon="CANCEL").take = row.take
 
 
 def _progress(row: bpy.types.PropertyGroup) -> str:
+    if row.cancel:
+        return "Stopping"
     if not row.total:
         return "Looking at the clip"
     left = f", {duration(row.seconds_left)} left" if row.seconds_left >= 0.0 else ""
@@ -80,6 +151,21 @@ def duration(seconds: float) -> str:
         return f"{max(1, round(seconds))} s"
     minutes = round(seconds / 60.0)
     return f"{minutes} min" if minutes < 60 else f"{minutes // 60} h {minutes % 60:02d} min"
+
+
+def size(megabytes: float) -> str:
+    """An amount of disk in words."""
+    return f"{megabytes:.0f} MB" if megabytes < 1000.0 else f"{megabytes / 1000.0:.1f} GB"
+
+
+def _say(layout: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str = "NONE") -> None:
+    """A sentence over as many lines as the sidebar's width asks for."""
+    points = context.region.width / context.preferences.system.ui_scale if context.region else 300.0
+    lines = textwrap.wrap(text, max(16, int((points - 50.0) / POINTS_A_LETTER)))
+    column = layout.column(align=True)
+    column.scale_y = 0.8
+    for number, line in enumerate(lines):
+        column.label(text=line, icon=icon if number == 0 or icon == "NONE" else "BLANK1")
 
 
 class SMOKELIFT_PT_view(_Main, bpy.types.Panel):
@@ -100,18 +186,36 @@ class _Advanced:
     bl_region_type = "UI"
     bl_options = {"DEFAULT_CLOSED"}
 
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """There is nothing to set before there is a clip."""
+        return context.scene.smokelift.clip is not None
+
     def draw(self, context: bpy.types.Context) -> None:
         """Whatever most shots do not need."""
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
         settings = context.scene.smokelift
-        for name in ("longest_side", "fps", "transfer", "speed", "device", "use_medium"):
+        row = layout.row()
+        row.active = settings.camera_mode == "SCENE"
+        row.prop(settings, "longest_side")
+        for name in ("fps", "transfer", "speed", "device", "use_medium"):
             layout.prop(settings, name)
         column = layout.column()
         column.active = settings.use_medium
         for name in ("extinction", "albedo", "anisotropy"):
             column.prop(settings, name)
+        state = context.window_manager.smokelift
+        if state.check_scene == context.scene.session_uid and state.notes:
+            layout.label(text="{} x {} x {} voxels. Assumed:".format(*state.resolution))
+            for note in state.notes.split("\n"):
+                _say(layout, context, note)
+        layout.operator("smokelift.check", icon="VIEWZOOM")
+        earlier = len(takes(run.output_folder(context.scene)))
+        row = layout.row()
+        row.active = earlier > 1
+        row.operator("smokelift.remove_takes", text=f"Delete Earlier Results ({max(0, earlier - 1)})", icon="TRASH")
 
 
 class SMOKELIFT_PT_view_advanced(_Advanced, bpy.types.Panel):

@@ -7,12 +7,19 @@ from bpy.props import (
     EnumProperty,
     FloatProperty,
     IntProperty,
+    IntVectorProperty,
     PointerProperty,
     StringProperty,
 )
 
 
-def _clip_chosen(settings: "SmokeliftSettings", _context: bpy.types.Context) -> None:
+def _changed(_settings: "SmokeliftSettings", context: bpy.types.Context) -> None:
+    """What the shot will take has changed: look again, where there is somebody to see it."""
+    if not bpy.app.background and context.window is not None:
+        bpy.ops.smokelift.check()
+
+
+def _clip_chosen(settings: "SmokeliftSettings", context: bpy.types.Context) -> None:
     """A new clip is used from its first frame to its last."""
     if settings.clip is not None:
         settings.first, settings.last = 1, max(1, settings.clip.frame_duration)
@@ -31,8 +38,8 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
         type=bpy.types.MovieClip,
         update=_clip_chosen,
     )
-    first: IntProperty(name="First", description="First frame of the clip to use", default=1, min=1)
-    last: IntProperty(name="Last", description="Last frame of the clip to use", default=1, min=1)
+    first: IntProperty(name="First", description="First frame of the clip to use", default=1, min=1, update=_changed)
+    last: IntProperty(name="Last", description="Last frame of the clip to use", default=1, min=1, update=_changed)
     plate_mode: EnumProperty(
         name="Background",
         description="What the picture shows where there is no smoke",
@@ -40,8 +47,11 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
             ("ESTIMATE", "From the Clip", "Find the background in the frames where the smoke does not cover it"),
             ("FILE", "Clean Plate", "A picture of the same view without smoke"),
         ],
+        update=_changed,
     )
-    plate: StringProperty(name="Clean Plate", description="Picture of the same view without smoke", subtype="FILE_PATH")
+    plate: StringProperty(
+        name="Clean Plate", description="Picture of the same view without smoke", subtype="FILE_PATH", update=_changed
+    )
     camera_mode: EnumProperty(
         name="Camera",
         description="Where the clip was filmed from",
@@ -49,12 +59,14 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
             ("SCENE", "Scene Camera", "The scene's camera with its lens, sensor, shift and place"),
             ("GUESS", "Guess", "A level camera with an ordinary lens; one is made to match"),
         ],
+        update=_changed,
     )
     box: PointerProperty(
         name="Box",
         description="Box that holds all of the smoke; the smaller, the finer the result",
         type=bpy.types.Object,
         poll=_is_mesh,
+        update=_changed,
     )
     light_mode: EnumProperty(
         name="Light",
@@ -73,6 +85,7 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
             ("fine", "Fine", "All the detail that the clip holds, several times slower"),
         ],
         default="balanced",
+        update=_changed,
     )
     output: StringProperty(
         name="Output",
@@ -86,6 +99,7 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
         default=0,
         min=0,
         max=1024,
+        update=_changed,
     )
     fps: FloatProperty(
         name="Captured At",
@@ -93,6 +107,7 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
         default=0.0,
         min=0.0,
         soft_max=1000.0,
+        update=_changed,
     )
     transfer: EnumProperty(
         name="Pixels",
@@ -102,6 +117,7 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
             ("srgb", "sRGB", "Ordinary video and pictures"),
             ("linear", "Linear", "Already proportional to light"),
         ],
+        update=_changed,
     )
     use_medium: BoolProperty(name="Smoke Material", description="Say how the smoke takes and scatters light")
     extinction: FloatProperty(
@@ -151,14 +167,25 @@ class SmokeliftJob(bpy.types.PropertyGroup):
     total: IntProperty()
     seconds_left: FloatProperty(default=-1.0)
     sentence: StringProperty()
+    notes: StringProperty()
     icon: IntProperty()
     cancel: BoolProperty()
 
 
 class SmokeliftState(bpy.types.PropertyGroup):
-    """What runs, waits and has ended in this session; never saved."""
+    """What runs, waits and has ended in this session, and what the next run would take; never saved."""
 
     jobs: CollectionProperty(type=SmokeliftJob)
+    check_scene: IntProperty()
+    check_ticks: IntProperty()
+    check_done: BoolProperty()
+    check_error: StringProperty()
+    notes: StringProperty()
+    resolution: IntVectorProperty(size=3)
+    seconds: FloatProperty()
+    memory: FloatProperty(description="GiB")
+    memory_free: FloatProperty(description="GiB")
+    disk: FloatProperty(description="MB")
 
 
 _CLASSES = (SmokeliftSettings, SmokeliftJob, SmokeliftState)

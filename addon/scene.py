@@ -27,8 +27,15 @@ class ShotError(ValueError):
     """A shot that cannot be run, and what to do about it, in one sentence."""
 
 
-def shot_tables(scene: bpy.types.Scene) -> dict[str, Any]:
+def shot_tables(scene: bpy.types.Scene, quick: bool = False) -> dict[str, Any]:
     """Return the tables of a scene file.
+
+    Parameters
+    ----------
+    scene
+        Its Smokelift settings say what is used of it.
+    quick
+        Take things as they are in the current frame, without a look at the others.
 
     Raises
     ------
@@ -37,7 +44,7 @@ def shot_tables(scene: bpy.types.Scene) -> dict[str, Any]:
     """
     settings = scene.smokelift
     tables: dict[str, Any] = {"clip": clip_table(scene)}
-    with _at_frame(scene, start_frame(scene)) as depsgraph:
+    with _at_frame(scene, scene.frame_current if quick else start_frame(scene)) as depsgraph:
         turn = Matrix.Identity(3)
         if settings.camera_mode == "SCENE":
             box = _box(settings)
@@ -53,7 +60,7 @@ def shot_tables(scene: bpy.types.Scene) -> dict[str, Any]:
             _check_outside(tables)
     if settings.plate_mode == "FILE":
         tables["background"] = {"image": _existing(settings.plate, "clean plate")}
-    if settings.camera_mode == "SCENE":
+    if settings.camera_mode == "SCENE" and not quick:
         _check_still(scene)
     return tables
 
@@ -362,10 +369,12 @@ def _check_outside(tables: dict[str, Any]) -> None:
 def _at_frame(scene: bpy.types.Scene, frame: int) -> Iterator[bpy.types.Depsgraph]:
     """The scene as it is in a frame; afterwards it is where it was."""
     before, fraction = scene.frame_current, scene.frame_subframe
-    scene.frame_set(frame)
+    if frame != before:
+        scene.frame_set(frame)
     try:
         layer = scene.view_layers[0]
         layer.update()
         yield layer.depsgraph
     finally:
-        scene.frame_set(before, subframe=fraction)
+        if scene.frame_current != before:
+            scene.frame_set(before, subframe=fraction)
