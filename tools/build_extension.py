@@ -25,10 +25,11 @@ from pathlib import Path
 from typing import Any
 
 import tomli_w
-from engine_wheels import PYTHONS, ROOT
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name, parse_wheel_filename
 from packaging.version import Version
+
+from engine_wheels import PYTHONS, ROOT
 
 STAGE = ROOT / "build" / "extension"
 
