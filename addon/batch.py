@@ -25,7 +25,7 @@ POLL_SECONDS = 0.05
 
 def main(words: Sequence[str]) -> int:
     """Make the smoke of the scene and return the exit status."""
-    from . import run, volume
+    from . import run
     from .job import EngineMissingError, Job, engine_command
     from .scene import ShotError
     from .take import TakeError
@@ -46,7 +46,7 @@ def main(words: Sequence[str]) -> int:
     if job.outcome != "done":
         print(f"smokelift: {job.sentence}", file=sys.stderr, flush=True)
         return CANCELLED if job.outcome == "cancelled" else (job.status or 1)
-    volume.show(scene, take)
+    run.present(scene, take)
     print(job.sentence, flush=True)
     if choices.save:
         bpy.ops.wm.save_mainfile()

@@ -102,7 +102,8 @@ def _plate_world(scene: bpy.types.Scene, take: Take, background: dict[str, Any])
         world = world.copy() if world is not None else bpy.data.worlds.new(NAME)
         world.name = NAME
         scene.world = world
-    world.use_nodes = True
+    if world.node_tree is None:  # since 5.0 there always is one
+        world.use_nodes = True
     nodes, links = world.node_tree.nodes, world.node_tree.links
     output = next((node for node in nodes if node.type == "OUTPUT_WORLD" and node.is_active_output), None)
     output = output or nodes.new("ShaderNodeOutputWorld")

@@ -12,6 +12,9 @@ from bpy.props import (
     StringProperty,
 )
 
+# Blender 4.5 and later want to be told that // is meant as the .blend's folder; older ones take it for granted.
+_PATH_OPTIONS = {"ANIMATABLE"} | ({"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) else set())
+
 
 def _changed(_settings: "SmokeliftSettings", context: bpy.types.Context) -> None:
     """What the shot will take has changed: look again, where there is somebody to see it."""
@@ -50,7 +53,11 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
         update=_changed,
     )
     plate: StringProperty(
-        name="Clean Plate", description="Picture of the same view without smoke", subtype="FILE_PATH", update=_changed
+        name="Clean Plate",
+        description="Picture of the same view without smoke",
+        subtype="FILE_PATH",
+        options=_PATH_OPTIONS,
+        update=_changed,
     )
     camera_mode: EnumProperty(
         name="Camera",
@@ -91,6 +98,7 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
         name="Output",
         description="Folder for the results; empty is a folder beside the .blend file",
         subtype="DIR_PATH",
+        options=_PATH_OPTIONS,
     )
 
     longest_side: IntProperty(

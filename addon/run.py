@@ -6,8 +6,8 @@ from pathlib import Path
 import bpy
 import bpy.utils.previews
 
+from . import look, volume
 from . import scene as shot
-from . import volume
 from .job import EngineMissingError, Job, Queue, engine_command
 from .take import Take, TakeError, new_take, takes
 
@@ -61,6 +61,14 @@ def enqueue(context: bpy.types.Context, scene: bpy.types.Scene, take: Take) -> N
     row = jobs.add()
     row.take, row.scene_uid = str(take.directory), scene.session_uid
     work(context)
+
+
+def present(scene: bpy.types.Scene, take: Take) -> bpy.types.Object | None:
+    """Show a take's finished frames, with the camera that the engine took for granted if it was left to it."""
+    thing, index = volume.show(scene, take), take.index()
+    if thing is not None and index is not None:
+        look.guessed_camera(scene, index)
+    return thing
 
 
 def busy(manager: bpy.types.WindowManager, take: Take) -> bool:
@@ -179,7 +187,7 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
         take = Take(Path(row.take))
         scene = find_scene(row)
         if scene is not None:
-            thing = volume.show(scene, take)
+            thing = present(scene, take)
             if thing is not None and not bpy.app.background:
                 self._follow(scene, thing, row)
         if not bpy.app.background:

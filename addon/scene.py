@@ -311,7 +311,10 @@ def _emitted(light: bpy.types.Light) -> list[float]:
 
 
 def _world_tables(scene: bpy.types.Scene, turn: Matrix) -> list[dict[str, Any]]:
-    """The equirectangular picture that is wired to the world's background, if there is one."""
+    """The equirectangular picture that is wired to the world's background, if there is one.
+
+    Its rotation is what Blender applies to a direction before it is looked up; a box that is turned adds its own.
+    """
     world = scene.world
     if world is None or world.node_tree is None:
         return []
@@ -333,7 +336,7 @@ def _world_tables(scene: bpy.types.Scene, turn: Matrix) -> list[dict[str, Any]]:
         if tilt > 1e-3:
             raise ShotError("The box is tilted against the world's picture: stand it upright, or choose other lights.")
         return [
-            {"type": "environment", "image": str(path), "rotation_degrees": math.degrees(-yaw), "strength": strength}
+            {"type": "environment", "image": str(path), "rotation_degrees": math.degrees(yaw), "strength": strength}
         ]
     return []
 

@@ -93,7 +93,8 @@ class Take:
             If the take was never begun, or its files were taken away.
         """
         try:
-            options = json.loads(self.request_file.read_text(encoding="utf-8"))["options"]
+            request = json.loads(self.request_file.read_text(encoding="utf-8"))
+            options = [str(word) for word in request["options"]]
         except (OSError, ValueError, LookupError, TypeError) as error:
             raise TakeError(f"{self.request_file} is missing or damaged: run the shot anew.") from error
         files = ["--out", str(self.directory), "--thumbnail", str(self.picture_file)]

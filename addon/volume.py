@@ -117,7 +117,8 @@ def _shade(volume: bpy.types.Volume, medium: dict[str, float]) -> None:
 def _material(name: str) -> bpy.types.Material:
     """Scattering is density x extinction x albedo; what is left of the extinction is absorbed."""
     material = bpy.data.materials.new(name)
-    material.use_nodes = True
+    if material.node_tree is None:  # since 5.0 there always is one
+        material.use_nodes = True
     tree = material.node_tree
     tree.nodes.clear()
     output = tree.nodes.new("ShaderNodeOutputMaterial")

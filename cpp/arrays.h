@@ -62,5 +62,6 @@ inline Out3 out(Array3 &a) { return {out(a[0]), out(a[1]), out(a[2])}; }
 
 void register_transport(py::module_ &module);
 void register_velocity(py::module_ &module);
+void register_render(py::module_ &module);
 
 } // namespace smokelift

@@ -15,8 +15,10 @@
 
 #if defined(__GNUC__)
 #define SMOKELIFT_INLINE inline __attribute__((always_inline))
+#define SMOKELIFT_INLINE_LAMBDA __attribute__((always_inline))
 #else
 #define SMOKELIFT_INLINE inline
+#define SMOKELIFT_INLINE_LAMBDA
 #endif
 
 namespace smokelift {

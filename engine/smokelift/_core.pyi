@@ -62,3 +62,97 @@ class LeastSquares:
         inner_limit: int,
         threads: int = 0,
     ) -> tuple[list[Array], Figures]: ...
+
+Volume = npt.NDArray[np.float32]
+
+def zeros(shape: tuple[int, ...]) -> Array: ...
+
+class Support:
+    """Where there can be smoke; ``marked`` is (nx, ny, nz)."""
+
+    def __init__(self, marked: npt.NDArray[np.uint8]) -> None: ...
+
+class Phase:
+    def __init__(self, *, to_eye: npt.ArrayLike, albedo: float, anisotropy: float) -> None: ...
+
+class ParallelLight:
+    def __init__(
+        self,
+        *,
+        direction: npt.ArrayLike,
+        energy: npt.ArrayLike,
+        axis: int,
+        travel: int,
+        first: int,
+        slope: tuple[float, float],
+        step: float,
+    ) -> None: ...
+
+class Face:
+    def __init__(
+        self,
+        *,
+        axis: int,
+        travel: int,
+        first: int,
+        planes: int,
+        far: float,
+        columns_b: tuple[int, int],
+        columns_c: tuple[int, int],
+    ) -> None: ...
+
+class PointLight:
+    def __init__(
+        self, *, position: npt.ArrayLike, energy: npt.ArrayLike, voxel_size: float, faces: list[Face]
+    ) -> None: ...
+
+Lights = list[ParallelLight | PointLight]
+
+class Rays:
+    """One ray a pixel; see `smokelift.render.rays.Rays` for the arrays."""
+
+    def __init__(self, lines: Array, length: Array, planes: npt.NDArray[np.int32]) -> None: ...
+    def clip(self, support: Support, medium: Volume, threads: int = 0) -> None: ...
+    @property
+    def samples(self) -> int: ...
+
+def pack(
+    density: Array, corner: tuple[int, int, int], support: Support, extinction: float, medium: Volume, threads: int = 0
+) -> None: ...
+def unpack(
+    gradient: Volume,
+    support: Support,
+    extinction: float,
+    result: Array,
+    corner: tuple[int, int, int],
+    threads: int = 0,
+) -> None: ...
+def shade(medium: Volume, support: Support, phase: Phase, lights: Lights, threads: int = 0) -> None: ...
+def shade_adjoint(
+    medium: Volume,
+    gradient: Volume,
+    scratch: Volume,
+    support: Support,
+    phase: Phase,
+    lights: Lights,
+    threads: int = 0,
+) -> None: ...
+def march(
+    medium: Volume,
+    support: Support,
+    rays: Rays,
+    scattered: Array,
+    depth: Array,
+    record: Volume | None,
+    threads: int = 0,
+) -> None: ...
+def march_adjoint(
+    rays: Rays,
+    depth: Array,
+    of_scattered: Array,
+    of_transmittance: Array,
+    record: Volume | None,
+    gradient: Volume,
+    support: Support,
+    threads: int = 0,
+) -> None: ...

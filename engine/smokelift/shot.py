@@ -14,7 +14,7 @@ from smokelift.background import Plate, estimate_plate, known_plate, matte
 from smokelift.cameras import WorkingPicture, as_matrix, working_picture
 from smokelift.clip import Clip
 from smokelift.images import area_average, read_image
-from smokelift.render.renderer import Scattering
+from smokelift.render.setup import Scattering
 from smokelift.scene import Background, Camera, DirectionalLight, Domain, Medium, Scene
 from smokelift.settings import LONGEST_SIDE, Settings
 

@@ -45,28 +45,80 @@ def light_optical_depth(extinction, voxel_size, direction):
     return np.moveaxis(out, 0, axis)
 
 
-def render(density, camera, domain, medium, sun, background, scattering="single"):
+def point_optical_depth(extinction, voxel_size, position):
+    """Optical depth from a point (grid coordinates) to the voxels, face by face of the cube around it."""
+    position = np.asarray(position, float)
+    out = np.zeros_like(extinction)
+    index = np.stack(np.meshgrid(*map(np.arange, extinction.shape), indexing="ij"), -1)
+    away = index - position
+    face_of = np.argmax(np.abs(away), -1)  # the first axis where two are equally far
+    for axis in range(3):
+        field = np.moveaxis(extinction, axis, 0)
+        lateral = np.delete(position, axis)
+        for sign in (1, -1):
+            ahead = [k for k in range(field.shape[0])[::sign] if sign * (k - position[axis]) >= 1e-3]
+            if not ahead:
+                continue
+            far = sign * (ahead[-1] - position[axis])
+            reach = int(np.ceil(far)) + 1
+            p, q = np.meshgrid(np.arange(-reach, reach + 1), np.arange(-reach, reach + 1), indexing="ij")
+            length = voxel_size * np.sqrt(1 + (p**2 + q**2) / far**2)
+            before = np.zeros(p.shape, extinction.dtype)
+            for k in ahead:
+                distance = sign * (k - position[axis])
+                scale = distance / far
+                value = length * _interpolate(field[k], lateral[0] + scale * p, lateral[1] + scale * q)
+                depth = before + value / 2
+                before = before + value
+                i, j = np.meshgrid(*map(np.arange, field.shape[1:]), indexing="ij")
+                at_voxels = _interpolate(depth, (i - lateral[0]) / scale + reach, (j - lateral[1]) / scale + reach)
+                mine = np.take(face_of, k, axis) == axis
+                target = np.moveaxis(out, axis, 0)[k]
+                target[mine] = at_voxels[mine]
+    return out
+
+
+def inscatter_of(kappa, camera, domain, medium, lights, scattering):
+    """In-scattered radiance per unit extinction at the voxels, (nx, ny, nz, 3)."""
+    h = domain.voxel_size
+    total = np.zeros((*kappa.shape, 3), kappa.dtype)
+    if scattering == "absorption":
+        return total
+    index = np.stack(np.meshgrid(*[np.arange(n) for n in kappa.shape], indexing="ij"), -1)
+    centres = np.array(domain.min) + (index + 0.5) * h
+    matrix = np.array(camera.matrix)
+    to_eye = matrix[:3, 3] - centres if camera.type == "perspective" else np.broadcast_to(matrix[:3, 2], centres.shape)
+    to_eye = to_eye / np.linalg.norm(to_eye, axis=-1, keepdims=True)
+    g = medium.anisotropy
+    for light in lights:
+        if hasattr(light, "position"):
+            away = centres - np.array(light.position)
+            distance = np.linalg.norm(away, axis=-1)
+            travel = away / distance[..., None]
+            energy = np.array(light.intensity) / distance[..., None] ** 2
+            grid_position = (np.array(light.position) - np.array(domain.min)) / h - 0.5
+            depth = point_optical_depth(kappa, h, grid_position)
+        else:
+            travel = np.array(light.direction) / np.linalg.norm(light.direction)
+            energy = np.array(light.irradiance)
+            depth = light_optical_depth(kappa, h, travel)
+        cosine = np.sum(to_eye * travel, -1)
+        phase = (1 - g * g) / (4 * np.pi * (1 + g * g - 2 * g * cosine) ** 1.5)
+        shadow = np.exp(-depth) if scattering == "single" else np.ones_like(depth)
+        total += medium.albedo * (phase * shadow)[..., None] * energy
+    return total
+
+
+def render(density, camera, domain, medium, lights, background, scattering="single"):
     """Image (rows, columns, 3), in the precision of the density: float64 or complex128."""
     h = domain.voxel_size
     kappa = medium.extinction * density
     origin, direction = ray_through_pixels(camera)
-    inscatter = np.zeros_like(kappa)
-    if scattering != "absorption" and sun is not None:
-        travel = np.array(sun.direction) / np.linalg.norm(sun.direction)
-        centres = np.stack(np.meshgrid(*[np.arange(n) for n in density.shape], indexing="ij"), -1) + 0.5
-        centres = np.array(domain.min) + centres * h
-        matrix = np.array(camera.matrix)
-        to_eye = (
-            matrix[:3, 3] - centres if camera.type == "perspective" else np.broadcast_to(matrix[:3, 2], centres.shape)
-        )
-        cosine = (to_eye @ travel) / np.linalg.norm(to_eye, axis=-1)
-        g = medium.anisotropy
-        phase = (1 - g * g) / (4 * np.pi * (1 + g * g - 2 * g * cosine) ** 1.5)
-        light = np.exp(-light_optical_depth(kappa, h, travel)) if scattering == "single" else 1.0
-        inscatter = medium.albedo * phase * light
+    inscatter = inscatter_of(kappa, camera, domain, medium, lights, scattering)
     start = (origin - np.array(domain.min)) / h - 0.5
     rows, columns = direction.shape[:2]
-    scattered, total = (np.zeros((rows, columns), density.dtype) for _ in range(2))
+    total = np.zeros((rows, columns), density.dtype)
+    scattered = np.zeros((rows, columns, 3), density.dtype)
     dominant = np.argmax(np.abs(direction), -1)
     for axis in range(3):
         k_field, j_field = np.moveaxis(kappa, axis, 0), np.moveaxis(inscatter, axis, 0)
@@ -78,16 +130,17 @@ def render(density, camera, domain, medium, sun, background, scattering="single"
             lateral = np.delete(direction[mine], axis, -1) / along[mine][:, None]
             base = np.delete(start[mine], axis, -1) - lateral * start[mine][:, axis][:, None]
             d = h / np.abs(along[mine])
-            tau, radiance = np.ones(d.shape, density.dtype), np.zeros(d.shape, density.dtype)
+            tau, radiance = np.ones(d.shape, density.dtype), np.zeros((*d.shape, 3), density.dtype)
             for k in range(k_field.shape[0])[::sign]:
                 b, c = base[:, 0] + lateral[:, 0] * k, base[:, 1] + lateral[:, 1] * k
                 visible = np.ones(d.shape, bool)
                 if camera.type == "perspective":
                     visible = (k - start[mine][:, axis]) * sign > 0
                 x = np.where(visible, _interpolate(k_field[k], b, c), 0) * d
-                nearest = [np.clip(at, 0, n - 1) for at, n in zip((b, c), j_field.shape[1:], strict=True)]
+                nearest = [np.clip(at, 0, n - 1) for at, n in zip((b, c), j_field.shape[1:3], strict=True)]
                 opacity = -np.expm1(-x)
-                radiance += tau * opacity * _interpolate(j_field[k], *nearest)
+                glow = np.stack([_interpolate(j_field[k][..., m], *nearest) for m in range(3)], -1)
+                radiance += (tau * opacity)[:, None] * glow
                 tau = tau * (1 - opacity)
             scattered[mine], total[mine] = radiance, tau
-    return scattered[..., None] * np.array(sun.irradiance if sun else (0, 0, 0)) + total[..., None] * background
+    return scattered + total[..., None] * background

@@ -14,7 +14,7 @@ from smokelift.density.descent import descend
 from smokelift.density.hull import project_voxels, visual_hull
 from smokelift.density.multiplicative import fit_multiplicative
 from smokelift.density.profile import depth_profile
-from smokelift.render import Renderer, render, scene_sun
+from smokelift.render import Renderer, render, scene_lights
 from smokelift.scene import Background, Camera, Medium, Scene
 
 QUICK = DensitySettings(fit_iterations=4, descent_iterations=6)
@@ -127,7 +127,7 @@ def test_the_multiplicative_fit_gets_better(plume, small) -> None:
     """More iterations never make the picture worse, and a start of half the density is nearly mended."""
     target = render(plume.densities[1], small)
     background = np.zeros((42, 30, 3), np.float32)
-    renderer = Renderer(small.camera, small.domain, small.medium, scene_sun(small.lights), background, "single")
+    renderer = Renderer(small.camera, small.domain, small.medium, scene_lights(small), background, "single")
     projection = project_voxels(small.camera, small.domain)
     start, weight = 0.5 * plume.densities[1], np.ones((42, 30), np.float32)
     noise = np.full((42, 30, 3), 1e-3, np.float32)
@@ -149,7 +149,7 @@ def test_descent_never_raises_the_loss(plume, small, thickness) -> None:
     mask = target.max(-1) > 0.01
     projection = project_voxels(scene.camera, scene.domain)
     hull = visual_hull(mask, projection)
-    renderer = Renderer(scene.camera, scene.domain, scene.medium, scene_sun(scene.lights), np.zeros(3), support=hull)
+    renderer = Renderer(scene.camera, scene.domain, scene.medium, scene_lights(scene), np.zeros(3), support=hull)
     start = np.where(hull, np.float32(0.02), np.float32(0))
     weight = np.ones(mask.shape, np.float32)
     losses = [descend(renderer, target, start, hull, weight, 0.0, steps, 0.0).loss for steps in range(40)]
@@ -258,7 +258,7 @@ def test_a_pattern_behind_the_smoke_does_not_print_through(plume, small, scatter
     plate = noisy_plate(np.repeat(pattern[..., None], 3, 2))
     medium = Medium(extinction=4.0, albedo=0.9)
     scene = replace(small, medium=medium, background=None)
-    renderer = Renderer(scene.camera, scene.domain, medium, scene_sun(scene.lights), plate.image, scattering)
+    renderer = Renderer(scene.camera, scene.domain, medium, scene_lights(scene), plate.image, scattering)
     target = renderer.image(plume.densities[1])
     found: Density = reconstruct_density(target, scene, settings=replace(QUICK, scattering=scattering), plate=plate)
     assert found.figures["psnr"] >= 35

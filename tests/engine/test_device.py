@@ -1,4 +1,4 @@
-"""The renderer's back ends: the CPU by itself, and a GPU, or Vulkan in software, on request."""
+"""Which device renders: the processor by itself, and a GPU, or Vulkan in software, on request."""
 
 import json
 import subprocess

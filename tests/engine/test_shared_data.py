@@ -29,7 +29,7 @@ def test_render_agrees_with_mitsuba(name, view):
         densities = file["density"]
     with np.load(DATA / "synthetic" / name / f"{view}.npz") as file:
         images = file["image"]
-    renderer = Renderer(camera, scene.domain, scene.medium, scene.lights[0], np.zeros(3, np.float32))
+    renderer = Renderer(camera, scene.domain, scene.medium, scene.lights, np.zeros(3, np.float32))
     for frame in (5, 20, 35):
         expected = images[frame].astype(np.float64)
         error = renderer.image(densities[frame])[..., 0] - expected
@@ -65,7 +65,7 @@ def test_real_smoke_before_a_textured_wall():
     small = shot.small_scene
     model = replace(settings.density, scattering=shot.scattering)
     density = smokelift.reconstruct_density(image, small, settings=model, plate=shot.plate)
-    renderer = Renderer(small.camera, small.domain, small.medium, small.lights[0], shot.plate.image, shot.scattering)
+    renderer = Renderer(small.camera, small.domain, small.medium, small.lights, shot.plate.image, shot.scattering)
     rows, columns = np.nonzero(matte(image, shot.plate).mask)
     box = np.s_[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
     rendered = linear_to_srgb(np.clip(renderer.image(density.values)[box], 0, 1))

@@ -21,9 +21,11 @@ from smokelift.density.multiplicative import fit_multiplicative
 from smokelift.density.paper import fit_paper
 from smokelift.density.profile import spread_along_depth
 from smokelift.images import srgb_to_linear
-from smokelift.render import Renderer, scene_background, scene_sun
-from smokelift.render.renderer import Image, Scattering, Volume
-from smokelift.scene import Camera, DirectionalLight, Domain, Medium, Scene
+from smokelift.render import Renderer, scene_background, scene_lights
+from smokelift.render.lights import unshadowed_source
+from smokelift.render.renderer import Image, Volume
+from smokelift.render.setup import Scattering
+from smokelift.scene import Camera, Domain, Medium, Scene
 
 __all__ = ["Density", "DensitySettings", "depth_guess", "reconstruct_density"]
 
@@ -112,7 +114,7 @@ def reconstruct_density(
     camera, domain, medium = scene.camera, scene.domain, scene.medium or Medium()
     image = _checked_image(image, camera)
     plate = plate or _clean_plate(scene, camera)
-    sun = scene_sun(scene.lights)
+    lights = scene_lights(scene)
     mask = matte(image, plate).mask
     projection = project_voxels(camera, domain)
     hull = visual_hull(mask, projection)
@@ -122,7 +124,7 @@ def reconstruct_density(
         return Density(np.zeros(domain.resolution, np.float32), hull, _figures(0.0, 1, 0, hull))
     if settings.method == "paper":
         return _paper(image, plate.image, scene, initial, settings)
-    renderer = Renderer(camera, domain, medium, sun, plate.image, settings.scattering, hull)
+    renderer = Renderer(camera, domain, medium, lights, plate.image, settings.scattering, hull)
     counts = reached(mask, projection)
     weight = counts.astype(np.float32)
     noise = noise_at(image, plate)
@@ -145,7 +147,10 @@ def depth_guess(image: Image, scene: Scene, settings: DensitySettings, plate: Pl
     """Density (nx, ny, nz) from one picture alone: unshadowed optical depths, spread by the depth profile."""
     assert scene.camera is not None and scene.domain is not None
     medium = scene.medium or Medium()
-    depth = _optical_depth(image, plate.image, scene_sun(scene.lights), medium, settings.scattering)
+    source = np.zeros(3)
+    if settings.scattering != "absorption":
+        source = unshadowed_source(scene_lights(scene), medium, scene.domain)
+    depth = _optical_depth(image, plate.image, source)
     mask = matte(image, plate).mask
     amount = np.where(mask, depth, 0).astype(np.float32)
     projection = project_voxels(scene.camera, scene.domain)
@@ -157,9 +162,9 @@ def depth_guess(image: Image, scene: Scene, settings: DensitySettings, plate: Pl
 def _paper(image: Image, background: Image, scene: Scene, initial: Volume | None, settings: DensitySettings) -> Density:
     assert scene.camera is not None and scene.domain is not None
     camera, domain, medium = scene.camera, scene.domain, scene.medium or Medium()
-    sun = scene_sun(scene.lights)
+    lights = scene_lights(scene)
     views = (camera, orbit(camera, domain, 90))
-    renderers = [Renderer(view, domain, medium, sun, background, settings.scattering) for view in views]
+    renderers = [Renderer(view, domain, medium, lights, background, settings.scattering) for view in views]
     # fog of optical depth 0.1 across the domain: thin, because dense media have local minima
     thin = 0.1 / (medium.extinction * (domain.max[0] - domain.min[0]))
     fog = np.full(domain.resolution, thin, np.float32)
@@ -170,13 +175,8 @@ def _paper(image: Image, background: Image, scene: Scene, initial: Volume | None
     return Density(fit.density, everywhere, _figures(loss, image.size // 3, fit.iterations, everywhere))
 
 
-def _optical_depth(
-    image: Image, background: Image, sun: DirectionalLight | None, medium: Medium, scattering: Scattering
-) -> NDArray[np.float64]:
+def _optical_depth(image: Image, background: Image, source: NDArray[np.float64]) -> NDArray[np.float64]:
     """Optical depth (rows, columns) of unshadowed smoke that explains the picture: I = J (1 - t) + t B."""
-    source = np.zeros(3)
-    if sun is not None and scattering != "absorption":
-        source = medium.albedo / (4 * np.pi) * np.array(sun.irradiance)
     contrast = background - source
     power = np.sum(contrast**2, -1)
     clear = np.sum((image - source) * contrast, -1) / np.maximum(power, 1e-12)

@@ -1,17 +1,22 @@
 """The differentiable renderer: a density and a scene in, an image out, and the exact derivative back.
 
-``rays`` puts camera rays into the grid, ``light`` finds how much light reaches every voxel, ``view`` sums it up
-along the rays, ``renderer`` ties them together, ``device`` runs them.
+``setup`` puts camera rays (``rays``) and lights (``lights``) into the grid, ``device`` chooses between ``cpu`` and
+``gpu``, which find how much light reaches every voxel and sum it up along the rays, ``renderer`` makes colours of it.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import overload
 
 import numpy as np
 
 from smokelift import images
 from smokelift.render.device import DeviceError, start
-from smokelift.render.renderer import Image, Renderer, Scattering, Volume
-from smokelift.scene import Camera, DirectionalLight, Domain, Light, Medium, Scene
+from smokelift.render.lights import FiniteLight
+from smokelift.render.renderer import Image, Renderer, Volume
+from smokelift.render.setup import Scattering
+from smokelift.scene import Camera, Domain, EnvironmentLight, Medium, Scene
 
 __all__ = ["DeviceError", "Renderer", "render", "render_gradient", "start"]
 
@@ -24,8 +29,7 @@ def render(density: Volume, scene: Scene, camera: Camera | None = None, scatteri
     density : (nx, ny, nz)
         Density at voxel centres, >= 0.
     scene
-        Needs a domain, and a camera unless one is given; at most one directional light. Without a background the
-        smoke is seen before black.
+        Needs a domain, and a camera unless one is given. Without a background the smoke is seen before black.
     camera
         Another camera than the scene's. The scene's background picture belongs to the scene's camera, so before
         another camera a picture is replaced by its mean colour.
@@ -45,61 +49,82 @@ def render(density: Volume, scene: Scene, camera: Camera | None = None, scatteri
     return scene_renderer(scene, camera, scattering).image(_checked(density, scene))
 
 
+@overload
+def render_gradient(
+    density: Volume, scene: Scene, target: Image, camera: Camera | None = None, scattering: Scattering = "single"
+) -> tuple[float, Volume, Image]: ...
+@overload
 def render_gradient(
     density: Volume,
     scene: Scene,
-    target: Image,
-    camera: Camera | None = None,
+    target: Sequence[Image],
+    camera: Sequence[Camera],
     scattering: Scattering = "single",
-) -> tuple[float, Volume, Image]:
+) -> tuple[float, Volume, list[Image]]: ...
+def render_gradient(
+    density: Volume,
+    scene: Scene,
+    target: Image | Sequence[Image],
+    camera: Camera | Sequence[Camera] | None = None,
+    scattering: Scattering = "single",
+) -> tuple[float, Volume, Image | list[Image]]:
     """Squared difference between the rendered and a target image, with its derivative (method section 2).
 
     Parameters
     ----------
-    density, scene, camera, scattering
+    density, scene, scattering
         As in `render`.
-    target : (rows, columns, 3)
+    target : (rows, columns, 3), or a sequence of such
         Linear radiance.
+    camera
+        As in `render`; or several cameras, with as many targets, whose losses are added up.
 
     Returns
     -------
     loss : float
-        Sum over pixels and channels of (image - target)^2.
+        Sum over views, pixels and channels of (image - target)^2.
     gradient : (nx, ny, nz) float32
-        dloss / ddensity: the exact derivative of the discrete image, shadows included.
-    image : (rows, columns, 3) float32
+        dloss / ddensity: the exact derivative of the discrete images, shadows included.
+    image : (rows, columns, 3) float32, or a list of such
 
     Raises
     ------
     ValueError
-        As in `render`, or if the target is not finite or has another shape than the image.
+        As in `render`, if a target is not finite or has another shape than its image, or if there are not as many
+        targets as cameras.
     """
+    density = _checked(density, scene)
+    if camera is None or isinstance(camera, Camera):
+        return _view_gradient(density, scene, np.asarray(target, np.float32), camera, scattering)
+    if len(camera) != len(target) or not camera:
+        raise ValueError(f"There must be one target a camera, not {len(target)} for {len(camera)}.")
+    loss, gradient, pictures = 0.0, np.zeros(density.shape, np.float32), []
+    for view, goal in zip(camera, target, strict=True):
+        part, slope, picture = _view_gradient(density, scene, np.asarray(goal, np.float32), view, scattering)
+        loss += part
+        gradient += slope
+        pictures.append(picture)
+    return loss, gradient, pictures
+
+
+def _view_gradient(
+    density: Volume, scene: Scene, target: Image, camera: Camera | None, scattering: Scattering
+) -> tuple[float, Volume, Image]:
     renderer = scene_renderer(scene, camera, scattering)
     width, height = renderer.camera.size
-    target = np.asarray(target, np.float32)
     if target.shape != (height, width, 3):
         raise ValueError(f"The target image must have the shape {(height, width, 3)}, not {target.shape}.")
     if not np.isfinite(target).all():
         raise ValueError("The target image holds values that are not finite.")
-    image = renderer.image(_checked(density, scene), keep_record=True)
+    image = renderer.image(density, keep_record=True)
     difference = image - target
     loss = float(np.sum(np.square(difference, dtype=np.float64)))
     return loss, renderer.gradient(2 * difference), image
 
 
-def scene_sun(lights: tuple[Light, ...]) -> DirectionalLight | None:
-    """The one directional light of a scene, or None without lights.
-
-    Raises
-    ------
-    ValueError
-        If there are several lights, or one that is not directional.
-    """
-    if not lights:
-        return None
-    if len(lights) > 1 or not isinstance(lights[0], DirectionalLight):
-        raise ValueError('This version renders one light of type "directional"; remove the others from the scene.')
-    return lights[0]
+def scene_lights(scene: Scene) -> tuple[FiniteLight, ...]:
+    """The lights of a scene as the renderer takes them."""
+    return tuple(light for light in scene.lights if not isinstance(light, EnvironmentLight))
 
 
 def scene_background(scene: Scene, camera: Camera | None = None) -> Image:
@@ -126,7 +151,7 @@ def scene_renderer(
     Raises
     ------
     ValueError
-        If there is no camera or no domain, or for lights that are not rendered.
+        If there is no camera or no domain.
     """
     view = camera or scene.camera
     if view is None:
@@ -135,7 +160,7 @@ def scene_renderer(
         view,
         _domain(scene),
         scene.medium or Medium(),
-        scene_sun(scene.lights),
+        scene_lights(scene),
         scene_background(scene, camera) if background is None else background,
         scattering,
     )

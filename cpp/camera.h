@@ -1,0 +1,58 @@
+// Camera rays through the grid: the picture, and its derivative (method sections 1 and 2).
+#pragma once
+
+#include "voxels.h"
+
+#include "threads.h"
+
+#include <vector>
+
+namespace smokelift {
+
+// Neighbouring pixels of a row whose rays have the same dominant axis and travel the same way along it.
+struct Run {
+    int row, column, count;
+    int axis, travel;
+    int first, last; // planes that any of them crosses
+};
+
+// One ray a pixel. A ray crosses plane k of its dominant axis at (b0 + b1 k, c0 + c1 k), in grid coordinates.
+struct Rays {
+    static constexpr int LANES = 16; // pixels of a run, at most
+
+    const float *lines = nullptr;  // b0, b1, c0, c1 of each
+    const float *length = nullptr; // distance between samples, m
+    int *planes = nullptr;         // dominant axis, travel, first and last plane of each; last < first: none
+    int rows = 0, columns = 0;
+    std::vector<Run> runs;
+
+    void find_runs();
+    std::size_t pixels() const { return std::size_t(rows) * columns; }
+};
+
+// What the samples held, or the derivatives of the loss by that: [channel][plane][row][column], the channels
+// those of the voxels. Written where a run has samples; a ray of the run without one has zeros there.
+struct Record {
+    float *data = nullptr;
+    int planes = 0;
+
+    float *at(const Rays &rays, int channel, int plane, const Run &run) const {
+        return data + ((std::size_t(channel) * planes + plane) * rays.rows + run.row) * rays.columns +
+               run.column;
+    }
+};
+
+// Shortens every ray to where the voxels around it hold anything, and finds the runs again.
+void clip(const Voxels &medium, Rays &rays, Workers &workers);
+
+// Radiance scattered towards the camera, [row][column][channel], and optical depth of every ray. The record
+// is optional.
+void march(const Voxels &medium, const Rays &rays, float *scattered, float *depth, const Record &record,
+           Workers &workers);
+
+// Turns the recorded samples into derivatives, in place, and adds them to the voxels of `gradient`.
+void march_adjoint(const Rays &rays, const float *depth, const float *of_scattered,
+                   const float *of_transmittance, const Record &record, const Voxels &gradient,
+                   Workers &workers);
+
+} // namespace smokelift

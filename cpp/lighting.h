@@ -1,0 +1,57 @@
+// How light reaches the voxels, for one light: J = E p V, and the derivative of that (method sections 1 and
+// 2).
+#pragma once
+
+#include "voxels.h"
+
+#include "threads.h"
+
+namespace smokelift {
+
+// Henyey-Greenstein phase function times albedo towards a camera, 1/sr. `to_eye` maps the index of a voxel to
+// the direction from there to the eye, of any length.
+struct Phase {
+    std::array<std::array<float, 4>, 3> to_eye{};
+    float albedo = 1, anisotropy = 0;
+};
+
+// Parallel light. In the planes of voxels across its dominant axis a ray moves `slope` voxels a plane along
+// the two other axes; `first` is the number of the first plane in the grid of which this one is a part.
+struct ParallelLight {
+    std::array<float, 3> direction{}; // of travel, unit length
+    std::array<float, 3> energy{};    // irradiance by channel, W/m^2
+    int axis = 0, travel = 1, first = 0;
+    std::array<double, 2> slope{};
+    float step = 0; // length of a ray between two planes, m
+};
+
+// Light from a point outside the grid.
+struct PointLight {
+    // A side of the cube around the light, and the planes of voxels in front of it, the nearest first.
+    struct Face {
+        int axis, travel;    // travel: +1 or -1
+        int first_k, planes; // plane number n is first_k + travel n
+        double far;          // distance of the plane where columns are one voxel apart, in voxels
+        int first_p, count_p, first_q, count_q; // columns that meet the grid, along the two other axes
+    };
+
+    std::array<double, 3> position{}; // in grid coordinates, voxel centres at integers
+    std::array<float, 3> energy{};    // intensity by channel over the voxel edge squared, W/m^2
+    float voxel_size = 0;             // m
+    std::vector<Face> faces;
+};
+
+// J of the voxels within the spans: that of this light, or with `add` that much more.
+void shade(const Voxels &medium, const Spans &spans, const Phase &phase, const ParallelLight &light, bool add,
+           Workers &workers);
+void shade(const Voxels &medium, const Spans &spans, const Phase &phase, const PointLight &light, bool add,
+           Workers &workers);
+
+// Adds what J's derivative (the J channels of `gradient`) says of the extinction along the light's way to the
+// extinction channel of `gradient`. `scratch` is one float a voxel.
+void shade_adjoint(const Voxels &medium, const Voxels &gradient, const Voxels &scratch, const Spans &spans,
+                   const Phase &phase, const ParallelLight &light, Workers &workers);
+void shade_adjoint(const Voxels &medium, const Voxels &gradient, const Spans &spans, const Phase &phase,
+                   const PointLight &light, Workers &workers);
+
+} // namespace smokelift

@@ -1,0 +1,231 @@
+// The sweep of a parallel light, and its adjoint.
+//
+// The grid is sheared so that every light ray is a column: column p meets plane k of the light's dominant
+// axis at lateral position p + slope k. The fraction of slope k is the same for a whole plane, so going from
+// voxels to columns (S) and back (its transpose) are bilinear with constant weights, and between them lies a
+// running sum along the columns (K, midpoint rule): optical depth = S^T K S kappa x step. The transpose of
+// the running sum is that of the light that travels the other way, so the adjoint is the sweep of the
+// reversed light.
+//
+// Columns do not depend on each other, so a task takes some neighbouring rows of them through all planes and
+// keeps its running sums in the cache; the row that two tasks share is computed by both.
+#include "lighting.h"
+
+#include "exponential.h"
+#include "phase.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+namespace smokelift {
+namespace {
+
+constexpr int ROWS_PER_TASK = 12;
+
+struct Columns {
+    const ParallelLight &light;
+    const Spans &spans;
+    int planes, count_b, count_c; // of the grid: along the axis, along the two others
+    int first_p, end_p;           // rows of columns that meet the grid
+    int first_q, count_q;         // columns in a row
+
+    Columns(const ParallelLight &l, const Spans &s) : light(l), spans(s) {
+        planes = s.n[l.axis];
+        count_b = s.n[LATERAL[l.axis][0]];
+        count_c = s.n[LATERAL[l.axis][1]];
+        const auto [low_b, high_b] = std::minmax({shift(0, 0), shift(0, planes - 1)});
+        const auto [low_c, high_c] = std::minmax({shift(1, 0), shift(1, planes - 1)});
+        first_p = -1 - high_b;
+        end_p = count_b - low_b;
+        first_q = -1 - high_c;
+        count_q = count_c - low_c - first_q;
+    }
+    int shift(int lateral, int k) const {
+        return static_cast<int>(std::floor(light.slope[lateral] * (light.first + k)));
+    }
+    float fraction(int lateral, int k) const {
+        const double at = light.slope[lateral] * (light.first + k);
+        return static_cast<float>(at - std::floor(at));
+    }
+    int tasks() const { return (end_p - 1 - first_p + ROWS_PER_TASK - 1) / ROWS_PER_TASK; }
+};
+
+template <int S> SMOKELIFT_INLINE void load(const float *__restrict from, int count, float *__restrict to) {
+    for (int c = 0; c < count; ++c)
+        to[c] = from[c * S];
+}
+
+// out = (1 - f) a + f b for rows of voxels.
+SMOKELIFT_INLINE void mix_rows(const float *a, const float *b, Stride stride, int count, float f,
+                               float *__restrict buffer, float *__restrict out) {
+    switch (stride) {
+    case 1:
+        load<1>(a, count, out), load<1>(b, count, buffer);
+        break;
+    case 2:
+        load<2>(a, count, out), load<2>(b, count, buffer);
+        break;
+    case 4:
+        load<4>(a, count, out), load<4>(b, count, buffer);
+        break;
+    default:
+        for (int c = 0; c < count; ++c) {
+            out[c] = a[c * stride];
+            buffer[c] = b[c * stride];
+        }
+    }
+    for (int c = 0; c < count; ++c)
+        out[c] += f * (buffer[c] - out[c]);
+}
+
+// Takes task number `task` of the columns through the field (its first float of each voxel). visit(k, i,
+// first, end, depth) gets the sums along the light's way, in units of (value of the field) x planes, for a
+// row of voxels.
+template <class Visit>
+SMOKELIFT_INLINE void sweep(const Columns &columns, const Voxels &field, int task, const Visit &visit) {
+    const ParallelLight &light = columns.light;
+    const int begin = columns.first_p + task * ROWS_PER_TASK;
+    const int rows = std::min(columns.end_p - begin, ROWS_PER_TASK + 1);
+    const int pitch = columns.count_q, count_c = columns.count_c;
+    std::vector<float> memory(std::size_t(2 * rows + 1) * pitch + 3 * (count_c + 2));
+    float *const sums = memory.data(), *const values = sums + std::size_t(rows) * pitch;
+    float *const mixed = values + std::size_t(rows) * pitch, *const line = mixed + pitch,
+                 *const buffer = line + count_c + 2, *const depth = buffer + count_c + 2;
+    std::vector<std::pair<int, int>> filled(rows); // where a row of `values` is not zero
+    const Stride stride = field.stride(LATERAL[light.axis][1]);
+
+    for (int step = 0; step < columns.planes; ++step) {
+        const int k = light.travel > 0 ? step : columns.planes - 1 - step;
+        const int shift_b = columns.shift(0, k), shift_c = columns.shift(1, k);
+        const float f = columns.fraction(0, k), g = columns.fraction(1, k);
+        if (begin + shift_b >= columns.count_b || begin + rows + shift_b < 0)
+            continue;
+        for (int r = 0; r < rows; ++r) {
+            const int i = begin + r + shift_b; // between rows i and i + 1 of voxels
+            int first = count_c, end = 0;
+            for (int row = i; row <= i + 1; ++row) {
+                if (row >= 0 && row < columns.count_b) {
+                    const auto &span = columns.spans.row(light.axis, k, row);
+                    if (span[0] < span[1]) {
+                        first = std::min(first, span[0]);
+                        end = std::max(end, span[1]);
+                    }
+                }
+            }
+            filled[r] = {0, 0};
+            if (first >= end)
+                continue;
+            const float *near = field.at(light.axis, k, i, first),
+                        *far = field.at(light.axis, k, i + 1, first);
+            float *const inside = line + 1;
+            mix_rows(near, far, stride, end - first, f, buffer, inside);
+            inside[-1] = inside[end - first] = 0;
+            const int q = first - 1 - shift_c - columns.first_q;
+            float *__restrict value = values + std::size_t(r) * pitch + q;
+            for (int c = 0; c <= end - first; ++c)
+                value[c] = line[c] + g * (line[c + 1] - line[c]);
+            filled[r] = {q, q + end - first + 1};
+        }
+        for (int r = 0; r + 1 < rows; ++r) {
+            const int i = begin + r + shift_b + 1; // the row of voxels between columns r and r + 1
+            if (i < 0 || i >= columns.count_b)
+                continue;
+            const auto &span = columns.spans.row(light.axis, k, i);
+            const int first = span[0], count = span[1] - span[0];
+            if (count <= 0)
+                continue;
+            const int q = first - shift_c - 1 - columns.first_q;
+            const float *__restrict s0 = sums + std::size_t(r) * pitch + q, *__restrict s1 = s0 + pitch;
+            const float *__restrict v0 = values + std::size_t(r) * pitch + q, *__restrict v1 = v0 + pitch;
+            for (int c = 0; c <= count; ++c)
+                mixed[c] = f * (s0[c] + 0.5f * v0[c]) + (1 - f) * (s1[c] + 0.5f * v1[c]);
+            for (int c = 0; c < count; ++c)
+                depth[c] = g * mixed[c] + (1 - g) * mixed[c + 1];
+            visit(k, i, first, span[1], depth);
+        }
+        for (int r = 0; r < rows; ++r) {
+            float *__restrict sum = sums + std::size_t(r) * pitch;
+            float *__restrict value = values + std::size_t(r) * pitch;
+            for (int q = filled[r].first; q < filled[r].second; ++q) {
+                sum[q] += value[q];
+                value[q] = 0;
+            }
+        }
+    }
+}
+
+SMOKELIFT_CLONES
+void shade_columns(const Columns &columns, const Voxels &medium, const Phase &phase, bool add, int task) {
+    const ParallelLight &light = columns.light;
+    const Stride stride = medium.stride(LATERAL[light.axis][1]);
+    std::vector<float> memory(columns.count_c);
+    float *const __restrict lit = memory.data();
+    sweep(columns, medium, task,
+          [&](int k, int i, int first, int end, const float *__restrict depth) SMOKELIFT_INLINE_LAMBDA {
+              phase_row(phase, light, light.axis, k, i, first, end, lit);
+              for (int c = 0; c < end - first; ++c)
+                  lit[c] *= attenuation(light.step * depth[c]).transmittance;
+              write_inscatter(medium, medium.at(light.axis, k, i, first), stride, light.energy.data(), lit,
+                              end - first, add);
+          });
+}
+
+// scratch = derivative of the loss by the optical depth to the light: -E p V dJ.
+SMOKELIFT_CLONES
+void depth_gradient(const Columns &columns, const Voxels &medium, const Voxels &gradient,
+                    const Voxels &scratch, const Phase &phase, int task) {
+    const ParallelLight &light = columns.light;
+    const int c_axis = LATERAL[light.axis][1];
+    const Stride stride = gradient.stride(c_axis), scratch_stride = scratch.stride(c_axis);
+    std::vector<float> memory(2 * columns.count_c);
+    float *const __restrict lit = memory.data(), *const __restrict of_inscatter = lit + columns.count_c;
+    sweep(columns, medium, task,
+          [&](int k, int i, int first, int end, const float *__restrict depth) SMOKELIFT_INLINE_LAMBDA {
+              phase_row(phase, light, light.axis, k, i, first, end, lit);
+              const float *in = gradient.at(light.axis, k, i, first) + 1;
+              std::fill_n(of_inscatter, end - first, 0.0f);
+              for (int channel = 0; channel < gradient.width - 1; ++channel)
+                  for (int c = 0; c < end - first; ++c)
+                      of_inscatter[c] -= light.energy[channel] * in[c * stride + channel];
+              for (int c = 0; c < end - first; ++c)
+                  lit[c] *= of_inscatter[c] * attenuation(light.step * depth[c]).transmittance;
+              float *out = scratch.at(light.axis, k, i, first);
+              for (int c = 0; c < end - first; ++c)
+                  out[c * scratch_stride] = lit[c];
+          });
+}
+
+SMOKELIFT_CLONES
+void add_columns(const Columns &columns, const Voxels &scratch, const Voxels &gradient, int task) {
+    const ParallelLight &light = columns.light;
+    const Stride stride = gradient.stride(LATERAL[light.axis][1]);
+    sweep(columns, scratch, task,
+          [&](int k, int i, int first, int end, const float *__restrict depth) SMOKELIFT_INLINE_LAMBDA {
+              float *out = gradient.at(light.axis, k, i, first);
+              for (int c = 0; c < end - first; ++c)
+                  out[c * stride] += light.step * depth[c];
+          });
+}
+
+} // namespace
+
+void shade(const Voxels &medium, const Spans &spans, const Phase &phase, const ParallelLight &light, bool add,
+           Workers &workers) {
+    const Columns columns(light, spans);
+    workers.run(columns.tasks(), [&](int task) { shade_columns(columns, medium, phase, add, task); });
+}
+
+void shade_adjoint(const Voxels &medium, const Voxels &gradient, const Voxels &scratch, const Spans &spans,
+                   const Phase &phase, const ParallelLight &light, Workers &workers) {
+    const Columns columns(light, spans);
+    workers.run(columns.tasks(),
+                [&](int task) { depth_gradient(columns, medium, gradient, scratch, phase, task); });
+    ParallelLight reversed = light;
+    reversed.travel = -light.travel;
+    const Columns back(reversed, spans);
+    workers.run(back.tasks(), [&](int task) { add_columns(back, scratch, gradient, task); });
+}
+
+} // namespace smokelift

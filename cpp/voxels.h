@@ -1,0 +1,70 @@
+// The renderer's grid: voxels with a border of one around them, and where among them there can be smoke.
+#pragma once
+
+#include "grid.h"
+
+#include "threads.h"
+
+#include <cstddef>
+#include <vector>
+
+namespace smokelift {
+
+using Stride = std::ptrdiff_t;
+
+// The two other axes of each axis.
+constexpr int LATERAL[3][2] = {{1, 2}, {0, 2}, {0, 1}};
+
+// `width` floats a voxel: extinction (1/m), then in-scattered radiance J by channel (or derivatives by
+// these). Indices run from -1, the border, to n. Extinction is 0 in the border, J that of the nearest voxel.
+struct Voxels {
+    float *data = nullptr;
+    Shape n{};
+    int width = 1;
+
+    Stride stride(int axis) const {
+        const Stride z = width, y = z * (n[2] + 2);
+        return axis == 2 ? z : axis == 1 ? y : y * (n[1] + 2);
+    }
+    float *at(int x, int y, int z) const {
+        return data + (x + 1) * stride(0) + (y + 1) * stride(1) + (z + 1) * stride(2);
+    }
+    // The voxel in plane k across an axis, at (i, j) of the two other axes.
+    float *at(int axis, int k, int i, int j) const {
+        return axis == 0 ? at(k, i, j) : axis == 1 ? at(i, k, j) : at(i, j, k);
+    }
+};
+
+// Ranges of rows of voxels: along z by (x, y), and along y by (x, z).
+struct Spans {
+    std::vector<std::array<int, 2>> along_z, along_y; // first and end
+    Shape n{};
+
+    // The row at lateral position i of plane k across an axis.
+    const std::array<int, 2> &row(int axis, int k, int i) const {
+        return axis == 0   ? along_z[std::size_t(k) * n[1] + i]
+               : axis == 1 ? along_z[std::size_t(i) * n[1] + k]
+                           : along_y[std::size_t(i) * n[2] + k];
+    }
+};
+
+// For every row the range in which voxels are marked, or lie beside a marked one, corners included.
+Spans spans_around(const unsigned char *marked, const Shape &n);
+
+// Extinction of the marked voxels from their density. The density is a box of a larger array; `density`
+// points to its first voxel.
+void pack(const float *density, Stride stride_x, Stride stride_y, const unsigned char *marked,
+          float extinction, const Spans &spans, const Voxels &medium, Workers &workers);
+
+// result = extinction x first channel at the marked voxels, 0 elsewhere. The result is a box of a larger
+// array.
+void unpack(const Voxels &gradient, const unsigned char *marked, float extinction, float *result,
+            Stride stride_x, Stride stride_y, Workers &workers);
+
+void clear(const Voxels &voxels, Workers &workers);
+
+// In-scattered radiance of the border: the nearest voxel's. And the adjoint.
+void extend_into_border(const Voxels &medium);
+void fold_border(const Voxels &gradient);
+
+} // namespace smokelift

@@ -1,0 +1,226 @@
+"""A scene's lights in the terms of a grid, each as the cheapest exact sweep takes it (method section 1)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smokelift.render.rays import LATERAL
+from smokelift.scene import DirectionalLight, Domain, Medium, PointLight
+
+Array = NDArray[np.float64]
+FiniteLight = DirectionalLight | PointLight
+"""A light that one sweep can do; an environment becomes many of them."""
+
+Box = tuple[int, int, int]
+
+_CLOSEST = 1e-3
+"""Voxels: a plane this close to the light, or closer, is no voxel's farthest axis."""
+
+
+@dataclass(frozen=True, eq=False)
+class Parallel:
+    """Parallel light, swept from plane to plane across the dominant axis of its direction.
+
+    Attributes
+    ----------
+    direction : (3,)
+        Of travel, unit length.
+    energy : (channels,)
+        Irradiance, W/m^2.
+    axis, travel
+        Dominant axis, and +1 or -1 along it.
+    first
+        Number of the box's first plane: its columns are those of the whole domain.
+    slope
+        Lateral shift a plane along the two other axes, in voxels, -1 to 1.
+    step
+        Length of a ray between two planes, m.
+    """
+
+    direction: Array
+    energy: Array
+    axis: int
+    travel: int
+    first: int
+    slope: tuple[float, float]
+    step: float
+
+
+@dataclass(frozen=True)
+class Face:
+    """A side of the cube around a point light, and the grid's planes in front of it.
+
+    From the light go columns with slopes p / far, q / far: in the plane at the distance ``far`` they are one voxel
+    apart, nearer to the light they are closer together.
+
+    Attributes
+    ----------
+    axis, travel
+        The planes lie across this axis; +1 or -1 along it leads away from the light.
+    first, planes
+        The nearest plane, and how many there are.
+    far
+        Distance of the whole domain's farthest plane, in voxels.
+    columns_b, columns_c
+        First column that meets the grid and their number, along the two other axes.
+    """
+
+    axis: int
+    travel: int
+    first: int
+    planes: int
+    far: float
+    columns_b: tuple[int, int]
+    columns_c: tuple[int, int]
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """Light from a point.
+
+    Attributes
+    ----------
+    position : (3,)
+        In the box's grid coordinates: voxel centres at integers.
+    energy : (channels,)
+        Intensity over the voxel edge squared, W/m^2: the irradiance one voxel away.
+    voxel_size
+        m.
+    faces
+        Those through which voxels are seen. A voxel belongs to the axis along which it is farthest from the light,
+        the first such axis if there are several.
+    """
+
+    position: Array
+    energy: Array
+    voxel_size: float
+    faces: tuple[Face, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Lighting:
+    """All lights of a scene.
+
+    Attributes
+    ----------
+    lights
+        The sweeps to do.
+    colour : (channels, 3)
+        Turns the channels into colours. Smoke is grey, so lights of one colour need one channel, others three.
+    """
+
+    lights: tuple[Parallel | Point, ...]
+    colour: Array
+
+    @property
+    def channels(self) -> int:
+        """How many channels of in-scattered radiance there are: 0, 1 or 3."""
+        return len(self.colour)
+
+
+def lighting(lights: Sequence[FiniteLight], domain: Domain, corner: Box, shape: Box) -> Lighting:
+    """Lights over a box of a domain's voxels; those without energy are left out.
+
+    Parameters
+    ----------
+    corner, shape
+        First voxel of the box, and its size in voxels.
+
+    Raises
+    ------
+    ValueError
+        If a point light stands inside the domain.
+    """
+    bright = [light for light in lights if any(_colour(light))]
+    if not bright:
+        return Lighting((), np.zeros((0, 3)))
+    colour, energies = _channels(np.array([_colour(light) for light in bright], np.float64))
+    sweeps = [
+        _point(light, energy, domain, corner, shape)
+        if isinstance(light, PointLight)
+        else _parallel(light, energy, domain, corner)
+        for light, energy in zip(bright, energies, strict=True)
+    ]
+    return Lighting(tuple(sweeps), colour)
+
+
+def unshadowed_source(lights: Sequence[FiniteLight], medium: Medium, domain: Domain) -> Array:
+    """Radiance (3,) that isotropic smoke in the middle of the domain scatters per unit extinction, unshadowed."""
+    centre = (np.array(domain.min) + np.array(domain.max)) / 2
+    total = np.zeros(3)
+    for light in lights:
+        colour = np.array(_colour(light))
+        total += colour / np.sum((centre - light.position) ** 2) if isinstance(light, PointLight) else colour
+    return medium.albedo / (4 * np.pi) * total
+
+
+def _colour(light: FiniteLight) -> tuple[float, float, float]:
+    return light.irradiance if isinstance(light, DirectionalLight) else light.intensity
+
+
+def _channels(colours: Array) -> tuple[Array, Array]:
+    """Split colours (lights, 3) into energies (lights, channels) and the channels' colours (channels, 3)."""
+    first = colours[0]
+    share = colours @ first / (first @ first)
+    if np.allclose(colours, share[:, None] * first, rtol=1e-6, atol=0):
+        return first[None], share[:, None]
+    return np.eye(3), colours
+
+
+def _parallel(light: DirectionalLight, energy: Array, domain: Domain, corner: Box) -> Parallel:
+    direction = np.array(light.direction, np.float64)
+    direction /= np.linalg.norm(direction)
+    axis = int(np.argmax(np.abs(direction)))
+    along = float(direction[axis])
+    b, c = LATERAL[axis]
+    return Parallel(
+        direction=direction,
+        energy=energy,
+        axis=axis,
+        travel=1 if along > 0 else -1,
+        first=corner[axis],
+        slope=(float(direction[b]) / along, float(direction[c]) / along),
+        step=domain.voxel_size / abs(along),
+    )
+
+
+def _point(light: PointLight, energy: Array, domain: Domain, corner: Box, shape: Box) -> Point:
+    if domain.contains(light.position):
+        raise ValueError(f"The point light at {list(light.position)} is inside the domain; it must be outside.")
+    h = domain.voxel_size
+    position = (np.array(light.position) - np.array(domain.min)) / h - 0.5 - np.array(corner)
+    faces = []
+    for axis in range(3):
+        first, last = -corner[axis], domain.resolution[axis] - 1 - corner[axis]
+        for travel, farthest in ((-1, first), (1, last)):
+            face = _face(position, shape, axis, travel, travel * (farthest - float(position[axis])))
+            if face:
+                faces.append(face)
+    return Point(position, energy / h**2, h, tuple(faces))
+
+
+def _face(light: Array, shape: Box, axis: int, travel: int, far: float) -> Face | None:
+    at = float(light[axis])
+    if travel > 0:
+        first, last = max(0, math.ceil(at + _CLOSEST)), shape[axis] - 1
+    else:
+        first, last = min(shape[axis] - 1, math.floor(at - _CLOSEST)), 0
+    planes = travel * (last - first) + 1
+    if planes <= 0:
+        return None
+    near, deepest = travel * (first - at), travel * (last - at)
+    columns = []
+    for lateral in LATERAL[axis]:
+        low, high = -1 - float(light[lateral]), shape[lateral] - float(light[lateral])
+        if low >= deepest or high <= -deepest:
+            return None  # every voxel is farther off this axis than along it
+        most = math.ceil(far) + 1
+        begin = max(math.floor(min(low / near, low / deepest) * far), -most)
+        end = min(math.ceil(max(high / near, high / deepest) * far), most)
+        columns.append((begin, end - begin + 1))
+    return Face(axis, travel, first, planes, far, columns[0], columns[1])

@@ -1,0 +1,118 @@
+"""What does not change from picture to picture: a camera, lights and the part of a grid that may hold smoke."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smokelift.render.lights import Box, FiniteLight, Lighting, lighting
+from smokelift.render.rays import Rays, camera_rays
+from smokelift.scene import Camera, Domain, Medium
+
+Slices = tuple[slice, slice, slice]
+Scattering = Literal["single", "unshadowed", "absorption"]
+
+
+@dataclass(frozen=True, eq=False)
+class Setup:
+    """One camera before one grid: the box around the voxels that may hold smoke.
+
+    Attributes
+    ----------
+    domain
+        The whole domain.
+    corner
+        First voxel of the box.
+    marked : (x, y, z) uint8
+        The voxels of the box that may hold smoke.
+    everywhere
+        Whether that is all voxels.
+    medium
+        Extinction, albedo, anisotropy.
+    rays
+        Of the camera, through the box.
+    to_eye : (3, 4)
+        Affine map from a voxel's index in the box to the direction from there to the eye, of any length.
+    lighting
+        The lights, in coordinates of the box. Without channels the smoke only absorbs.
+    shadows
+        Whether light is attenuated on its way to the voxels.
+    """
+
+    domain: Domain
+    corner: Box
+    marked: NDArray[np.uint8]
+    everywhere: bool
+    medium: Medium
+    rays: Rays
+    to_eye: NDArray[np.float64]
+    lighting: Lighting
+    shadows: bool
+
+    @property
+    def shape(self) -> Box:
+        """Voxels of the box."""
+        x, y, z = self.marked.shape
+        return x, y, z
+
+
+def make_setup(
+    camera: Camera,
+    domain: Domain,
+    medium: Medium,
+    lights: Sequence[FiniteLight],
+    scattering: Scattering,
+    support: NDArray[np.bool_] | None,
+) -> Setup:
+    """Set up a renderer; see `smokelift.render.renderer.Renderer` for the parameters."""
+    if support is None:
+        support = np.broadcast_to(np.True_, domain.resolution)
+    corner, part = _box_around(support)
+    box = _part_of(domain, part)
+    found = lighting(() if scattering == "absorption" else lights, domain, corner, box.resolution)
+    return Setup(
+        domain=domain,
+        corner=corner,
+        marked=support[part].astype(np.uint8),
+        everywhere=bool(support.all()),
+        medium=medium,
+        rays=camera_rays(camera, box),
+        to_eye=_to_eye(camera, box),
+        lighting=found,
+        shadows=scattering == "single" and found.channels > 0,
+    )
+
+
+def _box_around(support: NDArray[np.bool_]) -> tuple[Box, Slices]:
+    """First voxel and slices of the box around the marked voxels and their neighbours; one voxel if none is marked."""
+    spans = []
+    for axis in range(3):
+        marked = np.nonzero(support.any(tuple(other for other in range(3) if other != axis)))[0]
+        count = support.shape[axis]
+        spans.append((max(int(marked[0]) - 1, 0), min(int(marked[-1]) + 2, count)) if marked.size else (0, 1))
+    x, y, z = spans
+    return (x[0], y[0], z[0]), (slice(*x), slice(*y), slice(*z))
+
+
+def _part_of(domain: Domain, part: Slices) -> Domain:
+    h = domain.voxel_size
+    low = [start + h * span.start for start, span in zip(domain.min, part, strict=True)]
+    high = [start + h * span.stop for start, span in zip(domain.min, part, strict=True)]
+    x, y, z = (span.stop - span.start for span in part)
+    return Domain((low[0], low[1], low[2]), (high[0], high[1], high[2]), (x, y, z))
+
+
+def _to_eye(camera: Camera, domain: Domain) -> NDArray[np.float64]:
+    matrix = np.array(camera.matrix, np.float64)
+    affine = np.zeros((3, 4))
+    if camera.type == "orthographic":
+        affine[:, 3] = matrix[:3, 2]
+        return affine
+    h = domain.voxel_size
+    affine[:, :3] = -h * np.eye(3)
+    affine[:, 3] = matrix[:3, 3] - (np.array(domain.min) + 0.5 * h)
+    return affine

@@ -1,0 +1,146 @@
+"""The one place that imports and starts Taichi, and that knows where its arrays live.
+
+Taichi compiles the kernels for a GPU; on the processor it runs the paper's baseline, and the GPU's kernels in tests.
+There a device array is a NumPy array, which kernels use in place; on a GPU it is a Taichi array.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import re
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
+import taichi as ti
+
+GPU_BACKENDS = {"cuda": ti.cuda, "metal": ti.metal, "vulkan": ti.vulkan}
+
+_running: str | None = None  # Taichi itself is one per process
+
+
+def supported_gpu() -> str | None:
+    """Name of the first GPU back end that Taichi can use here, or None."""
+    with Path(os.devnull).open("wb") as nowhere, _diverted(nowhere):
+        for name, arch in GPU_BACKENDS.items():
+            if ti.lang.misc.is_arch_supported(arch):
+                return name
+    return None
+
+
+def start(backend: str) -> str:
+    """Start Taichi on ``"cpu"`` or one of `GPU_BACKENDS`; on the back end that already runs, do nothing.
+
+    Returns
+    -------
+    str
+        The name of the Vulkan device, if it is one and has just been started.
+
+    Raises
+    ------
+    RuntimeError
+        If Taichi already runs on another back end.
+    """
+    global _running
+    if _running is not None:
+        if _running != backend:
+            raise RuntimeError(f"Taichi already runs on {_running} in this process.")
+        return ""
+    chip = _initialise(GPU_BACKENDS.get(backend, ti.cpu))
+    _running = backend
+    return chip
+
+
+def stop() -> None:
+    """End Taichi, so that it can start on another back end."""
+    global _running
+    ti.reset()
+    _running = None
+
+
+def _cache_directory() -> Path:
+    base = os.environ.get("XDG_CACHE_HOME")
+    return (Path(base) if base else Path.home() / ".cache") / "smokelift" / "taichi"
+
+
+def _initialise(arch: Any) -> str:
+    """Start Taichi on a back end; the name of its Vulkan device, if it has one."""
+    cache = _cache_directory()
+    try:
+        cache.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        cache = Path(tempfile.gettempdir()) / "smokelift-taichi"
+    with tempfile.TemporaryFile() as log:
+        with _diverted(log):
+            ti.init(
+                arch=arch,
+                default_fp=ti.f32,
+                # exact operations: x != x must stay a test for NaN, and CPU and GPU should agree
+                fast_math=False,
+                offline_cache_file_path=str(cache),
+                log_level=ti.TRACE,  # nothing else tells the device's name
+            )
+            ti.set_logging_level(ti.ERROR)
+        log.seek(0)
+        found = re.search(rb'Vulkan Device "([^"]*)"', log.read())
+    return found.group(1).decode(errors="replace") if found else ""
+
+
+def zeros(shape: tuple[int, ...]) -> Any:
+    """A float32 array of zeros on the device."""
+    if _running == "cpu":
+        return np.zeros(shape, np.float32)
+    array = ti.ndarray(ti.f32, shape)
+    array.fill(0.0)
+    return array
+
+
+def upload(values: np.ndarray[Any, Any]) -> Any:
+    """A device array (float32 or int32) with these values; on the CPU the same memory where possible."""
+    dtype = np.int32 if np.issubdtype(values.dtype, np.integer) else np.float32
+    values = np.ascontiguousarray(values, dtype)
+    if _running == "cpu":
+        return values
+    array = ti.ndarray(ti.i32 if dtype is np.int32 else ti.f32, values.shape)
+    array.from_numpy(values)
+    return array
+
+
+def matrix(values: np.ndarray[Any, Any]) -> Any:
+    """A small matrix as a kernel argument."""
+    return ti.Matrix(values.astype(np.float32).tolist(), dt=ti.f32)
+
+
+def vector(values: np.ndarray[Any, Any]) -> Any:
+    """A small vector as a kernel argument."""
+    return ti.Vector(values.astype(np.float32).tolist(), dt=ti.f32)
+
+
+def download(array: Any) -> np.ndarray[Any, Any]:
+    """The values of a device array; on the CPU the array itself, so copy before it is written again."""
+    return array if isinstance(array, np.ndarray) else np.asarray(array.to_numpy())
+
+
+@contextmanager
+def _diverted(file: IO[bytes]) -> Iterator[None]:
+    """Taichi's greeting and its drivers' complaints go to a file: output may carry JSON, errors are exceptions."""
+    for stream in (sys.stdout, sys.stderr):
+        stream.flush()
+    saved = [os.dup(number) for number in (1, 2)]
+    try:
+        for number in (1, 2):
+            os.dup2(file.fileno(), number)
+        # Python's streams need not be those two: a notebook or a test has put others in their place
+        with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
+            yield
+    finally:
+        for number, copy in zip((1, 2), saved, strict=True):
+            os.dup2(copy, number)
+            os.close(copy)

@@ -1,0 +1,53 @@
+"""The GPU's kernels against the processor's code, run by Taichi on the processor: no GPU is needed for that."""
+
+import numpy as np
+import pytest
+
+from smokelift.render import taichi_runtime
+from smokelift.render.cpu import CpuPipeline
+from smokelift.render.gpu import GpuPipeline
+from smokelift.render.setup import make_setup
+from smokelift.scene import Camera, DirectionalLight, Domain, Medium, PointLight
+
+SHAPE = (9, 10, 12)
+DOMAIN = Domain((0.0, 0.0, 0.0), (0.9, 1.0, 1.2), SHAPE)
+SUN = DirectionalLight((0.57, 0.45, -0.68), (3.0, 2.0, 1.0))
+LIGHTS = {
+    "directional": (SUN,),
+    "point close by": (PointLight((-0.06, 0.5, 0.9), (1.5, 1.0, 0.5)),),
+    "all, in colour": (SUN, PointLight((4.0, -3.0, 5.0), (60, 50, 40)), DirectionalLight((0, 1, 0.1), (0, 1, 2))),
+    "none": (),
+}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def taichi_on_the_processor():
+    try:
+        taichi_runtime.start("cpu")
+    except RuntimeError as busy:
+        pytest.skip(str(busy))
+
+
+@pytest.mark.parametrize("lights", LIGHTS.values(), ids=LIGHTS.keys())
+@pytest.mark.parametrize("scattering", ["single", "unshadowed"])
+@pytest.mark.parametrize("hull", [False, True])
+def test_both_pipelines_agree(lights, scattering, hull):
+    """The same picture and the same derivative, twice in a row, with and without a hull."""
+    rng = np.random.default_rng(1)
+    density = (rng.random(SHAPE) * (rng.random(SHAPE) > 0.3)).astype(np.float32)
+    support = None
+    if hull:
+        support = density > 0
+        support[:2], support[:, -3:] = False, False
+        density = np.where(support, density, 0).astype(np.float32)
+    camera = Camera.look_at((2.5, -1.2, 2.4), (0.45, 0.5, 0.6), fov_y_degrees=40, size=(14, 16))
+    setup = make_setup(camera, DOMAIN, Medium(4.0, 0.9, 0.3), lights, scattering, support)
+    pipelines = CpuPipeline(setup), GpuPipeline(setup)
+    for values in (density / 2, density):
+        results = []
+        for pipeline in pipelines:
+            scattered, depth = (part.copy() for part in pipeline.image(values, True))
+            slope = pipeline.gradient(np.full(scattered.shape, 0.7, np.float32), np.full(depth.shape, 0.3, np.float32))
+            results.append((scattered, depth, slope))
+        for ours, theirs in zip(*results, strict=True):
+            np.testing.assert_allclose(ours, theirs, rtol=1e-4, atol=1e-6 * float(np.abs(theirs).max(initial=0)))
