@@ -1,0 +1,17 @@
+"""Save the example as a .blend: ``blender -b --python make_shot.py -- FILE FIRST LAST LONGEST_SIDE``."""
+
+import sys
+from pathlib import Path
+
+import bpy
+
+sys.path.insert(0, str(Path(__file__).parents[3]))
+from tests.example_shot import set_up_example
+
+file, first, last, longest_side = sys.argv[sys.argv.index("--") + 1 :]
+for thing in list(bpy.data.objects):
+    bpy.data.objects.remove(thing)
+scene = set_up_example(bpy.context.scene)
+scene.smokelift.first, scene.smokelift.last = int(first), int(last)
+scene.smokelift.longest_side = int(longest_side)
+bpy.ops.wm.save_as_mainfile(filepath=file)
