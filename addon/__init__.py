@@ -9,15 +9,15 @@ same without a window.
 
 def register() -> None:
     """Make everything known to Blender."""
-    from . import batch, operators, panel, properties, run
+    from . import batch, operators, panel, properties, run, volume
 
-    for module in (properties, run, operators, panel, batch):
+    for module in (properties, volume, run, operators, panel, batch):
         module.register()
 
 
 def unregister() -> None:
     """Take everything back."""
-    from . import batch, operators, panel, properties, run
+    from . import batch, operators, panel, properties, run, volume
 
-    for module in (batch, panel, operators, run, properties):
+    for module in (batch, panel, operators, run, volume, properties):
         module.unregister()

@@ -48,6 +48,8 @@ def main(words: Sequence[str]) -> int:
         return CANCELLED if job.outcome == "cancelled" else (job.status or 1)
     run.present(scene, take)
     print(job.sentence, flush=True)
+    if choices.set_up:
+        bpy.ops.smokelift.set_up()
     if choices.save:
         bpy.ops.wm.save_mainfile()
     if choices.render:
@@ -58,7 +60,7 @@ def main(words: Sequence[str]) -> int:
 def _wait(job: Any) -> None:
     """Run a job to its end and print what it says; SIGTERM and Ctrl-C cancel it."""
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
-    said = 0
+    said = done = 0
     job.start()
     try:
         while not job.ended:
@@ -68,8 +70,9 @@ def _wait(job: Any) -> None:
                     for note in job.notes[said:]:
                         print(note, flush=True)
                     said = len(job.notes)
-                    if job.total:
-                        print(f"frame {job.done} of {job.total}", flush=True)
+                    if job.done > done:
+                        done = job.done
+                        print(f"frame {done} of {job.total}", flush=True)
             except KeyboardInterrupt:
                 job.cancel()
     finally:
@@ -100,9 +103,14 @@ def _scene(choices: argparse.Namespace) -> bpy.types.Scene:
 
 
 def _render(scene: bpy.types.Scene, path: Path) -> None:
-    """Render the scene's frame range to a video, or its current frame to a picture."""
+    """Render all frames of the smoke where the name has #### for their numbers, else the scene's current frame."""
     scene.render.filepath = str(path.absolute())
-    bpy.ops.render.render(write_still=True)
+    if "#" not in path.name:
+        bpy.ops.render.render(write_still=True)
+        return
+    data = scene.smokelift.volume.data
+    scene.frame_start, scene.frame_end = data.frame_start, data.frame_start + data.frame_duration - 1
+    bpy.ops.render.render(animation=True)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -112,8 +120,11 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--quality", choices=("draft", "balanced", "fine"))
     parser.add_argument("--output", type=Path, help="folder for the results")
     parser.add_argument("--resume", action="store_true", help="go on with the last unfinished run")
+    parser.add_argument("--set-up", action="store_true", help="make renders look like the clip, as Set Up Shot does")
     parser.add_argument("--save", action="store_true", help="save the .blend with the result")
-    parser.add_argument("--render", type=Path, metavar="PICTURE", help="render the current frame afterwards")
+    parser.add_argument(
+        "--render", type=Path, metavar="PICTURE", help="render the current frame, or all where the name has ####"
+    )
     return parser
 
 

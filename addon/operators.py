@@ -7,7 +7,7 @@ from bpy.props import StringProperty
 from mathutils import Vector
 
 from . import look, run, volume
-from .scene import ShotError
+from .scene import ShotError, box_of
 from .take import Take, TakeError, takes
 
 LOG_TEXT = "Smokelift Log"
@@ -111,18 +111,23 @@ class SMOKELIFT_OT_make_box(bpy.types.Operator):
     bl_label = "Frame Box"
     bl_options = {"REGISTER", "UNDO"}
 
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Needs a camera."""
+        if context.scene.camera is None:
+            cls.poll_message_set("The scene has no camera: add one where the clip was filmed from")
+            return False
+        return True
+
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Make or move the box."""
         scene = context.scene
-        if scene.camera is None:
-            self.report({"ERROR"}, "The scene has no camera: add one where the clip was filmed from.")
-            return {"CANCELLED"}
-        box = scene.smokelift.box
-        if box is None or box.name not in scene.objects:
+        low, high = framed_box(scene)
+        box = box_of(scene)
+        if box is None:
             box = _new_box()
             scene.collection.objects.link(box)
             scene.smokelift.box = box
-        low, high = framed_box(scene)
         box.parent = None
         box.rotation_euler = (0.0, 0.0, 0.0)
         box.location = (low + high) / 2

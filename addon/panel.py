@@ -5,7 +5,7 @@ import textwrap
 import bpy
 
 from . import run, volume
-from .scene import clip_path, frame_rate
+from .scene import box_of, clip_path, frame_rate
 from .take import takes
 
 POINTS_A_LETTER = 6.5
@@ -69,11 +69,9 @@ def _draw_shot(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         layout.prop(settings, "plate", text=" ")
     layout.prop(settings, "camera_mode")
     if settings.camera_mode == "SCENE":
-        if context.scene.camera is None:
-            _say(layout, context, "The scene has no camera: add one where the clip was filmed from.", "ERROR")
-        else:
-            layout.prop(settings, "box")
-            layout.operator("smokelift.make_box", text="Frame Box" if settings.box else "Make Box", icon="MESH_CUBE")
+        layout.prop(settings, "box")
+        known = box_of(context.scene) is not None
+        layout.operator("smokelift.make_box", text="Frame Box" if known else "Make Box", icon="MESH_CUBE")
     layout.prop(settings, "light_mode")
 
 
@@ -127,13 +125,12 @@ def _draw_job(layout: bpy.types.UILayout, context: bpy.types.Context, row: bpy.t
         _say(box, context, row.sentence, "ERROR" if row.outcome == "failed" else "INFO")
     if row.icon:
         box.template_icon(icon_value=row.icon, scale=8.0)
-    for note in filter(None, row.notes.split("\n")):
-        _say(box, context, note)
-    buttons = box.row(align=True)
     if row.outcome in run.ENDED:
-        buttons.operator("smokelift.open_log", icon="TEXT").take = row.take
+        for note in filter(None, row.notes.split("\n")):
+            _say(box, context, note)
+        box.operator("smokelift.open_log", icon="TEXT").take = row.take
     else:
-        buttons.operator("smokelift.cancel", text="Cancel", icon="CANCEL").take = row.take
+        box.operator("smokelift.cancel", text="Cancel", icon="CANCEL").take = row.take
 
 
 def _progress(row: bpy.types.PropertyGroup) -> str:

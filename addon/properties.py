@@ -28,6 +28,13 @@ def _clip_chosen(settings: "SmokeliftSettings", context: bpy.types.Context) -> N
         settings.first, settings.last = 1, max(1, settings.clip.frame_duration)
 
 
+def _box_chosen(settings: "SmokeliftSettings", context: bpy.types.Context) -> None:
+    """Who says where the smoke is in the scene means the scene's camera."""
+    if settings.box is not None:
+        settings.camera_mode = "SCENE"
+    _changed(settings, context)
+
+
 def _is_mesh(_settings: "SmokeliftSettings", thing: bpy.types.Object) -> bool:
     return thing.type == "MESH"
 
@@ -63,8 +70,12 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
         name="Camera",
         description="Where the clip was filmed from",
         items=[
+            (
+                "GUESS",
+                "Guess",
+                "A level camera with an ordinary lens, and a box around the smoke; it is made",
+            ),
             ("SCENE", "Scene Camera", "The scene's camera with its lens, sensor, shift and place"),
-            ("GUESS", "Guess", "A level camera with an ordinary lens; one is made to match"),
         ],
         update=_changed,
     )
@@ -73,7 +84,7 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
         description="Box that holds all of the smoke; the smaller, the finer the result",
         type=bpy.types.Object,
         poll=_is_mesh,
-        update=_changed,
+        update=_box_chosen,
     )
     light_mode: EnumProperty(
         name="Light",

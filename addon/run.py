@@ -81,11 +81,16 @@ def work(context: bpy.types.Context) -> None:
     if bpy.app.background:
         bpy.ops.smokelift.work("EXEC_DEFAULT")
         return
-    windows = context.window_manager.windows
-    if not any(handler.bl_idname == SMOKELIFT_OT_work.__name__ for w in windows for handler in w.modal_operators):
+    if not workers(context.window_manager):
         # in the first window, which is there as long as Blender is
-        with context.temp_override(window=windows[0]):
+        with context.temp_override(window=context.window_manager.windows[0]):
             bpy.ops.smokelift.work("INVOKE_DEFAULT")
+
+
+def workers(manager: bpy.types.WindowManager) -> list[bpy.types.Operator]:
+    """Whoever looks after the queue: one, or nobody."""
+    running = [operator for window in manager.windows for operator in window.modal_operators]
+    return [operator for operator in running if operator.bl_idname == SMOKELIFT_OT_work.__name__]
 
 
 class SMOKELIFT_OT_work(bpy.types.Operator):
@@ -161,10 +166,10 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
                 self._tell(rows[name], job)
             if job.ended:
                 del self._jobs[name]  # a resumed take comes back under the same name
-        checking = self._look_ahead(manager.smokelift)
-        if changed or checking == "told":
+        looked = self._look_ahead(manager.smokelift)
+        if changed or looked:
             redraw(manager)
-        return bool(self._jobs) or checking == "busy"
+        return bool(self._jobs) or self._check is not None or manager.smokelift.check_ticks > 0
 
     def _start(self, name: str, row: bpy.types.PropertyGroup) -> None:
         take = Take(Path(name))
@@ -194,6 +199,7 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
             row.icon = self._picture(take)
             if job.ended:
                 bpy.ops.ed.undo_push(message="Make Smoke")
+                self.report({"ERROR" if job.outcome == "failed" else "INFO"}, job.sentence)
 
     def _follow(self, scene: bpy.types.Scene, thing: bpy.types.Object, row: bpy.types.PropertyGroup) -> None:
         """Move the playhead to the newest frame, until somebody else moves it."""
@@ -218,19 +224,19 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
             bpy.data.images.remove(image)
         return preview.icon_id
 
-    def _look_ahead(self, state: bpy.types.PropertyGroup) -> str:
-        """Ask the engine what the shot will take. Returns "busy", "told" (just now) or "idle"."""
+    def _look_ahead(self, state: bpy.types.PropertyGroup) -> bool:
+        """Ask the engine what the shot will take, once the settings rest. Returns whether anything changed."""
         if state.check_ticks > 0:
-            state.check_ticks = 0 if bpy.app.background else state.check_ticks - 1
-            if state.check_ticks == 0:
-                self._ask(state)
-                return "told"
-            return "busy"
+            state.check_ticks -= 1
+            if state.check_ticks > 0:
+                return False
+            self._ask(state)
+            return True
         if self._check is None:
-            return "idle"
+            return False
         self._check.poll()
         if not self._check.ended:
-            return "busy"
+            return False
         job, self._check = self._check, None
         details = job.details
         state.check_done = job.outcome == "done"
@@ -241,7 +247,7 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
             state.seconds = details["seconds"]
             state.memory, state.memory_free = details["memory"] / 2**30, details["memory_free"] / 2**30
             state.disk = details["disk"] / 1e6
-        return "told"
+        return True
 
     def _ask(self, state: bpy.types.PropertyGroup) -> None:
         if self._check is not None:
@@ -286,5 +292,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Take it back."""
+    """Take it back, and end what it runs."""
+    for worker in workers(bpy.context.window_manager):
+        worker.cancel(bpy.context)
     bpy.utils.unregister_class(SMOKELIFT_OT_work)

@@ -47,7 +47,9 @@ def shot_tables(scene: bpy.types.Scene, quick: bool = False) -> dict[str, Any]:
     with _at_frame(scene, scene.frame_current if quick else start_frame(scene)) as depsgraph:
         turn = Matrix.Identity(3)
         if settings.camera_mode == "SCENE":
-            box = _box(settings)
+            box = box_of(scene)
+            if box is None:
+                raise ShotError("Say where the smoke is: press Make Box, and move it so that it holds the smoke.")
             turn = box.matrix_world.to_quaternion().to_matrix()
             camera = _camera(scene, depsgraph)
             tables["camera"] = camera_table(scene, camera, depsgraph, turn)
@@ -73,9 +75,8 @@ def options(scene: bpy.types.Scene) -> list[str]:
 def turned_world(scene: bpy.types.Scene) -> Matrix:
     """The engine's axes in Blender's world (4x4): how the result is placed."""
     settings = scene.smokelift
-    if settings.camera_mode != "SCENE" or settings.box is None:
-        return Matrix.Identity(4)
-    return settings.box.matrix_world.to_quaternion().to_matrix().to_4x4()
+    box = box_of(scene) if settings.camera_mode == "SCENE" else None
+    return Matrix.Identity(4) if box is None else box.matrix_world.to_quaternion().to_matrix().to_4x4()
 
 
 # clip
@@ -231,6 +232,12 @@ def _check_seen(scene: bpy.types.Scene, camera: bpy.types.Object, box: bpy.types
 # box
 
 
+def box_of(scene: bpy.types.Scene) -> bpy.types.Object | None:
+    """The box that holds the smoke; a deleted one, which the setting keeps in the file, does not count."""
+    box = scene.smokelift.box
+    return box if box is not None and box.name in scene.objects else None
+
+
 def box_corners(box: bpy.types.Object) -> list[Vector]:
     """The eight corners of a box in the world."""
     return [box.matrix_world @ Vector(corner) for corner in box.bound_box]
@@ -255,12 +262,6 @@ def domain_table(box: bpy.types.Object, turn: Matrix, settings: bpy.types.Proper
         "max": [s + length for s, length in zip(start, size, strict=True)],
         "resolution": counts,
     }
-
-
-def _box(settings: bpy.types.PropertyGroup) -> bpy.types.Object:
-    if settings.box is None:
-        raise ShotError("Say where the smoke is: press Make Box, and move it so that it holds the smoke.")
-    return settings.box
 
 
 # lights

@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import Any
 
 import bpy
-from mathutils import Matrix, Vector
+from bpy.app.handlers import persistent
+from mathutils import Vector
 
 from .scene import frame_rate, turned_world
 from .take import Take
@@ -26,7 +27,9 @@ def show(scene: bpy.types.Scene, take: Take) -> bpy.types.Object | None:
         return None
     thing = _object(scene)
     if shown_take(scene) != take:
-        _place(thing, turned_world(scene), index["scene"]["domain"])
+        thing.delta_location = (0.0, 0.0, 0.0)
+        thing.matrix_world = turned_world(scene)
+    _settle(thing, index["scene"]["domain"])
     _play(thing.data, scene, take, index)
     _shade(thing.data, index["scene"]["medium"])
     return thing
@@ -54,12 +57,21 @@ def _object(scene: bpy.types.Scene) -> bpy.types.Object:
     return thing
 
 
-def _place(thing: bpy.types.Object, world: Matrix, domain: dict[str, Any]) -> None:
+@persistent
+def settle_all(_file: str = "") -> None:
+    """Put the smoke of every scene to where this Blender needs it, after another one saved the file."""
+    for scene in bpy.data.scenes:
+        take = shown_take(scene)
+        index = take.index() if take is not None else None
+        if index is not None:
+            _settle(scene.smokelift.volume, index["scene"]["domain"])
+
+
+def _settle(thing: bpy.types.Object, domain: dict[str, Any]) -> None:
+    """Make up for Cycles, which before 5.0 renders every grid half a voxel too far along all its axes."""
     voxel = (domain["max"][0] - domain["min"][0]) / domain["resolution"][0]
-    # Before 5.0 Cycles renders every grid half a voxel too far along all its axes.
     shift = Vector([-voxel / 2] * 3) if bpy.app.version < (5, 0, 0) else Vector()
-    thing.delta_location = world.to_3x3() @ shift
-    thing.matrix_world = world @ Matrix.Translation(shift)
+    thing.delta_location = thing.matrix_basis.to_quaternion() @ shift
 
 
 def _play(volume: bpy.types.Volume, scene: bpy.types.Scene, take: Take, index: dict[str, Any]) -> None:
@@ -129,3 +141,13 @@ def _material(name: str) -> bpy.types.Material:
     shader.inputs["Absorption Color"].default_value = (0.0, 0.0, 0.0, 1.0)
     tree.links.new(shader.outputs["Volume"], output.inputs["Volume"])
     return material
+
+
+def register() -> None:
+    """Look after files that are loaded."""
+    bpy.app.handlers.load_post.append(settle_all)
+
+
+def unregister() -> None:
+    """Leave them alone."""
+    bpy.app.handlers.load_post.remove(settle_all)

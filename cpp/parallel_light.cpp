@@ -16,7 +16,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 #include <vector>
 
 namespace smokelift {
@@ -57,27 +56,27 @@ template <int S> SMOKELIFT_INLINE void load(const float *__restrict from, int co
         to[c] = from[c * S];
 }
 
-// out = (1 - f) a + f b for rows of voxels.
-SMOKELIFT_INLINE void mix_rows(const float *a, const float *b, Stride stride, int count, float f,
-                               float *__restrict buffer, float *__restrict out) {
+// The first floats of a row of voxels.
+SMOKELIFT_INLINE void load_row(const float *from, Stride stride, int count, float *__restrict to) {
     switch (stride) {
     case 1:
-        load<1>(a, count, out), load<1>(b, count, buffer);
-        break;
+        return load<1>(from, count, to);
     case 2:
-        load<2>(a, count, out), load<2>(b, count, buffer);
-        break;
+        return load<2>(from, count, to);
     case 4:
-        load<4>(a, count, out), load<4>(b, count, buffer);
-        break;
+        return load<4>(from, count, to);
     default:
-        for (int c = 0; c < count; ++c) {
-            out[c] = a[c * stride];
-            buffer[c] = b[c * stride];
-        }
+        for (int c = 0; c < count; ++c)
+            to[c] = from[c * stride];
     }
-    for (int c = 0; c < count; ++c)
-        out[c] += f * (buffer[c] - out[c]);
+}
+
+SMOKELIFT_INLINE std::array<int, 2> joined(const std::array<int, 2> &a, const std::array<int, 2> &b) {
+    if (a[0] >= a[1])
+        return b;
+    if (b[0] >= b[1])
+        return a;
+    return {std::min(a[0], b[0]), std::max(a[1], b[1])};
 }
 
 // Takes task number `task` of the columns through the field (its first float of each voxel). visit(k, i,
@@ -89,11 +88,13 @@ SMOKELIFT_INLINE void sweep(const Columns &columns, const Voxels &field, int tas
     const int begin = columns.first_p + task * ROWS_PER_TASK;
     const int rows = std::min(columns.end_p - begin, ROWS_PER_TASK + 1);
     const int pitch = columns.count_q, count_c = columns.count_c;
-    std::vector<float> memory(std::size_t(2 * rows + 1) * pitch + 3 * (count_c + 2));
+    const int width = count_c + 2; // a row of voxels with its border
+    std::vector<float> memory(std::size_t(2 * rows + 1) * pitch + std::size_t(rows + 3) * width);
     float *const sums = memory.data(), *const values = sums + std::size_t(rows) * pitch;
-    float *const mixed = values + std::size_t(rows) * pitch, *const line = mixed + pitch,
-                 *const buffer = line + count_c + 2, *const depth = buffer + count_c + 2;
-    std::vector<std::pair<int, int>> filled(rows); // where a row of `values` is not zero
+    float *const mixed = values + std::size_t(rows) * pitch, *const slid = mixed + pitch,
+                 *const line = slid + std::size_t(rows + 1) * width, *const depth = line + width;
+    // where rows of `slid` and of `values` are not zero
+    std::vector<std::array<int, 2>> slid_range(rows + 1), filled(rows);
     const Stride stride = field.stride(LATERAL[light.axis][1]);
 
     for (int step = 0; step < columns.planes; ++step) {
@@ -102,32 +103,36 @@ SMOKELIFT_INLINE void sweep(const Columns &columns, const Voxels &field, int tas
         const float f = columns.fraction(0, k), g = columns.fraction(1, k);
         if (begin + shift_b >= columns.count_b || begin + rows + shift_b < 0)
             continue;
-        for (int r = 0; r < rows; ++r) {
-            const int i = begin + r + shift_b; // between rows i and i + 1 of voxels
-            int first = count_c, end = 0;
-            for (int row = i; row <= i + 1; ++row) {
-                if (row >= 0 && row < columns.count_b) {
-                    const auto &span = columns.spans.row(light.axis, k, row);
-                    if (span[0] < span[1]) {
-                        first = std::min(first, span[0]);
-                        end = std::max(end, span[1]);
-                    }
-                }
-            }
-            filled[r] = {0, 0};
-            if (first >= end)
+        // rows of voxels, slid along themselves to where the columns are: slid[1 + c] lies between c and c +
+        // 1
+        for (int r = 0; r <= rows; ++r) {
+            const int i = begin + r + shift_b;
+            slid_range[r] = {0, 0};
+            if (i < 0 || i >= columns.count_b)
                 continue;
-            const float *near = field.at(light.axis, k, i, first),
-                        *far = field.at(light.axis, k, i + 1, first);
-            float *const inside = line + 1;
-            mix_rows(near, far, stride, end - first, f, buffer, inside);
-            inside[-1] = inside[end - first] = 0;
-            const int q = first - 1 - shift_c - columns.first_q;
-            float *__restrict value = values + std::size_t(r) * pitch + q;
-            for (int c = 0; c <= end - first; ++c)
-                value[c] = line[c] + g * (line[c + 1] - line[c]);
-            filled[r] = {q, q + end - first + 1};
+            const auto &span = columns.spans.row(light.axis, k, i);
+            const int count = span[1] - span[0];
+            if (count <= 0)
+                continue;
+            load_row(field.at(light.axis, k, i, span[0]), stride, count, line + 1);
+            line[0] = line[count + 1] = 0;
+            float *__restrict out = slid + std::size_t(r) * width + span[0];
+            for (int c = 0; c <= count; ++c)
+                out[c] = line[c] + g * (line[c + 1] - line[c]);
+            slid_range[r] = {span[0], span[1] + 1};
         }
+        const int to_q = -1 - shift_c - columns.first_q; // number of the column at slid[0]
+        for (int r = 0; r < rows; ++r) {
+            const auto [first, end] = joined(slid_range[r], slid_range[r + 1]);
+            const float *__restrict near = slid + std::size_t(r) * width, *__restrict far = near + width;
+            float *__restrict value = values + std::size_t(r) * pitch + to_q;
+            for (int c = first; c < end; ++c)
+                value[c] = near[c] + f * (far[c] - near[c]);
+            filled[r] = {first + to_q, end + to_q};
+        }
+        for (int r = 0; r <= rows; ++r)
+            std::fill(slid + std::size_t(r) * width + slid_range[r][0],
+                      slid + std::size_t(r) * width + slid_range[r][1], 0.0f);
         for (int r = 0; r + 1 < rows; ++r) {
             const int i = begin + r + shift_b + 1; // the row of voxels between columns r and r + 1
             if (i < 0 || i >= columns.count_b)
@@ -148,7 +153,7 @@ SMOKELIFT_INLINE void sweep(const Columns &columns, const Voxels &field, int tas
         for (int r = 0; r < rows; ++r) {
             float *__restrict sum = sums + std::size_t(r) * pitch;
             float *__restrict value = values + std::size_t(r) * pitch;
-            for (int q = filled[r].first; q < filled[r].second; ++q) {
+            for (int q = filled[r][0]; q < filled[r][1]; ++q) {
                 sum[q] += value[q];
                 value[q] = 0;
             }

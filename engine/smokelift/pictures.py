@@ -99,10 +99,11 @@ def write_preview(path: Path, sequence: Sequence, clip: Clip) -> None:
 
 
 def write_thumbnail(path: Path, clip: Clip, shot: Shot, frame: Frame) -> None:
-    """The part of a frame that the grid is fitted to, beside its reconstruction, as a PNG."""
+    """The part of a frame that the grid is fitted to, beside its reconstruction (or above, if wide), as a PNG."""
     seen = shot.working.cut(clip.frame(frame.number - 1))
     renderer = scene_renderer(shot.small_scene, None, shot.scattering, shot.plate.image)
-    both = eight_bit(np.concatenate([seen, renderer.image(frame.density)], 1))
+    wide = seen.shape[1] > seen.shape[0]
+    both = eight_bit(np.concatenate([seen, renderer.image(frame.density)], 0 if wide else 1))
     with atomic_path(path) as aside:
         Pillow.fromarray(both).save(aside, format="PNG")
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from addon.toml import dumps
 
 TEXTS = st.text(st.characters(exclude_categories=["Cs"]))
-NUMBERS = st.integers(-(2**31), 2**31) | st.floats(allow_nan=False, allow_infinity=False)
+NUMBERS = st.integers(-(2**31), 2**31) | st.floats(allow_nan=False, allow_infinity=False, allow_subnormal=False)
 VALUES = st.recursive(TEXTS | NUMBERS, lambda inner: st.lists(inner, max_size=4), max_leaves=8)
 NAMES = st.from_regex(r"[a-z_]{1,8}", fullmatch=True)
 TABLES = st.dictionaries(NAMES, VALUES, max_size=4)

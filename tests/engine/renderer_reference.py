@@ -61,7 +61,16 @@ def point_optical_depth(extinction, voxel_size, position):
                 continue
             far = sign * (ahead[-1] - position[axis])
             reach = int(np.ceil(far)) + 1
-            p, q = np.meshgrid(np.arange(-reach, reach + 1), np.arange(-reach, reach + 1), indexing="ij")
+            distances = np.array([sign * (k - position[axis]) for k in ahead])
+            columns = []
+            for at, count in zip(lateral, field.shape[1:], strict=True):  # those that meet the grid
+                slopes = np.stack([(-1 - at) / distances, (count - at) / distances]) * far
+                columns.append(
+                    np.arange(max(-reach, int(np.floor(slopes.min()))), min(reach, int(np.ceil(slopes.max()))) + 1)
+                )
+            if not all(map(len, columns)):
+                continue  # no voxel is seen through this face
+            p, q = np.meshgrid(*columns, indexing="ij")
             length = voxel_size * np.sqrt(1 + (p**2 + q**2) / far**2)
             before = np.zeros(p.shape, extinction.dtype)
             for k in ahead:
@@ -71,7 +80,9 @@ def point_optical_depth(extinction, voxel_size, position):
                 depth = before + value / 2
                 before = before + value
                 i, j = np.meshgrid(*map(np.arange, field.shape[1:]), indexing="ij")
-                at_voxels = _interpolate(depth, (i - lateral[0]) / scale + reach, (j - lateral[1]) / scale + reach)
+                at_voxels = _interpolate(
+                    depth, (i - lateral[0]) / scale - columns[0][0], (j - lateral[1]) / scale - columns[1][0]
+                )
                 mine = np.take(face_of, k, axis) == axis
                 target = np.moveaxis(out, axis, 0)[k]
                 target[mine] = at_voxels[mine]

@@ -7,16 +7,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import overload
 
 import numpy as np
 
 from smokelift import images
 from smokelift.render.device import DeviceError, start
+from smokelift.render.environment import environment_count, environment_lights
 from smokelift.render.lights import FiniteLight
 from smokelift.render.renderer import Image, Renderer, Volume
 from smokelift.render.setup import Scattering
-from smokelift.scene import Camera, Domain, EnvironmentLight, Medium, Scene
+from smokelift.scene import Camera, DirectionalLight, Domain, EnvironmentLight, Medium, Scene
 
 __all__ = ["DeviceError", "Renderer", "render", "render_gradient", "start"]
 
@@ -122,9 +124,36 @@ def _view_gradient(
     return loss, renderer.gradient(2 * difference), image
 
 
-def scene_lights(scene: Scene) -> tuple[FiniteLight, ...]:
-    """The lights of a scene as the renderer takes them."""
-    return tuple(light for light in scene.lights if not isinstance(light, EnvironmentLight))
+def scene_lights(scene: Scene, camera: Camera | None = None) -> tuple[FiniteLight, ...]:
+    """The lights of a scene as the renderer takes them: an environment becomes as many parallel ones as it needs.
+
+    Their number is found with the scene's own camera, if it has one, and stays the same for other cameras: a sequence
+    is lit alike from all sides.
+
+    Raises
+    ------
+    ValueError
+        If a scene with an environment lacks a camera or a domain.
+    smokelift.images.ImageError
+        If an environment's picture cannot be read.
+    """
+    lights: list[FiniteLight] = []
+    for light in scene.lights:
+        if not isinstance(light, EnvironmentLight):
+            lights.append(light)
+            continue
+        view = scene.camera or camera
+        if view is None:
+            raise ValueError("The scene has no camera; an environment light needs one to choose its directions.")
+        lights += _environment(light, view, _domain(scene), scene.medium or Medium())
+    return tuple(lights)
+
+
+@lru_cache(maxsize=4)
+def _environment(
+    light: EnvironmentLight, camera: Camera, domain: Domain, medium: Medium
+) -> tuple[DirectionalLight, ...]:
+    return environment_lights(light, environment_count(light, camera, domain, medium))
 
 
 def scene_background(scene: Scene, camera: Camera | None = None) -> Image:
@@ -160,7 +189,7 @@ def scene_renderer(
         view,
         _domain(scene),
         scene.medium or Medium(),
-        scene_lights(scene),
+        scene_lights(scene, view),
         scene_background(scene, camera) if background is None else background,
         scattering,
     )
