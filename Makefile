@@ -65,7 +65,8 @@ $(VENV)/extension.stamp: $(VENV)/engine.stamp
 	touch $@
 
 test-blender: dist/extension.stamp
-	$(BIN)/python tests/blender/run.py
+	SMOKELIFT_ZIP=$$(ls "$$PWD"/dist/smokelift-*-linux_x64.zip) \
+		$(BIN)/python -m pytest -v --durations=0 --durations-min=1 tests/blender/wheels.py tests/blender/debian.py
 
 clean:
 	rm -rf $(VENV) build dist demo

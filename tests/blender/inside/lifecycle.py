@@ -97,9 +97,9 @@ sys.exit(batch.main(sys.argv[1:]))
 def test_installs_from_disk() -> None:
     """The zip is all that is needed, and Blender's own numpy stays the only one."""
     assert not extension().exists()
-    assert bpy.ops.extensions.package_install_files(
-        filepath=str(ZIP), repo="user_default", enable_on_install=True
-    ) == {"FINISHED"}
+    assert bpy.ops.extensions.package_install_files(filepath=str(ZIP), repo="user_default", enable_on_install=True) == {
+        "FINISHED"
+    }
     assert MODULE in bpy.context.preferences.addons
     assert (site() / "taichi").is_dir()
     assert not (site() / "numpy").exists()

@@ -12,6 +12,7 @@ import sys
 import time
 import traceback
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 
 import bpy
@@ -65,7 +66,7 @@ def story() -> Iterator[float]:
     report["outcome"], report["sentence"], report["progress"] = jobs[0].outcome, jobs[0].sentence, seen
     report["seconds"] = round(time.monotonic() - clicked, 2)
     report["seconds_to_first_frame"] = round(first_drawn[0] - clicked, 2) if first_drawn else None
-    gaps = sorted(b - a for a, b in zip(ticks, ticks[1:], strict=False))
+    gaps = sorted(after - before for before, after in pairwise(ticks))
     report["longest_gaps"] = [round(gap, 3) for gap in gaps[-5:]]
     shell("xdotool mousemove 400 500")
     yield 1.5

@@ -14,4 +14,7 @@ for thing in list(bpy.data.objects):
 scene = set_up_example(bpy.context.scene)
 scene.smokelift.first, scene.smokelift.last = int(first), int(last)
 scene.smokelift.longest_side = int(longest_side)
+scene.frame_set(int(last))
+scene.render.resolution_percentage = 50
+scene.cycles.samples, scene.cycles.use_denoising = 32, False
 bpy.ops.wm.save_as_mainfile(filepath=file)
