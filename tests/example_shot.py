@@ -12,8 +12,16 @@ from mathutils import Vector
 EXAMPLE = Path(__file__).parents[1] / "examples" / "plume"
 
 
-def set_up_example(scene: bpy.types.Scene) -> bpy.types.Scene:
-    """Give a scene the example's camera, box, sun, black world, clip and plate, at draft quality."""
+def set_up_example(scene: bpy.types.Scene, folder: Path = EXAMPLE) -> bpy.types.Scene:
+    """Give a scene the example's camera, box, sun, black world, clip and plate, at draft quality.
+
+    Parameters
+    ----------
+    scene
+        An empty one.
+    folder
+        Where the clip and the plate lie.
+    """
     world = scene.world = bpy.data.worlds.new("World")
     if world.node_tree is None:
         world.use_nodes = True
@@ -25,9 +33,9 @@ def set_up_example(scene: bpy.types.Scene) -> bpy.types.Scene:
     sun.data.energy = 18.0
     sun.rotation_euler = Vector((0.57, 0.46, -0.68)).to_track_quat("-Z", "Y").to_euler()
     settings = scene.smokelift
-    settings.clip = bpy.data.movieclips.load(str(EXAMPLE / "clip.mp4"))
+    settings.clip = bpy.data.movieclips.load(str(folder / "clip.mp4"))
     settings.box = add_box(scene, (-1.0, -1.0, 0.0), (1.0, 1.0, 3.0))
-    settings.plate_mode, settings.plate = "FILE", str(EXAMPLE / "plate.png")
+    settings.plate_mode, settings.plate = "FILE", str(folder / "plate.png")
     settings.light_mode = "SCENE"
     settings.quality = "draft"
     scene.render.resolution_x, scene.render.resolution_y = 256, 384

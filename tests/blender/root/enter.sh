@@ -10,6 +10,7 @@ exec unshare --mount --propagation private --pid --fork --kill-child --net bash 
     mount --rbind /dev "$root/dev"
     mount --rbind /sys "$root/sys"
     mount -t tmpfs tmpfs "$root/dev/shm"
+    mount -t tmpfs tmpfs "$root/home"
     mount --bind "$folder" "$root$folder"
     cd /
     exec env -i PATH=/usr/bin:/bin:/usr/sbin:/sbin HOME=/root LANG=C.UTF-8 TERM=dumb chroot "$root" "$@"
