@@ -136,7 +136,7 @@ def _frames(text: str) -> tuple[int, int]:
     return first, last
 
 
-def _command(words: list[str]) -> int:
+def command(words: list[str]) -> int:
     """``blender --command smokelift reconstruct ...``"""
     if not words or words[0] != "reconstruct":
         print("usage: blender -b shot.blend --command smokelift reconstruct [options]", file=sys.stderr)
@@ -146,32 +146,32 @@ def _command(words: list[str]) -> int:
 
 def register() -> None:
     """Add the command to Blender's own."""
-    register.handle = bpy.utils.register_cli_command("smokelift", _command)
+    register.handles = [bpy.utils.register_cli_command("smokelift", command)]
 
 
 def unregister() -> None:
-    """Take the command away."""
-    bpy.utils.unregister_cli_command(register.handle)
+    """Take the command away. Its handle must not live on: at the end of Blender that would crash."""
+    bpy.utils.unregister_cli_command(register.handles.pop())
 
 
-def _package() -> Any:
-    """The add-on that this script belongs to: the enabled one, or loaded from beside the script."""
-    folder = Path(__file__).resolve().parent
+def _run_as_script() -> int:
+    """Run the add-on that this script belongs to: the enabled one, or else the one that lies beside it."""
+    words = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
+    init = Path(__file__).resolve().parent / "__init__.py"
     for module in list(sys.modules.values()):
         file = getattr(module, "__file__", None)
-        if file and Path(file).resolve() == folder / "__init__.py" and hasattr(bpy.types.Scene, "smokelift"):
-            return module
+        if file and Path(file).resolve() == init and hasattr(bpy.types.Scene, "smokelift"):
+            return importlib.import_module(f"{module.__name__}.batch").main(words)
     name = "smokelift_addon"  # not the folder's name: an extension's is the engine's
-    spec = importlib.util.spec_from_file_location(
-        name, folder / "__init__.py", submodule_search_locations=[str(folder)]
-    )
-    package = importlib.util.module_from_spec(spec)
-    sys.modules[name] = package
+    spec = importlib.util.spec_from_file_location(name, init, submodule_search_locations=[str(init.parent)])
+    package = sys.modules[name] = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(package)
     package.register()
-    return package
+    try:
+        return importlib.import_module(f"{name}.batch").main(words)
+    finally:
+        package.unregister()
 
 
 if __name__ == "__main__":
-    _words = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
-    sys.exit(importlib.import_module(f"{_package().__name__}.batch").main(_words))
+    sys.exit(_run_as_script())
