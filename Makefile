@@ -1,6 +1,9 @@
 # make demo   lift the example clip to a VDB sequence, with pictures to look at, in demo/
 # make test   formatting, types and tests; nothing that needs a GPU
-# Both set up what they need in .venv first. Only Python 3.11 to 3.13 and a C++17 compiler are assumed.
+# make extension      the Blender extension's zips in dist/; ENGINE_WHEELS=DIR adds platforms built elsewhere
+# make test-blender   that zip in the bpy wheels and in a real Blender
+# All set up what they need in .venv first. Only Python 3.11 to 3.13 and a C++17 compiler are assumed; the last two
+# need Python 3.11 and 3.13 both, because Blender does.
 
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
@@ -16,7 +19,7 @@ QUIET_PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
 HAS_VDB = $(shell $(BIN)/python -c 'import importlib.util as u; print("yes" if u.find_spec("bpy") else "")')
 
-.PHONY: demo test pytest lint clean
+.PHONY: demo test pytest lint extension test-blender clean
 
 demo: $(VENV)/engine.stamp
 	rm -rf demo/sequence
@@ -46,6 +49,24 @@ $(VENV)/tools.stamp: pyproject.toml
 $(VENV)/engine.stamp: $(VENV)/tools.stamp $(ENGINE_SOURCES)
 	$(QUIET_PIP) '.[vdb]'
 	touch $@
+
+extension: dist/extension.stamp
+
+dist/extension.stamp: build/engine-wheels/stamp tools/build_extension.py blender_manifest.toml LICENSE $(wildcard addon/*.py)
+	$(BIN)/python tools/build_extension.py --engine-wheels build/engine-wheels $(ENGINE_WHEELS) --out dist
+	touch $@
+
+build/engine-wheels/stamp: $(VENV)/extension.stamp tools/engine_wheels.py $(ENGINE_SOURCES)
+	$(BIN)/python tools/engine_wheels.py --out build/engine-wheels
+	touch $@
+
+$(VENV)/extension.stamp: $(VENV)/engine.stamp
+	$(QUIET_PIP) --group extension
+	touch $@
+
+test-blender: dist/extension.stamp
+	SMOKELIFT_ZIP=$$(ls "$$PWD"/dist/smokelift-*-linux_x64.zip) \
+		$(BIN)/python -m pytest -v --durations=0 --durations-min=1 tests/blender/wheels.py tests/blender/debian.py
 
 clean:
 	rm -rf $(VENV) build dist demo

@@ -25,7 +25,7 @@ from smokelift.settings import Settings
 from smokelift.transport import Velocity, advect, project
 from smokelift.velocity import VelocitySettings, estimate_velocity
 
-__version__ = "0.1.0"
+__version__ = "1.0.0"
 
 __all__ = [
     "Background",

@@ -1,4 +1,4 @@
-"""The command line: ``smokelift reconstruct | render | preview | doctor | bench``.
+"""The command line: ``smokelift reconstruct | inspect | render | preview | doctor | bench``.
 
 Exit status: 0 done, 2 bad input, 3 device or memory, 130 cancelled (and resumable).
 """
@@ -12,7 +12,7 @@ import signal
 import sys
 import time
 from collections.abc import Sequence as Many
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 from smokelift import pictures
@@ -20,12 +20,14 @@ from smokelift.bench import command
 from smokelift.cameras import orbit
 from smokelift.clip import Clip
 from smokelift.doctor import report
+from smokelift.forecast import forecast
 from smokelift.images import write_image
 from smokelift.memory import require_memory
 from smokelift.progress import Reporter, reporter
 from smokelift.reconstruct import reconstruct
 from smokelift.render import DeviceError, device
 from smokelift.scene import Camera, ClipSource, Scene
+from smokelift.scene_file import scene_to_dict
 from smokelift.sequence import Sequence
 from smokelift.settings import METHODS, QUALITIES, Settings
 from smokelift.shot import prepare_shot
@@ -74,6 +76,8 @@ def _reconstruct(options: argparse.Namespace, say: Reporter) -> None:
         for first in frames:
             say.start(len(clip), first.number - 1)
             for frame in itertools.chain([first], frames):
+                if options.thumbnail:
+                    pictures.write_thumbnail(options.thumbnail, clip, shot, frame)
                 say.frame(frame.number, frame.figures)
     sequence = Sequence.open(options.out)
     if not any((sequence.figures(number).get("hull_share") or 0) > 0 for number in sequence.frames):
@@ -85,6 +89,26 @@ def _reconstruct(options: argparse.Namespace, say: Reporter) -> None:
     say.finish(
         f"{len(sequence.frames)} frames in {options.out} ({seconds:.0f} s).",
         {"directory": str(options.out), "frames": len(sequence.frames), "seconds": round(seconds, 1)},
+    )
+
+
+def _inspect(options: argparse.Namespace, say: Reporter) -> None:
+    settings = Settings.preset(options.quality, options.method, options.resolution)
+    scene = _scene(options.input, options.frames)
+    assert scene.clip is not None
+    with Clip.open(scene.clip) as clip:
+        shot = prepare_shot(clip, scene, settings)
+        frames = len(clip)
+    domain = shot.scene.domain
+    assert domain is not None
+    for note in shot.notes:
+        say.note(note)
+    cost = forecast(domain, frames, settings.quality)
+    voxels = " x ".join(map(str, domain.resolution))
+    say.finish(
+        f"{frames} frames of {voxels} voxels: about {cost.seconds:.0f} s, {cost.memory / 2**30:.1f} GiB of memory "
+        f"({cost.memory_free / 2**30:.1f} are free), up to {cost.disk / 1e6:.0f} MB on disk.",
+        {"frames": frames, "scene": scene_to_dict(shot.scene), **asdict(cost)},
     )
 
 
@@ -133,6 +157,7 @@ def _doctor(options: argparse.Namespace, say: Reporter) -> None:
 
 _COMMANDS = {
     "reconstruct": _reconstruct,
+    "inspect": _inspect,
     "render": _render,
     "preview": _preview,
     "doctor": _doctor,
@@ -199,15 +224,22 @@ def _parser() -> argparse.ArgumentParser:
     common.add_argument("--device", choices=("auto", "cpu", "gpu"), default="auto", help="where to render")
     common.add_argument("--progress", choices=("text", "json"), default="text", help="a bar, or one JSON object a line")
 
-    job = commands.add_parser("reconstruct", parents=[common], help="a clip or scene file to a VDB sequence")
-    job.add_argument("input", type=Path, help="scene.toml, or a video, or frame_####.png")
+    what = argparse.ArgumentParser(add_help=False)
+    what.add_argument("input", type=Path, help="scene.toml, or a video, or frame_####.png")
+    what.add_argument("--quality", choices=QUALITIES, default="balanced")
+    what.add_argument("--method", choices=METHODS, default="default", help="paper: the published loop, for comparison")
+    what.add_argument("--resolution", type=_three_counts, metavar="X,Y,Z", help="voxels, if not the scene's")
+    what.add_argument("--frames", type=_frame_range, metavar="A:B", help="first and last frame, from 0")
+
+    job = commands.add_parser("reconstruct", parents=[common, what], help="a clip or scene file to a VDB sequence")
     job.add_argument("--out", type=Path, required=True, help="directory for the sequence")
-    job.add_argument("--quality", choices=QUALITIES, default="balanced")
-    job.add_argument("--method", choices=METHODS, default="default", help="paper: the published loop, for comparison")
-    job.add_argument("--resolution", type=_three_counts, metavar="X,Y,Z", help="voxels, if not the scene's")
-    job.add_argument("--frames", type=_frame_range, metavar="A:B", help="first and last frame, from 0")
     job.add_argument("--npz", action="store_true", help="write NumPy twins as well")
+    job.add_argument("--thumbnail", type=Path, metavar="FILE.png", help="keep a small picture of the last frame there")
     job.add_argument("--resume", action="store_true", help="go on from the frames that are there")
+
+    commands.add_parser(
+        "inspect", parents=[common, what], help="what would be assumed, chosen and spent, before it is spent"
+    )
 
     picture = commands.add_parser("render", parents=[common], help="an image or video of a sequence")
     picture.add_argument("directory", type=Path)

@@ -25,6 +25,11 @@ def needed(resolution: tuple[int, int, int]) -> int:
     return BASE_BYTES + BYTES_A_VOXEL * x * y * z
 
 
+def free_memory() -> int:
+    """Bytes that programs may still take."""
+    return int(psutil.virtual_memory().available)
+
+
 def require_memory(domain: Domain) -> None:
     """Check that a domain's grid fits into the memory that is free.
 
@@ -33,7 +38,7 @@ def require_memory(domain: Domain) -> None:
     NotEnoughMemoryError
         With the largest resolution of the same shape that fits.
     """
-    free = psutil.virtual_memory().available
+    free = free_memory()
     want = needed(domain.resolution)
     if want <= free:
         return

@@ -18,10 +18,12 @@ from smokelift.cameras import orbit
 from smokelift.clip import Clip
 from smokelift.files import atomic_path
 from smokelift.images import area_average, linear_to_srgb
+from smokelift.reconstruct import Frame
 from smokelift.render import Renderer, scene_background, scene_renderer
 from smokelift.render.renderer import Image
 from smokelift.scene import Camera
 from smokelift.sequence import Sequence
+from smokelift.shot import Shot
 
 SHEET_ANGLES = (0, 20, 45, 90)
 SHEET_ROWS = 5
@@ -94,6 +96,16 @@ def write_preview(path: Path, sequence: Sequence, clip: Clip) -> None:
             )
 
     write_video(path, frames(), clip.fps)
+
+
+def write_thumbnail(path: Path, clip: Clip, shot: Shot, frame: Frame) -> None:
+    """The part of a frame that the grid is fitted to, beside its reconstruction (or above, if wide), as a PNG."""
+    seen = shot.working.cut(clip.frame(frame.number - 1))
+    renderer = scene_renderer(shot.small_scene, None, shot.scattering, shot.plate.image)
+    wide = seen.shape[1] > seen.shape[0]
+    both = eight_bit(np.concatenate([seen, renderer.image(frame.density)], 0 if wide else 1))
+    with atomic_path(path) as aside:
+        Pillow.fromarray(both).save(aside, format="PNG")
 
 
 def _turned(sequence: Sequence, height: int) -> list[Renderer]:

@@ -1,0 +1,177 @@
+"""The same job without a window:
+
+    blender -b shot.blend --command smokelift reconstruct [options]     where the extension is enabled
+    blender -b shot.blend -P addon/batch.py -- [options]                anywhere
+
+Settings come from the .blend; options override them. Exit status: 0 done, 2 bad input, 3 device or memory, 130
+cancelled (and resumable).
+"""
+
+import argparse
+import importlib
+import importlib.util
+import signal
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+DONE, BAD_INPUT, CANCELLED = 0, 2, 130
+POLL_SECONDS = 0.05
+
+
+def main(words: Sequence[str]) -> int:
+    """Make the smoke of the scene and return the exit status."""
+    from . import run
+    from .job import EngineMissingError, Job, engine_command
+    from .scene import ShotError
+    from .take import TakeError
+
+    try:
+        choices = _parser().parse_args(list(words))
+    except SystemExit as leaving:
+        return int(leaving.code or 0)
+    try:
+        scene = _scene(choices)
+        take = run.unfinished(scene) if choices.resume else None
+        take = take or run.begin(scene)
+        job = Job(engine_command(take.arguments()), take.log_file)
+    except (ShotError, TakeError, EngineMissingError) as error:
+        print(f"smokelift: {error}", file=sys.stderr, flush=True)
+        return BAD_INPUT
+    _wait(job)
+    if job.outcome != "done":
+        print(f"smokelift: {job.sentence}", file=sys.stderr, flush=True)
+        return CANCELLED if job.outcome == "cancelled" else (job.status or 1)
+    run.present(scene, take)
+    print(job.sentence, flush=True)
+    if choices.set_up:
+        bpy.ops.smokelift.set_up()
+    if choices.save:
+        bpy.ops.wm.save_mainfile()
+    if choices.render:
+        _render(scene, choices.render)
+    return DONE
+
+
+def _wait(job: Any) -> None:
+    """Run a job to its end and print what it says; SIGTERM and Ctrl-C cancel it."""
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    said = done = 0
+    job.start()
+    try:
+        while not job.ended:
+            try:
+                time.sleep(POLL_SECONDS)
+                if job.poll():
+                    for note in job.notes[said:]:
+                        print(note, flush=True)
+                    said = len(job.notes)
+                    if job.done > done:
+                        done = job.done
+                        print(f"frame {done} of {job.total}", flush=True)
+            except KeyboardInterrupt:
+                job.cancel()
+    finally:
+        job.kill()
+        signal.signal(signal.SIGTERM, before)
+
+
+def _scene(choices: argparse.Namespace) -> bpy.types.Scene:
+    """The scene with what the options override."""
+    from .scene import ShotError
+
+    scene = bpy.context.scene
+    settings = scene.smokelift
+    if choices.clip:
+        try:
+            settings.clip = bpy.data.movieclips.load(str(choices.clip.absolute()))
+        except RuntimeError:
+            raise ShotError(f"The clip {choices.clip} cannot be opened.") from None
+    if choices.frames:
+        settings.first, settings.last = choices.frames
+    if choices.quality:
+        settings.quality = choices.quality
+    if choices.output:
+        settings.output = str(choices.output.absolute())
+    if settings.clip is None:
+        raise ShotError("The scene has no clip for Smokelift: give one with --clip.")
+    return scene
+
+
+def _render(scene: bpy.types.Scene, path: Path) -> None:
+    """Render all frames of the smoke where the name has #### for their numbers, else the scene's current frame."""
+    scene.render.filepath = str(path.absolute())
+    if "#" not in path.name:
+        bpy.ops.render.render(write_still=True)
+        return
+    data = scene.smokelift.volume.data
+    scene.frame_start, scene.frame_end = data.frame_start, data.frame_start + data.frame_duration - 1
+    bpy.ops.render.render(animation=True)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="smokelift", description="Turn the scene's clip into a volume of smoke.")
+    parser.add_argument("--clip", type=Path, help="another clip than the scene's")
+    parser.add_argument("--frames", type=_frames, metavar="A:B", help="first and last frame of the clip, from 1")
+    parser.add_argument("--quality", choices=("draft", "balanced", "fine"))
+    parser.add_argument("--output", type=Path, help="folder for the results")
+    parser.add_argument("--resume", action="store_true", help="go on with the last unfinished run")
+    parser.add_argument("--set-up", action="store_true", help="make renders look like the clip, as Set Up Shot does")
+    parser.add_argument("--save", action="store_true", help="save the .blend with the result")
+    parser.add_argument(
+        "--render", type=Path, metavar="PICTURE", help="render the current frame, or all where the name has ####"
+    )
+    return parser
+
+
+def _frames(text: str) -> tuple[int, int]:
+    try:
+        first, last = (int(part) for part in text.split(":"))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected the first and last frame A:B, from 1") from None
+    return first, last
+
+
+def command(words: list[str]) -> int:
+    """``blender --command smokelift reconstruct ...``"""
+    if not words or words[0] != "reconstruct":
+        print("usage: blender -b shot.blend --command smokelift reconstruct [options]", file=sys.stderr)
+        return BAD_INPUT
+    return main(words[1:])
+
+
+def register() -> None:
+    """Add the command to Blender's own."""
+    register.handles = [bpy.utils.register_cli_command("smokelift", command)]
+
+
+def unregister() -> None:
+    """Take the command away. Its handle must not live on: at the end of Blender that would crash."""
+    bpy.utils.unregister_cli_command(register.handles.pop())
+
+
+def _run_as_script() -> int:
+    """Run the add-on that this script belongs to: the enabled one, or else the one that lies beside it."""
+    words = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
+    init = Path(__file__).resolve().parent / "__init__.py"
+    for module in list(sys.modules.values()):
+        file = getattr(module, "__file__", None)
+        if file and Path(file).resolve() == init and hasattr(bpy.types.Scene, "smokelift"):
+            return importlib.import_module(f"{module.__name__}.batch").main(words)
+    name = "smokelift_addon"  # not the folder's name: an extension's is the engine's
+    spec = importlib.util.spec_from_file_location(name, init, submodule_search_locations=[str(init.parent)])
+    package = sys.modules[name] = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(package)
+    package.register()
+    try:
+        return importlib.import_module(f"{name}.batch").main(words)
+    finally:
+        package.unregister()
+
+
+if __name__ == "__main__":
+    sys.exit(_run_as_script())

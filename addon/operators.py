@@ -1,0 +1,308 @@
+"""What the sidebar's buttons do."""
+
+from pathlib import Path
+
+import bpy
+from bpy.props import StringProperty
+from mathutils import Vector
+
+from . import look, run, volume
+from .scene import ShotError, box_of
+from .take import Take, TakeError, takes
+
+LOG_TEXT = "Smokelift Log"
+BOX_SHARE = 0.9
+"""Share of the picture that a new box fills."""
+
+
+class SMOKELIFT_OT_run(bpy.types.Operator):
+    """Turn the clip into a volume of smoke. Blender stays usable meanwhile"""
+
+    bl_idname = "smokelift.run"
+    bl_label = "Make Smoke"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Needs a clip."""
+        return _has_clip(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Write the shot's files and put it into the queue."""
+        try:
+            take = run.begin(context.scene)
+        except (ShotError, TakeError) as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        run.enqueue(context, context.scene, take)
+        return {"FINISHED"}
+
+
+class SMOKELIFT_OT_resume(bpy.types.Operator):
+    """Go on with the run that was stopped, from its last finished frame, with the settings that it had"""
+
+    bl_idname = "smokelift.resume"
+    bl_label = "Resume"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Needs a clip."""
+        return _has_clip(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Put the unfinished take into the queue again."""
+        take = run.unfinished(context.scene)
+        if take is None or run.busy(context.window_manager, take):
+            self.report({"ERROR"}, "There is nothing to go on with: press Make Smoke.")
+            return {"CANCELLED"}
+        run.enqueue(context, context.scene, take)
+        return {"FINISHED"}
+
+
+class SMOKELIFT_OT_cancel(bpy.types.Operator):
+    """Stop. Finished frames stay, and Resume goes on from them"""
+
+    bl_idname = "smokelift.cancel"
+    bl_label = "Stop Making Smoke?"
+    bl_options = {"INTERNAL"}
+
+    take: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Ask first, where no button was pressed."""
+        if self.take:
+            return self.execute(context)
+        return context.window_manager.invoke_confirm(self, event)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Stop one job, or the one that runs."""
+        for row in context.window_manager.smokelift.jobs:
+            if row.take == self.take or (not self.take and row.outcome == "running"):
+                row.cancel = True
+                if row.outcome == "waiting":
+                    row.outcome, row.sentence = "cancelled", "Cancelled before it began."
+        return {"FINISHED"}
+
+
+class SMOKELIFT_OT_check(bpy.types.Operator):
+    """Look at the clip, and say what will be assumed and how much time, memory and disk it will take"""
+
+    bl_idname = "smokelift.check"
+    bl_label = "Check Shot"
+    bl_options = {"INTERNAL"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Needs a clip."""
+        return _has_clip(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Have the worker look, as soon as the settings rest."""
+        state = context.window_manager.smokelift
+        state.check_scene = context.scene.session_uid
+        state.check_ticks = run.CHECK_TICKS
+        run.work(context)
+        return {"FINISHED"}
+
+
+class SMOKELIFT_OT_make_box(bpy.types.Operator):
+    """Fit the box to the camera's picture, at the distance of the 3D cursor; make it if there is none"""
+
+    bl_idname = "smokelift.make_box"
+    bl_label = "Frame Box"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Needs a camera."""
+        if context.scene.camera is None:
+            cls.poll_message_set("The scene has no camera: add one where the clip was filmed from")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Make or move the box."""
+        scene = context.scene
+        low, high = framed_box(scene)
+        box = box_of(scene)
+        if box is None:
+            box = _new_box()
+            scene.collection.objects.link(box)
+            scene.smokelift.box = box
+        box.parent = None
+        box.rotation_euler = (0.0, 0.0, 0.0)
+        box.location = (low + high) / 2
+        box.scale = (high - low) / 2
+        return {"FINISHED"}
+
+
+def framed_box(scene: bpy.types.Scene) -> tuple[Vector, Vector]:
+    """An upright box that nearly fills the camera's picture, at the 3D cursor's depth: lowest and highest corner."""
+    camera = scene.camera
+    frame = [camera.matrix_world @ corner for corner in camera.data.view_frame(scene=scene)]
+    eye = camera.matrix_world.translation
+    ahead = -camera.matrix_world.to_3x3().col[2].normalized()
+    near = (frame[0] - eye).dot(ahead)
+    depth = (scene.cursor.location - eye).dot(ahead)
+    if depth < 2 * near:  # the cursor is behind the camera, or in its lens
+        depth = 10 * near
+    if camera.data.type == "ORTHO":
+        corners = [corner + ahead * (depth - near) for corner in frame]
+    else:
+        corners = [eye + (corner - eye) * (depth / near) for corner in frame]
+    middle = sum(corners, Vector()) / 4
+    width = BOX_SHARE * (corners[0] - corners[3]).length
+    height = BOX_SHARE * (corners[0] - corners[1]).length
+    half = Vector((width, min(width, height), height)) / 2
+    return middle - half, middle + half
+
+
+def _new_box() -> bpy.types.Object:
+    mesh = bpy.data.meshes.new("Smoke Box")
+    corners = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
+    faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    mesh.from_pydata(corners, [], faces)
+    box = bpy.data.objects.new("Smoke Box", mesh)
+    box.display_type = "WIRE"
+    box.hide_render = True
+    return box
+
+
+class SMOKELIFT_OT_match_clip(bpy.types.Operator):
+    """Give the scene the clip's picture size, frame rate and length"""
+
+    bl_idname = "smokelift.match_clip"
+    bl_label = "Match Scene to Clip"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Needs a clip."""
+        return _has_clip(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Set size, rate and length."""
+        look.match_clip(context.scene)
+        return {"FINISHED"}
+
+
+class SMOKELIFT_OT_set_up(bpy.types.Operator):
+    """Make a render from the camera look like the clip."""
+
+    bl_idname = "smokelift.set_up"
+    bl_description = (
+        "Make a render from the camera look like the clip: its size and speed, the background behind the smoke, the "
+        "light that was found, Cycles, and colours as they are. The old world stays in the file"
+    )
+    bl_label = "Set Up Shot"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Needs a result."""
+        if volume.shown_take(context.scene) is None:
+            cls.poll_message_set("Make smoke first")
+            return False
+        return _has_clip(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Set everything up."""
+        take = volume.shown_take(context.scene)
+        index = take.index()
+        if index is None:
+            self.report({"ERROR"}, f"The files of the smoke in {take.directory} are gone: make it again.")
+            return {"CANCELLED"}
+        if context.scene.smokelift.camera_mode == "SCENE" and context.scene.camera is None:
+            self.report({"ERROR"}, "The scene has no camera any more: choose the one that the smoke was made for.")
+            return {"CANCELLED"}
+        look.set_up(context.scene, take, index)
+        volume.show(context.scene, take)  # the frame rate may have changed
+        return {"FINISHED"}
+
+
+class SMOKELIFT_OT_open_log(bpy.types.Operator):
+    """Show what was said during the run, in a text editor"""
+
+    bl_idname = "smokelift.open_log"
+    bl_label = "Open Log"
+
+    take: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Load the log as a text, and show it where a text editor is, or in a window of its own."""
+        log = Take(Path(self.take)).log_file
+        if not log.is_file():
+            self.report({"ERROR"}, f"There is no log at {log}: the engine never started.")
+            return {"CANCELLED"}
+        text = bpy.data.texts.get(LOG_TEXT) or bpy.data.texts.new(LOG_TEXT)
+        text.from_string(log.read_text(encoding="utf-8", errors="replace"))
+        if not bpy.app.background:
+            editor = _text_editor(context)
+            editor.text, editor.top = text, 0
+        return {"FINISHED"}
+
+
+def _text_editor(context: bpy.types.Context) -> bpy.types.Space:
+    areas = [area for window in context.window_manager.windows for area in window.screen.areas]
+    found = next((area for area in areas if area.type == "TEXT_EDITOR"), None)
+    if found is None:
+        bpy.ops.wm.window_new()
+        found = context.window_manager.windows[-1].screen.areas[0]
+        found.type = "TEXT_EDITOR"
+    return found.spaces.active
+
+
+class SMOKELIFT_OT_remove_takes(bpy.types.Operator):
+    """Delete the files of all results in the output folder but the one on show"""
+
+    bl_idname = "smokelift.remove_takes"
+    bl_label = "Delete Earlier Results?"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Needs a clip."""
+        return _has_clip(cls, context)
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Ask first."""
+        return context.window_manager.invoke_confirm(self, event)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Delete what no scene shows and nothing works on."""
+        kept = {str(take.directory) for scene in bpy.data.scenes if (take := volume.shown_take(scene))}
+        kept |= {row.take for row in context.window_manager.smokelift.jobs}
+        for take in takes(run.output_folder(context.scene)):
+            if str(take.directory) not in kept:
+                take.remove()
+        return {"FINISHED"}
+
+
+def _has_clip(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    if context.scene.smokelift.clip is None:
+        cls.poll_message_set("Choose a clip first")
+        return False
+    return True
+
+
+_CLASSES = (
+    SMOKELIFT_OT_run,
+    SMOKELIFT_OT_resume,
+    SMOKELIFT_OT_cancel,
+    SMOKELIFT_OT_check,
+    SMOKELIFT_OT_make_box,
+    SMOKELIFT_OT_match_clip,
+    SMOKELIFT_OT_set_up,
+    SMOKELIFT_OT_open_log,
+    SMOKELIFT_OT_remove_takes,
+)
+
+
+def register() -> None:
+    """Make the operators known."""
+    for cls in _CLASSES:
+        bpy.utils.register_class(cls)
+
+
+def unregister() -> None:
+    """Take them back."""
+    for cls in reversed(_CLASSES):
+        bpy.utils.unregister_class(cls)

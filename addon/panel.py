@@ -1,0 +1,244 @@
+"""The sidebar's tab Smokelift, in the 3D View and in the Movie Clip Editor."""
+
+import textwrap
+
+import bpy
+
+from . import run, volume
+from .scene import box_of, clip_path, frame_rate
+from .take import takes
+
+POINTS_A_LETTER = 6.5
+"""Mean width of a letter of Blender's interface font at scale 1; labels do not wrap by themselves."""
+
+
+class _Main:
+    bl_label = "Smokelift"
+    bl_category = "Smokelift"
+    bl_region_type = "UI"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """From the clip to the button, top to bottom."""
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        settings = context.scene.smokelift
+        layout.template_ID(settings, "clip", open="clip.open")
+        if settings.clip is None:
+            _say(
+                layout,
+                context,
+                "Choose a video or a picture sequence of smoke, filmed with a camera that stands still.",
+            )
+            return
+        _draw_clip(layout, context)
+        _draw_shot(layout, context)
+        column = layout.column()
+        column.prop(settings, "quality")
+        _draw_cost(column, context)
+        layout.prop(settings, "output", placeholder=str(run.output_folder(context.scene)))
+        _draw_run(layout, context)
+
+
+def _draw_clip(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    scene = context.scene
+    settings, clip = scene.smokelift, scene.smokelift.clip
+    if not clip_path(clip).is_file():
+        _say(layout, context, f"{clip_path(clip)} is not there: choose the clip again.", "ERROR")
+    row = layout.row(align=True)
+    row.prop(settings, "first", text="Frames")
+    row.prop(settings, "last", text="")
+    size = (scene.render.resolution_x, scene.render.resolution_y)
+    other_rate = clip.source == "MOVIE" and abs(clip.fps - frame_rate(scene)) > 0.01
+    if size != tuple(clip.size) or other_rate:
+        column = layout.column(align=True)
+        _say(
+            column,
+            context,
+            f"The clip has {clip.size[0]} x {clip.size[1]} pixels at {clip.fps:g} frames a second, "
+            f"the scene {size[0]} x {size[1]} at {frame_rate(scene):g}.",
+            "INFO",
+        )
+        column.operator("smokelift.match_clip")
+
+
+def _draw_shot(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    settings = context.scene.smokelift
+    layout.prop(settings, "plate_mode")
+    if settings.plate_mode == "FILE":
+        layout.prop(settings, "plate", text=" ")
+    layout.prop(settings, "camera_mode")
+    if settings.camera_mode == "SCENE":
+        layout.prop(settings, "box")
+        known = box_of(context.scene) is not None
+        layout.operator("smokelift.make_box", text="Frame Box" if known else "Make Box", icon="MESH_CUBE")
+    layout.prop(settings, "light_mode")
+
+
+def _draw_cost(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """What the run will take, if the engine has looked at this scene."""
+    state = context.window_manager.smokelift
+    if state.check_scene != context.scene.session_uid:
+        layout.operator("smokelift.check", icon="VIEWZOOM")
+        return
+    if state.check_error:
+        _say(layout, context, state.check_error, "ERROR")
+    elif state.check_done:
+        column = layout.column(align=True)
+        column.label(text=f"About {duration(state.seconds)}", icon="TIME")
+        column.label(text=f"{state.memory:.1f} GB of memory, up to {size(state.disk)} on disk", icon="BLANK1")
+        if state.memory > state.memory_free:
+            _say(column, context, f"Only {state.memory_free:.1f} GB are free: choose a lower quality.", "ERROR")
+    else:
+        layout.label(text="Looking at the clip", icon="TIME")
+
+
+def _draw_run(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    scene = context.scene
+    jobs = context.window_manager.smokelift.jobs
+    own = [row for row in jobs if row.scene_uid == scene.session_uid]
+    column = layout.column()
+    column.scale_y = 1.5
+    if all(row.outcome in run.ENDED for row in own):
+        begun = run.unfinished(scene)
+        if begun is not None and begun.frames():
+            column.operator("smokelift.resume", text=f"Resume after Frame {begun.frames()}", icon="FILE_REFRESH")
+            column.operator("smokelift.run", text="Make Smoke Anew", icon="PLAY")
+        else:
+            column.operator("smokelift.run", text="Make Smoke", icon="PLAY")
+    for row in jobs:
+        _draw_job(layout, context, row)
+    if volume.shown_take(scene) is not None:
+        layout.operator("smokelift.set_up", icon="CAMERA_DATA")
+
+
+def _draw_job(layout: bpy.types.UILayout, context: bpy.types.Context, row: bpy.types.PropertyGroup) -> None:
+    box = layout.box()
+    scene = run.find_scene(row)
+    if scene is not None and scene != context.scene:
+        box.label(text=scene.name, icon="SCENE_DATA")
+    if row.outcome == "waiting":
+        box.label(text="Waits for the one before", icon="SORTTIME")
+    elif row.outcome == "running":
+        box.progress(factor=row.done / row.total if row.total else 0.0, text=_progress(row))
+    else:
+        _say(box, context, row.sentence, "ERROR" if row.outcome == "failed" else "INFO")
+    if row.icon:
+        box.template_icon(icon_value=row.icon, scale=8.0)
+    if row.outcome in run.ENDED:
+        for note in filter(None, row.notes.split("\n")):
+            _say(box, context, note)
+        box.operator("smokelift.open_log", icon="TEXT").take = row.take
+    else:
+        box.operator("smokelift.cancel", text="Cancel", icon="CANCEL").take = row.take
+
+
+def _progress(row: bpy.types.PropertyGroup) -> str:
+    if row.cancel:
+        return "Stopping"
+    if not row.total:
+        return "Looking at the clip"
+    left = f", {duration(row.seconds_left)} left" if row.seconds_left >= 0.0 else ""
+    return f"Frame {row.done} of {row.total}{left}"
+
+
+def duration(seconds: float) -> str:
+    """A time in words, no finer than is honest."""
+    if seconds < 60.0:
+        return f"{max(1, round(seconds))} s"
+    minutes = round(seconds / 60.0)
+    return f"{minutes} min" if minutes < 60 else f"{minutes // 60} h {minutes % 60:02d} min"
+
+
+def size(megabytes: float) -> str:
+    """An amount of disk in words."""
+    return f"{megabytes:.0f} MB" if megabytes < 1000.0 else f"{megabytes / 1000.0:.1f} GB"
+
+
+def _say(layout: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str = "NONE") -> None:
+    """A sentence over as many lines as the sidebar's width asks for."""
+    points = context.region.width / context.preferences.system.ui_scale if context.region else 300.0
+    lines = textwrap.wrap(text, max(16, int((points - 50.0) / POINTS_A_LETTER)))
+    column = layout.column(align=True)
+    column.scale_y = 0.8
+    for number, line in enumerate(lines):
+        column.label(text=line, icon=icon if number == 0 or icon == "NONE" else "BLANK1")
+
+
+class SMOKELIFT_PT_view(_Main, bpy.types.Panel):
+    """In the 3D View."""
+
+    bl_space_type = "VIEW_3D"
+
+
+class SMOKELIFT_PT_clip(_Main, bpy.types.Panel):
+    """In the Movie Clip Editor."""
+
+    bl_space_type = "CLIP_EDITOR"
+
+
+class _Advanced:
+    bl_label = "Advanced"
+    bl_category = "Smokelift"
+    bl_region_type = "UI"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """There is nothing to set before there is a clip."""
+        return context.scene.smokelift.clip is not None
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Whatever most shots do not need."""
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        settings = context.scene.smokelift
+        row = layout.row()
+        row.active = settings.camera_mode == "SCENE"
+        row.prop(settings, "longest_side")
+        for name in ("fps", "transfer", "speed", "device", "use_medium"):
+            layout.prop(settings, name)
+        column = layout.column()
+        column.active = settings.use_medium
+        for name in ("extinction", "albedo", "anisotropy"):
+            column.prop(settings, name)
+        state = context.window_manager.smokelift
+        if state.check_scene == context.scene.session_uid and state.notes:
+            layout.label(text="{} x {} x {} voxels. Assumed:".format(*state.resolution))
+            for note in state.notes.split("\n"):
+                _say(layout, context, note)
+        layout.operator("smokelift.check", icon="VIEWZOOM")
+        earlier = len(takes(run.output_folder(context.scene)))
+        row = layout.row()
+        row.active = earlier > 1
+        row.operator("smokelift.remove_takes", text=f"Delete Earlier Results ({max(0, earlier - 1)})", icon="TRASH")
+
+
+class SMOKELIFT_PT_view_advanced(_Advanced, bpy.types.Panel):
+    """In the 3D View."""
+
+    bl_space_type = "VIEW_3D"
+    bl_parent_id = "SMOKELIFT_PT_view"
+
+
+class SMOKELIFT_PT_clip_advanced(_Advanced, bpy.types.Panel):
+    """In the Movie Clip Editor."""
+
+    bl_space_type = "CLIP_EDITOR"
+    bl_parent_id = "SMOKELIFT_PT_clip"
+
+
+_CLASSES = (SMOKELIFT_PT_view, SMOKELIFT_PT_clip, SMOKELIFT_PT_view_advanced, SMOKELIFT_PT_clip_advanced)
+
+
+def register() -> None:
+    """Make the panels known."""
+    for cls in _CLASSES:
+        bpy.utils.register_class(cls)
+
+
+def unregister() -> None:
+    """Take them back."""
+    for cls in reversed(_CLASSES):
+        bpy.utils.unregister_class(cls)

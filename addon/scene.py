@@ -1,0 +1,384 @@
+"""From the Blender scene to the engine's scene file.
+
+Everything is said in the axes of the box that holds the smoke: the engine's voxels are not turned against its
+world, so a box that is turned in Blender turns everything else the other way. Where a box stands upright, as most
+do, both worlds are the same. One Blender unit is a metre.
+"""
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import bpy
+from bpy_extras.object_utils import world_to_camera_view
+from mathutils import Matrix, Vector
+
+LONGEST_SIDE = {"draft": 64, "balanced": 96, "fine": 144}
+"""Voxels along the box's longest side, as the engine has them where it chooses the box itself."""
+
+FEWEST_VOXELS = 8
+POSES = 9
+"""Frames at which a camera that is not to move is looked at."""
+
+
+class ShotError(ValueError):
+    """A shot that cannot be run, and what to do about it, in one sentence."""
+
+
+def shot_tables(scene: bpy.types.Scene, quick: bool = False) -> dict[str, Any]:
+    """Return the tables of a scene file.
+
+    Parameters
+    ----------
+    scene
+        Its Smokelift settings say what is used of it.
+    quick
+        Take things as they are in the current frame, without a look at the others.
+
+    Raises
+    ------
+    ShotError
+        If something is missing or cannot be used.
+    """
+    settings = scene.smokelift
+    tables: dict[str, Any] = {"clip": clip_table(scene)}
+    with _at_frame(scene, scene.frame_current if quick else start_frame(scene)) as depsgraph:
+        turn = Matrix.Identity(3)
+        if settings.camera_mode == "SCENE":
+            box = box_of(scene)
+            if box is None:
+                raise ShotError("Say where the smoke is: press Make Box, and move it so that it holds the smoke.")
+            turn = box.matrix_world.to_quaternion().to_matrix()
+            camera = _camera(scene, depsgraph)
+            tables["camera"] = camera_table(scene, camera, depsgraph, turn)
+            tables["domain"] = domain_table(box, turn, settings)
+            _check_seen(scene, camera, box)
+        if settings.use_medium:
+            tables["medium"] = {key: getattr(settings, key) for key in ("extinction", "albedo", "anisotropy")}
+        if settings.light_mode == "SCENE":
+            tables["lights"] = light_tables(scene, depsgraph, turn)
+            _check_outside(tables)
+    if settings.plate_mode == "FILE":
+        tables["background"] = {"image": _existing(settings.plate, "clean plate")}
+    if settings.camera_mode == "SCENE" and not quick:
+        _check_still(scene)
+    return tables
+
+
+def options(scene: bpy.types.Scene) -> list[str]:
+    """The engine's options that are no part of the scene file."""
+    return ["--quality", scene.smokelift.quality, "--device", scene.smokelift.device]
+
+
+def turned_world(scene: bpy.types.Scene) -> Matrix:
+    """The engine's axes in Blender's world (4x4): how the result is placed."""
+    settings = scene.smokelift
+    box = box_of(scene) if settings.camera_mode == "SCENE" else None
+    return Matrix.Identity(4) if box is None else box.matrix_world.to_quaternion().to_matrix().to_4x4()
+
+
+# clip
+
+
+def clip_path(clip: bpy.types.MovieClip) -> Path:
+    """Where a clip lies."""
+    return Path(bpy.path.abspath(clip.filepath, library=clip.library))
+
+
+def clip_table(scene: bpy.types.Scene) -> dict[str, Any]:
+    """The clip and the frames of it that are used, counted from 0."""
+    settings = scene.smokelift
+    clip = settings.clip
+    if clip is None:
+        raise ShotError("Choose a clip first.")
+    path = clip_path(clip)
+    if not path.is_file():
+        raise ShotError(f"The clip {path} is not there: choose it again, or use File > External Data.")
+    count = clip.frame_duration
+    if not 1 <= settings.first <= settings.last <= count:
+        raise ShotError(f"Frames {settings.first} to {settings.last} are not in the clip: it has frames 1 to {count}.")
+    before = clip.frame_offset - 1
+    table: dict[str, Any] = {"path": str(path), "frames": [settings.first + before, settings.last + before]}
+    if settings.fps > 0.0:
+        table["fps"] = settings.fps
+    elif clip.source == "SEQUENCE":
+        table["fps"] = frame_rate(scene)
+    if settings.transfer != "AUTO":
+        table["transfer"] = settings.transfer
+    return table
+
+
+def frame_rate(scene: bpy.types.Scene) -> float:
+    """Frames a second of a scene."""
+    return scene.render.fps / scene.render.fps_base
+
+
+def start_frame(scene: bpy.types.Scene) -> int:
+    """The scene's frame in which the first used frame of the clip is seen."""
+    settings = scene.smokelift
+    return settings.clip.frame_start + settings.first - 1
+
+
+def _existing(path: str, what: str) -> str:
+    if not path:
+        raise ShotError(f"Choose the {what}, or let it be found from the clip.")
+    absolute = Path(bpy.path.abspath(path))
+    if not absolute.is_file():
+        raise ShotError(f"The {what} {absolute} is not there: choose it again.")
+    return str(absolute)
+
+
+# camera
+
+
+def camera_table(
+    scene: bpy.types.Scene, camera: bpy.types.Object, depsgraph: bpy.types.Depsgraph, turn: Matrix
+) -> dict[str, Any]:
+    """The camera as a pinhole (or orthographic) camera of the clip's size.
+
+    Parameters
+    ----------
+    scene
+        For the clip, and for the pixels' shape.
+    camera, depsgraph
+        Evaluated at the frame that counts.
+    turn
+        The engine's axes (3x3).
+    """
+    width, height = scene.smokelift.clip.size
+    render = scene.render
+    if camera.data.type not in ("PERSP", "ORTHO"):
+        raise ShotError("The camera is panoramic: choose Perspective or Orthographic in its lens settings.")
+    if not math.isclose(render.resolution_x * height, render.resolution_y * width, rel_tol=0.005):
+        raise ShotError(
+            f"The render size {render.resolution_x} x {render.resolution_y} has another shape than the clip, "
+            f"{width} x {height}: press Match Scene to Clip, or set it in the output settings."
+        )
+    axes = camera.matrix_world.to_3x3().normalized()
+    skew = max(abs(axes.col[i].dot(axes.col[j])) for i, j in ((0, 1), (0, 2), (1, 2)))
+    if skew > 1e-4 or axes.determinant() < 0.0:
+        raise ShotError("The camera is skewed or mirrored by the scale of its parents: apply their scale.")
+    pose = turn.to_4x4().inverted() @ Matrix.Translation(camera.matrix_world.translation) @ axes.to_4x4()
+    # Blender's own matrix knows every fit, shift and aspect; it sends the picture's edges to -1 and 1.
+    lens = camera.calc_matrix_camera(
+        depsgraph,
+        x=width,
+        y=height,
+        scale_x=render.pixel_aspect_x,
+        scale_y=render.pixel_aspect_y,
+    )
+    perspective = camera.data.type == "PERSP"
+    off_x, off_y = (-lens[0][2], -lens[1][2]) if perspective else (lens[0][3], lens[1][3])
+    return {
+        "type": "perspective" if perspective else "orthographic",
+        "matrix": [list(row) for row in pose],
+        "fx": lens[0][0] * width / 2,
+        "fy": lens[1][1] * height / 2,
+        "cx": (1 + off_x) * width / 2,
+        "cy": (1 - off_y) * height / 2,
+        "size": [width, height],
+    }
+
+
+def _camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> bpy.types.Object:
+    if scene.camera is None:
+        raise ShotError("The scene has no camera: add one where the clip was filmed from, or choose Guess.")
+    return scene.camera.evaluated_get(depsgraph)
+
+
+def _check_still(scene: bpy.types.Scene) -> None:
+    """Refuse a camera that moves or zooms: the engine knows still ones only."""
+    settings = scene.smokelift
+    start, length = start_frame(scene), settings.last - settings.first
+    if length == 0:
+        return
+    looks = []
+    with _at_frame(scene, start) as depsgraph:
+        for frame in sorted({start + round(step * length / (POSES - 1)) for step in range(POSES)}):
+            scene.frame_set(frame)
+            camera = _camera(scene, depsgraph)
+            looks.append((camera.matrix_world.copy(), camera.data.lens, camera.data.shift_x, camera.data.shift_y))
+    size = max(settings.box.dimensions)
+    for matrix, *lens in looks:
+        moved = (matrix.translation - looks[0][0].translation).length > 1e-3 * size
+        turned = matrix.to_quaternion().rotation_difference(looks[0][0].to_quaternion()).angle > 1e-3
+        if (
+            moved
+            or turned
+            or any(abs(a - b) > 1e-4 * max(1.0, abs(b)) for a, b in zip(lens, looks[0][1:], strict=True))
+        ):
+            raise ShotError(
+                "The camera moves during the clip, and only footage from a camera that stands still can be used: "
+                "choose frames in which it does, or stabilise the clip."
+            )
+
+
+def _check_seen(scene: bpy.types.Scene, camera: bpy.types.Object, box: bpy.types.Object) -> None:
+    """Refuse a box that lies wholly beside the picture or behind the camera."""
+    places = [world_to_camera_view(scene, camera, corner) for corner in box_corners(box)]
+    beside = (
+        all(p.z <= 0.0 for p in places),
+        all(p.x < 0.0 for p in places),
+        all(p.x > 1.0 for p in places),
+        all(p.y < 0.0 for p in places),
+        all(p.y > 1.0 for p in places),
+    )
+    if beside[0] or (any(beside) and all(p.z > 0.0 for p in places)):
+        raise ShotError("The box is not in the camera's picture: move it there, or press Frame Box.")
+
+
+# box
+
+
+def box_of(scene: bpy.types.Scene) -> bpy.types.Object | None:
+    """The box that holds the smoke; a deleted one, which the setting keeps in the file, does not count."""
+    box = scene.smokelift.box
+    return box if box is not None and box.name in scene.objects else None
+
+
+def box_corners(box: bpy.types.Object) -> list[Vector]:
+    """The eight corners of a box in the world."""
+    return [box.matrix_world @ Vector(corner) for corner in box.bound_box]
+
+
+def domain_table(box: bpy.types.Object, turn: Matrix, settings: bpy.types.PropertyGroup) -> dict[str, Any]:
+    """The box in cubic voxels, whole blocks of four of them: it grows a little, but keeps its floor."""
+    back = turn.inverted()
+    corners = [back @ corner for corner in box_corners(box)]
+    low = Vector(min(corner[axis] for corner in corners) for axis in range(3))
+    high = Vector(max(corner[axis] for corner in corners) for axis in range(3))
+    extent = high - low
+    if min(extent) <= 1e-6 * max(*extent, 1e-6):
+        raise ShotError("The box is flat: give it a width, a depth and a height.")
+    voxel = max(extent) / (settings.longest_side or LONGEST_SIDE[settings.quality])
+    counts = [max(FEWEST_VOXELS, 4 * math.ceil(length / voxel / 4 - 1e-4)) for length in extent]
+    size = [count * voxel for count in counts]
+    middle = (low + high) / 2
+    start = [middle[0] - size[0] / 2, middle[1] - size[1] / 2, low[2]]
+    return {
+        "min": start,
+        "max": [s + length for s, length in zip(start, size, strict=True)],
+        "resolution": counts,
+    }
+
+
+# lights
+
+
+def light_tables(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, turn: Matrix) -> list[dict[str, Any]]:
+    """The scene's suns and point lights, and the picture that lights its world."""
+    back = turn.inverted()
+    tables = []
+    others = []
+    for thing in scene.objects:
+        if thing.type != "LIGHT" or thing.hide_render:
+            continue
+        light = thing.data
+        matrix = thing.evaluated_get(depsgraph).matrix_world
+        if light.type == "SUN":
+            direction = back @ -matrix.to_3x3().col[2].normalized()
+            tables.append({"type": "directional", "direction": list(direction), "irradiance": sun_irradiance(light)})
+        elif light.type == "POINT":
+            position = back @ matrix.translation
+            tables.append({"type": "point", "position": list(position), "intensity": point_intensity(light)})
+        else:
+            others.append(thing.name)
+    tables += _world_tables(scene, turn)
+    if not tables:
+        unusable = f" ({', '.join(others)} cannot be used)" if others else ""
+        raise ShotError(
+            f"The scene has no sun, point light or world picture{unusable}: add one, or choose light From the Clip."
+        )
+    return tables
+
+
+def sun_irradiance(light: bpy.types.Light) -> list[float]:
+    """Irradiance (W/m2) of a sun: what Blender calls its strength is just that."""
+    return [light.energy * part for part in _emitted(light)]
+
+
+def point_intensity(light: bpy.types.Light) -> list[float]:
+    """Intensity (W/sr) of a point light: its power goes evenly into all directions."""
+    return [light.energy * part / (4 * math.pi) for part in _emitted(light)]
+
+
+def _emitted(light: bpy.types.Light) -> list[float]:
+    """Colour of a light with everything that multiplies its power; older versions lack some of it."""
+    factor = 2.0 ** getattr(light, "exposure", 0.0)
+    warmth = light.temperature_color if getattr(light, "use_temperature", False) else (1.0, 1.0, 1.0)
+    return [factor * a * b for a, b in zip(light.color, warmth, strict=True)]
+
+
+def _world_tables(scene: bpy.types.Scene, turn: Matrix) -> list[dict[str, Any]]:
+    """The equirectangular picture that is wired to the world's background, if there is one.
+
+    Its rotation is what Blender applies to a direction before it is looked up; a box that is turned adds its own.
+    """
+    world = scene.world
+    if world is None or world.node_tree is None:
+        return []
+    backgrounds = [node for node in world.node_tree.nodes if node.type == "BACKGROUND"]
+    for node in backgrounds:
+        links = node.inputs["Color"].links
+        source = links[0].from_node if links else None
+        strength = node.inputs["Strength"].default_value
+        if source is None or source.type != "TEX_ENVIRONMENT" or source.image is None or strength == 0.0:
+            continue
+        path = Path(bpy.path.abspath(source.image.filepath, library=source.image.library))
+        if source.projection != "EQUIRECTANGULAR" or path.suffix.lower() not in (".exr", ".hdr"):
+            raise ShotError(
+                f"The world's picture {source.image.name} cannot be used: it has to be an .exr or .hdr panorama."
+            )
+        if not path.is_file():
+            raise ShotError(f"The world's picture {path} is not there: choose it again, or unpack it.")
+        yaw, tilt = _yaw(_mapping(source) @ turn)
+        if tilt > 1e-3:
+            raise ShotError("The box is tilted against the world's picture: stand it upright, or choose other lights.")
+        return [
+            {"type": "environment", "image": str(path), "rotation_degrees": math.degrees(yaw), "strength": strength}
+        ]
+    return []
+
+
+def _mapping(texture: bpy.types.ShaderNode) -> Matrix:
+    """Rotation (3x3) that a Mapping node applies to directions before they are looked up."""
+    links = texture.inputs["Vector"].links
+    node = links[0].from_node if links else None
+    if node is None or node.type != "MAPPING":
+        return Matrix.Identity(3)
+    turn = node.inputs["Rotation"].default_value.to_matrix()
+    return turn.inverted() if node.vector_type == "TEXTURE" else turn
+
+
+def _yaw(turn: Matrix) -> tuple[float, float]:
+    """Angle of a rotation about Z, and how far it tilts Z (radians)."""
+    up = turn @ Vector((0.0, 0.0, 1.0))
+    return math.atan2(turn[1][0], turn[0][0]), up.angle(Vector((0.0, 0.0, 1.0)))
+
+
+def _check_outside(tables: dict[str, Any]) -> None:
+    """Refuse a point light inside the box."""
+    domain = tables.get("domain")
+    for light in tables["lights"]:
+        if domain is None or light["type"] != "point":
+            continue
+        sides = zip(domain["min"], light["position"], domain["max"], strict=True)
+        if all(low <= place <= high for low, place, high in sides):
+            raise ShotError("A point light is inside the box: move it out, or hide it from renders.")
+
+
+@contextmanager
+def _at_frame(scene: bpy.types.Scene, frame: int) -> Iterator[bpy.types.Depsgraph]:
+    """The scene as it is in a frame; afterwards it is where it was."""
+    before, fraction = scene.frame_current, scene.frame_subframe
+    if frame != before:
+        scene.frame_set(frame)
+    try:
+        layer = scene.view_layers[0]
+        layer.update()
+        yield layer.depsgraph
+    finally:
+        if scene.frame_current != before:
+            scene.frame_set(before, subframe=fraction)

@@ -1,0 +1,155 @@
+"""The same job without a window: what it says, what it leaves, and the exit status of every way to end."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import bpy
+import pytest
+from conftest import EXAMPLE, quietly
+
+from addon import batch, volume
+from addon.take import Take
+from smokelift.sequence import Sequence
+
+SCRIPT = Path(batch.__file__)
+# what ``blender -b FILE -P batch.py -- ...`` does, where there is no blender but its module
+BLENDER = """
+import runpy, sys, bpy
+bpy.ops.wm.open_mainfile(filepath=sys.argv[1])
+runpy.run_path(sys.argv[2], run_name="__main__")
+"""
+
+
+@pytest.fixture
+def saved(shot, tmp_path) -> Path:
+    """The shot as a file, small and short."""
+    settings = shot.smokelift
+    settings.first, settings.last, settings.longest_side = 27, 30, 32
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+    return tmp_path / "shot.blend"
+
+
+def command(blend: Path, *words: object) -> list[str]:
+    return [sys.executable, "-c", BLENDER, str(blend), str(SCRIPT), "--", *map(str, words)]
+
+
+def blender(blend: Path, *words: object) -> subprocess.CompletedProcess[str]:
+    """Run the script on a file."""
+    return subprocess.run(command(blend, *words), capture_output=True, text=True, check=False, timeout=300)
+
+
+def test_a_shot_from_the_command_line(saved, tmp_path) -> None:
+    """Progress on standard output, status 0, and the result in the file: the same as the panel's."""
+    done = blender(saved, "--save", "--set-up", "--render", tmp_path / "still.png")
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    assert [line for line in lines if line.startswith("frame ")][-1] == "frame 4 of 4"
+    assert any("4 frames in" in line for line in lines)
+    take = Take(saved.parent / "smokelift" / "clip" / "take_0001")
+    assert take.complete()
+    quietly(lambda: bpy.ops.wm.open_mainfile(filepath=str(saved)))
+    scene = bpy.context.scene
+    assert volume.shown_take(scene) == take
+    assert scene.smokelift.volume.data.frame_duration == 4
+    assert scene.render.engine == "CYCLES"
+    assert (tmp_path / "still.png").is_file()
+    scene.smokelift.output = str(tmp_path / "panel")
+    bpy.ops.smokelift.run()
+    ours, theirs = Sequence.open(take.directory), Sequence.open(tmp_path / "panel" / "take_0001")
+    assert ours.scene == theirs.scene
+    assert ours.settings == theirs.settings
+    for number in ours.frames:
+        assert ours.figures(number)["psnr"] == theirs.figures(number)["psnr"]
+
+
+def test_options_override_the_file(saved, tmp_path) -> None:
+    """Clip, frames, quality, folder."""
+    clip = tmp_path / "other.mp4"
+    clip.write_bytes((EXAMPLE / "clip.mp4").read_bytes())
+    words = ("--clip", clip, "--frames", "2:3", "--quality", "fine", "--output", tmp_path / "elsewhere")
+    assert blender(saved, *words).returncode == 0
+    sequence = Sequence.open(tmp_path / "elsewhere" / "take_0001")
+    assert sequence.scene.clip.path == clip
+    assert sequence.scene.clip.frames == (1, 2)
+    assert sequence.settings["quality"] == "fine"
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "said"),
+    [
+        (("--clip", "none.mp4"), 2, "none.mp4"),
+        (("--frames", "40:60"), 2, "frames 1 to 48"),
+        (("--frames", "5"), 2, "--frames"),
+        (("--quality", "best"), 2, "--quality"),
+        (("--unknown",), 2, "--unknown"),
+        (("--help",), 0, ""),
+    ],
+)
+def test_bad_input(shot, words, status, said, capsys) -> None:
+    """Status 2 and a sentence."""
+    assert batch.main(words) == status
+    captured = capsys.readouterr()
+    assert said in captured.err
+    assert "Traceback" not in captured.err
+
+
+def test_no_clip(scene, capsys) -> None:
+    """Whoever forgot it is told how to give one."""
+    assert batch.main([]) == 2
+    assert "--clip" in capsys.readouterr().err
+
+
+def test_the_command_wants_its_verb(shot, capsys) -> None:
+    """``blender --command smokelift`` alone says how it is used."""
+    assert batch.command([]) == 2
+    assert "reconstruct" in capsys.readouterr().err
+    assert batch.command(["reconstruct", "--frames", "40:60"]) == 2
+    assert "frames 1 to 48" in capsys.readouterr().err
+
+
+def test_an_engine_that_fails(shot, tmp_path, capsys) -> None:
+    """Its own status, and its own words."""
+    (tmp_path / "clip.mp4").write_bytes((EXAMPLE / "clip.mp4").read_bytes())
+    shot.smokelift.clip = bpy.data.movieclips.load(str(tmp_path / "clip.mp4"))
+    (tmp_path / "clip.mp4").write_text("not a video " * 100)
+    assert batch.main([]) == 2
+    assert "is not a video" in capsys.readouterr().err
+
+
+@pytest.fixture
+def running(saved) -> Iterator[subprocess.Popen[str]]:
+    """A run whose first frames are finished."""
+    words = command(saved, "--frames", "1:48", "--quality", "fine")
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        for line in process.stdout:
+            if line.startswith("frame 3 "):
+                break
+        yield process
+        process.kill()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGTERM to send")
+def test_cancelled_and_gone_on_with(running, saved) -> None:
+    """Status 130, finished frames stay, --resume goes on from them."""
+    running.send_signal(signal.SIGTERM)
+    _, said = running.communicate(timeout=60)
+    assert running.returncode == 130
+    assert "finished frames stay" in said
+    take = Take(saved.parent / "smokelift" / "clip" / "take_0001")
+    there = take.frames()
+    assert there >= 3
+    assert take.resumable()
+    with subprocess.Popen(
+        command(saved, "--resume"), stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+    ) as again:
+        assert again.stdout is not None
+        first = next(line for line in again.stdout if line.startswith("frame "))
+        again.send_signal(signal.SIGTERM)
+        again.communicate(timeout=60)
+    assert int(first.split()[1]) in (there, there + 1)

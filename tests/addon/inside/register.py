@@ -1,0 +1,43 @@
+"""Registering and unregistering leave nothing behind."""
+
+from __future__ import annotations
+
+import bpy
+
+import addon
+
+
+def ours() -> set[str]:
+    """Names of everything of ours that Blender knows."""
+    classes = {name for name in dir(bpy.types) if "smokelift" in name.lower()}
+    operators = {f"ops.{name}" for name in dir(bpy.ops.smokelift)}
+    places = (bpy.types.Scene, bpy.types.WindowManager, bpy.types.Object, bpy.types.MovieClip)
+    properties = {f"{place.__name__}.smokelift" for place in places if hasattr(place, "smokelift")}
+    return classes | operators | properties
+
+
+def handlers() -> int:
+    lists = [getattr(bpy.app.handlers, name) for name in dir(bpy.app.handlers)]
+    return sum(len(entries) for entries in lists if isinstance(entries, list))
+
+
+def test_nothing_is_left() -> None:
+    """No class, operator, property or handler; and it can be done again."""
+    assert {"Scene.smokelift", "ops.run", "SMOKELIFT_PT_view"} <= ours()
+    during = handlers()
+    addon.unregister()
+    assert ours() == set()
+    before = handlers()
+    addon.register()
+    assert handlers() == during >= before
+
+
+def test_names_follow_blenders_rules() -> None:
+    """Every operator has a tooltip and every setting a name and a tooltip."""
+    for name in dir(bpy.ops.smokelift):
+        kind = getattr(bpy.ops.smokelift, name).get_rna_type()
+        assert kind.description, name
+    for setting in bpy.types.Scene.bl_rna.properties["smokelift"].fixed_type.properties:
+        if setting.identifier not in ("rna_type", "name"):
+            assert setting.name and setting.description, setting.identifier
+            assert not setting.description.endswith("."), setting.identifier  # Blender adds it

@@ -1,0 +1,398 @@
+"""From the Blender scene to the scene file: against Blender's own projection, and the engine's."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+from bpy_extras.object_utils import world_to_camera_view
+from conftest import EXAMPLE, add
+from mathutils import Euler, Matrix, Vector
+
+from addon import scene as module
+from addon.scene import ShotError, shot_tables
+from addon.take import Take
+from smokelift.render.rays import project
+from smokelift.scene import Scene
+
+CORNERS = [(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (0.0, 3.0)]
+
+
+def engines(scene: bpy.types.Scene, folder: Path) -> Scene:
+    """The scene as the engine reads it, through a file."""
+    take = Take(folder / "take_0001")
+    take.begin(shot_tables(scene), [])
+    return Scene.load(take.scene_file)
+
+
+def load_clip(scene: bpy.types.Scene, path: Path) -> None:
+    scene.smokelift.clip = bpy.data.movieclips.load(str(path))
+
+
+@pytest.fixture
+def picture(shot, tmp_path):
+    """Gives the shot a clip (of one picture) of another size, and the same render size."""
+
+    def of_size(width: int, height: int) -> bpy.types.Scene:
+        image = bpy.data.images.new("picture", width, height)
+        image.filepath_raw, image.file_format = str(tmp_path / "picture.png"), "PNG"
+        image.save()
+        load_clip(shot, tmp_path / "picture.png")
+        shot.render.resolution_x, shot.render.resolution_y = width, height
+        shot.smokelift.plate_mode = "ESTIMATE"
+        return shot
+
+    return of_size
+
+
+# camera
+
+
+@pytest.mark.parametrize("size", [(256, 384), (640, 360), (300, 300)], ids=["portrait", "landscape", "square"])
+@pytest.mark.parametrize("fit", ["AUTO", "HORIZONTAL", "VERTICAL"])
+@pytest.mark.parametrize(
+    "lens",
+    [
+        {"lens": 50.0},
+        {"lens": 18.0, "sensor_width": 23.5, "sensor_height": 15.6},
+        {"lens": 35.0, "shift_x": 0.13, "shift_y": -0.21},
+        {"type": "ORTHO", "ortho_scale": 5.0, "shift_x": -0.1},
+    ],
+    ids=["plain", "small-sensor", "shifted", "orthographic"],
+)
+def test_points_fall_where_blender_sees_them(picture, tmp_path, size, fit, lens) -> None:
+    """Every fit, shift and shape of picture, to a thousandth of a pixel."""
+    scene = picture(*size)
+    data = scene.camera.data
+    data.sensor_fit = fit
+    for name, value in lens.items():
+        setattr(data, name, value)
+    agree(scene, tmp_path)
+
+
+@pytest.mark.parametrize("aspect", [(2.0, 1.0), (1.0, 1.5)])
+def test_pixels_that_are_not_square(picture, tmp_path, aspect) -> None:
+    """Anamorphic footage."""
+    scene = picture(320, 240)
+    scene.render.pixel_aspect_x, scene.render.pixel_aspect_y = aspect
+    scene.camera.data.shift_x = 0.1
+    agree(scene, tmp_path)
+
+
+def test_a_camera_that_is_turned_scaled_and_parented(picture, tmp_path) -> None:
+    """Only where it is and how it is turned counts."""
+    scene = picture(320, 240)
+    parent = add(scene, "Parent", None)
+    parent.location, parent.rotation_euler, parent.scale = (1.0, 2.0, 0.5), (0.0, 0.0, 0.3), (2.0, 2.0, 2.0)
+    scene.camera.parent = parent
+    scene.camera.matrix_world = Matrix.LocRotScale((2.0, -6.0, 3.0), Euler((1.35, 0.05, 0.3)), (3.0, 3.0, 3.0))
+    agree(scene, tmp_path)
+
+
+def test_a_clip_of_another_size_but_the_same_shape(picture, tmp_path) -> None:
+    """Renders may be smaller than the footage."""
+    scene = picture(640, 360)
+    scene.render.resolution_x, scene.render.resolution_y = 1920, 1080
+    agree(scene, tmp_path)
+
+
+def agree(scene: bpy.types.Scene, folder: Path) -> None:
+    """Compare the picture's places of the box's corners, and of points inside, in pixels of the clip."""
+    camera = engines(scene, folder).camera
+    points = np.array([*CORNERS, (0.1, 0.2, 1.1), (-0.4, 0.3, 2.0)])
+    found, _ = project(camera, points)
+    width, height = scene.smokelift.clip.size
+    assert camera.size == (width, height)
+    seen = [world_to_camera_view(scene, scene.camera, Vector(point)) for point in points]
+    wanted = np.array([(place.x * width, (1.0 - place.y) * height) for place in seen])
+    np.testing.assert_allclose(found, wanted, atol=1e-3 * max(1.0, np.abs(wanted).max() / 1000))
+
+
+def test_the_camera_of_the_clips_first_frame(shot) -> None:
+    """Wherever the playhead stands, and it stays there."""
+    shot.camera.location = (0.0, -9.0, 1.5)
+    shot.camera.keyframe_insert("location", frame=1)
+    shot.camera.location = (0.0, -7.0, 1.5)
+    shot.camera.keyframe_insert("location", frame=20)
+    shot.smokelift.first = 25
+    shot.frame_set(3)
+    assert shot_tables(shot)["camera"]["matrix"][1][3] == pytest.approx(-7.0)
+    assert shot.frame_current == 3
+
+
+# what a camera must not do
+
+
+def refusal(scene: bpy.types.Scene) -> str:
+    """The sentence with which a shot is refused."""
+    with pytest.raises(ShotError) as caught:
+        shot_tables(scene)
+    text = str(caught.value)
+    assert text.endswith(".")
+    return text
+
+
+def test_a_camera_that_moves(shot) -> None:
+    """Refused, and the playhead stays."""
+    shot.camera.keyframe_insert("location", frame=1)
+    shot.camera.location.x += 0.5
+    shot.camera.keyframe_insert("location", frame=40)
+    shot.frame_set(7)
+    assert "camera moves" in refusal(shot)
+    assert shot.frame_current == 7
+
+
+def test_a_camera_that_zooms(shot) -> None:
+    """The same."""
+    shot.camera.data.keyframe_insert("lens", frame=1)
+    shot.camera.data.lens *= 1.2
+    shot.camera.data.keyframe_insert("lens", frame=40)
+    assert "camera moves" in refusal(shot)
+
+
+def test_a_camera_that_moves_before_and_after(shot) -> None:
+    """Only the frames that are used count."""
+    for frame, x in ((1, 1.0), (10, 0.0), (20, 0.0), (30, 1.0)):
+        shot.camera.location.x = x
+        shot.camera.keyframe_insert("location", frame=frame)
+    shot.smokelift.first, shot.smokelift.last = 10, 20
+    shot_tables(shot)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        (lambda s: setattr(s, "camera", None), "no camera"),
+        (lambda s: setattr(s.camera.data, "type", "PANO"), "panoramic"),
+        (lambda s: setattr(s.render, "resolution_x", 1920), "Match Scene to Clip"),
+        (lambda s: setattr(s.smokelift, "clip", None), "Choose a clip"),
+        (lambda s: setattr(s.smokelift, "last", 49), "frames 1 to 48"),
+        (lambda s: setattr(s.smokelift, "first", 30) or setattr(s.smokelift, "last", 20), "Frames 30 to 20"),
+        (lambda s: setattr(s.smokelift, "plate", ""), "Choose the clean plate"),
+        (lambda s: setattr(s.smokelift, "plate", "//none.png"), "none.png is not there"),
+        (lambda s: setattr(s.smokelift, "box", None), "Make Box"),
+        (lambda s: setattr(s.smokelift.box, "scale", (1.0, 0.0, 1.0)), "flat"),
+        (lambda s: setattr(s.smokelift.box, "location", (30.0, 0.0, 1.5)), "not in the camera's picture"),
+        (lambda s: setattr(s.smokelift.box, "location", (0.0, -30.0, 1.5)), "not in the camera's picture"),
+        (lambda s: setattr(s.camera, "scale", (1.0, 1.0, -1.0)), "mirrored"),
+        (lambda s: setattr(s.smokelift.clip, "filepath", "//moved.mp4"), "moved.mp4 is not there"),
+        (lambda s: bpy.data.objects.remove(bpy.data.objects["Sun"]), "no sun"),
+    ],
+)
+def test_what_is_missing_is_said(shot, spoil, words) -> None:
+    """One sentence each, that says what to do."""
+    shot_tables(shot)
+    spoil(shot)
+    assert words in refusal(shot)
+
+
+# clip
+
+
+def test_frames_are_counted_from_nought(shot) -> None:
+    """Blender counts from one."""
+    shot.smokelift.first, shot.smokelift.last = 5, 9
+    table = shot_tables(shot)["clip"]
+    assert table == {"path": str(EXAMPLE / "clip.mp4"), "frames": [4, 8]}
+
+
+def test_a_new_clip_is_used_whole(shot, tmp_path) -> None:
+    """Its length is known at once."""
+    shot.smokelift.first, shot.smokelift.last = 5, 9
+    load_clip(shot, EXAMPLE / "plate.png")
+    assert (shot.smokelift.first, shot.smokelift.last) == (1, 1)
+    load_clip(shot, EXAMPLE / "clip.mp4")
+    assert (shot.smokelift.first, shot.smokelift.last) == (1, 48)
+
+
+def test_a_picture_sequence_has_the_scenes_rate(shot, tmp_path) -> None:
+    """Pictures carry none; a video's own is left to the engine; what the user says wins."""
+    for number in range(7, 12):
+        (tmp_path / f"smoke_{number:03d}.png").write_bytes((EXAMPLE / "plate.png").read_bytes())
+    load_clip(shot, tmp_path / "smoke_007.png")
+    shot.render.fps, shot.render.fps_base = 30, 1.001
+    table = shot_tables(shot)["clip"]
+    assert table["frames"] == [0, 4]
+    assert table["path"].endswith("smoke_007.png")
+    assert table["fps"] == pytest.approx(30 / 1.001)
+    shot.smokelift.fps = 120.0
+    shot.smokelift.transfer = "linear"
+    table = shot_tables(shot)["clip"]
+    assert (table["fps"], table["transfer"]) == (120.0, "linear")
+
+
+def test_paths_beside_the_blend(shot, tmp_path) -> None:
+    """// is the .blend's folder."""
+    for name in ("clip.mp4", "plate.png"):
+        (tmp_path / name).write_bytes((EXAMPLE / name).read_bytes())
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+    shot.smokelift.clip.filepath, shot.smokelift.plate = "//clip.mp4", "//plate.png"
+    tables = shot_tables(shot)
+    assert tables["clip"]["path"] == str(tmp_path / "clip.mp4")
+    assert tables["background"]["image"] == str(tmp_path / "plate.png")
+
+
+def test_guessing_leaves_camera_and_box_to_the_engine(shot, tmp_path) -> None:
+    """Then none is needed."""
+    shot.smokelift.camera_mode, shot.camera, shot.smokelift.box = "GUESS", None, None
+    tables = shot_tables(shot)
+    assert "camera" not in tables
+    assert "domain" not in tables
+    assert engines(shot, tmp_path).camera is None
+
+
+# box
+
+
+@pytest.mark.parametrize(("quality", "longest"), [("draft", 64), ("balanced", 96), ("fine", 144)])
+def test_the_box_becomes_cubes(shot, tmp_path, quality, longest) -> None:
+    """As many as the engine would choose; the box holds all of the user's, and keeps its floor."""
+    shot.smokelift.quality = quality
+    domain = engines(shot, tmp_path).domain
+    assert max(domain.resolution) == longest
+    assert all(low <= -1.0 + 1e-6 for low in domain.min[:2])
+    assert all(high >= 1.0 - 1e-6 for high in domain.max[:2])
+    assert (domain.min[2], domain.max[2]) == pytest.approx((0.0, 3.0))
+    assert domain.centre[:2] == pytest.approx((0.0, 0.0))
+
+
+def test_the_engine_has_the_same_qualities() -> None:
+    """Said twice, because the add-on imports nothing of the engine."""
+    from smokelift.settings import LONGEST_SIDE
+
+    assert dict(LONGEST_SIDE) == module.LONGEST_SIDE
+
+
+def test_a_resolution_of_ones_own(shot, tmp_path) -> None:
+    """Along the longest side."""
+    shot.smokelift.longest_side = 40
+    assert engines(shot, tmp_path).domain.resolution == (28, 28, 40)
+
+
+def test_a_turned_box_turns_everything_else(shot, tmp_path) -> None:
+    """The engine sees the same picture: points of the box, in its own axes, fall where Blender sees them."""
+    box = shot.smokelift.box
+    box.rotation_euler = (0.2, -0.1, 0.5)
+    bpy.context.view_layer.update()
+    found = engines(shot, tmp_path)
+    world = module.turned_world(shot)
+    corners = np.array([world.inverted() @ corner for corner in module.box_corners(box)])
+    low, high = corners.min(0), corners.max(0)
+    assert (np.array(found.domain.min) <= low + 1e-5).all()
+    assert (np.array(found.domain.max) >= high - 1e-5).all()
+    pixels, _ = project(found.camera, corners)
+    seen = [world_to_camera_view(shot, shot.camera, corner) for corner in module.box_corners(box)]
+    np.testing.assert_allclose(pixels, [(p.x * 256, (1 - p.y) * 384) for p in seen], atol=1e-3)
+    direction = world.to_3x3() @ Vector(found.lights[0].direction)
+    assert direction.dot(Vector((0.57, 0.46, -0.68)).normalized()) == pytest.approx(1.0)
+
+
+# lights
+
+
+def lights(scene: bpy.types.Scene) -> list[dict]:
+    bpy.context.view_layer.update()
+    return shot_tables(scene)["lights"]
+
+
+def test_a_sun(shot) -> None:
+    """Strength is irradiance; the light travels along its -Z."""
+    sun = bpy.data.objects["Sun"]
+    sun.data.color = (1.0, 0.5, 0.25)
+    sun.scale = (3.0, 3.0, 3.0)
+    (table,) = lights(shot)
+    assert table["type"] == "directional"
+    assert table["irradiance"] == pytest.approx([18.0, 9.0, 4.5])
+    assert table["direction"] == pytest.approx(list(Vector((0.57, 0.46, -0.68)).normalized()), abs=1e-6)
+
+
+def test_a_point_light(shot) -> None:
+    """Power spread evenly over all directions."""
+    lamp = add(shot, "Lamp", bpy.data.lights.new("Lamp", "POINT"))
+    lamp.location, lamp.data.energy = (2.0, -3.0, 4.0), 400.0
+    table = next(table for table in lights(shot) if table["type"] == "point")
+    assert table["position"] == pytest.approx([2.0, -3.0, 4.0])
+    assert table["intensity"] == pytest.approx([400.0 / (4 * math.pi)] * 3)
+
+
+def test_lights_that_do_not_render_are_left_out(shot) -> None:
+    """And those that the engine does not know are named if there is no other."""
+    bpy.data.objects["Sun"].hide_render = True
+    add(shot, "Window", bpy.data.lights.new("Window", "AREA"))
+    assert "Window cannot be used" in refusal(shot)
+
+
+def test_a_point_light_in_the_smoke(shot) -> None:
+    """Refused."""
+    lamp = add(shot, "Lamp", bpy.data.lights.new("Lamp", "POINT"))
+    lamp.location = (0.0, 0.0, 1.0)
+    bpy.context.view_layer.update()
+    assert "inside the box" in refusal(shot)
+
+
+@pytest.fixture
+def panorama(shot, tmp_path):
+    """A world lit by a picture; returns the picture's node."""
+    path = tmp_path / "sky.exr"
+    image = bpy.data.images.new("sky", 16, 8, float_buffer=True)
+    image.filepath_raw, image.file_format = str(path), "OPEN_EXR"
+    image.save()
+    tree = shot.world.node_tree
+    node = tree.nodes.new("ShaderNodeTexEnvironment")
+    node.image = bpy.data.images.load(str(path))
+    tree.links.new(node.outputs["Color"], tree.nodes["Background"].inputs["Color"])
+    tree.nodes["Background"].inputs["Strength"].default_value = 1.5
+    return node
+
+
+def test_a_world_picture(shot, panorama, tmp_path) -> None:
+    """With its strength."""
+    table = lights(shot)[-1]
+    assert table == {
+        "type": "environment",
+        "image": str(tmp_path / "sky.exr"),
+        "rotation_degrees": pytest.approx(0.0),
+        "strength": 1.5,
+    }
+
+
+def test_a_world_picture_that_is_turned(shot, panorama) -> None:
+    """The Mapping node's rotation is applied to the direction that is looked up; the box's comes before it."""
+    tree = shot.world.node_tree
+    mapping = tree.nodes.new("ShaderNodeMapping")
+    mapping.inputs["Rotation"].default_value[2] = math.radians(30.0)
+    tree.links.new(mapping.outputs[0], panorama.inputs["Vector"])
+    assert lights(shot)[-1]["rotation_degrees"] == pytest.approx(30.0)
+    mapping.vector_type = "TEXTURE"
+    assert lights(shot)[-1]["rotation_degrees"] == pytest.approx(-30.0)
+    shot.smokelift.box.rotation_euler[2] = math.radians(10.0)
+    assert lights(shot)[-1]["rotation_degrees"] == pytest.approx(-20.0)
+    shot.smokelift.box.rotation_euler[0] = math.radians(10.0)
+    bpy.context.view_layer.update()
+    assert "tilted" in refusal(shot)
+
+
+def test_world_pictures_that_cannot_be_used(shot, panorama) -> None:
+    """Mirror balls, pictures that are no panoramas, and files that are gone."""
+    panorama.projection = "MIRROR_BALL"
+    assert "cannot be used" in refusal(shot)
+    panorama.projection = "EQUIRECTANGULAR"
+    panorama.image.filepath = "//gone.exr"
+    assert "gone.exr is not there" in refusal(shot)
+    panorama.image.filepath = "//sky.jpg"
+    assert "cannot be used" in refusal(shot)
+
+
+# medium
+
+
+def test_a_medium_of_ones_own(shot, tmp_path) -> None:
+    """Only if asked for."""
+    assert engines(shot, tmp_path).medium is None
+    settings = shot.smokelift
+    settings.use_medium, settings.extinction, settings.albedo, settings.anisotropy = True, 7.0, 0.5, -0.25
+    medium = engines(shot, tmp_path).medium
+    assert (medium.extinction, medium.albedo, medium.anisotropy) == (7.0, 0.5, -0.25)

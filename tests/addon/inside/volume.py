@@ -1,0 +1,295 @@
+"""The result in Blender: what plays when, where it is, and what it is made of."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+from conftest import EXAMPLE, quietly
+from mathutils import Vector
+
+from addon import run, volume
+from addon.scene import box_corners
+from addon.take import Take
+from smokelift.scene import Domain, Medium, Scene
+from smokelift.scene_file import scene_to_dict
+from smokelift.vdb import write_vdb
+
+FRAMES = 6
+HALF_VOXEL_TOO_FAR = bpy.app.version < (5, 0, 0)
+
+
+def made(folder: Path, frames: int = FRAMES, fps: float = 24.0, medium: Medium | None = None, number: int = 1) -> Take:
+    """A take as the engine leaves it: smoke that fills a box in a corner of the domain, and the first frame empty."""
+    take = Take(folder / f"take_{number:04d}")
+    take.directory.mkdir(parents=True)
+    domain = Domain((-1.0, -1.0, 0.0), (1.0, 1.0, 3.0), (16, 16, 24))
+    for n in range(1, frames + 1):
+        density = np.zeros(domain.resolution, np.float32)
+        if n > 1:
+            density[10:13, 3:5, 12:14] = 1.0 + n
+        write_vdb(take.directory / f"smoke_{n:04d}.vdb", density, np.ones((*domain.resolution, 3)), domain)
+    scene = scene_to_dict(Scene(domain=domain, medium=medium or Medium(4.0, 0.8, 0.3)))
+    scene["clip"] = {"path": str(EXAMPLE / "clip.mp4"), "fps": fps}
+    index = {"complete": True, "scene": scene, "settings": {}, "frames": {str(n): {} for n in range(1, frames + 1)}}
+    (take.directory / "sequence.json").write_text(json.dumps(index))
+    return take
+
+
+def evaluated(scene: bpy.types.Scene, frame: int) -> bpy.types.Object:
+    """The smoke as it is seen in a frame, its grids loaded."""
+    scene.frame_set(frame)
+    thing = scene.smokelift.volume.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    thing.data.grids.load()
+    return thing
+
+
+def plays(scene: bpy.types.Scene, frame: int) -> int | None:
+    """Number of the file that is seen in a frame."""
+    grids = evaluated(scene, frame).data.grids
+    assert grids.error_message == ""
+    found = re.search(r"smoke_(\d{4})\.vdb$", grids.frame_filepath)
+    return int(found[1]) if found else None
+
+
+# what plays when
+
+
+def test_every_frame_has_its_file_and_nothing_plays_before_or_after(shot, tmp_path) -> None:
+    """One file a frame where the rates agree."""
+    volume.show(shot, made(tmp_path))
+    assert [plays(shot, frame) for frame in range(0, 9)] == [None, 1, 2, 3, 4, 5, 6, None, None]
+    data = shot.smokelift.volume.data
+    assert (data.frame_start, data.frame_duration, data.frame_offset) == (1, FRAMES, 0)
+    assert data.animation_data is None or not data.animation_data.drivers
+
+
+def test_part_of_a_clip_plays_where_the_clip_does(shot, tmp_path) -> None:
+    """Also if the clip starts late."""
+    shot.smokelift.first, shot.smokelift.clip.frame_start = 11, 101
+    volume.show(shot, made(tmp_path))
+    assert [plays(shot, frame) for frame in (110, 111, 116, 117)] == [None, 1, 6, None]
+
+
+@pytest.mark.parametrize(
+    ("fps", "wanted"),
+    [
+        (48, [None, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 6, 6, None]),
+        (12, [None, 1, 3, 5, None]),
+        (30, [None, 1, 1, 2, 3, 4, 5, 5, 6, None]),
+    ],
+)
+def test_in_real_time_at_another_frame_rate(shot, tmp_path, fps, wanted) -> None:
+    """A second of the clip is a second of the scene."""
+    shot.render.fps = fps
+    volume.show(shot, made(tmp_path))
+    assert [plays(shot, frame) for frame in range(len(wanted))] == wanted
+    assert shot.smokelift.volume.data.velocity_scale == 1.0
+
+
+def test_frame_by_frame_at_another_frame_rate(shot, tmp_path) -> None:
+    """As Blender plays the clip itself; motion blur follows what is seen."""
+    shot.render.fps, shot.smokelift.speed = 48, "FRAMES"
+    volume.show(shot, made(tmp_path))
+    assert [plays(shot, frame) for frame in (0, 1, 6, 7)] == [None, 1, 6, None]
+    assert shot.smokelift.volume.data.velocity_scale == pytest.approx(2.0)
+
+
+def test_changing_the_speed_leaves_no_driver(shot, tmp_path) -> None:
+    """What was right for one rate is not kept for another."""
+    take = made(tmp_path)
+    shot.render.fps = 48
+    volume.show(shot, take)
+    shot.render.fps = 24
+    volume.show(shot, take)
+    assert [plays(shot, frame) for frame in (1, 2, 6, 7)] == [1, 2, 6, None]
+
+
+def test_it_grows(shot, tmp_path) -> None:
+    """Frames are seen as soon as they are finished, in the same object."""
+    take = made(tmp_path)
+    whole = json.loads((take.directory / "sequence.json").read_text())
+    seen = []
+    for count in (0, 2, 5):
+        some = {**whole, "complete": False, "frames": {str(n): {} for n in range(1, count + 1)}}
+        (take.directory / "sequence.json").write_text(json.dumps(some))
+        thing = volume.show(shot, take)
+        seen.append(thing and (thing.name, thing.data.frame_duration))
+    assert seen == [None, ("Smoke clip.mp4", 2), ("Smoke clip.mp4", 5)]
+
+
+# where it is
+
+
+def test_grids_and_their_place(shot, tmp_path) -> None:
+    """Density and velocity, in the engine's voxels: the smoke is where the engine has it."""
+    take = made(tmp_path)
+    volume.show(shot, take)
+    thing = evaluated(shot, 3)
+    grids = {grid.name: grid for grid in thing.data.grids}
+    assert {name: grid.data_type for name, grid in grids.items()} == {"density": "FLOAT", "velocity": "VECTOR_FLOAT"}
+    voxel = 0.125
+    shift = -voxel / 2 if HALF_VOXEL_TOO_FAR else 0.0
+    # Blender knows the blocks of 8 voxels that hold something (velocity two voxels beyond the smoke); from their first
+    # voxel's centre to their last's, and since 5.0 with the half voxel around them.
+    around = 0.0 if HALF_VOXEL_TOO_FAR else voxel / 2
+    blocks = [((first - 2) // 8 * 8, (last + 2) // 8 * 8 + 7) for first, last in ((10, 12), (3, 4), (12, 13))]
+    low = np.array([-1.0, -1.0, 0.0]) + (np.array([first for first, _ in blocks]) + 0.5) * voxel
+    high = np.array([-1.0, -1.0, 0.0]) + (np.array([last for _, last in blocks]) + 0.5) * voxel
+    corners = np.array([thing.matrix_world @ Vector(corner) for corner in thing.bound_box])
+    np.testing.assert_allclose(corners.min(0), low - around + shift, atol=1e-5)
+    np.testing.assert_allclose(corners.max(0), high + around + shift, atol=1e-5)
+
+
+def test_a_turned_box_turns_the_smoke(shot, tmp_path) -> None:
+    """With the box's rotation, about the world's origin, as its scene was given."""
+    shot.smokelift.box.rotation_euler = (0.1, 0.2, 0.7)
+    bpy.context.view_layer.update()
+    thing = volume.show(shot, made(tmp_path))
+    bpy.context.view_layer.update()
+    turn = thing.matrix_world.to_quaternion().rotation_difference(shot.smokelift.box.matrix_world.to_quaternion())
+    assert turn.angle == pytest.approx(0.0, abs=1e-5)
+    assert len(box_corners(shot.smokelift.box)) == 8
+    shift = thing.matrix_world.to_3x3().inverted() @ thing.matrix_world.translation
+    assert list(shift) == pytest.approx([-0.0625] * 3 if HALF_VOXEL_TOO_FAR else [0.0] * 3, abs=1e-6)
+
+
+def test_smoke_that_was_moved_stays_where_it_was_put_while_it_grows(shot, tmp_path) -> None:
+    """Another take puts it into the shot again."""
+    first = made(tmp_path)
+    thing = volume.show(shot, first)
+    thing.location.x += 5.0
+    volume.show(shot, first)
+    assert thing.location.x == pytest.approx(5.0)
+    volume.show(shot, made(tmp_path, number=2))
+    assert thing.location.x == pytest.approx(0.0)
+
+
+# what it is made of
+
+
+def test_the_material_is_the_mediums(shot, tmp_path) -> None:
+    """Extinction, albedo and anisotropy that were fitted; clipping and velocity as the files need them."""
+    thing = volume.show(shot, made(tmp_path))
+    (material,) = thing.data.materials
+    output = next(node for node in material.node_tree.nodes if node.type == "OUTPUT_MATERIAL")
+    shader = output.inputs["Volume"].links[0].from_node
+    values = {name: shader.inputs[name].default_value for name in ("Density", "Anisotropy", "Density Attribute")}
+    assert values == {"Density": 4.0, "Anisotropy": pytest.approx(0.3), "Density Attribute": "density"}
+    assert list(shader.inputs["Color"].default_value) == pytest.approx([0.8, 0.8, 0.8, 1.0])
+    assert shader.inputs["Emission Strength"].default_value == 0.0
+    data = thing.data
+    assert (data.velocity_grid, data.velocity_unit, data.render.clipping) == ("velocity", "SECOND", 0.0)
+
+
+def test_running_again_replaces(shot, tmp_path) -> None:
+    """One object, one volume, one material, with the new values."""
+    volume.show(shot, made(tmp_path))
+    before = [len(kind) for kind in (bpy.data.objects, bpy.data.volumes, bpy.data.materials)]
+    thing = volume.show(shot, made(tmp_path, frames=3, medium=Medium(9.0, 0.5), number=2))
+    assert [len(kind) for kind in (bpy.data.objects, bpy.data.volumes, bpy.data.materials)] == before
+    assert "take_0002" in thing.data.filepath
+    assert thing.data.frame_duration == 3
+    shader = thing.data.materials[0].node_tree.nodes[volume.SHADER]
+    assert shader.inputs["Density"].default_value == 9.0
+
+
+def test_a_material_of_the_users_own_is_left_alone(shot, tmp_path) -> None:
+    """And so is what was added to ours."""
+    thing = volume.show(shot, made(tmp_path))
+    own = bpy.data.materials.new("Own")
+    thing.data.materials[0] = own
+    volume.show(shot, made(tmp_path, number=2))
+    assert thing.data.materials[0] == own
+
+
+def test_smoke_that_was_deleted_is_made_again(shot, tmp_path) -> None:
+    """Nothing refers to what is gone."""
+    thing = volume.show(shot, made(tmp_path))
+    bpy.data.objects.remove(thing)
+    assert shot.smokelift.volume is None
+    assert volume.show(shot, made(tmp_path, number=2)).name in shot.objects
+
+
+def test_smoke_that_was_unlinked_is_made_again(shot, tmp_path) -> None:
+    """As the Delete key does it."""
+    thing = volume.show(shot, made(tmp_path))
+    shot.collection.objects.unlink(thing)
+    again = volume.show(shot, made(tmp_path, number=2))
+    assert again.name in shot.objects
+
+
+# saving
+
+
+def test_it_survives_saving_and_loading(shot, tmp_path) -> None:
+    """Settings, smoke, material; the files are found relative to the .blend, also after the folder moved."""
+    home = tmp_path / "home"
+    home.mkdir()
+    bpy.ops.wm.save_as_mainfile(filepath=str(home / "shot.blend"))
+    settings = shot.smokelift
+    settings.first, settings.last, settings.quality, settings.output = 3, 8, "fine", "//out"
+    shot.render.fps = 48
+    volume.show(shot, made(home / "out"))
+    assert settings.volume.data.filepath == "//out/take_0001/smoke_0001.vdb"
+    bpy.ops.wm.save_mainfile()
+    moved = home.rename(tmp_path / "moved")
+    quietly(lambda: bpy.ops.wm.open_mainfile(filepath=str(moved / "shot.blend")))
+    scene = bpy.context.scene
+    settings = scene.smokelift
+    assert (settings.first, settings.last, settings.quality, settings.output) == (3, 8, "fine", "//out")
+    assert settings.clip.name == "clip.mp4"
+    assert settings.box.name == "Box"
+    assert volume.shown_take(scene) == Take(moved / "out" / "take_0001")
+    assert plays(scene, 5) == 1
+    assert plays(scene, 7) == 2
+    assert settings.volume.data.materials[0].node_tree.nodes[volume.SHADER].inputs["Density"].default_value == 4.0
+
+
+def test_nothing_of_the_session_is_saved(shot, tmp_path) -> None:
+    """Jobs belong to the Blender that runs them."""
+    bpy.context.window_manager.smokelift.jobs.add().take = "somewhere"
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    quietly(lambda: bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend")))
+    assert len(bpy.context.window_manager.smokelift.jobs) == 0
+
+
+# the camera that is guessed
+
+
+@pytest.mark.parametrize("size", [(256, 384), (384, 256)])
+def test_a_guessed_camera_is_made(shot, tmp_path, size) -> None:
+    """With the engine's lens and place; the scene's own camera stays the scene's."""
+    from bpy_extras.object_utils import world_to_camera_view
+
+    from smokelift.scene import Camera
+
+    own = shot.camera
+    shot.smokelift.camera_mode = "GUESS"
+    shot.render.resolution_x, shot.render.resolution_y = size
+    camera = Camera.look_at((0.0, -5.0, 1.0), (0.0, 0.0, 1.0), fov_y_degrees=30.0, size=size)
+    take = made(tmp_path)
+    index = json.loads((take.directory / "sequence.json").read_text())
+    index["scene"]["camera"] = scene_to_dict(Scene(camera=camera))["camera"]
+    (take.directory / "sequence.json").write_text(json.dumps(index))
+    for _ in range(2):
+        run.present(shot, take)
+    assert shot.camera == own
+    (thing,) = (thing for thing in shot.objects if thing.type == "CAMERA" and thing != own)
+    bpy.context.view_layer.update()
+    place = world_to_camera_view(shot, thing, Vector((0.3, 0.5, 1.4)))
+    column = camera.cx + camera.fx * 0.3 / 5.5
+    row = camera.cy - camera.fy * 0.4 / 5.5
+    assert (place.x * size[0], (1 - place.y) * size[1]) == pytest.approx((column, row), abs=1e-3)
+    assert math.isclose(thing.data.lens, camera.fx * 36 / max(size), rel_tol=1e-5)
+    shot.camera = None
+    run.present(shot, take)
+    assert shot.camera == thing
+    assert replace(camera, size=size) == camera

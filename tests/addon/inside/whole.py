@@ -1,0 +1,306 @@
+"""The whole job on the example clip, as the installed extension would run it, and renders of its result."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+from conftest import EXAMPLE, add, rendered
+
+import smokelift
+from addon import run, volume
+from addon.scene import point_intensity, shot_tables, sun_irradiance
+from addon.take import Take
+from smokelift.clip import Clip
+from smokelift.images import area_average, linear_to_srgb
+from smokelift.scene import Scene
+from smokelift.scene_file import scene_from_dict
+from smokelift.sequence import Sequence
+from smokelift.settings import Settings
+
+FIRST, LAST = 27, 30
+LONGEST = 40
+WANTED_DB = 25.0
+
+
+def psnr(found: np.ndarray, wanted: np.ndarray) -> float:
+    return float(-10 * np.log10(np.mean(np.square(found - wanted))))
+
+
+def filmed(number: int, width: int, height: int) -> np.ndarray:
+    """A frame of the clip, counted from 1, as displayed."""
+    with Clip.open(EXAMPLE / "clip.mp4") as clip:
+        return linear_to_srgb(area_average(clip.frame(number - 1), width, height))
+
+
+def make(scene: bpy.types.Scene, folder: Path) -> bpy.types.PropertyGroup:
+    """Press the button; without a window that waits for the end."""
+    settings = scene.smokelift
+    settings.first, settings.last, settings.longest_side = FIRST, LAST, LONGEST
+    settings.output = str(folder)
+    assert bpy.ops.smokelift.run() == {"FINISHED"}
+    (row,) = bpy.context.window_manager.smokelift.jobs
+    return row
+
+
+def look_alike(scene: bpy.types.Scene, folder: Path) -> tuple[float, float]:
+    """Set the shot up and render it small: dB against the clip, of the whole picture and where there is smoke."""
+    assert bpy.ops.smokelift.set_up() == {"FINISHED"}
+    scene.render.resolution_percentage = 50
+    scene.cycles.samples, scene.cycles.use_denoising = 32, False
+    scene.frame_set(LAST)
+    found = rendered(scene, folder / "render.png")
+    height, width = found.shape[:2]
+    wanted, plate = filmed(LAST, width, height), filmed(1, width, height)
+    smoke = np.abs(wanted - plate).max(-1) > 0.05
+    assert smoke.mean() > 0.05
+    return psnr(found, wanted), psnr(found[smoke], wanted[smoke])
+
+
+def test_everything_known(shot, tmp_path) -> None:
+    """Camera, box, sun and plate: frames, place and material are the engine's, and a render looks like the clip."""
+    row = make(shot, tmp_path / "out")
+    assert (row.outcome, row.done, row.total) == ("done", 4, 4)
+    sequence = Sequence.open(tmp_path / "out" / "take_0001")
+    assert sequence.complete
+    data = shot.smokelift.volume.data
+    assert (data.frame_start, data.frame_duration) == (FIRST, 4)
+    shader = data.materials[0].node_tree.nodes[volume.SHADER]
+    assert shader.inputs["Density"].default_value == pytest.approx(sequence.scene.medium.extinction)
+    whole, smoke = look_alike(shot, tmp_path)
+    assert whole > WANTED_DB + 5
+    assert smoke > WANTED_DB
+
+
+def test_light_and_background_from_the_clip(shot, tmp_path) -> None:
+    """The light that was estimated is made, the background that was estimated is shown."""
+    shot.smokelift.light_mode, shot.smokelift.plate_mode = "ESTIMATE", "ESTIMATE"
+    bpy.data.objects.remove(bpy.data.objects["Sun"])
+    make(shot, tmp_path / "out")
+    whole, smoke = look_alike(shot, tmp_path)
+    assert whole > WANTED_DB + 2
+    assert smoke > WANTED_DB - 3  # four frames of a standing plume say little about what is behind it
+
+
+def test_nothing_known_but_the_clip(scene, tmp_path) -> None:
+    """An empty scene and a clip."""
+    scene.smokelift.clip = bpy.data.movieclips.load(str(EXAMPLE / "clip.mp4"))
+    scene.smokelift.plate_mode, scene.smokelift.plate = "FILE", str(EXAMPLE / "plate.png")
+    scene.smokelift.quality = "draft"
+    row = make(scene, tmp_path / "out")
+    assert row.outcome == "done"
+    assert "Camera not given" in row.notes
+    whole, smoke = look_alike(scene, tmp_path)
+    assert (scene.render.resolution_x, scene.render.resolution_y) == (256, 384)
+    assert whole > WANTED_DB + 5
+    assert smoke > WANTED_DB
+    assert scene.camera.name == "Smokelift Camera"
+
+
+def test_setting_up_twice_changes_nothing(shot, tmp_path) -> None:
+    """No second world, light or background."""
+    make(shot, tmp_path / "out")
+    shot.smokelift.light_mode = "ESTIMATE"
+
+    def census() -> list[int]:
+        kinds = (bpy.data.worlds, bpy.data.lights, bpy.data.objects, bpy.data.images, bpy.data.cameras)
+        return [len(kind) for kind in kinds] + [
+            len(shot.camera.data.background_images),
+            len(shot.world.node_tree.nodes),
+            len(shot.world.node_tree.links),
+        ]
+
+    bpy.ops.smokelift.set_up()
+    before = census()
+    bpy.ops.smokelift.set_up()
+    assert census() == before
+    assert "World" in bpy.data.worlds  # the user's own
+
+
+def test_running_twice_makes_a_second_take_and_one_smoke(shot, tmp_path) -> None:
+    """The first take's files stay until they are asked to go."""
+    make(shot, tmp_path / "out")
+    first = shot.smokelift.volume
+    row = make(shot, tmp_path / "out")
+    assert row.take.endswith("take_0002")
+    assert shot.smokelift.volume == first
+    assert [thing for thing in shot.objects if thing.type == "VOLUME"] == [first]
+    assert volume.shown_take(shot) == Take(tmp_path / "out" / "take_0002")
+    assert Take(tmp_path / "out" / "take_0001").complete()
+    assert bpy.ops.smokelift.remove_takes() == {"FINISHED"}
+    assert not (tmp_path / "out" / "take_0001").exists()
+    assert Take(tmp_path / "out" / "take_0002").complete()
+
+
+def test_a_failure_is_a_sentence_and_a_log(shot, tmp_path) -> None:
+    """And leaves the smoke that was there."""
+    make(shot, tmp_path / "out")
+    (tmp_path / "clip.mp4").write_bytes((EXAMPLE / "clip.mp4").read_bytes())
+    shot.smokelift.clip = bpy.data.movieclips.load(str(tmp_path / "clip.mp4"))
+    (tmp_path / "clip.mp4").write_text("not a video " * 100)
+    row = make(shot, tmp_path / "out")
+    assert row.outcome == "failed"
+    assert "is not a video" in row.sentence
+    assert volume.shown_take(shot) == Take(tmp_path / "out" / "take_0001")
+    assert bpy.ops.smokelift.open_log(take=row.take) == {"FINISHED"}
+    assert "is not a video" in bpy.data.texts["Smokelift Log"].as_string()
+
+
+def test_a_look_ahead(shot, tmp_path) -> None:
+    """Time, memory, disk, and what is assumed; an impossible shot says why."""
+    bpy.ops.smokelift.check()
+    state = bpy.context.window_manager.smokelift
+    assert state.check_done
+    assert tuple(state.resolution) == (44, 44, 64)
+    assert state.seconds > 1
+    assert 0.1 < state.memory < state.memory_free
+    assert 1 < state.disk < 100
+    assert "Medium not given" in state.notes
+    shot.camera = None
+    bpy.ops.smokelift.check()
+    assert not state.check_done
+    assert "no camera" in state.check_error
+
+
+def test_going_on_with_what_was_stopped(shot, tmp_path) -> None:
+    """From the last finished frame, with the settings of then, to a complete take."""
+    settings = shot.smokelift
+    settings.first, settings.last, settings.longest_side = FIRST, LAST, LONGEST
+    settings.output = str(tmp_path / "out")
+    take = run.begin(shot)
+    stopped = Scene.load(take.scene_file)
+    with Clip.open(stopped.clip) as clip:
+        frames = smokelift.reconstruct(clip, stopped, Settings.preset("draft"), take.directory)
+        next(frames), next(frames)
+        frames.close()
+    settings.quality = "fine"
+    assert run.unfinished(shot) == take
+    assert bpy.ops.smokelift.resume() == {"FINISHED"}
+    (row,) = bpy.context.window_manager.smokelift.jobs
+    assert (row.outcome, row.done, row.total) == ("done", 4, 4)
+    assert take.complete()
+    assert settings.volume.data.frame_duration == 4
+    assert run.unfinished(shot) is None
+    with pytest.raises(RuntimeError, match="nothing to go on with"):
+        bpy.ops.smokelift.resume()
+
+
+def test_scenes_have_their_own_smoke(shot, tmp_path) -> None:
+    """Each with its own takes and its own volume."""
+    make(shot, tmp_path / "one")
+    other = bpy.data.scenes.new("Other")
+    other.smokelift.clip = shot.smokelift.clip
+    other.smokelift.quality = "draft"
+    other.smokelift.first, other.smokelift.last = FIRST, FIRST + 1
+    other.smokelift.output = str(tmp_path / "two")
+    run.enqueue(bpy.context, other, run.begin(other))
+    rows = bpy.context.window_manager.smokelift.jobs
+    assert [row.outcome for row in rows] == ["done", "done"]
+    assert volume.shown_take(shot) == Take(tmp_path / "one" / "take_0001")
+    assert volume.shown_take(other) == Take(tmp_path / "two" / "take_0001")
+    assert other.smokelift.volume.name in other.objects
+    assert other.smokelift.volume.name not in shot.objects
+
+
+# lights, as Cycles has them
+
+
+@pytest.mark.parametrize(
+    ("kind", "strength", "place"),
+    [("SUN", 3.0, (0.0, 0.0, 2.0)), ("POINT", 100.0, (0.0, 0.0, 2.0)), ("POINT", 100.0, (0.0, 0.0, 3.0))],
+)
+def test_irradiance_and_intensity_are_those_of_cycles(scene, tmp_path, kind, strength, place) -> None:
+    """A white, matt plane below the light shows its irradiance over pi."""
+    scene.render.engine = "CYCLES"
+    scene.render.resolution_x = scene.render.resolution_y = 8
+    scene.cycles.samples, scene.cycles.use_denoising, scene.cycles.max_bounces = 16, False, 0
+    mesh = bpy.data.meshes.new("Plane")
+    mesh.from_pydata([(-9, -9, 0), (9, -9, 0), (9, 9, 0), (-9, 9, 0)], [], [(0, 1, 2, 3)])
+    material = bpy.data.materials.new("White")
+    if material.node_tree is None:
+        material.use_nodes = True
+    nodes = material.node_tree.nodes
+    nodes.clear()
+    white = nodes.new("ShaderNodeBsdfDiffuse")
+    white.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
+    material.node_tree.links.new(white.outputs[0], nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
+    mesh.materials.append(material)
+    add(scene, "Plane", mesh)
+    light = add(scene, "Light", bpy.data.lights.new("Light", kind))
+    light.location, light.data.energy, light.data.color = place, strength, (1.0, 0.5, 0.25)
+    if kind == "POINT":
+        light.data.shadow_soft_size = 0.0
+    camera = scene.camera = add(scene, "Camera", bpy.data.cameras.new("Camera"))
+    camera.location, camera.data.type, camera.data.ortho_scale = (0.0, 0.0, 5.0), "ORTHO", 0.05
+    shown = rendered(scene, tmp_path / "plane.exr").mean((0, 1))
+    if kind == "SUN":
+        wanted = np.array(sun_irradiance(light.data)) / math.pi
+    else:
+        wanted = np.array(point_intensity(light.data)) / place[2] ** 2 / math.pi
+    np.testing.assert_allclose(shown, wanted, rtol=2e-3)
+
+
+def test_everything_that_makes_a_light_stronger_counts(scene) -> None:
+    """Exposure and temperature, where this Blender has them."""
+    light = bpy.data.lights.new("Sun", "SUN")
+    light.energy = 2.0
+    if not hasattr(light, "exposure"):
+        pytest.skip("this Blender's lights have no exposure")
+    light.exposure = 1.0
+    assert sun_irradiance(light) == pytest.approx([4.0, 4.0, 4.0])
+    light.use_temperature, light.temperature = True, 3000.0
+    red, _, blue = sun_irradiance(light)
+    assert red > 4.0 > blue
+
+
+@pytest.mark.parametrize("kind", ["sun", "point", "panorama"])
+def test_cycles_and_the_engine_agree_on_every_light(shot, tmp_path, kind) -> None:
+    """The same smoke in the same light, by two renderers."""
+    row = make(shot, tmp_path / "out")
+    sequence = Sequence.open(row.take)
+    bpy.data.objects["Sun"].hide_render = kind != "sun"
+    if kind == "point":
+        lamp = add(shot, "Lamp", bpy.data.lights.new("Lamp", "POINT"))
+        lamp.location, lamp.data.energy, lamp.data.shadow_soft_size = (1.5, -2.5, 2.5), 1000.0, 0.0
+    if kind == "panorama":
+        light_by_picture(shot, tmp_path)
+    bpy.context.view_layer.update()
+    tables = {**shot_tables(shot), "background": {"color": [0.0, 0.0, 0.0]}, "medium": vars(sequence.scene.medium)}
+    lit = scene_from_dict(tables)
+    wanted = smokelift.render(sequence.density(LAST - FIRST + 1), lit)
+    shot.render.engine = "CYCLES"
+    shot.cycles.samples, shot.cycles.use_denoising = 64, False
+    shot.render.resolution_percentage = 25
+    shot.smokelift.box.hide_render = True
+    shot.world.cycles_visibility.camera = False
+    shot.frame_set(LAST)
+    found = rendered(shot, tmp_path / "lit.exr")
+    wanted = area_average(wanted, found.shape[1], found.shape[0])
+    assert found.sum() == pytest.approx(wanted.sum(), rel=0.03)
+    assert np.linalg.norm(found - wanted) / np.linalg.norm(wanted) < 0.15  # most of it noise
+
+
+def light_by_picture(scene: bpy.types.Scene, folder: Path) -> None:
+    """A sky that is bright on one side, turned by 40 degrees."""
+    rows, columns = 16, 32
+    values = np.full((rows, columns, 4), 0.05, np.float32)
+    values[9:13, 4:9] = (6.0, 4.0, 2.0, 1.0)
+    image = bpy.data.images.new("sky", columns, rows, float_buffer=True)
+    image.colorspace_settings.name = "Non-Color"  # or it is written as displayed
+    image.pixels.foreach_set(values.ravel())
+    image.filepath_raw, image.file_format = str(folder / "sky.exr"), "OPEN_EXR"
+    image.save()
+    tree = scene.world.node_tree
+    texture = tree.nodes.new("ShaderNodeTexEnvironment")
+    texture.image = bpy.data.images.load(str(folder / "sky.exr"))
+    texture.interpolation = "Closest"
+    mapping = tree.nodes.new("ShaderNodeMapping")
+    mapping.inputs["Rotation"].default_value[2] = math.radians(40.0)
+    place = tree.nodes.new("ShaderNodeTexCoord")
+    tree.links.new(place.outputs["Generated"], mapping.inputs["Vector"])
+    tree.links.new(mapping.outputs[0], texture.inputs["Vector"])
+    tree.links.new(texture.outputs["Color"], tree.nodes["Background"].inputs["Color"])
+    tree.nodes["Background"].inputs["Strength"].default_value = 1.5

@@ -1,0 +1,98 @@
+"""The files of a run: numbered, never overwritten, found again."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from addon.take import Take, TakeError, new_take, takes
+
+TABLES = {"clip": {"path": "/a b/clip.mp4", "frames": [0, 9]}}
+
+
+def begun(folder: Path) -> Take:
+    take = new_take(folder)
+    take.begin(TABLES, ["--quality", "draft"])
+    return take
+
+
+def with_sequence(take: Take, frames: int, complete: bool) -> None:
+    take.directory.mkdir()
+    index = {"complete": complete, "frames": {str(n): {} for n in range(1, frames + 1)}}
+    (take.directory / "sequence.json").write_text(json.dumps(index))
+
+
+def test_takes_are_numbered_and_never_overwritten(tmp_path) -> None:
+    """The next is one above the highest, also where one was taken away or only some of its files are left."""
+    folder = tmp_path / "new" / "folder"
+    assert takes(folder) == []
+    first, second = begun(folder), begun(folder)
+    assert [take.directory.name for take in (first, second)] == ["take_0001", "take_0002"]
+    first.remove()
+    (folder / "take_0007.log").write_text("all that is left")
+    (folder / "holiday.jpg").write_text("not ours")
+    assert new_take(folder).directory.name == "take_0008"
+    assert [take.directory.name for take in takes(folder)] == ["take_0002", "take_0007"]
+
+
+def test_a_take_knows_how_the_engine_is_called(tmp_path) -> None:
+    """The scene file is there, and the arguments begin the take or go on with it."""
+    take = begun(tmp_path)
+    assert tomllib.loads(take.scene_file.read_text()) == TABLES
+    arguments = Take(take.directory).arguments()  # as another session would
+    assert arguments[:2] == ["reconstruct", str(take.scene_file)]
+    assert arguments[arguments.index("--out") + 1] == str(take.directory)
+    assert "--resume" in arguments
+    assert arguments[-2:] == ["--quality", "draft"]
+    assert arguments[arguments.index("--progress") + 1] == "json"
+
+
+def test_frames_and_completeness(tmp_path) -> None:
+    """Nothing before the engine has written, then what it wrote."""
+    take = begun(tmp_path)
+    assert (take.frames(), take.complete(), take.resumable()) == (0, False, True)
+    with_sequence(take, 3, complete=False)
+    assert (take.frames(), take.complete(), take.resumable()) == (3, False, True)
+    (take.directory / "sequence.json").write_text('{"complete": true, "frames": {"1": {}}}')
+    assert (take.frames(), take.complete(), take.resumable()) == (1, True, False)
+    (take.directory / "sequence.json").write_text("half a fi")
+    assert (take.frames(), take.complete()) == (0, False)
+
+
+@pytest.mark.parametrize("lost", ["scene_file", "request_file"])
+def test_a_take_without_its_files_is_not_gone_on_with(tmp_path, lost) -> None:
+    """Somebody tidied up."""
+    take = begun(tmp_path)
+    getattr(take, lost).unlink()
+    assert not take.resumable()
+
+
+@pytest.mark.parametrize("damage", ["", "{", "[]", '{"options": 3}', "{}"])
+def test_a_damaged_request_is_said(tmp_path, damage) -> None:
+    """With the file's name and what to do."""
+    take = begun(tmp_path)
+    take.request_file.write_text(damage)
+    with pytest.raises(TakeError, match=r"take_0001\.json is missing or damaged: run the shot anew"):
+        take.arguments()
+
+
+def test_a_folder_that_cannot_be_written_to(tmp_path) -> None:
+    """One sentence with the folder."""
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(TakeError, match=r"file cannot be written to.*choose another output folder"):
+        Take(tmp_path / "file" / "take_0001").begin(TABLES, [])
+
+
+def test_removing_takes_all_files_of_one_take(tmp_path) -> None:
+    """And none of another."""
+    first, second = begun(tmp_path), begun(tmp_path)
+    for take in (first, second):
+        with_sequence(take, 1, complete=True)
+        take.log_file.write_text("log")
+        take.picture_file.write_text("picture")
+    first.remove()
+    assert {path.name[:9] for path in tmp_path.iterdir()} == {"take_0002"}
+    assert second.frames() == 1

@@ -1,0 +1,144 @@
+"""The extension in a real Blender, 4.3.2 from Debian trixie, without a window and with one.
+
+It runs in a Debian root in a folder of its own, which is kept between runs. Always without a network.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from engine_wheels import ROOT
+from smokelift.clip import Clip
+from smokelift.images import area_average, linear_to_srgb
+from tests.blender.setting import LIFECYCLE, WORK, ZIP, pytest_words, run, unavailable, user_folder, variables
+
+SCRIPTS = ROOT / "tests" / "blender" / "root"
+PLACE = Path(os.environ.get("SMOKELIFT_BLENDER_ROOT", Path.home() / ".cache" / "smokelift-tests" / "trixie"))
+"""The Debian root; 1.2 GB."""
+
+FIRST, LAST = 19, 30
+LONGEST_SIDE = 48
+WANTED_DB = 25.0
+
+
+@pytest.fixture(scope="module")
+def root() -> Path:
+    """The Debian root, built unless it is there, made by the same script."""
+    script = SCRIPTS / "make.sh"
+    stamp = PLACE / "made-by"
+    recipe = hashlib.sha256(script.read_bytes()).hexdigest()
+    if not sys.platform.startswith("linux") or os.geteuid() != 0:
+        unavailable("it takes root on Linux to build a Debian root and to enter it: run make test-blender as root")
+    if stamp.is_file() and stamp.read_text() == recipe:
+        return PLACE
+    if shutil.which("mmdebstrap") is None:
+        if shutil.which("apt-get") is None:
+            unavailable("mmdebstrap was not found: install it, and run make test-blender again")
+        quiet = {"check": True, "stdout": subprocess.DEVNULL}
+        subprocess.run(["apt-get", "update", "-q"], **quiet)
+        subprocess.run(["apt-get", "install", "-yq", "--no-install-recommends", "mmdebstrap"], **quiet)
+    done = subprocess.run([script, PLACE], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    if done.returncode != 0:
+        unavailable(f"the Debian root could not be built: {done.stdout.strip()[-2000:]}")
+    stamp.write_text(recipe)
+    return PLACE
+
+
+def inside(root: Path, folder: Path, *command: str | Path) -> str:
+    """Run a command in the Debian root, with the repository at its own path; returns what it said."""
+    words = [f"{name}={value}" for name, value in variables(folder).items()]
+    return run([str(SCRIPTS / "enter.sh"), str(root), str(ROOT), "env", *words, *map(str, command)])
+
+
+@pytest.fixture(scope="module")
+def installed(root) -> Path:
+    """The folder of a user who has installed the zip on the command line."""
+    folder = user_folder("debian")
+    install = ("--command", "extension", "install-file", "--repo", "user_default", "--enable", ZIP)
+    inside(root, folder, "blender", "-b", *install)
+    return folder
+
+
+def test_from_install_to_uninstall(root) -> None:
+    """The whole story of `inside`, in a Blender that is no module."""
+    folder = user_folder("debian-story")
+    run_pytest = LIFECYCLE.with_name("run_pytest.py")
+    inside(root, folder, "blender", "-b", "--python", run_pytest, "--", *pytest_words(LIFECYCLE, folder))
+
+
+def test_command_makes_smoke_that_renders_like_the_clip(root, installed) -> None:
+    """``blender -b shot.blend --command smokelift reconstruct``, and a Cycles render from the clip's camera."""
+    blend = installed / "plume" / "shot.blend"
+    make_shot = ("--python", SCRIPTS / "make_shot.py", "--", blend, FIRST, LAST, LONGEST_SIDE)
+    # what installing says of its success cannot be trusted: this fails if the add-on is not enabled
+    inside(root, installed, "blender", "-b", "--python-exit-code", "1", *make_shot)
+    picture = blend.with_name("render.png")
+    command = ("--command", "smokelift", "reconstruct", "--set-up", "--save", "--render", picture)
+    said = inside(root, installed, "blender", "-b", blend, *command)
+    frames = LAST - FIRST + 1
+    assert f"frame {frames} of {frames}" in said
+    found = np.asarray(Image.open(picture).convert("RGB"), np.float32) / 255
+    with Clip.open(ROOT / "examples" / "plume" / "clip.mp4") as clip:
+        height, width = found.shape[:2]
+        wanted, plate = (linear_to_srgb(area_average(clip.frame(number), width, height)) for number in (LAST - 1, 0))
+    smoke = np.abs(wanted - plate).max(-1) > 0.05
+    assert smoke.mean() > 0.05
+    assert psnr(found, wanted) > WANTED_DB + 5
+    assert psnr(found[smoke], wanted[smoke]) > WANTED_DB
+
+
+def psnr(found: Any, wanted: Any) -> float:
+    return float(-10 * np.log10(np.mean(np.square(found - wanted))))
+
+
+def test_window(root, installed) -> None:
+    """The tab is drawn, a click on the button runs the job beside a Blender that goes on, and smoke appears."""
+    pictures = WORK / "pictures"
+    shutil.rmtree(pictures, ignore_errors=True)
+    pictures.mkdir()
+    inside(root, installed, SCRIPTS / "window.sh", pictures, FIRST, LAST, LONGEST_SIDE)
+    report = json.loads((pictures / "report.json").read_text())
+    assert "failure" not in report, report["failure"]
+    print(json.dumps(report, indent=1))
+    frames = LAST - FIRST + 1
+    for name in ("view_3d", "clip_editor"):
+        seen = report[name]
+        assert seen["outcome"] == "done"
+        assert seen["progress"][-1] == frames
+        assert len(seen["progress"]) > 3, "the count did not move while the job ran"
+        stages = ("closed", "idle", "running", "done")
+        closed, idle, running, done = (load(pictures / f"{name}_{stage}.png") for stage in stages)
+        for picture in (closed, idle, running, done):
+            assert picture.std() > 10, "the screen is blank"
+        assert change(closed, idle, seen["sidebar"]) > 2, "the tab looks like the one before it"
+        assert change(idle, running, seen["sidebar"]) > 2, "no progress is to be seen"
+        assert change(running, done, seen["sidebar"]) > 1, "the end is not to be seen"
+        if name == "view_3d":
+            assert seen["seconds_to_first_drawing"] < seen["seconds"], "no smoke was drawn before the end"
+            x, y, width, height = report["viewport"]
+            middle = [x + width // 3, y + height // 4, width // 4, height // 2]  # the camera's picture
+            assert change(idle, done, middle) > 1, "no smoke is to be seen"
+    assert report["volumes"] == 1, "the second run did not replace the first"
+    assert change(load(pictures / "view_3d_done.png"), load(pictures / "rendered.png"), middle) > 10
+
+
+def load(path: Path) -> Any:
+    return np.asarray(Image.open(path).convert("L"), np.float32)
+
+
+def change(before: Any, after: Any, region: list[int]) -> float:
+    """Mean difference of two pictures in a region (grey levels of 255)."""
+    x, y, width, height = region
+    rows, columns = slice(y, y + height), slice(x, x + width)
+    return float(np.abs(after[rows, columns] - before[rows, columns]).mean())

@@ -1,0 +1,261 @@
+"""The extension's life in a Blender that has nothing of it: installed from its zip, used, disabled, removed.
+
+The tests are one story and run in this order. Whatever they need beyond the zip would be a fault: there is no other
+engine here, and no network.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Vector
+
+from tests.example_shot import EXAMPLE, set_up_example
+
+ZIP = Path(os.environ["SMOKELIFT_ZIP"])
+MODULE = "bl_ext.user_default.smokelift"
+FIRST, LAST = 21, 32
+FRAMES = LAST - FIRST + 1
+LONGEST_SIDE = 32
+
+# The engine knows best where its smoke is; it runs in a process of its own here too.
+_CORNERS = """
+import sys
+sys.path.insert(0, sys.argv[1])
+import json, numpy as np
+from pathlib import Path
+from smokelift import Sequence
+sequence = Sequence.open(Path(sys.argv[2]))
+domain = sequence.scene.domain
+answer = {}
+for number in sequence.frames:
+    places = np.argwhere(sequence.density(number) > 0)
+    low = np.array(domain.min) + places.min(0) * domain.voxel_size
+    high = np.array(domain.min) + (places.max(0) + 1) * domain.voxel_size
+    answer[number] = [low.tolist(), high.tolist(), float(sequence.density(number).astype(float).sum())]
+print(json.dumps(answer))
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where the .blend is saved, and the takes beside it."""
+    return tmp_path_factory.mktemp("shot")
+
+
+def site() -> Path:
+    """Where Blender unpacks wheels."""
+    name = f"python{sys.version_info.major}.{sys.version_info.minor}"
+    return Path(os.environ["BLENDER_USER_RESOURCES"], "extensions", ".local", "lib", name, "site-packages")
+
+
+def extension() -> Path:
+    return Path(os.environ["BLENDER_USER_RESOURCES"], "extensions", "user_default", "smokelift")
+
+
+def corners(take: Path) -> dict[int, Any]:
+    """Lowest and highest corner of every frame's smoke (m) and its mass, as the engine reads its files."""
+    command = [sys.executable, "-I", "-c", _CORNERS, str(site()), str(take)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return {int(number): corner for number, corner in json.loads(done.stdout.splitlines()[-1]).items()}
+
+
+def shown(scene: bpy.types.Scene) -> bpy.types.Object:
+    """The one object that shows smoke."""
+    (thing,) = [thing for thing in scene.objects if thing.type == "VOLUME"]
+    return thing
+
+
+def take_of(thing: bpy.types.Object) -> Path:
+    return Path(bpy.path.abspath(thing.data.filepath)).parent
+
+
+def batch(blend: Path, *words: str) -> list[str]:
+    """A command that runs the add-on on a file without a window, in a Blender of its own."""
+    if not bpy.app.module:
+        return [bpy.app.binary_path, "-b", str(blend), "--command", "smokelift", "reconstruct", *words]
+    start = f"""
+import sys, bpy
+bpy.ops.preferences.addon_enable(module={MODULE!r})
+bpy.ops.wm.open_mainfile(filepath={str(blend)!r})
+from {MODULE} import batch
+sys.exit(batch.main(sys.argv[1:]))
+"""
+    return [sys.executable, "-c", start, *words]
+
+
+def test_installs_from_disk() -> None:
+    """The zip is all that is needed, and Blender's own numpy stays the only one."""
+    assert not extension().exists()
+    assert bpy.ops.extensions.package_install_files(filepath=str(ZIP), repo="user_default", enable_on_install=True) == {
+        "FINISHED"
+    }
+    assert MODULE in bpy.context.preferences.addons
+    assert (site() / "taichi").is_dir()
+    assert not (site() / "numpy").exists()
+    assert Path(extension(), "LICENSE").is_file()
+    bpy.ops.wm.save_userpref()
+
+
+def test_engine_runs_with_blenders_numpy() -> None:
+    """Started as the add-on starts it, the engine finds its libraries, an OpenVDB module and Blender's numpy."""
+    from bl_ext.user_default.smokelift.job import engine_command
+
+    # it ends with its standard input, so that has to stay open
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
+    with subprocess.Popen(engine_command(["doctor"]), text=True, **pipes) as engine:
+        said = engine.stdout.read()
+        assert engine.wait() == 0, said
+    assert f"numpy {np.__version__}" in said
+    assert "OpenVDB: missing" not in said
+
+
+def test_makes_smoke(folder) -> None:
+    """The example becomes a Volume with the engine's grids, frames, place and material."""
+    bpy.ops.wm.read_homefile(use_empty=True)
+    scene = set_up_example(bpy.context.scene)
+    scene.smokelift.longest_side = LONGEST_SIDE
+    scene.smokelift.first, scene.smokelift.last = FIRST, LAST
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "shot.blend"))
+    assert bpy.ops.smokelift.run() == {"FINISHED"}
+    thing = shown(scene)
+    volume = thing.data
+    index = json.loads((take_of(thing) / "sequence.json").read_text())
+    assert index["complete"] and len(index["frames"]) == FRAMES
+    assert volume.is_sequence and volume.frame_duration == FRAMES
+    assert volume.frame_start == scene.smokelift.clip.frame_start + FIRST - 1
+    assert volume.velocity_unit == "SECOND" and volume.velocity_grid == "velocity"
+    assert volume.render.clipping == 0.0
+    node = next(node for node in thing.active_material.node_tree.nodes if node.type == "PRINCIPLED_VOLUME")
+    medium = index["scene"]["medium"]
+    assert node.inputs["Density"].default_value == pytest.approx(medium["extinction"])
+    assert node.inputs["Color"].default_value[:3] == pytest.approx([medium["albedo"]] * 3)
+    assert node.inputs["Anisotropy"].default_value == pytest.approx(medium["anisotropy"])
+    bpy.ops.wm.save_mainfile()
+
+
+def test_smoke_is_where_the_engine_put_it() -> None:
+    """In every frame Blender's voxels lie in the world where the engine's do, and its bounds hold the smoke."""
+    scene = bpy.context.scene
+    thing = shown(scene)
+    take = take_of(thing)
+    domain = json.loads((take / "sequence.json").read_text())["scene"]["domain"]
+    voxel = (domain["max"][2] - domain["min"][2]) / domain["resolution"][2]
+    expected = corners(take)
+    assert sorted(expected) == list(range(1, FRAMES + 1))
+    for number, (low, high, mass) in expected.items():
+        assert mass > 0.0
+        scene.frame_set(thing.data.frame_start + number - 1)
+        thing.data.grids.load()
+        assert {grid.name for grid in thing.data.grids} == {"density", "velocity"}
+        assert Path(bpy.path.abspath(thing.data.grids.frame_filepath)).name == f"smoke_{number:04d}.vdb"
+        assert not thing.data.grids.error_message
+        (density,) = [grid for grid in thing.data.grids if grid.name == "density"]
+        first = thing.matrix_world @ density.matrix_object @ Vector((0.0, 0.0, 0.0))
+        # before 5.0 Cycles takes a voxel's corner for its centre, and the add-on makes up for it
+        centre = 0.0 if bpy.app.version < (5, 0, 0) else voxel / 2
+        assert list(first) == pytest.approx([edge + centre for edge in domain["min"]], abs=1e-4)
+        places = [thing.matrix_world @ Vector(corner) for corner in thing.evaluated_get(depsgraph()).bound_box]
+        # Blender's bounds go round all voxels that are stored, which are more than those with smoke
+        for axis in range(3):
+            least, most = min(p[axis] for p in places), max(p[axis] for p in places)
+            assert domain["min"][axis] - 0.51 * voxel < least < low[axis] + 1.01 * voxel
+            assert high[axis] - 1.01 * voxel < most < domain["max"][axis] + 0.51 * voxel
+
+
+def depsgraph() -> bpy.types.Depsgraph:
+    return bpy.context.evaluated_depsgraph_get()
+
+
+def test_file_can_be_loaded_again(folder) -> None:
+    """Settings, result and material come back with the .blend, also from another place."""
+    moved = folder.with_name(folder.name + "_moved")
+    folder.rename(moved)
+    try:
+        bpy.ops.wm.read_homefile(use_empty=True)
+        bpy.ops.wm.open_mainfile(filepath=str(moved / "shot.blend"))
+        scene = bpy.context.scene
+        settings = scene.smokelift
+        assert (settings.last, settings.longest_side, settings.quality) == (LAST, LONGEST_SIDE, "draft")
+        assert settings.box.name == "Box" and settings.clip is not None and settings.volume == shown(scene)
+        scene.frame_set(shown(scene).data.frame_start)
+        assert shown(scene).data.grids.load()
+        assert take_of(shown(scene)).is_relative_to(moved)
+    finally:
+        bpy.ops.wm.read_homefile(use_empty=True)
+        moved.rename(folder)
+
+
+def test_cancel_keeps_frames_and_resume_ends_the_same(folder) -> None:
+    """In a Blender without a window: SIGTERM after the first frame, then --resume, gives what one go gave."""
+    blend = folder / "shot.blend"
+    words = ["--output", str(folder / "again")]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
+    with subprocess.Popen(batch(blend, *words), text=True, **pipes) as process:
+        said = []
+        for line in process.stdout:
+            said.append(line)
+            if re.match("frame [1-9]", line):
+                process.terminate()
+                break
+        said += process.stdout.readlines()
+        assert process.wait() == 130, "".join(said)
+    assert any("finished frames stay" in line for line in said)
+    take = folder / "again" / "take_0001"
+    index = json.loads((take / "sequence.json").read_text())
+    assert 1 <= len(index["frames"]) < FRAMES and not index["complete"]
+
+    done = subprocess.run(batch(blend, "--resume", *words), capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert f"frame {FRAMES} of {FRAMES}" in done.stdout
+    bpy.ops.wm.open_mainfile(filepath=str(blend))
+    assert corners(take) == corners(take_of(shown(bpy.context.scene)))
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        (["--clip", "nowhere.mp4"], "nowhere.mp4"),
+        (["--clip", str(EXAMPLE / "README.md")], "README.md"),
+        (["--frames", "5:500"], "5 to 500"),
+        (["--output", "/proc/nowhere"], "/proc/nowhere"),
+    ],
+)
+def test_bad_input_is_one_sentence(folder, words, reason) -> None:
+    """Exit status 2 and one sentence that names what is wrong; nothing else on standard error from us."""
+    done = subprocess.run(batch(folder / "shot.blend", *words), capture_output=True, text=True)
+    assert done.returncode == 2, done.stdout + done.stderr
+    (sentence,) = [line for line in done.stderr.splitlines() if line.startswith("smokelift: ")]
+    assert reason in sentence and sentence.endswith(".")
+    assert "Traceback" not in done.stderr
+
+
+def test_disabling_leaves_nothing() -> None:
+    """No property, operator, class or handler is left."""
+    bpy.ops.preferences.addon_disable(module=MODULE)
+    assert not hasattr(bpy.types.Scene, "smokelift") and not hasattr(bpy.types.WindowManager, "smokelift")
+    assert not dir(bpy.ops.smokelift)
+    assert not [name for name in dir(bpy.types) if "smokelift" in name.lower()]
+    lists = [getattr(bpy.app.handlers, name) for name in dir(bpy.app.handlers)]
+    assert not [f for entries in lists if isinstance(entries, list) for f in entries if MODULE in f.__module__]
+
+
+def test_uninstalling_leaves_nothing() -> None:
+    """Files and wheels are gone, and Blender still has its numpy."""
+    repositories = bpy.context.preferences.extensions.repos
+    place = next(i for i, repository in enumerate(repositories) if repository.module == "user_default")
+    assert bpy.ops.extensions.package_uninstall(repo_index=place, pkg_id="smokelift") == {"FINISHED"}
+    assert not extension().exists()
+    left = {path.name for path in site().iterdir()} if site().is_dir() else set()
+    assert not left & {"smokelift", "taichi", "scipy", "av"}, left
+    assert np.zeros(1).size == 1

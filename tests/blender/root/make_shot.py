@@ -1,0 +1,23 @@
+"""Save the example as a .blend beside its clip: ``blender -b --python make_shot.py -- FILE FIRST LAST LONGEST_SIDE``."""
+
+import shutil
+import sys
+from pathlib import Path
+
+import bpy
+
+sys.path.insert(0, str(Path(__file__).parents[3]))
+from tests.example_shot import EXAMPLE, set_up_example
+
+file, first, last, longest_side = sys.argv[sys.argv.index("--") + 1 :]
+folder = Path(file).parent
+shutil.copytree(EXAMPLE, folder)
+for thing in list(bpy.data.objects):
+    bpy.data.objects.remove(thing)
+scene = set_up_example(bpy.context.scene, folder)
+scene.smokelift.first, scene.smokelift.last = int(first), int(last)
+scene.smokelift.longest_side = int(longest_side)
+scene.frame_set(int(last))
+scene.render.resolution_percentage = 50
+scene.cycles.samples, scene.cycles.use_denoising = 32, False
+bpy.ops.wm.save_as_mainfile(filepath=file)

@@ -1,0 +1,61 @@
+"""Where the tests in Blenders find things, and how they are run there."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from engine_wheels import ROOT
+
+ZIP = Path(os.environ.get("SMOKELIFT_ZIP", ROOT / "dist" / "missing"))
+WORK = ROOT / "build" / "test-blender"
+"""Everything that the tests leave; pictures and figures are meant to be looked at."""
+
+LIFECYCLE = ROOT / "tests" / "blender" / "inside" / "lifecycle.py"
+
+
+def unavailable(reason: str) -> None:
+    """Leave a test out, with the reason; fail it where a Blender that cannot be had is not to be excused."""
+    if os.environ.get("SMOKELIFT_REQUIRE_BLENDER"):
+        pytest.fail(reason)
+    pytest.skip(reason)
+
+
+def user_folder(name: str) -> Path:
+    """A new folder for a Blender's settings and extensions; without these in it Blender would use the user's own."""
+    folder = WORK / name
+    shutil.rmtree(folder, ignore_errors=True)
+    for within in ("config", "scripts", "extensions", "datafiles"):
+        (folder / within).mkdir(parents=True)
+    return folder
+
+
+def variables(folder: Path) -> dict[str, str]:
+    """What a Blender and the tests in it need to know."""
+    return {"BLENDER_USER_RESOURCES": str(folder), "SMOKELIFT_ZIP": str(ZIP), "PYTHONDONTWRITEBYTECODE": "1"}
+
+
+def pytest_words(file: Path, folder: Path, imports: Sequence[Path] = (ROOT,)) -> list[str]:
+    """Arguments for the pytest in a Blender: what to run, where to leave files, and where to import from."""
+    words = ["-q", "-p", "no:cacheprovider", "-c", str(ROOT / "pyproject.toml"), "--basetemp", str(folder / "tmp")]
+    return [*words, "-o", f"pythonpath={' '.join(map(str, imports))}", str(file)]
+
+
+def run(command: Sequence[str], environment: dict[str, str] | None = None) -> str:
+    """Run a command to its good end and return what it said."""
+    # from elsewhere than the sources, which would be imported by accident
+    done = subprocess.run(
+        command,
+        cwd=WORK,
+        env=os.environ | (environment or {}),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+    assert done.returncode == 0, f"status {done.returncode} of {' '.join(command)}\n{done.stdout[-20_000:]}"
+    return done.stdout

