@@ -1,4 +1,4 @@
-"""Save the example as a .blend beside its clip: ``blender -b --python make_shot.py -- FILE FIRST LAST LONGEST_SIDE``."""
+"""Save the example as a .blend beside its clip: ``blender -b --python make_shot.py -- FILE FIRST LAST SIDE``."""
 
 import shutil
 import sys
