@@ -311,3 +311,11 @@ def test_a_scene_without_camera_or_domain_is_refused(small, missing) -> None:
     """There is nothing to reconstruct into, or from."""
     with pytest.raises(ValueError, match="camera and a domain"):
         reconstruct_density(np.zeros((42, 30, 3), np.float32), replace(small, **{missing: None}))
+
+
+def test_density_holds_no_traces(plume):
+    """A voxel has smoke that a picture can show, or none: denormal numbers differ from process to process."""
+    scene = plume.scene
+    picture = render(plume.densities[0], scene)
+    values = reconstruct_density(picture, scene).values
+    assert (values[values > 0] >= 1e-20).all()

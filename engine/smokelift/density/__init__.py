@@ -30,6 +30,10 @@ from smokelift.scene import Camera, Domain, Medium, Scene
 __all__ = ["Density", "DensitySettings", "depth_guess", "reconstruct_density"]
 
 
+TRACE = 1e-20
+"""Density below which a voxel is empty."""
+
+
 @dataclass(frozen=True)
 class DensitySettings:
     """How a density is fitted to a picture.
@@ -139,7 +143,9 @@ def reconstruct_density(
     )  # fmt: skip
     final = descend(renderer, image, fit.density, hull, weight, enough, settings.descent_iterations, settings.tolerance)
     return Density(
-        final.density, hull, _figures(final.loss, int(counts.sum()), fit.iterations + final.iterations, hull)
+        _without_traces(final.density),
+        hull,
+        _figures(final.loss, int(counts.sum()), fit.iterations + final.iterations, hull),
     )
 
 
@@ -174,7 +180,9 @@ def _paper(image: Image, background: Image, scene: Scene, initial: Volume | None
     fit = fit_paper(renderers, image, start, fog, settings.paper_rate, 1e-4, settings.descent_iterations)
     loss = float(np.sum(np.square(renderers[0].image(fit.density) - image, dtype=np.float64)))
     everywhere = np.ones(domain.resolution, np.bool_)
-    return Density(fit.density, everywhere, _figures(loss, image.size // 3, fit.iterations, everywhere))
+    return Density(
+        _without_traces(fit.density), everywhere, _figures(loss, image.size // 3, fit.iterations, everywhere)
+    )
 
 
 def _optical_depth(image: Image, background: Image, source: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -183,6 +191,15 @@ def _optical_depth(image: Image, background: Image, source: NDArray[np.float64])
     power = np.sum(contrast**2, -1)
     clear = np.sum((image - source) * contrast, -1) / np.maximum(power, 1e-12)
     return np.asarray(-np.log(np.clip(clear, 0.05, 1.0)))
+
+
+def _without_traces(density: Volume) -> Volume:
+    """The density without what no picture can show.
+
+    Numbers near the end of float32's range are 0 to a processor that flushes them, and libraries switch that on or off
+    for a whole process: a resumed run would not be the same to the bit.
+    """
+    return np.where(density < TRACE, np.float32(0), density)
 
 
 def _clean_plate(scene: Scene, camera: Camera) -> Plate:
