@@ -14,6 +14,7 @@ import time
 from collections.abc import Sequence as Many
 from dataclasses import asdict, replace
 from pathlib import Path
+from types import FrameType
 
 from smokelift import pictures
 from smokelift.bench import command
@@ -42,11 +43,22 @@ def main(arguments: Many[str] | None = None) -> int:
     """Run a command and return the exit status."""
     options = _parser().parse_args(arguments)
     say = reporter(getattr(options, "progress", "text"))
+    ended: list[int] = []
+
+    def end(number: int, _frame: FrameType | None) -> None:
+        ended.append(number)
+        raise KeyboardInterrupt
+
     # a terminal's Ctrl-C and a parent's polite end are the same wish
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    signal.signal(signal.SIGTERM, end)
     try:
-        with say:
-            _COMMANDS[options.command](options, say)
+        try:
+            with say:
+                _COMMANDS[options.command](options, say)
+        except Exception as error:
+            if ended:  # a library made an error of its own of the interruption
+                raise KeyboardInterrupt from error
+            raise
     except KeyboardInterrupt:
         hint = "; finished frames stay, --resume goes on from them" if options.command == "reconstruct" else ""
         say.fail(f"Cancelled{hint}.", CANCELLED)
