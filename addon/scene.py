@@ -97,6 +97,8 @@ def clip_table(scene: bpy.types.Scene) -> dict[str, Any]:
     if not path.is_file():
         raise ShotError(f"The clip {path} is not there: choose it again, or use File > External Data.")
     count = clip.frame_duration
+    if count < 1:  # Blender takes any file for a clip
+        raise ShotError(f"The clip {path} is no video and no picture that Blender can read: choose another.")
     if not 1 <= settings.first <= settings.last <= count:
         raise ShotError(f"Frames {settings.first} to {settings.last} are not in the clip: it has frames 1 to {count}.")
     before = clip.frame_offset - 1

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
+import zipfile
 from dataclasses import dataclass
 
 import pytest
+from packaging.utils import parse_wheel_filename
 
 from engine_wheels import ROOT, find_python
-from tests.blender.setting import LIFECYCLE, pytest_words, run, unavailable, user_folder, variables
+from tests.blender.setting import LIFECYCLE, ZIP, pytest_words, run, unavailable, user_folder, variables
 
 ADD_ONS_TESTS = ROOT / "tests" / "addon" / "inside"
-_INSTALL = "import bpy, sys; bpy.ops.extensions.package_install_files(filepath=sys.argv[1], repo='user_default')"
 
 
 @dataclass(frozen=True)
@@ -81,14 +83,18 @@ def test_from_install_to_uninstall(wheel, python) -> None:
     run([*python, "-m", "pytest", *pytest_words(LIFECYCLE, folder)], variables(folder))
 
 
-def test_add_ons_own_tests_on_what_is_installed(wheel, python) -> None:
-    """What `make test` asks of the sources with one bpy, asked of the installed files with every bpy."""
+def test_add_ons_own_tests_on_what_is_shipped(wheel, python) -> None:
+    """What `make test` asks of the sources with one bpy, asked of the zip's files with every bpy."""
     folder = user_folder(f"bpy-{wheel.blender}")
-    run([*python, "-c", _INSTALL, str(variables(folder)["SMOKELIFT_ZIP"])], variables(folder))
-    (site,) = (folder / "extensions" / ".local" / "lib").glob("python*/site-packages")
-    renamed = folder / "installed"
-    renamed.mkdir()
-    (renamed / "addon").symlink_to(folder / "extensions" / "user_default" / "smokelift")
+    # unpacked without Blender's help: it takes the wheels away again with every reset to factory settings
+    add_on, site = folder / "shipped" / "addon", folder / "site"
+    with zipfile.ZipFile(ZIP) as archive:
+        archive.extractall(add_on)
+    names = {parse_wheel_filename(file.name)[0] for file in (add_on / "wheels").iterdir()}
+    pip = [*python, "-m", "pip", "--disable-pip-version-check", "install", "--quiet", "--no-index", "--no-deps"]
+    run([*pip, "--find-links", str(add_on / "wheels"), "--target", str(site), *sorted(names)])
+    imports = [add_on.parent, site]
+    environment = variables(folder) | {"PYTHONPATH": os.pathsep.join(map(str, imports))}
     for file in sorted(ADD_ONS_TESTS.glob("*.py")):
         if file.name != "conftest.py":  # each in a process of its own, as there
-            run([*python, "-m", "pytest", *pytest_words(file, folder, [renamed, site])], variables(folder))
+            run([*python, "-m", "pytest", *pytest_words(file, folder, imports)], environment)

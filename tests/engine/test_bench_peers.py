@@ -65,7 +65,6 @@ def test_exact_peer(stage, peer):
 
 
 def test_paper_has_nearly_the_image_and_another_derivative(stage):
-    pytest.importorskip("smokelift.render.paper")
     folder, scene = stage
     out = once("paper", folder)
     image, gradient = reference.image_and_gradient(scene)
