@@ -2,8 +2,7 @@
 
     python benchmarks/velocity_truth.py plume/truth.npz puff/truth.npz
 
-A truth file holds ``density`` [frame, x, y, z], ``velocity_x/y/z`` in m/s on faces (that of frame f carries
-density f to f + 1), ``inflow_packed`` (np.packbits of the cells where smoke enters), ``voxel_size`` and ``fps``.
+benchmarks/truth bakes such files and says what is in them.
 """
 
 from __future__ import annotations
@@ -14,52 +13,37 @@ from pathlib import Path
 
 import numpy as np
 import scipy.fft
+from truth.truth import Truth
 
 from smokelift.velocity import Velocity, VelocitySettings, estimate_velocity, predict_velocity
 
 FIRST, LAST, STEP = 10, 35, 5
 
 
-class Truth:
-    """Densities, velocities and inlet of one scene."""
+def estimate(
+    truth: Truth,
+    frame: int,
+    settings: VelocitySettings,
+    inlet_known: bool = True,
+    prediction: Velocity | None = None,
+) -> Velocity:
+    """Velocity found from the densities of a frame and the next."""
+    return estimate_velocity(
+        truth.density(frame),
+        truth.density(frame + 1),
+        truth.dt,
+        truth.voxel_size,
+        settings,
+        inflow=truth.inflow(frame) if inlet_known else None,
+        prediction=prediction,
+    )
 
-    def __init__(self, path: Path) -> None:
-        with np.load(path) as file:
-            self.density = file["density"]
-            self.faces = [file[f"velocity_{axis}"] for axis in "xyz"]
-            self.inflow_packed = file["inflow_packed"]
-            self.voxel_size = float(file["voxel_size"])
-            self.dt = 1 / float(file["fps"])
 
-    def inflow(self, frame: int) -> np.ndarray:
-        shape = self.density.shape[1:]
-        return np.unpackbits(self.inflow_packed[frame])[: np.prod(shape)].reshape(shape).astype(bool)
-
-    def estimate(
-        self,
-        frame: int,
-        settings: VelocitySettings,
-        inlet_known: bool = True,
-        prediction: Velocity | None = None,
-    ) -> Velocity:
-        before, after = self.density[frame : frame + 2].astype(np.float32)
-        return estimate_velocity(
-            before,
-            after,
-            self.dt,
-            self.voxel_size,
-            settings,
-            inflow=self.inflow(frame) if inlet_known else None,
-            prediction=prediction,
-        )
-
-    def error(self, velocity: Velocity, frame: int) -> float:
-        """Relative L2 error where there is smoke, without the inlet."""
-        x, y, z = (component[frame].astype(np.float32) for component in self.faces)
-        truth = Velocity((x, y, z), self.voxel_size).centres()
-        after = self.density[frame + 1]
-        smoke = (after > 0.01 * after.max()) & ~self.inflow(frame)
-        return float(np.linalg.norm((velocity.centres() - truth)[smoke]) / np.linalg.norm(truth[smoke]))
+def error(truth: Truth, velocity: Velocity, frame: int) -> float:
+    """Relative L2 error where there is smoke, without the inlet."""
+    wanted, after = truth.velocity(frame).centres(), truth.density(frame + 1)
+    smoke = (after > 0.01 * after.max()) & ~truth.inflow(frame)
+    return float(np.linalg.norm((velocity.centres() - wanted)[smoke]) / np.linalg.norm(wanted[smoke]))
 
 
 def poisson_seconds(shape: tuple[int, ...]) -> float:
@@ -80,22 +64,22 @@ def main(paths: list[str]) -> None:
         "paper, inlet known": (VelocitySettings(method="paper"), True),
     }
     for path in paths:
-        truth = Truth(Path(path))
+        truth = Truth.load(Path(path))
         for name, (settings, inlet_known) in cases.items():
             errors, seconds = [], []
             for frame in range(FIRST, LAST + 1, STEP):
                 start = time.perf_counter()
-                velocity = truth.estimate(frame, settings, inlet_known)
+                velocity = estimate(truth, frame, settings, inlet_known)
                 seconds.append(time.perf_counter() - start)
-                errors.append(truth.error(velocity, frame))
-            unit = poisson_seconds(truth.density.shape[1:])
+                errors.append(error(truth, velocity, frame))
+            unit = poisson_seconds(truth.shape)
             typical = float(np.median(seconds))
             print(f"{path}: {name}: error {np.mean(errors):.3f}, {typical:.3f} s = {typical / unit:.0f} Poisson solves")
         for inlet_known in (True, False):
             errors, prediction = [], None
             for frame in range(FIRST, FIRST + 10):
-                velocity = truth.estimate(frame, VelocitySettings(), inlet_known, prediction)
-                errors.append(truth.error(velocity, frame))
+                velocity = estimate(truth, frame, VelocitySettings(), inlet_known, prediction)
+                errors.append(error(truth, velocity, frame))
                 prediction = predict_velocity(velocity, truth.dt)
             known = "known" if inlet_known else "unknown"
             print(f"{path}: ten frames with prediction, inlet {known}: {' '.join(f'{e:.3f}' for e in errors)}")

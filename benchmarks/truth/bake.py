@@ -1,0 +1,88 @@
+"""Bake scenes with a known flow: Mantaflow, inside a Blender of Debian's that is fetched for it.
+
+    python benchmarks/truth/bake.py OUT [choose | report | NAME ...] [--resolution 64x64x96]
+
+writes OUT/NAME/truth.npz for each scene that is not there yet. Needs root on Linux and mmdebstrap.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import os
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from scenes import BOX_SIZE, SEEDS, names, scene
+
+HERE = Path(__file__).resolve().parent
+ENTER = HERE.parents[1] / "tests" / "blender" / "root" / "enter.sh"
+ROOT = Path.home() / ".cache" / "smokelift-tests" / "bookworm"
+
+
+def debian_root() -> Path:
+    """The Debian root with Blender 3.4.1, built unless it is there, made by the same recipe."""
+    recipe, stamp = HERE / "make_root.sh", ROOT / "made-by"
+    made_by = hashlib.sha256(recipe.read_bytes()).hexdigest()
+    if stamp.is_file() and stamp.read_text() == made_by:
+        return ROOT
+    if not sys.platform.startswith("linux") or os.geteuid() != 0 or shutil.which("mmdebstrap") is None:
+        sys.exit("Baking builds a Debian root: install mmdebstrap, and run this again as root on Linux.")
+    print(f"building a Debian root in {ROOT}", flush=True)
+    subprocess.run([recipe, ROOT], check=True, stdout=subprocess.DEVNULL)
+    stamp.write_text(made_by)
+    return ROOT
+
+
+def bake(name: str, across: int, folder: Path) -> None:
+    """Bake a scene into a folder, which appears whole or not at all."""
+    part = folder.with_suffix(".part")
+    shutil.rmtree(part, ignore_errors=True)
+    part.mkdir(parents=True)
+    # the root sees one folder of ours only: what runs in there goes with it
+    scripts = [shutil.copy(HERE / script, part) for script in ("manta_scene.py", "scenes.py")]
+    blender = ("blender", "-b", "--factory-startup", "--python-exit-code", "1", "-P", scripts[0])
+    command = [ENTER, debian_root(), part, *blender, "--", name, str(across), part / "truth.npz"]
+    log = part / "bake.log"
+    with log.open("w") as stream:
+        done = subprocess.run(command, stdout=stream, stderr=subprocess.STDOUT)
+    if done.returncode != 0 or not (part / "truth.npz").is_file():
+        sys.exit(f"{name} was not baked; the last that Blender said is in {log}.")
+    for script in scripts:
+        Path(script).unlink()
+    log.unlink()
+    shutil.rmtree(part / "__pycache__", ignore_errors=True)
+    part.rename(folder)
+
+
+def voxels_across(text: str) -> int:
+    """Voxels along x of a resolution like "64x64x96", which has to have the box's proportions."""
+    counts = [int(count) for count in text.split("x")]
+    if [count * BOX_SIZE[0] for count in counts] != [counts[0] * size for size in BOX_SIZE]:
+        raise ValueError(text)
+    return counts[0]
+
+
+def main() -> None:
+    """Bake what is asked for and not there."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("out", type=Path)
+    parser.add_argument("scenes", nargs="+", help="a use (choose, report) or names such as plume-1")
+    parser.add_argument("--resolution", type=voxels_across, default=64, help="as 48x48x72; 64x64x96 unless said")
+    options = parser.parse_args()
+    wanted = [name for word in options.scenes for name in (names(word) if word in SEEDS else [word])]
+    for name in wanted:
+        scene(name)  # an unknown one is refused before the first is baked
+    for name in wanted:
+        folder = options.out.resolve() / name
+        if not folder.exists():
+            began = time.monotonic()
+            bake(name, options.resolution, folder)
+            print(f"{folder / 'truth.npz'}: {time.monotonic() - began:.0f} s", flush=True)
+
+
+if __name__ == "__main__":
+    main()

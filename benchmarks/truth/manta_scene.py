@@ -1,0 +1,251 @@
+"""Bake a scene with Mantaflow: ``blender -b --factory-startup -P manta_scene.py -- NAME ACROSS OUT``, Blender 3.4.
+
+ACROSS is the number of voxels along x; OUT is the file to write, in the format that truth.py reads. One step is one
+frame. A voxel on every side is simulated and cut off, so that the floor and the open sides lie on the box's sides.
+"""
+
+import ctypes
+import json
+import sys
+import tempfile
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parent))
+from scenes import BOX_MIN, BOX_SIZE, FPS, FRAMES, Inlet, Scene, scene
+
+DT = 1 / FPS
+COOLING = 0.4  # decay of the heat (1/s)
+VORTICITY_CONFINEMENT = 0.1
+DRAFT = 0.06  # strength of the air's first motion (m/s)
+FAINTEST = 1e-3  # densities below it are not smoke
+MARGIN = 6  # voxels around the smoke within which the velocity is kept
+KEPT = slice(1, -1)
+
+
+class Noise:
+    """Smooth noise in space and time: a sum of waves with random directions, frequencies and phases.
+
+    Parameters
+    ----------
+    rng
+        Source of the random numbers.
+    shortest, longest
+        Range of the wavelengths (m).
+    rate
+        Largest frequency in time (1/s).
+    """
+
+    def __init__(self, rng: np.random.Generator, shortest: float, longest: float, rate: float) -> None:
+        direction = rng.normal(size=(3, 32))
+        wavelength = np.exp(rng.uniform(np.log(shortest), np.log(longest), 32))
+        self.waves = (2 * np.pi * direction / np.linalg.norm(direction, axis=0) / wavelength).astype(np.float32)
+        self.frequencies = 2 * np.pi * rng.uniform(-rate, rate, 32)
+        self.phases = rng.uniform(0, 2 * np.pi, 32)
+
+    def __call__(self, points: np.ndarray, time: float) -> np.ndarray:
+        """Values of unit variance at points (..., 3) at a time (s)."""
+        angles = self.frequencies * time + self.phases
+        return sum(np.cos(points @ wave + angle) for wave, angle in zip(self.waves.T, angles, strict=True)) / 4
+
+
+def boot() -> Any:
+    """Return the `manta` module with a complete class table.
+
+    Mantaflow misses inherited methods until its second start under Python 3.11; baking a throw-away domain
+    forces the first one, and that bake may fail.
+    """
+    for thing in list(bpy.data.objects):
+        bpy.data.objects.remove(thing)
+    bpy.ops.mesh.primitive_cube_add(size=2)
+    domain = bpy.context.object
+    modifier = domain.modifiers.new("Fluid", "FLUID")
+    modifier.fluid_type = "DOMAIN"
+    settings = modifier.domain_settings
+    settings.domain_type, settings.resolution_max, settings.cache_type = "GAS", 8, "ALL"
+    bpy.context.view_layer.objects.active = domain
+    with tempfile.TemporaryDirectory() as folder:
+        settings.cache_directory, settings.cache_frame_start, settings.cache_frame_end = folder, 1, 1
+        try:
+            bpy.ops.fluid.bake_all()
+        except RuntimeError as error:
+            print("first bake, which may fail:", error)
+    import manta
+
+    return manta
+
+
+def view(grid: Any, shape: tuple[int, ...], components: int = 1) -> np.ndarray:
+    """Return a writable view [x, y, z(, component)] of a Mantaflow grid, valid until its next advection."""
+    count = int(np.prod(shape)) * components
+    buffer = (ctypes.c_float * count).from_address(int(grid.getDataPointer(), 16))
+    data = np.frombuffer(buffer, np.float32)
+    if components == 1:
+        return data.reshape(shape[::-1]).transpose(2, 1, 0)
+    return data.reshape(*shape[::-1], components).transpose(2, 1, 0, 3)
+
+
+class Simulation:
+    """Smoke and heat carried by an incompressible flow above a floor, open above and at the sides.
+
+    Parameters
+    ----------
+    manta
+        Mantaflow.
+    scene
+        What to simulate.
+    across
+        Voxels along x.
+    """
+
+    def __init__(self, manta: Any, scene: Scene, across: int) -> None:
+        self.manta, self.scene = manta, scene
+        self.voxel = BOX_SIZE[0] / across
+        self.shape = tuple(round(size / self.voxel) + 2 for size in BOX_SIZE)
+        self.scale = DT / self.voxel  # m/s -> voxels a frame, Mantaflow's unit here
+        axes = [
+            low + np.arange(-0.5, count - 1, dtype=np.float32) * self.voxel
+            for low, count in zip(BOX_MIN, self.shape, strict=True)
+        ]
+        self.points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+
+        rng = np.random.default_rng(scene.seed)
+        self.wisps = Noise(rng, 0.15, 0.45, 2.0)
+        self.gusts = [Noise(rng, 0.20, 0.60, 2.0) for _ in range(3)]
+        self.wobble = [Noise(rng, 1.0, 2.0, 1.2) for _ in range(2)]
+        drafts = [Noise(rng, 0.4, 1.2, 0.0) for _ in range(3)]
+
+        solver = manta.Solver(name="smoke", gridSize=manta.vec3(*self.shape), dim=3)
+        solver.timestep = 1.0
+        create = solver.create
+        self.flags, self.velocity = create(manta.FlagGrid), create(manta.MACGrid)
+        self.smoke, self.heat, self.pressure = (create(manta.RealGrid) for _ in range(3))
+        self.flags.initDomain(boundaryWidth=0)
+        self.flags.fillGrid()
+        manta.setOpenBound(
+            flags=self.flags, bWidth=1, openBound="xXyYZ", type=manta.CellType_TypeOutflow | manta.CellType_TypeEmpty
+        )
+        velocity = view(self.velocity, self.shape, 3)
+        for axis, (draft, wind) in enumerate(zip(drafts, scene.wind, strict=True)):
+            velocity[..., axis] = self.scale * (wind + DRAFT * draft(self.points, 0.0))
+        self.air = velocity.copy()
+        self.make_incompressible()
+        self.solver = solver  # the last attribute, so that it goes after its grids
+
+    def make_incompressible(self) -> None:
+        """Project the velocity."""
+        self.manta.setWallBcs(flags=self.flags, vel=self.velocity)
+        self.manta.solvePressure(flags=self.flags, vel=self.velocity, pressure=self.pressure, cgAccuracy=1e-4)
+        # Mantaflow leaves out the faces of the open sides that belong to cells beyond the box
+        velocity, pressure = view(self.velocity, self.shape, 3), view(self.pressure, self.shape)
+        velocity[-1, KEPT, KEPT, 0] += pressure[-2, KEPT, KEPT]
+        velocity[KEPT, -1, KEPT, 1] += pressure[KEPT, -2, KEPT]
+        velocity[KEPT, KEPT, -1, 2] += pressure[KEPT, KEPT, -2]
+
+    def step(self, time: float) -> np.ndarray:
+        """Advance by a frame, to a time (s); return the cells [x, y, z] where smoke was put in."""
+        manta, fields = self.manta, {"flags": self.flags, "vel": self.velocity}
+        for grid in (self.smoke, self.heat, self.velocity):
+            manta.advectSemiLagrange(**fields, grid=grid, order=2)
+        manta.resetOutflow(flags=self.flags, real=self.smoke)
+        manta.resetOutflow(flags=self.flags, real=self.heat)
+        manta.vorticityConfinement(**fields, strength=VORTICITY_CONFINEMENT)
+
+        smoke, heat = view(self.smoke, self.shape), view(self.heat, self.shape)
+        velocity = view(self.velocity, self.shape, 3)
+        lift = self.scene.buoyancy * DT * self.scale
+        velocity[:, :, 1:, 2] += lift * 0.5 * (heat[:, :, 1:] + heat[:, :, :-1])
+        heat *= np.exp(-COOLING * DT)
+        smoke *= np.exp(-self.scene.thinning * DT)
+        self.blow_wind(velocity)
+        cells = np.zeros(self.shape, bool)
+        if time < self.scene.blowing:
+            for inlet in self.scene.inlets:
+                cells |= self.blow(inlet, time, smoke, heat, velocity)
+        self.make_incompressible()
+        return cells[KEPT, KEPT, KEPT]
+
+    def blow_wind(self, velocity: np.ndarray) -> None:
+        """Renew the air on the sides that the wind comes from, in place."""
+        for axis, wind in enumerate(self.scene.wind):
+            if wind:
+                side = [slice(None)] * 3
+                side[axis] = slice(0, 1) if wind > 0 else slice(-1, None)
+                velocity[tuple(side)] = self.air[tuple(side)]
+
+    def blow(self, inlet: Inlet, time: float, smoke: np.ndarray, heat: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+        """Set the fields in one inlet, in place, and return its cells."""
+        mean = np.array(inlet.velocity)
+        speed = np.linalg.norm(mean)
+        axis = mean / speed
+        centre = np.array(inlet.position)
+        sway = np.array([wobble(centre, time) for wobble in self.wobble])
+        centre[:2] += 0.25 * inlet.radius * sway
+        offset = self.points - centre.astype(np.float32)
+        along = offset @ axis.astype(np.float32)
+        radius = np.sqrt((offset**2).sum(-1) - along**2)
+        cells = (np.abs(along) < inlet.half_length) & (radius < inlet.radius)
+        where = self.points[cells]
+        rim = np.clip(2.0 * (1.0 - radius[cells] / inlet.radius), 0.0, 1.0)
+        strength = np.clip(1.0 + 0.4 * self.wisps(where, time), 0.1, 1.6) * rim
+        smoke[cells] = np.maximum(smoke[cells], strength)
+        heat[cells] = np.maximum(heat[cells], np.minimum(strength, 1))
+        for component, gust in enumerate(self.gusts):
+            blown = mean[component] + self.scene.gust * speed * gust(where, time)
+            velocity[..., component][cells] = self.scale * blown
+        return cells
+
+    def record(self) -> tuple[np.ndarray, list[np.ndarray]]:
+        """Return the density and the velocity on x, y and z faces (m/s) near the smoke, in the box."""
+        smoke = view(self.smoke, self.shape)[KEPT, KEPT, KEPT]
+        smoke = np.where(smoke > FAINTEST, smoke, 0).astype(np.float16)
+        near = np.pad(smoke > 0, MARGIN)
+        for axis in range(3):  # as far as MARGIN along each axis: a cube around every cell
+            count = smoke.shape[axis]
+            near = np.logical_or.reduce([near.take(range(s, s + count), axis) for s in range(2 * MARGIN + 1)])
+        velocity = view(self.velocity, self.shape, 3) / self.scale
+        faces = []
+        for axis in range(3):
+            kept = [KEPT] * 3
+            kept[axis] = slice(1, None)
+            ends = [(0, 0)] * 3
+            ends[axis] = (1, 1)
+            padded = np.pad(near, ends)
+            low, high = (padded.take(range(s, s + near.shape[axis] + 1), axis) for s in (0, 1))
+            faces.append(np.where(low | high, velocity[(*kept, axis)], 0).astype(np.float16))
+        return smoke, faces
+
+
+def main() -> None:
+    """Bake one scene."""
+    name, across, out = sys.argv[sys.argv.index("--") + 1 :]
+    made = scene(name)
+    simulation = Simulation(boot(), made, int(across))
+    warm_up = round(made.warm_up * FPS)
+    densities, faces, inflows = [], [], []
+    for frame in range(-warm_up, FRAMES):
+        cells = simulation.step((frame + warm_up) * DT)
+        if frame >= 0:
+            density, velocity = simulation.record()
+            densities.append(density)
+            faces.append(velocity)
+            inflows.append(np.packbits(cells))
+    np.savez_compressed(
+        out,
+        density=np.stack(densities),
+        **{f"velocity_{axis}": np.stack([f[i] for f in faces]) for i, axis in enumerate("xyz")},
+        velocity_frames=np.arange(FRAMES),
+        voxel_size=simulation.voxel,
+        fps=FPS,
+        inflow_packed=np.stack(inflows),
+        closed=np.array(["z-"]),
+        made_by=json.dumps(asdict(made)),
+    )
+
+
+if __name__ == "__main__":
+    main()
