@@ -1,0 +1,279 @@
+"""Make the clip of a baked scene with Mitsuba 3, and what no reconstruction may see: linear pictures from four sides.
+
+    python benchmarks/truth/picture.py plume-1/truth.npz OUT [--light point] [--background wall] [--check 20]
+
+None of the project's own code takes part. The pictures are single scattering, integrated at half-voxel steps over
+Mitsuba's own sensor, emitters and trilinear grid, so they carry no noise; `--check` compares frames with `volpath`.
+Scattering is isotropic, so that what arrives at a point is one number, found once for all cameras.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+from pathlib import Path
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from agreement_reference import emitter, integral, sensor, volume
+from example.render import YAWS, blocks, crop, srgb_decode, srgb_encode, turned, wall, write_png, write_video
+
+PIXELS = 4  # a voxel
+FOV = 30.0
+DISTANCE = 7.0  # of the camera from the axis (m)
+DIRECTIONS = (8, 16)  # of light from the surroundings: Gauss points in z, equal ones in azimuth
+CHECK_BLOCK = 16  # pixels; volpath's noise is averaged over such blocks
+CHECK_PASSES, CHECK_SAMPLES = 4, 4096  # a block
+IRRADIANCE = 8.0  # of a light, at the middle of the box
+
+
+def lights(kind: str, rng: np.random.Generator, folder: Path) -> dict[str, Any]:
+    """Draw a light as a scene file has it; the surroundings are painted into the folder.
+
+    It comes from 30 to 55 degrees above, and from anywhere in front or at the sides, up to 20 degrees behind.
+    """
+    azimuth, height = np.radians(rng.uniform(-20, 200)), np.radians(rng.uniform(30, 55))
+    towards = np.array([np.cos(height) * np.cos(azimuth), -np.cos(height) * np.sin(azimuth), np.sin(height)])
+    if kind == "directional":
+        return {"type": kind, "direction": (-towards).round(6).tolist(), "irradiance": [IRRADIANCE] * 3}
+    if kind == "point":
+        distance = rng.uniform(2.2, 3.0)
+        position = np.array([0.0, 0.0, 1.5]) + distance * towards
+        return {"type": kind, "position": position.round(6).tolist(), "intensity": [IRRADIANCE * distance**2] * 3}
+    rows = 64
+    elevation = np.pi * (0.5 - (np.arange(rows)[:, None] + 0.5) / rows)
+    around = 2 * np.pi * (0.5 - (np.arange(2 * rows) + 0.5) / (2 * rows))
+    cosine = np.cos(elevation) * (np.cos(around) * towards[0] + np.sin(around) * towards[1])
+    cosine = cosine + np.sin(elevation) * towards[2]
+    radiance = 0.3 + 0.2 * np.sin(elevation) + 5.0 * np.exp(6 * (cosine - 1))
+    path = folder / "surroundings.exr"
+    mi.Bitmap(np.repeat(radiance[..., None], 3, -1).astype(np.float32)).write(str(path))
+    return {"type": kind, "image": str(path), "rotation_degrees": 0.0, "strength": 1.0}
+
+
+def arriving(light: dict[str, Any], points: Any) -> list[tuple[Any, Any]]:
+    """Directions towards a light from points, each with the irradiance from there without smoke."""
+    if light["type"] == "environment":
+        source = mi.load_dict(emitter(light))
+        heights, weights = np.polynomial.legendre.leggauss(DIRECTIONS[0])
+        found = []
+        for z, weight in zip(heights.tolist(), weights.tolist(), strict=True):
+            for azimuth in 2 * math.pi * (np.arange(DIRECTIONS[1]) + 0.5) / DIRECTIONS[1]:
+                level = math.sqrt(1 - z * z)
+                towards = mi.Vector3f(level * math.cos(azimuth), level * math.sin(azimuth), z)
+                looking = dr.zeros(mi.SurfaceInteraction3f)
+                looking.wi = -towards
+                irradiance = source.eval(looking)[0] * (weight * 2 * math.pi / DIRECTIONS[1])
+                dr.make_opaque(towards, irradiance)  # one kernel for all directions
+                found.append((towards, irradiance))
+        return found
+    scene = mi.load_dict({"type": "scene", "shape": {"type": "sphere"}, "light": emitter(light)})
+    where = dr.zeros(mi.Interaction3f, dr.width(points))
+    where.p = points
+    sample, irradiance = scene.emitters()[0].sample_direction(where, mi.Point2f(0.5))
+    return [(mi.Vector3f(sample.d), irradiance[0])]
+
+
+@dr.syntax
+def march(smoke: Any, source: Any, box: Any, ray: Any, step: float, extinction: float) -> tuple[Any, Any]:
+    """March through the smoke.
+
+    Parameters
+    ----------
+    smoke, source
+        Textures: the density, and what is scattered into a direction per optical depth (source function).
+    box
+        Where there is smoke.
+    ray
+        The camera's rays.
+    step
+        Largest step (m).
+    extinction
+        1/m per unit of density.
+
+    Returns
+    -------
+    radiance, transmittance
+        Of the rays.
+    """
+    hit, near, far = box.ray_intersect(ray)
+    length = dr.select(hit, far - near, 0.0)
+    count = mi.UInt32(dr.ceil(length / step))
+    width = length / mi.Float(dr.maximum(count, 1))
+    where = dr.zeros(mi.Interaction3f, dr.width(ray))
+    radiance, transmittance = mi.Float(0.0), mi.Float(1.0)
+    i = mi.UInt32(0)
+    while i < count:
+        where.p = ray(near + (mi.Float(i) + 0.5) * width)
+        passed = dr.exp(-extinction * smoke.eval_1(where) * width)
+        radiance += transmittance * (1.0 - passed) * source.eval_1(where)
+        transmittance *= passed
+        i += 1
+    return radiance, transmittance
+
+
+class Renderer:
+    """Pictures of densities in the light and medium of a scene, from several cameras.
+
+    Parameters
+    ----------
+    scene
+        Domain, medium and light as in a scene file.
+    cameras
+        What `agreement_reference.sensor` takes.
+    """
+
+    def __init__(self, scene: dict[str, Any], cameras: list[dict[str, Any]]) -> None:
+        self.medium, self.light, self.cameras = scene["medium"], scene["light"], cameras
+        self.low, self.high = (np.array(scene["domain"][key], float) for key in ("min", "max"))
+        self.rays = []
+        for camera in cameras:
+            width, height = camera["size"]
+            index = dr.arange(mi.UInt32, width * height)
+            pixel = mi.Point2f((mi.Float(index % width) + 0.5) / width, (mi.Float(index // width) + 0.5) / height)
+            self.rays.append(mi.load_dict(sensor(camera)).sample_ray(0.0, 0.5, pixel, mi.Point2f(0.5))[0])
+
+    def images(self, density: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Radiance of the smoke alone and transmittance, each [row, column], a camera."""
+        voxel = float((self.high - self.low)[0] / density.shape[0])
+        part, low, high = crop(density, self.low, voxel)
+        box = mi.BoundingBox3f(mi.ScalarPoint3f(low), mi.ScalarPoint3f(high))
+        smoke = mi.load_dict(volume(part, low, high))
+        source = mi.load_dict(volume(self.scattered(smoke, box, part.shape, low, voxel), low, high))
+        found = []
+        for camera, ray in zip(self.cameras, self.rays, strict=True):
+            width, height = camera["size"]
+            views = march(smoke, source, box, ray, voxel / 2, self.medium["extinction"])
+            radiance, transmittance = (view.numpy().reshape(height, width) for view in views)
+            found.append((radiance, transmittance))
+        return found
+
+    def scattered(self, smoke: Any, box: Any, shape: tuple[int, ...], low: np.ndarray, voxel: float) -> np.ndarray:
+        """Source function of the smoke, on its grid; on one twice as fine for lights with sharp shadows."""
+        fine = 1 if self.light["type"] == "environment" else 2
+        axes = [a + (np.arange(fine * n) + 0.5) * voxel / fine for a, n in zip(low, shape, strict=True)]
+        points = mi.Point3f(*(p.ravel() for p in np.meshgrid(*axes, indexing="ij")))
+        total = mi.Float(0.0)
+        for towards, irradiance in arriving(self.light, points):
+            depth = integral(smoke, box, points, towards, voxel / fine)
+            total += irradiance * dr.exp(-self.medium["extinction"] * depth)
+            dr.eval(total)
+        return self.medium["albedo"] / (4 * math.pi) * total.numpy().reshape([fine * n for n in shape])
+
+    def path_traced(self, density: np.ndarray) -> np.ndarray:
+        """The first camera's picture by `volpath` at single scattering; pixels are blocks of the camera's."""
+        centre, half = (self.low + self.high) / 2, (self.high - self.low) / 2
+        interior = {
+            "type": "heterogeneous",
+            "sigma_t": volume(density, self.low, self.high),
+            "scale": self.medium["extinction"],
+            "albedo": self.medium["albedo"],
+            "phase": {"type": "isotropic"},
+        }
+        scene = mi.load_dict(
+            {
+                "type": "scene",
+                "integrator": {"type": "volpath", "max_depth": 2, "hide_emitters": True},
+                "camera": sensor(self.cameras[0], CHECK_BLOCK),
+                "domain": {
+                    "type": "cube",
+                    "to_world": mi.ScalarTransform4f().translate(centre).scale(half),
+                    "bsdf": {"type": "null"},
+                    "interior": interior,
+                },
+                "light": emitter(self.light),
+            }
+        )
+        passes = [mi.render(scene, spp=CHECK_SAMPLES, seed=seed).numpy()[..., 0] for seed in range(CHECK_PASSES)]
+        return np.mean(passes, axis=0)
+
+
+def table(name: str, values: dict[str, Any]) -> str:
+    """Lay out a table of a scene file."""
+    return "\n".join([name, *(f"{key} = {json.dumps(value)}" for key, value in values.items())]) + "\n"
+
+
+def main() -> None:
+    """Render a scene's clip, views and plate."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("truth", type=Path, help="baked by bake.py")
+    parser.add_argument("out", type=Path, help="folder")
+    parser.add_argument("--light", choices=("directional", "point", "environment"), default="directional")
+    parser.add_argument("--background", choices=("black", "wall"), default="black")
+    parser.add_argument("--check", type=int, nargs="*", default=[], help="frames to compare with volpath")
+    options = parser.parse_args()
+    options.out.mkdir(parents=True, exist_ok=True)
+
+    with np.load(options.truth) as file:
+        densities, voxel, fps = file["density"], float(file["voxel_size"]), float(file["fps"])
+        name = json.loads(str(file["made_by"]))["name"]
+    nx, ny, nz = shape = densities.shape[1:]
+    rng = np.random.default_rng(list(name.encode()))
+    light = lights(options.light, rng, options.out)
+    high = [nx * voxel / 2, ny * voxel / 2, nz * voxel]
+    scene = {
+        "domain": {"min": [-high[0], -high[1], 0.0], "max": high, "resolution": list(shape)},
+        "medium": {
+            "extinction": round(rng.uniform(4.0, 7.0), 2),
+            "albedo": round(rng.uniform(0.7, 0.95), 2),
+            "anisotropy": 0.0,
+        },
+        "light": light,
+    }
+    middle = high[2] / 2
+    camera = {
+        "position": [0.0, -DISTANCE, middle],
+        "target": [0.0, 0.0, middle],
+        "up": [0.0, 0.0, 1.0],
+        "fov_y_degrees": FOV,
+        "size": [PIXELS * nx, PIXELS * nz],
+    }
+    views = {view: turned(camera, yaw) for view, yaw in YAWS.items()}
+    renderer = Renderer(scene, [camera | {"matrix": matrix.tolist()} for matrix, _ in views.values()])
+    for frame in options.check:
+        density = densities[frame].astype(np.float32)
+        traced, marched = renderer.path_traced(density), blocks(renderer.images(density)[0][0][..., None])[..., 0]
+        difference = np.sqrt(np.mean((marched - traced) ** 2) / np.mean(traced**2))
+        print(f"frame {frame}: against volpath {difference:.2%} RMS, {marched.sum() / traced.sum() - 1:+.2%} in all")
+
+    walled = options.background == "wall"
+    behind = wall(*camera["size"], len(name)) if walled else np.zeros((*camera["size"][::-1], 3))
+    plate = srgb_encode(behind)
+    stored: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {view: [] for view in views}
+    pictures = []
+    for density in densities:
+        rendered = renderer.images(density.astype(np.float32))
+        for view, pair in zip(views, rendered, strict=True):
+            stored[view].append(pair)
+        radiance, transmittance = (picture[..., None] for picture in rendered[0])
+        pictures.append(srgb_encode(radiance + transmittance * srgb_decode(plate)))
+    write_video(options.out / "front.mp4", pictures, fps, crf=12)
+    for view, pairs in stored.items():
+        image, transmittance = (np.stack(half).astype(np.float16) for half in zip(*pairs, strict=True))
+        np.savez_compressed(options.out / f"{view}.npz", image=image, transmittance=transmittance)
+        (options.out / f"{view}.toml").write_text(views[view][1])
+    if walled:
+        write_png(options.out / "plate.png", plate)
+        np.savez_compressed(options.out / "background_plate.npz", plate=srgb_decode(plate).astype(np.float16))
+    said = light | {"image": Path(light["image"]).name} if "image" in light else light
+    text = [
+        table("[clip]", {"path": "front.mp4", "fps": fps, "transfer": "srgb"}),
+        views["front"][1],
+        table("[domain]", scene["domain"]),
+        table("[medium]", scene["medium"]),
+        table("[[lights]]", said),
+        table("[background]", {"image": "plate.png"} if walled else {"color": [0.0, 0.0, 0.0]}),
+    ]
+    (options.out / "scene.toml").write_text("\n".join(text))
+    brightest = max(float(radiance.max()) for radiance, _ in stored["front"])
+    print(f"{options.out}: {len(densities)} frames, smoke up to {brightest:.3f}")
+
+
+if __name__ == "__main__":
+    main()
