@@ -60,10 +60,10 @@ def bake(name: str, across: int, folder: Path) -> None:
 
 def voxels_across(text: str) -> int:
     """Voxels along x of a resolution like "64x64x96", which has to have the box's proportions."""
-    counts = [int(count) for count in text.split("x")]
-    if [count * BOX_SIZE[0] for count in counts] != [counts[0] * size for size in BOX_SIZE]:
-        raise ValueError(text)
-    return counts[0]
+    across = int(text.split("x")[0])
+    if text != "x".join(f"{across * size / BOX_SIZE[0]:g}" for size in BOX_SIZE):
+        raise argparse.ArgumentTypeError(f"{text} has not the proportions of the box: say for instance 48x48x72.")
+    return across
 
 
 def main() -> None:
@@ -74,8 +74,11 @@ def main() -> None:
     parser.add_argument("--resolution", type=voxels_across, default=64, help="as 48x48x72; 64x64x96 unless said")
     options = parser.parse_args()
     wanted = [name for word in options.scenes for name in (names(word) if word in SEEDS else [word])]
-    for name in wanted:
-        scene(name)  # an unknown one is refused before the first is baked
+    try:
+        for name in wanted:
+            scene(name)
+    except ValueError as unknown:
+        parser.error(str(unknown))
     for name in wanted:
         folder = options.out.resolve() / name
         if not folder.exists():

@@ -97,7 +97,7 @@ def main() -> None:
     parser.add_argument("--frames", action="store_true", help="every frame, not only means")
     options = parser.parse_args()
     sheet, axes = pyplot.subplots(
-        len(options.truths), len(SHOWN), figsize=(12, 4.6 * len(options.truths)), squeeze=False, layout="compressed"
+        len(options.truths), len(SHOWN), figsize=(12, 2.6 * len(options.truths)), squeeze=False, layout="compressed"
     )
     print(" " * 24 + "".join(f"{name.replace('_', ' '):>10s}"[:10] for name in Figures.__dataclass_fields__))
     for path, row in zip(options.truths, axes, strict=True):
@@ -111,7 +111,7 @@ def main() -> None:
             axis.imshow(projections(truth, frame), cmap="gray", vmin=0, vmax=1)
             axis.set_title(f"{name}, frame {frame}: front, side", fontsize=9)
             axis.set_axis_off()
-    sheet.savefig(options.sheet, dpi=60)
+    sheet.savefig(options.sheet, dpi=60, bbox_inches="tight")
 
 
 if __name__ == "__main__":
