@@ -72,7 +72,7 @@ class Truth:
 
     def density(self, frame: int) -> Array:
         """Density of a frame, [x, y, z]."""
-        return self.densities[frame].astype(np.float32)
+        return np.asarray(self.densities[frame], np.float32)
 
     def velocity(self, frame: int) -> Velocity:
         """What carries the density of a frame to the next one."""
