@@ -31,6 +31,7 @@ DIRECTIONS = (8, 16)  # of light from the surroundings: Gauss points in z, equal
 CHECK_BLOCK = 16  # pixels; volpath's noise is averaged over such blocks
 CHECK_PASSES, CHECK_SAMPLES = 4, 4096  # a block
 IRRADIANCE = 8.0  # of a light, at the middle of the box
+LIGHT_DISTANCE = 2.5  # of a point light from there (m)
 
 
 def lights(kind: str, rng: np.random.Generator, folder: Path) -> dict[str, Any]:
@@ -43,9 +44,8 @@ def lights(kind: str, rng: np.random.Generator, folder: Path) -> dict[str, Any]:
     if kind == "directional":
         return {"type": kind, "direction": (-towards).round(6).tolist(), "irradiance": [IRRADIANCE] * 3}
     if kind == "point":
-        distance = rng.uniform(2.2, 3.0)
-        position = np.array([0.0, 0.0, 1.5]) + distance * towards
-        return {"type": kind, "position": position.round(6).tolist(), "intensity": [IRRADIANCE * distance**2] * 3}
+        position = np.array([0.0, 0.0, 1.5]) + LIGHT_DISTANCE * towards
+        return {"type": kind, "position": position.round(6).tolist(), "intensity": [IRRADIANCE * LIGHT_DISTANCE**2] * 3}
     rows = 64
     elevation = np.pi * (0.5 - (np.arange(rows)[:, None] + 0.5) / rows)
     around = 2 * np.pi * (0.5 - (np.arange(2 * rows) + 0.5) / (2 * rows))
