@@ -20,7 +20,6 @@ from scenes import BOX_MIN, BOX_SIZE, FPS, FRAMES, Inlet, Scene, scene
 
 DT = 1 / FPS
 COOLING = 0.4  # decay of the heat (1/s)
-VORTICITY_CONFINEMENT = 0.1
 DRAFT = 0.06  # strength of the air's first motion (m/s)
 FAINTEST = 1e-3  # densities below it are not smoke
 MARGIN = 6  # voxels around the smoke within which the velocity is kept
@@ -153,7 +152,6 @@ class Simulation:
             manta.advectSemiLagrange(**fields, grid=grid, order=2)
         manta.resetOutflow(flags=self.flags, real=self.smoke)
         manta.resetOutflow(flags=self.flags, real=self.heat)
-        manta.vorticityConfinement(**fields, strength=VORTICITY_CONFINEMENT)
 
         smoke, heat = view(self.smoke, self.shape), view(self.heat, self.shape)
         velocity = view(self.velocity, self.shape, 3)
