@@ -66,7 +66,7 @@ $(VENV)/extension.stamp: $(VENV)/engine.stamp
 
 test-blender: dist/extension.stamp
 	SMOKELIFT_ZIP=$$(ls "$$PWD"/dist/smokelift-*-linux_x64.zip) \
-		$(BIN)/python -m pytest -v --durations=0 --durations-min=1 tests/blender/wheels.py tests/blender/debian.py
+		$(BIN)/python -m pytest -v -rP --durations=0 --durations-min=1 tests/blender/wheels.py tests/blender/debian.py
 
 clean:
 	rm -rf $(VENV) build dist demo

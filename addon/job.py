@@ -88,6 +88,8 @@ class Job:
         The engine's estimate; None while unknown.
     notes
         What was assumed or noticed, a sentence each.
+    warnings
+        Those of the notes that came with the frames: what is wrong with the result, not what was assumed before.
     sentence
         How it ended, or why it failed.
     details
@@ -101,6 +103,7 @@ class Job:
         self.done = self.total = 0
         self.seconds_left: float | None = None
         self.notes: list[str] = []
+        self.warnings: list[str] = []
         self.sentence = ""
         self.details: Mapping[str, Any] = {}
         self.status: int | None = None
@@ -207,6 +210,8 @@ class Job:
         match event:
             case "note":
                 self.notes.append(str(message["text"]))
+                if self.done:
+                    self.warnings.append(self.notes[-1])
                 self._note_down(self.notes[-1])
             case "start":
                 self.done, self.total = int(message["done"]), int(message["total"])

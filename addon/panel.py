@@ -76,10 +76,11 @@ def _draw_shot(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
 
 
 def _draw_cost(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """What the run will take, if the engine has looked at this scene."""
+    """What the run will take, if the engine has looked at this scene; it does so when the tab is seen first."""
     state = context.window_manager.smokelift
     if state.check_scene != context.scene.session_uid:
         layout.operator("smokelift.check", icon="VIEWZOOM")
+        run.check_soon(context)
         return
     if state.check_error:
         _say(layout, context, state.check_error, "ERROR")
@@ -106,6 +107,8 @@ def _draw_run(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
             column.operator("smokelift.run", text="Make Smoke Anew", icon="PLAY")
         else:
             column.operator("smokelift.run", text="Make Smoke", icon="PLAY")
+    else:
+        column.operator("smokelift.run", text="Make Another After This", icon="PLAY")
     for row in jobs:
         _draw_job(layout, context, row)
     if volume.shown_take(scene) is not None:
@@ -126,8 +129,8 @@ def _draw_job(layout: bpy.types.UILayout, context: bpy.types.Context, row: bpy.t
     if row.icon:
         box.template_icon(icon_value=row.icon, scale=8.0)
     if row.outcome in run.ENDED:
-        for note in filter(None, row.notes.split("\n")):
-            _say(box, context, note)
+        for warning in filter(None, row.warnings.split("\n")):
+            _say(box, context, warning, "ERROR")
         box.operator("smokelift.open_log", icon="TEXT").take = row.take
     else:
         box.operator("smokelift.cancel", text="Cancel", icon="CANCEL").take = row.take
@@ -157,8 +160,8 @@ def size(megabytes: float) -> str:
 
 def _say(layout: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str = "NONE") -> None:
     """A sentence over as many lines as the sidebar's width asks for."""
-    points = context.region.width / context.preferences.system.ui_scale if context.region else 300.0
-    lines = textwrap.wrap(text, max(16, int((points - 50.0) / POINTS_A_LETTER)))
+    points = context.region.width / context.preferences.system.ui_scale - (50.0 if icon == "NONE" else 70.0)
+    lines = textwrap.wrap(text, max(16, int(points / POINTS_A_LETTER)))
     column = layout.column(align=True)
     column.scale_y = 0.8
     for number, line in enumerate(lines):

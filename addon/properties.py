@@ -186,7 +186,7 @@ class SmokeliftJob(bpy.types.PropertyGroup):
     total: IntProperty()
     seconds_left: FloatProperty(default=-1.0)
     sentence: StringProperty()
-    notes: StringProperty()
+    warnings: StringProperty()
     icon: IntProperty()
     cancel: BoolProperty()
 

@@ -93,6 +93,20 @@ def workers(manager: bpy.types.WindowManager) -> list[bpy.types.Operator]:
     return [operator for operator in running if operator.bl_idname == SMOKELIFT_OT_work.__name__]
 
 
+def check_soon(context: bpy.types.Context) -> None:
+    """Have the engine look at the shot, unless it has looked at one of this file. Drawing code may call it."""
+    state, first = context.window_manager.smokelift, context.window_manager.windows[0]
+    looked = any(scene.session_uid == state.check_scene for scene in bpy.data.scenes)
+    if not looked and context.window == first and not bpy.app.timers.is_registered(_check):
+        bpy.app.timers.register(_check)  # while it draws, Blender lets nothing be changed
+
+
+def _check() -> None:
+    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
+        if bpy.ops.smokelift.check.poll():
+            bpy.ops.smokelift.check()
+
+
 class SMOKELIFT_OT_work(bpy.types.Operator):
     """Look ten times a second at what the engine says, until the queue is empty"""
 
@@ -184,7 +198,7 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
     def _tell(self, row: bpy.types.PropertyGroup, job: Job) -> None:
         """Show how a job stands: in the panel, and its frames in the viewport."""
         grown = job.done != row.done
-        row.outcome, row.sentence, row.notes = job.outcome, job.sentence, "\n".join(job.notes)
+        row.outcome, row.sentence, row.warnings = job.outcome, job.sentence, "\n".join(job.warnings)
         row.done, row.total = job.done, job.total
         row.seconds_left = -1.0 if job.seconds_left is None else job.seconds_left
         if not (grown or job.ended) or bpy.app.is_job_running("RENDER"):
@@ -200,6 +214,8 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
             if job.ended:
                 bpy.ops.ed.undo_push(message="Make Smoke")
                 self.report({"ERROR" if job.outcome == "failed" else "INFO"}, job.sentence)
+            if job.outcome == "failed":
+                bpy.ops.smokelift.open_log(take=row.take)
 
     def _follow(self, scene: bpy.types.Scene, thing: bpy.types.Object, row: bpy.types.PropertyGroup) -> None:
         """Move the playhead to the newest frame, until somebody else moves it."""
@@ -293,6 +309,8 @@ def register() -> None:
 
 def unregister() -> None:
     """Take it back, and end what it runs."""
+    if bpy.app.timers.is_registered(_check):
+        bpy.app.timers.unregister(_check)
     for worker in workers(bpy.context.window_manager):
         worker.cancel(bpy.context)
     bpy.utils.unregister_class(SMOKELIFT_OT_work)

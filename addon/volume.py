@@ -103,6 +103,7 @@ def _play(volume: bpy.types.Volume, scene: bpy.types.Scene, take: Take, index: d
     volume.velocity_unit = "SECOND"
     volume.velocity_scale = 1.0 if real else ratio
     volume.render.clipping = 0.0
+    volume.display.density = index["scene"]["medium"]["extinction"]  # as thick in the viewport as in a render
 
 
 def _relative(path: str) -> str:

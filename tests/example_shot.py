@@ -57,9 +57,11 @@ def add_camera(scene: bpy.types.Scene, location: Any, rotation: Any = (0.0, 0.0,
 
 
 def add_box(scene: bpy.types.Scene, low: Any, high: Any) -> bpy.types.Object:
-    """A new box between two corners."""
+    """A new box between two corners, as the add-on makes them."""
     mesh = bpy.data.meshes.new("Box")
-    mesh.from_pydata([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], [], [])
+    corners = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
+    edges = [(i, i | axis) for i in range(8) for axis in (1, 2, 4) if not i & axis]
+    mesh.from_pydata(corners, edges, [])
     box = add(scene, "Box", mesh)
     box.location = (Vector(low) + Vector(high)) / 2
     box.scale = (Vector(high) - Vector(low)) / 2

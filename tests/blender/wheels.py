@@ -97,4 +97,4 @@ def test_add_ons_own_tests_on_what_is_shipped(wheel, python) -> None:
     environment = variables(folder) | {"PYTHONPATH": os.pathsep.join(map(str, imports))}
     for file in sorted(ADD_ONS_TESTS.glob("*.py")):
         if file.name != "conftest.py":  # each in a process of its own, as there
-            run([*python, "-m", "pytest", *pytest_words(file, folder, imports)], environment)
+            run([*python, "-m", "pytest", *pytest_words(file, folder, [*imports, ROOT])], environment)

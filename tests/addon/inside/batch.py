@@ -10,11 +10,12 @@ from pathlib import Path
 
 import bpy
 import pytest
-from conftest import EXAMPLE, quietly
+from conftest import quietly
 
 from addon import batch, volume
 from addon.take import Take
 from smokelift.sequence import Sequence
+from tests.example_shot import EXAMPLE
 
 SCRIPT = Path(batch.__file__)
 # what ``blender -b FILE -P batch.py -- ...`` does, where there is no blender but its module

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import sys
 from collections.abc import Iterator
@@ -11,11 +10,9 @@ from typing import Any
 
 import bpy
 import pytest
-from mathutils import Vector
 
 import addon
-
-EXAMPLE = Path(__file__).parents[3] / "examples" / "plume"
+from tests.example_shot import set_up_example
 
 
 @pytest.fixture(autouse=True)
@@ -36,49 +33,8 @@ def scene(blender) -> bpy.types.Scene:
 
 @pytest.fixture
 def shot(scene) -> bpy.types.Scene:
-    """The example as an artist would have it: camera, box, sun, black world, clip and plate."""
-    world = scene.world = bpy.data.worlds.new("World")
-    if world.node_tree is None:
-        world.use_nodes = True
-    world.node_tree.nodes["Background"].inputs["Color"].default_value = (0.0, 0.0, 0.0, 1.0)
-    camera = add_camera(scene, (0.0, -7.0, 1.5), (math.pi / 2, 0.0, 0.0))
-    camera.data.sensor_fit, camera.data.sensor_height = "VERTICAL", 24.0
-    camera.data.lens = 12.0 / math.tan(math.radians(15.0))
-    sun = add(scene, "Sun", bpy.data.lights.new("Sun", "SUN"))
-    sun.data.energy = 18.0
-    sun.rotation_euler = Vector((0.57, 0.46, -0.68)).to_track_quat("-Z", "Y").to_euler()
-    settings = scene.smokelift
-    settings.clip = bpy.data.movieclips.load(str(EXAMPLE / "clip.mp4"))
-    settings.box = add_box(scene, (-1.0, -1.0, 0.0), (1.0, 1.0, 3.0))
-    settings.plate_mode, settings.plate = "FILE", str(EXAMPLE / "plate.png")
-    settings.light_mode = "SCENE"
-    settings.quality = "draft"
-    scene.render.resolution_x, scene.render.resolution_y = 256, 384
-    return scene
-
-
-def add(scene: bpy.types.Scene, name: str, data: Any) -> bpy.types.Object:
-    """A new object in a scene."""
-    thing = bpy.data.objects.new(name, data)
-    scene.collection.objects.link(thing)
-    return thing
-
-
-def add_camera(scene: bpy.types.Scene, location: Any, rotation: Any = (0.0, 0.0, 0.0)) -> bpy.types.Object:
-    """A new camera, the scene's own."""
-    camera = scene.camera = add(scene, "Camera", bpy.data.cameras.new("Camera"))
-    camera.location, camera.rotation_euler = location, rotation
-    return camera
-
-
-def add_box(scene: bpy.types.Scene, low: Any, high: Any) -> bpy.types.Object:
-    """A new box between two corners."""
-    mesh = bpy.data.meshes.new("Box")
-    mesh.from_pydata([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], [], [])
-    box = add(scene, "Box", mesh)
-    box.location = (Vector(low) + Vector(high)) / 2
-    box.scale = (Vector(high) - Vector(low)) / 2
-    return box
+    """The example as an artist would have it."""
+    return set_up_example(scene)
 
 
 def rendered(scene: bpy.types.Scene, path: Path) -> Any:

@@ -9,7 +9,6 @@ import bpy
 import numpy as np
 import pytest
 from bpy_extras.object_utils import world_to_camera_view
-from conftest import EXAMPLE, add
 from mathutils import Euler, Matrix, Vector
 
 from addon import scene as module
@@ -17,6 +16,7 @@ from addon.scene import ShotError, shot_tables
 from addon.take import Take
 from smokelift.render.rays import project
 from smokelift.scene import Scene
+from tests.example_shot import EXAMPLE, add
 
 CORNERS = [(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (0.0, 3.0)]
 

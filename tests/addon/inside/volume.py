@@ -11,7 +11,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from conftest import EXAMPLE, quietly
+from conftest import quietly
 from mathutils import Vector
 
 from addon import run, volume
@@ -20,6 +20,7 @@ from addon.take import Take
 from smokelift.scene import Domain, Medium, Scene
 from smokelift.scene_file import scene_to_dict
 from smokelift.vdb import write_vdb
+from tests.example_shot import EXAMPLE
 
 FRAMES = 6
 HALF_VOXEL_TOO_FAR = bpy.app.version < (5, 0, 0)
@@ -186,6 +187,7 @@ def test_the_material_is_the_mediums(shot, tmp_path) -> None:
     assert shader.inputs["Emission Strength"].default_value == 0.0
     data = thing.data
     assert (data.velocity_grid, data.velocity_unit, data.render.clipping) == ("velocity", "SECOND", 0.0)
+    assert data.display.density == 4.0
 
 
 def test_running_again_replaces(shot, tmp_path) -> None:

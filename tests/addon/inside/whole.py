@@ -8,7 +8,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from conftest import EXAMPLE, add, rendered
+from conftest import rendered
 
 import smokelift
 from addon import run, volume
@@ -20,6 +20,7 @@ from smokelift.scene import Scene
 from smokelift.scene_file import scene_from_dict
 from smokelift.sequence import Sequence
 from smokelift.settings import Settings
+from tests.example_shot import EXAMPLE, add
 
 FIRST, LAST = 27, 30
 LONGEST = 40
@@ -92,7 +93,8 @@ def test_nothing_known_but_the_clip(scene, tmp_path) -> None:
     scene.smokelift.quality = "draft"
     row = make(scene, tmp_path / "out")
     assert row.outcome == "done"
-    assert "Camera not given" in row.notes
+    assert "Camera not given" in Take(Path(row.take)).log_file.read_text()
+    assert not row.warnings
     whole, smoke = look_alike(scene, tmp_path)
     assert (scene.render.resolution_x, scene.render.resolution_y) == (256, 384)
     assert whole > WANTED_DB + 5
