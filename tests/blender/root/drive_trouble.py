@@ -1,0 +1,154 @@
+"""An artist who does odd things while smoke is made. Runs inside Blender, on a file with a shot.
+
+Every chapter leaves what came of it in the report; the last one closes Blender in the middle of a run.
+"""
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import bpy
+
+sys.path.insert(0, str(Path(__file__).parent))
+from artist import ENDED, first_window, jobs, perform, picture, report, shell, until
+
+MODULE = "bl_ext.user_default.smokelift"
+
+
+def story() -> Iterator[float]:
+    """One chapter after the other."""
+    yield from undo()
+    yield from delete_and_rename()
+    yield from save_elsewhere()
+    yield from stop_with_the_keyboard()
+    yield from queue()
+    yield from fail()
+    yield from disable()
+    yield from close()
+
+
+def scene() -> bpy.types.Scene:
+    """Blender's undo replaces it, so it is looked up anew each time."""
+    return first_window().scene
+
+
+def volumes() -> list[bpy.types.Object]:
+    return [thing for thing in scene().objects if thing.type == "VOLUME"]
+
+
+def press(operator: str, *arguments: object, **settings: object) -> None:
+    """Run an operator as its button in the first window does."""
+    area = max(first_window().screen.areas, key=lambda area: area.width * area.height)
+    with bpy.context.temp_override(window=first_window(), area=area):
+        family, name = operator.split(".")
+        getattr(getattr(bpy.ops, family), name)(*arguments, **settings)
+
+
+def begin() -> Iterator[float]:
+    """Press the button and wait for the first frames."""
+    press("smokelift.run")
+    yield from until(lambda: jobs()[-1].done >= 2)
+
+
+def end() -> Iterator[float]:
+    """Wait until everything has ended; returns how."""
+    yield from until(lambda: all(job.outcome in ENDED for job in jobs()))
+    yield 0.5
+    (thing,) = volumes() or [None]
+    return {
+        "outcomes": [job.outcome for job in jobs()],
+        "sentence": jobs()[-1].sentence,
+        "volumes": len(volumes()),
+        "frames": thing and thing.data.frame_duration,
+        "file": thing and Path(bpy.path.abspath(thing.data.filepath)).is_file(),
+    }
+
+
+def undo() -> Iterator[float]:
+    """Undo everything, twice, and redo it."""
+    for name in ("Box", "Sun"):
+        scene().objects[name].location.z += 0.01
+        press("ed.undo_push", message=name)
+    yield from begin()
+    press("ed.undo")
+    yield 0.5
+    press("ed.undo")
+    yield 0.5
+    press("ed.redo")
+    report["undo"] = yield from end()
+
+
+def delete_and_rename() -> Iterator[float]:
+    """Delete the smoke with its data, and call the scene something else."""
+    yield from begin()
+    data = volumes()[0].data
+    bpy.data.objects.remove(volumes()[0])
+    bpy.data.volumes.remove(data)
+    scene().name = "Räuchlein"
+    report["delete_and_rename"] = yield from end()
+
+
+def save_elsewhere() -> Iterator[float]:
+    """Save the file into another folder."""
+    yield from begin()
+    other = Path(bpy.data.filepath).parent / "ein anderer Ört"
+    other.mkdir()
+    press("wm.save_as_mainfile", filepath=str(other / "shot.blend"))
+    report["save_elsewhere"] = yield from end()
+
+
+def stop_with_the_keyboard() -> Iterator[float]:
+    """Esc, and yes; then go on."""
+    yield from begin()
+    shell("xdotool mousemove 500 400; sleep 0.2; xdotool key Escape; sleep 0.8; xdotool key Return")
+    report["stopped"] = yield from end()
+    press("smokelift.resume")
+    report["resumed"] = yield from end()
+
+
+def queue() -> Iterator[float]:
+    """Two runs, of which the second is stopped before it begins, and a third."""
+    press("smokelift.run")
+    press("smokelift.run")
+    press("smokelift.run")
+    yield 0.5
+    press("smokelift.cancel", take=jobs()[1].take)
+    report["queue"] = yield from end()
+
+
+def fail() -> Iterator[float]:
+    """The clip's file is replaced by something else: a log opens."""
+    clip = Path(bpy.path.abspath(scene().smokelift.clip.filepath))
+    good = clip.read_bytes()
+    clip.write_text("not a video " * 100)
+    press("smokelift.run")
+    report["failed"] = yield from end()
+    yield 1.0
+    windows = bpy.context.window_manager.windows
+    logs = [a for w in windows for a in w.screen.areas if a.type == "TEXT_EDITOR" and a.spaces.active.text]
+    report["log"] = logs and logs[0].spaces.active.text.as_string()
+    yield from picture("failed")
+    clip.write_bytes(good)
+
+
+def disable() -> Iterator[float]:
+    """The add-on is switched off, and on again."""
+    yield from begin()
+    index = Path(jobs()[-1].take) / "sequence.json"
+    bpy.ops.preferences.addon_disable(module=MODULE)
+    before = index.read_bytes()
+    yield 3.0
+    report["disabled"] = {"known": hasattr(bpy.types.Scene, "smokelift"), "stopped": index.read_bytes() == before}
+    bpy.ops.preferences.addon_enable(module=MODULE)
+    yield 0.5
+    press("smokelift.resume")
+    report["enabled"] = yield from end()
+
+
+def close() -> Iterator[float]:
+    """And quit, which ends the story."""
+    yield from begin()
+    report["last_take"] = jobs()[-1].take
+
+
+perform(story)
