@@ -27,6 +27,9 @@ FIRST, LAST = 21, 32
 FRAMES = LAST - FIRST + 1
 LONGEST_SIDE = 32
 
+# Blender's own installer forgets to close its pipes
+pytestmark = pytest.mark.filterwarnings("ignore:Exception ignored in. <_io:pytest.PytestUnraisableExceptionWarning")
+
 # The engine knows best where its smoke is; it runs in a process of its own here too.
 _CORNERS = """
 import sys
