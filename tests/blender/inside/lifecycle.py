@@ -85,7 +85,7 @@ def take_of(thing: bpy.types.Object) -> Path:
 
 def batch(blend: Path, *words: str) -> list[str]:
     """A command that runs the add-on on a file without a window, in a Blender of its own."""
-    if not bpy.app.module:
+    if not getattr(bpy.app, "module", False):  # Blender 4.3 does not know that it could be one
         return [bpy.app.binary_path, "-b", str(blend), "--command", "smokelift", "reconstruct", *words]
     start = f"""
 import sys, bpy

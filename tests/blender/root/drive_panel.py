@@ -88,11 +88,12 @@ def make_smoke(window: bpy.types.Window, area: bpy.types.Area, name: str) -> Ite
     click()
     yield from until(lambda: {job.take for job in jobs()} - earlier)
     job = next(job for job in jobs() if job.take not in earlier)
+    half_way = None
     while job.outcome not in ENDED:
         if seen["progress"][-1:] != [job.done]:
             seen["progress"].append(job.done)
-            if job.total and job.done == job.total // 2:
-                shell(take(f"{name}_running"))
+            if not half_way and job.done >= job.total // 2 > 0:
+                half_way = shell(take(f"{name}_running"))
         yield 0.05
     seen["seconds"] = round(time.monotonic() - clicked, 2)
     bpy.app.timers.unregister(tick)
