@@ -4,6 +4,7 @@ Pictures are of the whole screen and taken from outside, by xwd: what Blender sa
 OpenGL is software. They and report.json are left in the folder that the command line names last.
 """
 
+import faulthandler
 import json
 import subprocess
 import sys
@@ -25,6 +26,7 @@ def perform(story: Callable[[], Iterator[float]]) -> None:
     """Have a story told beside Blender's own life: it yields how long to wait before going on. Then Blender quits."""
     bpy.context.preferences.view.show_splash = False
     bpy.context.preferences.system.viewport_aa = "OFF"  # else every picture is drawn eight times, in software
+    faulthandler.enable()  # where a crash of Blender came from
     steps = story()
     bpy.app.timers.register(lambda: _go_on(steps), first_interval=1.0, persistent=True)
 
