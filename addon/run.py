@@ -205,14 +205,19 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
             return
         take = Take(Path(row.take))
         scene = find_scene(row)
+        made = 0
         if scene is not None:
+            before = _things()
             thing = present(scene, take)
+            made = _things() - before
             if thing is not None and not bpy.app.background:
                 self._follow(scene, thing, row)
         if not bpy.app.background:
             row.icon = self._picture(take)
-            if job.ended:
+            if made or job.ended:
+                # undoing steps that do not know of new objects would leave Blender with pointers into nowhere
                 bpy.ops.ed.undo_push(message="Make Smoke")
+            if job.ended:
                 self.report({"ERROR" if job.outcome == "failed" else "INFO"}, job.sentence)
             if job.outcome == "failed":
                 bpy.ops.smokelift.open_log(take=row.take)
@@ -288,6 +293,10 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
 def find_scene(row: bpy.types.PropertyGroup) -> bpy.types.Scene | None:
     """The scene of a job; it may have been renamed, or be gone."""
     return next((scene for scene in bpy.data.scenes if scene.session_uid == row.scene_uid), None)
+
+
+def _things() -> int:
+    return sum(map(len, (bpy.data.objects, bpy.data.volumes, bpy.data.cameras, bpy.data.materials)))
 
 
 def redraw(manager: bpy.types.WindowManager) -> None:
