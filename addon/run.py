@@ -149,6 +149,7 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
     def _begin(self) -> None:
         self._queue = Queue()
         self._jobs: dict[str, Job] = {}
+        self._unseen: dict[str, Job] = {}  # those whose newest frames are not in the viewport yet
         self._check: Job | None = None
         self._pictures = bpy.utils.previews.new()
         self._playhead: dict[str, int] = {}
@@ -180,10 +181,14 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
                 self._tell(rows[name], job)
             if job.ended:
                 del self._jobs[name]  # a resumed take comes back under the same name
+        while self._unseen and not bpy.app.is_job_running("RENDER"):  # which must not lose its data
+            name, job = self._unseen.popitem()
+            if name in rows:
+                self._show(rows[name], job)
         looked = self._look_ahead(manager.smokelift)
         if changed or looked:
             redraw(manager)
-        return bool(self._jobs) or self._check is not None or manager.smokelift.check_ticks > 0
+        return bool(self._jobs or self._unseen) or self._check is not None or manager.smokelift.check_ticks > 0
 
     def _start(self, name: str, row: bpy.types.PropertyGroup) -> None:
         take = Take(Path(name))
@@ -196,13 +201,16 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
         self._queue.add(job)
 
     def _tell(self, row: bpy.types.PropertyGroup, job: Job) -> None:
-        """Show how a job stands: in the panel, and its frames in the viewport."""
+        """Show in the panel how a job stands."""
         grown = job.done != row.done
         row.outcome, row.sentence, row.warnings = job.outcome, job.sentence, "\n".join(job.warnings)
         row.done, row.total = job.done, job.total
         row.seconds_left = -1.0 if job.seconds_left is None else job.seconds_left
-        if not (grown or job.ended) or bpy.app.is_job_running("RENDER"):
-            return
+        if grown or job.ended:
+            self._unseen[row.take] = job
+
+    def _show(self, row: bpy.types.PropertyGroup, job: Job) -> None:
+        """Show a job's frames in the viewport, and how it ended."""
         take = Take(Path(row.take))
         scene = find_scene(row)
         made = 0
