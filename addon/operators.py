@@ -245,8 +245,7 @@ def _text_editor(context: bpy.types.Context) -> bpy.types.Space:
     areas = [area for window in context.window_manager.windows for area in window.screen.areas]
     found = next((area for area in areas if area.type == "TEXT_EDITOR"), None)
     if found is None:
-        with context.temp_override(window=context.window):  # or what runs now would go on in the new window
-            bpy.ops.wm.window_new()
+        bpy.ops.wm.window_new()
         found = context.window_manager.windows[-1].screen.areas[0]
         found.type = "TEXT_EDITOR"
     return found.spaces.active

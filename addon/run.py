@@ -1,5 +1,6 @@
 """Running the engine beside Blender: the queue of takes, the look ahead, and what of them is shown."""
 
+import functools
 import time
 from pathlib import Path
 
@@ -105,6 +106,11 @@ def _check() -> None:
     with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
         if bpy.ops.smokelift.check.poll():
             bpy.ops.smokelift.check()
+
+
+def _open_log(take: str) -> None:
+    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
+        bpy.ops.smokelift.open_log(take=take)
 
 
 class SMOKELIFT_OT_work(bpy.types.Operator):
@@ -228,7 +234,8 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
             if job.ended:
                 self.report({"ERROR" if job.outcome == "failed" else "INFO"}, job.sentence)
             if job.outcome == "failed":
-                bpy.ops.smokelift.open_log(take=row.take)
+                # not from here: a modal operator that opens a window is never taken off the one it was in
+                bpy.app.timers.register(functools.partial(_open_log, row.take))
 
     def _follow(self, scene: bpy.types.Scene, thing: bpy.types.Object, row: bpy.types.PropertyGroup) -> None:
         """Move the playhead to the newest frame, until somebody else moves it."""

@@ -102,7 +102,8 @@ def test_command_makes_smoke_that_renders_like_the_clip(root, installed) -> None
 def test_relit_from_elsewhere(root, installed) -> None:
     """The same smoke in other light, which it is bright towards, and from another side: not a picture on a card."""
     folder = installed / "plume"
-    inside(root, installed, "blender", "-b", folder / "shot.blend", "--python", SCRIPTS / "relight.py", "--", folder)
+    relight = ("--python-exit-code", "1", "--python", SCRIPTS / "relight.py", "--", folder)
+    inside(root, installed, "blender", "-b", folder / "shot.blend", *relight)
     left, right, elsewhere = (load(folder / f"{name}.png") for name in ("from_left", "from_right", "elsewhere"))
     columns = np.arange(left.shape[1])
     middle_left, middle_right = ((picture.sum(0) * columns).sum() / picture.sum() for picture in (left, right))
