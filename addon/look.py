@@ -99,8 +99,12 @@ def _plate_world(scene: bpy.types.Scene, take: Take, background: dict[str, Any])
     """A world that shows the camera what is behind the smoke, and lights the smoke as the old one did."""
     world = scene.world
     if world is None or not world.name.startswith(NAME):
-        world = world.copy() if world is not None else bpy.data.worlds.new(NAME)
-        world.name = NAME
+        if world is None:
+            world = bpy.data.worlds.new(NAME)
+        else:
+            world.use_fake_user = True  # or it would not be saved any more
+            world = world.copy()
+            world.name, world.use_fake_user = NAME, False
         scene.world = world
     if world.node_tree is None:  # since 5.0 there always is one
         world.use_nodes = True

@@ -119,7 +119,7 @@ def test_setting_up_twice_changes_nothing(shot, tmp_path) -> None:
     before = census()
     bpy.ops.smokelift.set_up()
     assert census() == before
-    assert "World" in bpy.data.worlds  # the user's own
+    assert bpy.data.worlds["World"].use_fake_user, "the user's own world would not be saved"
 
 
 def test_running_twice_makes_a_second_take_and_one_smoke(shot, tmp_path) -> None:
