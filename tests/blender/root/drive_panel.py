@@ -28,6 +28,7 @@ from artist import (
 )
 
 TICK_SECONDS = 0.02
+DRAWINGS = 5
 
 
 def story() -> Iterator[float]:
@@ -105,7 +106,16 @@ def make_smoke(window: bpy.types.Window, area: bpy.types.Area, name: str) -> Ite
     look_away()
     yield 1.5
     yield from picture(f"{name}_done")
+    seen["seconds_of_a_drawing"] = round(drawing_alone(window), 3)
     return seen
+
+
+def drawing_alone(window: bpy.types.Window) -> float:
+    """How long the whole window takes to draw (s) while no engine runs: in software, much of a gap is that."""
+    began = time.monotonic()
+    with bpy.context.temp_override(window=window):
+        bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=DRAWINGS)
+    return (time.monotonic() - began) / DRAWINGS
 
 
 def note_smoke(scene: bpy.types.Scene, drawn: list[float]) -> None:
