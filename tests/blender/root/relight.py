@@ -11,7 +11,7 @@ folder = Path(sys.argv[-1])
 scene = bpy.context.scene
 sun, camera = bpy.data.objects["Sun"], scene.camera
 sun.data.energy, sun.data.color = 22.0, (1.0, 0.72, 0.45)
-scene.world = bpy.data.worlds["World"]  # the black one from before the shot was set up: the wall is not there
+(scene.world,) = [world for world in bpy.data.worlds if world.use_fake_user]  # black, from before Set Up Shot
 scene.cycles.samples = 64
 
 
