@@ -14,13 +14,13 @@ SEEN = ROOT / "build" / "test-blender" / "pictures"
 MADE = ROOT / "build" / "test-blender" / "debian" / "plume"
 DOCS = ROOT / "docs"
 
-SIDEBAR = (1042, 78, 1300, 680)
+SIDEBAR = (1042, 78, 1300, 730)
 """Where the tab is in a picture of the screen: left, top, right, bottom."""
 
 STAGES = ("idle", "running", "done")
 FRAME = 30
 GAP = 8
-COLOURS = 96
+COLOURS = 256
 
 
 def main() -> None:
@@ -29,7 +29,7 @@ def main() -> None:
     save("blender_panel.png", beside(panels))
     window = Image.open(SEEN / "view_3d_running.png").convert("RGB")
     save("blender_window.png", window.resize((1200, 750), Image.Resampling.LANCZOS))
-    renders = [Image.open(MADE / name).convert("RGB") for name in ("render.png", "from_left.png", "elsewhere.png")]
+    renders = [Image.open(MADE / name).convert("RGB") for name in ("as_filmed.png", "from_left.png", "elsewhere.png")]
     with Clip.open(ROOT / "examples" / "plume" / "clip.mp4") as clip:
         filmed = linear_to_srgb(area_average(clip.frame(FRAME - 1), *renders[0].size))
     save("blender_render.png", beside([Image.fromarray((255 * filmed + 0.5).astype("uint8")), *renders]))
