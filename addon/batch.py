@@ -155,13 +155,12 @@ def unregister() -> None:
 
 
 def _run_as_script() -> int:
-    """Run the add-on that this script belongs to: the enabled one, or else the one that lies beside it."""
+    """Run the add-on that is enabled, or else the one that this script lies in."""
     words = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
+    if hasattr(bpy.types.Scene, "smokelift"):
+        package = type(bpy.context.scene.smokelift).__module__.rpartition(".")[0]
+        return importlib.import_module(f"{package}.batch").main(words)
     init = Path(__file__).resolve().parent / "__init__.py"
-    for module in list(sys.modules.values()):
-        file = getattr(module, "__file__", None)
-        if file and Path(file).resolve() == init and hasattr(bpy.types.Scene, "smokelift"):
-            return importlib.import_module(f"{module.__name__}.batch").main(words)
     name = "smokelift_addon"  # not the folder's name: an extension's is the engine's
     spec = importlib.util.spec_from_file_location(name, init, submodule_search_locations=[str(init.parent)])
     package = sys.modules[name] = importlib.util.module_from_spec(spec)

@@ -100,6 +100,17 @@ def test_command_makes_smoke_that_renders_like_the_clip(root, installed) -> None
     assert psnr(found[smoke], wanted[smoke]) > WANTED_DB
 
 
+def test_script_makes_smoke_too(root, installed) -> None:
+    """``blender -b shot.blend -P addon/batch.py`` uses the add-on that is enabled, and has its exit status."""
+    blend = installed / "plume" / "shot.blend"
+    script = ("-P", ROOT / "addon" / "batch.py", "--", "--output", installed / "by script")
+    said = inside(root, installed, "blender", "-b", blend, *script, "--frames", f"{LAST - 1}:{LAST}")
+    assert "frame 2 of 2" in said
+    assert "Traceback" not in said and "registered before" not in said, said
+    with pytest.raises(AssertionError, match="status 2 "):
+        inside(root, installed, "blender", "-b", blend, *script, "--frames", "5:500")
+
+
 def test_relit_from_elsewhere(root, installed) -> None:
     """The same smoke in other light, which it is bright towards, and from another side: not a picture on a card."""
     folder = installed / "plume"
