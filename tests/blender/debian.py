@@ -56,7 +56,7 @@ def root() -> Path:
     return PLACE
 
 
-def inside(root: Path, folder: Path, *command: str | Path) -> str:
+def inside(root: Path, folder: Path, *command: str | Path | int) -> str:
     """Run a command in the Debian root, with the repository at its own path; returns what it said."""
     words = [f"{name}={value}" for name, value in variables(folder).items()]
     return run([str(SCRIPTS / "enter.sh"), str(root), str(ROOT), "env", *words, *map(str, command)])
@@ -131,7 +131,8 @@ def test_window(root, installed) -> None:
     """The tab is drawn, a click on the button runs the job beside a Blender that goes on, and smoke appears."""
     pictures = WORK / "pictures"
     # where an artist would have it; the folder is gone with the command
-    report = story(root, installed, "drive_panel.py", pictures, Path("/home/artist/plume/shot.blend"), LONGEST_SIDE)
+    blend = Path("/home/artist/plume/shot.blend")
+    report = story(root, installed, "drive_panel.py", pictures, (blend, FIRST, LAST, LONGEST_SIDE))
     frames = LAST - FIRST + 1
     for name in ("view_3d", "clip_editor"):
         seen = report[name]
@@ -160,8 +161,9 @@ def test_trouble_at_the_window(root, installed) -> None:
     """Undo, deleting, renaming, saving elsewhere, Esc, queues, failures, switching off and quitting during a run."""
     pictures = WORK / "trouble"
     blend = installed / "ein Räuchlein 煙" / "shot.blend"
-    report = story(root, installed, "drive_trouble.py", pictures, blend, 32)
-    frames = LAST - FIRST + 1
+    first = LAST - 23  # so many that none of the runs ends before the artist is done with it
+    report = story(root, installed, "drive_trouble.py", pictures, (blend, first, LAST, 32))
+    frames = LAST - first + 1
     for name in ("undo", "delete_and_rename", "save_elsewhere", "resumed", "enabled"):
         seen = report[name]
         assert (seen["outcomes"], seen["volumes"], seen["frames"]) == (["done"], 1, frames), name
@@ -180,11 +182,11 @@ def test_trouble_at_the_window(root, installed) -> None:
     assert 2 <= len(index["frames"]) == len(list(last.glob("smoke_*.vdb")))
 
 
-def story(root: Path, user: Path, script: str, pictures: Path, blend: Path, longest_side: int) -> Any:
-    """Have an artist's story told at a window; returns its report."""
+def story(root: Path, user: Path, script: str, pictures: Path, shot: tuple[Path, int, int, int]) -> Any:
+    """Have an artist's story told at a window, on a shot as make_shot.py makes it; returns its report."""
     shutil.rmtree(pictures, ignore_errors=True)
     pictures.mkdir()
-    said = inside(root, user, SCRIPTS / "window.sh", script, pictures, blend, FIRST, LAST, longest_side)
+    said = inside(root, user, SCRIPTS / "window.sh", script, pictures, *shot)
     report = json.loads((pictures / "report.json").read_text())
     assert "failure" not in report, report["failure"] + said
     assert "Traceback" not in said, said
