@@ -61,7 +61,7 @@ LeastSquares::LeastSquares(const In3 &direction, In offset, In weight, In irrota
     }
 }
 
-void LeastSquares::regularise(const In3 &u, const Out3 &result, Workers &workers) {
+void LeastSquares::regularise(const In3 &u, const Out3 &result, Workers &workers, bool irrotational) {
     for (int c = 0; c < 3; ++c)
         if (regularisation_.first_order > 0) {
             smoothness(u[c], {0, 0, 0}, u[c].n, regularisation_.first_order, {}, result[c], workers);
@@ -74,7 +74,7 @@ void LeastSquares::regularise(const In3 &u, const Out3 &result, Workers &workers
     curl(u, vorticity_.out(), workers);
     for (int c = 0; c < 3; ++c)
         smoothness(vorticity_.in()[c], first_edge(c), shape_, regularisation_.second_order,
-                   irrotational_.in()[c], stress_.out()[c], workers);
+                   irrotational ? irrotational_.in()[c] : In{}, stress_.out()[c], workers);
     add_curl_transposed(stress_.in(), result, workers);
 }
 
@@ -90,7 +90,7 @@ void LeastSquares::apply(const In3 &u, const Out3 &result, Workers &workers) {
 
 Field3 LeastSquares::right_hand_side(Workers &workers) {
     Field3 b(shapes());
-    regularise(centre_.in(), b.out(), workers);
+    regularise(centre_.in(), b.out(), workers, false);
     const Out along = along_;
     workers.run(shape_[0], [&](int i) {
         product(offset_.in().row(i, 0), weight_.in().row(i, 0), along.row(i, 0), along.slab_size());

@@ -12,8 +12,8 @@ struct Regularisation {
     float kinetic = 0;      // times the squared velocity
 };
 
-//     E(u) = sum over cells of weight (offset + direction . u)^2 + R(u - centre),
-//     R(v) = sum of irrotational |curl v|^2 + the three terms of Regularisation
+//     E(u) = sum over cells of weight (offset + direction . u)^2 + irrotational |curl u|^2 + R(u - centre),
+//     R(v) = the three terms of Regularisation
 //
 // E(u) = u.Au - 2 b.u + constant with A symmetric and positive definite if kinetic > 0.
 class LeastSquares {
@@ -33,7 +33,7 @@ public:
     std::array<Shape, 3> shapes() const { return face_shapes(shape_); }
 
 private:
-    void regularise(const In3 &u, const Out3 &result, Workers &workers);
+    void regularise(const In3 &u, const Out3 &result, Workers &workers, bool irrotational = true);
 
     Shape shape_;
     Closed closed_;

@@ -32,7 +32,7 @@ Figures projected_cg(LeastSquares &problem, double tolerance, int limit, const O
     // The square of the projected gradient; the limit is relative to what the images ask of a fluid at rest.
     const double goal = tolerance * tolerance * reference;
     // In single precision the gradient stops falling somewhere; steps beyond that lead away from the minimum.
-    constexpr int patience = 20;
+    constexpr int patience = 10;
     double best = squared;
     for (int stalled = 0; squared > goal && stalled < patience && figures.iterations < limit;) {
         problem.apply(search.in(), product.out(), workers);

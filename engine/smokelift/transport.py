@@ -36,6 +36,11 @@ class Velocity:
         Edge of a voxel in metres.
     figures
         How it was found, if it was estimated: see `smokelift.velocity.estimate_velocity`.
+    confidence
+        Of an estimate, shape (nx, ny, nz), 0 to 1: how far the densities show the motion there; the rest is filled in
+        by smoothness and incompressibility.
+    source
+        Of an estimate, shape (nx, ny, nz): density that enters per second, >= 0.
 
     Raises
     ------
@@ -46,6 +51,8 @@ class Velocity:
     faces: Faces
     voxel_size: float
     figures: Mapping[str, float] = field(default_factory=dict)
+    confidence: Array | None = None
+    source: Array | None = None
 
     def __post_init__(self) -> None:
         require_positive("voxel_size", self.voxel_size)

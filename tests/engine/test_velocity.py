@@ -18,7 +18,18 @@ PAPER = VelocitySettings(method="paper")
 
 # For what moves as a whole and without noise: the default weights are those of turbulent smoke.
 LARGE = {"shape": (48, 48, 48), "radius": 10.5}
-SMOOTH = VelocitySettings(smoothness=3.0, irrotational=0.003, kinetic=1e-4, blur=0.0, tolerance=0.003)
+# The data term, the pyramid and the solver, without priors about smoke
+SMOOTH = VelocitySettings(
+    smoothness=3.0,
+    irrotational=0.003,
+    kinetic=1e-4,
+    unexplained=1.0,
+    momentum=0.0,
+    sources=False,
+    blur=0.0,
+    tolerance=0.003,
+    iterations=100,
+)
 
 
 def structured_density(x, y, z, radius=6.0):
@@ -74,8 +85,8 @@ def test_recovers_a_rotation(angle):
 
 
 @pytest.mark.parametrize("motion", [(0.7, -0.4, 0.9), (2.1, -1.2, 2.7)])
-def test_default_weights_recover_the_translation_of_a_smooth_blob(motion):
-    """The weights of turbulent smoke, solved to the end: an early stop leaves a tenth."""
+def test_default_finds_the_motion_of_a_smooth_blob(motion):
+    """A blob without texture tells the flow around it as little as to the eye: its mass has to go where it went."""
     x, y, z = positions((48, 48, 48))
 
     def blob(x, y, z):
@@ -83,9 +94,9 @@ def test_default_weights_recover_the_translation_of_a_smooth_blob(motion):
         return sum(a * np.exp(-((x - i) ** 2 + (y - j) ** 2 + (z - k) ** 2) / s) for i, j, k, s, a in centres)
 
     before, after = blob(x, y, z), blob(x - motion[0], y - motion[1], z - motion[2])
-    truth = np.broadcast_to(motion, (48, 48, 48, 3))
-    velocity = estimate_velocity(before, after, DT, VOXEL, VelocitySettings(tolerance=1e-3))
-    assert error_in_smoke(velocity, after, truth) < 0.05
+    velocity = estimate_velocity(before, after, DT, VOXEL)
+    mean = np.average(velocity.centres().reshape(-1, 3), axis=0, weights=after.ravel()) * DT / VOXEL
+    assert np.linalg.norm(mean - motion) < 0.15 * np.linalg.norm(motion)
 
 
 @pytest.mark.parametrize("seed", [0, 3, 6])
@@ -145,21 +156,100 @@ def test_walls_let_nothing_through():
     assert x[-1].any()
 
 
-def test_inflow_is_not_taken_for_motion():
+def growing_source():
+    """Smoke that stays where it is, and an inlet in it."""
     x, y, z = positions(SHAPE)
     before = structured_density(x, y, z)
-    source = (x**2 + y**2 < 16) & (abs(z) < 3)
-    after = before + 0.5 * source
-    plain = estimate_velocity(before, after, DT, VOXEL)
+    source = (x**2 + y**2 < 9) & (abs(z + 6) < 2)
+    return before, before + 0.3 * source, source
+
+
+def test_inflow_that_is_marked_is_not_taken_for_motion():
+    before, after, source = growing_source()
+    plain = estimate_velocity(before, after, DT, VOXEL, VelocitySettings(sources=False))
     told = estimate_velocity(before, after, DT, VOXEL, inflow=ndimage.binary_dilation(source, iterations=2))
-    assert np.linalg.norm(told.centres()) < 0.05 * np.linalg.norm(plain.centres())
+    assert np.linalg.norm(told.centres()) < 0.1 * np.linalg.norm(plain.centres())
+
+
+def test_inflow_is_found():
+    before, after, source = growing_source()
+    rest = Velocity.zero(SHAPE, VOXEL)
+    steady = dataclasses.replace(rest, faces=tuple(component + np.float32(1e-4) for component in rest.faces))
+    plain = estimate_velocity(before, after, DT, VOXEL, VelocitySettings(sources=False), prediction=steady)
+    found = estimate_velocity(before, after, DT, VOXEL, prediction=steady)
+    assert np.linalg.norm(found.centres()) < 0.7 * np.linalg.norm(plain.centres())
+    near = ndimage.binary_dilation(source, iterations=2)
+    assert found.source[near].sum() > 0.5 * found.source.sum() > 0
+    assert found.source.min() >= 0
 
 
 def test_a_prediction_helps():
     before, after, truth = rotation(0.25)
-    faces = estimate_velocity(before, after, DT, VOXEL, VelocitySettings(tolerance=0.1, warps=1))
+    faces = estimate_velocity(before, after, DT, VOXEL, VelocitySettings(tolerance=0.1, warps=1, momentum=0.0))
     refined = estimate_velocity(before, after, DT, VOXEL, prediction=faces)
     assert error_in_smoke(refined, after, truth) < error_in_smoke(faces, after, truth)
+
+
+def test_a_true_prediction_is_trusted_and_a_wrong_one_is_not():
+    before, after, truth = rotation(0.2)
+    faces = turning_faces(0.2)
+    right = estimate_velocity(before, after, DT, VOXEL, prediction=faces)
+    wrong = Velocity([-component for component in faces.faces], VOXEL)
+    refused = estimate_velocity(before, after, DT, VOXEL, prediction=wrong)
+    assert right.figures["trust"] > 0.9
+    assert error_in_smoke(right, after, truth) < 0.15
+    assert refused.figures["trust"] == 0
+    np.testing.assert_array_equal(refused.centres(), estimate_velocity(before, after, DT, VOXEL).centres())
+
+
+def turning_faces(angle):
+    """The displacement of `rotation` on faces, in m/s."""
+    c, s = np.cos(angle), np.sin(angle)
+    faces = []
+    for axis in range(3):
+        shape = [n + (d == axis) for d, n in enumerate(SHAPE)]
+        x, _, z = (
+            i - (n - 1) / 2 - 0.5 * (d == axis) for d, (i, n) in enumerate(zip(np.indices(shape), SHAPE, strict=True))
+        )
+        faces.append([x - (c * x + s * z), 0 * x, z - (c * z - s * x)][axis] * VOXEL / DT)
+    return Velocity(faces, VOXEL)
+
+
+def test_buoyancy_is_found_beside_a_prediction():
+    """Smoke that has gained speed since the prediction was made: the gain is fitted, not left to smoothness."""
+    before, after, truth = translation(np.array([0.0, 0.0, 1.0]), **LARGE)
+    zero = Velocity.zero(before.shape, VOXEL)
+    slower = Velocity([c + np.float32(0.7 * VOXEL / DT) * (a == 2) for a, c in enumerate(zero.faces)], VOXEL)
+    found = estimate_velocity(before, after, DT, VOXEL, prediction=slower)
+    assert error_in_smoke(found, after, truth) < 0.5 * error_in_smoke(slower, after, truth)
+
+
+@pytest.mark.parametrize("noise", [0.01, 0.03, 0.1])
+def test_noise_is_not_turbulence(noise):
+    before, after, truth = rotation(0.15)
+    rng = np.random.default_rng(1)
+    before, after = (
+        np.maximum(a + noise * a.max() * rng.standard_normal(SHAPE) * (a > 0.01), 0) for a in (before, after)
+    )
+    found = estimate_velocity(before, after, DT, VOXEL)
+    inside = after > 0.1 * after.max()
+    speed, true_speed = (np.linalg.norm(u[inside], axis=-1) for u in (found.centres() * DT / VOXEL, truth))
+    assert speed.max() < 1.8 * true_speed.max()
+    assert speed.mean() < 1.4 * true_speed.mean()
+
+
+def test_smoke_that_thins_out_does_not_move():
+    before, _, _ = translation(np.zeros(3))
+    drift = estimate_velocity(before, 0.9 * before, DT, VOXEL).centres() * DT / VOXEL
+    assert np.abs(drift[before > 0.1 * before.max()]).mean() < 0.05
+
+
+def test_confidence_is_where_there_is_structure():
+    before, after, _ = rotation(0.1)
+    confidence = estimate_velocity(before, after, DT, VOXEL).confidence
+    assert confidence.shape == SHAPE
+    assert confidence.min() >= 0 and confidence.max() <= 1
+    assert confidence[after > 0.3 * after.max()].mean() > 0.5 > 0.05 > confidence[:3, :3, :3].max()
 
 
 @pytest.mark.parametrize("method", ["default", "paper"])
