@@ -14,8 +14,8 @@ from smokelift.images import write_image
 from smokelift.pictures import (
     SHEET_ANGLES,
     TILE_HEIGHT,
+    Viewer,
     eight_bit,
-    sequence_renderer,
     write_contact_sheet,
     write_preview,
     write_video,
@@ -82,15 +82,16 @@ def test_a_video_that_breaks_off_leaves_nothing(tmp_path) -> None:
 
 def test_the_front_is_the_scenes_own_view(plume, sequence) -> None:
     """Without another camera the picture is that of the scene."""
-    image = sequence_renderer(sequence).image(plume.densities[2])
+    image = Viewer(sequence).image(3, plume.densities[2])
     np.testing.assert_allclose(image, render(plume.densities[2], plume.scene), atol=1e-6)
 
 
 def test_a_turned_camera_is_taken(plume, sequence) -> None:
     """Another camera's picture is that camera's."""
     camera = orbit(plume.scene.camera, plume.scene.domain, 90)
-    image = sequence_renderer(sequence, camera).image(plume.densities[2])
-    np.testing.assert_allclose(image, render(plume.densities[2], plume.scene, camera), atol=1e-6)
+    for viewer in (Viewer(sequence, camera), Viewer(sequence, turn=(90, 0))):
+        image = viewer.image(3, plume.densities[2])
+        np.testing.assert_allclose(image, render(plume.densities[2], plume.scene, camera), atol=1e-6)
 
 
 @pytest.mark.parametrize("count", [1, 2, 5])
@@ -135,9 +136,8 @@ def test_a_background_picture_is_shown_in_front_and_its_mean_beside(plume, tmp_p
     write_image(tmp_path / "plate.exr", plate)
     scene = replace(plume.scene, background=Background(image=tmp_path / "plate.exr"))
     sequence = written(scene, [np.zeros_like(plume.densities[0])], tmp_path / "out")
-    np.testing.assert_allclose(sequence_renderer(sequence).image(sequence.density(1)), plate, atol=1e-3)
-    turned = orbit(scene.camera, scene.domain, 45)
-    image = sequence_renderer(sequence, turned).image(sequence.density(1))
+    np.testing.assert_allclose(Viewer(sequence).image(1, sequence.density(1)), plate, atol=1e-3)
+    image = Viewer(sequence, turn=(45, 0)).image(1, sequence.density(1))
     np.testing.assert_allclose(image, 0.25, atol=1e-3)
     with Clip.open(plume.scene.clip) as clip:
         write_contact_sheet(tmp_path / "sheet.png", sequence, clip)
