@@ -134,8 +134,8 @@ class Camera:
         """Check every value and store plain tuples."""
         if self.type not in ("perspective", "orthographic"):
             raise SceneError(f'type must be "perspective" or "orthographic", not {shown(self.type)}', key="type")
-        _set(self, matrix=_rigid(self.matrix), size=picture_size(self.size))
         _set(self, matrices=tuple(_rigid(matrix, "matrices") for matrix in self.matrices))
+        _set(self, matrix=_rigid(self.matrix), size=picture_size(self.size))
         if self.matrices and self.matrix != self.matrices[0]:
             raise SceneError("matrix must be the first of matrices", key="matrices")
         for key in ("fx", "fy"):

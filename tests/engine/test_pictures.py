@@ -142,3 +142,27 @@ def test_a_background_picture_is_shown_in_front_and_its_mean_beside(plume, tmp_p
     with Clip.open(plume.scene.clip) as clip:
         write_contact_sheet(tmp_path / "sheet.png", sequence, clip)
         write_preview(tmp_path / "preview.mp4", sequence, clip)
+
+
+def test_a_moving_camera_is_followed(plume, tracked, tmp_path) -> None:
+    """In front each frame is seen as it was filmed, before its own plate; turned by so much from there."""
+    scene = replace(tracked, background=Background(image=tmp_path / "plate_#.exr"))
+    for n in range(5):
+        write_image(tmp_path / f"plate_{n}.exr", np.full((56, 40, 3), 0.1 * n, np.float32))
+    sequence = written(scene, plume.densities, tmp_path / "out")
+    front, turned = Viewer(sequence), Viewer(sequence, turn=(30, 0))
+    for number in (1, 4, 2):
+        density, camera = plume.densities[number - 1], tracked.camera.at(number - 1)
+        before = replace(tracked, background=Background(color=[0.1 * (number - 1)] * 3))
+        np.testing.assert_allclose(front.image(number, density), render(density, before, camera), atol=1e-3)
+        aside = orbit(camera, scene.domain, 30)
+        np.testing.assert_allclose(turned.image(number, density), render(density, tracked, aside), atol=1e-3)
+    with Clip.open(tracked.clip) as clip:
+        write_contact_sheet(tmp_path / "sheet.png", sequence, clip)
+        write_preview(tmp_path / "preview.mp4", sequence, clip)
+
+
+def test_a_moving_camera_is_no_picture_of_its_own(plume, tracked) -> None:
+    """Which frame's is meant has to be said."""
+    with pytest.raises(ValueError, match=r"camera\.at\(frame\)"):
+        render(plume.densities[0], tracked)
