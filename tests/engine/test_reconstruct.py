@@ -227,11 +227,12 @@ def test_a_moving_camera_resumes_on_its_own_path_only(tracked, draft, tmp_path) 
         np.testing.assert_array_equal(sequence.density(frame.number), frame.density)
 
 
-def test_smoke_that_a_moving_camera_loses_goes_on(plume, tracked, draft) -> None:
-    """What is not in the picture is carried along: it keeps its mass and goes on rising."""
-    away = look_at_matrix((0, -4, 0.8), (0, -9, 0.8), (0, 0, 1))
-    poses = (*tracked.camera.matrices[:4], away)
-    frames = frames_of(replace(tracked, camera=replace(tracked.camera, matrices=poses)), draft)
+@pytest.mark.parametrize("target", [(0, -9, 0.8), (1.1, 0, 0.8)], ids=["away", "aside"])
+def test_smoke_that_a_moving_camera_loses_goes_on(plume, tracked, draft, tmp_path, target) -> None:
+    """What is not in the picture is carried along, also if part of the box is: it keeps its mass and goes on rising."""
+    poses = (*tracked.camera.matrices[:4], look_at_matrix((0, -4, 0.8), target, (0, 0, 1)))
+    scene = plume.write(tmp_path, plume.densities, replace(tracked, camera=replace(tracked.camera, matrices=poses)))
+    frames = frames_of(scene, draft)
     assert frames[4].figures["hull_share"] == 0
     assert frames[4].density.sum() == pytest.approx(frames[3].density.sum(), rel=0.1)
     assert centroid(frames[4].density, tracked)[2] > centroid(frames[3].density, tracked)[2] + 0.02

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,17 @@ import pytest
 from smokelift.clip import Clip
 from smokelift.images import write_image
 from smokelift.render.rays import project
-from smokelift.scene import Background, Camera, ClipSource, DirectionalLight, Domain, Medium, Scene, look_at_matrix
+from smokelift.scene import (
+    Background,
+    Camera,
+    ClipSource,
+    DirectionalLight,
+    Domain,
+    EnvironmentLight,
+    Medium,
+    Scene,
+    look_at_matrix,
+)
 from smokelift.settings import LONGEST_SIDE, Settings
 from smokelift.shot import Shot, prepare_shot
 
@@ -167,6 +178,18 @@ def test_each_frame_has_its_own_small_picture(tracked, draft) -> None:
     first = shot.at(0)
     assert first is not None
     assert first.small_scene == shot.small_scene
+
+
+def test_surroundings_do_not_flicker_while_the_camera_moves(tracked, draft, tmp_path, monkeypatch) -> None:
+    """An environment is as many lights in one frame as in another, though another camera would need more."""
+    wanted = {pose[0][3]: 4 + n for n, pose in enumerate(tracked.camera.matrices)}
+    module = sys.modules["smokelift.render"]  # the function of that name hides it
+    monkeypatch.setattr(module, "environment_count", lambda _light, camera, *_: wanted[camera.position[0]])
+    sky = np.random.default_rng(0).uniform(0.1, 2.0, (8, 16, 3)).astype(np.float32)
+    write_image(tmp_path / "sky.exr", sky)
+    shot = shot_of(replace(tracked, lights=(EnvironmentLight(tmp_path / "sky.exr"),)), draft)
+    lights = {frame.small_scene.lights for n in range(5) if (frame := shot.at(n)) is not None}
+    assert len(lights) == 1
 
 
 def test_a_frame_that_shows_nothing_of_the_domain(tracked, draft) -> None:

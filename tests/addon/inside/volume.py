@@ -143,8 +143,8 @@ def test_the_plate_of_a_moving_camera_plays_beside_the_clip(shot, tmp_path, kind
     shot.render.resolution_x, shot.render.resolution_y, shot.cycles.samples = 16, 24, 1
     for frame in (2, 5):
         shot.frame_set(frame)
-        corner = rendered(shot, tmp_path / "out.exr")[1, 1]
-        assert corner == pytest.approx([levels[frame - 1]] * 3, abs=0.02)
+        behind = np.median(rendered(shot, tmp_path / "out.exr"), axis=(0, 1))
+        assert behind == pytest.approx([levels[frame - 1]] * 3, abs=0.02)
         places.append(thing.matrix_world.copy())
     assert places[0] == places[1]
 
