@@ -218,7 +218,7 @@ def test_a_moving_camera_resumes_on_its_own_path_only(tracked, draft, tmp_path) 
     cut_off(tracked, draft, out, 3)
     poses = tracked.camera.matrices
     other = replace(tracked.camera, matrices=(*poses[:-1], poses[0]))
-    with pytest.raises(SequenceError, match="matrices"):
+    with pytest.raises(SequenceError, match=r"scene\.camera\.matrices\[4\]\[0\]\[0\] was 0\.\d+ and is now 0\.\d+;"):
         frames_of(replace(tracked, camera=other), draft, out, npz=True, resume=True)
     frames_of(tracked, draft, out, npz=True, resume=True)
     sequence = Sequence.open(out)
