@@ -4,6 +4,7 @@ Everything that is made here has a name of its own and is found again by it, so 
 """
 
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -43,7 +44,7 @@ def set_up(scene: bpy.types.Scene, take: Take, index: dict[str, Any]) -> None:
     _show_clip_behind(scene.camera.data, scene.smokelift.clip)
     if scene.smokelift.light_mode == "ESTIMATE":
         _estimated_sun(scene, index)
-    _plate_world(scene, take, index["scene"].get("background") or {})
+    _plate_world(scene, take, index["scene"])
     scene.render.engine = "CYCLES"
     scene.view_settings.view_transform = "Standard"
     scene.view_settings.look = "None"
@@ -95,7 +96,7 @@ def _estimated_sun(scene: bpy.types.Scene, index: dict[str, Any]) -> None:
     sun.rotation_euler = Vector(table["direction"]).to_track_quat("-Z", "Y").to_euler()
 
 
-def _plate_world(scene: bpy.types.Scene, take: Take, background: dict[str, Any]) -> None:
+def _plate_world(scene: bpy.types.Scene, take: Take, tables: dict[str, Any]) -> None:
     """A world that shows the camera what is behind the smoke, and lights the smoke as the old one did."""
     world = scene.world
     if world is None or not world.name.startswith(NAME):
@@ -126,16 +127,21 @@ def _plate_world(scene: bpy.types.Scene, take: Take, background: dict[str, Any])
         for node, left in ((rays, 400.0), (seen, 200.0)):
             node.location = mix.location - Vector((left, 200.0))
     seen = mix.inputs[2].links[0].from_node
-    _wire_plate(world.node_tree, seen, take, background)
+    picture = _wire_plate(world.node_tree, seen, take, tables.get("background") or {})
+    if picture is not None:
+        _play_plate(picture, scene.smokelift.clip, "matrices" in tables["camera"])
 
 
-def _wire_plate(tree: bpy.types.NodeTree, seen: bpy.types.ShaderNode, take: Take, background: dict[str, Any]) -> None:
+def _wire_plate(
+    tree: bpy.types.NodeTree, seen: bpy.types.ShaderNode, take: Take, background: dict[str, Any]
+) -> bpy.types.ShaderNode | None:
+    """Show a clean plate or a colour; returns the plate's node."""
     colour = seen.inputs["Color"]
     if "image" not in background:
         for link in list(colour.links):
             tree.links.remove(link)
         colour.default_value = (*background.get("color", (0.0, 0.0, 0.0)), 1.0)
-        return
+        return None
     if not colour.links:
         place = tree.nodes.new("ShaderNodeTexCoord")
         picture = tree.nodes.new("ShaderNodeTexImage")
@@ -146,4 +152,21 @@ def _wire_plate(tree: bpy.types.NodeTree, seen: bpy.types.ShaderNode, take: Take
             node.location = seen.location - Vector((left, 0.0))
     path = Path(background["image"])
     path = path if path.is_absolute() else take.directory / path
-    colour.links[0].from_node.image = bpy.data.images.load(str(path), check_existing=True)
+    node = colour.links[0].from_node
+    node.image = bpy.data.images.load(str(path), check_existing=True)
+    return node
+
+
+def _play_plate(node: bpy.types.ShaderNode, clip: bpy.types.MovieClip, tracked: bool) -> None:
+    """Let a plate with a picture for every frame play beside the clip."""
+    image, user = node.image, node.image_user
+    number = re.search(r"(\d+)\.\w+$", image.filepath)
+    if tracked and image.source == "FILE" and number:
+        image.source = "SEQUENCE"
+    if image.source == "FILE":
+        return
+    # Blender counts a sequence's pictures by the numbers in their names, and a video's frames from 1
+    before = int(number[1]) - 1 if number and image.source == "SEQUENCE" else 0
+    user.frame_start, user.frame_duration = clip.frame_start, clip.frame_duration
+    user.frame_offset = before + clip.frame_offset
+    user.use_auto_refresh = True

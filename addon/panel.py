@@ -28,7 +28,7 @@ class _Main:
             _say(
                 layout,
                 context,
-                "Choose a video or a picture sequence of smoke, filmed with a camera that stands still.",
+                "Choose a video or a picture sequence of smoke. If its camera moves, track it first.",
             )
             return
         _draw_clip(layout, context)

@@ -44,7 +44,7 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
 
     clip: PointerProperty(
         name="Clip",
-        description="Footage of smoke from a camera that stands still: a video or a sequence of pictures",
+        description="Footage of smoke: a video or a sequence of pictures",
         type=bpy.types.MovieClip,
         update=_clip_chosen,
     )
@@ -55,13 +55,16 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
         description="What the picture shows where there is no smoke",
         items=[
             ("ESTIMATE", "From the Clip", "Find the background in the frames where the smoke does not cover it"),
-            ("FILE", "Clean Plate", "A picture of the same view without smoke"),
+            ("FILE", "Clean Plate", "A picture of the same view without smoke; of a moving camera, one for each frame"),
         ],
         update=_changed,
     )
     plate: StringProperty(
         name="Clean Plate",
-        description="Picture of the same view without smoke",
+        description=(
+            "Picture of the same view without smoke. If the camera moves: a video without smoke, or the first picture "
+            "of a sequence, with a picture for every frame of the clip"
+        ),
         subtype="FILE_PATH",
         options=_PATH_OPTIONS,
         update=_changed,
@@ -75,7 +78,7 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
                 "Guess",
                 "A level camera with an ordinary lens, and a box around the smoke; it is made",
             ),
-            ("SCENE", "Scene Camera", "The scene's camera with its lens, sensor, shift and place"),
+            ("SCENE", "Scene Camera", "The scene's camera with its lens, sensor, shift and place, tracked or still"),
         ],
         update=_changed,
     )

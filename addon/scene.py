@@ -19,8 +19,12 @@ LONGEST_SIDE = {"draft": 64, "balanced": 96, "fine": 144}
 """Voxels along the box's longest side, as the engine has them where it chooses the box itself."""
 
 FEWEST_VOXELS = 8
+LENS = ("fx", "fy", "cx", "cy")
 POSES = 9
-"""Frames at which a camera that is not to move is looked at."""
+"""Frames at which the camera is looked at to see whether it moves."""
+
+PICTURES = (".png", ".jpg", ".jpeg", ".exr", ".hdr")
+"""Pictures that the engine reads; it takes any other file for a video."""
 
 
 class ShotError(ValueError):
@@ -51,19 +55,18 @@ def shot_tables(scene: bpy.types.Scene, quick: bool = False) -> dict[str, Any]:
             if box is None:
                 raise ShotError("Say where the smoke is: press Make Box, and move it so that it holds the smoke.")
             turn = box.matrix_world.to_quaternion().to_matrix()
-            camera = _camera(scene, depsgraph)
-            tables["camera"] = camera_table(scene, camera, depsgraph, turn)
             tables["domain"] = domain_table(box, turn, settings)
-            _check_seen(scene, camera, box)
+            tables["camera"] = _filmed_by(scene, turn, box_corners(box), quick)
         if settings.use_medium:
             tables["medium"] = {key: getattr(settings, key) for key in ("extinction", "albedo", "anisotropy")}
         if settings.light_mode == "SCENE":
             tables["lights"] = light_tables(scene, depsgraph, turn)
             _check_outside(tables)
     if settings.plate_mode == "FILE":
-        tables["background"] = {"image": _existing(settings.plate, "clean plate")}
-    if settings.camera_mode == "SCENE" and not quick:
-        _check_still(scene)
+        plate = _existing(settings.plate, "clean plate")
+        if "matrices" in tables.get("camera", {}):
+            _check_changes(Path(plate))
+        tables["background"] = {"image": plate}
     return tables
 
 
@@ -190,36 +193,74 @@ def _camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> bpy.types
     return scene.camera.evaluated_get(depsgraph)
 
 
-def _check_still(scene: bpy.types.Scene) -> None:
-    """Refuse a camera that moves or zooms: the engine knows still ones only."""
-    settings = scene.smokelift
-    start, length = start_frame(scene), settings.last - settings.first
-    if length == 0:
-        return
+def _filmed_by(scene: bpy.types.Scene, turn: Matrix, corners: list[Vector], quick: bool) -> dict[str, Any]:
+    """The camera's table: its matrix, or that of every used frame if it moves.
+
+    To look at a frame costs an evaluation of the whole scene, so a few have to do for a camera that stands still.
+
+    Parameters
+    ----------
+    scene, turn
+        As `camera_table` has them.
+    corners
+        Of the box, in the world.
+    quick
+        The current frame has to do.
+    """
+    start, length = start_frame(scene), scene.smokelift.last - scene.smokelift.first
+    frames = [start + round(step * length / (POSES - 1)) for step in range(POSES)]
+    looks = _looks(scene, [scene.frame_current] if quick else sorted(set(frames)), turn, corners)
+    first = looks[0][0]
+    size = max((a - b).length for a in corners for b in corners)
+    moves = any(_moved(table["matrix"], first["matrix"], size) for table, _ in looks)
+    if moves:
+        looks = _looks(scene, list(range(start, start + length + 1)), turn, corners)
+    if any(abs(table[key] - first[key]) > 1e-4 * max(table["size"]) for table, _ in looks for key in LENS):
+        raise ShotError(
+            "The camera zooms during the clip, and only footage with one focal length can be used: choose frames in "
+            "which its lens does not change."
+        )
+    if not any(seen for _, seen in looks):
+        raise ShotError("The box is not in the camera's picture: move it there, or press Frame Box.")
+    if not moves:
+        return first
+    matrices = [table["matrix"] for table, _ in looks]
+    return {**{key: value for key, value in first.items() if key != "matrix"}, "matrices": matrices}
+
+
+def _looks(
+    scene: bpy.types.Scene, frames: list[int], turn: Matrix, corners: list[Vector]
+) -> list[tuple[dict[str, Any], bool]]:
+    """The still camera of each of some frames, and whether the box is in its picture."""
     looks = []
-    with _at_frame(scene, start) as depsgraph:
-        for frame in sorted({start + round(step * length / (POSES - 1)) for step in range(POSES)}):
-            scene.frame_set(frame)
+    with _at_frame(scene, frames[0]) as depsgraph:
+        for frame in frames:
+            if frame != scene.frame_current:
+                scene.frame_set(frame)
             camera = _camera(scene, depsgraph)
-            looks.append((camera.matrix_world.copy(), camera.data.lens, camera.data.shift_x, camera.data.shift_y))
-    size = max(settings.box.dimensions)
-    for matrix, *lens in looks:
-        moved = (matrix.translation - looks[0][0].translation).length > 1e-3 * size
-        turned = matrix.to_quaternion().rotation_difference(looks[0][0].to_quaternion()).angle > 1e-3
-        if (
-            moved
-            or turned
-            or any(abs(a - b) > 1e-4 * max(1.0, abs(b)) for a, b in zip(lens, looks[0][1:], strict=True))
-        ):
-            raise ShotError(
-                "The camera moves during the clip, and only footage from a camera that stands still can be used: "
-                "choose frames in which it does, or stabilise the clip."
-            )
+            looks.append((camera_table(scene, camera, depsgraph, turn), _sees(scene, camera, corners)))
+    return looks
 
 
-def _check_seen(scene: bpy.types.Scene, camera: bpy.types.Object, box: bpy.types.Object) -> None:
-    """Refuse a box that lies wholly beside the picture or behind the camera."""
-    places = [world_to_camera_view(scene, camera, corner) for corner in box_corners(box)]
+def _moved(pose: list[list[float]], before: list[list[float]], size: float) -> bool:
+    """Whether a camera was carried or turned by more than the eye would notice at something of a size."""
+    matrix, other = Matrix(pose), Matrix(before)
+    carried = (matrix.translation - other.translation).length > 1e-3 * size
+    return carried or matrix.to_quaternion().rotation_difference(other.to_quaternion()).angle > 1e-3
+
+
+def _check_changes(plate: Path) -> None:
+    """Refuse a single picture as clean plate of a camera that moves."""
+    if plate.suffix.lower() in PICTURES and not plate.stem[-1].isdigit():
+        raise ShotError(
+            "The camera moves, and one picture cannot show what is behind the smoke all the time: choose a video, or "
+            "the first of a sequence of pictures, with a clean plate for every frame of the clip."
+        )
+
+
+def _sees(scene: bpy.types.Scene, camera: bpy.types.Object, corners: list[Vector]) -> bool:
+    """False for a box that lies wholly beside the picture or behind the camera."""
+    places = [world_to_camera_view(scene, camera, corner) for corner in corners]
     beside = (
         all(p.z <= 0.0 for p in places),
         all(p.x < 0.0 for p in places),
@@ -227,8 +268,7 @@ def _check_seen(scene: bpy.types.Scene, camera: bpy.types.Object, box: bpy.types
         all(p.y < 0.0 for p in places),
         all(p.y > 1.0 for p in places),
     )
-    if beside[0] or (any(beside) and all(p.z > 0.0 for p in places)):
-        raise ShotError("The box is not in the camera's picture: move it there, or press Frame Box.")
+    return not (beside[0] or (any(beside) and all(p.z > 0.0 for p in places)))
 
 
 # box
@@ -382,5 +422,5 @@ def _at_frame(scene: bpy.types.Scene, frame: int) -> Iterator[bpy.types.Depsgrap
         layer.update()
         yield layer.depsgraph
     finally:
-        if scene.frame_current != before:
+        if (scene.frame_current, scene.frame_subframe) != (before, fraction):
             scene.frame_set(before, subframe=fraction)

@@ -85,7 +85,9 @@ def _play(volume: bpy.types.Volume, scene: bpy.types.Scene, take: Take, index: d
     volume.sequence_mode = "CLIP"
     clip_rate, scene_rate = index["scene"]["clip"]["fps"], frame_rate(scene)
     ratio = scene_rate / clip_rate
-    real = scene.smokelift.speed == "REAL" and not math.isclose(ratio, 1.0, rel_tol=1e-3)
+    # a camera that moves was read frame by frame, as Blender plays clips, and the smoke has to stay in step with it
+    tracked = "matrices" in index["scene"].get("camera", {})
+    real = scene.smokelift.speed == "REAL" and not tracked and not math.isclose(ratio, 1.0, rel_tol=1e-3)
     clip = scene.smokelift.clip
     before = scene.smokelift.first - 1
     start = (clip.frame_start if clip else 1) + (round(before * ratio) if real else before)

@@ -12,18 +12,23 @@ are filled smoothly from their neighbours. What never moves, a nozzle or a perfe
 background.
 
 Noise is judged in sRGB values, where that of cameras and codecs is about the same at all brightnesses.
+
+A camera that moves shows another part of the background in every frame, so a pixel has no value of its own: the
+background has to be of one colour, or known frame by frame.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
-from smokelift.clip import Clip
+from smokelift.clip import Clip, is_video
 from smokelift.images import Picture, area_average, linear_to_srgb, srgb_to_linear
+from smokelift.scene import Scene
 
 CODE = np.float32(1 / 255)
 """One step of 8 bit video: no noise is taken to be smaller."""
@@ -41,6 +46,7 @@ _NOISE_STEP = 3  # every third pixel of every third row is enough to know the no
 _SMOOTH = 1.5  # pixels
 _FAINT, _SURE = 4.0, 8.0  # noise; thresholds of the mask
 _LEAST_SURE = 1e-4  # share of the picture that must be surely smoke in a patch of the mask
+_MOST_NOISE = np.float32(6 / 255)  # a pixel that varies more while the camera moves sees more than one colour
 _WORST_FRAME = 2.0  # how many times more than the clip a frame may be taken to deviate as a whole
 
 
@@ -145,6 +151,73 @@ def known_plate(background: npt.ArrayLike, clip: Clip, sample_count: int = 32) -
     return _plate(encoded, np.ones((height, width), np.float32), sigma)
 
 
+def open_plates(scene: Scene) -> Clip | None:
+    """Open a scene's clean plate as a clip if it changes from frame to frame, and return None if it does not.
+
+    Its frames are counted as those of the clip's file. A numbered picture stands for itself before a still camera, and
+    for the sequence that it begins before one that moves.
+
+    Raises
+    ------
+    ClipError
+        If it cannot be read.
+    """
+    image = scene.background.image if scene.background is not None else None
+    moves = scene.camera is not None and scene.camera.moves
+    if image is None or not (moves or "#" in image.name or is_video(image)):
+        return None
+    return Clip.open(image)
+
+
+def changing_plate(plates: Clip, clip: Clip, sample_count: int = 32) -> Callable[[int], Plate]:
+    """Return what gives the plate of each of the clip's frames, for a background that is known frame by frame.
+
+    Parameters
+    ----------
+    plates
+        With a frame for every one of the clip's file, resized to the clip if need be.
+    clip
+        Its noise is what differs from the plates.
+    sample_count
+        Frames looked at.
+
+    Raises
+    ------
+    ValueError
+        If there are too few plates.
+    ClipError
+        If a frame cannot be read.
+    """
+    first, last = clip.first, clip.first + len(clip) - 1
+    if last >= len(plates):
+        raise ValueError(
+            f"{plates.path}: has {len(plates)} of the frames 0 to {last} that are needed; give a clean plate with a "
+            "picture for every frame of the clip, or a color, in [background]."
+        )
+    width, height = clip.size
+
+    def encoded(frame: int) -> Picture:
+        return linear_to_srgb(area_average(plates.frame(first + frame), width, height))
+
+    numbers = _spread(clip, sample_count)
+    skip = slice(None, None, _NOISE_STEP)
+    apart = [(linear_to_srgb(clip.frame(n)) - encoded(n))[skip, skip] for n in numbers]
+    sigma = _noise_of(np.stack(apart))
+    sure = np.ones((height, width), np.float32)
+    return lambda frame: _plate(encoded(frame), sure, sigma)
+
+
+def one_colour(plate: Plate) -> tuple[float, float, float] | None:
+    """Return the linear colour of a plate that was estimated from a moving camera, or None if it has more than one."""
+    known = plate.confidence > 0.5
+    if known.mean() < 0.5 or _encoded_noise(plate).max() > _MOST_NOISE:
+        return None
+    red, green, blue = (float(v) for v in np.median(plate.image[known], axis=0))
+    colour = np.broadcast_to(np.array([red, green, blue], np.float32), plate.image.shape)
+    differs = matte(plate.image, Plate(colour, np.ones_like(plate.confidence), plate.noise)).mask
+    return None if (differs & known).any() else (red, green, blue)
+
+
 def matte(frame: npt.ArrayLike, plate: Plate) -> Matte:
     """Find the smoke in a frame.
 
@@ -205,13 +278,19 @@ def _samples(clip: Clip, count: int, step: int = 1) -> npt.NDArray[np.uint16]:
     """
     width, height = clip.size
     most = max(3, step**2 * _STORE_BYTES // (width * height * 6))
-    numbers = np.unique(np.linspace(0, len(clip) - 1, min(count, most, len(clip))).round().astype(int))
+    numbers = _spread(clip, min(count, most))
     rows, columns = len(range(0, height, step)), len(range(0, width, step))
     samples = np.empty((len(numbers), rows, columns, 3), np.uint16)
     for sample, number in zip(samples, numbers, strict=True):
-        encoded = linear_to_srgb(clip.frame(int(number))[::step, ::step])
+        encoded = linear_to_srgb(clip.frame(number)[::step, ::step])
         sample[...] = np.clip(encoded * _FIXED_POINT + 0.5, 0, 65535)
     return samples
+
+
+def _spread(clip: Clip, count: int) -> list[int]:
+    """Return so many numbers of frames (or all, if there are fewer), spread evenly over the clip."""
+    numbers = np.unique(np.linspace(0, len(clip) - 1, min(count, len(clip))).round())
+    return [int(number) for number in numbers]
 
 
 def _decoded(samples: npt.NDArray[np.uint16]) -> Picture:
@@ -225,7 +304,11 @@ def _temporal_noise(samples: npt.NDArray[np.uint16]) -> Picture:
     does not disturb. (Differences of frames in a row would miss that codecs let static blocks stand, then
     jump.)
     """
-    spread = _decoded(samples).std(axis=0).reshape(-1, 3)
+    return _noise_of(_decoded(samples))
+
+
+def _noise_of(frames: Picture) -> Picture:
+    spread = frames.std(axis=0).reshape(-1, 3)
     noise: Picture = np.maximum(np.median(spread, axis=0), CODE).astype(np.float32)
     return noise
 

@@ -18,7 +18,6 @@ from types import FrameType
 
 from smokelift import pictures
 from smokelift.bench import command
-from smokelift.cameras import orbit
 from smokelift.clip import Clip
 from smokelift.doctor import report
 from smokelift.forecast import forecast
@@ -27,7 +26,7 @@ from smokelift.memory import require_memory
 from smokelift.progress import Reporter, reporter
 from smokelift.reconstruct import reconstruct
 from smokelift.render import DeviceError, device
-from smokelift.scene import Camera, ClipSource, Scene
+from smokelift.scene import ClipSource, Scene
 from smokelift.scene_file import scene_to_dict
 from smokelift.sequence import Sequence
 from smokelift.settings import METHODS, QUALITIES, Settings
@@ -126,7 +125,7 @@ def _inspect(options: argparse.Namespace, say: Reporter) -> None:
 
 def _render(options: argparse.Namespace, say: Reporter) -> None:
     sequence = Sequence.open(options.directory)
-    camera = _camera(options.camera, sequence.scene)
+    viewer = _viewer(options.camera, sequence)
     suffix = options.out.suffix.lower()
     if suffix not in (".exr", ".png", *pictures.VIDEO_KINDS):
         raise ValueError(f"{options.out}: write an image (.exr, .png) or a video ({', '.join(pictures.VIDEO_KINDS)}).")
@@ -135,14 +134,13 @@ def _render(options: argparse.Namespace, say: Reporter) -> None:
     if not options.out.absolute().parent.is_dir():
         raise ValueError(f"{options.out}: the folder {options.out.parent} does not exist.")
     device.start(options.device)
-    renderer = pictures.sequence_renderer(sequence, camera)
     if suffix in pictures.VIDEO_KINDS:
         numbers = sequence.frames if options.frame is None else (options.frame,)
         fps = sequence.scene.clip.fps if sequence.scene.clip and sequence.scene.clip.fps else 24.0
-        pictures.write_video(options.out, (renderer.image(sequence.density(n)) for n in numbers), fps)
+        pictures.write_video(options.out, (viewer.image(n, sequence.density(n)) for n in numbers), fps)
     else:
         number = sequence.frames[0] if options.frame is None else options.frame
-        write_image(options.out, renderer.image(sequence.density(number)))
+        write_image(options.out, viewer.image(number, sequence.density(number)))
     say.finish(f"{options.out} written.", {"file": str(options.out)})
 
 
@@ -188,18 +186,17 @@ def _scene(path: Path, frames: tuple[int, int] | None) -> Scene:
     return scene if frames is None else replace(scene, clip=replace(scene.clip, frames=frames))
 
 
-def _camera(name: str, scene: Scene) -> Camera | None:
-    """The camera that a word, two angles or a file stand for; None is the scene's own."""
-    assert scene.camera is not None and scene.domain is not None
+def _viewer(name: str, sequence: Sequence) -> pictures.Viewer:
+    """What looks from where a word, two angles or a camera file say."""
     if name == "front":
-        return None
+        return pictures.Viewer(sequence)
     if name == "side":
-        return orbit(scene.camera, scene.domain, SIDE_YAW)
+        return pictures.Viewer(sequence, turn=(SIDE_YAW, 0.0))
     if name.endswith(".toml"):
         camera = Scene.load(name).camera
         if camera is None:
             raise ValueError(f"{name}: has no [camera].")
-        return camera
+        return pictures.Viewer(sequence, camera)
     try:
         yaw, pitch = (float(part) for part in name.split(","))
         if not (math.isfinite(yaw) and math.isfinite(pitch)):
@@ -208,7 +205,7 @@ def _camera(name: str, scene: Scene) -> Camera | None:
         raise ValueError(
             f"--camera {name}: expected front, side, two angles YAW,PITCH in degrees, or a camera.toml."
         ) from None
-    return orbit(scene.camera, scene.domain, yaw, pitch)
+    return pictures.Viewer(sequence, turn=(yaw, pitch))
 
 
 def _three_counts(text: str) -> tuple[int, int, int]:

@@ -133,10 +133,7 @@ class Clip:
         if transfer not in (None, "srgb", "linear"):
             raise ClipError(f'{path}: transfer must be "srgb" or "linear", not "{transfer}"')
         source: _Source
-        if "#" in path.name or path.suffix.lower() in READABLE:
-            source = _Pictures(path, transfer, fps)
-        else:
-            source = _Video(path, transfer)
+        source = _Video(path, transfer) if is_video(path) else _Pictures(path, transfer, fps)
         try:
             return cls(path, source, fps, frames)
         except BaseException:
@@ -184,6 +181,11 @@ class Clip:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+def is_video(path: Path) -> bool:
+    """Return whether a path, to judge by its name, is that of a video, not of one or more pictures."""
+    return "#" not in path.name and path.suffix.lower() not in READABLE
 
 
 class _Pictures:

@@ -14,19 +14,21 @@ from numpy.typing import NDArray
 from PIL import Image as Pillow
 from PIL import ImageDraw
 
+from smokelift.background import open_plates
 from smokelift.cameras import orbit
 from smokelift.clip import Clip
 from smokelift.files import atomic_path
 from smokelift.images import area_average, linear_to_srgb
 from smokelift.reconstruct import Frame
 from smokelift.render import Renderer, scene_background, scene_renderer
-from smokelift.render.renderer import Image
+from smokelift.render.renderer import Image, Volume
 from smokelift.scene import Camera
 from smokelift.sequence import Sequence
 from smokelift.shot import Shot
 
 SHEET_ANGLES = (0, 20, 45, 90)
 SHEET_ROWS = 5
+PREVIEW_ANGLES = (0, 45)
 TILE_HEIGHT = 320
 PREVIEW_HEIGHT = 480
 
@@ -39,9 +41,68 @@ VIDEO_KINDS = {
 """Container and codec of each suffix."""
 
 
-def sequence_renderer(sequence: Sequence, camera: Camera | None = None, background: Image | None = None) -> Renderer:
-    """The renderer of a sequence's own scene, or of another camera before the scene's mean background."""
-    return scene_renderer(sequence.scene, camera, sequence.settings["density"]["scattering"], background)
+class Viewer:
+    """Renders the frames of a sequence from its scene's camera, or from another before the scene's mean background.
+
+    Where nothing moves, one renderer serves all frames.
+
+    Parameters
+    ----------
+    sequence
+        What is seen.
+    camera
+        Another camera than the scene's own.
+    turn
+        Yaw and pitch (degrees) by which the camera of each frame is carried around the domain; see `orbit`.
+    height
+        Rows of the picture, if not the camera's.
+    """
+
+    def __init__(
+        self,
+        sequence: Sequence,
+        camera: Camera | None = None,
+        *,
+        turn: tuple[float, float] = (0.0, 0.0),
+        height: int | None = None,
+    ) -> None:
+        scene = sequence.scene
+        own = camera is None and turn == (0.0, 0.0)
+        camera = camera or scene.camera
+        assert camera is not None
+        self._camera = camera if height is None else camera.resized(*small_size(camera, height))
+        self._sequence, self._turn = sequence, turn
+        self._plates = open_plates(scene) if own else None
+        # the picture of its background belongs to the scene's own camera
+        self._background = scene_background(scene, None if own else self._at(0))
+        self._changes = camera.moves or self._plates is not None
+        self._renderers: dict[int, Renderer] = {}
+
+    def image(self, number: int, density: Volume) -> Image:
+        """The picture of a frame, numbered as in the sequence, with its density."""
+        frame = number - 1 if self._changes else 0
+        if frame not in self._renderers:
+            self._renderers = {frame: self._renderer(frame)}
+        return self._renderers[frame].image(density)
+
+    def _renderer(self, frame: int) -> Renderer:
+        scene, camera, background = self._sequence.scene, self._at(frame), self._background
+        if self._plates is not None:
+            background = self._plates.frame(frame + (scene.clip.first if scene.clip is not None else 0))
+        if background.ndim == 3:
+            background = area_average(background, *camera.size)
+        return scene_renderer(scene, camera, self._sequence.settings["density"]["scattering"], background)
+
+    def _at(self, frame: int) -> Camera:
+        domain = self._sequence.scene.domain
+        assert domain is not None
+        camera = self._camera.at(frame)
+        return camera if self._turn == (0.0, 0.0) else orbit(camera, domain, *self._turn)
+
+
+def small_size(camera: Camera, height: int) -> tuple[int, int]:
+    """Width and height of a camera's picture with so many rows."""
+    return max(2, round(camera.size[0] * height / camera.size[1])), height
 
 
 def eight_bit(image: Image) -> NDArray[np.uint8]:
@@ -71,12 +132,12 @@ def write_contact_sheet(path: Path, sequence: Sequence, clip: Clip) -> None:
     """Input, reconstruction and turned views of some frames, side by side."""
     frames = sequence.frames
     chosen = [frames[i] for i in np.unique(np.linspace(0, len(frames) - 1, SHEET_ROWS + 2).round().astype(int))[1:-1]]
-    renderers = _turned(sequence, TILE_HEIGHT)
+    viewers = [Viewer(sequence, turn=(angle, 0.0), height=TILE_HEIGHT) for angle in SHEET_ANGLES]
     rows = []
     for number in chosen or frames:
         density = sequence.density(number)
-        tiles = [_fitted(clip.frame(number - 1), renderers[0].camera)]
-        tiles += [renderer.image(density) for renderer in renderers]
+        tiles = [_input(clip, number, sequence, TILE_HEIGHT)]
+        tiles += [viewer.image(number, density) for viewer in viewers]
         rows.append([eight_bit(tile) for tile in tiles])
     titles = ["input", *(f"{angle}\N{DEGREE SIGN}" for angle in SHEET_ANGLES)]
     titles[1] = "reconstruction"
@@ -86,42 +147,33 @@ def write_contact_sheet(path: Path, sequence: Sequence, clip: Clip) -> None:
 
 def write_preview(path: Path, sequence: Sequence, clip: Clip) -> None:
     """The input beside the reconstruction from the front and from 45 degrees, as a video."""
-    front, _, turned, _ = _turned(sequence, PREVIEW_HEIGHT)
+    viewers = [Viewer(sequence, turn=(angle, 0.0), height=PREVIEW_HEIGHT) for angle in PREVIEW_ANGLES]
 
     def frames() -> Iterable[Image]:
         for number in sequence.frames:
             density = sequence.density(number)
-            yield np.concatenate(
-                [_fitted(clip.frame(number - 1), front.camera), front.image(density), turned.image(density)], 1
-            )
+            views = [viewer.image(number, density) for viewer in viewers]
+            yield np.concatenate([_input(clip, number, sequence, PREVIEW_HEIGHT), *views], 1)
 
     write_video(path, frames(), clip.fps)
 
 
 def write_thumbnail(path: Path, clip: Clip, shot: Shot, frame: Frame) -> None:
     """The part of a frame that the grid is fitted to, beside its reconstruction (or above, if wide), as a PNG."""
-    seen = shot.working.cut(clip.frame(frame.number - 1))
-    renderer = scene_renderer(shot.small_scene, None, shot.scattering, shot.plate.image)
+    now = shot.at(frame.number - 1)
+    if now is None:  # nothing of the domain is in this frame's picture: the picture of the last one stays
+        return
+    seen = now.working.cut(clip.frame(frame.number - 1))
+    renderer = scene_renderer(now.small_scene, None, now.scattering, now.plate.image)
     wide = seen.shape[1] > seen.shape[0]
     both = eight_bit(np.concatenate([seen, renderer.image(frame.density)], 0 if wide else 1))
     with atomic_path(path) as aside:
         Pillow.fromarray(both).save(aside, format="PNG")
 
 
-def _turned(sequence: Sequence, height: int) -> list[Renderer]:
-    """Renderers of small pictures from the front and from the sheet's other angles."""
-    scene = sequence.scene
-    assert scene.camera is not None and scene.domain is not None
-    width = max(2, round(scene.camera.size[0] * height / scene.camera.size[1]))
-    small = scene.camera.resized(width, height)
-    behind = scene_background(scene)
-    front = sequence_renderer(sequence, small, area_average(behind, width, height) if behind.ndim == 3 else behind)
-    turned = [orbit(small, scene.domain, angle) for angle in SHEET_ANGLES if angle]
-    return [front, *(sequence_renderer(sequence, camera) for camera in turned)]
-
-
-def _fitted(frame: Image, camera: Camera) -> Image:
-    return area_average(frame, *camera.size)
+def _input(clip: Clip, number: int, sequence: Sequence, height: int) -> Image:
+    assert sequence.scene.camera is not None
+    return area_average(clip.frame(number - 1), *small_size(sequence.scene.camera, height))
 
 
 def _sheet(rows: Many[Many[NDArray[np.uint8]]], titles: Many[str], labels: Many[str]) -> Pillow.Image:

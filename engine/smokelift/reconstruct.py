@@ -19,8 +19,9 @@ import numpy as np
 
 from smokelift.clip import Clip
 from smokelift.density import Density, depth_guess, reconstruct_density
+from smokelift.density.hull import project_voxels
 from smokelift.render.renderer import Image, Volume
-from smokelift.scene import Scene
+from smokelift.scene import Domain, Scene
 from smokelift.sequence import SequenceWriter
 from smokelift.settings import Settings
 from smokelift.shot import Shot, prepare_shot
@@ -119,13 +120,13 @@ def _frames(clip: Clip, shot: Shot, settings: Settings, start: Frame | None) -> 
     before = start
     for index in range(start.number if start else 0, len(clip)):
         began = time.perf_counter()
-        image = shot.working.cut(clip.frame(index))
+        now = shot.at(index)
         predicted = None
         initial = None
         if before is not None and index >= 2:
             predicted = predict_velocity(before.velocity, dt, settings.velocity.closed)
             initial = advect(before.density, predicted, dt)
-        density = _corrected(image, shot, settings, initial)
+        density = _unseen(domain, initial) if now is None else _corrected(clip.frame(index), now, settings, initial)
         fitted = time.perf_counter()
         velocity = Velocity.zero(domain.resolution, domain.voxel_size)
         if before is not None:
@@ -149,10 +150,24 @@ def _frames(clip: Clip, shot: Shot, settings: Settings, start: Frame | None) -> 
         before = frame
 
 
-def _corrected(image: Image, shot: Shot, settings: Settings, transported: Volume | None) -> Density:
+def _corrected(picture: Image, shot: Shot, settings: Settings, transported: Volume | None) -> Density:
     """The frame's density from its picture and the density carried along."""
-    scene, share = shot.small_scene, settings.transport
+    image, scene, share = shot.working.cut(picture), shot.small_scene, settings.transport
+    initial = transported
     if settings.method == "default" and transported is not None and share < 1:
         guess = depth_guess(image, scene, settings.density, shot.plate)
-        transported = np.float32(1 - share) * guess + np.float32(share) * transported
-    return reconstruct_density(image, scene, transported, settings.density, plate=shot.plate)
+        initial = np.float32(1 - share) * guess + np.float32(share) * transported
+    density = reconstruct_density(image, scene, initial, settings.density, plate=shot.plate)
+    assert shot.scene.camera is not None and scene.camera is not None and scene.domain is not None
+    if transported is not None and shot.scene.camera.moves:
+        # what a moving camera does not see now it may have seen before
+        seen = project_voxels(scene.camera, scene.domain).visible
+        density = replace(density, values=np.where(seen, density.values, transported))
+    return density
+
+
+def _unseen(domain: Domain, transported: Volume | None) -> Density:
+    """The density of a frame whose picture shows nothing of the domain: what was carried along."""
+    nothing = np.zeros(domain.resolution, np.float32)
+    figures = {"loss": 0.0, "psnr": 0.0, "iterations": 0.0, "hull_share": 0.0}
+    return Density(nothing if transported is None else transported, nothing > 0, figures)

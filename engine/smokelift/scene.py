@@ -111,11 +111,14 @@ class Camera:
         Perspective: focal lengths in pixels. Orthographic: pixels per metre.
     cx, cy
         Where the optical axis meets the picture, in pixels.
+    matrices
+        Of a camera that moves: its matrix in every frame of the clip that is used, ``matrix`` the first of them.
+        Empty for one that stands still.
 
     Raises
     ------
     SceneError
-        If the matrix is not rigid, or a size or focal length is not positive.
+        If a matrix is not rigid, or a size or focal length is not positive.
     """
 
     type: Literal["perspective", "orthographic"]
@@ -125,12 +128,16 @@ class Camera:
     fy: float
     cx: float
     cy: float
+    matrices: tuple[Matrix, ...] = ()
 
     def __post_init__(self) -> None:
         """Check every value and store plain tuples."""
         if self.type not in ("perspective", "orthographic"):
             raise SceneError(f'type must be "perspective" or "orthographic", not {shown(self.type)}', key="type")
+        _set(self, matrices=tuple(_rigid(matrix, "matrices") for matrix in self.matrices))
         _set(self, matrix=_rigid(self.matrix), size=picture_size(self.size))
+        if self.matrices and self.matrix != self.matrices[0]:
+            raise SceneError("matrix must be the first of matrices", key="matrices")
         for key in ("fx", "fy"):
             value = number(getattr(self, key), key, "a number above 0")
             if value <= 0.0:
@@ -175,6 +182,25 @@ class Camera:
     def position(self) -> Vector:
         """Where the camera is, in metres."""
         return self.matrix[0][3], self.matrix[1][3], self.matrix[2][3]
+
+    @property
+    def moves(self) -> bool:
+        """Whether it has a matrix for every frame."""
+        return bool(self.matrices)
+
+    def at(self, frame: int) -> Camera:
+        """Return the camera as it stands in a frame, counted from 0 at the first that is used.
+
+        Raises
+        ------
+        SceneError
+            If it moves, and has no matrix for that frame.
+        """
+        if not self.moves:
+            return self
+        if not 0 <= frame < len(self.matrices):
+            raise SceneError(f"matrices are given for frames 0 to {len(self.matrices) - 1}, not for {frame}")
+        return replace(self, matrix=self.matrices[frame], matrices=())
 
     def resized(self, width: int, height: int) -> Camera:
         """Return the same camera with another number of pixels over the same field of view."""
@@ -228,23 +254,20 @@ def look_at_matrix(position: Any, target: Any, up: Any) -> Matrix:
     return cast(Matrix, tuple(tuple(row) for row in [*rows.tolist(), [0.0, 0.0, 0.0, 1.0]]))
 
 
-def _rigid(value: Any) -> Matrix:
+def _rigid(value: Any, key: str = "matrix") -> Matrix:
     """Check a camera to world matrix. A few rounded digits in a file (1e-3) are forgiven."""
+    name = key if key == "matrix" else f"every one of {key}"
     expected = "four rows of four numbers, camera to world"
-    rows = [
-        [number(v, "matrix", expected) for v in items(row, 4, "matrix", expected)]
-        for row in items(value, 4, "matrix", expected)
-    ]
+    rows = [[number(v, key, expected) for v in items(row, 4, key, expected)] for row in items(value, 4, key, expected)]
     rotation = np.array(rows)[:3, :3]
     if rows[3] != [0.0, 0.0, 0.0, 1.0]:
-        raise SceneError(f"matrix must end with the row [0, 0, 0, 1], not {shown(rows[3])}", key="matrix")
+        raise SceneError(f"{name} must end with the row [0, 0, 0, 1], not {shown(rows[3])}", key=key)
     if np.abs(rotation.T @ rotation - np.eye(3)).max() > 1e-3:
         raise SceneError(
-            "matrix must be rigid: its upper left 3x3 part must be a rotation without scale or shear",
-            key="matrix",
+            f"{name} must be rigid: its upper left 3x3 part must be a rotation without scale or shear", key=key
         )
     if np.linalg.det(rotation) < 0.0:
-        raise SceneError("matrix must be rigid: its upper left 3x3 part mirrors", key="matrix")
+        raise SceneError(f"{name} must be rigid: its upper left 3x3 part mirrors", key=key)
     return cast(Matrix, tuple(tuple(row) for row in rows))
 
 
@@ -411,7 +434,8 @@ Light = DirectionalLight | PointLight | EnvironmentLight
 class Background:
     """What the camera sees behind the smoke: one linear colour, or a picture (a clean plate).
 
-    With neither, the background is estimated from the clip.
+    A video, or pictures written ``plate_####.png``, is a plate that changes: its frame n is behind the clip's frame
+    n. With neither, the background is estimated from the clip.
     """
 
     color: Vector | None = None
@@ -465,6 +489,11 @@ class ClipSource:
         if self.transfer not in (None, "srgb", "linear"):
             raise SceneError(f'transfer must be "srgb" or "linear", not {shown(self.transfer)}', key="transfer")
 
+    @property
+    def first(self) -> int:
+        """First frame, counted from 0."""
+        return 0 if self.frames is None else self.frames[0]
+
 
 @dataclass(frozen=True)
 class View:
@@ -481,7 +510,7 @@ class Scene:
     Raises
     ------
     SceneError
-        If a camera cannot see the domain, or a point light stands inside it.
+        If a camera can see the domain in no frame, or a point light stands inside it.
     """
 
     clip: ClipSource | None = None
@@ -509,7 +538,10 @@ class Scene:
             *((f"views.{index}.camera", view.camera) for index, view in enumerate(self.views)),
         ]
         for table, camera in cameras:
-            if camera is not None and not sees(camera, self.domain):
+            if camera is None:
+                continue
+            frames = range(len(camera.matrices) or 1)
+            if not any(sees(camera.at(frame), self.domain) for frame in frames):
                 raise SceneError("does not see the domain: no part of the box is in its picture", table=table)
 
     @classmethod
@@ -538,7 +570,7 @@ class Scene:
 
 
 def sees(camera: Camera, domain: Domain) -> bool:
-    """Return False if all of the box lies outside one side of what the camera sees.
+    """Return False if all of the box lies outside one side of what a still camera sees.
 
     That test is exact for every box except one that passes by a corner of the picture, which counts as seen.
     """

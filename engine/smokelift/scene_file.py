@@ -155,7 +155,11 @@ def _clip_to_dict(clip: ClipSource, base: Path | None) -> dict[str, Any]:
 def _camera_to_dict(camera: Camera) -> dict[str, Any]:
     return {
         "type": camera.type,
-        "matrix": [list(row) for row in camera.matrix],
+        **(
+            {"matrices": [[list(row) for row in matrix] for matrix in camera.matrices]}
+            if camera.moves
+            else {"matrix": [list(row) for row in camera.matrix]}
+        ),
         "fx": camera.fx,
         "fy": camera.fy,
         "cx": camera.cx,
@@ -305,15 +309,22 @@ class _Reader:
     def _camera(self, place: Place, data: Table) -> Camera:
         kind = data.get("type", "perspective")
         lens = ("height",) if kind == "orthographic" else ("fov_y_degrees",)
-        pose = ("matrix", "position", "target", "up")
+        pose = ("matrices", "matrix", "position", "target", "up")
         self._known(place, data, ("type", "size", *pose, "fx", "fy", "cx", "cy", *lens))
         self._needed(data, "size")
         width, height = picture_size(data["size"])
-        if "matrix" in data:
-            for key in pose[1:]:
+        given = next((key for key in pose[:2] if key in data), None)
+        matrices: tuple[Any, ...] = ()
+        if given is not None:
+            for key in pose[pose.index(given) + 1 :]:
                 if key in data:
-                    raise SceneError(f"takes matrix or {key}, not both", key=key)
-            matrix = data["matrix"]
+                    raise SceneError(f"takes {given} or {key}, not both", key=key)
+            matrix = data[given]
+            if given == "matrices":
+                if not isinstance(matrix, list) or not matrix:
+                    expected = "a list of 4x4 matrices, camera to world, one a frame"
+                    raise SceneError(f"matrices must be {expected}, not {shown(matrix)}", key=given)
+                matrices, matrix = tuple(matrix), matrix[0]
         else:
             if "position" not in data or "target" not in data:
                 raise SceneError("needs matrix, or position and target")
@@ -328,7 +339,7 @@ class _Reader:
                 raise SceneError(f"needs {lens[0]} or fx")
             fx, fy = data["fx"], data.get("fy", data["fx"])
         centre = data.get("cx", width / 2), data.get("cy", height / 2)
-        return Camera(kind, matrix, (width, height), fx, fy, *centre)
+        return Camera(kind, matrix, (width, height), fx, fy, *centre, matrices)
 
 
 def _focal(key: str, value: Any, height: int) -> float:

@@ -476,7 +476,13 @@ def _difference(where: str, there: Any, now: Any) -> str:
             if inner:
                 return inner
         return ""
-    return "" if there == now else f"{where} was {json.dumps(there)} and is now {json.dumps(now)}"
+    if isinstance(there, list) and isinstance(now, list) and len(there) == len(now):
+        parts = (_difference(f"{where}[{n}]", *pair) for n, pair in enumerate(zip(there, now, strict=True)))
+        return next(filter(None, parts), "")
+    if there == now:
+        return ""
+    was, is_now = (text if len(text) <= 60 else f"{text[:57]}..." for text in map(json.dumps, (there, now)))
+    return f"{where} was {was} and is now {is_now}"
 
 
 def _read_index(directory: Path) -> dict[str, Any]:

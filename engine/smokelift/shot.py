@@ -5,15 +5,26 @@ What a scene file leaves out is estimated from the clip or defaulted, and every 
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.background import Plate, estimate_plate, known_plate, matte
-from smokelift.cameras import WorkingPicture, as_matrix, working_picture
+from smokelift.background import (
+    Plate,
+    changing_plate,
+    estimate_plate,
+    known_plate,
+    matte,
+    one_colour,
+    open_plates,
+)
+from smokelift.cameras import CameraError, WorkingPicture, as_matrix, working_picture
 from smokelift.clip import Clip
 from smokelift.images import area_average, read_image
+from smokelift.render import scene_lights
 from smokelift.render.setup import Scattering
 from smokelift.scene import Background, Camera, DirectionalLight, Domain, Medium, Scene
 from smokelift.settings import LONGEST_SIDE, Settings
@@ -41,15 +52,17 @@ class Shot:
         With the camera of the full picture, domain, medium and lights (empty only if nothing is scattered); its
         background stays unknown where it was estimated.
     working
-        The small picture that the grid is fitted to.
+        The small picture that the grid is fitted to; of the first frame that shows the domain if the camera moves.
     plate
-        Background of the small picture, with the clip's noise.
+        Background of that small picture, with the clip's noise.
     scattering
         How light is scattered: ``"single"`` where the light is known, else ``"unshadowed"``.
     estimated_background
         Full picture behind the smoke where the scene does not give one, (rows, columns, 3).
     notes
         What was assumed or estimated, a sentence each.
+    plate_at
+        Background of the full picture in every frame, counted from 0, where camera or background change; else None.
     """
 
     scene: Scene
@@ -58,6 +71,20 @@ class Shot:
     scattering: Scattering
     estimated_background: NDArray[np.float32] | None
     notes: tuple[str, ...]
+    plate_at: Callable[[int], Plate] | None = None
+
+    def at(self, frame: int) -> Shot | None:
+        """The shot as it is in a frame, counted from 0; None if nothing of the domain is in the picture then."""
+        if self.plate_at is None:
+            return self
+        assert self.scene.camera is not None and self.scene.domain is not None
+        try:
+            working = working_picture(self.scene.camera.at(frame), self.scene.domain)
+        except CameraError:
+            return None
+        # An environment is as many lights as one camera needs; were they chosen anew, the light would flicker.
+        lit = replace(self.scene, lights=scene_lights(self.small_scene))
+        return replace(self, scene=lit, working=working, plate=_small(self.plate_at(frame), working))
 
     @property
     def small_scene(self) -> Scene:
@@ -85,8 +112,19 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
     notes: list[str] = []
     if clip.warning:
         notes.append(clip.warning)
-    plate = _plate(clip, scene, notes)
-    samples = _smoke_samples(clip, plate)
+    moves = scene.camera is not None and scene.camera.moves
+    if scene.camera is not None and moves and len(scene.camera.matrices) != len(clip):
+        raise ValueError(
+            f"[camera] matrices are given for {len(scene.camera.matrices)} frames, and {len(clip)} frames of the clip "
+            "are used; give one matrix for each."
+        )
+    plates = open_plates(scene)
+    if plates is not None:
+        plate_at = changing_plate(plates, clip)
+    else:
+        plate, scene = _plate(clip, scene, notes)
+        plate_at = lambda _frame: plate  # noqa: E731
+    samples = _smoke_samples(clip, plate_at)
     camera, domain = _geometry(clip, scene, settings, samples, notes)
     medium = scene.medium
     if medium is None:
@@ -107,12 +145,25 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
             "Light not given: as much from everywhere as the thickest smoke shows, "
             f"irradiance {', '.join(f'{v:.2f}' for v in sun.irradiance)}, without shadows."
         )
-    working = working_picture(camera, domain)
+    working, shown = _working(camera, domain)
     source = None if scene.clip is None else replace(scene.clip, fps=clip.fps)
     complete = replace(scene, clip=source, camera=camera, domain=domain, medium=medium, lights=lights)
-    small = Plate(working.cut(plate.image), working.cut(plate.confidence), plate.noise)
+    plate = plate_at(shown)
     estimated = plate.image if _unknown(scene.background) else None
-    return Shot(complete, working, small, scattering, estimated, tuple(notes))
+    changing = plate_at if moves or plates is not None else None
+    return Shot(complete, working, _small(plate, working), scattering, estimated, tuple(notes), changing)
+
+
+def _working(camera: Camera, domain: Domain) -> tuple[WorkingPicture, int]:
+    """The small picture of the first frame that shows the domain, and that frame."""
+    for frame in range(len(camera.matrices)):
+        with suppress(CameraError):
+            return working_picture(camera.at(frame), domain), frame
+    return working_picture(camera, domain), 0
+
+
+def _small(plate: Plate, working: WorkingPicture) -> Plate:
+    return Plate(working.cut(plate.image), working.cut(plate.confidence), plate.noise)
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,15 +188,18 @@ class _SmokeSamples:
     behind: NDArray[np.float32]
 
 
-def _smoke_samples(clip: Clip, plate: Plate) -> _SmokeSamples:
+def _smoke_samples(clip: Clip, plate_at: Callable[[int], Plate]) -> _SmokeSamples:
     width, height = clip.size
     scale = max(1.0, max(width, height) / PICTURE_SIDE)
     columns, rows = max(1, round(width / scale)), max(1, round(height / scale))
-    small = Plate(area_average(plate.image, columns, rows), area_average(plate.confidence, columns, rows), plate.noise)
     covered = np.zeros((rows, columns), np.bool_)
     colours, behind = [], []
-    for number in np.unique(np.linspace(0, len(clip) - 1, min(SAMPLES, len(clip))).round().astype(int)):
-        picture = area_average(clip.frame(int(number)), columns, rows)
+    for number in np.unique(np.linspace(0, len(clip) - 1, min(SAMPLES, len(clip))).round().astype(int)).tolist():
+        plate = plate_at(number)
+        small = Plate(
+            area_average(plate.image, columns, rows), area_average(plate.confidence, columns, rows), plate.noise
+        )
+        picture = area_average(clip.frame(number), columns, rows)
         mask = matte(picture, small).mask
         covered |= mask
         colours.append(picture[mask])
@@ -153,16 +207,26 @@ def _smoke_samples(clip: Clip, plate: Plate) -> _SmokeSamples:
     return _SmokeSamples(scale, covered, np.concatenate(colours), np.concatenate(behind))
 
 
-def _plate(clip: Clip, scene: Scene, notes: list[str]) -> Plate:
+def _plate(clip: Clip, scene: Scene, notes: list[str]) -> tuple[Plate, Scene]:
+    """The plate of a background that does not change, and the scene with what was found out about it."""
     background = scene.background
     if background is not None and not _unknown(background):
         known = background.color if background.image is None else read_image(background.image)
         assert known is not None
-        return known_plate(known, clip)
+        return known_plate(known, clip), scene
     plate = estimate_plate(clip)
+    if scene.camera is not None and scene.camera.moves:
+        colour = one_colour(plate)
+        if colour is None:
+            raise ValueError(
+                "The camera moves, so what is behind the smoke cannot be found from the clip; give a clean plate with "
+                "a picture for every frame (a video or plate_####.png), or a color, in [background]."
+            )
+        notes.append(f"Background not given: one colour, {', '.join(f'{v:.2g}' for v in colour)} (linear).")
+        return known_plate(colour, clip), replace(scene, background=Background(color=colour))
     unseen = float(np.mean(plate.confidence < 0.5))
     notes.append(f"Background estimated from the clip; {unseen:.0%} of the picture is hardly ever free of smoke.")
-    return plate
+    return plate, scene
 
 
 def _unknown(background: Background | None) -> bool:

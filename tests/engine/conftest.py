@@ -11,7 +11,16 @@ import pytest
 
 from smokelift.images import write_image
 from smokelift.render import render
-from smokelift.scene import Background, Camera, ClipSource, DirectionalLight, Domain, Medium, Scene
+from smokelift.scene import (
+    Background,
+    Camera,
+    ClipSource,
+    DirectionalLight,
+    Domain,
+    Medium,
+    Scene,
+    look_at_matrix,
+)
 from smokelift.settings import Settings
 
 FRAMES = 5
@@ -58,9 +67,10 @@ class Plume:
     ) -> Scene:
         """Render volumes into a picture sequence; the scene with that clip."""
         scene = scene or self.scene
+        assert scene.camera is not None
         folder.mkdir(parents=True, exist_ok=True)
         for number, density in enumerate(densities):
-            write_image(folder / f"frame_{number:04d}{suffix}", render(density, scene))
+            write_image(folder / f"frame_{number:04d}{suffix}", render(density, scene, scene.camera.at(number)))
         return replace(scene, clip=ClipSource(folder / f"frame_####{suffix}", fps=24.0))
 
 
@@ -77,6 +87,19 @@ def plume(tmp_path_factory: pytest.TempPathFactory) -> Plume:
     densities = tuple(Plume.blob(scene, FIRST_HEIGHT + RISE * n) for n in range(FRAMES))
     empty = Plume(scene, densities)
     return replace(empty, scene=empty.write(tmp_path_factory.mktemp("plume"), densities))
+
+
+@pytest.fixture(scope="session")
+def tracked(plume: Plume, tmp_path_factory: pytest.TempPathFactory) -> Scene:
+    """The same blob from a camera that goes by, closer, upward and rolling a little."""
+    camera = plume.scene.camera
+    assert camera is not None
+    poses = [
+        look_at_matrix((x, -4 + x, 0.8 + x / 2), (0.8 * x, 0, 0.8), (x / 4, 0, 1))
+        for x in np.linspace(-0.25, 0.25, FRAMES)
+    ]
+    scene = replace(plume.scene, camera=replace(camera, matrix=poses[0], matrices=tuple(poses)))
+    return plume.write(tmp_path_factory.mktemp("tracked"), plume.densities, scene)
 
 
 @pytest.fixture(scope="session")

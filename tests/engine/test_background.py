@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from smokelift.background import estimate_plate, known_plate, matte
+from smokelift.background import changing_plate, estimate_plate, known_plate, matte, one_colour
 from smokelift.clip import Clip
 from smokelift.images import linear_to_srgb, srgb_to_linear, write_image
 
@@ -144,6 +144,73 @@ def test_what_does_not_fit_is_refused(tmp_path: Path) -> None:
     for background in ((1.0, 2.0), np.full((4, 4, 3), np.nan), np.ones((4, 4))):
         with pytest.raises(ValueError, match="finite colour or RGB picture"):
             known_plate(background, clip)
+
+
+def pan(folder: Path, wide: np.ndarray, smoke: float) -> Clip:
+    """Write and open a clip in which a wide background passes by behind smoke."""
+    random = np.random.default_rng(2)
+    for n in range(COUNT):
+        alpha = np.clip(smoke * puff(n), 0.0, 1.0)[..., None]
+        codes = linear_to_srgb(wide[:, 2 * n : 2 * n + WIDTH] * (1.0 - alpha) + 0.6 * alpha)
+        codes = codes + random.normal(0.0, 1.0 / 255, codes.shape)
+        write_image(folder / f"frame_{n:03d}.png", srgb_to_linear(np.clip(codes, 0.0, 1.0)))
+    return Clip.open(folder / "frame_###.png", fps=24)
+
+
+def passing_wall() -> np.ndarray:
+    """Return a textured linear background that is wide enough for a pan."""
+    blocks = np.random.default_rng(0).uniform(0.2, 0.5, (HEIGHT // 8, (WIDTH + 2 * COUNT) // 8, 3))
+    return srgb_to_linear(np.kron(blocks, np.ones((8, 8, 1))))
+
+
+@pytest.mark.parametrize("colour", [(0.0, 0.0, 0.0), (0.1, 0.3, 0.05)], ids=["black", "green"])
+def test_one_colour_behind_a_moving_camera_is_found(tmp_path: Path, colour: tuple[float, float, float]) -> None:
+    wide = np.broadcast_to(colour, (HEIGHT, WIDTH + 2 * COUNT, 3))
+    found = one_colour(estimate_plate(pan(tmp_path, wide, 1.0)))
+    assert found == pytest.approx(colour, abs=0.003)
+
+
+@pytest.mark.parametrize("smoke", [0.0, 1.0])
+def test_more_than_one_colour_behind_a_moving_camera_is_told(tmp_path: Path, smoke: float) -> None:
+    assert one_colour(estimate_plate(pan(tmp_path, passing_wall(), smoke))) is None
+
+
+def test_a_slope_behind_a_moving_camera_is_not_one_colour(tmp_path: Path) -> None:
+    """It passes up and down, so no pixel changes, and yet there are many colours."""
+    wide = np.broadcast_to(np.linspace(0.1, 0.3, HEIGHT)[:, None, None], (HEIGHT, WIDTH + 2 * COUNT, 3))
+    assert one_colour(estimate_plate(pan(tmp_path, wide, 1.0))) is None
+
+
+def test_a_plate_for_every_frame(tmp_path: Path) -> None:
+    """Each frame has its own, the noise is that of the difference, and the smoke is found before it."""
+    (tmp_path / "clip").mkdir()
+    (tmp_path / "plate").mkdir()
+    wide = passing_wall()
+    clip = pan(tmp_path / "clip", wide, 1.0)
+    plates = pan(tmp_path / "plate", wide, 0.0)
+    plate_at = changing_plate(plates, clip)
+    slope = (srgb_to_linear(linear_to_srgb(0.1) + 0.01) - 0.1) / 0.01
+    for n in (4, 12, 20):
+        plate = plate_at(n)
+        assert codes_apart(plate.image, wide[:, 2 * n : 2 * n + WIDTH]).max() < 6
+        assert plate.noise.mean() < 2.5 / 255 * slope
+        mask = matte(clip.frame(n), plate).mask
+        assert mask[puff(n) > 0.3].mean() > 0.95
+        assert mask[puff(n) == 0.0].mean() < 0.08
+
+
+def test_plates_are_counted_as_the_clips_file(tmp_path: Path) -> None:
+    """A part of the clip has that part of the plates; too few are refused."""
+    for name in ("clip", "plate"):
+        (tmp_path / name).mkdir()
+    wide = passing_wall()
+    pan(tmp_path / "clip", wide, 1.0)
+    plates = pan(tmp_path / "plate", wide, 0.0)
+    late = Clip.open(tmp_path / "clip" / "frame_###.png", fps=24, frames=(10, 15))
+    assert codes_apart(changing_plate(plates, late)(2).image, wide[:, 24 : 24 + WIDTH]).max() < 6
+    few = Clip.open(tmp_path / "plate" / "frame_###.png", fps=24, frames=(0, 12))
+    with pytest.raises(ValueError, match="has 13 of the frames 0 to 15 that are needed"):
+        changing_plate(few, late)
 
 
 @pytest.mark.skipif(not DATA.is_dir(), reason="needs the development data")

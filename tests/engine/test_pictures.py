@@ -14,8 +14,8 @@ from smokelift.images import write_image
 from smokelift.pictures import (
     SHEET_ANGLES,
     TILE_HEIGHT,
+    Viewer,
     eight_bit,
-    sequence_renderer,
     write_contact_sheet,
     write_preview,
     write_video,
@@ -82,15 +82,16 @@ def test_a_video_that_breaks_off_leaves_nothing(tmp_path) -> None:
 
 def test_the_front_is_the_scenes_own_view(plume, sequence) -> None:
     """Without another camera the picture is that of the scene."""
-    image = sequence_renderer(sequence).image(plume.densities[2])
+    image = Viewer(sequence).image(3, plume.densities[2])
     np.testing.assert_allclose(image, render(plume.densities[2], plume.scene), atol=1e-6)
 
 
 def test_a_turned_camera_is_taken(plume, sequence) -> None:
     """Another camera's picture is that camera's."""
     camera = orbit(plume.scene.camera, plume.scene.domain, 90)
-    image = sequence_renderer(sequence, camera).image(plume.densities[2])
-    np.testing.assert_allclose(image, render(plume.densities[2], plume.scene, camera), atol=1e-6)
+    for viewer in (Viewer(sequence, camera), Viewer(sequence, turn=(90, 0))):
+        image = viewer.image(3, plume.densities[2])
+        np.testing.assert_allclose(image, render(plume.densities[2], plume.scene, camera), atol=1e-6)
 
 
 @pytest.mark.parametrize("count", [1, 2, 5])
@@ -135,10 +136,33 @@ def test_a_background_picture_is_shown_in_front_and_its_mean_beside(plume, tmp_p
     write_image(tmp_path / "plate.exr", plate)
     scene = replace(plume.scene, background=Background(image=tmp_path / "plate.exr"))
     sequence = written(scene, [np.zeros_like(plume.densities[0])], tmp_path / "out")
-    np.testing.assert_allclose(sequence_renderer(sequence).image(sequence.density(1)), plate, atol=1e-3)
-    turned = orbit(scene.camera, scene.domain, 45)
-    image = sequence_renderer(sequence, turned).image(sequence.density(1))
+    np.testing.assert_allclose(Viewer(sequence).image(1, sequence.density(1)), plate, atol=1e-3)
+    image = Viewer(sequence, turn=(45, 0)).image(1, sequence.density(1))
     np.testing.assert_allclose(image, 0.25, atol=1e-3)
     with Clip.open(plume.scene.clip) as clip:
         write_contact_sheet(tmp_path / "sheet.png", sequence, clip)
         write_preview(tmp_path / "preview.mp4", sequence, clip)
+
+
+def test_a_moving_camera_is_followed(plume, tracked, tmp_path) -> None:
+    """In front each frame is seen as it was filmed, before its own plate; turned by so much from there."""
+    scene = replace(tracked, background=Background(image=tmp_path / "plate_#.exr"))
+    for n in range(5):
+        write_image(tmp_path / f"plate_{n}.exr", np.full((56, 40, 3), 0.1 * n, np.float32))
+    sequence = written(scene, plume.densities, tmp_path / "out")
+    front, turned = Viewer(sequence), Viewer(sequence, turn=(30, 0))
+    for number in (1, 4, 2):
+        density, camera = plume.densities[number - 1], tracked.camera.at(number - 1)
+        before = replace(tracked, background=Background(color=[0.1 * (number - 1)] * 3))
+        np.testing.assert_allclose(front.image(number, density), render(density, before, camera), atol=1e-3)
+        aside = orbit(camera, scene.domain, 30)
+        np.testing.assert_allclose(turned.image(number, density), render(density, tracked, aside), atol=1e-3)
+    with Clip.open(tracked.clip) as clip:
+        write_contact_sheet(tmp_path / "sheet.png", sequence, clip)
+        write_preview(tmp_path / "preview.mp4", sequence, clip)
+
+
+def test_a_moving_camera_is_no_picture_of_its_own(plume, tracked) -> None:
+    """Which frame's is meant has to be said."""
+    with pytest.raises(ValueError, match=r"camera\.at\(frame\)"):
+        render(plume.densities[0], tracked)

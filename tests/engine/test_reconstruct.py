@@ -12,11 +12,12 @@ import pytest
 
 from smokelift.clip import Clip
 from smokelift.density import DensitySettings
-from smokelift.density.hull import project_voxels
+from smokelift.density.hull import project_voxels, voxel_centres
+from smokelift.images import write_image
 from smokelift.metrics import psnr
 from smokelift.reconstruct import Frame, reconstruct
-from smokelift.render import render
-from smokelift.scene import Scene
+from smokelift.render import render, scene_renderer
+from smokelift.scene import Background, ClipSource, Scene, look_at_matrix
 from smokelift.sequence import Sequence, SequenceError
 from smokelift.settings import Settings
 from smokelift.vdb import VdbUnavailable, read_vdb, vdb_module
@@ -184,6 +185,74 @@ def test_an_estimated_background_resumes_and_moves(plume, draft, tmp_path) -> No
     for frame in whole:
         np.testing.assert_array_equal(sequence.density(frame.number), frame.density)
     assert render(sequence.density(4), sequence.scene).shape == (56, 40, 3)
+
+
+def centroid(density: np.ndarray, scene: Scene) -> np.ndarray:
+    """Where the smoke is, in metres."""
+    assert scene.domain is not None
+    return np.average(voxel_centres(scene.domain).reshape(-1, 3), axis=0, weights=density.ravel())
+
+
+def test_smoke_from_a_moving_camera_stands_where_it_stood(plume, tracked, draft, tmp_path) -> None:
+    """The pictures are met, the smoke is in its place to half a voxel; a still camera's would drift off."""
+    still = replace(tracked, camera=tracked.camera.at(0))
+    found = {name: frames_of(scene, draft) for name, scene in (("path", tracked), ("still", still))}
+    off = {
+        name: [
+            np.linalg.norm(centroid(frame.density, tracked) - centroid(truth, tracked)) / tracked.domain.voxel_size
+            for frame, truth in zip(frames, plume.densities, strict=True)
+        ]
+        for name, frames in found.items()
+    }
+    assert max(off["path"]) < 0.5
+    assert max(off["still"]) > 4
+    with Clip.open(tracked.clip) as clip:
+        for index, frame in enumerate(found["path"]):
+            assert psnr(render(frame.density, tracked, tracked.camera.at(index)), clip.frame(index)) >= 40
+
+
+def test_a_moving_camera_resumes_on_its_own_path_only(tracked, draft, tmp_path) -> None:
+    """The path is kept with the sequence: the rest is the same to the bit, and another path is refused."""
+    out = tmp_path / "out"
+    whole = frames_of(tracked, draft)
+    cut_off(tracked, draft, out, 3)
+    poses = tracked.camera.matrices
+    other = replace(tracked.camera, matrices=(*poses[:-1], poses[0]))
+    with pytest.raises(SequenceError, match=r"scene\.camera\.matrices\[4\]\[0\]\[0\] was 0\.\d+ and is now 0\.\d+;"):
+        frames_of(replace(tracked, camera=other), draft, out, npz=True, resume=True)
+    frames_of(tracked, draft, out, npz=True, resume=True)
+    sequence = Sequence.open(out)
+    assert sequence.scene == tracked
+    for frame in whole:
+        np.testing.assert_array_equal(sequence.density(frame.number), frame.density)
+
+
+@pytest.mark.parametrize("target", [(0, -9, 0.8), (1.1, 0, 0.8)], ids=["away", "aside"])
+def test_smoke_that_a_moving_camera_loses_goes_on(plume, tracked, draft, tmp_path, target) -> None:
+    """What is not in the picture is carried along, also if part of the box is: it keeps its mass and goes on rising."""
+    poses = (*tracked.camera.matrices[:4], look_at_matrix((0, -4, 0.8), target, (0, 0, 1)))
+    scene = plume.write(tmp_path, plume.densities, replace(tracked, camera=replace(tracked.camera, matrices=poses)))
+    frames = frames_of(scene, draft)
+    assert frames[4].figures["hull_share"] == 0
+    assert frames[4].density.sum() == pytest.approx(frames[3].density.sum(), rel=0.1)
+    assert centroid(frames[4].density, tracked)[2] > centroid(frames[3].density, tracked)[2] + 0.02
+
+
+def test_a_clean_plate_for_every_frame(plume, tracked, draft, tmp_path) -> None:
+    """A wall that passes by behind the smoke is no smoke, and the pictures are met."""
+    blocks = np.random.default_rng(0).uniform(0.05, 0.2, (7, 7, 3)).astype(np.float32)
+    wide = np.kron(blocks, np.ones((8, 8, 1), np.float32))
+    for n, density in enumerate(plume.densities):
+        plate = np.ascontiguousarray(wide[:, 3 * n : 3 * n + 40])
+        write_image(tmp_path / f"plate_{n}.exr", plate)
+        renderer = scene_renderer(tracked, tracked.camera.at(n), "single", plate)
+        write_image(tmp_path / f"frame_{n}.exr", renderer.image(density))
+    clip = ClipSource(tmp_path / "frame_#.exr", fps=24)
+    scene = replace(tracked, clip=clip, background=Background(image=tmp_path / "plate_#.exr"))
+    frames = frames_of(scene, draft, tmp_path / "out", npz=True)
+    assert all(frame.figures["psnr"] >= 35 for frame in frames)
+    assert all(frame.figures["hull_share"] < 0.5 for frame in frames)
+    assert Sequence.open(tmp_path / "out").scene == scene
 
 
 def test_an_exception_of_the_caller_leaves_what_can_be_resumed(plume, draft, tmp_path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,7 @@ from smokelift.scene import (
     Scene,
     SceneError,
     View,
+    look_at_matrix,
 )
 from smokelift.scene_file import scene_from_dict, scene_to_dict
 
@@ -75,6 +77,9 @@ size = [200, 300]
 [views.clip]
 path = "side/frame_####.exr"
 """
+
+
+AIMED = "position = [0, -7, 1.5]\ntarget = [0, 0, 1.5]"
 
 
 def load(folder: Path, text: str) -> Scene:
@@ -181,6 +186,18 @@ def test_a_file_may_hold_any_one_table(tmp_path: Path) -> None:
             'color = [0.1, 0.2, 0.3]\nimage = "a.png"',
             "line 36: [background] takes color or image, not both",
         ),
+        (
+            "target = [0, 0, 1.5]\nfov",
+            f"target = [0, 0, 1.5]\nmatrices = {[[list(row) for row in FRONT]]}\nfov",
+            "line 8: [camera] takes matrices or position, not both",
+        ),
+        (AIMED, "matrices = []", "line 8: [camera] matrices must be a list of 4x4 matrices"),
+        (AIMED, "matrices = [[1, 2], [3, 4]]", "line 8: [camera] matrices must be four rows of four numbers"),
+        (
+            AIMED,
+            f"matrices = [{[list(row) for row in FRONT]}, {np.diag([2, 1, 1, 1]).tolist()}]",
+            "line 8: [camera] every one of matrices must be rigid",
+        ),
         ("height = 3", "height = -3", "line 42: [views.camera] height must be a number of metres above 0"),
         ("side/frame", "", None),
         ("[views.clip]\npath", "[views.clap]\npath", 'line 44: [[views]] there is no key "clap" here'),
@@ -278,6 +295,37 @@ def test_a_camera_that_passes_the_domain_by_is_refused() -> None:
     assert Scene(camera=inside, domain=domain).camera == inside
 
 
+def moving(*positions: tuple[float, float, float]) -> Camera:
+    """A camera that looks along +Y from one position after the other."""
+    poses = [look_at_matrix(p, (p[0], p[1] + 1, p[2]), (0, 0, 1)) for p in positions]
+    return Camera("perspective", poses[0], (256, 384), 700.0, 700.0, 128.0, 192.0, tuple(poses))
+
+
+def test_a_moving_camera_stands_still_in_every_frame() -> None:
+    """Each frame has its own matrix; size and lens are shared, also by resized ones."""
+    camera = moving((0, -7, 1.5), (1, -7, 1.5), (2, -7, 1.5))
+    for frame in range(3):
+        still = camera.at(frame)
+        assert not still.moves
+        assert still.position == (frame, -7.0, 1.5)
+        assert still.at(9) == still
+        assert camera.resized(64, 96).at(frame) == still.resized(64, 96)
+    assert camera.matrix == camera.matrices[0]
+    with pytest.raises(SceneError, match="frames 0 to 2, not for 3"):
+        camera.at(3)
+    with pytest.raises(SceneError, match="first of matrices"):
+        replace(camera, matrix=camera.matrices[1])
+
+
+def test_a_moving_camera_must_see_the_domain_once() -> None:
+    """One frame with the box in its picture is enough."""
+    domain = Domain((-1, -1, 0), (1, 1, 3), (20, 20, 30))
+    camera = moving((50, -7, 1.5), (0, -7, 1.5))
+    assert Scene(camera=camera, domain=domain).camera == camera
+    with pytest.raises(SceneError, match="does not see the domain"):
+        Scene(camera=moving((50, -7, 1.5), (40, -7, 1.5)), domain=domain)
+
+
 numbers = st.floats(-1e6, 1e6, allow_subnormal=False)
 positive = st.floats(1e-6, 1e6)
 vectors = st.tuples(numbers, numbers, numbers)
@@ -304,9 +352,13 @@ def cameras(draw: st.DrawFn) -> Camera:
     matrix = np.eye(4)
     matrix[:3, :3] = about_z @ about_y @ about_x
     matrix[:3, 3] = draw(vectors)
+    moved = matrix.copy()
+    moved[:3, 3] = draw(vectors)
+    matrices = draw(st.sampled_from([(), (matrix,), (matrix, moved)]))
     kind = draw(st.sampled_from(["perspective", "orthographic"]))
     size = draw(st.tuples(st.integers(1, 9999), st.integers(1, 9999)))
-    return Camera(kind, matrix, size, *draw(st.tuples(positive, positive, numbers, numbers)))  # type: ignore[arg-type]
+    lens = draw(st.tuples(positive, positive, numbers, numbers))
+    return Camera(kind, matrix, size, *lens, matrices)  # type: ignore[arg-type]
 
 
 lights = st.one_of(

@@ -2,14 +2,26 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from smokelift.clip import Clip
+from smokelift.images import write_image
 from smokelift.render.rays import project
-from smokelift.scene import Background, Camera, DirectionalLight, Domain, Medium, Scene
+from smokelift.scene import (
+    Background,
+    Camera,
+    ClipSource,
+    DirectionalLight,
+    Domain,
+    EnvironmentLight,
+    Medium,
+    Scene,
+    look_at_matrix,
+)
 from smokelift.settings import LONGEST_SIDE, Settings
 from smokelift.shot import Shot, prepare_shot
 
@@ -146,6 +158,69 @@ def test_a_camera_of_another_shape_is_refused(plume, draft) -> None:
     camera = Camera.look_at((0, -4, 0.8), (0, 0, 0.8), fov_y_degrees=30, size=(64, 48))
     with pytest.raises(ValueError, match="64 x 48, the clip's 40 x 56"):
         shot_of(replace(plume.scene, camera=camera), draft)
+
+
+def test_a_moving_camera_needs_a_pose_for_every_frame(tracked, draft) -> None:
+    """Five frames of the clip are used, so there must be five."""
+    with pytest.raises(ValueError, match=r"matrices are given for 5 frames, and 4 frames of the clip are used"):
+        shot_of(replace(tracked, clip=replace(tracked.clip, frames=(1, 4))), draft)
+
+
+def test_each_frame_has_its_own_small_picture(tracked, draft) -> None:
+    """Its camera is the frame's, cut to the domain; what is asked of the whole is the first frame's."""
+    shot = shot_of(tracked, draft)
+    assert shot.scene == tracked
+    for frame in range(5):
+        now = shot.at(frame)
+        assert now is not None
+        assert now.small_scene.camera.matrix == tracked.camera.matrices[frame]
+        assert now.plate.image.shape[:2] == now.working.camera.size[::-1]
+    first = shot.at(0)
+    assert first is not None
+    assert first.small_scene == shot.small_scene
+
+
+def test_surroundings_do_not_flicker_while_the_camera_moves(tracked, draft, tmp_path, monkeypatch) -> None:
+    """An environment is as many lights in one frame as in another, though another camera would need more."""
+    wanted = {pose[0][3]: 4 + n for n, pose in enumerate(tracked.camera.matrices)}
+    module = sys.modules["smokelift.render"]  # the function of that name hides it
+    monkeypatch.setattr(module, "environment_count", lambda _light, camera, *_: wanted[camera.position[0]])
+    sky = np.random.default_rng(0).uniform(0.1, 2.0, (8, 16, 3)).astype(np.float32)
+    write_image(tmp_path / "sky.exr", sky)
+    shot = shot_of(replace(tracked, lights=(EnvironmentLight(tmp_path / "sky.exr"),)), draft)
+    lights = {frame.small_scene.lights for n in range(5) if (frame := shot.at(n)) is not None}
+    assert len(lights) == 1
+
+
+def test_a_frame_that_shows_nothing_of_the_domain(tracked, draft) -> None:
+    """There is no picture to fit, and the first one that shows it stands for the shot."""
+    away = look_at_matrix((0, -4, 0.8), (0, -9, 0.8), (0, 0, 1))
+    poses = (away, *tracked.camera.matrices[1:])
+    shot = shot_of(replace(tracked, camera=replace(tracked.camera, matrix=away, matrices=poses)), draft)
+    assert shot.at(0) is None
+    assert shot.small_scene.camera.matrix == poses[1]
+
+
+def test_one_colour_behind_a_moving_camera_is_found(tracked, draft) -> None:
+    """Black, in which the tracked blob hangs."""
+    shot = shot_of(replace(tracked, background=None), draft)
+    assert shot.scene.background.color == pytest.approx((0, 0, 0), abs=1e-3)
+    assert shot.estimated_background is None
+    assert [note for note in shot.notes if note.startswith("Background not given: one colour")]
+
+
+def test_a_background_that_moves_must_be_given(tracked, draft, tmp_path) -> None:
+    """Neither can it be found from the clip, nor does one picture show it."""
+    stripes = np.zeros((56, 40, 3), np.float32)
+    for n in range(5):
+        stripes[:] = 0.2 + 0.1 * np.sin(np.arange(40) + n)[:, None]
+        write_image(tmp_path / f"wall_{n}.png", stripes)
+    scene = replace(tracked, clip=ClipSource(tmp_path / "wall_#.png", fps=24), background=None)
+    with pytest.raises(ValueError, match="give a clean plate with a picture for every frame"):
+        shot_of(scene, draft)
+    write_image(tmp_path / "plate.png", stripes)
+    with pytest.raises(ValueError, match=r"plate\.png: has 1 of the frames 0 to 4 that are needed; give a clean plate"):
+        shot_of(replace(scene, background=Background(image=tmp_path / "plate.png")), draft)
 
 
 def test_a_domain_beside_the_picture_is_refused(plume, draft) -> None:

@@ -115,6 +115,8 @@ def reconstruct_density(
     settings = settings or DensitySettings()
     if scene.camera is None or scene.domain is None:
         raise ValueError("A reconstruction needs a scene with a camera and a domain.")
+    if scene.camera.moves:
+        raise ValueError("The camera moves; give the scene the one of the picture's frame, camera.at(frame).")
     camera, domain, medium = scene.camera, scene.domain, scene.medium or Medium()
     image = _checked_image(image, camera)
     plate = plate or _clean_plate(scene, camera)

@@ -13,6 +13,7 @@ from typing import overload
 import numpy as np
 
 from smokelift import images
+from smokelift.background import open_plates
 from smokelift.render.device import DeviceError, start
 from smokelift.render.environment import environment_count, environment_lights
 from smokelift.render.lights import FiniteLight
@@ -127,8 +128,8 @@ def _view_gradient(
 def scene_lights(scene: Scene, camera: Camera | None = None) -> tuple[FiniteLight, ...]:
     """The lights of a scene as the renderer takes them: an environment becomes as many parallel ones as it needs.
 
-    Their number is found with the scene's own camera, if it has one, and stays the same for other cameras: a sequence
-    is lit alike from all sides.
+    Their number is found with the scene's own camera (where it is in the first frame), if it has one, and stays the
+    same for other cameras: a sequence is lit alike from all sides.
 
     Raises
     ------
@@ -145,7 +146,7 @@ def scene_lights(scene: Scene, camera: Camera | None = None) -> tuple[FiniteLigh
         view = scene.camera or camera
         if view is None:
             raise ValueError("The scene has no camera; an environment light needs one to choose its directions.")
-        lights += _environment(light, view, _domain(scene), scene.medium or Medium())
+        lights += _environment(light, view.at(0), _domain(scene), scene.medium or Medium())
     return tuple(lights)
 
 
@@ -157,7 +158,10 @@ def _environment(
 
 
 def scene_background(scene: Scene, camera: Camera | None = None) -> Image:
-    """Background radiance for a camera: (rows, columns, 3), or (3,) where it is one colour."""
+    """Background radiance for a camera: (rows, columns, 3), or (3,) where it is one colour.
+
+    Of a clean plate that changes it is that of the first frame.
+    """
     background = scene.background
     if background is None:
         return np.zeros(3, np.float32)
@@ -165,7 +169,11 @@ def scene_background(scene: Scene, camera: Camera | None = None) -> Image:
         return np.array(background.color, np.float32)
     if background.image is None:
         return np.zeros(3, np.float32)
-    picture = images.read_image(background.image)
+    plates = open_plates(scene)
+    if plates is None:
+        picture = images.read_image(background.image)
+    else:
+        picture = plates.frame(scene.clip.first if scene.clip is not None else 0)
     if camera is not None and camera != scene.camera:
         return np.asarray(picture.reshape(-1, 3).mean(0))
     width, height = scene.camera.size if scene.camera else picture.shape[1::-1]
@@ -180,11 +188,13 @@ def scene_renderer(
     Raises
     ------
     ValueError
-        If there is no camera or no domain.
+        If there is no camera or no domain, or the camera moves.
     """
     view = camera or scene.camera
     if view is None:
         raise ValueError("The scene has no camera; give one.")
+    if view.moves:
+        raise ValueError("The camera moves; give the one of a frame, camera.at(frame).")
     return Renderer(
         view,
         _domain(scene),

@@ -11,12 +11,14 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from conftest import quietly
+from conftest import quietly, rendered
 from mathutils import Vector
 
-from addon import run, volume
+from addon import look, run, volume
 from addon.scene import box_corners
 from addon.take import Take
+from smokelift.images import write_image
+from smokelift.pictures import write_video
 from smokelift.scene import Domain, Medium, Scene
 from smokelift.scene_file import scene_to_dict
 from smokelift.vdb import write_vdb
@@ -100,6 +102,51 @@ def test_frame_by_frame_at_another_frame_rate(shot, tmp_path) -> None:
     volume.show(shot, made(tmp_path))
     assert [plays(shot, frame) for frame in (0, 1, 6, 7)] == [None, 1, 6, None]
     assert shot.smokelift.volume.data.velocity_scale == pytest.approx(2.0)
+
+
+def tracked(take: Take, **tables: dict) -> dict:
+    """Make the take one of a camera that moves, and return its index."""
+    file = take.directory / "sequence.json"
+    index = json.loads(file.read_text())
+    index["scene"] |= {"camera": {"matrices": [np.eye(4).tolist()] * FRAMES}, **tables}
+    file.write_text(json.dumps(index))
+    return index
+
+
+def test_smoke_keeps_step_with_a_camera_that_moves(shot, tmp_path) -> None:
+    """Blender plays clip and track frame by frame, whatever their rate."""
+    shot.render.fps = 48
+    take = made(tmp_path)
+    tracked(take)
+    volume.show(shot, take)
+    assert [plays(shot, frame) for frame in range(0, 9)] == [None, 1, 2, 3, 4, 5, 6, None, None]
+    assert shot.smokelift.volume.data.velocity_scale == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize("kind", ["pictures", "video"])
+def test_the_plate_of_a_moving_camera_plays_beside_the_clip(shot, tmp_path, kind) -> None:
+    """A render of every frame shows its own plate behind the smoke; the smoke itself stands still in the world."""
+    levels = [0.1 * n for n in range(1, FRAMES + 1)]
+    plates = [np.full((16, 16, 3), level, np.float32) for level in levels]
+    path = tmp_path / ("plate.mp4" if kind == "video" else "plate_0101.png")
+    if kind == "video":
+        write_video(path, plates, 24.0)
+    else:
+        for number, plate in enumerate(plates, 101):
+            write_image(tmp_path / f"plate_{number:04d}.png", plate)
+    take = made(tmp_path)
+    index = tracked(take, background={"image": str(path)})
+    thing = volume.show(shot, take)
+    places = []
+    for _ in range(2):
+        look.set_up(shot, take, index)
+    shot.render.resolution_x, shot.render.resolution_y, shot.cycles.samples = 16, 24, 1
+    for frame in (2, 5):
+        shot.frame_set(frame)
+        behind = np.median(rendered(shot, tmp_path / "out.exr"), axis=(0, 1))
+        assert behind == pytest.approx([levels[frame - 1]] * 3, abs=0.02)
+        places.append(thing.matrix_world.copy())
+    assert places[0] == places[1]
 
 
 def test_changing_the_speed_leaves_no_driver(shot, tmp_path) -> None:

@@ -15,7 +15,8 @@ from addon import run, volume
 from addon.scene import point_intensity, shot_tables, sun_irradiance
 from addon.take import Take
 from smokelift.clip import Clip
-from smokelift.images import area_average, linear_to_srgb
+from smokelift.density.hull import voxel_centres
+from smokelift.images import area_average, linear_to_srgb, write_image
 from smokelift.scene import Scene
 from smokelift.scene_file import scene_from_dict
 from smokelift.sequence import Sequence
@@ -100,6 +101,38 @@ def test_nothing_known_but_the_clip(scene, tmp_path) -> None:
     assert whole > WANTED_DB + 5
     assert smoke > WANTED_DB
     assert scene.camera.name == "Smokelift Camera"
+
+
+def test_a_camera_that_moves(shot, tmp_path) -> None:
+    """A blob filmed while the camera goes by: it stands still where it was, and a render looks like the clip."""
+    settings, camera = shot.smokelift, shot.camera
+    for frame, x in ((1, -0.4), (4, 0.4)):
+        camera.location.x = x
+        camera.keyframe_insert("location", frame=frame)
+    settings.first, settings.last, settings.longest_side, settings.plate_mode = 1, 4, LONGEST, "ESTIMATE"
+    known = scene_from_dict({**shot_tables(shot), "medium": {"extinction": 3.0}})
+    points = voxel_centres(known.domain)
+    centre = np.array([0.2, -0.1, 1.3])
+    blob = np.maximum(np.exp(-np.sum((points - centre) ** 2, -1) / 0.3**2) - 0.05, 0).astype(np.float32)
+    for frame in range(4):
+        write_image(tmp_path / f"clip_{frame}.png", smokelift.render(blob, known, known.camera.at(frame)))
+    settings.clip = bpy.data.movieclips.load(str(tmp_path / "clip_0.png"))
+    settings.output = str(tmp_path / "out")
+    assert bpy.ops.smokelift.run() == {"FINISHED"}
+    (row,) = bpy.context.window_manager.smokelift.jobs
+    assert row.outcome == "done", row.sentence
+    sequence = Sequence.open(row.take)
+    for number in sequence.frames:
+        found = np.average(points.reshape(-1, 3), axis=0, weights=sequence.density(number).ravel())
+        assert np.abs(found - centre)[[0, 2]].max() < known.domain.voxel_size
+    assert bpy.ops.smokelift.set_up() == {"FINISHED"}
+    shot.render.resolution_percentage, shot.cycles.samples, shot.cycles.use_denoising = 50, 32, False
+    for frame in (1, 4):
+        shot.frame_set(frame)
+        picture = rendered(shot, tmp_path / "render.png")
+        with Clip.open(tmp_path / "clip_#.png", fps=24) as clip:
+            wanted = linear_to_srgb(area_average(clip.frame(frame - 1), 128, 192))
+        assert psnr(picture, wanted) > WANTED_DB + 5
 
 
 def test_setting_up_twice_changes_nothing(shot, tmp_path) -> None:
