@@ -32,9 +32,10 @@ Figures projected_cg(LeastSquares &problem, double tolerance, int limit, const O
     // The square of the projected gradient; the limit is relative to what the images ask of a fluid at rest.
     const double goal = tolerance * tolerance * reference;
     // In single precision the gradient stops falling somewhere; steps beyond that lead away from the minimum.
-    constexpr int patience = 10;
+    // Far from there it may rise for a while all the same.
+    const auto patience = [&](double least) { return least > 1e-8 * reference ? 20 : 1; };
     double best = squared;
-    for (int stalled = 0; squared > goal && stalled < patience && figures.iterations < limit;) {
+    for (int stalled = 0; squared > goal && stalled < patience(best) && figures.iterations < limit;) {
         problem.apply(search.in(), product.out(), workers);
         const double curvature = dot(search.data(), product.data(), n, workers);
         const float step = float(squared / curvature);
