@@ -31,7 +31,7 @@ FIRST, LAST = 19, 30
 LONGEST_SIDE = 48
 WANTED_DB = 25.0
 LONGEST_GAP = 2.0
-"""Seconds. How long gaps are is a matter of the machine; a Blender that waited for the engine would stand still longer."""
+"""Seconds. How long gaps are is up to the machine; a Blender that waited for the engine would stand still longer."""
 
 
 @pytest.fixture(scope="module")
