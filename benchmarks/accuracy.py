@@ -206,7 +206,7 @@ def score(subject: Subject, run: str, folder: Path) -> dict[str, Any]:
         for view, image in shown.items():
             scores[view].add(image, subject.seen(view, frame))
     found = {view: judge.figures() for view, judge in scores.items()}
-    for name in VIEW_FIGURES:
+    for name in VIEW_FIGURES if subject.scored.step == 1 else VIEW_FIGURES[:-2]:  # flicker is of frames in a row
         row |= {f"{name}_{view}": figures[name] for view, figures in found.items()}
         new = [figures[name] for figures in list(found.values())[1:] if figures[name] is not None]
         row[f"{name}_new"] = float(np.mean(new)) if new else None
