@@ -136,13 +136,13 @@ def draw(runs: Runs, path: Path) -> None:
     """
     if path.suffix.lower() != ".png":
         raise ValueError(f"{path}: the chart is written as .png.")
+    shown = [key for key in ERRORS if any(run.seconds is not None and key in run.errors for run in runs.runs)]
+    if not shown:
+        raise ValueError("No run has both a time and an error; there is nothing to draw.")
     try:
         from matplotlib.figure import Figure
     except ImportError:
         raise ValueError("smokelift chart needs matplotlib: pip install matplotlib.") from None
-    shown = [key for key in ERRORS if any(run.seconds is not None and key in run.errors for run in runs.runs)]
-    if not shown:
-        raise ValueError("No run has both a time and an error; there is nothing to draw.")
     figure = Figure(figsize=(5.2 * len(shown), 5.0), layout="constrained")
     methods = list(dict.fromkeys(run.method for run in runs.runs))
     colours = {method: f"C{index}" for index, method in enumerate(methods)}
