@@ -252,7 +252,7 @@ def markdown(rows: list[dict[str, Any]], views: list[str]) -> str:
         "mass": lambda row: _join(row, ["mass_ratio"], ".2f"),
         "velocity, cosine": lambda row: _join(row, ["velocity_error", "velocity_cosine"], ".2f"),
         "around": lambda row: _join(row, ["velocity_error_around", "velocity_cosine_around"], ".2f"),
-        "div (true)": lambda row: _join(row, ["divergence", "divergence_truth"], ".3f"),
+        "div (true)": lambda row: _join(row, ["divergence", "divergence_truth"], ".0e"),
         "warp (true)": lambda row: _join(row, ["warp_error", "warp_error_truth"], ".2f"),
         "s a frame": lambda row: _join(row, ["seconds"], ".2f"),
         "solves": lambda row: _join(row, ["solves"], ".0f"),

@@ -84,7 +84,7 @@ def main() -> None:
             if run == SMEAR:
                 arrays = {"density": frame}
             else:
-                arrays = {"density": frame.density, "velocity": frame.velocity.centres().astype(np.float16)}
+                arrays = {"density": frame.density, "velocity": frame.velocity.centres()}
             units.append(poisson_seconds(arrays["density"].shape))
             np.savez(out / f"{number:04d}.npz", **arrays)
             began = time.perf_counter()

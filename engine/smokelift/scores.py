@@ -140,8 +140,8 @@ class VolumeScore:
         true_velocity = truth.velocity(frame - 1).centres()
         free = ~(truth.inflow(frame - 1) | truth.inflow(frame))
         inside, around = smoke & free, ndimage.binary_dilation(smoke, iterations=AROUND) & free
-        if not inside.any():
-            return {}
+        if not ndimage.binary_erosion(inside, np.ones((2, 2, 2))).any():
+            return {}  # too little smoke for a divergence
         voxels = truth.dt / truth.voxel_size
         error, cosine = metrics.velocity_error(velocity, true_velocity, inside)
         error_around, cosine_around = metrics.velocity_error(velocity, true_velocity, around)
