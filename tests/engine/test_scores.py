@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -15,20 +17,25 @@ FPS = 20.0
 BLACK = np.zeros(3, np.float32)
 
 
-def rising(frame: int) -> np.ndarray:
-    """A Gaussian ball that rises a voxel a frame."""
+HEIGHTS = (7, 8, 10, 13)
+"""Of the ball in each frame (voxels)."""
+
+
+def ball(height: int) -> np.ndarray:
+    """A Gaussian ball."""
     x, y, z = np.indices(SHAPE, np.float32)
-    return np.exp(-((x - 7.5) ** 2 + (y - 7.5) ** 2 + (z - 7 - frame) ** 2) / 10).astype(np.float32)
+    return np.exp(-((x - 7.5) ** 2 + (y - 7.5) ** 2 + (z - height) ** 2) / 10).astype(np.float32)
 
 
 @pytest.fixture(scope="module")
 def truth() -> Truth:
-    """Four frames of it, without an inlet."""
-    upward = Velocity.zero(SHAPE, VOXEL).faces
-    upward[2][:] = VOXEL * FPS
+    """Four frames of a ball that rises faster and faster, without an inlet."""
+    upward = [np.stack([face] * 4).astype(np.float16) for face in Velocity.zero(SHAPE, VOXEL).faces]
+    for frame, rise in enumerate(np.diff(HEIGHTS)):
+        upward[2][frame] = rise * VOXEL * FPS
     return Truth(
-        densities=np.stack([rising(frame) for frame in range(4)]).astype(np.float16),
-        faces=tuple(np.stack([face] * 4).astype(np.float16) for face in upward),
+        densities=np.stack([ball(height) for height in HEIGHTS]).astype(np.float16),
+        faces=tuple(upward),
         inflow_packed=np.zeros((4, int(np.prod(SHAPE)) // 8), np.uint8),
         voxel_size=VOXEL,
         fps=FPS,
@@ -112,7 +119,7 @@ def test_each_mistake_shows_where_it_belongs(truth) -> None:
     half, deep, slow = VolumeScore(truth), VolumeScore(truth), VolumeScore(truth)
     still = np.zeros((*SHAPE, 3), np.float32)
     for frame in range(4):
-        density, velocity = truth.density(frame), truth.velocity(0).centres()
+        density, velocity = truth.density(frame), truth.velocity(max(frame - 1, 0)).centres()
         half.add(frame, 0.5 * density)
         deep.add(frame, np.roll(density, 1, 1), velocity)
         slow.add(frame, density, velocity * (0.5 if frame < 3 else 1) if frame != 1 else still)
@@ -125,6 +132,20 @@ def test_each_mistake_shows_where_it_belongs(truth) -> None:
     assert slow.figures()["velocity_error"] == pytest.approx((1 + 0.5 + 0) / 3)
     assert slow.figures()["velocity_cosine"] == pytest.approx(2 / 3)
     assert slow.figures()["warp_error"] > 0.1
+
+
+def test_where_smoke_is_put_in_motion_is_not_scored(truth) -> None:
+    """Nonsense in the inlet's cells, before or after the step, changes no figure of the motion."""
+    inlet = np.zeros(SHAPE, bool)
+    inlet[6:10, 6:10, 6:9] = True
+    fed = replace(truth, inflow_packed=np.stack([np.packbits(inlet)] * 4))
+    right, wrong = VolumeScore(fed), VolumeScore(fed)
+    for frame in range(3):
+        density, velocity = truth.density(frame), truth.velocity(max(frame - 1, 0)).centres()
+        right.add(frame, density, velocity)
+        wrong.add(frame, density, np.where(inlet[..., None], -velocity, velocity))
+    for name in ("velocity_error", "velocity_error_around", "warp_error"):
+        assert wrong.figures()[name] == right.figures()[name]
 
 
 def test_a_velocity_after_a_gap_is_not_scored(truth) -> None:
