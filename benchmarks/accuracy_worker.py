@@ -10,7 +10,6 @@ clip to OpenVDB files on disk; the arrays are written between frames.
 from __future__ import annotations
 
 import json
-import resource
 import sys
 import tempfile
 import time
@@ -64,6 +63,18 @@ def smeared(clip: Clip, shot: Shot) -> Iterator[np.ndarray]:
         yield reconstruct_density(image, shot.small_scene, fog, settings, plate=shot.plate).values
 
 
+def peak_mib() -> float | None:
+    """The most memory that this process had; None where the system does not say.
+
+    Not getrusage's maximum, which in a started process begins with that of the one that started it.
+    """
+    try:
+        status = Path("/proc/self/status").read_text()
+    except OSError:
+        return None
+    return next(int(line.split()[1]) / 1024 for line in status.splitlines() if line.startswith("VmHWM"))
+
+
 def main() -> None:
     """Do the run."""
     scene_path, run, first, last, out = (*sys.argv[1:5], Path(sys.argv[5]))
@@ -93,7 +104,7 @@ def main() -> None:
         "frames": len(seconds),
         "seconds": float(np.median(clocked)),
         "solves": float(np.median(clocked) / np.median(units)),
-        "memory_mib": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+        "memory_mib": peak_mib(),
         "scattering": shot.scattering,
         "resolution": list(shot.scene.domain.resolution),
         "method": "baseline" if run == SMEAR else settings.method,
