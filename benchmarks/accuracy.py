@@ -326,7 +326,7 @@ def main() -> None:
         writer.writeheader()
         writer.writerows(rows)
     text = markdown(rows + means(rows), list(subjects[0].cameras))
-    (options.out / f"{name}.md").write_text(f"{said['machine']}, {said['date']}\n\n{text}")
+    (options.out / f"{name}.md").write_text(f"{said['machine']}, {said['date']}\n\n{text}\n![Pictures]({name}.png)\n")
     contact_sheet(subjects, runs, folder, options.out / f"{name}.png")
 
 
