@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 import scipy.fft
-from truth.truth import Truth
 
+from smokelift.truth import Truth
 from smokelift.velocity import Velocity, VelocitySettings, estimate_velocity, predict_velocity
 
 FIRST, LAST, STEP = 10, 35, 5

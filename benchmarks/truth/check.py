@@ -14,9 +14,9 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 from scipy import ndimage
-from truth import Truth
 
 from smokelift.transport import advect, divergence
+from smokelift.truth import Truth
 
 matplotlib.use("Agg")
 from matplotlib import pyplot

@@ -1,4 +1,4 @@
-"""The command line: ``smokelift reconstruct | inspect | render | preview | doctor | bench``.
+"""The command line: ``smokelift reconstruct | inspect | render | preview | evaluate | chart | doctor | bench``.
 
 Exit status: 0 done, 2 bad input, 3 device or memory, 130 cancelled (and resumable).
 """
@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import itertools
+import json
 import math
 import signal
 import sys
@@ -16,10 +17,12 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from types import FrameType
 
-from smokelift import pictures
+from smokelift import charts, pictures
 from smokelift.bench import command
 from smokelift.clip import Clip
 from smokelift.doctor import report
+from smokelift.evaluate import evaluate
+from smokelift.files import atomic_path
 from smokelift.forecast import forecast
 from smokelift.images import write_image
 from smokelift.memory import require_memory
@@ -131,8 +134,7 @@ def _render(options: argparse.Namespace, say: Reporter) -> None:
         raise ValueError(f"{options.out}: write an image (.exr, .png) or a video ({', '.join(pictures.VIDEO_KINDS)}).")
     if not sequence.frames:
         raise ValueError(f"{options.directory}: there are no finished frames to render yet.")
-    if not options.out.absolute().parent.is_dir():
-        raise ValueError(f"{options.out}: the folder {options.out.parent} does not exist.")
+    _require_folder(options.out)
     device.start(options.device)
     if suffix in pictures.VIDEO_KINDS:
         numbers = sequence.frames if options.frame is None else (options.frame,)
@@ -160,6 +162,37 @@ def _preview(options: argparse.Namespace, say: Reporter) -> None:
     )
 
 
+def _evaluate(options: argparse.Namespace, say: Reporter) -> None:
+    if options.truth is None and not options.view:
+        raise ValueError("Say what to compare with: --truth truth.npz, or --view camera.toml clip.mp4.")
+    for path in (options.json, options.picture):
+        _require_folder(path)
+    if options.picture is not None and options.picture.suffix.lower() != ".png":
+        raise ValueError(f"{options.picture}: the picture is written as .png.")
+    sequence = Sequence.open(options.directory)
+    device.start(options.device)
+    found = evaluate(sequence, options.truth, tuple((camera, clip) for camera, clip in options.view))
+    text = json.dumps(found.figures, indent=1, allow_nan=False)
+    if options.picture is not None:
+        found.write_picture(options.picture)
+    if options.json is not None:
+        with atomic_path(options.json) as aside:
+            aside.write_text(text + "\n", encoding="utf-8")
+        text = f"{options.json} written."
+    say.finish(text, found.figures)
+
+
+def _chart(options: argparse.Namespace, say: Reporter) -> None:
+    _require_folder(options.out)
+    charts.draw(charts.read_runs(options.csv), options.out)
+    say.finish(f"{options.out} written.", {"file": str(options.out)})
+
+
+def _require_folder(path: Path | None) -> None:
+    if path is not None and not path.absolute().parent.is_dir():
+        raise ValueError(f"{path}: the folder {path.parent} does not exist.")
+
+
 def _doctor(options: argparse.Namespace, say: Reporter) -> None:
     for line in report():
         say.note(line)
@@ -170,6 +203,8 @@ _COMMANDS = {
     "inspect": _inspect,
     "render": _render,
     "preview": _preview,
+    "evaluate": _evaluate,
+    "chart": _chart,
     "doctor": _doctor,
     "bench": command.bench,
 }
@@ -259,6 +294,25 @@ def _parser() -> argparse.ArgumentParser:
     look = commands.add_parser("preview", parents=[common], help="a contact sheet and a preview video")
     look.add_argument("directory", type=Path)
     look.add_argument("--out", type=Path, help="directory for them; by default the one that holds the sequence")
+
+    judge = commands.add_parser("evaluate", parents=[common], help="a sequence beside the truth, or beside other views")
+    judge.add_argument("directory", type=Path)
+    judge.add_argument("--truth", type=Path, metavar="truth.npz", help="known densities and velocities")
+    judge.add_argument(
+        "--view",
+        type=Path,
+        nargs=2,
+        action="append",
+        default=[],
+        metavar=("camera.toml", "clip.mp4"),
+        help="what another camera saw; may be repeated",
+    )
+    judge.add_argument("--json", type=Path, metavar="FILE", help="write the figures there, not on standard output")
+    judge.add_argument("--picture", type=Path, metavar="FILE.png", help="truth and sequence side by side")
+
+    drawing = commands.add_parser("chart", parents=[common], help="speed against accuracy, from measured runs")
+    drawing.add_argument("csv", type=Path, help="written by benchmarks/accuracy.py")
+    drawing.add_argument("--out", type=Path, required=True, metavar="chart.png")
 
     commands.add_parser("doctor", parents=[common], help="versions, devices and what is missing")
     command.add_parser(commands)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy import ndimage
+from scipy import fft, ndimage
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -153,6 +153,221 @@ def velocity_error(
     products = (u * v).sum(axis=-1)[moving]
     cosine = np.divide(products, lengths, out=np.zeros_like(products), where=lengths > 0.0)
     return error, float(cosine.mean())
+
+
+def height_mass_error(density: npt.ArrayLike, truth: npt.ArrayLike) -> float:
+    """Return how much mass is at a wrong height: sum |m - m_true| / sum m_true over the layers along z.
+
+    Parameters
+    ----------
+    density, truth
+        Arrays of one shape (nx, ny, nz).
+
+    Returns
+    -------
+    0 for equal masses in every layer, 1 for no density at all; infinity if only the truth is empty.
+
+    Raises
+    ------
+    ValueError
+        If the shapes differ or a value is not finite.
+    """
+    found, true = _pair(density, truth)
+    layers, wanted = found.sum(axis=(0, 1)), true.sum(axis=(0, 1))
+    return _ratio(float(np.abs(layers - wanted).sum()), float(wanted.sum()))
+
+
+def mean_divergence(velocity: npt.ArrayLike, voxel_size: float, mask: npt.ArrayLike | None = None) -> float:
+    """Return the mean |div u| in 1/s of a velocity at voxel centres, measured at the corners between eight voxels.
+
+    Where velocities at the centres are means of opposite faces, that is the mean over the eight voxels of the
+    divergence on their faces: zero if that is. Central differences would be small for a smooth flow only.
+
+    Parameters
+    ----------
+    velocity
+        Shape (nx, ny, nz, 3), m/s.
+    voxel_size
+        Edge of a voxel in metres.
+    mask
+        Which voxels count, shape (nx, ny, nz): a corner counts if all of its eight do. None counts all.
+
+    Raises
+    ------
+    ValueError
+        If a value is not finite, the mask does not fit, or no corner counts.
+    """
+    u = _finite(velocity)
+    outflow = np.zeros([n - 1 for n in u.shape[:3]])
+    for axis in range(3):
+        slope = np.diff(u[..., axis], axis=axis)
+        for across in {0, 1, 2} - {axis}:
+            slope = (np.delete(slope, 0, across) + np.delete(slope, -1, across)) / 2
+        outflow += slope / voxel_size
+    counts = _mask(mask, u.shape[:3])
+    corners = np.lib.stride_tricks.sliding_window_view(counts, (2, 2, 2)).all(axis=(3, 4, 5))
+    return float(np.abs(outflow)[_mask(corners, outflow.shape)].mean())
+
+
+def warp_error(
+    before: npt.ArrayLike, after: npt.ArrayLike, displacement: npt.ArrayLike, mask: npt.ArrayLike | None = None
+) -> float:
+    """Return how well a velocity carries one density into the next: |before(x - u) - after| / |after|.
+
+    Densities are interpolated linearly and are zero outside the box. The truth's own is not zero, and a wrong
+    velocity may have a smaller one: this says whether motion and densities agree, not whether either is right.
+
+    Parameters
+    ----------
+    before, after
+        Densities of one shape (nx, ny, nz).
+    displacement
+        The way u from one to the other in voxels at the points of arrival, shape (nx, ny, nz, 3).
+    mask
+        Which voxels count; None counts all.
+
+    Raises
+    ------
+    ValueError
+        If shapes differ, a value is not finite, or no voxel counts.
+    """
+    start, end = _pair(before, after)
+    way = _finite(displacement)
+    if way.shape != (*start.shape, 3):
+        raise ValueError(f"the displacement {way.shape} must have a vector for each of {start.shape} voxels")
+    origins = np.indices(start.shape) - np.moveaxis(way, -1, 0)
+    return volume_error(ndimage.map_coordinates(start, origins, order=1, mode="constant"), end, mask)
+
+
+def shifted_psnr(
+    a: npt.ArrayLike, b: npt.ArrayLike, reach: float = 0.25, peak: float = 1.0
+) -> tuple[float, tuple[int, int]]:
+    """Return the PSNR of two pictures after the best shift of the first by whole pixels.
+
+    What is moved in from outside is zero: give differences from the background. The sum of squares of every shift
+    comes from one correlation by fast Fourier transforms.
+
+    Parameters
+    ----------
+    a, b
+        Pictures of one shape, (rows, columns) or (rows, columns, channels).
+    reach
+        Largest shift, as a share of the rows and of the columns.
+    peak
+        The value of white.
+
+    Returns
+    -------
+    Decibels (infinity for equal pictures), and the shift in rows and columns.
+
+    Raises
+    ------
+    ValueError
+        If the shapes differ or a value is not finite.
+    """
+    first, second = (np.atleast_3d(picture) for picture in _pair(a, b))
+    rows, columns = first.shape[:2]
+    far = int(reach * rows), int(reach * columns)
+    size = [fft.next_fast_len(n + f, real=True) for n, f in zip((rows, columns), far, strict=True)]
+    waves = np.conj(fft.rfft2(first, size, axes=(0, 1))) * fft.rfft2(second, size, axes=(0, 1))
+    overlap = fft.irfft2(waves.sum(axis=-1), size)
+    # sums of squares of what stays in the picture, from a table of sums
+    table = np.zeros((rows + 1, columns + 1))
+    table[1:, 1:] = (first**2).sum(axis=-1).cumsum(0).cumsum(1)
+    down, right = (np.arange(-f, f + 1) for f in far)
+    top, bottom = np.maximum(0, -down), rows - np.maximum(0, down)
+    left, end = np.maximum(0, -right), columns - np.maximum(0, right)
+    kept = table[np.ix_(bottom, end)] - table[np.ix_(top, end)] - table[np.ix_(bottom, left)] + table[np.ix_(top, left)]
+    squares = kept + float((second**2).sum()) - 2 * overlap[np.ix_(down, right)]
+    row, column = np.unravel_index(int(squares.argmin()), squares.shape)
+    shift = int(down[row]), int(right[column])
+    moved = np.zeros_like(first)
+    there = np.s_[max(0, shift[0]) : rows + min(0, shift[0]), max(0, shift[1]) : columns + min(0, shift[1])]
+    here = np.s_[max(0, -shift[0]) : rows - max(0, shift[0]), max(0, -shift[1]) : columns - max(0, shift[1])]
+    moved[there] = first[here]
+    return psnr(moved, second, peak=peak), shift
+
+
+OCTAVES = ((2.0, 4.0), (4.0, 8.0), (8.0, 16.0), (16.0, 32.0))
+"""Bands of `octave_power` in cycles across the longer side: from the shape of the smoke to what 64 voxels hold."""
+
+
+def octave_power(picture: npt.ArrayLike) -> Array:
+    """Return the power of a picture in each of `OCTAVES`, whatever the direction.
+
+    Parameters
+    ----------
+    picture
+        Shape (rows, columns), at least 64 pixels on the longer side for the last band: the smoke alone, as its
+        difference from the background. It is faded out over an eighth at each edge, which smoke may cross.
+
+    Raises
+    ------
+    ValueError
+        If a value is not finite or the picture has not two axes.
+    """
+    values = _finite(picture)
+    if values.ndim != 2:
+        raise ValueError(f"the power of octaves needs a picture (rows, columns), not one of shape {values.shape}")
+    rows, columns = values.shape
+    longer = max(rows, columns)
+    power = np.abs(fft.fft2(values * np.outer(_faded(rows), _faded(columns)))) ** 2
+    cycles = longer * np.hypot(fft.fftfreq(rows)[:, None], fft.fftfreq(columns))
+    return np.array([power[(low <= cycles) & (cycles < high)].sum() for low, high in OCTAVES])
+
+
+def spectrum_distance(power: npt.ArrayLike, truth: npt.ArrayLike) -> tuple[float, Array]:
+    """Return how much stronger or weaker detail is than the truth's, wherever it is.
+
+    Parameters
+    ----------
+    power, truth
+        Sums of `octave_power` over the same frames.
+
+    Returns
+    -------
+    The root mean square over the octaves, in dB, and each octave's 10 log10(power / truth): negative where the
+    picture is smoother than the truth. A millionth of the truth's total is added to both, so that nothing is
+    infinite.
+
+    Raises
+    ------
+    ValueError
+        If the shapes differ, a value is not finite, or the truth has no power at all.
+    """
+    found, true = _pair(power, truth)
+    floor = 1e-6 * float(true.sum())
+    if floor <= 0:
+        raise ValueError("the truth's pictures show nothing: there is no spectrum to compare with")
+    ratios = 10 * np.log10((found + floor) / (true + floor))
+    return float(np.sqrt(np.mean(ratios**2))), np.asarray(ratios, np.float64)
+
+
+def flicker(series: npt.ArrayLike) -> float:
+    """Return the unsteadiness of something in time: RMS of its second differences over its own RMS.
+
+    Parameters
+    ----------
+    series
+        Shape (frames, ...), at least three frames; coarse means (of blocks of a picture, of layers of a volume) show
+        flicker, single pixels mostly motion.
+
+    Raises
+    ------
+    ValueError
+        If a value is not finite, or there are fewer than three frames.
+    """
+    values = _finite(series)
+    if len(values) < 3:
+        raise ValueError(f"flicker needs at least three frames, not {len(values)}")
+    second = values[2:] - 2 * values[1:-1] + values[:-2]
+    return _ratio(float(np.sqrt(np.mean(second**2))), float(np.sqrt(np.mean(values**2))))
+
+
+def _faded(count: int) -> Array:
+    """Ones with an eighth at both ends that rises from zero (Tukey's window)."""
+    inward = np.minimum(np.arange(count), np.arange(count)[::-1]) + 0.5
+    return np.asarray(np.sin(np.pi / 2 * np.minimum(1.0, 8 * inward / count)) ** 2)
 
 
 def _ratio(error: float, norm: float) -> float:

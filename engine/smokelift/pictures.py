@@ -142,7 +142,7 @@ def write_contact_sheet(path: Path, sequence: Sequence, clip: Clip) -> None:
     titles = ["input", *(f"{angle}\N{DEGREE SIGN}" for angle in SHEET_ANGLES)]
     titles[1] = "reconstruction"
     with atomic_path(path) as aside:
-        _sheet(rows, titles, [f"frame {number}" for number in chosen or frames]).save(aside, format="PNG")
+        sheet(rows, titles, [f"frame {number}" for number in chosen or frames]).save(aside, format="PNG")
 
 
 def write_preview(path: Path, sequence: Sequence, clip: Clip) -> None:
@@ -176,18 +176,18 @@ def _input(clip: Clip, number: int, sequence: Sequence, height: int) -> Image:
     return area_average(clip.frame(number - 1), *small_size(sequence.scene.camera, height))
 
 
-def _sheet(rows: Many[Many[NDArray[np.uint8]]], titles: Many[str], labels: Many[str]) -> Pillow.Image:
+def sheet(rows: Many[Many[NDArray[np.uint8]]], titles: Many[str], labels: Many[str]) -> Pillow.Image:
+    """Rows of tiles of one height, as wide as those in their column, with titles above and a label over each row."""
     gap, line = 4, 16
-    height, width = rows[0][0].shape[:2]
-    sheet = Pillow.new(
-        "RGB", (gap + len(titles) * (width + gap), line + len(rows) * (height + line + gap)), (32, 32, 32)
-    )
-    draw = ImageDraw.Draw(sheet)
-    for column, title in enumerate(titles):
-        draw.text((gap + column * (width + gap), 2), title, fill=(230, 230, 230))
+    height = rows[0][0].shape[0]
+    lefts = gap + np.cumsum([0, *(tile.shape[1] + gap for tile in rows[0])])
+    whole = Pillow.new("RGB", (int(lefts[-1]), line + len(rows) * (height + line + gap)), (32, 32, 32))
+    draw = ImageDraw.Draw(whole)
+    for title, left in zip(titles, lefts, strict=False):
+        draw.text((left, 2), title, fill=(230, 230, 230))
     for row, (tiles, label) in enumerate(zip(rows, labels, strict=True)):
         top = line + row * (height + line + gap)
         draw.text((gap, top + 2), label, fill=(170, 170, 170))
-        for column, tile in enumerate(tiles):
-            sheet.paste(Pillow.fromarray(tile), (gap + column * (width + gap), top + line))
-    return sheet
+        for tile, left in zip(tiles, lefts, strict=False):
+            whole.paste(Pillow.fromarray(tile), (int(left), top + line))
+    return whole

@@ -7,7 +7,20 @@ import math
 import numpy as np
 import pytest
 
-from smokelift.metrics import mass, psnr, ssim, velocity_error, volume_error
+from smokelift.metrics import (
+    flicker,
+    height_mass_error,
+    mass,
+    mean_divergence,
+    octave_power,
+    psnr,
+    shifted_psnr,
+    spectrum_distance,
+    ssim,
+    velocity_error,
+    volume_error,
+    warp_error,
+)
 
 
 def test_psnr() -> None:
@@ -102,3 +115,102 @@ def test_masks_must_fit_and_count_something() -> None:
             velocity_error(np.ones((4, 4, 3)), np.ones((4, 4, 3)), mask)
     with pytest.raises(ValueError, match="finite"):
         mass(np.array([math.inf]), 1.0)
+
+
+def test_height_mass_error() -> None:
+    truth = np.random.default_rng(4).random((4, 5, 6))
+    assert height_mass_error(np.roll(truth, 2, 0), truth) == pytest.approx(0.0)
+    assert height_mass_error(1.2 * truth, truth) == pytest.approx(0.2)
+    one = np.zeros((2, 2, 4))
+    one[..., 1] = 1.0
+    assert height_mass_error(np.roll(one, 1, 2), one) == 2.0
+    assert height_mass_error(0 * one, one) == 1.0
+
+
+def test_mean_divergence() -> None:
+    x, y, z = np.indices((6, 7, 8), float)
+    outward = np.stack([x, 2 * y, -5 * z], -1)
+    assert mean_divergence(outward, 0.5) == pytest.approx(4.0)
+    assert mean_divergence(np.stack([-y, x, 0 * z], -1), 0.5) == pytest.approx(0.0)
+    mask = np.zeros((6, 7, 8), bool)
+    mask[1:3, 1:3, 1:3] = True
+    broken = np.where(x[..., None] > 2, 100.0, outward)
+    assert mean_divergence(broken, 0.5, mask) == pytest.approx(4.0)
+    assert mean_divergence(broken, 0.5) > 5.0
+    with pytest.raises(ValueError, match="count"):
+        mean_divergence(outward, 0.5, x == 0)
+
+
+def test_a_flow_without_divergence_on_faces_has_none() -> None:
+    """However rough it is: the curl of noise on a staggered grid, at the centres."""
+    a, b, c = np.random.default_rng(8).random((3, 9, 9, 9))
+    faces = (
+        np.diff(c, axis=1)[:, :, :-1] - np.diff(b, axis=2)[:, :-1],
+        np.diff(a, axis=2)[:-1] - np.diff(c, axis=0)[:, :, :-1],
+        np.diff(b, axis=0)[:, :-1] - np.diff(a, axis=1)[:-1],
+    )
+    opposite = [(np.delete(f, 0, d) + np.delete(f, -1, d)) / 2 for d, f in enumerate(faces)]
+    assert mean_divergence(np.stack(opposite, -1), 1.0) < 1e-14
+    assert mean_divergence(np.stack([opposite[0], 0 * a[1:, 1:, 1:], opposite[2]], -1), 1.0) > 0.1
+
+
+def test_warp_error() -> None:
+    before = np.zeros((8, 8, 8))
+    before[2:5, 2:5, 2:5] = np.random.default_rng(5).random((3, 3, 3))
+    after = np.roll(before, 2, 0)
+    way = np.zeros((8, 8, 8, 3))
+    assert warp_error(before, after, way) > 1.0
+    way[..., 0] = 2.0
+    assert warp_error(before, after, way) == pytest.approx(0.0)
+    assert warp_error(before, after, -way) > 1.0
+    with pytest.raises(ValueError, match="vector for each"):
+        warp_error(before, after, way[..., :2])
+
+
+def test_shifted_psnr_against_all_shifts() -> None:
+    random = np.random.default_rng(6)
+    a, b = random.random((2, 12, 9, 3))
+    best = -math.inf
+    for down in range(-3, 4):
+        for right in range(-2, 3):
+            moved = np.zeros_like(a)
+            for row in range(12):
+                for column in range(9):
+                    if 0 <= row - down < 12 and 0 <= column - right < 9:
+                        moved[row, column] = a[row - down, column - right]
+            best = max(best, psnr(moved, b))
+    assert shifted_psnr(a, b)[0] == pytest.approx(best)
+
+
+def test_shifted_psnr_finds_the_shift() -> None:
+    a = np.zeros((40, 30))
+    a[10:20, 8:15] = np.random.default_rng(7).random((10, 7))
+    decibels, shift = shifted_psnr(np.roll(a, (6, -5), (0, 1)), a)
+    assert decibels == math.inf
+    assert shift == (-6, 5)
+    assert shifted_psnr(np.roll(a, 15, 0), a)[0] < 40  # beyond its reach
+
+
+def test_octaves_and_their_distance() -> None:
+    rows, columns = np.indices((96, 64))
+    fine, coarse = np.sin(2 * np.pi * 24 * rows / 96), np.sin(2 * np.pi * 3 * columns / 96)
+    assert octave_power(fine).argmax() == 3
+    assert octave_power(coarse).argmax() == 0
+    truth = octave_power(fine + coarse)
+    distance, octaves = spectrum_distance(octave_power(fine + 0.1 * coarse), truth)
+    assert octaves[0] == pytest.approx(-20, abs=0.5)
+    assert octaves[3] == pytest.approx(0, abs=0.1)
+    assert distance == pytest.approx(np.sqrt(np.mean(octaves**2)))
+    assert spectrum_distance(truth, truth)[0] == 0.0
+    with pytest.raises(ValueError, match="nothing"):
+        spectrum_distance(truth, 0 * truth)
+    with pytest.raises(ValueError, match="rows, columns"):
+        octave_power(np.zeros((8, 8, 3)))
+
+
+def test_flicker() -> None:
+    steady = np.arange(6.0)[:, None] + np.ones(4)
+    assert flicker(steady) == pytest.approx(0.0)
+    assert flicker(np.array([1.0, 1.0, 1.0, 1.0]) + 0.1 * np.array([1, -1, 1, -1])) == pytest.approx(0.4, rel=0.01)
+    with pytest.raises(ValueError, match="three frames"):
+        flicker(steady[:2])

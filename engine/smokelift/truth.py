@@ -1,16 +1,21 @@
-"""Scenes whose flow is known: the files that bake.py writes, and others in their format."""
+"""Scenes whose flow is known, to compare results with: the files that benchmarks/truth/bake.py writes."""
 
 from __future__ import annotations
 
+import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
-from smokelift.transport import Side, Velocity
+from smokelift.transport import Side, Velocity, face_shapes
 
 Array = npt.NDArray[np.float32]
+
+
+class TruthError(ValueError):
+    """A file that holds no truth, and why."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,16 +48,40 @@ class Truth:
 
     @staticmethod
     def load(path: Path) -> Truth:
-        """Read a truth.npz."""
-        with np.load(path) as file:
-            return Truth(
-                densities=file["density"],
-                faces=tuple(file[f"velocity_{axis}"] for axis in "xyz"),
-                inflow_packed=file["inflow_packed"],
-                voxel_size=float(file["voxel_size"]),
-                fps=float(file["fps"]),
-                closed=tuple(file["closed"].tolist()) if "closed" in file else (),
-            )
+        """Read a truth.npz.
+
+        Raises
+        ------
+        TruthError
+            If there is no such file, it is damaged, or it holds something else.
+        """
+        try:
+            with path.open("rb") as opened, np.load(opened) as file:
+                truth = Truth(
+                    densities=file["density"],
+                    faces=tuple(file[f"velocity_{axis}"] for axis in "xyz"),
+                    inflow_packed=file["inflow_packed"],
+                    voxel_size=float(file["voxel_size"]),
+                    fps=float(file["fps"]),
+                    closed=tuple(file["closed"].tolist()) if "closed" in file else (),
+                )
+        except FileNotFoundError:
+            raise TruthError(f"{path}: no such file.") from None
+        except KeyError as missing:
+            raise TruthError(f"{path}: is no truth.npz: {missing.args[0]}.") from None
+        except (OSError, ValueError, EOFError, TypeError, AttributeError, zipfile.BadZipFile) as error:
+            raise TruthError(f"{path}: cannot be read as a truth.npz: {error}.") from error
+        truth._check(path)
+        return truth
+
+    def _check(self, path: Path) -> None:
+        if self.densities.ndim != 4:
+            raise TruthError(f"{path}: density must be [frame, x, y, z], not of shape {self.densities.shape}.")
+        wanted = [(self.frames, *shape) for shape in face_shapes(self.shape)]
+        if (found := [face.shape for face in self.faces]) != wanted:
+            raise TruthError(f"{path}: velocity on faces must have the shapes {wanted}, not {found}.")
+        if not (self.voxel_size > 0 and self.fps > 0):
+            raise TruthError(f"{path}: voxel_size and fps must be positive, not {self.voxel_size} and {self.fps}.")
 
     @property
     def frames(self) -> int:

@@ -1,0 +1,116 @@
+"""One run of accuracy.py in a process of its own, so that its peak of memory is its own.
+
+    python accuracy_worker.py scene.toml RUN FIRST LAST OUT
+
+reads the clip's frames FIRST to LAST and leaves OUT/0001.npz, ... (density; velocity at centres in m/s, if the run has
+one), OUT/scene.toml with what was estimated, and OUT/run.json. Only the reconstruction is clocked, from decoding the
+clip to OpenVDB files on disk; the arrays are written between frames.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pipeline import poisson_seconds
+
+from smokelift import Clip, Scene, Settings, reconstruct, reconstruct_density
+from smokelift.density import DensitySettings
+from smokelift.shot import Shot, prepare_shot
+
+SMEAR = "smear"
+SMEAR_SETTINGS = DensitySettings(fit_iterations=24, descent_iterations=0, tolerance=1e-3)
+"""Only whole rays are scaled, so that a density which is constant along them stays so."""
+
+STARTED = 2
+"""Frames that are not clocked: the first two come together, and compilers work before them."""
+
+
+def run_settings(run: str) -> Settings:
+    """Settings of a run's name: a quality or "paper", then changes, "balanced:transport=0,velocity.levels=2"."""
+    name, _, changes = run.partition(":")
+    settings = Settings.preset(method="paper") if name == "paper" else Settings.preset(name)
+    for change in filter(None, changes.split(",")):
+        key, _, text = change.partition("=")
+        if key == "resolution":
+            x, y, z = (int(count) for count in text.split("x"))
+            settings = replace(settings, resolution=(x, y, z))
+            continue
+        try:
+            value: Any = json.loads(text)
+        except json.JSONDecodeError:
+            value = text
+        group, _, inner = key.rpartition(".")
+        changed = replace(getattr(settings, group), **{inner: value}) if group else value
+        settings = replace(settings, **{group or inner: changed})
+    return settings
+
+
+def smeared(clip: Clip, shot: Shot) -> Iterator[np.ndarray]:
+    """The front fit with a density that is constant along the rays inside the domain."""
+    domain, medium = shot.scene.domain, shot.scene.medium
+    fog = np.full(domain.resolution, 0.5 / (medium.extinction * (domain.max[1] - domain.min[1])), np.float32)
+    settings = replace(SMEAR_SETTINGS, scattering=shot.scattering)
+    for index in range(len(clip)):
+        image = shot.working.cut(clip.frame(index))
+        yield reconstruct_density(image, shot.small_scene, fog, settings, plate=shot.plate).values
+
+
+def peak_mib() -> float | None:
+    """The most memory that this process had; None where the system does not say.
+
+    Not getrusage's maximum, which in a started process begins with that of the one that started it.
+    """
+    try:
+        status = Path("/proc/self/status").read_text()
+    except OSError:
+        return None
+    return next(int(line.split()[1]) / 1024 for line in status.splitlines() if line.startswith("VmHWM"))
+
+
+def main() -> None:
+    """Do the run."""
+    scene_path, run, first, last, out = (*sys.argv[1:5], Path(sys.argv[5]))
+    scene = Scene.load(scene_path)
+    source = replace(scene.clip, frames=(int(first), int(last)))
+    settings = Settings.preset() if run == SMEAR else run_settings(run)
+    seconds, units = [], []
+    with tempfile.TemporaryDirectory() as folder, Clip.open(source) as clip:
+        shot = prepare_shot(clip, scene, settings)
+        shot.scene.save(out / "scene.toml")
+        if run == SMEAR:
+            found: Iterator[Any] = smeared(clip, shot)
+        else:
+            found = reconstruct(clip, scene, settings, Path(folder) / "smoke", shot=shot)
+        began = time.perf_counter()
+        for number, frame in enumerate(found, 1):
+            seconds.append(time.perf_counter() - began)
+            if run == SMEAR:
+                arrays = {"density": frame}
+            else:
+                arrays = {"density": frame.density, "velocity": frame.velocity.centres()}
+            units.append(poisson_seconds(arrays["density"].shape))
+            np.savez(out / f"{number:04d}.npz", **arrays)
+            began = time.perf_counter()
+    clocked = seconds[STARTED:] or seconds
+    result = {
+        "frames": len(seconds),
+        "seconds": float(np.median(clocked)),
+        "solves": float(np.median(clocked) / np.median(units)),
+        "memory_mib": peak_mib(),
+        "scattering": shot.scattering,
+        "resolution": list(shot.scene.domain.resolution),
+        "method": "baseline" if run == SMEAR else settings.method,
+    }
+    (out / "run.json").write_text(json.dumps(result) + "\n")
+
+
+if __name__ == "__main__":
+    main()

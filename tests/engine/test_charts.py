@@ -1,0 +1,91 @@
+"""``smokelift chart``: what is read from the CSV, which runs are on the front, and what cannot be drawn."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from smokelift.charts import pareto_front, read_runs
+from smokelift.cli import main
+
+HEADER = "scene,run,method,frames,seconds,psnr_new,density_error,velocity_error,machine,date\n"
+ROWS = (
+    "a,draft,default,24,0.5,20,0.9,0.7,box,2026-01-01\n"
+    "b,draft,default,24,1.5,30,0.7,0.5,box,2026-01-02\n"
+    "a,paper,paper,24,6,20,1.0,0.8,box,2026-01-01\n"
+    "b,paper,paper,24,8,20,1.0,0.8,box,2026-01-01\n"
+    "a,billboard,baseline,24,,20,,,box,2026-01-01\n"
+    "b,billboard,baseline,24,,20,,,box,2026-01-01\n"
+    "a,truth,reference,24,,60,,,box,2026-01-01\n"
+)
+
+
+def write(folder: Path, text: str = HEADER + ROWS) -> Path:
+    path = folder / "runs.csv"
+    path.write_text(text)
+    return path
+
+
+def refused(capsys, path: Path, out: Path) -> str:
+    capsys.readouterr()
+    assert main(["chart", str(path), "--out", str(out)]) == 2
+    lines = capsys.readouterr().err.strip().splitlines()
+    assert len(lines) == 1, lines
+    return lines[0]
+
+
+def test_runs_are_means_over_the_scenes(tmp_path) -> None:
+    found = read_runs(write(tmp_path))
+    draft, paper, billboard = found.runs  # a reference is not drawn
+    assert (draft.name, draft.method, draft.seconds) == ("draft", "default", 1.0)
+    assert draft.errors["view_error"] == pytest.approx(10 ** (-25 / 20))
+    assert draft.errors["density_error"] == pytest.approx(0.8)
+    assert draft.errors["velocity_error"] == pytest.approx(0.6)
+    assert paper.seconds == 7
+    assert billboard.seconds is None
+    assert list(billboard.errors) == ["view_error"]
+    assert found.caption == "a, b; 24 frames; box; 2026-01-01, 2026-01-02"
+
+
+def test_only_scenes_that_all_share_count(tmp_path) -> None:
+    text = (HEADER + ROWS).replace("b,paper,paper,24,8,20,1.0,0.8,box,2026-01-01\n", "")
+    found = read_runs(write(tmp_path, text))
+    assert found.runs[0].seconds == 0.5
+    assert found.caption.startswith("a; 24 frames")
+
+
+def test_the_pareto_front() -> None:
+    points = [(1.0, 5.0), (2.0, 3.0), (3.0, 4.0), (2.0, 6.0), (9.0, 1.0), (9.5, 1.0)]
+    assert pareto_front(points) == [0, 1, 4]
+    assert pareto_front([(1.0, 2.0), (1.0, 1.0)]) == [1]
+    assert pareto_front([]) == []
+
+
+def test_a_chart_is_drawn(tmp_path, capsys) -> None:
+    pytest.importorskip("matplotlib")
+    assert main(["chart", str(write(tmp_path)), "--out", str(tmp_path / "chart.png")]) == 0
+    assert (tmp_path / "chart.png").read_bytes().startswith(b"\x89PNG")
+    assert "chart.png written" in "".join(capsys.readouterr().out.splitlines())
+
+
+def test_what_cannot_be_read(tmp_path, capsys) -> None:
+    out = tmp_path / "chart.png"
+    assert "no such file" in refused(capsys, tmp_path / "gone.csv", out)
+    assert "'psnr_new'" in refused(capsys, write(tmp_path, HEADER.replace("psnr_new", "psnr")), out)
+    assert "no runs" in refused(capsys, write(tmp_path, HEADER), out)
+    assert "must be a number" in refused(capsys, write(tmp_path, (HEADER + ROWS).replace("0.5,20", "soon,20")), out)
+    assert "share" in refused(
+        capsys, write(tmp_path, (HEADER + ROWS).replace("a,paper", "c,paper").replace("b,paper", "d,paper")), out
+    )
+    untimed = HEADER + "a,billboard,baseline,24,,20,,,box,2026-01-01\n"
+    assert "nothing to draw" in refused(capsys, write(tmp_path, untimed), out)
+    assert ".png" in refused(capsys, write(tmp_path), tmp_path / "chart.pdf")
+    assert "does not exist" in refused(capsys, write(tmp_path), tmp_path / "no" / "chart.png")
+    assert not out.exists()
+
+
+def test_without_matplotlib(tmp_path, capsys, monkeypatch) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    assert "pip install matplotlib" in refused(capsys, write(tmp_path), tmp_path / "chart.png")

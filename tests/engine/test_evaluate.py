@@ -1,0 +1,270 @@
+"""``smokelift evaluate``: a sequence beside known volumes and other views, and every way to ask for nonsense."""
+
+from __future__ import annotations
+
+import json
+import signal
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from smokelift.cameras import orbit
+from smokelift.cli import main
+from smokelift.images import write_image
+from smokelift.render import render
+from smokelift.scene import Background, Domain, Scene
+from smokelift.sequence import SequenceWriter
+from smokelift.transport import Velocity
+
+RISE = 1.5
+"""Voxels a frame of the tiny plume."""
+
+
+@pytest.fixture(autouse=True)
+def own_signals() -> Iterator[None]:
+    """The command line takes SIGTERM; give it back."""
+    before = signal.getsignal(signal.SIGTERM)
+    yield
+    signal.signal(signal.SIGTERM, before)
+
+
+def write(folder: Path, scene: Scene, densities, speed: float = 1.0) -> Path:
+    """A sequence of volumes that rise as fast as the truth, or by another speed."""
+    faces = Velocity.zero(scene.domain.resolution, scene.domain.voxel_size).faces
+    faces[2][:] = speed * RISE * scene.domain.voxel_size * 24
+    with SequenceWriter(folder, scene, {"density": {"scattering": "single"}}, npz=True) as writer:
+        for number, density in enumerate(densities, 1):
+            writer.write(number, density, faces)
+    return folder
+
+
+def write_truth(path: Path, scene: Scene, densities, **changes) -> Path:
+    """The tiny plume in the format of baked scenes."""
+    shape, count = scene.domain.resolution, len(densities)
+    faces = Velocity.zero(shape, scene.domain.voxel_size).faces
+    faces[2][:] = RISE * scene.domain.voxel_size * 24
+    arrays = {
+        "density": np.stack(densities).astype(np.float16),
+        **{
+            f"velocity_{axis}": np.stack([face] * count).astype(np.float16)
+            for axis, face in zip("xyz", faces, strict=True)
+        },
+        "inflow_packed": np.zeros((count, int(np.prod(shape)) // 8), np.uint8),
+        "voxel_size": scene.domain.voxel_size,
+        "fps": 24,
+        "closed": np.array([], dtype="U2"),
+    } | changes
+    np.savez(path, **{name: value for name, value in arrays.items() if value is not None})
+    return path
+
+
+@pytest.fixture(scope="module")
+def truth(plume, tmp_path_factory) -> Path:
+    return write_truth(tmp_path_factory.mktemp("truth") / "truth.npz", plume.scene, plume.densities)
+
+
+@pytest.fixture(scope="module")
+def perfect(plume, tmp_path_factory) -> Path:
+    """The true volumes as a sequence."""
+    return write(tmp_path_factory.mktemp("perfect") / "out", plume.scene, plume.densities)
+
+
+@pytest.fixture(scope="module")
+def side(plume, tmp_path_factory) -> tuple[Path, Path]:
+    """Another camera's file and what it saw."""
+    folder = tmp_path_factory.mktemp("side")
+    scene = replace(plume.scene, camera=orbit(plume.scene.camera, plume.scene.domain, 60), clip=None)
+    filmed = plume.write(folder / "clip", plume.densities, scene, suffix=".exr")
+    Scene(camera=scene.camera).save(folder / "camera.toml")
+    return folder / "camera.toml", filmed.clip.path
+
+
+def evaluate(capsys, *words: object) -> dict:
+    """What is written on standard output, which is JSON and nothing else."""
+    capsys.readouterr()
+    assert main(["evaluate", *map(str, words)]) == 0
+    captured = capsys.readouterr()
+    assert captured.err == ""
+    return json.loads(captured.out)
+
+
+def refused(capsys, *words: object) -> str:
+    capsys.readouterr()
+    assert main(["evaluate", *map(str, words)]) == 2
+    lines = capsys.readouterr().err.strip().splitlines()
+    assert len(lines) == 1, lines
+    return lines[0]
+
+
+def test_the_truth_beside_itself(perfect, truth, capsys) -> None:
+    found = evaluate(capsys, perfect, "--truth", truth)
+    assert found["frames"] == 5
+    assert "views" not in found
+    figures = found["truth"]
+    assert figures["density_error"] < 1e-3
+    assert figures["height_mass_error"] < 1e-3
+    assert figures["velocity_error"] < 1e-3
+    assert figures["velocity_cosine"] == pytest.approx(1)
+    assert figures["warp_error"] == pytest.approx(figures["warp_error_truth"], abs=1e-3)
+
+
+def test_a_wrong_sequence_beside_the_truth(plume, truth, tmp_path, capsys) -> None:
+    """Smoke that lies too deep and is said to stand still."""
+    folder = write(tmp_path / "out", plume.scene, [np.roll(d, 4, 1) for d in plume.densities], speed=0.0)
+    figures = evaluate(capsys, folder, "--truth", truth)["truth"]
+    assert figures["density_error"] > 0.3
+    assert figures["height_mass_error"] < 1e-3
+    assert figures["velocity_error"] == pytest.approx(1)
+    assert figures["velocity_cosine"] == 0
+    assert figures["warp_error"] > 2 * figures["warp_error_truth"]
+
+
+def test_frames_are_those_of_the_clip(plume, truth, tmp_path, capsys) -> None:
+    """A sequence of a part of the clip is compared with that part."""
+    scene = replace(plume.scene, clip=replace(plume.scene.clip, frames=(2, 4)))
+    part = write(tmp_path / "part", scene, plume.densities[2:])
+    assert evaluate(capsys, part, "--truth", truth)["truth"]["density_error"] < 1e-3
+    beginning = write(tmp_path / "beginning", plume.scene, plume.densities[2:])
+    assert evaluate(capsys, beginning, "--truth", truth)["truth"]["density_error"] > 0.3
+
+
+def test_another_resolution_of_the_same_box(plume, truth, tmp_path, capsys) -> None:
+    domain = plume.scene.domain
+    scene = replace(plume.scene, domain=Domain(domain.min, domain.max, (12, 12, 16)))
+    coarse = [d.reshape(12, 2, 12, 2, 16, 2).mean((1, 3, 5)) for d in plume.densities]
+    figures = evaluate(capsys, write(tmp_path / "out", scene, coarse), "--truth", truth)["truth"]
+    assert 0.01 < figures["density_error"] < 0.5
+    assert figures["mass_ratio"] == pytest.approx(1, abs=0.02)
+
+
+def test_the_input_and_another_view(perfect, side, capsys) -> None:
+    found = evaluate(capsys, perfect, "--view", *side)
+    given, new = found["views"]
+    assert (given["name"], new["name"]) == ("input", "camera")
+    assert given["size"] == new["size"] == [40, 56]
+    assert given["psnr"] is None or given["psnr"] > 50
+    assert new["psnr"] is None or new["psnr"] > 50
+    assert new["ssim"] > 0.999
+    assert new["spectrum_distance"] < 0.1
+    assert new["flicker"] == pytest.approx(new["flicker_truth"], rel=0.01)
+
+
+def test_smoke_that_lies_too_deep_is_seen_from_the_side_only(plume, side, tmp_path, capsys) -> None:
+    moved = write(tmp_path / "out", plume.scene, [np.roll(d, 3, 1) for d in plume.densities])
+    given, new = evaluate(capsys, moved, "--view", *side)["views"]
+    assert new["psnr"] < given["psnr"] - 3
+    assert new["psnr_shifted"] > new["psnr"] + 5
+
+
+def test_json_and_picture_as_files(perfect, truth, side, tmp_path, capsys) -> None:
+    files = ("--json", tmp_path / "a.json", "--picture", tmp_path / "a.png")
+    assert main(["evaluate", *map(str, (perfect, "--truth", truth, "--view", *side, *files))]) == 0
+    assert "a.json written" in "".join(capsys.readouterr().out.splitlines())
+    found = json.loads((tmp_path / "a.json").read_text())
+    assert found["truth"]["density_error"] < 1e-3
+    assert len(found["views"]) == 2
+    with Image.open(tmp_path / "a.png") as sheet:
+        pixels = np.asarray(sheet).max(-1)
+    assert pixels.shape[0] > 5 * 320
+    # truth and sequence along y and x, then seen and sequence of two views
+    tiles = [240] * 4 + [229] * 4
+    lefts = 4 + np.cumsum([0, *(width + 4 for width in tiles)])
+    assert pixels.shape[1] == lefts[-1]
+    for left, width in zip(lefts, tiles, strict=False):
+        assert pixels[16 : 16 + 320, left : left + width].max() > 100
+    first, second = (pixels[32:352, left : left + 240].astype(int) for left in lefts[:2])
+    assert np.abs(first - second).max() <= 2
+
+
+def test_progress_as_json(perfect, truth, capsys) -> None:
+    found = evaluate(capsys, perfect, "--truth", truth, "--progress", "json")
+    assert found["event"] == "done"
+    assert found["truth"]["density_error"] < 1e-3
+
+
+def test_a_missing_input_clip_is_noted(plume, side, tmp_path, capsys) -> None:
+    scene = replace(plume.scene, clip=replace(plume.scene.clip, path=tmp_path / "gone.mp4"))
+    found = evaluate(capsys, write(tmp_path / "out", scene, plume.densities), "--view", *side)
+    assert [view["name"] for view in found["views"]] == ["camera"]
+    assert "gone.mp4" in found["notes"][0]
+
+
+def test_a_view_before_a_background_of_its_own(plume, perfect, tmp_path, capsys) -> None:
+    """The camera file's background is what stands behind the smoke there."""
+    camera = orbit(plume.scene.camera, plume.scene.domain, 60)
+    scene = replace(plume.scene, camera=camera, clip=None, background=Background(color=(0.1, 0.2, 0.3)))
+    filmed = plume.write(tmp_path / "clip", plume.densities, scene, suffix=".exr")
+    Scene(camera=camera, background=scene.background).save(tmp_path / "camera.toml")
+    new = evaluate(capsys, perfect, "--view", tmp_path / "camera.toml", filmed.clip.path)["views"][1]
+    assert new["psnr"] is None or new["psnr"] > 50
+    assert new["spectrum_distance"] < 0.1
+
+
+# refusals
+
+
+def test_nothing_to_compare_with(perfect, capsys) -> None:
+    assert "--truth" in refused(capsys, perfect)
+
+
+def test_no_sequence_there(tmp_path, truth, capsys) -> None:
+    assert "holds no sequence" in refused(capsys, tmp_path, "--truth", truth)
+
+
+def test_a_sequence_without_frames(plume, truth, tmp_path, capsys) -> None:
+    assert "no finished frames" in refused(capsys, write(tmp_path / "out", plume.scene, []), "--truth", truth)
+
+
+@pytest.mark.parametrize("content", [None, b"", b"text " * 100, b"PK\x03\x04" + b"0" * 200])
+def test_a_truth_that_cannot_be_read(perfect, tmp_path, capsys, content) -> None:
+    path = tmp_path / "truth.npz"
+    if content is not None:
+        path.write_bytes(content)
+    assert str(path) in refused(capsys, perfect, "--truth", path)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"velocity_x": None}, "velocity_x"),
+        ({"velocity_y": np.zeros((5, 24, 24, 32), np.float16)}, "velocity on faces"),
+        ({"density": np.zeros((24, 24, 32), np.float16)}, "frame, x, y, z"),
+        ({"fps": 0}, "positive"),
+        ({"fps": 30}, "30 frames a second"),
+        ({"voxel_size": 0.06}, "box"),
+    ],
+)
+def test_a_truth_that_does_not_fit(plume, perfect, tmp_path, capsys, change, said) -> None:
+    path = write_truth(tmp_path / "truth.npz", plume.scene, plume.densities, **change)
+    sentence = refused(capsys, perfect, "--truth", path)
+    assert str(path) in sentence
+    assert said in sentence
+
+
+def test_a_truth_with_too_few_frames(plume, perfect, tmp_path, capsys) -> None:
+    path = write_truth(tmp_path / "truth.npz", plume.scene, plume.densities[:3])
+    assert "holds 3 frames" in refused(capsys, perfect, "--truth", path)
+
+
+def test_views_that_do_not_fit(plume, perfect, side, tmp_path, capsys) -> None:
+    camera, clip = side
+    assert "No such" in refused(capsys, perfect, "--view", tmp_path / "camera.toml", clip)
+    assert "no such" in refused(capsys, perfect, "--view", camera, tmp_path / "clip.mp4")
+    Scene(background=Background(color=(0.0, 0.0, 0.0))).save(tmp_path / "nothing.toml")
+    assert "[camera]" in refused(capsys, perfect, "--view", tmp_path / "nothing.toml", clip)
+    Scene(camera=plume.scene.camera.resized(40, 40)).save(tmp_path / "square.toml")
+    assert "40 x 56" in refused(capsys, perfect, "--view", tmp_path / "square.toml", clip)
+    for number in range(3):
+        write_image(tmp_path / f"short_{number}.exr", render(plume.densities[0], plume.scene))
+    assert "has 3 frames" in refused(capsys, perfect, "--view", camera, tmp_path / "short_#.exr")
+
+
+def test_folders_that_do_not_exist(perfect, truth, tmp_path, capsys) -> None:
+    for option, name in (("--json", "a.json"), ("--picture", "a.png")):
+        sentence = refused(capsys, perfect, "--truth", truth, option, tmp_path / "no" / name)
+        assert "does not exist" in sentence
+    assert ".png" in refused(capsys, perfect, "--truth", truth, "--picture", tmp_path / "a.jpg")

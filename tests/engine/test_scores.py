@@ -1,0 +1,181 @@
+"""Figures gathered over frames: what is perfect, what is wrong in one way only, and other grids."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from smokelift.scores import PictureScore, VolumeScore, eight_bit_values, finite_mean, resampled
+from smokelift.transport import Velocity
+from smokelift.truth import Truth
+
+SHAPE = (16, 16, 24)
+VOXEL = 0.05
+FPS = 20.0
+BLACK = np.zeros(3, np.float32)
+
+
+HEIGHTS = (7, 8, 10, 13)
+"""Of the ball in each frame (voxels)."""
+
+
+def ball(height: int) -> np.ndarray:
+    """A Gaussian ball."""
+    x, y, z = np.indices(SHAPE, np.float32)
+    return np.exp(-((x - 7.5) ** 2 + (y - 7.5) ** 2 + (z - height) ** 2) / 10).astype(np.float32)
+
+
+@pytest.fixture(scope="module")
+def truth() -> Truth:
+    """Four frames of a ball that rises faster and faster, without an inlet."""
+    upward = [np.stack([face] * 4).astype(np.float16) for face in Velocity.zero(SHAPE, VOXEL).faces]
+    for frame, rise in enumerate(np.diff(HEIGHTS)):
+        upward[2][frame] = rise * VOXEL * FPS
+    return Truth(
+        densities=np.stack([ball(height) for height in HEIGHTS]).astype(np.float16),
+        faces=tuple(upward),
+        inflow_packed=np.zeros((4, int(np.prod(SHAPE)) // 8), np.uint8),
+        voxel_size=VOXEL,
+        fps=FPS,
+        closed=(),
+    )
+
+
+def picture(shift: int = 0, size: tuple[int, int] = (96, 64)) -> np.ndarray:
+    rows, columns = np.indices(size, np.float32)
+    ball = np.exp(-(((rows - 50) / 8) ** 2) - ((columns - 30 - shift) / 6) ** 2)
+    texture = 1 + 0.3 * np.sin(0.9 * rows) * np.cos(0.8 * (columns - shift))
+    return np.repeat((0.5 * ball * texture)[..., None], 3, -1).astype(np.float32)
+
+
+def test_equal_pictures_are_perfect() -> None:
+    score = PictureScore(BLACK)
+    for brightness in (0.8, 1.0, 0.9, 0.7):
+        alone = score.add(brightness * picture(), brightness * picture())
+        assert alone["psnr"] == np.inf
+    figures = score.figures()
+    assert figures["psnr"] is None  # no finite decibels
+    assert figures["ssim"] == pytest.approx(1)
+    assert figures["spectrum_distance"] == pytest.approx(0, abs=1e-9)
+    assert figures["flicker"] == figures["flicker_truth"] > 0.01
+
+
+def test_a_shifted_picture_is_forgiven_by_its_own_figures_only() -> None:
+    score = PictureScore(BLACK)
+    assert score.add(0.97 * picture(9), picture())["shift"] == [0, -9]
+    figures = score.figures()
+    assert figures["psnr"] < 30
+    assert figures["psnr_shifted"] > figures["psnr"] + 12
+    assert figures["spectrum_distance"] < 0.5
+    assert figures["flicker"] is None  # one frame
+
+
+def test_a_blurred_picture_lacks_its_fine_octaves() -> None:
+    plain = picture(size=(96, 64))
+    blurred = sum(np.roll(plain, step, axis) for step in (-3, -1, 1, 3) for axis in (0, 1)) / 8
+    score = PictureScore(BLACK)
+    score.add(blurred, plain)
+    figures = score.figures()
+    assert figures["spectrum_octaves"][-1] < -3
+    assert abs(figures["spectrum_octaves"][0]) < 1
+    assert figures["spectrum_distance"] > 1.5
+
+
+def test_the_background_is_no_smoke() -> None:
+    """What both pictures share does not count as detail, and moving the smoke leaves it in place."""
+    wall = np.random.default_rng(0).random((96, 64, 3)).astype(np.float32) * 0.2
+    score = PictureScore(wall)
+    score.add(wall, wall)
+    assert score.figures()["spectrum_distance"] is None
+
+
+def test_unsteady_light_shows_as_flicker() -> None:
+    score = PictureScore(BLACK)
+    for factor in (1.0, 0.8, 1.0, 0.8):
+        score.add(factor * picture(), picture())
+    figures = score.figures()
+    assert figures["flicker_truth"] == 0
+    assert figures["flicker"] > 0.1
+
+
+def test_the_truth_itself_is_perfect(truth) -> None:
+    score = VolumeScore(truth)
+    for frame in range(4):
+        score.add(frame, truth.density(frame), truth.velocity(max(frame - 1, 0)).centres())
+    figures = score.figures()
+    assert figures["density_error"] == figures["height_mass_error"] == figures["velocity_error"] == 0
+    assert figures["velocity_error_around"] == 0
+    assert figures["mass_ratio"] == pytest.approx(1)
+    assert figures["velocity_cosine"] == pytest.approx(1)
+    assert figures["warp_error"] == figures["warp_error_truth"] < 2e-3  # float16
+    assert figures["divergence"] == figures["divergence_truth"] < 1e-6
+    assert figures["flicker"] == figures["flicker_truth"]
+
+
+def test_each_mistake_shows_where_it_belongs(truth) -> None:
+    """Half the mass; smoke a voxel too deep; a velocity that is half as fast; a step that does not fit."""
+    half, deep, slow = VolumeScore(truth), VolumeScore(truth), VolumeScore(truth)
+    still = np.zeros((*SHAPE, 3), np.float32)
+    for frame in range(4):
+        density, velocity = truth.density(frame), truth.velocity(max(frame - 1, 0)).centres()
+        half.add(frame, 0.5 * density)
+        deep.add(frame, np.roll(density, 1, 1), velocity)
+        slow.add(frame, density, velocity * (0.5 if frame < 3 else 1) if frame != 1 else still)
+    assert half.figures()["mass_ratio"] == pytest.approx(0.5)
+    assert half.figures()["height_mass_error"] == pytest.approx(0.5)
+    assert "velocity_error" not in half.figures()
+    assert deep.figures()["density_error"] > 0.2
+    assert deep.figures()["height_mass_error"] == pytest.approx(0, abs=1e-6)
+    assert deep.figures()["warp_error"] == pytest.approx(deep.figures()["warp_error_truth"], abs=1e-3)
+    assert slow.figures()["velocity_error"] == pytest.approx((1 + 0.5 + 0) / 3)
+    assert slow.figures()["velocity_cosine"] == pytest.approx(2 / 3)
+    assert slow.figures()["warp_error"] > 0.1
+
+
+def test_where_smoke_is_put_in_motion_is_not_scored(truth) -> None:
+    """Nonsense in the inlet's cells, before or after the step, changes no figure of the motion."""
+    inlet = np.zeros(SHAPE, bool)
+    inlet[6:10, 6:10, 6:9] = True
+    fed = replace(truth, inflow_packed=np.stack([np.packbits(inlet)] * 4))
+    right, wrong = VolumeScore(fed), VolumeScore(fed)
+    for frame in range(3):
+        density, velocity = truth.density(frame), truth.velocity(max(frame - 1, 0)).centres()
+        right.add(frame, density, velocity)
+        wrong.add(frame, density, np.where(inlet[..., None], -velocity, velocity))
+    for name in ("velocity_error", "velocity_error_around", "warp_error"):
+        assert wrong.figures()[name] == right.figures()[name]
+
+
+def test_a_velocity_after_a_gap_is_not_scored(truth) -> None:
+    """A velocity belongs to the step from the frame before."""
+    score = VolumeScore(truth)
+    score.add(0, truth.density(0), np.zeros((*SHAPE, 3), np.float32))
+    score.add(2, truth.density(2), np.zeros((*SHAPE, 3), np.float32))
+    assert "velocity_error" not in score.figures()
+
+
+def test_other_resolutions_over_the_same_box(truth) -> None:
+    """Means on a coarser grid, interpolation on a finer one; each axis its own."""
+    density = truth.density(0)
+    fine = density.repeat(2, 0).repeat(2, 1).repeat(2, 2)
+    np.testing.assert_allclose(resampled(fine, SHAPE), density, atol=1e-6)
+    ramp = np.broadcast_to(np.arange(8, dtype=np.float32)[:, None, None, None] + 0.5, (8, 4, 6, 3))
+    found = resampled(np.ascontiguousarray(ramp), (16, 8, 12))
+    assert found.shape == (16, 8, 12, 3)
+    np.testing.assert_allclose(
+        found[1:-1], np.broadcast_to(((np.arange(16) + 0.5) / 2)[1:-1, None, None, None], found[1:-1].shape)
+    )
+    score = VolumeScore(truth)
+    score.add(0, fine)
+    assert score.figures()["density_error"] < 1e-3
+
+
+def test_values_are_those_of_an_8_bit_picture() -> None:
+    np.testing.assert_allclose(eight_bit_values(np.array([-1, 0.2159, 7])) * 255, [0, 128, 255], rtol=1e-6)
+
+
+def test_means_leave_out_what_is_infinite() -> None:
+    assert finite_mean([1.0, np.inf, 3.0]) == 2.0
+    assert finite_mean([np.inf]) is None
