@@ -15,7 +15,7 @@ from smokelift import pictures
 from smokelift.clip import Clip, ClipError
 from smokelift.files import atomic_path
 from smokelift.images import area_average
-from smokelift.render import scene_background
+from smokelift.render import scene_background, scene_renderer
 from smokelift.render.renderer import Image, Volume
 from smokelift.scene import Camera, Scene
 from smokelift.scores import Figures, PictureScore, VolumeScore, resampled
@@ -209,7 +209,7 @@ def _view(name: str, camera: Camera, own: Scene, clip: Clip, first: int, sequenc
 
 
 def _against_view(sequence: Sequence, view: SeenView, tiles: Tiles) -> Figures:
-    renderer = pictures.sequence_renderer(sequence, view.camera, view.background)
+    renderer = scene_renderer(sequence.scene, view.camera, sequence.settings["density"]["scattering"], view.background)
     score = PictureScore(view.background)
     for number in sequence.frames:
         seen, image = view.seen(number), renderer.image(sequence.density(number))
