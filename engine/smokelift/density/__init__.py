@@ -30,8 +30,9 @@ from smokelift.scene import Camera, Domain, Medium, Scene
 __all__ = ["Density", "DensitySettings", "depth_guess", "reconstruct_density"]
 
 
-TRACE = 1e-20
-"""Density below which a voxel is empty."""
+TRACE = 1e-9
+"""Density below which a voxel is empty: nothing can show it, and what a process does with numbers below float's normal
+range (libraries may switch that) does not reach it."""
 
 
 @dataclass(frozen=True)

@@ -280,9 +280,9 @@ def _unexplained(linear: _Linearisation, weight: Array, centre: Faces, noise: fl
     left = linear.offset.copy()
     for g, motion in zip(linear.direction, at_centres(centre), strict=True):
         left += g * motion
-    floor = noise / linear.scale**2 * float(weight[linear.smoke].sum())
-    whole = float(np.vdot(weight * linear.offset, linear.offset)) - floor
-    return max(float(np.vdot(weight * left, left)) - floor, 0.0) / whole if whole > 0 else 1.0
+    floor = noise / linear.scale**2 * float(weight[linear.smoke].sum(dtype=np.float64))
+    whole, rest = (float((weight * r * r).sum(dtype=np.float64)) - floor for r in (linear.offset, left))
+    return max(rest, 0.0) / whole if whole > 0 else 1.0
 
 
 def _solve(

@@ -119,8 +119,9 @@ def _least_squares(columns: list[Array], offset: Array) -> npt.NDArray[np.float6
     normal, right = matrix @ matrix.T, -matrix @ offset
     size = np.sqrt(np.diag(normal)) + 1e-30
     scaled = normal / np.outer(size, size) + RIDGE * np.eye(len(size))
-    found: npt.NDArray[np.float64] = np.linalg.solve(scaled, right / size) / size
-    return found
+    found = np.linalg.solve(scaled, right / size) / size
+    # BLAS adds in an order of its own, which depends on where arrays lie; a run has to be the same to the bit each time
+    return found.astype(np.float32).astype(np.float64)
 
 
 def _pushed(density: Array, push: npt.NDArray[np.float64], closed: list[bool], threads: int) -> Faces:
