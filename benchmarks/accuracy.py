@@ -272,6 +272,18 @@ def _join(row: dict[str, Any], names: list[str], form: str) -> str:
     )
 
 
+def write(out: Path, name: str, rows: list[dict[str, Any]], subjects: list[Subject]) -> None:
+    """The table as Markdown, on one page with the pictures, and every figure as CSV."""
+    columns = dict.fromkeys(column for row in rows for column in row)
+    with (out / f"{name}.csv").open("w", newline="") as file:
+        writer = csv.DictWriter(file, columns)
+        writer.writeheader()
+        writer.writerows(rows)
+    table = markdown(rows + means(rows), list(subjects[0].cameras))
+    page = f"{rows[0]['machine']}, {rows[0]['date']}\n\n{table}\n![Pictures]({name}.png)\n"
+    (out / f"{name}.md").write_text(page)
+
+
 def contact_sheet(subjects: list[Subject], runs: list[str], folder: Callable[[Subject, str], Path], path: Path) -> None:
     """The last scored frame: a row a scene; for every view the truth, the first run and what else is to be shown."""
     shown = [run for run in dict.fromkeys([runs[0], *SHOWN]) if run in runs]
@@ -316,18 +328,12 @@ def main() -> None:
     computer = describe()
     said = {"machine": f"{computer['processor']}, {computer['cores']} cores", "date": date.today().isoformat()}
     rows = []
-    for subject in subjects:
+    for done, subject in enumerate(subjects, 1):  # written after every one: the next may take an hour
         for run in runs:
             rows.append(score(subject, run, folder(subject, run)) | said)
             print(markdown(rows[-1:], list(subject.cameras)).splitlines()[-1], flush=True)
-    columns = dict.fromkeys(column for row in rows for column in row)
-    with (options.out / f"{name}.csv").open("w", newline="") as file:
-        writer = csv.DictWriter(file, columns)
-        writer.writeheader()
-        writer.writerows(rows)
-    text = markdown(rows + means(rows), list(subjects[0].cameras))
-    (options.out / f"{name}.md").write_text(f"{said['machine']}, {said['date']}\n\n{text}\n![Pictures]({name}.png)\n")
-    contact_sheet(subjects, runs, folder, options.out / f"{name}.png")
+        write(options.out, name, rows, subjects[:done])
+        contact_sheet(subjects[:done], runs, folder, options.out / f"{name}.png")
 
 
 if __name__ == "__main__":

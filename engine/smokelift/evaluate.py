@@ -12,6 +12,7 @@ import numpy.typing as npt
 from PIL import Image as Pillow
 
 from smokelift import pictures
+from smokelift.background import open_plates
 from smokelift.clip import Clip, ClipError
 from smokelift.files import atomic_path
 from smokelift.images import area_average
@@ -175,7 +176,10 @@ def _open_views(
     scene = sequence.scene
     assert scene.camera is not None
     views = []
-    if scene.clip is not None:
+    if (plates := open_plates(scene)) is not None:
+        plates.close()
+        notes.append("The input view was left out: what stands behind the smoke there changes.")
+    elif scene.clip is not None:
         try:
             clip = stack.enter_context(Clip.open(scene.clip))
             views.append(_view("input", scene.camera, scene, clip, 0, sequence))
@@ -209,9 +213,13 @@ def _view(name: str, camera: Camera, own: Scene, clip: Clip, first: int, sequenc
 
 
 def _against_view(sequence: Sequence, view: SeenView, tiles: Tiles) -> Figures:
-    renderer = scene_renderer(sequence.scene, view.camera, sequence.settings["density"]["scattering"], view.background)
+    scene, scattering = sequence.scene, sequence.settings["density"]["scattering"]
+    renderer = None
     score = PictureScore(view.background)
     for number in sequence.frames:
+        if renderer is None or view.camera.moves:
+            camera = view.camera.at(view.first + number - 1)
+            renderer = scene_renderer(scene, camera, scattering, view.background)
         seen, image = view.seen(number), renderer.image(sequence.density(number))
         score.add(image, seen)
         if number in tiles:

@@ -16,7 +16,7 @@ from smokelift.cameras import orbit
 from smokelift.cli import main
 from smokelift.images import write_image
 from smokelift.render import render
-from smokelift.scene import Background, Domain, Scene
+from smokelift.scene import Background, ClipSource, Domain, Scene
 from smokelift.sequence import SequenceWriter
 from smokelift.transport import Velocity
 
@@ -202,6 +202,32 @@ def test_a_view_before_a_background_of_its_own(plume, perfect, tmp_path, capsys)
     new = evaluate(capsys, perfect, "--view", tmp_path / "camera.toml", filmed.clip.path)["views"][1]
     assert new["psnr"] is None or new["psnr"] > 50
     assert new["spectrum_distance"] < 0.1
+
+
+def test_cameras_that_move(plume, tmp_path, capsys) -> None:
+    """Each frame is rendered from where its camera was."""
+    still, domain = plume.scene.camera, plume.scene.domain
+    cameras = [orbit(still, domain, 8 * frame) for frame in range(5)]
+    for frame, (camera, density) in enumerate(zip(cameras, plume.densities, strict=True)):
+        write_image(tmp_path / f"seen_{frame}.exr", render(density, plume.scene, camera))
+    moving = replace(still, matrices=tuple(camera.matrix for camera in cameras))
+    scene = replace(plume.scene, camera=moving, clip=ClipSource(tmp_path / "seen_#.exr", fps=24.0))
+    Scene(camera=moving).save(tmp_path / "camera.toml")
+    sequence = write(tmp_path / "out", scene, plume.densities)
+    for view in evaluate(capsys, sequence, "--view", tmp_path / "camera.toml", scene.clip.path)["views"]:
+        assert view["psnr"] is None or view["psnr"] > 50
+
+
+def test_an_input_before_a_changing_background_is_left_out(plume, side, tmp_path, capsys) -> None:
+    for frame in range(5):
+        write_image(tmp_path / f"plate_{frame}.exr", np.zeros((56, 40, 3), np.float32))
+    scene = replace(plume.scene, background=Background(image=tmp_path / "plate_#.exr"))
+    Scene(camera=Scene.load(side[0]).camera, background=plume.scene.background).save(tmp_path / "camera.toml")
+    found = evaluate(
+        capsys, write(tmp_path / "out", scene, plume.densities), "--view", tmp_path / "camera.toml", side[1]
+    )
+    assert [view["name"] for view in found["views"]] == ["camera"]
+    assert "changes" in found["notes"][0]
 
 
 # refusals
