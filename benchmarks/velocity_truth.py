@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-import scipy.fft
+from pipeline import poisson_seconds
 from scipy import ndimage
 
 from smokelift.transport import advect
@@ -85,17 +85,6 @@ def score(truth: Truth, frame: int, found: Velocity, solves: float, step: int = 
         ours / best if step == 1 else np.nan,
         solves,
     )
-
-
-def poisson_seconds(shape: tuple[int, ...]) -> float:
-    """One cosine transform there and back on two threads, the median of eleven."""
-    field = np.random.default_rng(0).standard_normal(shape).astype(np.float32)
-    seconds = []
-    for _ in range(11):
-        start = time.perf_counter()
-        scipy.fft.idctn(scipy.fft.dctn(field, workers=2), workers=2)
-        seconds.append(time.perf_counter() - start)
-    return float(np.median(seconds))
 
 
 def pairs(

@@ -199,7 +199,7 @@ def changing_plate(plates: Clip, clip: Clip, sample_count: int = 32) -> Callable
     def encoded(frame: int) -> Picture:
         return linear_to_srgb(area_average(plates.frame(first + frame), width, height))
 
-    numbers = _spread(clip, sample_count)
+    numbers = clip.spread(sample_count)
     skip = slice(None, None, _NOISE_STEP)
     apart = [(linear_to_srgb(clip.frame(n)) - encoded(n))[skip, skip] for n in numbers]
     sigma = _noise_of(np.stack(apart))
@@ -278,19 +278,13 @@ def _samples(clip: Clip, count: int, step: int = 1) -> npt.NDArray[np.uint16]:
     """
     width, height = clip.size
     most = max(3, step**2 * _STORE_BYTES // (width * height * 6))
-    numbers = _spread(clip, min(count, most))
+    numbers = clip.spread(min(count, most))
     rows, columns = len(range(0, height, step)), len(range(0, width, step))
     samples = np.empty((len(numbers), rows, columns, 3), np.uint16)
     for sample, number in zip(samples, numbers, strict=True):
         encoded = linear_to_srgb(clip.frame(number)[::step, ::step])
         sample[...] = np.clip(encoded * _FIXED_POINT + 0.5, 0, 65535)
     return samples
-
-
-def _spread(clip: Clip, count: int) -> list[int]:
-    """Return so many numbers of frames (or all, if there are fewer), spread evenly over the clip."""
-    numbers = np.unique(np.linspace(0, len(clip) - 1, min(count, len(clip))).round())
-    return [int(number) for number in numbers]
 
 
 def _decoded(samples: npt.NDArray[np.uint16]) -> Picture:

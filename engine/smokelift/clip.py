@@ -170,6 +170,11 @@ class Clip:
     def __iter__(self) -> Iterator[Picture]:
         return (self.frame(n) for n in range(self.frame_count))
 
+    def spread(self, count: int) -> list[int]:
+        """So many numbers of frames (or all, if there are fewer), spread evenly over the clip."""
+        numbers = np.unique(np.linspace(0, len(self) - 1, min(count, len(self))).round())
+        return [int(number) for number in numbers]
+
     def close(self) -> None:
         """Close the file."""
         self._source.close()

@@ -194,7 +194,7 @@ def _smoke_samples(clip: Clip, plate_at: Callable[[int], Plate]) -> _SmokeSample
     columns, rows = max(1, round(width / scale)), max(1, round(height / scale))
     covered = np.zeros((rows, columns), np.bool_)
     colours, behind = [], []
-    for number in np.unique(np.linspace(0, len(clip) - 1, min(SAMPLES, len(clip))).round().astype(int)).tolist():
+    for number in clip.spread(SAMPLES):
         plate = plate_at(number)
         small = Plate(
             area_average(plate.image, columns, rows), area_average(plate.confidence, columns, rows), plate.noise
