@@ -117,6 +117,18 @@ def test_paper_mode_recovers_small_motion():
     assert velocity.figures["divergence"] < 1e-5
 
 
+def test_paper_mode_does_not_know_the_limits_of_the_default():
+    """It stops by its own rule: neither the default's few iterations nor measured noise have a part in it."""
+    before, after, _ = rotation(0.15)
+    noise = np.random.default_rng(2).standard_normal(SHAPE)
+    before = np.maximum(before + 0.1 * noise * (before > 0.01), 0)
+    found = estimate_velocity(before, after, DT, VOXEL, PAPER)
+    assert found.figures["iterations"] > VelocitySettings().iterations
+    blurred = [ndimage.gaussian_filter(a.astype(np.float32), PAPER.blur) for a in (before, after)]
+    alone = estimate_velocity(*blurred, DT, VOXEL, dataclasses.replace(PAPER, blur=0.0))
+    np.testing.assert_array_equal(found.centres(), alone.centres())
+
+
 @pytest.mark.parametrize("settings", [VelocitySettings(), PAPER], ids=["default", "paper"])
 @pytest.mark.parametrize("scale", [0.01, 100])
 def test_scale_of_density_does_not_matter(settings, scale):

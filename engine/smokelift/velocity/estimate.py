@@ -25,7 +25,7 @@ from smokelift.transport import (
     require_same_shape,
 )
 from smokelift.velocity.momentum import Motion, fit_motion
-from smokelift.velocity.noise import without_noise
+from smokelift.velocity.noise import NOISE_WIDTHS, without_noise
 from smokelift.velocity.pyramid import Level, pyramid, refine
 from smokelift.velocity.settings import VelocitySettings
 from smokelift.velocity.sources import source_weight
@@ -96,7 +96,9 @@ def estimate_velocity(
     if inflow is not None:
         require_same_shape("inflow", inflow.shape, shape)
         weight[inflow] = 0
-    first, second, noise = without_noise(first, second, settings.blur, settings.smoke_threshold)
+    paper = settings.method == "paper"
+    wider = () if paper else tuple(width for width in NOISE_WIDTHS if width > settings.blur)
+    first, second, noise = without_noise(first, second, (settings.blur, *wider), settings.smoke_threshold)
     predicted = _zero_faces(shape)
     if prediction is not None:
         require_same_shape("the prediction", prediction.shape, shape)
@@ -104,7 +106,7 @@ def estimate_velocity(
 
     finest = Level(first, second, weight, predicted)
     search = settings.sources and inflow is None
-    found = _paper(finest, settings) if settings.method == "paper" else _default(finest, search, noise, settings)
+    found = _paper(finest, settings) if paper else _default(finest, search, noise, settings)
     if found is None:
         return Velocity.zero((nx, ny, nz), voxel_size)
     (x, y, z), divergence = _core.project(found.u, closed, passes=1, threads=settings.threads)
@@ -176,10 +178,10 @@ def _paper(level: Level, settings: VelocitySettings) -> _Found | None:
 def _default(finest: Level, search: bool, noise: float, settings: VelocitySettings) -> _Found | None:
     """From coarse to fine, or straight on the finest grid where there is a prediction worth its name."""
     closed = closed_flags(settings.closed)
-    guided = _is_worth_it(finest, search, noise, settings)
-    rest = _zero_faces(finest.after.shape)
+    known = _worthwhile(finest, search, noise, settings)
+    guided = known is not None
     if not guided:
-        finest = replace(finest, prediction=rest)
+        finest = replace(finest, prediction=_zero_faces(finest.after.shape))
     levels = [finest] if guided else pyramid(finest, settings.levels)
     share = 1.0 if guided else settings.momentum
     iterations = products = projections = 0
@@ -189,13 +191,16 @@ def _default(finest: Level, search: bool, noise: float, settings: VelocitySettin
         if level is not levels[0]:
             u = refine(u, level.after.shape, closed, settings.threads)
         for warp in range(settings.warps):
-            change = _linearise(level, u, settings)
-            if change is None:
-                return None
-            linear = change
             # before anything is known of the motion all of the change would be a source
             blind = not guided and warp == 0 and level is levels[0]
-            weight = _weight(level, linear, search and not blind)
+            if known is not None:
+                (linear, weight), known = known, None
+            else:
+                change = _linearise(level, u, settings)
+                if change is None:
+                    return None
+                linear = change
+                weight = _weight(level, linear, search and not blind)
             if guided or level is not finest or level is levels[0]:
                 motion = _fit(level, linear, weight, settings, share)
             elif warp == 0:  # twelve projections are too much for the finest grid
@@ -224,14 +229,17 @@ def _default(finest: Level, search: bool, noise: float, settings: VelocitySettin
     return _Found(u, measures, confidence, (1 - weight) * np.maximum(linear.residual, 0))
 
 
-def _is_worth_it(finest: Level, search: bool, noise: float, settings: VelocitySettings) -> bool:
-    """Whether the prediction, as it stands, explains the change well enough to start from it."""
+def _worthwhile(
+    finest: Level, search: bool, noise: float, settings: VelocitySettings
+) -> tuple[_Linearisation, Array] | None:
+    """The change around the prediction and its weight, if the prediction as it stands explains it well enough."""
     if not any(component.any() for component in finest.prediction):
-        return False
+        return None
     linear = _linearise(finest, finest.prediction, settings)
     if linear is None:
-        return False
-    return _unexplained(linear, _weight(finest, linear, search), finest.prediction, noise) < WORTHLESS
+        return None
+    weight = _weight(finest, linear, search)
+    return (linear, weight) if _unexplained(linear, weight, finest.prediction, noise) < WORTHLESS else None
 
 
 def _linearise(level: Level, u: Faces, settings: VelocitySettings) -> _Linearisation | None:
@@ -316,7 +324,7 @@ def _solve(
             theta=settings.theta,
             absolute=settings.absolute_tolerance * math.sqrt(start[0].size),
             relative=settings.relative_tolerance,
-            limit=settings.iterations,
+            limit=settings.primal_dual_iterations,
             inner_tolerance=settings.inner_tolerance,
             inner_limit=settings.inner_iterations,
             threads=settings.threads,

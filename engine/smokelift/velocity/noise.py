@@ -11,9 +11,10 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
+from smokelift import _core
 from smokelift.transport import Array
 
-WIDTHS = (1.0, 1.5, 2.0)
+NOISE_WIDTHS = (1.0, 1.5, 2.0)
 """Standard deviations in voxels to choose from where the usual blur leaves too much."""
 
 LARGEST_SHARE = 0.35
@@ -38,15 +39,17 @@ def noise_level(density: Array, smoke: npt.NDArray[np.bool_]) -> float:
     return float(np.median(np.abs(finest[inside]))) / MAD
 
 
-def without_noise(before: Array, after: Array, blur: float, threshold: float) -> tuple[Array, Array, float]:
+def without_noise(
+    before: Array, after: Array, widths: tuple[float, ...], threshold: float
+) -> tuple[Array, Array, float]:
     """Blur two densities as much as their noise asks for.
 
     Parameters
     ----------
     before, after : (nx, ny, nz) float32
         The densities.
-    blur
-        Standard deviation in voxels that is taken in any case; 0 for none.
+    widths
+        Standard deviations in voxels to choose from, rising; 0 for none. The last is taken where none is enough.
     threshold
         Fraction of the largest density from which a voxel counts as smoke.
 
@@ -59,10 +62,10 @@ def without_noise(before: Array, after: Array, blur: float, threshold: float) ->
     """
     smoke = after > threshold * after.max()
     raw = float(np.hypot(noise_level(before, smoke), noise_level(after, smoke)))
-    for width in (blur, *(w for w in WIDTHS if w > blur)):
+    for width in widths:
         first, second = (ndimage.gaussian_filter(a, width) if width > 0 else a for a in (before, after))
         left = raw * _passed(width)
-        gradient = np.sqrt(sum(np.mean(np.square(g[smoke])) for g in np.gradient(second))) if smoke.any() else 0.0
+        gradient = np.sqrt(sum(np.mean(np.square(g[smoke])) for g in _core.gradient(second))) if smoke.any() else 0.0
         if left <= LARGEST_SHARE * gradient:
             break
     return first, second, left**2

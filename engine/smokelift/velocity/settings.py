@@ -54,13 +54,15 @@ class VelocitySettings:
     tolerance
         Projected CG stops at this fraction of the (preconditioned) gradient at rest.
     iterations
-        Limit for each solve. Ten are as exact against known velocities as a hundred, and no less smooth.
+        Limit for each solve by projected CG. Ten are as exact against known velocities as a hundred.
     sigma, tau, theta
         Primal-dual: dual step, primal step (the paper's gamma) and over-relaxation; sigma * tau <= 1. Ten
         times smaller sigma or larger tau is further from the minimum after the same time.
     absolute_tolerance, relative_tolerance
         Primal-dual: stops when the change is at most sqrt(3) absolute sqrt(voxels) + relative |u|, in voxels
         per frame: two in a hundred from the minimum.
+    primal_dual_iterations
+        Limit of its steps; a few tens are usual, and the paper knows none.
     inner_tolerance, inner_iterations
         Primal-dual: by how much, and in how many steps at most, the conjugate gradients in each proximal
         operator reduce their residual. Less exact costs less and changes nothing.
@@ -91,6 +93,7 @@ class VelocitySettings:
     theta: float = 1.0
     absolute_tolerance: float = 1e-4
     relative_tolerance: float = 1e-3
+    primal_dual_iterations: int = 100
     inner_tolerance: float = 0.3
     inner_iterations: int = 50
     closed: tuple[Side, ...] = ()
