@@ -95,7 +95,8 @@ def estimate_velocity(
     weight = np.ones(shape, np.float32)
     if inflow is not None:
         require_same_shape("inflow", inflow.shape, shape)
-        weight[inflow] = 0
+        # blur and gradients take the change there one voxel further
+        weight[ndimage.binary_dilation(inflow)] = 0
     paper = settings.method == "paper"
     wider = () if paper else tuple(width for width in NOISE_WIDTHS if width > settings.blur)
     first, second, noise = without_noise(first, second, (settings.blur, *wider), settings.smoke_threshold)
