@@ -25,7 +25,7 @@ from smokelift.scene import Domain, Scene
 from smokelift.sequence import SequenceWriter
 from smokelift.settings import Settings
 from smokelift.shot import Shot, prepare_shot
-from smokelift.transport import Velocity, advect
+from smokelift.transport import SIDES, Velocity, advect
 from smokelift.velocity import estimate_velocity, predict_velocity
 
 
@@ -91,7 +91,12 @@ def reconstruct(
     """
     settings = settings or Settings.preset()
     shot = shot or prepare_shot(clip, scene, settings)
-    settings = replace(settings, density=replace(settings.density, scattering=shot.scattering))
+    walls = {*settings.velocity.closed, *shot.scene.closed}
+    settings = replace(
+        settings,
+        density=replace(settings.density, scattering=shot.scattering),
+        velocity=replace(settings.velocity, closed=tuple(side for side in SIDES if side in walls)),
+    )
     if out is None:
         yield from _frames(clip, shot, settings, None)
         return
@@ -117,6 +122,7 @@ def _frames(clip: Clip, shot: Shot, settings: Settings, start: Frame | None) -> 
     assert shot.scene.domain is not None
     domain = shot.scene.domain
     dt = 1.0 / clip.fps
+    inflow = shot.scene.inflow()
     before = start
     for index in range(start.number if start else 0, len(clip)):
         began = time.perf_counter()
@@ -132,7 +138,13 @@ def _frames(clip: Clip, shot: Shot, settings: Settings, start: Frame | None) -> 
         if before is not None:
             prediction = predicted if settings.method == "default" else None
             velocity = estimate_velocity(
-                before.density, density.values, dt, domain.voxel_size, settings.velocity, prediction=prediction
+                before.density,
+                density.values,
+                dt,
+                domain.voxel_size,
+                settings.velocity,
+                inflow=inflow,
+                prediction=prediction,
             )
         done = time.perf_counter()
         figures = {
