@@ -119,7 +119,7 @@ def reconstruct(
 
 def _frames(clip: Clip, shot: Shot, settings: Settings, start: Frame | None) -> Iterator[Frame]:
     """Frames after ``start``; the first is held back until the second gives it a velocity."""
-    assert shot.scene.domain is not None
+    assert shot.scene.camera is not None and shot.scene.domain is not None
     domain = shot.scene.domain
     dt = 1.0 / clip.fps
     inflow = shot.scene.inflow()
@@ -131,7 +131,8 @@ def _frames(clip: Clip, shot: Shot, settings: Settings, start: Frame | None) -> 
         initial = None
         if before is not None and index >= 2:
             predicted = predict_velocity(before.velocity, dt, settings.velocity.closed)
-            initial = advect(before.density, predicted, dt)
+            # pictures correct the mass, but not of what a moving camera does not see
+            initial = advect(before.density, predicted, dt, conserve=shot.scene.camera.moves)
         density = _unseen(domain, initial) if now is None else _corrected(clip.frame(index), now, settings, initial)
         fitted = time.perf_counter()
         velocity = Velocity.zero(domain.resolution, domain.voxel_size)
