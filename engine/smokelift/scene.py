@@ -640,12 +640,13 @@ class Scene:
 
 def _sides(value: Any) -> tuple[Side, ...]:
     """Check the names of walls and put them in order."""
-    if not isinstance(value, list | tuple) or any(name not in SIDES for name in value):
+    given = list(value) if isinstance(value, tuple) else value
+    if not isinstance(given, list) or any(name not in SIDES for name in given):
         known = ", ".join(f'"{side}"' for side in SIDES)
         raise SceneError(
-            f"closed must be a list of sides of the box, of {known}, not {shown(value)}", key="closed", table="domain"
+            f"closed must be a list of sides of the box, of {known}, not {shown(given)}", key="closed", table="domain"
         )
-    return tuple(side for side in SIDES if side in value)
+    return tuple(side for side in SIDES if side in given)
 
 
 def sees(camera: Camera, domain: Domain) -> bool:
