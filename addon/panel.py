@@ -72,6 +72,8 @@ def _draw_shot(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         layout.prop(settings, "box")
         known = box_of(context.scene) is not None
         layout.operator("smokelift.make_box", text="Frame Box" if known else "Make Box", icon="MESH_CUBE")
+        layout.prop(settings, "inlet")
+    layout.prop(settings, "floor")
     layout.prop(settings, "light_mode")
 
 

@@ -39,6 +39,10 @@ def _is_mesh(_settings: "SmokeliftSettings", thing: bpy.types.Object) -> bool:
     return thing.type == "MESH"
 
 
+def _is_empty(_settings: "SmokeliftSettings", thing: bpy.types.Object) -> bool:
+    return thing.type == "EMPTY"
+
+
 class SmokeliftSettings(bpy.types.PropertyGroup):
     """The shot of one scene."""
 
@@ -88,6 +92,21 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
         type=bpy.types.Object,
         poll=_is_mesh,
         update=_box_chosen,
+    )
+    inlet: PointerProperty(
+        name="Inlet",
+        description=(
+            "Empty where the smoke comes from, as large as the place where it enters. Without one such places are "
+            "looked for; with one they are not"
+        ),
+        type=bpy.types.Object,
+        poll=_is_empty,
+        update=_changed,
+    )
+    floor: BoolProperty(
+        name="Floor",
+        description="The bottom of the box is solid: no air goes through it",
+        update=_changed,
     )
     light_mode: EnumProperty(
         name="Light",

@@ -57,11 +57,16 @@ def shot_tables(scene: bpy.types.Scene, quick: bool = False) -> dict[str, Any]:
             turn = box.matrix_world.to_quaternion().to_matrix()
             tables["domain"] = domain_table(box, turn, settings)
             tables["camera"] = _filmed_by(scene, turn, box_corners(box), quick)
+            inlet = _of(scene, settings.inlet)
+            if inlet is not None:
+                tables["inlet"] = [inlet_table(inlet.evaluated_get(depsgraph), turn, tables["domain"])]
         if settings.use_medium:
             tables["medium"] = {key: getattr(settings, key) for key in ("extinction", "albedo", "anisotropy")}
         if settings.light_mode == "SCENE":
             tables["lights"] = light_tables(scene, depsgraph, turn)
             _check_outside(tables)
+        if settings.floor:
+            tables.setdefault("domain", {})["closed"] = ["z-"]
     if settings.plate_mode == "FILE":
         plate = _existing(settings.plate, "clean plate")
         if "matrices" in tables.get("camera", {}):
@@ -275,9 +280,13 @@ def _sees(scene: bpy.types.Scene, camera: bpy.types.Object, corners: list[Vector
 
 
 def box_of(scene: bpy.types.Scene) -> bpy.types.Object | None:
-    """The box that holds the smoke; a deleted one, which the setting keeps in the file, does not count."""
-    box = scene.smokelift.box
-    return box if box is not None and box.name in scene.objects else None
+    """The box that holds the smoke."""
+    return _of(scene, scene.smokelift.box)
+
+
+def _of(scene: bpy.types.Scene, thing: bpy.types.Object | None) -> bpy.types.Object | None:
+    """An object of the scene; a deleted one, which a setting keeps in the file, does not count."""
+    return thing if thing is not None and thing.name in scene.objects else None
 
 
 def box_corners(box: bpy.types.Object) -> list[Vector]:
@@ -304,6 +313,18 @@ def domain_table(box: bpy.types.Object, turn: Matrix, settings: bpy.types.Proper
         "max": [s + length for s, length in zip(start, size, strict=True)],
         "resolution": counts,
     }
+
+
+def inlet_table(inlet: bpy.types.Object, turn: Matrix, domain: dict[str, Any]) -> dict[str, Any]:
+    """The ball around an Empty that is as large as the Empty is drawn."""
+    centre = turn.inverted() @ inlet.matrix_world.translation
+    radius = inlet.empty_display_size * max(abs(scale) for scale in inlet.matrix_world.to_scale())
+    if radius <= 0.0:
+        raise ShotError("The inlet has no size: scale the Empty up.")
+    sides = zip(domain["min"], centre, domain["max"], strict=True)
+    if (centre - Vector(min(max(place, low), high) for low, place, high in sides)).length > radius:
+        raise ShotError("The inlet is outside the box: move it to where the smoke enters.")
+    return {"centre": list(centre), "radius": radius}
 
 
 # lights

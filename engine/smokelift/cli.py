@@ -33,7 +33,7 @@ from smokelift.scene import ClipSource, Scene
 from smokelift.scene_file import scene_to_dict
 from smokelift.sequence import Sequence
 from smokelift.settings import METHODS, QUALITIES, Settings
-from smokelift.shot import prepare_shot
+from smokelift.shot import boundaries, prepare_shot
 from smokelift.vdb import VdbUnavailable
 
 DONE, BAD_INPUT, NO_DEVICE, CANCELLED = 0, 2, 3, 130
@@ -115,7 +115,7 @@ def _inspect(options: argparse.Namespace, say: Reporter) -> None:
         frames = len(clip)
     domain = shot.scene.domain
     assert domain is not None
-    for note in shot.notes:
+    for note in (*shot.notes, *boundaries(shot.scene, settings)):
         say.note(note)
     cost = forecast(domain, frames, settings.quality)
     voxels = " x ".join(map(str, domain.resolution))

@@ -25,7 +25,7 @@ from smokelift.scene import Domain, Scene
 from smokelift.sequence import SequenceWriter
 from smokelift.settings import Settings
 from smokelift.shot import Shot, prepare_shot
-from smokelift.transport import Velocity, advect
+from smokelift.transport import SIDES, Velocity, advect
 from smokelift.velocity import estimate_velocity, predict_velocity
 
 
@@ -91,7 +91,12 @@ def reconstruct(
     """
     settings = settings or Settings.preset()
     shot = shot or prepare_shot(clip, scene, settings)
-    settings = replace(settings, density=replace(settings.density, scattering=shot.scattering))
+    walls = {*settings.velocity.closed, *shot.scene.closed}
+    settings = replace(
+        settings,
+        density=replace(settings.density, scattering=shot.scattering),
+        velocity=replace(settings.velocity, closed=tuple(side for side in SIDES if side in walls)),
+    )
     if out is None:
         yield from _frames(clip, shot, settings, None)
         return
@@ -114,9 +119,10 @@ def reconstruct(
 
 def _frames(clip: Clip, shot: Shot, settings: Settings, start: Frame | None) -> Iterator[Frame]:
     """Frames after ``start``; the first is held back until the second gives it a velocity."""
-    assert shot.scene.domain is not None
+    assert shot.scene.camera is not None and shot.scene.domain is not None
     domain = shot.scene.domain
     dt = 1.0 / clip.fps
+    inflow = shot.scene.inflow()
     before = start
     for index in range(start.number if start else 0, len(clip)):
         began = time.perf_counter()
@@ -125,14 +131,21 @@ def _frames(clip: Clip, shot: Shot, settings: Settings, start: Frame | None) -> 
         initial = None
         if before is not None and index >= 2:
             predicted = predict_velocity(before.velocity, dt, settings.velocity.closed)
-            initial = advect(before.density, predicted, dt)
+            # pictures correct the mass, but not of what a moving camera does not see
+            initial = advect(before.density, predicted, dt, conserve=shot.scene.camera.moves)
         density = _unseen(domain, initial) if now is None else _corrected(clip.frame(index), now, settings, initial)
         fitted = time.perf_counter()
         velocity = Velocity.zero(domain.resolution, domain.voxel_size)
         if before is not None:
             prediction = predicted if settings.method == "default" else None
             velocity = estimate_velocity(
-                before.density, density.values, dt, domain.voxel_size, settings.velocity, prediction=prediction
+                before.density,
+                density.values,
+                dt,
+                domain.voxel_size,
+                settings.velocity,
+                inflow=inflow,
+                prediction=prediction,
             )
         done = time.perf_counter()
         figures = {

@@ -17,6 +17,9 @@ from pathlib import Path
 from typing import Any, Literal, cast
 
 import numpy as np
+import numpy.typing as npt
+
+from smokelift.transport import SIDES, Side
 
 Vector = tuple[float, float, float]
 Matrix = tuple[tuple[float, float, float, float], ...]
@@ -343,6 +346,43 @@ class Domain:
 
 
 @dataclass(frozen=True)
+class Inlet:
+    """A place where smoke enters: a ball.
+
+    Attributes
+    ----------
+    centre
+        In metres.
+    radius
+        In metres, above 0.
+    """
+
+    centre: Vector
+    radius: float
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        expected = "a number of metres above 0"
+        radius = number(self.radius, "radius", expected)
+        if radius <= 0.0:
+            raise SceneError(f"radius must be {expected}, not {shown(radius)}", key="radius")
+        _set(self, centre=vector(self.centre, "centre"), radius=radius)
+
+    def reaches(self, domain: Domain) -> bool:
+        """Return whether any of it lies in a box."""
+        nearest = np.clip(self.centre, domain.min, domain.max)
+        return math.dist(self.centre, nearest) <= self.radius
+
+    def voxels(self, domain: Domain) -> npt.NDArray[np.bool_]:
+        """Return where it is, shape (nx, ny, nz): voxels whose centres lie in it, or the nearest if none does."""
+        places = zip(domain.min, self.centre, domain.resolution, strict=True)
+        x, y, z = np.ix_(*(low + (np.arange(n) + 0.5) * domain.voxel_size - centre for low, centre, n in places))
+        squares = x**2 + y**2 + z**2
+        inside: npt.NDArray[np.bool_] = squares <= max(self.radius**2, squares.min())
+        return inside
+
+
+@dataclass(frozen=True)
 class Medium:
     """Optical properties of the smoke.
 
@@ -507,10 +547,19 @@ class View:
 class Scene:
     """One shot. Whatever is None (or, for lights, empty) is estimated or defaulted before a run, and said.
 
+    Attributes
+    ----------
+    closed
+        Sides of the domain that are walls, given or estimated: smoke and air go freely through the others. A floor is
+        ``("z-",)``.
+    inlets
+        All the places where smoke enters. Where none is marked they are looked for.
+
     Raises
     ------
     SceneError
-        If a camera can see the domain in no frame, or a point light stands inside it.
+        If a camera can see the domain in no frame, a point light stands inside it, an inlet lies outside, or a side
+        is unknown.
     """
 
     clip: ClipSource | None = None
@@ -520,12 +569,23 @@ class Scene:
     lights: tuple[Light, ...] = ()
     background: Background | None = None
     views: tuple[View, ...] = field(default=())
+    closed: tuple[Side, ...] = ()
+    inlets: tuple[Inlet, ...] = ()
 
     def __post_init__(self) -> None:
         """Check what no table can check alone."""
-        _set(self, lights=tuple(self.lights), views=tuple(self.views))
+        _set(self, lights=tuple(self.lights), views=tuple(self.views), inlets=tuple(self.inlets))
+        _set(self, closed=_sides(self.closed))
         if self.domain is None:
             return
+        for index, inlet in enumerate(self.inlets):
+            if not inlet.reaches(self.domain):
+                raise SceneError(
+                    f"is outside the domain: nothing within {inlet.radius:g} m of centre {shown(list(inlet.centre))} "
+                    "is in the box; move it in",
+                    key="centre",
+                    table=f"inlet.{index}",
+                )
         for index, light in enumerate(self.lights):
             if isinstance(light, PointLight) and self.domain.contains(light.position):
                 raise SceneError(
@@ -543,6 +603,15 @@ class Scene:
             frames = range(len(camera.matrices) or 1)
             if not any(sees(camera.at(frame), self.domain) for frame in frames):
                 raise SceneError("does not see the domain: no part of the box is in its picture", table=table)
+
+    def inflow(self) -> npt.NDArray[np.bool_] | None:
+        """Return the voxels of the domain where smoke enters, shape (nx, ny, nz); None if no inlet is marked."""
+        if self.domain is None or not self.inlets:
+            return None
+        inflow = np.zeros(self.domain.shape, np.bool_)
+        for inlet in self.inlets:
+            inflow |= inlet.voxels(self.domain)
+        return inflow
 
     @classmethod
     def load(cls, path: str | Path) -> Scene:
@@ -567,6 +636,17 @@ class Scene:
         from smokelift.scene_file import save_scene
 
         save_scene(self, Path(path))
+
+
+def _sides(value: Any) -> tuple[Side, ...]:
+    """Check the names of walls and put them in order."""
+    given = list(value) if isinstance(value, tuple) else value
+    if not isinstance(given, list) or any(name not in SIDES for name in given):
+        known = ", ".join(f'"{side}"' for side in SIDES)
+        raise SceneError(
+            f"closed must be a list of sides of the box, of {known}, not {shown(given)}", key="closed", table="domain"
+        )
+    return tuple(side for side in SIDES if side in given)
 
 
 def sees(camera: Camera, domain: Domain) -> bool:

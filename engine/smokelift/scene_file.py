@@ -23,6 +23,7 @@ from smokelift.scene import (
     DirectionalLight,
     Domain,
     EnvironmentLight,
+    Inlet,
     Light,
     Medium,
     PointLight,
@@ -104,13 +105,10 @@ def scene_to_dict(scene: Scene, base: Path | None = None) -> dict[str, Any]:
         data["clip"] = _clip_to_dict(scene.clip, base)
     if scene.camera is not None:
         data["camera"] = _camera_to_dict(scene.camera)
-    if scene.domain is not None:
-        domain = scene.domain
-        data["domain"] = {
-            "min": list(domain.min),
-            "max": list(domain.max),
-            "resolution": list(domain.resolution),
-        }
+    if scene.domain is not None or scene.closed:
+        data["domain"] = _domain_to_dict(scene)
+    if scene.inlets:
+        data["inlet"] = [{"centre": list(inlet.centre), "radius": inlet.radius} for inlet in scene.inlets]
     if scene.medium is not None:
         medium = scene.medium
         data["medium"] = {
@@ -132,6 +130,14 @@ def scene_to_dict(scene: Scene, base: Path | None = None) -> dict[str, Any]:
             {"camera": _camera_to_dict(view.camera), "clip": _clip_to_dict(view.clip, base)} for view in scene.views
         ]
     return data
+
+
+def _domain_to_dict(scene: Scene) -> dict[str, Any]:
+    domain = scene.domain
+    box: dict[str, Any] = {}
+    if domain is not None:
+        box = {"min": list(domain.min), "max": list(domain.max), "resolution": list(domain.resolution)}
+    return {**box, "closed": list(scene.closed)} if scene.closed else box
 
 
 def _written(path: Path, base: Path | None) -> str:
@@ -200,6 +206,7 @@ class _Reader:
             "clip": self._table(self._clip),
             "camera": self._table(self._camera),
             "domain": self._table(self._domain),
+            "inlet": self._tables(self._inlet),
             "medium": self._table(self._medium),
             "lights": self._tables(self._light),
             "background": self._table(self._background),
@@ -207,6 +214,10 @@ class _Reader:
         }
         self._known((), data, tuple(readers))
         parts = {name: readers[name]((name,), value) for name, value in data.items()}
+        if "domain" in parts:
+            parts["domain"], parts["closed"] = parts["domain"]
+        if "inlet" in parts:
+            parts["inlets"] = parts.pop("inlet")
         try:
             return Scene(**parts)
         except SceneError as error:
@@ -270,11 +281,22 @@ class _Reader:
         self._needed(data, "path")
         return ClipSource(**self._file(data, "path"))
 
-    def _domain(self, place: Place, data: Table) -> Domain:
+    def _domain(self, place: Place, data: Table) -> tuple[Domain | None, Any]:
+        """Read the box and its walls. Walls alone are those of the box that will be found."""
         keys = ("min", "max", "resolution")
+        self._known(place, data, (*keys, "closed"))
+        box = {key: value for key, value in data.items() if key != "closed"}
+        closed = data.get("closed", ())
+        if not box and "closed" in data:
+            return None, closed
+        self._needed(data, *keys)
+        return Domain(**box), closed
+
+    def _inlet(self, place: Place, data: Table) -> Inlet:
+        keys = ("centre", "radius")
         self._known(place, data, keys)
         self._needed(data, *keys)
-        return Domain(**data)
+        return Inlet(**data)
 
     def _medium(self, place: Place, data: Table) -> Medium:
         self._known(place, data, ("extinction", "albedo", "anisotropy"))

@@ -154,6 +154,24 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
     return Shot(complete, working, _small(plate, working), scattering, estimated, tuple(notes), changing)
 
 
+def boundaries(scene: Scene, settings: Settings) -> tuple[str, ...]:
+    """How smoke gets in and out of the box of a complete scene, a sentence each."""
+    inflow = scene.inflow()
+    if inflow is None:
+        search = settings.velocity.method == "default" and settings.velocity.sources
+        entry = f"No inlet marked: {'where smoke enters is found from the densities' if search else 'none is assumed'}."
+    else:
+        places, voxels = (
+            f"{n} {what}{'s' * (n > 1)}"
+            for n, what in ((len(scene.inlets), "marked inlet"), (int(inflow.sum()), "voxel"))
+        )
+        entry = f"Smoke enters at {places} ({voxels}); others are not looked for."
+    if not scene.closed:
+        return entry, "All sides of the box are open."
+    walls = ", ".join(scene.closed)
+    return entry, f"Closed sides of the box: {walls}; the others are open."
+
+
 def _working(camera: Camera, domain: Domain) -> tuple[WorkingPicture, int]:
     """The small picture of the first frame that shows the domain, and that frame."""
     for frame in range(len(camera.matrices)):
@@ -244,10 +262,14 @@ def _geometry(
             )
         camera = scene.camera.resized(*clip.size)
         if scene.domain is None:
-            raise ValueError("The scene gives a camera but no [domain]; give the box that holds the smoke.")
+            raise ValueError("The scene gives a camera but no box in [domain]; give the one that holds the smoke.")
         return camera, _with_resolution(scene.domain, settings.resolution)
     if scene.domain is not None:
         raise ValueError("The scene gives a [domain] but no [camera]; give the camera that filmed it.")
+    if scene.inlets:
+        raise ValueError(
+            "The scene marks an [[inlet]] but gives no [camera] and [domain]; give both to say where it is."
+        )
     camera, domain = _uncalibrated(clip, samples, settings)
     notes.append(
         "Camera not given: a level 50 mm lens on 36 mm film, the picture taken to be "

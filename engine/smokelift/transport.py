@@ -101,6 +101,7 @@ def advect(
     dt: float,
     *,
     scheme: Literal["maccormack", "semi-lagrangian"] = "maccormack",
+    conserve: bool = False,
 ) -> Carried:
     """Carry a density or a velocity along for one time step.
 
@@ -116,6 +117,12 @@ def advect(
     scheme
         ``"semi-lagrangian"`` is smooth and loses detail; ``"maccormack"`` (Selle et al. 2008) corrects the
         error of interpolation and keeps it. Both stay within the values around the point of origin.
+    conserve
+        For a density: restore the mass, which a flow without divergence keeps. On baked scenes MacCormack's steps gain
+        0.6 % each, 2 to 50 % in sixteen; semi-Lagrangian ones lose 0.5 %, 2 to 14 %. What leaves through the sides
+        is gone, nothing comes in. The repair is where interpolation is in doubt: where the two schemes differ, each
+        voxel by no more than they do there; what is left then is shared by all smoke in proportion. It makes
+        nothing negative and no smoke where there is none, and is no further from the truth (docs/measurements.md).
 
     Returns
     -------
@@ -126,7 +133,17 @@ def advect(
     Raises
     ------
     ValueError
-        If the shapes differ, a value is not finite, `dt` is not positive or the scheme is unknown.
+        If the shapes differ, a value is not finite, `dt` is not positive, the scheme is unknown, or mass is to be
+        kept of what has none: a velocity, or negative values.
+
+    Notes
+    -----
+    The way back is one straight step, whatever its length. For an estimated velocity that is exact, since it is
+    the displacement at arrival. In a physical one the path bends: in a swirl as wide as a box of 48 voxels the step
+    misses the point of origin by 0.05 voxels at a voxel a step, by 0.4 at three and by 4.6 at ten. Yet on baked
+    scenes of two to six voxels a frame neither a midpoint step nor two half steps paid: they predict the next
+    velocity to 0.057 both, one step to 0.048, and the density carried by that to 0.052 both, one step to 0.048
+    (benchmarks/transport_truth.py). Those scenes were made with straight steps themselves.
     """
     require_positive("dt", dt)
     if scheme not in ("maccormack", "semi-lagrangian"):
@@ -134,13 +151,42 @@ def advect(
     displacement = velocity.displacement(dt)
     corrected = scheme == "maccormack"
     if isinstance(field, Velocity):
+        if conserve:
+            raise ValueError("mass can be kept of a density, not of a velocity.")
         require_same_shape("the field", field.shape, velocity.shape)
         x, y, z = _core.advect_faces(field.faces, displacement, corrected)
         return Velocity((x, y, z), field.voxel_size)
     require_same_shape("the field", field.shape, velocity.shape)
     if not np.isfinite(field).all():
         raise ValueError("the field holds values that are not finite.")
-    return _core.advect_cells(field, displacement, corrected)
+    moved = _core.advect_cells(field, displacement, corrected)
+    if not conserve:
+        return moved
+    if field.min() < 0:
+        raise ValueError("mass can be kept of a density, not of negative values.")
+    other = _core.advect_cells(field, displacement, not corrected)
+    mass = float(np.sum(field * _share_inside(displacement), dtype=np.float64))
+    return _with_mass(moved, np.abs(moved - other), mass)
+
+
+def _with_mass(moved: Array, doubt: Array, mass: float) -> Array:
+    """The density with another mass: changed up to the doubt about it, and in proportion beyond that."""
+    change = np.minimum(doubt, moved)
+    missing, changeable = mass - float(moved.sum(dtype=np.float64)), float(change.sum(dtype=np.float64))
+    if changeable > 0:
+        moved = moved + np.float32(np.clip(missing / changeable, -1, 1)) * change
+    found = float(moved.sum(dtype=np.float64))
+    return moved * np.float32(mass / found) if found > 0 else moved
+
+
+def _share_inside(displacement: Faces) -> Array:
+    """The part of every voxel that is still in the box after a step."""
+    share = np.ones((), np.float32)
+    for axis, along in enumerate(at_centres(displacement)):
+        count = along.shape[axis]
+        low = along + np.arange(count, dtype=np.float32).reshape([-1 if d == axis else 1 for d in range(3)])
+        share = share * np.clip(np.minimum(low + 1, count - low), 0, 1)
+    return share
 
 
 def project(velocity: Velocity, closed: Iterable[Side] = ()) -> Velocity:

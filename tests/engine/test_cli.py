@@ -26,7 +26,7 @@ from smokelift.cli import main
 from smokelift.clip import Clip
 from smokelift.images import read_image
 from smokelift.render import device, render
-from smokelift.scene import Camera, Scene
+from smokelift.scene import Camera, Inlet, Scene
 from smokelift.sequence import Sequence
 from smokelift.vdb import VdbUnavailable, vdb_module
 
@@ -167,6 +167,28 @@ def test_a_clip_alone_is_enough(plume, tmp_path, capsys) -> None:
     sequence = Sequence.open(out)
     assert sequence.frames == (1, 2, 3)
     assert sequence.scene.domain.resolution == (16, 16, 24)
+
+
+def test_inspect_says_how_smoke_gets_in_and_out(plume, tmp_path, capsys) -> None:
+    """Marked inlets and closed sides, and the scene that would be run."""
+    scene = replace(plume.scene, closed=("z-",), inlets=(Inlet((0, 0, 0.2), 0.1),))
+    scene.save(tmp_path / "scene.toml")
+    assert command("inspect", tmp_path / "scene.toml", "--progress", "json", *QUICK) == 0
+    *notes, done = events(capsys.readouterr().out)
+    said = " ".join(event["text"] for event in notes)
+    assert "Smoke enters at 1 marked inlet" in said
+    assert "Closed sides of the box: z-;" in said
+    assert done["scene"]["domain"]["closed"] == ["z-"]
+    assert done["scene"]["inlet"] == [{"centre": [0.0, 0.0, 0.2], "radius": 0.1}]
+
+
+def test_an_inlet_outside_the_box(plume, tmp_path, capsys) -> None:
+    """One sentence."""
+    path = tmp_path / "scene.toml"
+    plume.scene.save(path)
+    path.write_text(path.read_text() + "\n[[inlet]]\ncentre = [9, 0, 0]\nradius = 1\n")
+    assert command("inspect", path, *QUICK) == 2
+    assert "[[inlet]] is outside the domain" in capsys.readouterr().err
 
 
 def test_no_smoke_at_all_is_said(plume, tmp_path, capsys) -> None:

@@ -18,6 +18,7 @@ from smokelift.scene import (
     DirectionalLight,
     Domain,
     EnvironmentLight,
+    Inlet,
     Medium,
     PointLight,
     Scene,
@@ -26,6 +27,7 @@ from smokelift.scene import (
     look_at_matrix,
 )
 from smokelift.scene_file import scene_from_dict, scene_to_dict
+from smokelift.transport import SIDES
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
 FRONT = ((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, -1.0, -7.0), (0.0, 1.0, 0.0, 1.5), (0.0, 0.0, 0.0, 1.0))
@@ -106,6 +108,50 @@ def test_every_table_is_read(tmp_path: Path) -> None:
     assert view.camera.fx == view.camera.fy == 100.0
     assert view.camera.position == (7.0, 0.0, 1.5)
     assert view.clip.path == tmp_path / "side" / "frame_####.exr"
+
+
+def test_walls_and_inlets_are_read(tmp_path: Path) -> None:
+    """In the order of the sides, whatever the file's."""
+    inlets = "[[inlet]]\ncentre = [0, 0, 0]\nradius = 0.5\n[[inlet]]\ncentre = [1, 0, 1]\nradius = 0.25\n"
+    text = GOOD.replace("[domain]", '[domain]\nclosed = ["z-", "x+"]').replace("[medium]", f"{inlets}[medium]")
+    scene = load(tmp_path, text)
+    assert scene.closed == ("x+", "z-")
+    assert scene.inlets == (Inlet((0, 0, 0), 0.5), Inlet((1, 0, 1), 0.25))
+    assert scene.domain == load(tmp_path, GOOD).domain
+
+
+def test_walls_of_a_box_that_is_not_given(tmp_path: Path) -> None:
+    """They wait for the one that will be found."""
+    scene = load(tmp_path, '[domain]\nclosed = ["z-"]\n')
+    assert scene == Scene(closed=("z-",))
+    assert scene.inflow() is None
+    with pytest.raises(SceneError, match="lacks min"):
+        load(tmp_path, "[domain]\n")
+
+
+def test_an_inlet_is_the_voxels_in_its_ball() -> None:
+    domain = Domain((-1, -1, 0), (1, 1, 3), (64, 64, 96))
+    inlet = Inlet((0.1, -0.2, 0), 0.4)
+    found = inlet.voxels(domain)
+    centres = np.stack(np.meshgrid(*(np.arange(n) + 0.5 for n in found.shape), indexing="ij"), -1) / 32 + domain.min
+    np.testing.assert_array_equal(found, np.linalg.norm(centres - inlet.centre, axis=-1) <= 0.4)
+    assert found.sum() / 32**3 == pytest.approx(2 / 3 * math.pi * 0.4**3, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("centre", "voxel"), [((0.01, 0.02, 0.05), (32, 32, 1)), ((-1.005, 0.99, 3), (0, 63, 95))], ids=["in", "beside"]
+)
+def test_a_small_inlet_is_the_nearest_voxel(centre, voxel) -> None:
+    domain = Domain((-1, -1, 0), (1, 1, 3), (64, 64, 96))
+    np.testing.assert_array_equal(np.argwhere(Inlet(centre, 0.006).voxels(domain)), [voxel])
+
+
+def test_inlets_add_up() -> None:
+    domain = Domain((-1, -1, 0), (1, 1, 3), (64, 64, 96))
+    inlets = Inlet((0, 0, 0), 0.2), Inlet((0.5, 0.5, 1), 0.1)
+    inflow = Scene(domain=domain, inlets=inlets).inflow()
+    np.testing.assert_array_equal(inflow, inlets[0].voxels(domain) | inlets[1].voxels(domain))
+    assert Scene(domain=domain).inflow() is None
 
 
 def test_a_file_may_hold_any_one_table(tmp_path: Path) -> None:
@@ -203,6 +249,34 @@ def test_a_file_may_hold_any_one_table(tmp_path: Path) -> None:
         ("[views.clip]\npath", "[views.clap]\npath", 'line 44: [[views]] there is no key "clap" here'),
         ("[-1, -1, 0]\nmax = [1, 1, 3]", "[9, -1, 0]\nmax = [11, 1, 3]", "[camera] does not see the domain"),
         ("[domain]", "domain = 3\n[dom]", "domain"),
+        (
+            "min = [-1, -1, 0]",
+            'closed = ["z-", "floor"]\nmin = [-1, -1, 0]',
+            'line 14: [domain] closed must be a list of sides of the box, of "x-", "x+", "y-", "y+", "z-", "z+", '
+            "not ['z-', 'floor']",
+        ),
+        ("min = [-1, -1, 0]", 'closed = "z-"', "line 13: [domain] lacks min"),
+        (
+            "min = [-1, -1, 0]",
+            'closed = "z-"\nmin = [-1, -1, 0]',
+            "line 14: [domain] closed must be a list of sides of the box",
+        ),
+        (
+            "[medium]",
+            "[[inlet]]\ncentre = [0, 0, 1]\nradius = 0\n[medium]",
+            "line 23: [[inlet]] radius must be a number of metres above 0, not 0",
+        ),
+        ("[medium]", "[[inlet]]\ncentre = [0, 0, 1]\n[medium]", "line 21: [[inlet]] lacks radius"),
+        (
+            "[medium]",
+            "[[inlet]]\ncentre = [0, 0]\nradius = 1\n[medium]",
+            "line 22: [[inlet]] centre must be three numbers",
+        ),
+        (
+            "[medium]",
+            "[[inlet]]\ncentre = [0, 0, 1]\nradius = 1\n[[inlet]]\ncentre = [0, 0, -2]\nradius = 1\n[medium]",
+            "line 25: [[inlet]] is outside the domain: nothing within 1 m of centre [0.0, 0.0, -2.0] is in the box",
+        ),
         ("albedo = 0.5", "albedo = ", "scene.toml: is not valid TOML: "),
     ],
 )  # fmt: skip
@@ -376,11 +450,18 @@ domains = st.builds(
 )
 
 
+walls = st.lists(st.sampled_from(SIDES), max_size=6).map(tuple)
+
+
 @st.composite
 def scenes(draw: st.DrawFn) -> Scene:
     if draw(st.booleans()):  # whatever cameras see and lights hit is refused or not elsewhere
-        return Scene(domain=draw(domains), clip=draw(clips))
+        domain = draw(domains)
+        inlets = draw(st.lists(st.builds(Inlet, st.just(domain.centre), positive), max_size=2))
+        return Scene(domain=domain, clip=draw(clips), closed=draw(walls), inlets=inlets)
     return Scene(
+        closed=draw(walls),
+        inlets=draw(st.lists(st.builds(Inlet, vectors, positive), max_size=2)),
         clip=draw(st.none() | clips),
         camera=draw(st.none() | cameras()),
         medium=draw(

@@ -18,12 +18,13 @@ from smokelift.scene import (
     DirectionalLight,
     Domain,
     EnvironmentLight,
+    Inlet,
     Medium,
     Scene,
     look_at_matrix,
 )
 from smokelift.settings import LONGEST_SIDE, Settings
-from smokelift.shot import Shot, prepare_shot
+from smokelift.shot import Shot, boundaries, prepare_shot
 
 
 def shot_of(scene: Scene, settings: Settings) -> Shot:
@@ -143,8 +144,36 @@ def test_pictures_without_a_rate_are_noted(plume, draft) -> None:
 
 def test_a_camera_needs_a_domain(plume, draft) -> None:
     """A calibrated camera says where the smoke is only together with its box."""
-    with pytest.raises(ValueError, match=r"camera but no \[domain\]"):
+    with pytest.raises(ValueError, match=r"camera but no box in \[domain\]"):
         shot_of(replace(plume.scene, domain=None), draft)
+
+
+def test_walls_stay_with_a_box_that_is_found(passing, draft) -> None:
+    """A floor needs no numbers."""
+    shot = shot_of(replace(bare(passing), closed=("z-",)), draft)
+    assert shot.scene.domain is not None
+    assert shot.scene.closed == ("z-",)
+    assert any("Closed sides of the box: z-" in sentence for sentence in boundaries(shot.scene, draft))
+
+
+def test_a_box_that_is_not_known_has_no_place_for_an_inlet(passing, draft) -> None:
+    """Metres mean nothing before there is a camera."""
+    with pytest.raises(ValueError, match=r"marks an \[\[inlet\]\] but gives no \[camera\] and \[domain\]"):
+        shot_of(replace(bare(passing), inlets=(Inlet((0, 0, 0), 0.1),)), draft)
+
+
+def test_how_smoke_gets_in_and_out_is_said(plume, draft) -> None:
+    """Marked or found, open or closed."""
+    assert boundaries(plume.scene, draft) == (
+        "No inlet marked: where smoke enters is found from the densities.",
+        "All sides of the box are open.",
+    )
+    marked = replace(plume.scene, inlets=(Inlet((0.01, 0.02, 0.21), 0.01),), closed=("x+", "z-"))
+    assert boundaries(marked, draft) == (
+        "Smoke enters at 1 marked inlet (1 voxel); others are not looked for.",
+        "Closed sides of the box: x+, z-; the others are open.",
+    )
+    assert boundaries(plume.scene, Settings.preset(method="paper"))[0] == "No inlet marked: none is assumed."
 
 
 def test_a_domain_needs_a_camera(plume, draft) -> None:

@@ -63,8 +63,8 @@ def estimate_velocity(
     settings
         See `VelocitySettings`.
     inflow
-        True in voxels where smoke enters, shape (nx, ny, nz): changes there are not taken for motion. Without it,
-        sources are looked for.
+        True in voxels where smoke enters, shape (nx, ny, nz): changes there are not taken for motion, and others
+        are not looked for, so it has to hold all of them. Without it, sources are looked for.
     prediction
         What the velocity should be near, such as `predict_velocity` of the frame before. How near is decided by how
         much of the change it explains; one that explains less than half is not used.

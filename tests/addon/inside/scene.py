@@ -248,6 +248,8 @@ def test_one_picture_is_no_clean_plate_of_a_moving_camera(tracked, tmp_path) -> 
         (lambda s: setattr(s.camera, "scale", (1.0, 1.0, -1.0)), "mirrored"),
         (lambda s: setattr(s.smokelift.clip, "filepath", "//moved.mp4"), "moved.mp4 is not there"),
         (lambda s: bpy.data.objects.remove(bpy.data.objects["Sun"]), "no sun"),
+        (lambda s: setattr(add_inlet(s), "location", (0.0, 0.0, -2.0)), "inlet is outside the box"),
+        (lambda s: setattr(add_inlet(s), "scale", (0.0, 0.0, 0.0)), "inlet has no size"),
     ],
 )
 def test_what_is_missing_is_said(shot, spoil, words) -> None:
@@ -356,6 +358,46 @@ def test_a_turned_box_turns_everything_else(shot, tmp_path) -> None:
     np.testing.assert_allclose(pixels, [(p.x * 256, (1 - p.y) * 384) for p in seen], atol=1e-3)
     direction = world.to_3x3() @ Vector(found.lights[0].direction)
     assert direction.dot(Vector((0.57, 0.46, -0.68)).normalized()) == pytest.approx(1.0)
+
+
+def add_inlet(scene: bpy.types.Scene) -> bpy.types.Object:
+    """An Empty in the smoke, drawn 0.2 m large."""
+    inlet = scene.smokelift.inlet = add(scene, "Inlet", None)
+    inlet.location, inlet.empty_display_size = (0.1, -0.2, 0.3), 0.2
+    return inlet
+
+
+def test_a_floor(shot, tmp_path) -> None:
+    """Of the box that is given, and of one that is found, even where the scene's lights are used."""
+    assert engines(shot, tmp_path).closed == ()
+    shot.smokelift.floor = True
+    assert engines(shot, tmp_path).closed == ("z-",)
+    shot.smokelift.camera_mode = "GUESS"
+    add(shot, "Lamp", bpy.data.lights.new("Lamp", "POINT"))
+    assert shot_tables(shot)["domain"] == {"closed": ["z-"]}
+    found = engines(shot, tmp_path)
+    assert (found.domain, found.closed) == (None, ("z-",))
+
+
+def test_an_inlet(shot, tmp_path) -> None:
+    """Where the Empty is and as large as it is drawn, in the axes of the box; no more once it is deleted."""
+    assert engines(shot, tmp_path).inlets == ()
+    inlet = add_inlet(shot)
+    inlet.scale = (1.0, 1.0, 1.5)
+    shot.smokelift.box.rotation_euler = (0.2, -0.1, 0.5)
+    bpy.context.view_layer.update()
+    (found,) = engines(shot, tmp_path).inlets
+    assert found.radius == pytest.approx(0.3)
+    assert list(module.turned_world(shot) @ Vector(found.centre)) == pytest.approx([0.1, -0.2, 0.3], abs=1e-6)
+    bpy.data.objects.remove(inlet)
+    assert engines(shot, tmp_path).inlets == ()
+
+
+def test_an_inlet_needs_a_box_of_its_own(shot) -> None:
+    """In a box that is found it would stand anywhere."""
+    add_inlet(shot)
+    shot.smokelift.camera_mode = "GUESS"
+    assert "inlet" not in shot_tables(shot)
 
 
 # lights
