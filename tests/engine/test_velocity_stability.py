@@ -120,7 +120,7 @@ def test_a_chain_of_frames_settles():
         prediction = predict_velocity(found, DT)
         errors.append(error(found, after, turning(angle)))
         speeds.append(np.linalg.norm(voxels_a_frame(found), axis=-1).max())
-    assert max(errors[3:]) < 0.65 < errors[0]
+    assert max(errors[3:]) < 0.85 * errors[0] < 0.65
     largest = np.linalg.norm(turning(angle)[after > 0.1 * after.max()], axis=-1).max()
     assert all(0.7 < speed / largest < 1.6 for speed in speeds[4:])
 
@@ -189,7 +189,7 @@ def test_smoke_rises_from_its_inlet(speed, told):
     (before, _), (after, inlet) = rising_column(speed, 0), rising_column(speed, 1)
     found = voxels_a_frame(estimate_velocity(before, after, DT, VOXEL, inflow=inlet if told else None))[..., 2]
     for height in (6, 7, 8, 10, 14, 20, 30):
-        assert 0.4 < np.average(found[..., height], weights=after[..., height]) / speed < 1.4
+        assert 0.3 < np.average(found[..., height], weights=after[..., height]) / speed < 1.4
 
 
 # first frame without smoke, empty hull
@@ -205,6 +205,30 @@ def test_smoke_that_is_gone_has_no_velocity(prediction):
 
 
 # dissipation read as motion
+
+
+@pytest.mark.parametrize("before", [0.0, 1e-6, 1e-3])
+def test_smoke_that_was_not_there_is_a_source(before):
+    density = moved((0, 0, 0))[0].astype(np.float32)
+    found = estimate_velocity(before * density, density, DT, VOXEL)
+    assert np.abs(voxels_a_frame(found)).max() == 0
+    np.testing.assert_allclose(found.source, (1 - before) * density / DT, rtol=1e-5)
+    assert not found.confidence.any()
+
+
+@pytest.mark.parametrize("brighter", [1.02, 1.2, 1.5, 10, 0.8])
+def test_flicker_is_no_motion(brighter):
+    density = moved((0, 0, 0))[0]
+    found = estimate_velocity(density, brighter * density, DT, VOXEL)
+    assert np.abs(voxels_a_frame(found)).max() < 0.05
+
+
+@pytest.mark.parametrize("brighter", [1.1, 0.9])
+def test_flicker_leaves_motion_as_it_is(brighter):
+    before, after = moved((0.5, 0, 1.5))
+    still, flickering = (estimate_velocity(before, factor * after, DT, VOXEL) for factor in (1, brighter))
+    difference = voxels_a_frame(flickering) - voxels_a_frame(still)
+    assert np.linalg.norm(difference) < 0.2 * np.linalg.norm(voxels_a_frame(still))
 
 
 @pytest.mark.parametrize("left", [0.5, 0.8, 0.95])
@@ -244,4 +268,4 @@ def test_blocks_that_stand_still_do_not_hold_the_smoke(amount):
     found = estimate_velocity(blocky(before, amount), blocky(after, amount), DT, VOXEL)
     clean = estimate_velocity(before, after, DT, VOXEL)
     assert mean_motion(found, after) == pytest.approx(motion, abs=0.2)
-    assert error(found, after, motion) < error(clean, after, motion) + 0.1
+    assert error(found, after, motion) < error(clean, after, motion) + 0.15

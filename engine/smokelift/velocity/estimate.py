@@ -24,8 +24,9 @@ from smokelift.transport import (
     require_positive,
     require_same_shape,
 )
+from smokelift.velocity.contrast import expanded
 from smokelift.velocity.momentum import Motion, fit_motion
-from smokelift.velocity.noise import NOISE_WIDTHS, without_noise
+from smokelift.velocity.noise import Followed, followed, without_noise
 from smokelift.velocity.pyramid import Level, pyramid, refine
 from smokelift.velocity.settings import VelocitySettings
 from smokelift.velocity.sources import source_weight
@@ -76,8 +77,8 @@ def estimate_velocity(
         of every voxel. `figures` has ``iterations``, ``products`` and ``projections`` of the whole estimate, the last
         ``residual`` of the solver, the ``divergence`` (max |div u| voxel size / max |u|), the ``unexplained`` share of
         the change that the centre of the regulariser leaves, the ``trust`` in the prediction and the ``thinning``, the
-        share of the smoke that dissolves in `dt`. Zero if there is no
-        smoke or no motion.
+        share of the smoke that dissolves in `dt`, below zero where all of it brightens. Zero if there is no smoke, or
+        none in one of the two, or no motion.
 
     Raises
     ------
@@ -98,16 +99,22 @@ def estimate_velocity(
         # blur and gradients take the change there one voxel further
         weight[ndimage.binary_dilation(inflow)] = 0
     paper = settings.method == "paper"
-    wider = () if paper else tuple(width for width in NOISE_WIDTHS if width > settings.blur)
-    first, second, noise = without_noise(first, second, (settings.blur, *wider), settings.smoke_threshold)
+    peaks = sorted(float(density.max()) for density in (first, second))
+    if not paper and peaks[0] <= settings.smoke_threshold * peaks[1]:
+        return _appeared(first, second, dt, voxel_size)
+    if paper:
+        blurred = without_noise(first, second, (settings.blur,), settings.smoke_threshold)
+        pair = Followed(*blurred, compressed=False)
+    else:
+        pair = followed(first, second, settings.blur, settings.smoke_threshold)
     predicted = _zero_faces(shape)
     if prediction is not None:
         require_same_shape("the prediction", prediction.shape, shape)
         predicted = prediction.displacement(dt)
 
-    finest = Level(first, second, weight, predicted)
+    finest = Level(pair.before, pair.after, weight, predicted)
     search = settings.sources and inflow is None
-    found = _paper(finest, settings) if paper else _default(finest, search, noise, settings)
+    found = _paper(finest, settings) if paper else _default(finest, search, pair, settings)
     if found is None:
         return Velocity.zero((nx, ny, nz), voxel_size)
     (x, y, z), divergence = _core.project(found.u, closed, passes=1, threads=settings.threads)
@@ -176,10 +183,10 @@ def _paper(level: Level, settings: VelocitySettings) -> _Found | None:
     return _Found(u, measures, nothing + 1, nothing)
 
 
-def _default(finest: Level, search: bool, noise: float, settings: VelocitySettings) -> _Found | None:
+def _default(finest: Level, search: bool, pair: Followed, settings: VelocitySettings) -> _Found | None:
     """From coarse to fine, or straight on the finest grid where there is a prediction worth its name."""
     closed = closed_flags(settings.closed)
-    known = _worthwhile(finest, search, noise, settings)
+    known = _worthwhile(finest, search, pair.noise, settings)
     guided = known is not None
     if not guided:
         finest = replace(finest, prediction=_zero_faces(finest.after.shape))
@@ -208,13 +215,14 @@ def _default(finest: Level, search: bool, noise: float, settings: VelocitySettin
                 motion = motion.finer()
             centre = motion.velocity(level.prediction, level.after, closed, settings.threads)
             linear = replace(linear, offset=linear.offset + np.float32(motion.thinning) * linear.carried)
-            unexplained = _unexplained(linear, weight, centre, noise / level.coarseness**3)
+            unexplained = _unexplained(linear, weight, centre, pair.noise / level.coarseness**3)
             stiffness = settings.unexplained / max(unexplained, settings.least_unexplained)
             solution, figures = _solve(linear, weight, centre, stiffness, centre if blind else u, settings)
             u = _within_reach(solution, u, settings)
             iterations += figures["iterations"]
             products += figures["products"]
             projections += figures["projections"]
+    density = expanded if pair.compressed else np.positive
     shown = weight * (linear.direction[0] ** 2 + linear.direction[1] ** 2 + linear.direction[2] ** 2)
     shown = ndimage.gaussian_filter(shown, CONFIDENCE_WIDTH, truncate=3.0)
     measures = {
@@ -224,10 +232,12 @@ def _default(finest: Level, search: bool, noise: float, settings: VelocitySettin
         "residual": figures["residual"],
         "unexplained": unexplained,
         "trust": motion.trust,
-        "thinning": motion.thinning,
+        "thinning": 1 - float(density(np.array(1 - motion.thinning, np.float32))),
     }
     confidence = shown / (shown + np.float32(stiffness * settings.smoothness))
-    return _Found(u, measures, confidence, (1 - weight) * np.maximum(linear.residual, 0))
+    carried = linear.carried * np.float32(linear.scale)
+    source = (1 - weight) * np.maximum(density(finest.after) - density(carried), 0)
+    return _Found(u, measures, confidence, source)
 
 
 def _worthwhile(
@@ -344,6 +354,14 @@ def _within_reach(solution: Faces, u: Faces, settings: VelocitySettings) -> Face
     cut = [old + np.clip(a, -REACH, REACH) for old, a in zip(u, increments, strict=True)]
     (x, y, z), _ = _core.project(cut, closed_flags(settings.closed), passes=1, threads=settings.threads)
     return x, y, z
+
+
+def _appeared(before: Array, after: Array, dt: float, voxel_size: float) -> Velocity:
+    """Between smoke and none there is no motion to be seen: what is new has come in."""
+    nx, ny, nz = after.shape
+    unknown = np.zeros_like(after)
+    source = np.maximum(after - before, 0) / np.float32(dt)
+    return replace(Velocity.zero((nx, ny, nz), voxel_size), confidence=unknown, source=source)
 
 
 def _zero_faces(shape: tuple[int, ...]) -> Faces:

@@ -11,8 +11,8 @@ change as the velocity itself, together with the trust t in the prediction:
 
     min sum W (r + d before + g . (t u_p + P(m) - u_k))^2
 
-and the share d >= 0 of the smoke that dissolves, which would else be read as motion. The result is the centre of the
-whole regulariser.
+and the share d of the smoke that dissolves or, below zero, that brightens, as a clip that flickers has it: either would
+else be read as motion. The result is the centre of the whole regulariser.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class Motion:
     trust
         Factor of the prediction, 0 to 1.
     thinning
-        Share of the smoke that dissolves in a frame.
+        Share of the smoke that dissolves in a frame; below zero where all of it gets denser.
     push : (1 or 4, 3)
         Voxels a frame at density 1: constant, and along x, y, z, for each component.
     """
@@ -107,8 +107,6 @@ def fit_motion(
     thinned = root * carried[counted]
     found = _least_squares([*columns, thinned], root * offset[counted])
     thinning = float(found[-1])
-    if thinning < 0:
-        thinning, found = 0.0, _least_squares(columns, root * offset[counted])
     trust = float(np.clip(found[3 * rows], 0, 1)) if predicted else 0.0
     return Motion(trust, thinning, share * found[: 3 * rows].reshape(rows, 3))
 

@@ -7,12 +7,15 @@ has next to nothing there. So the median of that scale's magnitude inside the sm
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
 from smokelift import _core
 from smokelift.transport import Array
+from smokelift.velocity.contrast import compressed
 
 NOISE_WIDTHS = (1.0, 1.5, 2.0)
 """Standard deviations in voxels to choose from where the usual blur leaves too much."""
@@ -23,6 +26,45 @@ a third moves an estimate by less than smoke's own finest scales do."""
 
 MAD = 0.6745
 """Median magnitude of a normal variable in standard deviations."""
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """Two densities as their motion is looked for.
+
+    Attributes
+    ----------
+    before, after : (nx, ny, nz) float32
+        Blurred, and perhaps compressed.
+    noise
+        Variance of the noise that is left in their difference.
+    compressed
+        Whether they are.
+    """
+
+    before: Array
+    after: Array
+    noise: float
+    compressed: bool
+
+
+def followed(before: Array, after: Array, blur: float, threshold: float) -> Followed:
+    """Compress two densities, or, where their noise asks for more blur, give them that instead.
+
+    Parameters
+    ----------
+    before, after : (nx, ny, nz) float32
+        The densities.
+    blur
+        Standard deviation in voxels of the Gaussian that smooths in any case.
+    threshold
+        Fraction of the largest density from which a voxel counts as smoke.
+    """
+    first, second, variance = without_noise(compressed(before), compressed(after), (blur,), threshold)
+    if np.sqrt(variance) <= LARGEST_SHARE * _gradient(second, second > threshold * second.max()):
+        return Followed(first, second, variance, True)
+    wider = tuple(width for width in NOISE_WIDTHS if width > blur)
+    return Followed(*without_noise(before, after, (blur, *wider), threshold), False)
 
 
 def noise_level(density: Array, smoke: npt.NDArray[np.bool_]) -> float:
@@ -65,10 +107,16 @@ def without_noise(
     for width in widths:
         first, second = (ndimage.gaussian_filter(a, width) if width > 0 else a for a in (before, after))
         left = raw * _passed(width)
-        gradient = np.sqrt(sum(np.mean(np.square(g[smoke])) for g in _core.gradient(second))) if smoke.any() else 0.0
-        if left <= LARGEST_SHARE * gradient:
+        if left <= LARGEST_SHARE * _gradient(second, smoke):
             break
     return first, second, left**2
+
+
+def _gradient(density: Array, smoke: npt.NDArray[np.bool_]) -> float:
+    """Root mean square of the gradient in the smoke."""
+    if not smoke.any():
+        return 0.0
+    return float(np.sqrt(sum(np.mean(np.square(g[smoke])) for g in _core.gradient(density))))
 
 
 def _passed(width: float) -> float:

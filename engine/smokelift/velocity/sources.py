@@ -3,9 +3,9 @@
 Where a velocity is wrong, the change that it leaves unexplained has both signs side by side, since smoke is moved and
 not made; where smoke enters, it is positive all over. So a source shows in the mean of the residual over a few voxels,
 beside the mean of its magnitude: their ratio, the coherence, is near one in an inlet and near zero elsewhere. A source
-also has to stand out from what is left unexplained in the rest of the smoke, and from other sources: the front of smoke
-that is faster than the estimate looks like a wide, weak one, and once the change there counts no more, the estimate gets
-slower still.
+also has to stand out from what is left unexplained in the rest of the smoke, and from other sources: the front of
+smoke that is faster than the estimate looks like a wide, weak one, and once the change there counts no more, the
+estimate gets slower still.
 
 An inlet is worth more than any refinement of the solver: read as motion, new smoke turns the flow at the base around.
 """
@@ -29,8 +29,8 @@ STRENGTH = (3.0, 6.0)
 """The same for the mean residual, in medians of its magnitude over the smoke."""
 
 PROMINENCE = (0.1, 0.2)
-"""The same for the mean residual, beside that of the strongest source: inlets of one scene are of one kind. A fast jet's
-error falls from 0.42 to 0.29 by it, as the true inlet is lost among false ones no more."""
+"""The same for the mean residual, beside that of the strongest source: inlets of one scene are of one kind. A fast
+jet's error falls from 0.42 to 0.29 by it, as the true inlet is lost among false ones no more."""
 
 FAINT = np.float32(1e-4)
 """Fraction of the largest density below which a residual means nothing."""
