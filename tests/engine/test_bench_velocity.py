@@ -32,6 +32,8 @@ PLAN = run.Plan(
     others=({"warps": 1}, {"method": "paper"}),
 )
 
+FEW = run.Plan(pairs=1, steps={}, reference=1, iterations=(1,), primal_dual_iterations=(), others=())
+
 
 @pytest.fixture(autouse=True)
 def own_signals() -> Iterator[None]:
@@ -134,8 +136,7 @@ def test_every_figure_in_json_and_in_the_table(quick, tmp_path, capsys):
 
 
 def test_more_iterations_are_nearer_to_the_truth(monkeypatch):
-    plan = replace(PLAN, pairs=2, steps={}, iterations=(1, 20), primal_dual_iterations=(), others=())
-    monkeypatch.setattr(run, "USUAL", plan)
+    monkeypatch.setattr(run, "USUAL", replace(FEW, pairs=2, iterations=(1, 20)))
     monkeypatch.setattr(run, "MOST", 1)
     (row,) = run.run([(32, 32, 48)], [], lambda _: None, lambda _: None)["sizes"]
     errors = [estimate["error"] for estimate in row["estimates"]]
@@ -144,7 +145,8 @@ def test_more_iterations_are_nearer_to_the_truth(monkeypatch):
     assert [len(estimate["errors"]) for estimate in row["estimates"]] == [2, 2]
 
 
-def test_known_scenes_take_the_place_of_the_built_in_one_at_their_size(quick, tmp_path, capsys):
+def test_known_scenes_take_the_place_of_the_built_in_one_at_their_size(quick, monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr(run, "USUAL", FEW)
     truth, path = write_truth(tmp_path / "plume-9" / "truth.npz"), tmp_path / "bench.json"
     assert bench(truth, "--sizes", "16x16x24,16x16x32", "--json", path) == 0
     known, built_in = json.loads(path.read_text())["sizes"]
@@ -161,13 +163,15 @@ def test_results_so_far_stay_when_the_rest_is_cancelled(quick, tmp_path, monkeyp
             raise KeyboardInterrupt
         return built_in_pair(shape, seed)
 
+    monkeypatch.setattr(run, "USUAL", FEW)
     monkeypatch.setattr(run, "built_in_pair", until_the_second_size)
     assert bench("--sizes", "16x16x24,16x16x32", "--json", path) == 130
     assert [row["size"] for row in json.loads(path.read_text())["sizes"]] == [[16, 16, 24]]
 
 
-def test_chart_is_a_picture(quick, tmp_path):
+def test_chart_is_a_picture(quick, monkeypatch, tmp_path):
     pytest.importorskip("matplotlib")
+    monkeypatch.setattr(run, "USUAL", replace(PLAN, reference=5, steps={"primal-dual": (1, 2)}, iterations=(1,)))
     path = tmp_path / "chart.png"
     assert bench("--sizes", "16x16x24", "--chart", path) == 0
     assert path.read_bytes().startswith(b"\x89PNG")
