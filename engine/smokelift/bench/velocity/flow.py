@@ -39,11 +39,14 @@ RADIUS = 0.13
 STIRRED = 4.0
 """Frames that the flow has drawn out the smoke before the first density."""
 
-STEP = 0.5
-"""Frames of a Runge-Kutta step."""
+STEPS_A_FRAME = 2
+"""Runge-Kutta steps of the frame between the densities. Longer ones do for the way before, which both share."""
 
 BALL = 0.22
 """Radius of the smoke before it was stirred."""
+
+REACH = 0.36
+"""Radius beyond which there is no smoke near; densities and motion are zero there."""
 
 STRUCTURE = 0.8
 """Root mean square of the structure, relative to the smoke without it."""
@@ -130,9 +133,8 @@ class Flow:
         v[2] += 1 - squares
         return np.asarray(np.float32(self.speed) * np.exp(-squares) * v)
 
-    def back(self, x: Array, frames: float) -> Array:
+    def back(self, x: Array, frames: float, steps: int) -> Array:
         """X(x, frames)."""
-        steps = round(frames / STEP)
         h = np.float32(-frames / steps)
         for _ in range(steps):
             k1 = self.velocity(x)
@@ -154,15 +156,15 @@ def built_in_pair(shape: tuple[int, int, int], seed: int) -> Pair:
         return np.asarray(ball * np.maximum(varied, 0))
 
     positions = _positions(shape)
+    near = np.flatnonzero(np.sum(positions * positions, 0) < REACH**2)
     before, after = (np.zeros(positions.shape[1], np.float32) for _ in range(2))
     motion = np.zeros_like(positions)
-    for start in range(0, len(before), BATCH):
-        part = slice(start, start + BATCH)
+    for start in range(0, len(near), BATCH):
+        part = near[start : start + BATCH]
         x = positions[:, part]
-        last = flow.back(x, 1.0)
+        last = flow.back(x, 1.0, STEPS_A_FRAME)
         motion[:, part] = (x - last) * np.float32(max(shape))
-        before[part] = smoke(flow.back(x, STIRRED))
-        after[part] = smoke(flow.back(last, STIRRED))
+        before[part], after[part] = (smoke(flow.back(end, STIRRED, round(STIRRED))) for end in (x, last))
     vectors = np.stack([component.reshape(shape) for component in motion], -1)
     return Pair(before.reshape(shape), after.reshape(shape), vectors, np.zeros(shape, bool))
 

@@ -78,7 +78,7 @@ USUAL = Plan(
 
 SHORT = Plan(
     pairs=1,
-    steps={"projected-cg": (2, 5, 12, 25), "primal-dual": (1, 2, 5)},
+    steps={"projected-cg": (2, 5, 12, 25, 40), "primal-dual": (1, 2, 5, 10)},
     reference=100,
     iterations=(2, 5, 10),
     primal_dual_iterations=(2,),
