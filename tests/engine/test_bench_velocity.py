@@ -186,12 +186,13 @@ def test_a_time_is_paired_with_the_solves_around_it(monkeypatch):
     assert solves == pytest.approx((1 / 0.2 + 1 / 0.25) / 2)
 
 
-def test_a_goal_counts_as_reached_when_it_was_measured():
+def test_time_to_a_goal_is_interpolated_between_what_was_measured():
     def step(solver: str, distance: float, solves: float) -> dict[str, object]:
         return {"solver": solver, "distance": distance, "solves": solves}
 
-    steps = [step("projected-cg", 0.2, 3), step("projected-cg", 0.04, 9), step("primal-dual", 0.3, 1)]
-    assert solves_to_reach({"steps": steps}, "projected-cg", 0.1) == 9
+    steps = [step("projected-cg", 0.2, 3), step("projected-cg", 0.05, 12), step("primal-dual", 0.3, 1)]
+    assert solves_to_reach({"steps": steps}, "projected-cg", 0.1) == pytest.approx(6)
+    assert solves_to_reach({"steps": steps}, "projected-cg", 0.25) == 3
     assert solves_to_reach({"steps": steps}, "primal-dual", 0.1) is None
 
 

@@ -54,7 +54,8 @@ def frames_for_pairs(name: str, truth: Truth, count: int) -> list[int]:
         raise ValueError(f"{name}: has {truth.frames} frames; {count} pairs of them need at least {count + 2}.")
     frames = [round(last * (k + 1) / (count + 1)) for k in range(count)]
     for frame in frames:
-        if not (truth.densities[frame].any() and any(component[frame].any() for component in truth.faces)):
+        smoke = truth.densities[frame : frame + 2].any(axis=(1, 2, 3)).all()
+        if not (smoke and any(component[frame].any() for component in truth.faces)):
             raise ValueError(f"{name}: frame {frame} has no smoke that moves; give a scene with smoke all along.")
     return frames
 

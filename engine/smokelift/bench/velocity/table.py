@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -55,8 +56,16 @@ def estimate_name(estimate: Mapping[str, Any]) -> str:
 
 
 def solves_to_reach(row: Mapping[str, Any], solver: str, goal: float) -> float | None:
-    """Fewest Poisson solves after which a solver was measured to be so near; None if it never was."""
-    return min((s["solves"] for s in row["steps"] if s["solver"] == solver and s["distance"] <= goal), default=None)
+    """Poisson solves after which a solver is so near, between the points measured; None if it never was."""
+    before = None
+    for step in (step for step in row["steps"] if step["solver"] == solver):
+        if step["distance"] <= goal:
+            if before is None:
+                return float(step["solves"])
+            share = math.log(before["distance"] / goal) / math.log(before["distance"] / step["distance"])
+            return float(before["solves"] ** (1 - share) * step["solves"] ** share)
+        before = step
+    return None
 
 
 def _linear(row: Mapping[str, Any]) -> Table:
