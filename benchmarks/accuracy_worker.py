@@ -19,9 +19,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pipeline import poisson_seconds
 
 from smokelift import Clip, Scene, Settings, reconstruct, reconstruct_density
+from smokelift.bench.machine import poisson_seconds
 from smokelift.density import DensitySettings
 from smokelift.shot import Shot, prepare_shot
 

@@ -16,23 +16,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import scipy.fft
 
 import smokelift
-
-
-def poisson_seconds(shape: tuple[int, int, int]) -> float:
-    """Median of five forward and inverse cosine transforms of a grid, the division in between included."""
-    field = np.random.default_rng(0).standard_normal(shape).astype(np.float32)
-    waves = [2 - 2 * np.cos(np.pi * np.arange(n) / n) for n in shape]
-    symbol = (waves[0][:, None, None] + waves[1][None, :, None] + waves[2]).astype(np.float32)
-    symbol[0, 0, 0] = 1
-    spent = []
-    for _ in range(5):
-        began = time.perf_counter()
-        scipy.fft.idctn(scipy.fft.dctn(field, workers=2) / symbol, workers=2)
-        spent.append(time.perf_counter() - began)
-    return float(np.median(spent))
+from smokelift.bench.machine import poisson_seconds
 
 
 def main() -> None:

@@ -17,9 +17,9 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-from pipeline import poisson_seconds
 from scipy import ndimage
 
+from smokelift.bench.machine import poisson_seconds
 from smokelift.transport import advect
 from smokelift.truth import Truth
 from smokelift.velocity import Velocity, VelocitySettings, estimate_velocity, predict_velocity

@@ -1,17 +1,27 @@
-"""``smokelift bench renderer``: its options, and what it does with them."""
+"""``smokelift bench renderer | velocity``: their options, and what they do with them."""
 
 from __future__ import annotations
 
 import argparse
 import json
+import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from smokelift.bench.peers import PEERS
 from smokelift.progress import Reporter
 from smokelift.render import device
+from smokelift.truth import Truth
 
 SMALLEST = 8
+"""Voxels a side for the renderer."""
+
+SMALLEST_SHAPE = 16
+"""Voxels a side for velocities, which want a coarser grid too."""
+
+SHAPES = ((64, 64, 96), (128, 128, 192), (256, 256, 288))
+"""The paper's."""
 
 
 def add_parser(commands: Any) -> None:
@@ -22,39 +32,81 @@ def add_parser(commands: Any) -> None:
     renderer.add_argument("--sizes", type=_sizes, default=(32, 64, 128, 256), metavar="N,N", help="voxels a side")
     renderer.add_argument("--peers", type=_peers, default=tuple(PEERS), metavar="A,B", help=f"of {', '.join(PEERS)}")
     renderer.add_argument("--device", choices=("cpu", "gpu"), default="cpu", help="for ours; peers use the processor")
-    renderer.add_argument("--json", type=Path, metavar="FILE", help="write every figure")
-    renderer.add_argument("--chart", type=Path, metavar="FILE", help="draw time against size and against share (.png)")
-    renderer.add_argument("--progress", choices=("text", "json"), default="text", help="a table, or JSON objects")
+    _add_outputs(renderer, "draw time against size and against share (.png)")
+    velocity = subjects.add_parser("velocity", help="error against time, of both solvers and of whole estimates")
+    velocity.add_argument("truths", nargs="*", type=Path, metavar="TRUTH.npz", help="known scenes; one is built in")
+    velocity.add_argument("--sizes", type=_shapes, default=SHAPES, metavar="XxYxZ,...", help="voxels along x, y and z")
+    _add_outputs(velocity, "draw error against time (.png)")
+
+
+def _add_outputs(parser: argparse.ArgumentParser, chart: str) -> None:
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write every figure")
+    parser.add_argument("--chart", type=Path, metavar="FILE", help=chart)
+    parser.add_argument("--progress", choices=("text", "json"), default="text", help="a table, or JSON objects")
 
 
 def bench(options: argparse.Namespace, say: Reporter) -> None:
-    """Run the benchmark; the table is the last thing that is said.
+    """Run a benchmark; the table is the last thing that is said.
 
     Raises
     ------
     ValueError
-        If a file cannot be written, or without matplotlib for a chart: before anything runs.
+        If a file cannot be written or read, or without matplotlib for a chart: before anything runs.
     DeviceError
         If a GPU is asked for and there is none.
     """
-    from smokelift.bench import chart, renderer, table  # the other commands do not want these
+    from smokelift.bench import chart  # the other commands do not want this
 
     for path in (options.json, options.chart):
         if path is not None and not path.absolute().parent.is_dir():
             raise ValueError(f"{path}: the folder {path.parent} does not exist.")
     if options.chart is not None:
         chart.require_matplotlib()
-    if options.device == "gpu" and device.available_gpu() is None:
-        raise device.DeviceError("No GPU that Taichi can use was found (CUDA, Metal or Vulkan); leave --device away.")
 
     def save(results: dict[str, Any]) -> None:
         if options.json is not None:
             options.json.write_text(json.dumps(results, indent=1) + "\n")
 
+    {"renderer": _renderer, "velocity": _velocity}[options.subject](options, say, save)
+
+
+def _renderer(options: argparse.Namespace, say: Reporter, save: Callable[[dict[str, Any]], None]) -> None:
+    from smokelift.bench import chart, renderer, table
+
+    if options.device == "gpu" and device.available_gpu() is None:
+        raise device.DeviceError("No GPU that Taichi can use was found (CUDA, Metal or Vulkan); leave --device away.")
     results = renderer.run(options.sizes, options.peers, options.device, say.note, save)
     if options.chart is not None:
         chart.draw(results, options.chart)
     say.finish(table.text(results), results)
+
+
+def _velocity(options: argparse.Namespace, say: Reporter, save: Callable[[dict[str, Any]], None]) -> None:
+    from smokelift.bench.velocity import chart, run, table
+
+    truths = []
+    for path in options.truths:
+        truth = Truth.load(path)
+        if truth.shape not in options.sizes:
+            size, sizes = run.size_text(truth.shape), ",".join(map(run.size_text, options.sizes))
+            raise ValueError(f"{path}: is of {size} voxels and none of --sizes {sizes}; scenes are not resampled.")
+        truths.append((path.parent.name if path.name == "truth.npz" else path.stem, truth))
+    results = run.run(options.sizes, truths, say.note, save)
+    if options.chart is not None:
+        chart.draw(results, options.chart)
+    say.finish(table.text(results), results)
+
+
+def _shapes(text: str) -> tuple[tuple[int, ...], ...]:
+    try:
+        shapes = {tuple(int(count) for count in part.split("x")) for part in text.split(",")}
+    except ValueError:
+        shapes = {()}
+    if any(len(shape) != 3 or min(shape) < SMALLEST_SHAPE for shape in shapes):
+        raise argparse.ArgumentTypeError(
+            f"{text!r}: expected numbers of voxels XxYxZ,XxYxZ, none below {SMALLEST_SHAPE}"
+        )
+    return tuple(sorted(shapes, key=math.prod))
 
 
 def _sizes(text: str) -> tuple[int, ...]:

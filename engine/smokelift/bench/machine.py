@@ -1,10 +1,11 @@
-"""The machine that a benchmark ran on: what it is, and how fast it copies memory."""
+"""The machine that a benchmark ran on: what it is, and how fast it copies memory and transforms a grid."""
 
 from __future__ import annotations
 
 import os
 import platform
 import time
+from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from importlib import metadata
 from pathlib import Path
@@ -12,11 +13,12 @@ from typing import Any
 
 import numpy as np
 import psutil
+import scipy.fft
 
 import smokelift
 
-LIBRARIES = ("numpy", "taichi", "drjit", "torch", "jax", "mitsuba")
 COPY_THREADS = 2
+POISSON_THREADS = 2
 
 
 def describe() -> dict[str, Any]:
@@ -30,10 +32,10 @@ def describe() -> dict[str, Any]:
     }
 
 
-def versions() -> dict[str, str]:
-    """Return the version of everything that is installed and takes part."""
+def versions(libraries: Iterable[str]) -> dict[str, str]:
+    """Return our version and those of the libraries that are installed."""
     found = {"smokelift": smokelift.__version__}
-    for name in LIBRARIES:
+    for name in libraries:
         try:
             found[name] = metadata.version(name)
         except metadata.PackageNotFoundError:
@@ -52,6 +54,23 @@ def copy_milliseconds(size: int) -> float:
             list(threads.map(np.copyto, target, source))
             spent.append(time.perf_counter() - began)
     return 1e3 * float(np.median(spent[2:]))
+
+
+def poisson_seconds(shape: tuple[int, int, int]) -> float:
+    """Median of five forward and inverse cosine transforms of a grid, float32, the division in between included.
+
+    The unit of whatever is as much work as some Poisson solves of its grid.
+    """
+    field = np.random.default_rng(0).standard_normal(shape, np.float32)
+    waves = [2 - 2 * np.cos(np.pi * np.arange(n) / n) for n in shape]
+    symbol = (waves[0][:, None, None] + waves[1][None, :, None] + waves[2]).astype(np.float32)
+    symbol[0, 0, 0] = 1
+    spent = []
+    for _ in range(5):
+        began = time.perf_counter()
+        scipy.fft.idctn(scipy.fft.dctn(field, workers=POISSON_THREADS) / symbol, workers=POISSON_THREADS)
+        spent.append(time.perf_counter() - began)
+    return float(np.median(spent))
 
 
 def _processor() -> str:

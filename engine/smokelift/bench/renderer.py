@@ -33,6 +33,8 @@ LIGHTS = (1, 16)
 SWEEP_SIZE = 128
 """The largest grid for the runs over shares and lights."""
 
+LIBRARIES = ("numpy", "taichi", "drjit", "torch", "jax", "mitsuba")
+
 Say = Callable[[str], None]
 Array = NDArray[np.floating[Any]]
 
@@ -118,7 +120,7 @@ def run(
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "device": device,
         "machine": machine.describe(),
-        "versions": machine.versions(),
+        "versions": machine.versions(LIBRARIES),
         "floor_ms": {},
         "rows": [],
         "shares": [],
