@@ -3,7 +3,14 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
+#include <new>
+#include <utility>
 #include <vector>
+
+#if defined(__linux__)
+#include <sys/mman.h>
+#endif
 
 // Hot loops are compiled for several instruction sets; the loader picks one. Elsewhere: the compiler's
 // target.
@@ -44,6 +51,9 @@ using Out = Grid<float>;
 using In3 = std::array<In, 3>;
 using Out3 = std::array<Out, 3>;
 
+// The elements with the first index i.
+template <class T> Grid<T> slab(const Grid<T> &a, int i) { return {a.row(i, 0), {1, a.n[1], a.n[2]}}; }
+
 inline In3 read(const Out3 &a) { return {In(a[0]), In(a[1]), In(a[2])}; }
 
 // Shapes of the normal velocities on x, y and z faces of a box of `n` cells.
@@ -57,7 +67,36 @@ inline std::array<Shape, 3> edge_shapes(const Shape &n) {
             Shape{n[0] + 1, n[1] + 1, n[2]}};
 }
 
-// Owns one array.
+// Leaves numbers uninitialised, so that the threads that fill an array are also those that first touch its pages, and
+// asks for large pages, as NumPy does: both count with arrays that live for one call.
+template <class T> struct LazyPages {
+    using value_type = T;
+
+    LazyPages() = default;
+    template <class U> LazyPages(const LazyPages<U> &) {}
+
+    T *allocate(std::size_t n) {
+        void *memory = ::operator new(n * sizeof(T));
+#if defined(__linux__)
+        constexpr std::uintptr_t page = 4096;
+        const auto start = (reinterpret_cast<std::uintptr_t>(memory) + page - 1) / page * page;
+        if (n * sizeof(T) >= std::size_t(1) << 22)
+            madvise(reinterpret_cast<void *>(start), n * sizeof(T) - page, MADV_HUGEPAGE);
+#endif
+        return static_cast<T *>(memory);
+    }
+    void deallocate(T *memory, std::size_t) { ::operator delete(memory); }
+    template <class U> void construct(U *) {}
+    template <class U, class... V> void construct(U *at, V &&...values) {
+        ::new (static_cast<void *>(at)) U(std::forward<V>(values)...);
+    }
+    template <class U> bool operator==(const LazyPages<U> &) const { return true; }
+    template <class U> bool operator!=(const LazyPages<U> &) const { return false; }
+};
+
+using Values = std::vector<float, LazyPages<float>>;
+
+// Owns one array; what it holds at first is not defined.
 class Field {
 public:
     Field() = default;
@@ -66,14 +105,14 @@ public:
     operator In() const { return {data_.data(), n_}; }
     Out out() { return *this; }
     In in() const { return *this; }
-    std::vector<float> &data() { return data_; }
+    Values &data() { return data_; }
 
 private:
-    std::vector<float> data_;
+    Values data_;
     Shape n_{};
 };
 
-// Owns three arrays in one block, so that sums and dot products are one loop.
+// Owns three arrays in one block, so that sums and dot products are one loop; not defined at first either.
 class Field3 {
 public:
     Field3() = default;
@@ -96,7 +135,7 @@ public:
     const std::array<Shape, 3> &shapes() const { return shapes_; }
 
 private:
-    std::vector<float> data_;
+    Values data_;
     std::array<Shape, 3> shapes_{};
 };
 
