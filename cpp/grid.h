@@ -3,7 +3,6 @@
 
 #include <array>
 #include <cstddef>
-#include <cstdint>
 #include <new>
 #include <utility>
 #include <vector>
@@ -67,8 +66,8 @@ inline std::array<Shape, 3> edge_shapes(const Shape &n) {
             Shape{n[0] + 1, n[1] + 1, n[2]}};
 }
 
-// Leaves numbers uninitialised, so that the threads that fill an array are also those that first touch its pages, and
-// asks for large pages, as NumPy does: both count with arrays that live for one call.
+// Leaves numbers uninitialised, so that the threads that fill an array are also those that first touch its pages. A
+// large one has pages of its own, large too where the system has them: given back as soon as it is done with.
 template <class T> struct LazyPages {
     using value_type = T;
 
@@ -76,16 +75,28 @@ template <class T> struct LazyPages {
     template <class U> LazyPages(const LazyPages<U> &) {}
 
     T *allocate(std::size_t n) {
-        void *memory = ::operator new(n * sizeof(T));
 #if defined(__linux__)
-        constexpr std::uintptr_t page = 4096;
-        const auto start = (reinterpret_cast<std::uintptr_t>(memory) + page - 1) / page * page;
-        if (n * sizeof(T) >= std::size_t(1) << 22)
-            madvise(reinterpret_cast<void *>(start), n * sizeof(T) - page, MADV_HUGEPAGE);
+        if (large(n)) {
+            void *memory = mmap(nullptr, n * sizeof(T), PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+            if (memory == MAP_FAILED)
+                throw std::bad_alloc();
+            madvise(memory, n * sizeof(T), MADV_HUGEPAGE);
+            return static_cast<T *>(memory);
+        }
 #endif
-        return static_cast<T *>(memory);
+        return static_cast<T *>(::operator new(n * sizeof(T)));
     }
-    void deallocate(T *memory, std::size_t) { ::operator delete(memory); }
+    void deallocate(T *memory, std::size_t n) {
+#if defined(__linux__)
+        if (large(n)) {
+            munmap(memory, n * sizeof(T));
+            return;
+        }
+#endif
+        (void)n;
+        ::operator delete(memory);
+    }
+    static bool large(std::size_t n) { return n * sizeof(T) >= std::size_t(1) << 22; }
     template <class U> void construct(U *) {}
     template <class U, class... V> void construct(U *at, V &&...values) {
         ::new (static_cast<void *>(at)) U(std::forward<V>(values)...);
