@@ -24,7 +24,7 @@ from smokelift.transport import (
 )
 from smokelift.velocity.momentum import Motion, Prediction, fit_motion
 from smokelift.velocity.noise import NOISE_WIDTHS, without_noise
-from smokelift.velocity.pyramid import Level, pyramid
+from smokelift.velocity.pyramid import Level, pyramid, refine
 from smokelift.velocity.settings import VelocitySettings
 from smokelift.velocity.sources import source_weight
 
@@ -191,8 +191,7 @@ def _default(
     while levels:  # a grid that is done with is not kept
         level = levels.pop(0)
         if not coarsest:
-            x, y, z = _core.refine(u, level.after.shape, closed, threads)
-            u = x, y, z
+            u = refine(u, level.after.shape, closed, threads)
         for warp in range(settings.warps):
             # before anything is known of the motion all of the change would be a source
             blind = not guided and warp == 0 and coarsest

@@ -1,4 +1,4 @@
-"""Densities on grids that are each half as fine as the one before."""
+"""Densities and velocities on grids that are each half as fine as the one before."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from smokelift.transport import Array
+from smokelift import _core
+from smokelift.transport import Array, Faces
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,12 @@ def pyramid(finest: Level, levels: int) -> list[Level]:
         before, after, weight = (_halve(a) for a in (last.before, last.after, last.weight))
         result.insert(0, Level(before, after, weight, 2 * last.coarseness))
     return result
+
+
+def refine(u: Faces, shape: tuple[int, ...], closed: list[bool], threads: int) -> Faces:
+    """A velocity on the next finer grid, in its voxels, without divergence."""
+    x, y, z = _core.refine(u, shape, closed, threads)
+    return x, y, z
 
 
 def _halve(a: Array) -> Array:
