@@ -66,8 +66,9 @@ inline std::array<Shape, 3> edge_shapes(const Shape &n) {
             Shape{n[0] + 1, n[1] + 1, n[2]}};
 }
 
-// Leaves numbers uninitialised, so that the threads that fill an array are also those that first touch its pages. A
-// large one has pages of its own, large too where the system has them: given back as soon as it is done with.
+// Leaves numbers uninitialised, so that the threads that fill an array are also those that first touch its
+// pages. A large one has pages of its own, large too where the system has them: given back as soon as it is
+// done with.
 template <class T> struct LazyPages {
     using value_type = T;
 
@@ -77,7 +78,8 @@ template <class T> struct LazyPages {
     T *allocate(std::size_t n) {
 #if defined(__linux__)
         if (large(n)) {
-            void *memory = mmap(nullptr, n * sizeof(T), PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+            void *memory =
+                mmap(nullptr, n * sizeof(T), PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
             if (memory == MAP_FAILED)
                 throw std::bad_alloc();
             madvise(memory, n * sizeof(T), MADV_HUGEPAGE);

@@ -22,7 +22,8 @@ void multiply(const float *__restrict a, float *__restrict out, std::size_t n) {
 }
 
 SMOKELIFT_CLONES
-void minus_product(const float *__restrict a, const float *__restrict b, float *__restrict out, std::size_t n) {
+void minus_product(const float *__restrict a, const float *__restrict b, float *__restrict out,
+                   std::size_t n) {
     for (std::size_t i = 0; i < n; ++i)
         out[i] = -(a[i] * b[i]);
 }
@@ -39,7 +40,8 @@ void add_scaled(const float *__restrict a, float factor, float *__restrict out, 
         out[i] += factor * a[i];
 }
 
-// The few slabs that a sweep along x has in use. They start as zero, as edges on the sides of the box have to be.
+// The few slabs that a sweep along x has in use. They start as zero, as edges on the sides of the box have to
+// be.
 class Window {
 public:
     explicit Window(const Shape &n) : shapes_(edge_shapes(n)), cells_{1, n[1], n[2]} {
@@ -69,8 +71,8 @@ private:
 
 } // namespace
 
-// A u with its scalar product with u; with an offset, R's part of A u less direction^T (weight offset). Everything
-// between u and the result is done slab by slab while it lies in the cache.
+// A u with its scalar product with u; with an offset, R's part of A u less direction^T (weight offset).
+// Everything between u and the result is done slab by slab while it lies in the cache.
 double LeastSquares::sweep(const In3 &u, In offset, const Out3 &result, Workers &workers) const {
     const int nx = shape_[0], slabs = nx + 1;
     const int size = std::clamp(nx / 8, 4, 16), blocks = (slabs + size - 1) / size;
@@ -90,7 +92,8 @@ double LeastSquares::sweep(const In3 &u, In offset, const Out3 &result, Workers 
                 pointwise = window.irrotational(c);
             }
             smoothness_slab(window.vorticity(std::max(i - 1, low[0]))[c], window.vorticity(i)[c],
-                            window.vorticity(std::min(i + 1, nx - 1))[c], low, shape_, second_order, pointwise, out);
+                            window.vorticity(std::min(i + 1, nx - 1))[c], low, shape_, second_order,
+                            pointwise, out);
         }
     };
     const auto along = [&](Window &window, int i) {
@@ -110,16 +113,17 @@ double LeastSquares::sweep(const In3 &u, In offset, const Out3 &result, Workers 
                 const In a = slab(u[c], i);
                 out[c] = slab(result[c], i);
                 if (first_order > 0) {
-                    smoothness_slab(slab(u[c], std::max(i - 1, 0)), a, slab(u[c], std::min(i + 1, u[c].n[0] - 1)),
-                                    {0, 0, 0}, u[c].n, first_order, {}, out[c]);
+                    smoothness_slab(slab(u[c], std::max(i - 1, 0)), a,
+                                    slab(u[c], std::min(i + 1, u[c].n[0] - 1)), {0, 0, 0}, u[c].n,
+                                    first_order, {}, out[c]);
                     add_scaled(a.data, kinetic, out[c].data, a.slab_size());
                 } else {
                     scaled(a.data, kinetic, out[c].data, a.slab_size());
                 }
             }
         add_curl_transposed_slab(read(window.stress(i)), read(window.stress(i + 1)), out);
-        add_directional_transposed_slab(i > 0 ? In(window.along(i - 1)) : In{}, i < nx ? In(window.along(i)) : In{},
-                                        direction_, out, i);
+        add_directional_transposed_slab(i > 0 ? In(window.along(i - 1)) : In{},
+                                        i < nx ? In(window.along(i)) : In{}, direction_, out, i);
         for (int c = 0; c < 3; ++c)
             if (out[c].data)
                 product += dot(u[c].row(i, 0), out[c].data, out[c].slab_size());

@@ -21,10 +21,10 @@ public:
     // What is passed here has to outlive this object.
     LeastSquares(const In3 &direction, In weight, In irrotational, const Regularisation &regularisation,
                  const Closed &closed)
-        : shape_(weight.n), closed_(closed), regularisation_(regularisation), direction_(direction), weight_(weight),
-          irrotational_(irrotational) {}
+        : shape_(weight.n), closed_(closed), regularisation_(regularisation), direction_(direction),
+          weight_(weight), irrotational_(irrotational) {}
 
-    double apply(const In3 &u, const Out3 &result, Workers &workers) const; // A u; returns u.Au
+    double apply(const In3 &u, const Out3 &result, Workers &workers) const;       // A u; returns u.Au
     Field3 right_hand_side(In offset, const In3 &centre, Workers &workers) const; // b
     Field3 diagonal(Workers &workers) const; // of A, as it is away from the sides
 

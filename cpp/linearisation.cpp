@@ -57,7 +57,8 @@ void scale_by(float factor, float *__restrict out, std::size_t n) {
 // residual = after - carried, carried /= scale, and offset = residual / scale - along.
 SMOKELIFT_CLONES
 void differences(const float *__restrict after, const float *__restrict along, float inverse,
-                 float *__restrict carried, float *__restrict residual, float *__restrict offset, std::size_t n) {
+                 float *__restrict carried, float *__restrict residual, float *__restrict offset,
+                 std::size_t n) {
     for (std::size_t i = 0; i < n; ++i) {
         residual[i] = after[i] - carried[i];
         offset[i] = inverse * residual[i] - along[i];
@@ -121,7 +122,8 @@ std::vector<double> sums(int slabs, std::size_t quantities, Workers &workers, co
 
 } // namespace
 
-double linearise(In before, In after, const In3 &u, float threshold, const Linearisation &result, Workers &workers) {
+double linearise(In before, In after, const In3 &u, float threshold, const Linearisation &result,
+                 Workers &workers) {
     const int nx = after.n[0];
     const std::size_t size = after.slab_size();
     const Out carried = result.carried, density = result.density;
@@ -156,14 +158,15 @@ double linearise(In before, In after, const In3 &u, float threshold, const Linea
     return scale;
 }
 
-std::array<double, 3> evidence(const In3 &direction, In offset, In weight, const unsigned char *smoke, const In3 &u,
-                               Workers &workers) {
+std::array<double, 3> evidence(const In3 &direction, In offset, In weight, const unsigned char *smoke,
+                               const In3 &u, Workers &workers) {
     const std::size_t size = offset.slab_size();
     const auto total = sums(offset.n[0], 3, workers, [&](int i, double *partial) {
         thread_local std::vector<float> along;
         along.resize(size);
         directional_slab(u, direction, {along.data(), {1, offset.n[1], offset.n[2]}}, i);
-        const auto row = evidence_row(along.data(), offset.row(i, 0), weight.row(i, 0), smoke + i * size, size);
+        const auto row =
+            evidence_row(along.data(), offset.row(i, 0), weight.row(i, 0), smoke + i * size, size);
         std::copy(row.begin(), row.end(), partial);
     });
     return {total[0], total[1], total[2]};
@@ -174,8 +177,8 @@ std::vector<double> weighted_products(const std::vector<In> &columns, In weight,
     auto total = sums(weight.n[0], count * count, workers, [&](int i, double *partial) {
         for (std::size_t a = 0; a < count; ++a)
             for (std::size_t b = a; b < count; ++b)
-                partial[a * count + b] = weighted_dot(columns[a].row(i, 0), columns[b].row(i, 0), weight.row(i, 0),
-                                                      weight.slab_size());
+                partial[a * count + b] = weighted_dot(columns[a].row(i, 0), columns[b].row(i, 0),
+                                                      weight.row(i, 0), weight.slab_size());
     });
     for (std::size_t a = 0; a < count; ++a)
         for (std::size_t b = 0; b < a; ++b)

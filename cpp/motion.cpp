@@ -69,8 +69,8 @@ Shape cells_between(const Out3 &faces) { return {faces[1].n[0], faces[0].n[1], f
 
 } // namespace
 
-void pushed(In density, const Push &push, float trust, const In3 &prediction, const Closed &closed, const Out3 &result,
-            Workers &workers) {
+void pushed(In density, const Push &push, float trust, const In3 &prediction, const Closed &closed,
+            const Out3 &result, Workers &workers) {
     const auto [nx, ny, nz] = density.n;
     const std::vector<float> x = axis(nx), y = axis(ny), z = axis(nz);
     const auto momentum = [&, nz = nz](int c, int i, int j, std::vector<float> &row) {
@@ -119,8 +119,9 @@ void refine(const In3 &coarse, const Closed &closed, const Out3 &result, Workers
             thread_local std::vector<float> row;
             row.resize(from.n[2]);
             for (int j = 0; j < to.n[1]; ++j) {
-                mix_rows(from.row(x.low[i], y.low[j]), from.row(x.high[i], y.low[j]), from.row(x.low[i], y.high[j]),
-                         from.row(x.high[i], y.high[j]), x.weight[i], y.weight[j], row.data(), from.n[2]);
+                mix_rows(from.row(x.low[i], y.low[j]), from.row(x.high[i], y.low[j]),
+                         from.row(x.low[i], y.high[j]), from.row(x.high[i], y.high[j]), x.weight[i],
+                         y.weight[j], row.data(), from.n[2]);
                 float *out = to.row(i, j);
                 for (int k = 0; k < to.n[2]; ++k)
                     out[k] = 2 * (row[z.low[k]] * (1 - z.weight[k]) + row[z.high[k]] * z.weight[k]);
@@ -135,7 +136,8 @@ float largest_difference(const In3 &a, const In3 &b, Workers &workers) {
     workers.run(a[0].n[0], [&](int i) {
         for (int c = 0; c < 3; ++c)
             if (i < a[c].n[0])
-                largest[i] = std::max(largest[i], difference_row(a[c].row(i, 0), b[c].row(i, 0), a[c].slab_size()));
+                largest[i] =
+                    std::max(largest[i], difference_row(a[c].row(i, 0), b[c].row(i, 0), a[c].slab_size()));
     });
     return *std::max_element(largest.begin(), largest.end());
 }

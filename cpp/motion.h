@@ -7,15 +7,17 @@
 
 namespace smokelift {
 
-// A push in the smoke: for each component a constant and, if there are slopes, three along x, y, z from -1 to 1.
+// A push in the smoke: for each component a constant and, if there are slopes, three along x, y, z from -1
+// to 1.
 using Push = std::vector<std::array<float, 3>>;
 
-// trust * prediction + P(density * push), with P the projection; the prediction is not looked at where trust is zero.
-void pushed(In density, const Push &push, float trust, const In3 &prediction, const Closed &closed, const Out3 &result,
-            Workers &workers);
+// trust * prediction + P(density * push), with P the projection; the prediction is not looked at where trust
+// is zero.
+void pushed(In density, const Push &push, float trust, const In3 &prediction, const Closed &closed,
+            const Out3 &result, Workers &workers);
 
-// A velocity in the cells of a grid that is twice as fine: linear, ends continued, projected. Faces coincide along
-// their own axis; across it centres lie a quarter of a coarse cell off.
+// A velocity in the cells of a grid that is twice as fine: linear, ends continued, projected. Faces coincide
+// along their own axis; across it centres lie a quarter of a coarse cell off.
 void refine(const In3 &coarse, const Closed &closed, const Out3 &result, Workers &workers);
 
 // Largest magnitude of the difference of two velocities.

@@ -103,8 +103,8 @@ void add_curl_transposed_slab(const In3 &w, const In3 &after, const Out3 &u) {
 }
 
 SMOKELIFT_CLONES
-void smoothness_slab(In before, In a, In after, const Shape &low, const Shape &high, float weight, In pointwise,
-                     Out result) {
+void smoothness_slab(In before, In a, In after, const Shape &low, const Shape &high, float weight,
+                     In pointwise, Out result) {
     const int first = low[2], last = high[2] - 1;
     if (first > last)
         return;

@@ -7,8 +7,8 @@ namespace {
 
 // Reciprocal pivots of the systems along x, from the diagonals less 2.
 SMOKELIFT_CLONES
-void eliminate(float *__restrict pivots, double *__restrict last, const double *__restrict square, double y_square,
-               double end, int nz) {
+void eliminate(float *__restrict pivots, double *__restrict last, const double *__restrict square,
+               double y_square, double end, int nz) {
     for (int k = 0; k < nz; ++k) {
         last[k] = 1 / (2 + y_square + end + square[k] - last[k]);
         pivots[k] = float(last[k]);
@@ -80,7 +80,8 @@ void Poisson::solve(Out f, Workers &workers) const {
         for (int i = 0; i < nx; ++i) {
             // A missing neighbour takes 1 from the diagonal at a wall and adds 1 at an open side.
             const double end = (i > 0 ? 0 : closed_[0] ? -1 : 1) + (i < nx - 1 ? 0 : closed_[1] ? -1 : 1);
-            eliminate(pivots.data() + std::size_t(i) * nz, last.data(), z_square_.data(), y_square_[j], end, nz);
+            eliminate(pivots.data() + std::size_t(i) * nz, last.data(), z_square_.data(), y_square_[j], end,
+                      nz);
         }
         // The constant mode has no equation of its own: pin its last value to zero.
         if (singular_ && j == 0)

@@ -17,15 +17,15 @@ py::dict as_dict(const Figures &f) {
                     "residual"_a = f.residual);
 }
 
-// The problem with what it looks at. The right-hand side is made when it is first asked for; from then on nothing
-// else is needed of offset and centre.
+// The problem with what it looks at. The right-hand side is made when it is first asked for; from then on
+// nothing else is needed of offset and centre.
 class Problem {
 public:
     Problem(const Array3 &direction, const Array &offset, const Array &weight, const Array &irrotational,
             const Array3 &centre, const Regularisation &regularisation, const Closed &closed)
-        : direction_(direction), centre_(centre), offset_(offset), weight_(weight), irrotational_(irrotational),
-          linear_(cells(direction, view(offset)), view(weight, shape_of(offset)),
-                  view(irrotational, shape_of(offset)), regularisation, closed) {
+        : direction_(direction), centre_(centre), offset_(offset), weight_(weight),
+          irrotational_(irrotational), linear_(cells(direction, view(offset)), view(weight, shape_of(offset)),
+                                               view(irrotational, shape_of(offset)), regularisation, closed) {
         view(centre, linear_.shapes());
     }
 
@@ -117,8 +117,9 @@ void register_estimate(py::module_ &module) {
             Array offset = new_array(second.n), residual = new_array(second.n), carried = new_array(second.n),
                   density = new_array(second.n);
             Mask smoke(std::vector<py::ssize_t>{second.n[0], second.n[1], second.n[2]});
-            const Linearisation result{out(direction), out(offset),  out(residual),
-                                       out(carried),   out(density), reinterpret_cast<unsigned char *>(smoke.mutable_data())};
+            const Linearisation result{
+                out(direction), out(offset),  out(residual),
+                out(carried),   out(density), reinterpret_cast<unsigned char *>(smoke.mutable_data())};
             const double scale = released(threads, [&](Workers &workers) {
                 return linearise(first, second, motion, threshold, result, workers);
             });
@@ -128,8 +129,8 @@ void register_estimate(py::module_ &module) {
 
     module.def(
         "evidence",
-        [](const Array3 &direction, const Array &offset, const Array &weight, const Mask &smoke, const Array3 &u,
-           int threads) {
+        [](const Array3 &direction, const Array &offset, const Array &weight, const Mask &smoke,
+           const Array3 &u, int threads) {
             const In r = view(offset), w = view(weight, r.n);
             const In3 g = view(direction, {r.n, r.n, r.n}), motion = view(u, face_shapes(r.n));
             const unsigned char *inside = marked(smoke, r.n);
@@ -176,7 +177,8 @@ void register_estimate(py::module_ &module) {
                 throw std::invalid_argument("expected a push, and a prediction to trust in.");
             Array3 result = new_arrays(face_shapes(a.n));
             const Out3 u = out(result);
-            released(threads, [&](Workers &workers) { pushed(a, push, trust, predicted, closed, u, workers); });
+            released(threads,
+                     [&](Workers &workers) { pushed(a, push, trust, predicted, closed, u, workers); });
             return result;
         },
         "density"_a, "push"_a, "trust"_a, "prediction"_a, "closed"_a, "threads"_a = 0);
@@ -196,7 +198,8 @@ void register_estimate(py::module_ &module) {
         "within_reach",
         [](const Array3 &solution, const Array3 &u, float reach, const Closed &closed, int threads) {
             const In3 found = faces_view(solution), from = view(u, face_shapes(cells_of(solution)));
-            if (released(threads, [&](Workers &workers) { return largest_difference(found, from, workers); }) <= reach)
+            if (released(threads,
+                         [&](Workers &workers) { return largest_difference(found, from, workers); }) <= reach)
                 return solution;
             Array3 result = new_arrays(face_shapes(cells_of(solution)));
             const Out3 held = out(result);
@@ -247,16 +250,16 @@ void register_velocity(py::module_ &module) {
         .def(
             "projected_cg",
             [](Problem &problem, const Array3 &start, double tolerance, int limit, int threads) {
-                return solved(problem, start, threads, [&](Field3 &b, Projection &, const Out3 &u, Workers &workers) {
-                    return projected_cg(problem.linear(), b, tolerance, limit, u, workers);
-                });
+                return solved(problem, start, threads,
+                              [&](Field3 &b, Projection &, const Out3 &u, Workers &workers) {
+                                  return projected_cg(problem.linear(), b, tolerance, limit, u, workers);
+                              });
             },
             "start"_a, py::kw_only(), "tolerance"_a, "limit"_a, "threads"_a = 0)
         .def(
             "primal_dual",
-            [](Problem &problem, const Array3 &start, double sigma, double tau, double theta,
-               double absolute, double relative, int limit, double inner_tolerance, int inner_limit,
-               int threads) {
+            [](Problem &problem, const Array3 &start, double sigma, double tau, double theta, double absolute,
+               double relative, int limit, double inner_tolerance, int inner_limit, int threads) {
                 const PrimalDual settings{sigma,    tau,   theta,           absolute,
                                           relative, limit, inner_tolerance, inner_limit};
                 return solved(problem, start, threads,

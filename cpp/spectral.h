@@ -14,8 +14,9 @@ class Spectral {
 public:
     Spectral(const Shape &n, const Closed &closed, double zeroth, double second, double fourth);
 
-    // Takes a derivative with respect to the faces (a plain one, without the weights of the inner product) to a
-    // preconditioned gradient without divergence, which stays here as waves; returns the product of the two.
+    // Takes a derivative with respect to the faces (a plain one, without the weights of the inner product) to
+    // a preconditioned gradient without divergence, which stays here as waves; returns the product of the
+    // two.
     double precondition(const In3 &derivative, Workers &workers);
 
     // search = gradient + factor * search
