@@ -445,6 +445,45 @@ def test_the_quadratic_is_symmetric_and_positive():
     assert flat(problem.apply(a)) @ flat(a) > 0
 
 
+@pytest.mark.parametrize("closed", [OPEN, [True] * 6, [True, False, False, True, True, True]])
+def test_the_preconditioner_knows_long_lines(closed):
+    """With kinetic energy alone the minimum is the part of the centre without divergence; the rest is a gradient.
+
+    Sides of the box apart, the preconditioner is then exact: a few steps are enough, on lines of any length.
+    """
+    shape = (72, 66, 100)
+    rng = np.random.default_rng(4)
+    faces = [rng.standard_normal([n + (d == axis) for d, n in enumerate(shape)], np.float32) for axis in range(3)]
+    zero = np.zeros(shape, np.float32)
+    problem = _core.LeastSquares(
+        direction=[zero] * 3,
+        offset=zero,
+        weight=zero,
+        irrotational=zero,
+        centre=faces,
+        first_order=0.0,
+        second_order=0.0,
+        kinetic=0.5,
+        closed=closed,
+    )
+    u, figures = problem.projected_cg([np.zeros_like(a) for a in faces], tolerance=1e-4, limit=20)
+    assert figures["iterations"] < 10
+    assert np.abs(_core.divergence(u)).max() < 1e-4
+    x, y, z = (a - b for a, b in zip(faces, u, strict=True))
+    vorticity = np.diff(z[:, :, 1:-1], axis=1)[1:-1] - np.diff(y[:, 1:-1], axis=2)[1:-1]
+    assert np.abs(vorticity).max() < 0.01
+    vorticity = np.diff(y[:, 1:-1], axis=0)[:, :, 1:-1] - np.diff(x[1:-1], axis=1)[:, :, 1:-1]
+    assert np.abs(vorticity).max() < 0.01
+
+
+@pytest.mark.parametrize(("width", "truncate"), [(0.5, 4.0), (1.0, 3.0), (2.0, 3.0)])
+@pytest.mark.parametrize("shape", [(9, 20, 13), (3, 2, 1)])
+def test_blur_is_a_gaussian(shape, width, truncate):
+    cells = np.random.default_rng(1).random(shape, np.float32)
+    expected = ndimage.gaussian_filter(cells, width, truncate=truncate)
+    np.testing.assert_allclose(_core.blur(cells, width, truncate), expected, rtol=1e-5)
+
+
 def test_a_uniform_flow_and_a_solid_turn_cost_no_second_order_smoothness():
     zero = np.zeros(TINY, np.float32)
     problem = _core.LeastSquares(
