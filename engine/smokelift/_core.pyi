@@ -28,7 +28,6 @@ def advect_cells(
     field: Array, displacement: Arrays, maccormack: bool, extend: bool = False, threads: int = 0
 ) -> Array: ...
 def advect_faces(field: Arrays, displacement: Arrays, maccormack: bool, threads: int = 0) -> list[Array]: ...
-
 def blur(cells: Array, width: float, truncate: float, threads: int = 0) -> Array:
     """A Gaussian of a standard deviation in cells, cut off at `truncate` of them; ends mirrored."""
 
