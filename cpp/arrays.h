@@ -7,6 +7,7 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include <memory>
 #include <stdexcept>
 
 namespace smokelift {
@@ -42,7 +43,13 @@ inline Shape cells_of(const Array3 &faces) {
 
 inline In3 faces_view(const Array3 &a) { return view(a, face_shapes(cells_of(a))); }
 
-inline Array new_array(const Shape &n) { return Array(std::vector<py::ssize_t>{n[0], n[1], n[2]}); }
+// Not defined at first; its memory goes back to the system with it, however small the others around it.
+inline Array new_array(const Shape &n) {
+    auto values = std::make_unique<Values>(volume(n));
+    const py::capsule owner(values.get(), [](void *p) { delete static_cast<Values *>(p); });
+    float *data = values.release()->data();
+    return Array(std::vector<py::ssize_t>{n[0], n[1], n[2]}, data, owner);
+}
 
 inline Array3 new_arrays(const std::array<Shape, 3> &n) {
     return {new_array(n[0]), new_array(n[1]), new_array(n[2])};

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 
 namespace smokelift {
 namespace {
@@ -44,148 +45,311 @@ SMOKELIFT_INLINE void stripe(int m, int k, const float *a, Stride lda, const flo
         tile<1, W>(k, a + i * lda, lda, b, ldb, c + i * ldc, ldc);
 }
 
+constexpr int lanes = 16; // lines that are transformed at once, side by side
+constexpr int dense = 32; // transforms up to this size are not split further
+
+using Lane = Lanes<lanes>::type;
+
+int points_of(Wave wave, int n) { return wave == Wave::cos1 ? n + 1 : wave == Wave::sin1 ? n - 1 : n; }
+
+// The transforms that leave out a face at the start, where sines are zero.
+int first_point(Wave wave) { return wave == Wave::sin1 || wave == Wave::sin3; }
+
+double value(Wave wave, int n, int mode, int point) {
+    const bool cosine = wave == Wave::cos1 || wave == Wave::cos2 || wave == Wave::cos3 || wave == Wave::cos4;
+    const bool centres = wave == Wave::cos2 || wave == Wave::sin2 || wave == Wave::cos4 || wave == Wave::sin4;
+    const bool halves = wave == Wave::cos3 || wave == Wave::sin3 || wave == Wave::cos4 || wave == Wave::sin4;
+    const double phase =
+        (mode + (halves ? 0.5 : 0)) * std::acos(-1.0) / n * (point + (centres ? 0.5 : first_point(wave)));
+    return cosine ? std::cos(phase) : std::sin(phase);
+}
+
+std::vector<int> count_up(int count) {
+    std::vector<int> result;
+    for (int m = 0; m < count; ++m)
+        result.push_back(m);
+    return result;
+}
+
 } // namespace
 
-SMOKELIFT_CLONES
-void multiply(int m, int n, int k, const float *a, int lda, const float *b, int ldb, float *c, int ldc) {
-    int j = 0;
-    for (; j + 16 <= n; j += 16)
-        stripe<16>(m, k, a, lda, b + j, ldb, c + j, ldc);
-    for (; j + 4 <= n; j += 4)
-        stripe<4>(m, k, a, lda, b + j, ldb, c + j, ldc);
-    for (; j < n; ++j)
-        stripe<1>(m, k, a, lda, b + j, ldb, c + j, ldc);
+Basis::Basis(Wave wave, int n, int first, int count) : modes_(count) {
+    const bool faces = wave == Wave::cos1 || wave == Wave::sin1 || wave == Wave::cos3 || wave == Wave::sin3;
+    length_ = n + faces;
+    std::vector<int> modes;
+    for (int m = first; m < first + count; ++m)
+        modes.push_back(m);
+    const int start = first_point(wave), points = points_of(wave, n);
+    rows_ = split(wave, n, modes, start, 1);
+    for (int i = 0; i < length_; ++i)
+        if (i < start || i >= start + points)
+            idle_.push_back(i);
+    norms_.resize(count);
+    for (int m = 0; m < count; ++m) {
+        double norm = 0;
+        for (int i = 0; i < points; ++i) {
+            const double x = value(wave, n, modes[m], i);
+            const bool half = faces && (start + i == 0 || start + i == n);
+            norm += (half ? 0.5 : 1) * x * x;
+        }
+        // A wave that is zero on these points comes out as rounding error.
+        norms_[rows_[m]] = norm > 1e-6 ? float(1 / std::sqrt(norm)) : 0;
+    }
+}
+
+// Plans a transform of points start, start + stride, ...; says where its modes will be.
+std::vector<int> Basis::split(Wave wave, int n, const std::vector<int> &modes, int start, int stride) {
+    const auto row = [&](int i) { return start + i * stride; };
+    const int half = n / 2;
+    std::vector<int> rows(modes.size());
+    if (n <= dense || n % 2) {
+        Leaf leaf;
+        leaf.start = start;
+        leaf.stride = stride;
+        leaf.points = points_of(wave, n);
+        leaf.count = int(modes.size());
+        leaf.first = leaves_.empty() ? 0 : leaves_.back().first + leaves_.back().count;
+        leaf.analysis.resize(std::size_t(leaf.count) * leaf.points);
+        leaf.synthesis.resize(leaf.analysis.size());
+        for (int m = 0; m < leaf.count; ++m) {
+            rows[m] = leaf.first + m;
+            for (int i = 0; i < leaf.points; ++i) {
+                const float x = float(value(wave, n, modes[m], i));
+                leaf.analysis[std::size_t(m) * leaf.points + i] = x;
+                leaf.synthesis[std::size_t(i) * leaf.count + m] = x;
+            }
+        }
+        leaves_.push_back(std::move(leaf));
+        return rows;
+    }
+    if (wave == Wave::cos1 || wave == Wave::sin1 || wave == Wave::cos2 || wave == Wave::sin2) {
+        // Modes of even and odd number are symmetric about the middle or antisymmetric.
+        std::vector<int> even, odd;
+        for (int mode : modes)
+            (mode % 2 ? odd : even).push_back(mode / 2);
+        const int last = points_of(wave, n) - 1;
+        for (int i = 0; i < last - i; ++i)
+            before_.push_back({row(i), row(last - i), 1, 1, 1, -1});
+        const int end = row(last); // the differences lie from there backwards
+        std::vector<int> of_even, of_odd;
+        if (wave == Wave::cos1) {
+            of_even = split(Wave::cos1, half, even, start, stride);
+            of_odd = split(Wave::cos3, half, odd, end, -stride);
+        } else if (wave == Wave::sin1) {
+            of_even = split(Wave::sin1, half, even, end, -stride);
+            of_odd = split(Wave::sin3, half, odd, start, stride);
+        } else if (wave == Wave::cos2) {
+            of_even = split(Wave::cos2, half, even, start, stride);
+            of_odd = split(Wave::cos4, half, odd, end, -stride);
+        } else {
+            of_even = split(Wave::sin2, half, even, end, -stride);
+            of_odd = split(Wave::sin4, half, odd, start, stride);
+        }
+        auto e = of_even.begin(), o = of_odd.begin();
+        for (std::size_t m = 0; m < modes.size(); ++m)
+            rows[m] = modes[m] % 2 ? *o++ : *e++;
+        return rows;
+    }
+    // Modes m and n - 1 - m are the same on every second point, and opposite on the others (III), or sums and
+    // differences of neighbours turned by half the angle of m (IV).
+    const bool cosine = wave == Wave::cos3 || wave == Wave::cos4,
+               whole = wave == Wave::cos3 || wave == Wave::sin3;
+    std::vector<int> a, b;
+    if (whole) {
+        a = split(wave, half, count_up(half), row(cosine ? 0 : 1), 2 * stride);
+        b = split(cosine ? Wave::cos4 : Wave::sin4, half, count_up(half), row(cosine ? 1 : 0), 2 * stride);
+    } else {
+        for (int i = 0; i < n; i += 2)
+            before_.push_back({row(i), row(i + 1), 1, 1, 1, -1});
+        a = split(wave, half, count_up(half), row(0), 2 * stride);
+        b = split(cosine ? Wave::sin4 : Wave::cos4, half, count_up(half), row(1), 2 * stride);
+    }
+    for (int m = 0; m < half; ++m) {
+        const double angle = (m + 0.5) * std::acos(-1.0) / n / 2;
+        const float c = float(std::cos(angle)), s = float(std::sin(angle));
+        if (whole)
+            after_.push_back({a[m], b[m], 1, 1, cosine ? 1.0f : -1.0f, cosine ? -1.0f : 1.0f});
+        else
+            after_.push_back({a[m], b[m], c, cosine ? s : -s, cosine ? -s : s, c});
+        rows[m] = a[m];
+        rows[n - 1 - m] = b[m];
+    }
+    return rows;
 }
 
 namespace {
 
-// Splits rows into symmetric and antisymmetric parts: sums into `e`, differences into `o`.
-SMOKELIFT_CLONES
-void fold_rows(const float *__restrict x, int count, int length, float *__restrict e, float *__restrict o) {
-    const int odd = length / 2, half = length - odd;
-    for (int r = 0; r < count; ++r, x += length, e += half, o += odd) {
-        for (int i = 0; i < odd; ++i) {
-            e[i] = x[i] + x[length - 1 - i];
-            o[i] = x[i] - x[length - 1 - i];
-        }
-        if (half > odd)
-            e[odd] = x[odd];
-    }
+template <class Turn> SMOKELIFT_INLINE void turn(const Turn &t, float *x) {
+    Lane &a = *reinterpret_cast<Lane *>(x + t.a * lanes), &b = *reinterpret_cast<Lane *>(x + t.b * lanes);
+    const Lane first = t.aa * a + t.ab * b, second = t.ba * a + t.bb * b;
+    a = first;
+    b = second;
 }
 
-SMOKELIFT_CLONES
-void unfold_rows(const float *__restrict e, const float *__restrict o, int count, int length,
-                 float *__restrict x) {
-    const int odd = length / 2, half = length - odd;
-    for (int r = 0; r < count; ++r, x += length, e += half, o += odd) {
-        for (int i = 0; i < odd; ++i)
-            x[i] = e[i] + o[i];
-        for (int i = 0; i < odd; ++i)
-            x[length - 1 - i] = e[i] - o[i];
-        if (half > odd)
-            x[odd] = e[odd];
-    }
-}
-
-// In place: row i becomes the sum and row length-1-i the difference of the two (and back, up to a factor of
-// two).
-SMOKELIFT_CLONES
-void fold_columns(float *x, int count, int length) {
-    for (int i = 0; i < length / 2; ++i) {
-        float *__restrict low = x + std::size_t(i) * count;
-        float *__restrict high = x + std::size_t(length - 1 - i) * count;
-        for (int w = 0; w < count; ++w) {
-            const float sum = low[w] + high[w], difference = low[w] - high[w];
-            low[w] = sum;
-            high[w] = difference;
-        }
-    }
+template <class Turn> SMOKELIFT_INLINE void turn_back(const Turn &t, float *x) {
+    turn(Turn{t.a, t.b, t.aa, t.ba, t.ab, t.bb}, x);
 }
 
 } // namespace
 
-Basis::Basis(int length, int first, const std::vector<double> &vectors)
-    : length_(length), modes_(int(vectors.size()) / length), folded_(first > 0) {
-    // Some modes may be zero everywhere; the others tell which symmetry comes first.
-    double asymmetry = 0;
-    for (int m = 0; m < first; ++m)
-        for (int i = 0; i < length; ++i)
-            asymmetry +=
-                std::abs(vectors[std::size_t(m) * length + i] - vectors[std::size_t(m + 1) * length - 1 - i]);
-    const bool even_first = asymmetry < 1e-6;
-    even_.count = !folded_ ? modes_ : even_first ? first : modes_ - first;
-    even_.start = folded_ && !even_first ? first : 0;
-    even_.points = folded_ ? length - length / 2 : length;
-    odd_.count = modes_ - even_.count;
-    odd_.start = even_first ? first : 0;
-    odd_.points = length - even_.points;
-    for (Block *block : {&even_, &odd_}) {
-        block->analysis.resize(std::size_t(block->count) * block->points);
-        block->synthesis.resize(block->analysis.size());
-        for (int m = 0; m < block->count; ++m)
-            for (int i = 0; i < block->points; ++i) {
-                const float value = float(vectors[std::size_t(block->start + m) * length + i]);
-                block->analysis[std::size_t(m) * block->points + i] = value;
-                block->synthesis[std::size_t(i) * block->count + m] = value;
-            }
+SMOKELIFT_CLONES
+void Basis::analyse(float *points, float *modes) const {
+    for (const Turn &t : before_)
+        turn(t, points);
+    for (const Leaf &leaf : leaves_)
+        stripe<lanes>(leaf.count, leaf.points, leaf.analysis.data(), leaf.points, points + leaf.start * lanes,
+                      leaf.stride * lanes, modes + leaf.first * lanes, lanes);
+    for (const Turn &t : after_)
+        turn(t, modes);
+    for (int m = 0; m < modes_; ++m)
+        reinterpret_cast<Lane *>(modes)[m] *= norms_[m];
+}
+
+// The transpose.
+SMOKELIFT_CLONES
+void Basis::synthesise(float *modes, float *points) const {
+    for (int m = 0; m < modes_; ++m)
+        reinterpret_cast<Lane *>(modes)[m] *= norms_[m];
+    for (auto t = after_.rbegin(); t != after_.rend(); ++t)
+        turn_back(*t, modes);
+    for (int i : idle_)
+        std::fill_n(points + i * lanes, lanes, 0.0f);
+    for (const Leaf &leaf : leaves_)
+        stripe<lanes>(leaf.points, leaf.count, leaf.synthesis.data(), leaf.count, modes + leaf.first * lanes,
+                      lanes, points + leaf.start * lanes, leaf.stride * lanes);
+    for (auto t = before_.rbegin(); t != before_.rend(); ++t)
+        turn_back(*t, points);
+}
+
+namespace {
+
+// Exchanges the off-diagonal blocks of `step` rows and lanes.
+#define SMOKELIFT_EXCHANGE(step, low, high)                                                                  \
+    for (int i = 0; i < lanes; ++i)                                                                          \
+        if (!(i & step)) {                                                                                   \
+            const Lane a = x[i], b = x[i + step];                                                            \
+            x[i] = __builtin_shufflevector(a, b, low);                                                       \
+            x[i + step] = __builtin_shufflevector(a, b, high);                                               \
+        }
+#define SMOKELIFT_LIST(...) __VA_ARGS__
+
+SMOKELIFT_INLINE void transpose(Lane *x){
+#pragma GCC unroll 16
+    SMOKELIFT_EXCHANGE(8, SMOKELIFT_LIST(0, 1, 2, 3, 4, 5, 6, 7, 16, 17, 18, 19, 20, 21, 22, 23),
+                       SMOKELIFT_LIST(8, 9, 10, 11, 12, 13, 14, 15, 24, 25, 26, 27, 28, 29, 30, 31))
+#pragma GCC unroll 16
+        SMOKELIFT_EXCHANGE(4, SMOKELIFT_LIST(0, 1, 2, 3, 16, 17, 18, 19, 8, 9, 10, 11, 24, 25, 26, 27),
+                           SMOKELIFT_LIST(4, 5, 6, 7, 20, 21, 22, 23, 12, 13, 14, 15, 28, 29, 30, 31))
+#pragma GCC unroll 16
+            SMOKELIFT_EXCHANGE(2, SMOKELIFT_LIST(0, 1, 16, 17, 4, 5, 20, 21, 8, 9, 24, 25, 12, 13, 28, 29),
+                               SMOKELIFT_LIST(2, 3, 18, 19, 6, 7, 22, 23, 10, 11, 26, 27, 14, 15, 30, 31))
+#pragma GCC unroll 16
+                SMOKELIFT_EXCHANGE(1,
+                                   SMOKELIFT_LIST(0, 16, 2, 18, 4, 20, 6, 22, 8, 24, 10, 26, 12, 28, 14, 30),
+                                   SMOKELIFT_LIST(1, 17, 3, 19, 5, 21, 7, 23, 9, 25, 11, 27, 13, 29, 15, 31))}
+
+SMOKELIFT_INLINE int at(const int *order, int i) {
+    return lanes * (order ? order[i] : i);
+}
+
+// Lines that are rows, side by side: element i of every line to row order[i] of x, or back.
+SMOKELIFT_CLONES
+void rows_in(const float *rows, int length, int lines, const int *order, float *x) {
+    int i = 0;
+    for (; lines == lanes && i + lanes <= length; i += lanes) {
+        Lane block[lanes];
+        for (int l = 0; l < lanes; ++l)
+            block[l] = *reinterpret_cast<const Lane *>(rows + std::size_t(l) * length + i);
+        transpose(block);
+        for (int k = 0; k < lanes; ++k)
+            *reinterpret_cast<Lane *>(x + at(order, i + k)) = block[k];
+    }
+    for (; i < length; ++i)
+        for (int l = 0; l < lines; ++l)
+            x[at(order, i) + l] = rows[std::size_t(l) * length + i];
+}
+
+SMOKELIFT_CLONES
+void rows_out(float *rows, int length, int lines, const int *order, const float *x) {
+    int i = 0;
+    for (; lines == lanes && i + lanes <= length; i += lanes) {
+        Lane block[lanes];
+        for (int k = 0; k < lanes; ++k)
+            block[k] = *reinterpret_cast<const Lane *>(x + at(order, i + k));
+        transpose(block);
+        for (int l = 0; l < lanes; ++l)
+            *reinterpret_cast<Lane *>(rows + std::size_t(l) * length + i) = block[l];
+    }
+    for (; i < length; ++i)
+        for (int l = 0; l < lines; ++l)
+            rows[std::size_t(l) * length + i] = x[at(order, i) + l];
+}
+
+// The same for lines that are columns.
+SMOKELIFT_CLONES
+void columns_in(const float *rows, int stride, int length, int lines, const int *order, float *x) {
+    for (int i = 0; i < length; ++i, rows += stride)
+        if (lines == lanes)
+            *reinterpret_cast<Lane *>(x + at(order, i)) = *reinterpret_cast<const Lane *>(rows);
+        else
+            std::copy_n(rows, lines, x + at(order, i));
+}
+
+SMOKELIFT_CLONES
+void columns_out(float *rows, int stride, int length, int lines, const int *order, const float *x) {
+    for (int i = 0; i < length; ++i, rows += stride)
+        if (lines == lanes)
+            *reinterpret_cast<Lane *>(rows) = *reinterpret_cast<const Lane *>(x + at(order, i));
+        else
+            std::copy_n(x + at(order, i), lines, rows);
+}
+
+} // namespace
+
+void Basis::rows_to_modes(const float *points, int count, float *modes, std::vector<float> &scratch) const {
+    scratch.resize(std::size_t(length_ + modes_) * lanes);
+    float *x = scratch.data(), *y = x + length_ * lanes;
+    for (int first = 0; first < count; first += lanes) {
+        const int lines = std::min(lanes, count - first);
+        rows_in(points + std::size_t(first) * length_, length_, lines, nullptr, x);
+        analyse(x, y);
+        rows_out(modes + std::size_t(first) * modes_, modes_, lines, rows_.data(), y);
     }
 }
 
-void Basis::rows_to_modes(const float *points, int count, float *modes, std::vector<float> &scratch) const {
-    scratch.resize(std::size_t(count) * length_);
-    float *e = scratch.data(), *o = e + std::size_t(count) * even_.points;
-    if (folded_)
-        fold_rows(points, count, length_, e, o);
-    else
-        std::copy_n(points, scratch.size(), e);
-    multiply(count, even_.count, even_.points, e, even_.points, even_.synthesis.data(), even_.count,
-             modes + even_.start, modes_);
-    multiply(count, odd_.count, odd_.points, o, odd_.points, odd_.synthesis.data(), odd_.count,
-             modes + odd_.start, modes_);
-}
-
 void Basis::rows_from_modes(const float *modes, int count, float *points, std::vector<float> &scratch) const {
-    scratch.resize(std::size_t(count) * length_);
-    float *e = scratch.data(), *o = e + std::size_t(count) * even_.points;
-    multiply(count, even_.points, even_.count, modes + even_.start, modes_, even_.analysis.data(),
-             even_.points, e, even_.points);
-    multiply(count, odd_.points, odd_.count, modes + odd_.start, modes_, odd_.analysis.data(), odd_.points, o,
-             odd_.points);
-    if (folded_)
-        unfold_rows(e, o, count, length_, points);
-    else
-        std::copy_n(e, scratch.size(), points);
+    scratch.resize(std::size_t(length_ + modes_) * lanes);
+    float *x = scratch.data(), *y = x + length_ * lanes;
+    for (int first = 0; first < count; first += lanes) {
+        const int lines = std::min(lanes, count - first);
+        rows_in(modes + std::size_t(first) * modes_, modes_, lines, rows_.data(), y);
+        synthesise(y, x);
+        rows_out(points + std::size_t(first) * length_, length_, lines, nullptr, x);
+    }
 }
 
 void Basis::columns_to_modes(const float *points, int stride, int count, float *modes, int modes_stride,
                              std::vector<float> &scratch) const {
-    scratch.resize(std::size_t(count) * length_);
-    float *x = scratch.data();
-    for (int i = 0; i < length_; ++i)
-        std::copy_n(points + std::size_t(i) * stride, count, x + std::size_t(i) * count);
-    if (folded_)
-        fold_columns(x, count, length_);
-    // The differences lie from the last row backwards.
-    multiply(even_.count, count, even_.points, even_.analysis.data(), even_.points, x, count,
-             modes + std::size_t(even_.start) * modes_stride, modes_stride);
-    multiply(odd_.count, count, odd_.points, odd_.analysis.data(), odd_.points,
-             x + std::size_t(length_ - 1) * count, -count, modes + std::size_t(odd_.start) * modes_stride,
-             modes_stride);
+    scratch.resize(std::size_t(length_ + modes_) * lanes);
+    float *x = scratch.data(), *y = x + length_ * lanes;
+    for (int first = 0; first < count; first += lanes) {
+        const int lines = std::min(lanes, count - first);
+        columns_in(points + first, stride, length_, lines, nullptr, x);
+        analyse(x, y);
+        columns_out(modes + first, modes_stride, modes_, lines, rows_.data(), y);
+    }
 }
 
 void Basis::columns_from_modes(const float *modes, int modes_stride, int count, float *points, int stride,
                                std::vector<float> &scratch) const {
-    scratch.resize(std::size_t(count) * length_);
-    float *x = scratch.data();
-    multiply(even_.points, count, even_.count, even_.synthesis.data(), even_.count,
-             modes + std::size_t(even_.start) * modes_stride, modes_stride, x, count);
-    multiply(odd_.points, count, odd_.count, odd_.synthesis.data(), odd_.count,
-             modes + std::size_t(odd_.start) * modes_stride, modes_stride,
-             x + std::size_t(length_ - 1) * count, -count);
-    if (folded_)
-        fold_columns(x, count, length_);
-    for (int i = 0; i < length_; ++i)
-        std::copy_n(x + std::size_t(i) * count, count, points + std::size_t(i) * stride);
+    scratch.resize(std::size_t(length_ + modes_) * lanes);
+    float *x = scratch.data(), *y = x + length_ * lanes;
+    for (int first = 0; first < count; first += lanes) {
+        const int lines = std::min(lanes, count - first);
+        columns_in(modes + first, modes_stride, modes_, lines, rows_.data(), y);
+        synthesise(y, x);
+        columns_out(points + first, stride, length_, lines, nullptr, x);
+    }
 }
 
 } // namespace smokelift

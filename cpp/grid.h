@@ -3,7 +3,13 @@
 
 #include <array>
 #include <cstddef>
+#include <new>
+#include <utility>
 #include <vector>
+
+#if defined(__linux__)
+#include <sys/mman.h>
+#endif
 
 // Hot loops are compiled for several instruction sets; the loader picks one. Elsewhere: the compiler's
 // target.
@@ -44,6 +50,9 @@ using Out = Grid<float>;
 using In3 = std::array<In, 3>;
 using Out3 = std::array<Out, 3>;
 
+// The elements with the first index i.
+template <class T> Grid<T> slab(const Grid<T> &a, int i) { return {a.row(i, 0), {1, a.n[1], a.n[2]}}; }
+
 inline In3 read(const Out3 &a) { return {In(a[0]), In(a[1]), In(a[2])}; }
 
 // Shapes of the normal velocities on x, y and z faces of a box of `n` cells.
@@ -57,7 +66,50 @@ inline std::array<Shape, 3> edge_shapes(const Shape &n) {
             Shape{n[0] + 1, n[1] + 1, n[2]}};
 }
 
-// Owns one array.
+// Leaves numbers uninitialised, so that the threads that fill an array are also those that first touch its
+// pages. A large one has pages of its own, large too where the system has them: given back as soon as it is
+// done with.
+template <class T> struct LazyPages {
+    using value_type = T;
+
+    LazyPages() = default;
+    template <class U> LazyPages(const LazyPages<U> &) {}
+
+    T *allocate(std::size_t n) {
+#if defined(__linux__)
+        if (large(n)) {
+            void *memory =
+                mmap(nullptr, n * sizeof(T), PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+            if (memory == MAP_FAILED)
+                throw std::bad_alloc();
+            madvise(memory, n * sizeof(T), MADV_HUGEPAGE);
+            return static_cast<T *>(memory);
+        }
+#endif
+        return static_cast<T *>(::operator new(n * sizeof(T)));
+    }
+    void deallocate(T *memory, std::size_t n) {
+#if defined(__linux__)
+        if (large(n)) {
+            munmap(memory, n * sizeof(T));
+            return;
+        }
+#endif
+        (void)n;
+        ::operator delete(memory);
+    }
+    static bool large(std::size_t n) { return n * sizeof(T) >= std::size_t(1) << 22; }
+    template <class U> void construct(U *) {}
+    template <class U, class... V> void construct(U *at, V &&...values) {
+        ::new (static_cast<void *>(at)) U(std::forward<V>(values)...);
+    }
+    template <class U> bool operator==(const LazyPages<U> &) const { return true; }
+    template <class U> bool operator!=(const LazyPages<U> &) const { return false; }
+};
+
+using Values = std::vector<float, LazyPages<float>>;
+
+// Owns one array; what it holds at first is not defined.
 class Field {
 public:
     Field() = default;
@@ -66,14 +118,14 @@ public:
     operator In() const { return {data_.data(), n_}; }
     Out out() { return *this; }
     In in() const { return *this; }
-    std::vector<float> &data() { return data_; }
+    Values &data() { return data_; }
 
 private:
-    std::vector<float> data_;
+    Values data_;
     Shape n_{};
 };
 
-// Owns three arrays in one block, so that sums and dot products are one loop.
+// Owns three arrays in one block, so that sums and dot products are one loop; not defined at first either.
 class Field3 {
 public:
     Field3() = default;
@@ -96,7 +148,7 @@ public:
     const std::array<Shape, 3> &shapes() const { return shapes_; }
 
 private:
-    std::vector<float> data_;
+    Values data_;
     std::array<Shape, 3> shapes_{};
 };
 

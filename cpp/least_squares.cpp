@@ -3,13 +3,10 @@
 #include "operators.h"
 
 #include <algorithm>
+#include <vector>
 
 namespace smokelift {
 namespace {
-
-void copy(In from, Out to) { std::copy_n(from.data, volume(from.n), to.data); }
-
-std::array<Shape, 3> cell_shapes(const Shape &n) { return {n, n, n}; }
 
 // Edges inside the box, the only ones that carry vorticity: [1, n) across, [0, n) along.
 Shape first_edge(int axis) {
@@ -19,9 +16,16 @@ Shape first_edge(int axis) {
 }
 
 SMOKELIFT_CLONES
-void product(const float *__restrict a, const float *__restrict b, float *__restrict out, std::size_t n) {
+void multiply(const float *__restrict a, float *__restrict out, std::size_t n) {
     for (std::size_t i = 0; i < n; ++i)
-        out[i] = a[i] * b[i];
+        out[i] *= a[i];
+}
+
+SMOKELIFT_CLONES
+void minus_product(const float *__restrict a, const float *__restrict b, float *__restrict out,
+                   std::size_t n) {
+    for (std::size_t i = 0; i < n; ++i)
+        out[i] = -(a[i] * b[i]);
 }
 
 SMOKELIFT_CLONES
@@ -30,88 +34,157 @@ void scaled(const float *__restrict a, float factor, float *__restrict out, std:
         out[i] = factor * a[i];
 }
 
+SMOKELIFT_CLONES
+void add_scaled(const float *__restrict a, float factor, float *__restrict out, std::size_t n) {
+    for (std::size_t i = 0; i < n; ++i)
+        out[i] += factor * a[i];
+}
+
+// The few slabs that a sweep along x has in use. They start as zero, as edges on the sides of the box have to
+// be.
+class Window {
+public:
+    explicit Window(const Shape &n) : shapes_(edge_shapes(n)), cells_{1, n[1], n[2]} {
+        for (int c = 0; c < 3; ++c)
+            shapes_[c][0] = 1;
+        plane_ = std::size_t(n[1] + 1) * (n[2] + 1);
+        memory_.resize(20 * plane_);
+    }
+
+    Out3 vorticity(int i) { return edges(i % 3); }
+    Out3 stress(int i) { return edges(3 + i % 2); }
+    Out irrotational(int c) { return edges(5)[c]; }
+    Out along(int i) { return {plane(18 + i % 2), cells_}; }
+
+private:
+    float *plane(int p) { return memory_.data() + p * plane_; }
+    Out3 edges(int slot) {
+        return {Out{plane(3 * slot), shapes_[0]}, Out{plane(3 * slot + 1), shapes_[1]},
+                Out{plane(3 * slot + 2), shapes_[2]}};
+    }
+
+    std::array<Shape, 3> shapes_;
+    Shape cells_;
+    std::size_t plane_;
+    std::vector<float> memory_;
+};
+
 } // namespace
 
-LeastSquares::LeastSquares(const In3 &direction, In offset, In weight, In irrotational, const In3 &centre,
-                           const Regularisation &regularisation, const Closed &closed)
-    : shape_(offset.n), closed_(closed), regularisation_(regularisation), direction_(cell_shapes(shape_)),
-      centre_(face_shapes(shape_)), irrotational_(edge_shapes(shape_)), offset_(shape_), weight_(shape_),
-      vorticity_(edge_shapes(shape_)), stress_(edge_shapes(shape_)), along_(shape_) {
-    copy(offset, offset_);
-    copy(weight, weight_);
-    for (int c = 0; c < 3; ++c) {
-        copy(direction[c], direction_.out()[c]);
-        copy(centre[c], centre_.out()[c]);
-        // An edge has the mean of the four cells around it.
-        const Out edges = irrotational_.out()[c];
-        const Shape low = first_edge(c);
-        for (int i = low[0]; i < shape_[0]; ++i)
-            for (int j = low[1]; j < shape_[1]; ++j) {
-                const float *rows[4] = {irrotational.row(i, j), irrotational.row(i - low[0], j),
-                                        irrotational.row(i, j - low[1]),
-                                        irrotational.row(i - low[0], j - low[1])};
-                float *out = edges.row(i, j);
-                if (c == 2)
-                    for (int k = 0; k < shape_[2]; ++k)
-                        out[k] = 0.25f * (rows[0][k] + rows[1][k] + rows[2][k] + rows[3][k]);
-                else
-                    for (int k = 1; k < shape_[2]; ++k)
-                        out[k] = 0.25f * (rows[0][k] + rows[0][k - 1] + rows[3][k] + rows[3][k - 1]);
+// A u with its scalar product with u; with an offset, R's part of A u less direction^T (weight offset).
+// Everything between u and the result is done slab by slab while it lies in the cache.
+double LeastSquares::sweep(const In3 &u, In offset, const Out3 &result, Workers &workers) const {
+    const int nx = shape_[0], slabs = nx + 1;
+    const int size = std::clamp(nx / 8, 4, 16), blocks = (slabs + size - 1) / size;
+    const auto &[first_order, second_order, kinetic] = regularisation_;
+
+    const auto stress = [&](Window &window, int i) {
+        for (int c = 0; c < 3; ++c) {
+            const Shape low = first_edge(c);
+            const Out out = window.stress(i)[c];
+            if (i < low[0] || i >= nx) {
+                std::fill_n(out.data, out.slab_size(), 0.0f);
+                continue;
             }
-    }
-}
-
-void LeastSquares::regularise(const In3 &u, const Out3 &result, Workers &workers, bool irrotational) {
-    for (int c = 0; c < 3; ++c)
-        if (regularisation_.first_order > 0) {
-            smoothness(u[c], {0, 0, 0}, u[c].n, regularisation_.first_order, {}, result[c], workers);
-            axpy(regularisation_.kinetic, u[c].data, result[c].data, volume(u[c].n), workers);
-        } else {
-            workers.run(u[c].n[0], [&](int i) {
-                scaled(u[c].row(i, 0), regularisation_.kinetic, result[c].row(i, 0), u[c].slab_size());
-            });
+            In pointwise;
+            if (!offset.data) {
+                edge_means_slab(irrotational_, c, window.irrotational(c), i);
+                pointwise = window.irrotational(c);
+            }
+            smoothness_slab(window.vorticity(std::max(i - 1, low[0]))[c], window.vorticity(i)[c],
+                            window.vorticity(std::min(i + 1, nx - 1))[c], low, shape_, second_order,
+                            pointwise, out);
         }
-    curl(u, vorticity_.out(), workers);
-    for (int c = 0; c < 3; ++c)
-        smoothness(vorticity_.in()[c], first_edge(c), shape_, regularisation_.second_order,
-                   irrotational ? irrotational_.in()[c] : In{}, stress_.out()[c], workers);
-    add_curl_transposed(stress_.in(), result, workers);
-}
+    };
+    const auto along = [&](Window &window, int i) {
+        const Out out = window.along(i);
+        if (offset.data) {
+            minus_product(offset.row(i, 0), weight_.row(i, 0), out.data, out.slab_size());
+        } else {
+            directional_slab(u, direction_, out, i);
+            multiply(weight_.row(i, 0), out.data, out.slab_size());
+        }
+    };
+    const auto finish = [&](Window &window, int i) {
+        Out3 out{};
+        double product = 0;
+        for (int c = 0; c < 3; ++c)
+            if (i < u[c].n[0]) {
+                const In a = slab(u[c], i);
+                out[c] = slab(result[c], i);
+                if (first_order > 0) {
+                    smoothness_slab(slab(u[c], std::max(i - 1, 0)), a,
+                                    slab(u[c], std::min(i + 1, u[c].n[0] - 1)), {0, 0, 0}, u[c].n,
+                                    first_order, {}, out[c]);
+                    add_scaled(a.data, kinetic, out[c].data, a.slab_size());
+                } else {
+                    scaled(a.data, kinetic, out[c].data, a.slab_size());
+                }
+            }
+        add_curl_transposed_slab(read(window.stress(i)), read(window.stress(i + 1)), out);
+        add_directional_transposed_slab(i > 0 ? In(window.along(i - 1)) : In{},
+                                        i < nx ? In(window.along(i)) : In{}, direction_, out, i);
+        for (int c = 0; c < 3; ++c)
+            if (out[c].data)
+                product += dot(u[c].row(i, 0), out[c].data, out[c].slab_size());
+        return product;
+    };
 
-void LeastSquares::apply(const In3 &u, const Out3 &result, Workers &workers) {
-    regularise(u, result, workers);
-    directional(u, direction_.in(), along_, workers);
-    const Out along = along_;
-    workers.run(shape_[0], [&](int i) {
-        product(along.row(i, 0), weight_.in().row(i, 0), along.row(i, 0), along.slab_size());
+    return workers.sum(blocks, [&](int block) {
+        const int first = block * size, last = std::min(first + size, slabs);
+        Window window(shape_);
+        double product = 0;
+        if (first > 0) {
+            curl_slab(u, window.vorticity(first - 1), first - 1);
+            along(window, first - 1);
+        }
+        curl_slab(u, window.vorticity(first), first);
+        for (int i = first; i <= last; ++i) {
+            if (i + 1 < nx)
+                curl_slab(u, window.vorticity(i + 1), i + 1);
+            stress(window, i);
+            if (i > first)
+                product += finish(window, i - 1);
+            if (i < std::min(last, nx))
+                along(window, i);
+        }
+        return product;
     });
-    add_directional_transposed(along_, direction_.in(), result, workers);
 }
 
-Field3 LeastSquares::right_hand_side(Workers &workers) {
+double LeastSquares::apply(const In3 &u, const Out3 &result, Workers &workers) const {
+    return sweep(u, {}, result, workers);
+}
+
+Field3 LeastSquares::right_hand_side(In offset, const In3 &centre, Workers &workers) const {
     Field3 b(shapes());
-    regularise(centre_.in(), b.out(), workers, false);
-    const Out along = along_;
-    workers.run(shape_[0], [&](int i) {
-        product(offset_.in().row(i, 0), weight_.in().row(i, 0), along.row(i, 0), along.slab_size());
-        scaled(along.row(i, 0), -1, along.row(i, 0), along.slab_size());
-    });
-    add_directional_transposed(along_, direction_.in(), b.out(), workers);
+    sweep(centre, offset, b.out(), workers);
     return b;
 }
 
-std::array<double, 3> LeastSquares::symbol() const {
-    double evidence = 0, irrotational = 0;
-    const In3 g = direction_.in();
-    for (std::size_t i = 0; i < volume(shape_); ++i) {
-        double square = 0;
-        for (const In &component : g)
-            square += double(component.data[i]) * component.data[i];
-        evidence += weight_.in().data[i] * square / 3;
-    }
-    for (std::size_t i = 0; i < volume(irrotational_.in()[2].n); ++i)
-        irrotational += irrotational_.in()[2].data[i];
+std::array<double, 3> LeastSquares::symbol(Workers &workers) const {
     const double cells = double(volume(shape_));
+    const double evidence = workers.sum(shape_[0], [&](int i) {
+        double sum = 0;
+        for (std::size_t k = 0; k < weight_.slab_size(); ++k) {
+            double square = 0;
+            for (const In &component : direction_) {
+                const double value = component.row(i, 0)[k];
+                square += value * value;
+            }
+            sum += weight_.row(i, 0)[k] * square / 3;
+        }
+        return sum;
+    });
+    const double irrotational = workers.sum(std::max(shape_[0] - 1, 0), [&](int i) {
+        Field edges(Shape{1, shape_[1] + 1, shape_[2]});
+        std::fill(edges.data().begin(), edges.data().end(), 0.0f);
+        edge_means_slab(irrotational_, 2, edges, i + 1);
+        double sum = 0;
+        for (float value : edges.data())
+            sum += value;
+        return sum;
+    });
     return {regularisation_.kinetic + evidence / cells, regularisation_.first_order + irrotational / cells,
             regularisation_.second_order};
 }
@@ -119,7 +192,12 @@ std::array<double, 3> LeastSquares::symbol() const {
 Field3 LeastSquares::diagonal(Workers &workers) const {
     Field3 diagonal(shapes());
     const Out3 out = diagonal.out();
-    const In3 g = direction_.in();
+    const In3 &g = direction_;
+    Field3 edges(edge_shapes(shape_));
+    std::fill_n(edges.data(), edges.size(), 0.0f);
+    for (int c = 0; c < 3; ++c)
+        for (int i = c != 0; i < shape_[0]; ++i)
+            edge_means_slab(irrotational_, c, slab(edges.out()[c], i), i);
     for (int c = 0; c < 3; ++c) {
         const Shape n = out[c].n;
         const int step[3] = {c == 0, c == 1, c == 2};
@@ -134,7 +212,7 @@ Field3 LeastSquares::diagonal(Workers &workers) const {
                         if (x < 0 || y < 0 || z < 0 || x >= shape_[0] || y >= shape_[1] || z >= shape_[2])
                             continue;
                         const float along = 0.5f * g[c].row(x, y)[z];
-                        sum += weight_.in().row(x, y)[z] * along * along;
+                        sum += weight_.row(x, y)[z] * along * along;
                     }
                     out[c].row(i, j)[k] = sum;
                 }
@@ -144,13 +222,13 @@ Field3 LeastSquares::diagonal(Workers &workers) const {
             if (e == c)
                 continue;
             const int across = 3 - c - e;
-            const In edges = irrotational_.in()[e];
+            const In around = edges.in()[e];
             workers.run(n[0], [&](int i) {
                 for (int j = 0; j < n[1]; ++j)
                     for (int k = 0; k < n[2]; ++k)
                         out[c].row(i, j)[k] +=
-                            edges.row(i, j)[k] +
-                            edges.row(i + (across == 0), j + (across == 1))[k + (across == 2)];
+                            around.row(i, j)[k] +
+                            around.row(i + (across == 0), j + (across == 1))[k + (across == 2)];
             });
         }
     }

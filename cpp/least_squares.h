@@ -18,30 +18,31 @@ struct Regularisation {
 // E(u) = u.Au - 2 b.u + constant with A symmetric and positive definite if kinetic > 0.
 class LeastSquares {
 public:
-    LeastSquares(const In3 &direction, In offset, In weight, In irrotational, const In3 &centre,
-                 const Regularisation &regularisation, const Closed &closed);
+    // What is passed here has to outlive this object.
+    LeastSquares(const In3 &direction, In weight, In irrotational, const Regularisation &regularisation,
+                 const Closed &closed)
+        : shape_(weight.n), closed_(closed), regularisation_(regularisation), direction_(direction),
+          weight_(weight), irrotational_(irrotational) {}
 
-    void apply(const In3 &u, const Out3 &result, Workers &workers); // A u
-    Field3 right_hand_side(Workers &workers);                       // b
-    Field3 diagonal(Workers &workers) const;                        // of A, as it is away from the sides
+    double apply(const In3 &u, const Out3 &result, Workers &workers) const;       // A u; returns u.Au
+    Field3 right_hand_side(In offset, const In3 &centre, Workers &workers) const; // b
+    Field3 diagonal(Workers &workers) const; // of A, as it is away from the sides
 
     // Coefficients of k^0, k^2 and k^4 of a problem with constant coefficients that resembles this one.
-    std::array<double, 3> symbol() const;
+    std::array<double, 3> symbol(Workers &workers) const;
 
     const Shape &shape() const { return shape_; }
     const Closed &closed() const { return closed_; }
     std::array<Shape, 3> shapes() const { return face_shapes(shape_); }
 
 private:
-    void regularise(const In3 &u, const Out3 &result, Workers &workers, bool irrotational = true);
+    double sweep(const In3 &u, In offset, const Out3 &result, Workers &workers) const;
 
     Shape shape_;
     Closed closed_;
     Regularisation regularisation_;
-    Field3 direction_, centre_, irrotational_; // the last on edges
-    Field offset_, weight_;
-    Field3 vorticity_, stress_; // scratch on edges, zero on the sides of the box
-    Field along_;               // scratch: weight * (direction . u)
+    In3 direction_;
+    In weight_, irrotational_;
 };
 
 struct Figures {

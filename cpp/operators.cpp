@@ -3,7 +3,6 @@
 #include <algorithm>
 
 namespace smokelift {
-namespace {
 
 SMOKELIFT_CLONES
 void divergence_slab(const In3 &u, Out cells, int i) {
@@ -12,11 +11,13 @@ void divergence_slab(const In3 &u, Out cells, int i) {
         const float *__restrict x0 = u[0].row(i, j), *__restrict x1 = u[0].row(i + 1, j);
         const float *__restrict y0 = u[1].row(i, j), *__restrict y1 = u[1].row(i, j + 1);
         const float *__restrict z = u[2].row(i, j);
-        float *__restrict out = cells.row(i, j);
+        float *__restrict out = cells.row(0, j);
         for (int k = 0; k < nz; ++k)
             out[k] = (x1[k] - x0[k]) + (y1[k] - y0[k]) + (z[k + 1] - z[k]);
     }
 }
+
+namespace {
 
 SMOKELIFT_CLONES
 void gradient_slab(In a, const Out3 &g, int i) {
@@ -42,7 +43,8 @@ void gradient_slab(In a, const Out3 &g, int i) {
     }
 }
 
-// Slab i of each edge array; i may be one past the last cell.
+} // namespace
+
 SMOKELIFT_CLONES
 void curl_slab(const In3 &u, const Out3 &w, int i) {
     const int nx = u[1].n[0], ny = u[0].n[1], nz = u[0].n[2];
@@ -50,7 +52,7 @@ void curl_slab(const In3 &u, const Out3 &w, int i) {
         for (int j = 1; j < ny; ++j) {
             const float *__restrict z0 = u[2].row(i, j - 1), *__restrict z1 = u[2].row(i, j);
             const float *__restrict y = u[1].row(i, j);
-            float *__restrict out = w[0].row(i, j);
+            float *__restrict out = w[0].row(0, j);
             for (int k = 1; k < nz; ++k)
                 out[k] = (z1[k] - z0[k]) - (y[k] - y[k - 1]);
         }
@@ -59,58 +61,59 @@ void curl_slab(const In3 &u, const Out3 &w, int i) {
     for (int j = 0; j < ny; ++j) {
         const float *__restrict z0 = u[2].row(i - 1, j), *__restrict z1 = u[2].row(i, j);
         const float *__restrict x = u[0].row(i, j);
-        float *__restrict out = w[1].row(i, j);
+        float *__restrict out = w[1].row(0, j);
         for (int k = 1; k < nz; ++k)
             out[k] = (x[k] - x[k - 1]) - (z1[k] - z0[k]);
     }
     for (int j = 1; j < ny; ++j) {
         const float *__restrict y0 = u[1].row(i - 1, j), *__restrict y1 = u[1].row(i, j);
         const float *__restrict x0 = u[0].row(i, j - 1), *__restrict x1 = u[0].row(i, j);
-        float *__restrict out = w[2].row(i, j);
+        float *__restrict out = w[2].row(0, j);
         for (int k = 0; k < nz; ++k)
             out[k] = (y1[k] - y0[k]) - (x1[k] - x0[k]);
     }
 }
 
 SMOKELIFT_CLONES
-void add_curl_transposed_slab(const In3 &w, const Out3 &u, int i) {
-    const int nx = u[1].n[0], ny = u[0].n[1], nz = u[0].n[2];
+void add_curl_transposed_slab(const In3 &w, const In3 &after, const Out3 &u) {
+    const int ny = u[0].n[1], nz = u[0].n[2];
     for (int j = 0; j < ny; ++j) {
-        float *__restrict out = u[0].row(i, j);
-        const float *__restrict y = w[1].row(i, j);
-        const float *__restrict z0 = w[2].row(i, j), *__restrict z1 = w[2].row(i, j + 1);
+        float *__restrict out = u[0].row(0, j);
+        const float *__restrict y = w[1].row(0, j);
+        const float *__restrict z0 = w[2].row(0, j), *__restrict z1 = w[2].row(0, j + 1);
         for (int k = 0; k < nz; ++k)
             out[k] += (y[k] - y[k + 1]) - (z0[k] - z1[k]);
     }
-    if (i >= nx)
+    if (!u[1].data)
         return;
     for (int j = 0; j <= ny; ++j) {
-        float *__restrict out = u[1].row(i, j);
-        const float *__restrict x = w[0].row(i, j);
-        const float *__restrict z0 = w[2].row(i, j), *__restrict z1 = w[2].row(i + 1, j);
+        float *__restrict out = u[1].row(0, j);
+        const float *__restrict x = w[0].row(0, j);
+        const float *__restrict z0 = w[2].row(0, j), *__restrict z1 = after[2].row(0, j);
         for (int k = 0; k < nz; ++k)
             out[k] += (z0[k] - z1[k]) - (x[k] - x[k + 1]);
     }
     for (int j = 0; j < ny; ++j) {
-        float *__restrict out = u[2].row(i, j);
-        const float *__restrict x0 = w[0].row(i, j), *__restrict x1 = w[0].row(i, j + 1);
-        const float *__restrict y0 = w[1].row(i, j), *__restrict y1 = w[1].row(i + 1, j);
+        float *__restrict out = u[2].row(0, j);
+        const float *__restrict x0 = w[0].row(0, j), *__restrict x1 = w[0].row(0, j + 1);
+        const float *__restrict y0 = w[1].row(0, j), *__restrict y1 = after[1].row(0, j);
         for (int k = 0; k <= nz; ++k)
             out[k] += (x0[k] - x1[k]) - (y0[k] - y1[k]);
     }
 }
 
 SMOKELIFT_CLONES
-void smoothness_slab(In a, const Shape &low, const Shape &high, float weight, In pointwise, Out result,
-                     int i) {
+void smoothness_slab(In before, In a, In after, const Shape &low, const Shape &high, float weight,
+                     In pointwise, Out result) {
     const int first = low[2], last = high[2] - 1;
+    if (first > last)
+        return;
     for (int j = low[1]; j < high[1]; ++j) {
-        const float *__restrict c = a.row(i, j);
-        const float *__restrict x0 = a.row(std::max(i - 1, low[0]), j);
-        const float *__restrict x1 = a.row(std::min(i + 1, high[0] - 1), j);
-        const float *__restrict y0 = a.row(i, std::max(j - 1, low[1]));
-        const float *__restrict y1 = a.row(i, std::min(j + 1, high[1] - 1));
-        float *__restrict out = result.row(i, j);
+        const float *__restrict c = a.row(0, j);
+        const float *__restrict x0 = before.row(0, j), *__restrict x1 = after.row(0, j);
+        const float *__restrict y0 = a.row(0, std::max(j - 1, low[1]));
+        const float *__restrict y1 = a.row(0, std::min(j + 1, high[1] - 1));
+        float *__restrict out = result.row(0, j);
         for (int k = first + 1; k < last; ++k)
             out[k] = weight * (6 * c[k] - ((x0[k] + x1[k]) + (y0[k] + y1[k]) + (c[k - 1] + c[k + 1])));
         for (int k : {first, last}) {
@@ -118,7 +121,7 @@ void smoothness_slab(In a, const Shape &low, const Shape &high, float weight, In
             out[k] = weight * (6 * c[k] - ((x0[k] + x1[k]) + (y0[k] + y1[k]) + ends));
         }
         if (pointwise.data) {
-            const float *__restrict extra = pointwise.row(i, j);
+            const float *__restrict extra = pointwise.row(0, j);
             for (int k = first; k <= last; ++k)
                 out[k] += extra[k] * c[k];
         }
@@ -134,11 +137,13 @@ void directional_slab(const In3 &u, const In3 &g, Out cells, int i) {
         const float *__restrict z = u[2].row(i, j);
         const float *__restrict gx = g[0].row(i, j), *__restrict gy = g[1].row(i, j);
         const float *__restrict gz = g[2].row(i, j);
-        float *__restrict out = cells.row(i, j);
+        float *__restrict out = cells.row(0, j);
         for (int k = 0; k < nz; ++k)
             out[k] = 0.5f * (gx[k] * (x0[k] + x1[k]) + gy[k] * (y0[k] + y1[k]) + gz[k] * (z[k] + z[k + 1]));
     }
 }
+
+namespace {
 
 SMOKELIFT_INLINE void add_half_product(const float *__restrict a, const float *__restrict b, int n,
                                        float *__restrict out) {
@@ -146,28 +151,53 @@ SMOKELIFT_INLINE void add_half_product(const float *__restrict a, const float *_
         out[k] += 0.5f * a[k] * b[k];
 }
 
+} // namespace
+
 SMOKELIFT_CLONES
-void add_directional_transposed_slab(In q, const In3 &g, const Out3 &u, int i) {
-    const auto [nx, ny, nz] = q.n;
-    for (int j = 0; j < ny; ++j)
-        for (int side = std::max(i - 1, 0); side <= std::min(i, nx - 1); ++side)
-            add_half_product(g[0].row(side, j), q.row(side, j), nz, u[0].row(i, j));
-    if (i >= nx)
+void add_directional_transposed_slab(In before, In q, const In3 &g, const Out3 &u, int i) {
+    const int ny = g[0].n[1], nz = g[0].n[2];
+    for (int j = 0; j < ny; ++j) {
+        if (before.data)
+            add_half_product(g[0].row(i - 1, j), before.row(0, j), nz, u[0].row(0, j));
+        if (q.data)
+            add_half_product(g[0].row(i, j), q.row(0, j), nz, u[0].row(0, j));
+    }
+    if (!q.data)
         return;
     for (int j = 0; j < ny; ++j) {
-        add_half_product(g[1].row(i, j), q.row(i, j), nz, u[1].row(i, j));
-        add_half_product(g[1].row(i, j), q.row(i, j), nz, u[1].row(i, j + 1));
-        add_half_product(g[2].row(i, j), q.row(i, j), nz, u[2].row(i, j));
-        add_half_product(g[2].row(i, j), q.row(i, j), nz, u[2].row(i, j) + 1);
+        add_half_product(g[1].row(i, j), q.row(0, j), nz, u[1].row(0, j));
+        add_half_product(g[1].row(i, j), q.row(0, j), nz, u[1].row(0, j + 1));
+        add_half_product(g[2].row(i, j), q.row(0, j), nz, u[2].row(0, j));
+        add_half_product(g[2].row(i, j), q.row(0, j), nz, u[2].row(0, j) + 1);
     }
 }
+
+SMOKELIFT_CLONES
+void edge_means_slab(In a, int c, Out edges, int i) {
+    const int x = c != 0, y = c != 1, z = c != 2; // one where an edge lies between two cells
+    for (int j = y; j < a.n[1]; ++j) {
+        const float *__restrict r0 = a.row(i, j), *__restrict r1 = a.row(i - x, j);
+        const float *__restrict r2 = a.row(i, j - y), *__restrict r3 = a.row(i - x, j - y);
+        float *__restrict out = edges.row(0, j);
+        if (z)
+            for (int k = 1; k < a.n[2]; ++k)
+                out[k] = 0.25f * (r0[k] + r0[k - 1] + r3[k] + r3[k - 1]);
+        else
+            for (int k = 0; k < a.n[2]; ++k)
+                out[k] = 0.25f * (r0[k] + r1[k] + r2[k] + r3[k]);
+    }
+}
+
+namespace {
 
 constexpr std::size_t chunk = 1 << 14;
 
 int chunks(std::size_t n) { return int((n + chunk - 1) / chunk); }
 
+} // namespace
+
 SMOKELIFT_CLONES
-double dot_chunk(const float *__restrict a, const float *__restrict b, std::size_t n) {
+double dot(const float *__restrict a, const float *__restrict b, std::size_t n) {
     // Sixteen running sums keep the vector units busy; a fixed number keeps the result the same everywhere.
     constexpr int lanes = 16;
     float sums[lanes] = {};
@@ -182,6 +212,8 @@ double dot_chunk(const float *__restrict a, const float *__restrict b, std::size
         total += value;
     return total;
 }
+
+namespace {
 
 SMOKELIFT_CLONES
 void axpy_chunk(float factor, const float *__restrict x, float *__restrict y, std::size_t n) {
@@ -198,41 +230,17 @@ void xpay_chunk(const float *__restrict x, float factor, float *__restrict y, st
 } // namespace
 
 void divergence(const In3 &faces, Out cells, Workers &workers) {
-    workers.run(cells.n[0], [&](int i) { divergence_slab(faces, cells, i); });
+    workers.run(cells.n[0], [&](int i) { divergence_slab(faces, slab(cells, i), i); });
 }
 
 void gradient(In cells, const Out3 &result, Workers &workers) {
     workers.run(cells.n[0], [&](int i) { gradient_slab(cells, result, i); });
 }
 
-void curl(const In3 &faces, const Out3 &edges, Workers &workers) {
-    workers.run(faces[0].n[0], [&](int i) { curl_slab(faces, edges, i); });
-}
-
-void add_curl_transposed(const In3 &edges, const Out3 &faces, Workers &workers) {
-    workers.run(faces[0].n[0], [&](int i) { add_curl_transposed_slab(edges, faces, i); });
-}
-
-void smoothness(In a, const Shape &low, const Shape &high, float weight, In pointwise, Out result,
-                Workers &workers) {
-    if (low[1] >= high[1] || low[2] >= high[2])
-        return;
-    workers.run(std::max(high[0] - low[0], 0),
-                [&](int i) { smoothness_slab(a, low, high, weight, pointwise, result, low[0] + i); });
-}
-
-void directional(const In3 &faces, const In3 &direction, Out cells, Workers &workers) {
-    workers.run(cells.n[0], [&](int i) { directional_slab(faces, direction, cells, i); });
-}
-
-void add_directional_transposed(In cells, const In3 &direction, const Out3 &faces, Workers &workers) {
-    workers.run(faces[0].n[0], [&](int i) { add_directional_transposed_slab(cells, direction, faces, i); });
-}
-
 double dot(const float *a, const float *b, std::size_t n, Workers &workers) {
     return workers.sum(chunks(n), [&](int c) {
         const std::size_t start = c * chunk;
-        return dot_chunk(a + start, b + start, std::min(chunk, n - start));
+        return dot(a + start, b + start, std::min(chunk, n - start));
     });
 }
 
@@ -248,6 +256,16 @@ void xpay(const float *x, float factor, float *y, std::size_t n, Workers &worker
         const std::size_t start = c * chunk;
         xpay_chunk(x + start, factor, y + start, std::min(chunk, n - start));
     });
+}
+
+void axpy(float factor, const In3 &x, const Out3 &y, Workers &workers) {
+    for (int c = 0; c < 3; ++c)
+        axpy(factor, x[c].data, y[c].data, volume(x[c].n), workers);
+}
+
+void copy(const In3 &x, const Out3 &y, Workers &workers) {
+    for (int c = 0; c < 3; ++c)
+        workers.run(x[c].n[0], [&](int i) { std::copy_n(x[c].row(i, 0), x[c].slab_size(), y[c].row(i, 0)); });
 }
 
 } // namespace smokelift

@@ -5,6 +5,16 @@
 namespace smokelift {
 namespace {
 
+// Reciprocal pivots of the systems along x, from the diagonals less 2.
+SMOKELIFT_CLONES
+void eliminate(float *__restrict pivots, double *__restrict last, const double *__restrict square,
+               double y_square, double end, int nz) {
+    for (int k = 0; k < nz; ++k) {
+        last[k] = 1 / (2 + y_square + end + square[k] - last[k]);
+        pivots[k] = float(last[k]);
+    }
+}
+
 // Forward elimination and back substitution along x for one y, all z at once.
 SMOKELIFT_CLONES
 void tridiagonal(float *f, const float *pivots, int nx, std::size_t slab, int nz) {
@@ -13,14 +23,14 @@ void tridiagonal(float *f, const float *pivots, int nx, std::size_t slab, int nz
     for (int i = 1; i < nx; ++i) {
         float *__restrict row = f + i * slab;
         const float *__restrict before = row - slab;
-        const float *__restrict pivot = pivots + i * slab;
+        const float *__restrict pivot = pivots + std::size_t(i) * nz;
         for (int k = 0; k < nz; ++k)
             row[k] = (row[k] + before[k]) * pivot[k];
     }
     for (int i = nx - 2; i >= 0; --i) {
         float *__restrict row = f + i * slab;
         const float *__restrict after = row + slab;
-        const float *__restrict pivot = pivots + i * slab;
+        const float *__restrict pivot = pivots + std::size_t(i) * nz;
         for (int k = 0; k < nz; ++k)
             row[k] += pivot[k] * after[k];
     }
@@ -28,7 +38,7 @@ void tridiagonal(float *f, const float *pivots, int nx, std::size_t slab, int nz
 
 } // namespace
 
-Poisson::Poisson(const Shape &n, const Closed &closed) : n_(n), closed_(closed), pivots_(n) {
+Poisson::Poisson(const Shape &n, const Closed &closed) : n_(n), closed_(closed) {
     singular_ = true;
     for (bool side : closed)
         singular_ = singular_ && side;
@@ -36,23 +46,10 @@ Poisson::Poisson(const Shape &n, const Closed &closed) : n_(n), closed_(closed),
     y_ = y.cells();
     z_ = z.cells();
 
-    Out pivots = pivots_;
-    std::vector<double> last(n[2]);
-    for (int j = 0; j < n[1]; ++j)
-        for (int i = 0; i < n[0]; ++i) {
-            // A missing neighbour takes 1 from the diagonal at a wall and adds 1 at an open side.
-            double diagonal = 2 + y.difference[j] * y.difference[j];
-            if (i == 0)
-                diagonal += closed[0] ? -1 : 1;
-            if (i == n[0] - 1)
-                diagonal += closed[1] ? -1 : 1;
-            for (int k = 0; k < n[2]; ++k) {
-                const double pivot = diagonal + z.difference[k] * z.difference[k] - (i ? last[k] : 0);
-                // The constant mode has no equation of its own: pin its last value to zero.
-                last[k] = singular_ && i == n[0] - 1 && j == 0 && k == 0 ? 0 : 1 / pivot;
-                pivots.row(i, j)[k] = float(last[k]);
-            }
-        }
+    for (double difference : y.difference)
+        y_square_.push_back(difference * difference);
+    for (double difference : z.difference)
+        z_square_.push_back(difference * difference);
 }
 
 void Poisson::solve(Out f, Workers &workers) const {
@@ -75,7 +72,22 @@ void Poisson::solve(Out f, Workers &workers) const {
         z_.rows_to_modes(f.row(i, 0), ny, f.row(i, 0), scratch);
         y_.columns_to_modes(f.row(i, 0), nz, nz, f.row(i, 0), nz, scratch);
     });
-    workers.run(ny, [&](int j) { tridiagonal(f.row(0, j), pivots_.in().row(0, j), nx, slab, nz); });
+    workers.run(ny, [&, nx = nx, nz = nz](int j) {
+        thread_local std::vector<float> pivots;
+        thread_local std::vector<double> last;
+        pivots.resize(std::size_t(nx) * nz);
+        last.assign(nz, 0);
+        for (int i = 0; i < nx; ++i) {
+            // A missing neighbour takes 1 from the diagonal at a wall and adds 1 at an open side.
+            const double end = (i > 0 ? 0 : closed_[0] ? -1 : 1) + (i < nx - 1 ? 0 : closed_[1] ? -1 : 1);
+            eliminate(pivots.data() + std::size_t(i) * nz, last.data(), z_square_.data(), y_square_[j], end,
+                      nz);
+        }
+        // The constant mode has no equation of its own: pin its last value to zero.
+        if (singular_ && j == 0)
+            pivots[std::size_t(nx - 1) * nz] = 0;
+        tridiagonal(f.row(0, j), pivots.data(), nx, slab, nz);
+    });
     workers.run(nx, [&](int i) {
         thread_local std::vector<float> scratch;
         y_.columns_from_modes(f.row(i, 0), nz, nz, f.row(i, 0), nz, scratch);

@@ -25,7 +25,7 @@ private:
     Closed closed_;
     bool singular_;
     Basis y_, z_;
-    Field pivots_; // reciprocal pivots of the tridiagonal systems
+    std::vector<double> y_square_, z_square_; // eigenvalues of -laplace along y and z
 };
 
 } // namespace smokelift

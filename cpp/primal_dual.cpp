@@ -40,8 +40,8 @@ void divide(const float *__restrict a, const float *__restrict b, float *__restr
 // product.
 class Proximal {
 public:
-    Proximal(LeastSquares &problem, const PrimalDual &settings, Workers &workers)
-        : problem_(problem), settings_(settings), workers_(workers), b_(problem.right_hand_side(workers)),
+    Proximal(const LeastSquares &problem, const Field3 &b, const PrimalDual &settings, Workers &workers)
+        : problem_(problem), b_(b), settings_(settings), workers_(workers),
           diagonal_(problem.diagonal(workers)), residual_(problem.shapes()), scaled_(problem.shapes()),
           search_(problem.shapes()), product_(problem.shapes()) {
         for (std::size_t i = 0; i < diagonal_.size(); ++i)
@@ -90,23 +90,24 @@ private:
         return dot(residual_.data(), scaled_.data(), residual_.size(), workers_);
     }
 
-    LeastSquares &problem_;
+    const LeastSquares &problem_;
+    const Field3 &b_;
     const PrimalDual &settings_;
     Workers &workers_;
-    Field3 b_, diagonal_, residual_, scaled_, search_, product_;
+    Field3 diagonal_, residual_, scaled_, search_, product_;
 };
 
 } // namespace
 
-Figures primal_dual(LeastSquares &problem, Projection &projection, const PrimalDual &s, const Out3 &result,
-                    Workers &workers) {
+Figures primal_dual(const LeastSquares &problem, const Field3 &b, Projection &projection, const PrimalDual &s,
+                    const Out3 &result, Workers &workers) {
     require_convergent(s);
     Figures figures;
-    Proximal proximal(problem, s, workers);
+    Proximal proximal(problem, b, s, workers);
     Field3 u(problem.shapes()), dual(problem.shapes()), xi(problem.shapes());
     const std::size_t n = u.size();
-    for (int c = 0; c < 3; ++c)
-        std::copy_n(result[c].data, volume(result[c].n), u.out()[c].data);
+    std::fill_n(dual.data(), n, 0.0f);
+    copy(read(result), u.out(), workers);
     Field3 relaxed = u, prox = u, before = u;
 
     for (bool converged = false; !converged && figures.iterations < s.limit; ++figures.iterations) {
@@ -132,8 +133,7 @@ Figures primal_dual(LeastSquares &problem, Projection &projection, const PrimalD
         converged = change <= std::sqrt(3.0) * s.absolute + s.relative * norm;
         figures.residual = norm > 0 ? change / norm : 0;
     }
-    for (int c = 0; c < 3; ++c)
-        std::copy_n(u.in()[c].data, volume(result[c].n), result[c].data);
+    copy(u.in(), result, workers);
     return figures;
 }
 

@@ -14,9 +14,9 @@ struct PrimalDual {
     int inner_limit;
 };
 
-// Minimises the quadratic over velocities without divergence, starting from u. Throws std::invalid_argument
-// for steps that violate the condition for convergence.
-Figures primal_dual(LeastSquares &problem, Projection &projection, const PrimalDual &settings, const Out3 &u,
-                    Workers &workers);
+// Minimises the quadratic with the right-hand side b over velocities without divergence, starting from u.
+// Throws std::invalid_argument for steps that violate the condition for convergence.
+Figures primal_dual(const LeastSquares &problem, const Field3 &b, Projection &projection,
+                    const PrimalDual &settings, const Out3 &u, Workers &workers);
 
 } // namespace smokelift

@@ -7,7 +7,9 @@ namespace smokelift {
 
 // Minimises the quadratic from u, which has to be free of divergence and stays so. Stops when the projected
 // gradient has fallen to `tolerance` times that of the fluid at rest, after `limit` iterations, or when
-// rounding keeps it from falling any further.
-Figures projected_cg(LeastSquares &problem, double tolerance, int limit, const Out3 &u, Workers &workers);
+// rounding keeps it from falling any further. `b`, the right-hand side, gives its room to the residual in the
+// meantime and is the same as before, to rounding, in the end.
+Figures projected_cg(const LeastSquares &problem, Field3 &b, double tolerance, int limit, const Out3 &u,
+                     Workers &workers);
 
 } // namespace smokelift

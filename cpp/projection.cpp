@@ -52,7 +52,8 @@ void subtract_gradient_slab(In p, const Out3 &u, const Closed &closed, int i) {
     }
 }
 
-double largest(const float *p, std::size_t n) {
+SMOKELIFT_CLONES
+float largest(const float *p, std::size_t n) {
     float value = 0;
     for (std::size_t i = 0; i < n; ++i)
         value = std::max(value, std::abs(p[i]));
@@ -86,12 +87,21 @@ void Projection::apply(const Out3 &u, Workers &workers) {
 }
 
 double relative_divergence(const In3 &u, Workers &workers) {
-    Field cells(Shape{u[1].n[0], u[0].n[1], u[0].n[2]});
-    divergence(u, cells, workers);
-    double speed = 0;
-    for (const In &component : u)
-        speed = std::max(speed, largest(component.data, volume(component.n)));
-    return speed > 0 ? largest(cells.in().data, cells.data().size()) / speed : 0;
+    const int nx = u[1].n[0];
+    std::vector<float> speeds(nx + 1), outflows(nx + 1);
+    workers.run(nx + 1, [&](int i) {
+        for (const In &component : u)
+            if (i < component.n[0])
+                speeds[i] = std::max(speeds[i], largest(component.row(i, 0), component.slab_size()));
+        if (i < nx) {
+            Field cells(Shape{1, u[0].n[1], u[0].n[2]});
+            divergence_slab(u, cells, i);
+            outflows[i] = largest(cells.data().data(), cells.data().size());
+        }
+    });
+    const float speed = *std::max_element(speeds.begin(), speeds.end());
+    const float outflow = *std::max_element(outflows.begin(), outflows.end());
+    return speed > 0 ? double(outflow) / double(speed) : 0;
 }
 
 } // namespace smokelift

@@ -20,17 +20,14 @@ public:
         return closed_low == closed_high ? n + 1 : n;
     }
 
-    Basis cells() const { return basis(n_, 0.5, closed_low_); }
-    Basis faces() const { return basis(n_ + 1, 0, !closed_low_); }
+    Basis cells() const { return Basis(cells_, n_, first_, count_); }
+    Basis faces() const { return Basis(faces_, n_, first_, count_); }
 
     std::vector<double> difference;
 
 private:
-    Basis basis(int length, double offset, bool cosine) const;
-
-    int n_, even_;
-    bool closed_low_;
-    std::vector<double> angles_;
+    Wave cells_, faces_;
+    int n_, first_, count_;
 };
 
 } // namespace smokelift

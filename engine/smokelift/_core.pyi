@@ -28,6 +28,28 @@ def advect_cells(
     field: Array, displacement: Arrays, maccormack: bool, extend: bool = False, threads: int = 0
 ) -> Array: ...
 def advect_faces(field: Arrays, displacement: Arrays, maccormack: bool, threads: int = 0) -> list[Array]: ...
+def blur(cells: Array, width: float, truncate: float, threads: int = 0) -> Array:
+    """A Gaussian of a standard deviation in cells, cut off at `truncate` of them; ends mirrored."""
+
+def linearise(
+    before: Array, after: Array, u: Arrays, threshold: float, threads: int = 0
+) -> tuple[list[Array], Array, Array, Array, Array, npt.NDArray[np.bool_], float]:
+    """Direction, offset, residual, carried, density, smoke and scale; a scale of zero leaves the others undefined."""
+
+def evidence(
+    direction: Arrays, offset: Array, weight: Array, smoke: npt.NDArray[np.bool_], u: Arrays, threads: int = 0
+) -> tuple[float, float, float]:
+    """Sums of weight offset^2, of weight (offset + direction . u)^2, and of weight inside the smoke."""
+
+def directional(direction: Arrays, u: Arrays, threads: int = 0) -> Array: ...
+def weighted_products(columns: list[Array], weight: Array, threads: int = 0) -> npt.NDArray[np.float64]: ...
+def pushed(
+    density: Array, push: npt.ArrayLike, trust: float, prediction: Arrays | None, closed: Closed, threads: int = 0
+) -> list[Array]:
+    """trust prediction + P(density push); a row of `push` for the constant, or four with slopes along x, y, z."""
+
+def refine(u: Arrays, shape: tuple[int, ...], closed: Closed, threads: int = 0) -> list[Array]: ...
+def within_reach(solution: Arrays, u: Arrays, reach: float, closed: Closed, threads: int = 0) -> list[Array]: ...
 
 class LeastSquares:
     def __init__(

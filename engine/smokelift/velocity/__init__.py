@@ -14,10 +14,10 @@ subject to div u = 0, over velocities u on voxel faces, in voxels per frame, wit
     u_p = t prediction + P(momentum)              both fitted with a few numbers (`momentum`)
     R(v) = k (smoothness * sum |grad curl v|^2 + kinetic * sum |v|^2)    (|grad v|^2 in method "paper")
 
-from coarse to fine grids (`pyramid`), linearised anew after every solve (`estimate`). Before and after are the
-densities that `noise` and `contrast` make of the given ones. Dividing by s makes every weight independent of the scales of
-density, space and time. k grows as u_p proves right: it is the given share of the change over the one that u_p leaves
-unexplained.
+from coarse to fine grids (`pyramid`), linearised anew after every solve (`linear`, `estimate`). Before and after are
+the densities that `noise` and `contrast` make of the given ones. Dividing by s makes every weight independent of the
+scales of density, space and time. k grows as u_p proves right: it is the given share of the change over the one that
+u_p leaves unexplained.
 
 Sources: Cen, Zhang, Liang (2023), Entropy 25, 1348, section 3.3 and algorithm 5 (method "paper"); Chambolle
 and Pock (2011), J. Math. Imaging Vis. 40, 120; Eckert et al. (2019), ACM TOG 38(6), 239 (ScalarFlow).

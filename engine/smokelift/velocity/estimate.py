@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,7 +16,6 @@ from smokelift.transport import (
     Side,
     Velocity,
     advect,
-    at_centres,
     closed_flags,
     face_shapes,
     project,
@@ -25,13 +23,13 @@ from smokelift.transport import (
     require_same_shape,
 )
 from smokelift.velocity.contrast import expanded
-from smokelift.velocity.momentum import Motion, fit_motion
+from smokelift.velocity.linear import Linearisation, least_squares, linearise, solve
+from smokelift.velocity.momentum import Motion, Prediction, fit_motion
 from smokelift.velocity.noise import Followed, followed, without_noise
 from smokelift.velocity.pyramid import Level, pyramid, refine
 from smokelift.velocity.settings import VelocitySettings
-from smokelift.velocity.sources import source_weight
 
-REACH = np.float32(1.0)
+REACH = 1.0
 """Voxels of the grid at hand up to which a linearisation of the density holds."""
 
 CONFIDENCE_WIDTH = 2.0
@@ -93,34 +91,35 @@ def estimate_velocity(
     require_same_shape("after", second.shape, first.shape)
     nx, ny, nz = shape = first.shape
     closed = closed_flags(settings.closed)
-    weight = np.ones(shape, np.float32)
+    weight: Array = np.broadcast_to(np.float32(1), shape)
     if inflow is not None:
         require_same_shape("inflow", inflow.shape, shape)
         # blur and gradients take the change there one voxel further
-        weight[ndimage.binary_dilation(inflow)] = 0
+        weight = (~ndimage.binary_dilation(inflow)).astype(np.float32)
     paper = settings.method == "paper"
     peaks = sorted(float(density.max()) for density in (first, second))
     if not paper and peaks[0] <= settings.smoke_threshold * peaks[1]:
         return _appeared(first, second, dt, voxel_size)
     if paper:
-        blurred = without_noise(first, second, (settings.blur,), settings.smoke_threshold)
+        blurred = without_noise(first, second, (settings.blur,), settings.smoke_threshold, settings.threads)
         pair = Followed(*blurred, compressed=False)
     else:
-        pair = followed(first, second, settings.blur, settings.smoke_threshold)
-    predicted = _zero_faces(shape)
+        pair = followed(first, second, settings.blur, settings.smoke_threshold, settings.threads)
+    predicted = None
     if prediction is not None:
         require_same_shape("the prediction", prediction.shape, shape)
-        predicted = prediction.displacement(dt)
+        predicted = Prediction(prediction.faces, dt / voxel_size)
 
-    finest = Level(pair.before, pair.after, weight, predicted)
+    finest = Level(pair.before, pair.after, weight)
     search = settings.sources and inflow is None
-    found = _paper(finest, settings) if paper else _default(finest, search, pair, settings)
+    found = _paper(finest, predicted, settings) if paper else _default(finest, predicted, search, pair, settings)
     if found is None:
         return Velocity.zero((nx, ny, nz), voxel_size)
     (x, y, z), divergence = _core.project(found.u, closed, passes=1, threads=settings.threads)
-    scale = np.float32(voxel_size / dt)
+    for component in (x, y, z):
+        component *= np.float32(voxel_size / dt)
     return Velocity(
-        (x * scale, y * scale, z * scale),
+        (x, y, z),
         voxel_size,
         {**found.figures, "divergence": divergence},
         confidence=found.confidence,
@@ -158,73 +157,66 @@ class _Found:
     source: Array
 
 
-@dataclass(frozen=True, eq=False)
-class _Linearisation:
-    """The change between two densities around a velocity: r + g . (u - u_k) = offset + direction . u."""
-
-    direction: Faces
-    offset: Array
-    residual: Array  # not divided by the scale, as the others are
-    carried: Array
-    density: Array
-    smoke: npt.NDArray[np.bool_]
-    scale: float
-
-
-def _paper(level: Level, settings: VelocitySettings) -> _Found | None:
+def _paper(level: Level, prediction: Prediction | None, settings: VelocitySettings) -> _Found | None:
     """The paper's estimate: one grid, one linearisation around rest."""
-    start = level.prediction
-    linear = _linearise(level, start, settings)
+    start = _zero_faces(level.after.shape) if prediction is None else prediction.displacement()
+    linear = linearise(level, start, False, settings)
     if linear is None:
         return None
-    u, figures = _solve(linear, level.weight, level.prediction, 1.0, start, settings)
+    u, figures = solve(least_squares(linear, start, 1.0, settings), start, settings)
     nothing = np.zeros_like(level.after)
     measures = {name: figures[name] for name in ("iterations", "products", "projections", "residual")}
     return _Found(u, measures, nothing + 1, nothing)
 
 
-def _default(finest: Level, search: bool, pair: Followed, settings: VelocitySettings) -> _Found | None:
+def _default(
+    finest: Level, prediction: Prediction | None, search: bool, pair: Followed, settings: VelocitySettings
+) -> _Found | None:
     """From coarse to fine, or straight on the finest grid where there is a prediction worth its name."""
-    closed = closed_flags(settings.closed)
-    known = _worthwhile(finest, search, pair.noise, settings)
+    closed, threads = closed_flags(settings.closed), settings.threads
+    known = _worthwhile(finest, prediction, search, pair.noise, settings)
     guided = known is not None
     if not guided:
-        finest = replace(finest, prediction=_zero_faces(finest.after.shape))
+        prediction = None
     levels = [finest] if guided else pyramid(finest, settings.levels)
     share = 1.0 if guided else settings.momentum
     iterations = products = projections = 0
     motion: Motion
-    u = levels[0].prediction
-    for level in levels:
-        if level is not levels[0]:
-            u = refine(u, level.after.shape, closed, settings.threads)
+    u = _zero_faces(levels[0].after.shape) if prediction is None else prediction.displacement()
+    coarsest = True
+    while levels:  # a grid that is done with is not kept
+        level = levels.pop(0)
+        if not coarsest:
+            u = refine(u, level.after.shape, closed, threads)
         for warp in range(settings.warps):
             # before anything is known of the motion all of the change would be a source
-            blind = not guided and warp == 0 and level is levels[0]
-            if known is not None:
-                (linear, weight), known = known, None
-            else:
-                change = _linearise(level, u, settings)
-                if change is None:
-                    return None
-                linear = change
-                weight = _weight(level, linear, search and not blind)
-            if guided or level is not finest or level is levels[0]:
-                motion = _fit(level, linear, weight, settings, share)
+            blind = not guided and warp == 0 and coarsest
+            linear, known = known or linearise(level, u, search and not blind, settings), None
+            if linear is None:
+                return None
+            if coarsest or level is not finest:
+                motion = _fit(level, prediction, linear, share, settings)
             elif warp == 0:  # twelve projections are too much for the finest grid
                 motion = motion.finer()
-            centre = motion.velocity(level.prediction, level.after, closed, settings.threads)
-            linear = replace(linear, offset=linear.offset + np.float32(motion.thinning) * linear.carried)
-            unexplained = _unexplained(linear, weight, centre, pair.noise / level.coarseness**3)
+            centre = motion.velocity(prediction, level.after, closed, threads)
+            linear = _thinned(linear, motion.thinning)
+            unexplained = _unexplained(linear, centre, pair.noise / level.coarseness**3, settings)
             stiffness = settings.unexplained / max(unexplained, settings.least_unexplained)
-            solution, figures = _solve(linear, weight, centre, stiffness, centre if blind else u, settings)
+            problem, start = least_squares(linear, centre, stiffness, settings), centre if blind else u
+            evidence = linear.direction, linear.weight
+            # The solver takes most of the memory: what it does not look at goes before, what it leaves after.
+            del linear, centre
+            solution, figures = solve(problem, start, settings)
+            del problem, start
+            if level is finest and warp == settings.warps - 1:
+                source = _source(level, u, evidence[1], settings, pair.compressed)
+                confidence = _confidence(*evidence, stiffness, settings)
             u = _within_reach(solution, u, settings)
+            del solution, evidence
             iterations += figures["iterations"]
             products += figures["products"]
             projections += figures["projections"]
-    density = expanded if pair.compressed else np.positive
-    shown = weight * (linear.direction[0] ** 2 + linear.direction[1] ** 2 + linear.direction[2] ** 2)
-    shown = ndimage.gaussian_filter(shown, CONFIDENCE_WIDTH, truncate=3.0)
+        coarsest = False
     measures = {
         "iterations": iterations,
         "products": products,
@@ -232,115 +224,71 @@ def _default(finest: Level, search: bool, pair: Followed, settings: VelocitySett
         "residual": figures["residual"],
         "unexplained": unexplained,
         "trust": motion.trust,
-        "thinning": 1 - float(density(np.array(1 - motion.thinning, np.float32))),
+        "thinning": 1 - (1 - motion.thinning) ** (4 / 3) if pair.compressed else motion.thinning,
     }
-    confidence = shown / (shown + np.float32(stiffness * settings.smoothness))
-    carried = linear.carried * np.float32(linear.scale)
-    source = (1 - weight) * np.maximum(density(finest.after) - density(carried), 0)
     return _Found(u, measures, confidence, source)
 
 
 def _worthwhile(
-    finest: Level, search: bool, noise: float, settings: VelocitySettings
-) -> tuple[_Linearisation, Array] | None:
-    """The change around the prediction and its weight, if the prediction as it stands explains it well enough."""
-    if not any(component.any() for component in finest.prediction):
+    finest: Level, prediction: Prediction | None, search: bool, noise: float, settings: VelocitySettings
+) -> Linearisation | None:
+    """The change around the prediction, if the prediction as it stands explains it well enough."""
+    if prediction is None or not any(component.any() for component in prediction.faces):
         return None
-    linear = _linearise(finest, finest.prediction, settings)
-    if linear is None:
-        return None
-    weight = _weight(finest, linear, search)
-    return (linear, weight) if _unexplained(linear, weight, finest.prediction, noise) < WORTHLESS else None
+    u = prediction.displacement()
+    linear = linearise(finest, u, search, settings)
+    return linear if linear is not None and _unexplained(linear, u, noise, settings) < WORTHLESS else None
 
 
-def _linearise(level: Level, u: Faces, settings: VelocitySettings) -> _Linearisation | None:
-    """The change around `u`; none where there is no structure to follow."""
-    threads = settings.threads
-    warped = _core.advect_cells(level.before, u, False, True, threads)
-    gx, gy, gz = _core.gradient((warped + level.after) * np.float32(0.5), threads)
-    density = np.maximum(warped, level.after)
-    smoke = density > settings.smoke_threshold * density.max()
-    squares = (gx * gx + gy * gy + gz * gz)[smoke]
-    scale = float(np.sqrt(squares.mean(dtype=np.float64))) if squares.size else 0.0
-    if scale == 0.0:
-        return None
-    residual = level.after - warped
-    gx, gy, gz, offset = (a / np.float32(scale) for a in (gx, gy, gz, residual))
-    # The problem is in the whole velocity u, not in its increment: r + g.(u - u_k) = (r - g.u_k) + g.u
-    for g, motion in zip((gx, gy, gz), at_centres(u), strict=True):
-        offset -= g * motion
-    return _Linearisation((gx, gy, gz), offset, residual, warped / np.float32(scale), density, smoke, scale)
-
-
-def _weight(level: Level, linear: _Linearisation, search: bool) -> Array:
-    """What changes count as motion: what is known beforehand, and without the sources that show."""
-    if not search:
-        return level.weight
-    return level.weight * source_weight(linear.residual, linear.density, linear.smoke, level.coarseness)
-
-
-def _fit(level: Level, linear: _Linearisation, weight: Array, settings: VelocitySettings, share: float) -> Motion:
+def _fit(
+    level: Level, prediction: Prediction | None, linear: Linearisation, share: float, settings: VelocitySettings
+) -> Motion:
     """Trust and momentum on one grid."""
     return fit_motion(
-        level.prediction,
+        prediction,
         level.after,
         linear.direction,
         linear.offset,
         linear.carried,
-        weight,
+        linear.weight,
         share,
         closed_flags(settings.closed),
         settings.threads,
     )
 
 
-def _unexplained(linear: _Linearisation, weight: Array, centre: Faces, noise: float) -> float:
+def _thinned(linear: Linearisation, thinning: float) -> Linearisation:
+    """The change that is left where a share of the smoke dissolves."""
+    return replace(linear, offset=linear.offset + np.float32(thinning) * linear.carried) if thinning else linear
+
+
+def _unexplained(linear: Linearisation, centre: Faces, noise: float, settings: VelocitySettings) -> float:
     """Share of the squared change that a velocity leaves, beyond what noise of a variance accounts for."""
-    left = linear.offset.copy()
-    for g, motion in zip(linear.direction, at_centres(centre), strict=True):
-        left += g * motion
-    floor = noise / linear.scale**2 * float(weight[linear.smoke].sum(dtype=np.float64))
-    whole, rest = (float((weight * r * r).sum(dtype=np.float64)) - floor for r in (linear.offset, left))
-    return max(rest, 0.0) / whole if whole > 0 else 1.0
-
-
-def _solve(
-    linear: _Linearisation, weight: Array, centre: Faces, stiffness: float, start: Faces, settings: VelocitySettings
-) -> tuple[Faces, _core.Figures]:
-    """The minimum of the quadratic problem, and how it was found."""
-    paper = settings.method == "paper"
-    problem = _core.LeastSquares(
-        direction=linear.direction,
-        offset=linear.offset,
-        weight=weight,
-        irrotational=np.where(linear.smoke | paper, np.float32(0), np.float32(settings.irrotational)),
-        centre=centre,
-        first_order=settings.smoothness if paper else 0.0,
-        second_order=0.0 if paper else stiffness * settings.smoothness,
-        kinetic=stiffness * settings.kinetic,
-        closed=closed_flags(settings.closed),
+    whole, rest, inside = _core.evidence(
+        linear.direction, linear.offset, linear.weight, linear.smoke, centre, settings.threads
     )
-    solver = settings.solver
-    if solver == "auto":
-        solver = "primal-dual" if paper else "projected-cg"
-    if solver == "projected-cg":
-        (x, y, z), figures = problem.projected_cg(
-            start, tolerance=settings.tolerance, limit=settings.iterations, threads=settings.threads
-        )
-    else:
-        (x, y, z), figures = problem.primal_dual(
-            start,
-            sigma=settings.sigma,
-            tau=settings.tau,
-            theta=settings.theta,
-            absolute=settings.absolute_tolerance * math.sqrt(start[0].size),
-            relative=settings.relative_tolerance,
-            limit=settings.primal_dual_iterations,
-            inner_tolerance=settings.inner_tolerance,
-            inner_limit=settings.inner_iterations,
-            threads=settings.threads,
-        )
-    return (x, y, z), figures
+    floor = noise / linear.scale**2 * inside
+    return max(rest - floor, 0.0) / (whole - floor) if whole > floor else 1.0
+
+
+def _source(level: Level, u: Faces, weight: Array, settings: VelocitySettings, compressed: bool) -> Array:
+    """Density that enters in a frame: what is left unexplained where changes are not motion."""
+    carried, after = _core.advect_cells(level.before, u, False, True, settings.threads), level.after
+    if compressed:
+        carried, after = expanded(carried), expanded(after)
+    source: Array = (1 - weight) * np.maximum(after - carried, 0)
+    return source
+
+
+def _confidence(direction: Faces, weight: Array, stiffness: float, settings: VelocitySettings) -> Array:
+    """How much the images show beside what the regulariser adds, from 0 to 1."""
+    shown = direction[0] ** 2
+    for g in direction[1:]:
+        shown += g**2
+    shown *= weight
+    shown = _core.blur(shown, CONFIDENCE_WIDTH, 3.0, settings.threads)
+    confidence: Array = shown / (shown + np.float32(stiffness * settings.smoothness))
+    return confidence
 
 
 def _within_reach(solution: Faces, u: Faces, settings: VelocitySettings) -> Faces:
@@ -348,11 +296,7 @@ def _within_reach(solution: Faces, u: Faces, settings: VelocitySettings) -> Face
 
     Beyond that the data term says nothing, and thin or noisy smoke would throw single wisps many voxels far.
     """
-    increments = [new - old for new, old in zip(solution, u, strict=True)]
-    if max(float(np.abs(a).max()) for a in increments) <= REACH:
-        return solution
-    cut = [old + np.clip(a, -REACH, REACH) for old, a in zip(u, increments, strict=True)]
-    (x, y, z), _ = _core.project(cut, closed_flags(settings.closed), passes=1, threads=settings.threads)
+    x, y, z = _core.within_reach(solution, u, REACH, closed_flags(settings.closed), settings.threads)
     return x, y, z
 
 

@@ -17,17 +17,29 @@ else be read as motion. The result is the centre of the whole regulariser.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from smokelift import _core
-from smokelift.transport import Array, Faces, at_centres, face_shapes
+from smokelift.transport import Array, Faces
 
 RIDGE = 1e-3
 """Relative to the diagonal of the normal equations, so that what the smoke does not determine stays small."""
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """What the velocity should be near: `scale` times `faces` in voxels a frame."""
+
+    faces: Faces
+    scale: float
+
+    def displacement(self) -> Faces:
+        """In voxels a frame, on faces."""
+        x, y, z = (np.float32(self.scale) * component for component in self.faces)
+        return x, y, z
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,11 +60,11 @@ class Motion:
     thinning: float
     push: npt.NDArray[np.float64]
 
-    def velocity(self, prediction: Faces, density: Array, closed: list[bool], threads: int) -> Faces:
+    def velocity(self, prediction: Prediction | None, density: Array, closed: list[bool], threads: int) -> Faces:
         """The motion t u_p + P(m) in voxels a frame, on faces."""
-        x, y, z = _pushed(density, self.push, closed, threads)
-        t = np.float32(self.trust)
-        return (x + t * prediction[0], y + t * prediction[1], z + t * prediction[2]) if t else (x, y, z)
+        faces, scale = (None, 0.0) if prediction is None else (prediction.faces, prediction.scale)
+        x, y, z = _core.pushed(density, self.push, self.trust * scale, faces, closed, threads)
+        return x, y, z
 
     def finer(self) -> Motion:
         """The same on a grid that is twice as fine."""
@@ -60,7 +72,7 @@ class Motion:
 
 
 def fit_motion(
-    prediction: Faces,
+    prediction: Prediction | None,
     density: Array,
     direction: Faces,
     offset: Array,
@@ -75,7 +87,7 @@ def fit_motion(
     Parameters
     ----------
     prediction
-        In voxels a frame on faces; zero if there is none.
+        None if there is none.
     density : (nx, ny, nz) float32
         What momentum goes with.
     direction, offset, weight : (nx, ny, nz) float32
@@ -89,60 +101,27 @@ def fit_motion(
     threads
         Processor cores.
     """
-    predicted = any(component.any() for component in prediction)
-    counted = (weight > 0) & ((direction[0] != 0) | (direction[1] != 0) | (direction[2] != 0) | (carried > 0))
-    root = np.sqrt(weight[counted])
-    g = [root * component[counted] for component in direction]
 
-    def along(u: Faces) -> Array:
-        x, y, z = at_centres(u)
-        total: Array = g[0] * x[counted] + g[1] * y[counted] + g[2] * z[counted]
-        return total
+    def along(u: Faces | list[Array]) -> Array:
+        return _core.directional(direction, u, threads)
 
-    rows = 1 if predicted else 4
+    rows = 4 if prediction is None else 1
     pushes = np.eye(3 * rows).reshape(-1, rows, 3)
-    columns = [along(_pushed(density, push, closed, threads)) for push in pushes]
-    if predicted:
-        columns.append(along(prediction))
-    thinned = root * carried[counted]
-    found = _least_squares([*columns, thinned], root * offset[counted])
+    columns = [along(_core.pushed(density, push, 0.0, None, closed, threads)) for push in pushes]
+    if prediction is not None:
+        columns.append(along(prediction.faces))
+    products = _core.weighted_products([*columns, carried, offset], weight, threads)
+    found = _least_squares(products)
     thinning = float(found[-1])
-    trust = float(np.clip(found[3 * rows], 0, 1)) if predicted else 0.0
+    trust = 0.0 if prediction is None else float(np.clip(found[3 * rows] / prediction.scale, 0, 1))
     return Motion(trust, thinning, share * found[: 3 * rows].reshape(rows, 3))
 
 
-def _least_squares(columns: list[Array], offset: Array) -> npt.NDArray[np.float64]:
-    """The factors x that make offset + columns . x least."""
-    matrix = np.stack(columns).astype(np.float64)
-    normal, right = matrix @ matrix.T, -matrix @ offset
+def _least_squares(products: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """The factors x that make offset + columns . x least, from the products of all columns, the last the offset."""
+    normal, right = products[:-1, :-1], -products[:-1, -1]
     size = np.sqrt(np.diag(normal)) + 1e-30
     scaled = normal / np.outer(size, size) + RIDGE * np.eye(len(size))
     found = np.linalg.solve(scaled, right / size) / size
-    # BLAS adds in an order of its own, which depends on where arrays lie; a run has to be the same to the bit each time
+    # LAPACK adds in an order of its own, which depends on where arrays lie; a run has to be the same to the bit
     return found.astype(np.float32).astype(np.float64)
-
-
-def _pushed(density: Array, push: npt.NDArray[np.float64], closed: list[bool], threads: int) -> Faces:
-    """The motion of the whole box that a push in the smoke makes, P(m)."""
-    faces = []
-    for axis, shape in enumerate(face_shapes(density.shape)):
-        component = np.zeros(shape, np.float32)
-        constant, *slopes = push[:, axis].astype(np.float32)
-        if constant or any(slopes):
-            profile = constant + sum(slope * x for slope, x in zip(slopes, _axes(density.shape), strict=False))
-            pushed = density * profile
-            low, high = _along(axis, slice(None, -1)), _along(axis, slice(1, None))
-            component[_along(axis, slice(1, -1))] = np.float32(0.5) * (pushed[low] + pushed[high])
-        faces.append(component)
-    (x, y, z), _ = _core.project(faces, closed, passes=1, threads=threads)
-    return x, y, z
-
-
-def _axes(shape: tuple[int, ...]) -> Iterator[Array]:
-    """x, y and z, from -1 to 1 over the box."""
-    for axis, count in enumerate(shape):
-        yield np.linspace(-1, 1, count, dtype=np.float32).reshape([-1 if d == axis else 1 for d in range(3)])
-
-
-def _along(axis: int, part: slice) -> tuple[slice, ...]:
-    return tuple(part if d == axis else slice(None) for d in range(3))

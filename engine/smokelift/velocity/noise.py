@@ -48,7 +48,7 @@ class Followed:
     compressed: bool
 
 
-def followed(before: Array, after: Array, blur: float, threshold: float) -> Followed:
+def followed(before: Array, after: Array, blur: float, threshold: float, threads: int) -> Followed:
     """Compress two densities, or, where their noise asks for more blur, give them that instead.
 
     Parameters
@@ -59,12 +59,14 @@ def followed(before: Array, after: Array, blur: float, threshold: float) -> Foll
         Standard deviation in voxels of the Gaussian that smooths in any case.
     threshold
         Fraction of the largest density from which a voxel counts as smoke.
+    threads
+        Processor cores.
     """
-    first, second, variance = without_noise(compressed(before), compressed(after), (blur,), threshold)
+    first, second, variance = without_noise(compressed(before), compressed(after), (blur,), threshold, threads)
     if np.sqrt(variance) <= LARGEST_SHARE * _gradient(second, second > threshold * second.max()):
         return Followed(first, second, variance, True)
     wider = tuple(width for width in NOISE_WIDTHS if width > blur)
-    return Followed(*without_noise(before, after, (blur, *wider), threshold), False)
+    return Followed(*without_noise(before, after, (blur, *wider), threshold, threads), False)
 
 
 def noise_level(density: Array, smoke: npt.NDArray[np.bool_]) -> float:
@@ -82,7 +84,7 @@ def noise_level(density: Array, smoke: npt.NDArray[np.bool_]) -> float:
 
 
 def without_noise(
-    before: Array, after: Array, widths: tuple[float, ...], threshold: float
+    before: Array, after: Array, widths: tuple[float, ...], threshold: float, threads: int
 ) -> tuple[Array, Array, float]:
     """Blur two densities as much as their noise asks for.
 
@@ -94,6 +96,8 @@ def without_noise(
         Standard deviations in voxels to choose from, rising; 0 for none. The last is taken where none is enough.
     threshold
         Fraction of the largest density from which a voxel counts as smoke.
+    threads
+        Processor cores.
 
     Returns
     -------
@@ -105,7 +109,7 @@ def without_noise(
     smoke = after > threshold * after.max()
     raw = float(np.hypot(noise_level(before, smoke), noise_level(after, smoke)))
     for width in widths:
-        first, second = (ndimage.gaussian_filter(a, width) if width > 0 else a for a in (before, after))
+        first, second = (_core.blur(a, width, 4.0, threads) if width > 0 else a for a in (before, after))
         left = raw * _passed(width)
         if left <= LARGEST_SHARE * _gradient(second, smoke):
             break

@@ -14,8 +14,8 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from scipy import ndimage
 
+from smokelift import _core
 from smokelift.transport import Array
 
 WIDTH = 2.0
@@ -36,7 +36,9 @@ FAINT = np.float32(1e-4)
 """Fraction of the largest density below which a residual means nothing."""
 
 
-def source_weight(residual: Array, density: Array, smoke: npt.NDArray[np.bool_], coarseness: float) -> Array:
+def source_weight(
+    residual: Array, density: Array, smoke: npt.NDArray[np.bool_], coarseness: float, threads: int
+) -> Array:
     """How far the change of each voxel may be taken for motion.
 
     Parameters
@@ -49,6 +51,8 @@ def source_weight(residual: Array, density: Array, smoke: npt.NDArray[np.bool_],
         Where there is smoke.
     coarseness
         Voxels of the finest grid along a voxel.
+    threads
+        Processor cores.
 
     Returns
     -------
@@ -57,8 +61,8 @@ def source_weight(residual: Array, density: Array, smoke: npt.NDArray[np.bool_],
     """
     largest = density.max()
     width = WIDTH / coarseness
-    mean = ndimage.gaussian_filter(residual, width, truncate=3.0)
-    magnitude = ndimage.gaussian_filter(np.abs(residual), width, truncate=3.0)
+    mean = _core.blur(residual, width, 3.0, threads)
+    magnitude = _core.blur(np.abs(residual), width, 3.0, threads)
     typical = float(np.median(np.abs(mean[smoke]))) if smoke.any() else 0.0
     if typical == 0.0:
         return np.ones(residual.shape, np.float32)

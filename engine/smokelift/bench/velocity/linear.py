@@ -16,8 +16,8 @@ import numpy.typing as npt
 from smokelift.bench.velocity.pairs import Pair, relative_error
 from smokelift.transport import Array, Faces, Velocity, closed_flags
 from smokelift.velocity import VelocitySettings, estimate_velocity
-from smokelift.velocity.estimate import _Linearisation, _linearise, _solve
-from smokelift.velocity.noise import without_noise
+from smokelift.velocity.linear import Linearisation, least_squares, linearise, solve
+from smokelift.velocity.noise import followed
 from smokelift.velocity.pyramid import Level, pyramid, refine
 
 Solver = Literal["projected-cg", "primal-dual"]
@@ -28,8 +28,7 @@ class LinearProblem:
     """A problem and where its solvers begin."""
 
     settings: VelocitySettings
-    linear: _Linearisation
-    weight: Array
+    linear: Linearisation
     start: Faces
     counted: npt.NDArray[np.bool_]
 
@@ -43,18 +42,18 @@ class LinearProblem:
             If nothing in the densities could show motion.
         """
         settings = VelocitySettings()
-        before, after, _ = without_noise(pair.before, pair.after, (settings.blur,), settings.smoke_threshold)
-        finest = Level(before, after, (~pair.inlet).astype(np.float32), _rest(after.shape))
+        clean = followed(pair.before, pair.after, settings.blur, settings.smoke_threshold, settings.threads)
+        finest = Level(clean.before, clean.after, (~pair.inlet).astype(np.float32))
         coarse = pyramid(finest, 2)[0]
         found = estimate_velocity(
             coarse.before, coarse.after, 1.0, 1.0, replace(settings, levels=settings.levels - 1, blur=0.0)
         )
         closed = closed_flags(settings.closed)
-        start = refine(found.faces, after.shape, closed, settings.threads)
-        linear = _linearise(finest, start, settings)
+        start = refine(found.faces, clean.after.shape, closed, settings.threads)
+        linear = linearise(finest, start, False, settings)
         if linear is None:
             raise ValueError("There is no smoke with structure between these frames to follow.")
-        return LinearProblem(settings, linear, finest.weight, start, pair.counted)
+        return LinearProblem(settings, linear, start, pair.counted)
 
     def solve(self, solver: Solver, iterations: int) -> Array:
         """Make so many iterations; the velocity at voxel centres (nx, ny, nz, 3), in voxels a frame."""
@@ -67,7 +66,8 @@ class LinearProblem:
             absolute_tolerance=0.0,
             relative_tolerance=0.0,
         )
-        faces, _ = _solve(self.linear, self.weight, _rest(self.counted.shape), 1.0, self.start, settings)
+        problem = least_squares(self.linear, _rest(self.counted.shape), 1.0, settings)
+        faces, _ = solve(problem, self.start, settings)
         return Velocity(faces, 1.0).centres()
 
     def distance(self, found: Array, optimum: Array) -> float:
