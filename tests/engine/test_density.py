@@ -10,10 +10,11 @@ import pytest
 
 from smokelift.background import Plate
 from smokelift.density import Density, DensitySettings, reconstruct_density
+from smokelift.density.axis import SmokeAxis
 from smokelift.density.descent import descend
 from smokelift.density.hull import project_voxels, visual_hull
 from smokelift.density.multiplicative import fit_multiplicative
-from smokelift.density.profile import depth_profile
+from smokelift.density.profile import DepthProfile
 from smokelift.render import Renderer, render, scene_lights
 from smokelift.scene import Background, Camera, Medium, Scene
 
@@ -83,7 +84,8 @@ def test_voxels_outside_the_picture_are_out(plume) -> None:
 def profile_of(amount, domain):
     """The profile at every voxel."""
     everywhere = np.ones(domain.resolution, np.bool_)
-    return depth_profile(amount, GRID, domain, everywhere).reshape(domain.resolution)
+    profile = DepthProfile(amount, GRID, domain, SmokeAxis.upright())
+    return profile.at(project_voxels(GRID, domain), everywhere).reshape(domain.resolution)
 
 
 def amount_of(width: int) -> np.ndarray:

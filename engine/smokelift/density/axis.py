@@ -1,0 +1,165 @@
+"""Where in depth the smoke stands: the axis that depth profiles are centred on.
+
+One picture of smoke in parallel light looks the same whether the smoke is near and small or far and large, so its place
+in depth has to come from something else. The floor gives it where smoke rises from there: a disc of smoke on the floor
+begins in the picture where the ray through the floor meets it, within a few rows. Elsewhere the axis of the domain is
+the best guess, because a box is put around its smoke.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smokelift.density.screen import Upright, upright_rows, view_frame
+from smokelift.scene import Camera, Domain
+
+TRUSTED_FRAMES = 0.6
+"""Share of the frames that have to show the foot."""
+
+CONFIDENCE = 0.8
+"""Share of the foot's distance from the domain's axis that is believed; what rises seldom rises straight."""
+
+JOINING = 1.45
+"""Growth of the smoke within half its width, in every frame, from which other smoke must have joined it: a column that
+only rises gets no thicker, and what piles up at its head moves on."""
+
+NEAR_SIDE = (0.3, 0.45)
+"""Distance of the foot from the axis, in reaches of the domain, from which (and from which on entirely) smoke is taken
+to lean back: a box whose smoke rose straight there would stand wrongly."""
+
+
+@dataclass(frozen=True, eq=False)
+class SmokeAxis:
+    """How far behind the domain's centre the middle of the smoke is, by height.
+
+    Attributes
+    ----------
+    heights : (n,)
+        In metres above the domain's centre, ascending, along `view_frame`'s height.
+    depths : (n,)
+        In metres along `view_frame`'s depth, away from the camera.
+    """
+
+    heights: NDArray[np.float64]
+    depths: NDArray[np.float64]
+
+    @staticmethod
+    def upright(depth: float = 0.0) -> SmokeAxis:
+        """The same depth at all heights."""
+        return SmokeAxis(np.zeros(1), np.full(1, float(depth)))
+
+    def at(self, heights: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Depths at some heights."""
+        return np.asarray(np.interp(heights, self.heights, self.depths))
+
+
+@dataclass(frozen=True)
+class _Foot:
+    """Where smoke meets the floor: depth and lateral width (m), and the height (m) at which it shows on the axis."""
+
+    depth: float
+    width: float
+    height: float
+
+
+def estimate_axis(amounts: Sequence[NDArray[np.float32]], camera: Camera, domain: Domain) -> SmokeAxis:
+    """The axis of the smoke in some frames of a clip.
+
+    Parameters
+    ----------
+    amounts : sequence of (rows, columns)
+        Optical depths, 0 where there is no smoke.
+    camera
+        A camera that stands still.
+
+    Returns
+    -------
+    SmokeAxis
+        The domain's axis where nothing says otherwise: no smoke that stands on the domain's floor in most frames, or a
+        camera that does not look down on the floor.
+    """
+    rows = [upright_rows(amount, camera, domain) for amount in amounts if amount.any()]
+    found = [foot for foot in (_foot(row, camera, domain) for row in rows) if foot is not None]
+    if not found or len(found) < TRUSTED_FRAMES * len(amounts):
+        return SmokeAxis.upright()
+    depth = float(np.median([foot.depth for foot in found]))
+    width = float(np.median([foot.width for foot in found]))
+    base = float(np.median([foot.height for foot in found]))
+    heights = rows[0].heights
+    totals = np.array([row.total for row in rows])
+    mean = totals.mean(0)
+    drift = _drift(rows, heights, base)
+    raised = np.cumsum(mean) / mean.sum()
+    reach = _reach(domain, view_frame(camera)[1])
+    low, high = NEAR_SIDE
+    returning = np.clip((abs(depth) / reach - low) / (high - low), 0, 1) * raised
+    # what drifts across the picture drifts in depth as well, nobody knows where to
+    believed = CONFIDENCE * depth * (1 - returning) / (1 + (drift / max(abs(depth), domain.voxel_size)) ** 2)
+    join = _joined(totals, heights, base + width / 2, width)
+    if join is not None:
+        believed *= np.clip((join + width / 2 - heights) / width, 0, 1)
+    return SmokeAxis(heights, believed)
+
+
+def _foot(row: Upright, camera: Camera, domain: Domain) -> _Foot | None:
+    """The foot in one frame, if the lower end of the smoke looks like one."""
+    _, along, height = view_frame(camera)
+    matrix = np.array(camera.matrix, np.float64)
+    centre = np.array(domain.centre)
+    if camera.type != "perspective" or abs(height[2]) < 1 or (matrix[:3, 3] - centre) @ along >= 0:
+        return None
+    above_floor = matrix[2, 3] - domain.min[2]
+    distance = float((centre - matrix[:3, 3]) @ along)
+    heights, total = row.heights, row.total
+    smoky = total > 0.05 * np.percentile(total[total > 0], 75)
+    first = int(np.argmax(smoky))
+    base = heights[first]
+    near = smoky & (heights <= base + 12 * (heights[1] - heights[0]))
+    width = float(2 * np.sqrt(3) * np.average(row.spread[near], weights=total[near]))
+    level = float(np.median(total[smoky & (heights <= base + width)]))
+
+    def floor_depth(share: float) -> float:
+        """Depth at which the floor is seen where the rows first hold so much of their level."""
+        after = int(np.argmax(total > share * level))
+        if after == 0:
+            return -np.inf
+        before = after - 1
+        part = (share * level - total[before]) / (total[after] - total[before])
+        up = heights[before] + part * (heights[after] - heights[before]) + centre[2] - domain.min[2]
+        return distance * up / (above_floor - up) if up < above_floor else np.inf
+
+    if above_floor <= 0:
+        return None
+    front, middle, back = (floor_depth(share) for share in (0.2, 0.5, 0.8))
+    pixel = distance**2 / (above_floor * camera.fy)
+    # a disc on the floor is as deep as it is wide; the lower end of what floats takes many more rows
+    if abs(middle) < _reach(domain, along) and back - front < width + pixel:
+        return _Foot(middle, width, float(base))
+    return None
+
+
+def _reach(domain: Domain, direction: NDArray[np.float64]) -> float:
+    """Half the domain's extent along a direction."""
+    return float(np.abs(direction) @ (np.array(domain.max) - np.array(domain.centre)))
+
+
+def _drift(rows: Sequence[Upright], heights: NDArray[np.float64], base: float) -> NDArray[np.float64]:
+    """How far the smoke has moved sideways from its foot at each height (m)."""
+    total = np.sum([row.total for row in rows], 0)
+    mean = np.sum([row.total * row.mean for row in rows], 0) / np.maximum(total, 1e-30)
+    known = (total > 0.02 * total.max()) & (heights >= base)
+    mean = np.interp(heights, heights[known], mean[known])
+    return mean - float(mean[known][0])
+
+
+def _joined(totals: NDArray[np.float64], heights: NDArray[np.float64], above: float, width: float) -> float | None:
+    """The height from which on the smoke is not only that of the foot; None if there is none."""
+    step = max(1, round(0.5 * width / (heights[1] - heights[0])))
+    least = 1e-3 * totals.max()
+    growth = np.min(np.maximum(totals[:, step:], least) / np.maximum(totals[:, :-step], least), 0)
+    sudden = (growth > JOINING) & (heights[:-step] > above)
+    return float(heights[:-step][sudden][0]) if sudden.any() else None
