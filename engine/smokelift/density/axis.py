@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.density.screen import Upright, upright_rows, view_frame
-from smokelift.scene import Camera, Domain
+from smokelift.scene import Camera, Domain, Vector
 
 TRUSTED_FRAMES = 0.6
 """Share of the frames that have to show the foot."""
@@ -66,7 +66,9 @@ class _Foot:
     height: float
 
 
-def estimate_axis(amounts: Sequence[NDArray[np.float32]], camera: Camera, domain: Domain) -> SmokeAxis:
+def estimate_axis(
+    amounts: Sequence[NDArray[np.float32]], camera: Camera, domain: Domain, sources: Sequence[Vector] = ()
+) -> SmokeAxis:
     """The axis of the smoke in some frames of a clip.
 
     Parameters
@@ -75,6 +77,8 @@ def estimate_axis(amounts: Sequence[NDArray[np.float32]], camera: Camera, domain
         Optical depths, 0 where there is no smoke.
     camera
         A camera that stands still.
+    sources
+        Where smoke is known to enter, in metres; else its foot on the floor is looked for.
 
     Returns
     -------
@@ -83,26 +87,59 @@ def estimate_axis(amounts: Sequence[NDArray[np.float32]], camera: Camera, domain
         camera that does not look down on the floor.
     """
     rows = [upright_rows(amount, camera, domain) for amount in amounts if amount.any()]
+    if not rows:
+        return SmokeAxis.upright()
+    heights = rows[0].heights
+    if sources:
+        depth, across = _through(sources, heights, camera, domain)
+        return SmokeAxis(heights, _believed(depth, across, rows, camera, domain))
     found = [foot for foot in (_foot(row, camera, domain) for row in rows) if foot is not None]
     if not found or len(found) < TRUSTED_FRAMES * len(amounts):
         return SmokeAxis.upright()
-    depth = float(np.median([foot.depth for foot in found]))
+    depth = np.full(heights.shape, np.median([foot.depth for foot in found]))
     width = float(np.median([foot.width for foot in found]))
     base = float(np.median([foot.height for foot in found]))
-    heights = rows[0].heights
-    totals = np.array([row.total for row in rows])
-    mean = totals.mean(0)
-    drift = _drift(rows, heights, base)
-    raised = np.cumsum(mean) / mean.sum()
-    reach = _reach(domain, view_frame(camera)[1])
-    low, high = NEAR_SIDE
-    returning = np.clip((abs(depth) / reach - low) / (high - low), 0, 1) * raised
-    # what drifts across the picture drifts in depth as well, nobody knows where to
-    believed = CONFIDENCE * depth * (1 - returning) / (1 + (drift / max(abs(depth), domain.voxel_size)) ** 2)
-    join = _joined(totals, heights, base + width / 2, width)
+    across = np.full(heights.shape, np.interp(base + width / 4, heights, _middle(rows)))
+    believed = _believed(depth, across, rows, camera, domain)
+    join = _joined(np.array([row.total for row in rows]), heights, base + width / 2, width)
     if join is not None:
         believed *= np.clip((join + width / 2 - heights) / width, 0, 1)
     return SmokeAxis(heights, believed)
+
+
+def _through(
+    sources: Sequence[Vector], heights: NDArray[np.float64], camera: Camera, domain: Domain
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Mean depth and lateral position (m), at some heights, of the sources below."""
+    lateral, along, height = view_frame(camera)
+    places = np.array(sources) - np.array(domain.centre)
+    places = places[np.argsort(places @ height)]
+    counts = np.arange(1, len(places) + 1)
+    depth, across = (
+        np.interp(heights, places @ height, np.cumsum(places @ direction) / counts) for direction in (along, lateral)
+    )
+    return depth, across
+
+
+def _believed(
+    depth: NDArray[np.float64], across: NDArray[np.float64], rows: Sequence[Upright], camera: Camera, domain: Domain
+) -> NDArray[np.float64]:
+    """What smoke that started at a depth and a lateral position says about the axis at each height."""
+    total = np.sum([row.total for row in rows], 0)
+    raised = np.cumsum(total) / total.sum()
+    low, high = NEAR_SIDE
+    leaning = np.clip((np.abs(depth) / _reach(domain, view_frame(camera)[1]) - low) / (high - low), 0, 1)
+    # what drifts across the picture drifts in depth as well, nobody knows where to
+    drift = (_middle(rows) - across) / np.maximum(np.abs(depth), domain.voxel_size)
+    return np.asarray(CONFIDENCE * depth * (1 - leaning * raised) / (1 + drift**2))
+
+
+def _middle(rows: Sequence[Upright]) -> NDArray[np.float64]:
+    """Mean lateral position (m) of the smoke at each height, over all frames."""
+    total = np.sum([row.total for row in rows], 0)
+    known = total > 0.02 * total.max()
+    mean = np.sum([row.total * row.mean for row in rows], 0)[known] / total[known]
+    return np.asarray(np.interp(rows[0].heights, rows[0].heights[known], mean))
 
 
 def _foot(row: Upright, camera: Camera, domain: Domain) -> _Foot | None:
@@ -145,15 +182,6 @@ def _foot(row: Upright, camera: Camera, domain: Domain) -> _Foot | None:
 def _reach(domain: Domain, direction: NDArray[np.float64]) -> float:
     """Half the domain's extent along a direction."""
     return float(np.abs(direction) @ (np.array(domain.max) - np.array(domain.centre)))
-
-
-def _drift(rows: Sequence[Upright], heights: NDArray[np.float64], base: float) -> NDArray[np.float64]:
-    """How far the smoke has moved sideways from its foot at each height (m)."""
-    total = np.sum([row.total for row in rows], 0)
-    mean = np.sum([row.total * row.mean for row in rows], 0) / np.maximum(total, 1e-30)
-    known = (total > 0.02 * total.max()) & (heights >= base)
-    mean = np.interp(heights, heights[known], mean[known])
-    return mean - float(mean[known][0])
 
 
 def _joined(totals: NDArray[np.float64], heights: NDArray[np.float64], above: float, width: float) -> float | None:
