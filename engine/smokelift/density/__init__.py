@@ -56,6 +56,9 @@ class DensitySettings:
     paper_rate
         Paper's method: change of density that one step makes in the steepest voxel of thin fog. The paper gives
         no figure; see docs/measurements.md for what more and less do.
+    texture
+        Noise along the depth, 0 to 1: without any, smoke is smooth from the side. 0.4 looks most like smoke and costs
+        0.1 to 0.2 dB in new views; the noise stands still while the smoke moves.
     """
 
     method: Literal["default", "paper"] = "default"
@@ -64,6 +67,11 @@ class DensitySettings:
     descent_iterations: int = 12
     tolerance: float = 0.02
     paper_rate: float = 0.03
+    texture: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.texture <= 1:
+            raise ValueError(f"texture must be a number from 0 to 1, not {self.texture}.")
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +147,7 @@ def reconstruct_density(
     counts = reached(mask, projection)
     # a ray that leaves through floor or ceiling says nothing about the smoke that it would have met outside
     profile = DepthProfile(optical_depth(image, scene, settings, plate), camera, domain, axis or SmokeAxis.upright())
-    weight = counts * profile.share_inside()
+    weight = counts * profile.share_inside() ** 2
     noise = noise_at(image, plate)
     # beyond this the fit would reproduce noise (discrepancy principle)
     enough = float(np.sum(np.square(noise[counts], dtype=np.float64)))
@@ -166,7 +174,7 @@ def depth_guess(
     amount = optical_depth(image, scene, settings, plate)
     projection = project_voxels(scene.camera, scene.domain)
     hull = visual_hull(matte(image, plate).mask, projection)
-    profile = DepthProfile(amount, scene.camera, scene.domain, axis or SmokeAxis.upright())
+    profile = DepthProfile(amount, scene.camera, scene.domain, axis or SmokeAxis.upright(), settings.texture)
     density = np.zeros(scene.domain.resolution, np.float32)
     density[hull] = projection.read(amount, hull) * profile.at(projection, hull)
     return density / np.float32((scene.medium or Medium()).extinction)

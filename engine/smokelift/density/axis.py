@@ -42,19 +42,26 @@ class SmokeAxis:
         In metres above the domain's centre, ascending, along `view_frame`'s height.
     depths : (n,)
         In metres along `view_frame`'s depth, away from the camera.
+    spreads : (n,)
+        Standard deviation (m) about it of several columns that are known to stand behind one another.
     """
 
     heights: NDArray[np.float64]
     depths: NDArray[np.float64]
+    spreads: NDArray[np.float64]
 
     @staticmethod
     def upright(depth: float = 0.0) -> SmokeAxis:
         """The same depth at all heights."""
-        return SmokeAxis(np.zeros(1), np.full(1, float(depth)))
+        return SmokeAxis(np.zeros(1), np.full(1, float(depth)), np.zeros(1))
 
     def at(self, heights: NDArray[np.float64]) -> NDArray[np.float64]:
         """Depths at some heights."""
         return np.asarray(np.interp(heights, self.heights, self.depths))
+
+    def spread_at(self, heights: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Spreads at some heights."""
+        return np.asarray(np.interp(heights, self.heights, self.spreads))
 
 
 @dataclass(frozen=True)
@@ -91,8 +98,8 @@ def estimate_axis(
         return SmokeAxis.upright()
     heights = rows[0].heights
     if sources:
-        depth, across = _through(sources, heights, camera, domain)
-        return SmokeAxis(heights, _believed(depth, across, rows, camera, domain))
+        depth, across, spread = _through(sources, heights, camera, domain)
+        return SmokeAxis(heights, _believed(depth, across, rows, camera, domain), spread)
     found = [foot for foot in (_foot(row, camera, domain) for row in rows) if foot is not None]
     if not found or len(found) < TRUSTED_FRAMES * len(amounts):
         return SmokeAxis.upright()
@@ -104,21 +111,23 @@ def estimate_axis(
     join = _joined(np.array([row.total for row in rows]), heights, base + width / 2, width)
     if join is not None:
         believed *= np.clip((join + width / 2 - heights) / width, 0, 1)
-    return SmokeAxis(heights, believed)
+    return SmokeAxis(heights, believed, np.zeros_like(believed))
 
 
 def _through(
     sources: Sequence[Vector], heights: NDArray[np.float64], camera: Camera, domain: Domain
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Mean depth and lateral position (m), at some heights, of the sources below."""
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Mean depth, mean lateral position and spread in depth (m), at some heights, of the sources below."""
     lateral, along, height = view_frame(camera)
     places = np.array(sources) - np.array(domain.centre)
     places = places[np.argsort(places @ height)]
     counts = np.arange(1, len(places) + 1)
-    depth, across = (
-        np.interp(heights, places @ height, np.cumsum(places @ direction) / counts) for direction in (along, lateral)
-    )
-    return depth, across
+    depths = places @ along
+    means = np.cumsum(depths) / counts
+    variances = np.cumsum(depths**2) / counts - means**2
+    quantities = means, np.cumsum(places @ lateral) / counts, np.sqrt(np.maximum(variances, 0))
+    depth, across, spread = (np.interp(heights, places @ height, quantity) for quantity in quantities)
+    return depth, across, spread
 
 
 def _believed(

@@ -13,6 +13,8 @@ round. Over four scenes with their axis known the mean was better in new views t
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
@@ -33,8 +35,14 @@ SILHOUETTE = 0.05
 THINNEST = 0.7
 """Half the thickness of a silhouette's thinnest parts, in pixels."""
 
+APART = 0.5
+"""Share of the distance between columns behind one another that lasts on the way up: they draw together."""
+
 SMOOTHING = 1.5
 """Of the thickness, in pixels."""
+
+GRAIN = 1.5
+"""Standard deviation (voxels) of the blur that makes texture of white noise."""
 
 
 def lateral_spread(
@@ -70,7 +78,8 @@ def inflated(mask: NDArray[np.bool_]) -> NDArray[np.float64]:
     About every pixel inside stands the largest ball whose outline stays inside; what a pixel shows of them all is as
     thick as the one that is thickest there.
     """
-    inside = ndimage.distance_transform_edt(np.pad(mask, 1))[1:-1, 1:-1]
+    # smoke goes on beyond the picture's edge, unless it is everywhere
+    inside = ndimage.distance_transform_edt(np.pad(mask, 1, mode="constant" if mask.all() else "edge"))[1:-1, 1:-1]
     half = np.where(mask, THINNEST, 0.0)
     radius = 1.5
     while (centres := inside >= radius).any():
@@ -99,6 +108,14 @@ def _pixel_size(camera: Camera, domain: Domain) -> float:
     return float(max(distance, domain.voxel_size) / camera.fx)
 
 
+@lru_cache(maxsize=2)
+def texture_noise(domain: Domain) -> NDArray[np.float32]:
+    """Noise (nx, ny, nz) as coarse as details of smoke, of mean 0 and standard deviation 1; always the same."""
+    white = np.random.default_rng(0).standard_normal(domain.resolution)
+    noise = ndimage.gaussian_filter(white, GRAIN, mode="wrap")
+    return np.asarray((noise - noise.mean()) / noise.std(), np.float32)
+
+
 class DepthProfile:
     """The profile that a picture suggests.
 
@@ -110,9 +127,14 @@ class DepthProfile:
         What is seen, from where.
     axis
         Where in depth its middle is.
+    texture
+        Standard deviation of the logarithm of the noise (see `texture_noise`) that the profile is multiplied with.
     """
 
-    def __init__(self, amount: NDArray[np.float32], camera: Camera, domain: Domain, axis: SmokeAxis) -> None:
+    def __init__(
+        self, amount: NDArray[np.float32], camera: Camera, domain: Domain, axis: SmokeAxis, texture: float = 0.0
+    ) -> None:
+        self._texture = texture
         self._camera, self._domain, self._axis = camera, domain, axis
         self._centre = np.array(domain.centre)
         _, self._depth, self._height = view_frame(camera)
@@ -125,7 +147,10 @@ class DepthProfile:
         height = offset @ self._height
         width = self._width(height, projection.read(self._balls, voxels))
         profile = np.exp(-((np.abs(offset @ self._depth - self._axis.at(height)) / width) ** FLATNESS))
-        return np.asarray(profile / (2 * width * gamma(1 + 1 / FLATNESS)))
+        profile /= 2 * width * gamma(1 + 1 / FLATNESS)
+        if self._texture > 0:
+            profile *= np.exp(self._texture * texture_noise(self._domain)[voxels])
+        return np.asarray(profile)
 
     def share_inside(self) -> NDArray[np.float32]:
         """Share (rows, columns) of the profile that each pixel's ray meets inside the domain."""
@@ -148,6 +173,7 @@ class DepthProfile:
 
     def _width(self, height: NDArray[np.float64], balls: NDArray[np.float32]) -> NDArray[np.float64]:
         """A, in metres."""
-        spread = np.sqrt(np.interp(height, self._heights, self._spread) * balls)
+        lateral = np.interp(height, self._heights, self._spread)
+        spread = np.sqrt(lateral * balls + (APART * self._axis.spread_at(height)) ** 2)
         scale = np.sqrt(gamma(1 / FLATNESS) / gamma(3 / FLATNESS))
         return np.asarray(np.maximum(spread, self._domain.voxel_size) * scale)
