@@ -94,8 +94,12 @@ def test_smoke_that_goes_on_below_the_box_has_no_foot() -> None:
     assert not estimate_axis([amount], FRONT, BOX).depths.any()
 
 
-@pytest.mark.parametrize("amounts", [[], [np.zeros((113, 75), np.float32)]])
-def test_no_smoke_is_on_the_axis(amounts) -> None:
+CORNER = np.zeros((113, 75), np.float32)
+CORNER[0, 0] = 1
+
+
+@pytest.mark.parametrize("amounts", [[], [0 * CORNER], [CORNER]])
+def test_no_smoke_in_the_box_is_on_the_axis(amounts) -> None:
     """Nothing to find, nothing refused."""
     assert not estimate_axis(amounts, FRONT, BOX).depths.any()
 
@@ -111,6 +115,7 @@ def test_known_sources_need_no_foot() -> None:
     """Floating smoke stands where it is said to enter; above the second of two sources, between them."""
     smoke = seen(column(0.3, low=1.0), column(0.3, low=1.1))
     one = estimate_axis(smoke, FRONT, BOX, [(0.2, 0.25, 0.5)])
-    np.testing.assert_allclose(one.at(np.array([-1.0, 0.2])), 0.2, atol=0.01)
+    np.testing.assert_allclose(one.at(np.array([-1.0, 0.2])), 0.25, atol=0.01)
     two = estimate_axis(smoke, FRONT, BOX, [(0.2, -0.05, 1.0), (0.2, 0.25, 0.2)])
-    np.testing.assert_allclose(two.at(np.array([-1.3, 0.2])), (0.2, 0.08), atol=0.01)
+    np.testing.assert_allclose(two.at(np.array([-1.3, 0.2])), (0.25, 0.1), atol=0.01)
+    np.testing.assert_allclose(two.spread_at(np.array([-1.3, 0.2])), (0.0, 0.15), atol=0.01)

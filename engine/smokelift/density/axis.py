@@ -21,7 +21,7 @@ TRUSTED_FRAMES = 0.6
 """Share of the frames that have to show the foot."""
 
 CONFIDENCE = 0.8
-"""Share of the foot's distance from the domain's axis that is believed; what rises seldom rises straight."""
+"""Share of the foot's distance from the domain's axis that is believed: a pixel is many centimetres on the floor."""
 
 JOINING = 1.45
 """Growth of the smoke within half its width, in every frame, from which other smoke must have joined it: a column that
@@ -93,7 +93,7 @@ def estimate_axis(
         The domain's axis where nothing says otherwise: no smoke that stands on the domain's floor in most frames, or a
         camera that does not look down on the floor.
     """
-    rows = [upright_rows(amount, camera, domain) for amount in amounts if amount.any()]
+    rows = [row for row in (upright_rows(amount, camera, domain) for amount in amounts) if row.total.any()]
     if not rows:
         return SmokeAxis.upright()
     heights = rows[0].heights
@@ -107,7 +107,7 @@ def estimate_axis(
     width = float(np.median([foot.width for foot in found]))
     base = float(np.median([foot.height for foot in found]))
     across = np.full(heights.shape, np.interp(base + width / 4, heights, _middle(rows)))
-    believed = _believed(depth, across, rows, camera, domain)
+    believed = CONFIDENCE * _believed(depth, across, rows, camera, domain)
     join = _joined(np.array([row.total for row in rows]), heights, base + width / 2, width)
     if join is not None:
         believed *= np.clip((join + width / 2 - heights) / width, 0, 1)
@@ -140,7 +140,7 @@ def _believed(
     leaning = np.clip((np.abs(depth) / _reach(domain, view_frame(camera)[1]) - low) / (high - low), 0, 1)
     # what drifts across the picture drifts in depth as well, nobody knows where to
     drift = (_middle(rows) - across) / np.maximum(np.abs(depth), domain.voxel_size)
-    return np.asarray(CONFIDENCE * depth * (1 - leaning * raised) / (1 + drift**2))
+    return np.asarray(depth * (1 - leaning * raised) / (1 + drift**2))
 
 
 def _middle(rows: Sequence[Upright]) -> NDArray[np.float64]:
@@ -160,6 +160,11 @@ def _foot(row: Upright, camera: Camera, domain: Domain) -> _Foot | None:
         return None
     above_floor = matrix[2, 3] - domain.min[2]
     distance = float((centre - matrix[:3, 3]) @ along)
+    reach = _reach(domain, along)
+    # depth of the floor that one row of the picture shows
+    pixel = distance**2 / (max(above_floor, 1e-9) * camera.fy)
+    if pixel > reach / 2:
+        return None
     heights, total = row.heights, row.total
     smoky = total > 0.05 * np.percentile(total[total > 0], 75)
     first = int(np.argmax(smoky))
@@ -178,12 +183,9 @@ def _foot(row: Upright, camera: Camera, domain: Domain) -> _Foot | None:
         up = heights[before] + part * (heights[after] - heights[before]) + centre[2] - domain.min[2]
         return distance * up / (above_floor - up) if up < above_floor else np.inf
 
-    if above_floor <= 0:
-        return None
     front, middle, back = (floor_depth(share) for share in (0.2, 0.5, 0.8))
-    pixel = distance**2 / (above_floor * camera.fy)
     # a disc on the floor is as deep as it is wide; the lower end of what floats takes many more rows
-    if abs(middle) < _reach(domain, along) and back - front < width + pixel:
+    if abs(middle) < reach and back - front < width + pixel:
         return _Foot(middle, width, float(base))
     return None
 
