@@ -35,6 +35,10 @@ TRACE = 1e-9
 """Density below which a voxel is empty: nothing can show it, and what a process does with numbers below float's normal
 range (libraries may switch that) does not reach it."""
 
+LEAST_SHARE = 0.3
+"""Weight of rays that meet none of the depth profile inside the domain: with less, smoke that stands elsewhere than the
+profile says is missing in the picture; with more, clots grow at the floor and the ceiling."""
+
 
 @dataclass(frozen=True)
 class DensitySettings:
@@ -145,9 +149,9 @@ def reconstruct_density(
         return _paper(image, plate.image, scene, initial, settings)
     renderer = Renderer(camera, domain, medium, lights, plate.image, settings.scattering, hull)
     counts = reached(mask, projection)
-    # a ray that leaves through floor or ceiling says nothing about the smoke that it would have met outside
+    # a ray that leaves through floor or ceiling crosses few voxels, which must not hold all that it shows
     profile = DepthProfile(optical_depth(image, scene, settings, plate), camera, domain, axis or SmokeAxis.upright())
-    weight = counts * profile.share_inside() ** 2
+    weight = counts * np.maximum(profile.share_inside(), LEAST_SHARE)
     noise = noise_at(image, plate)
     # beyond this the fit would reproduce noise (discrepancy principle)
     enough = float(np.sum(np.square(noise[counts], dtype=np.float64)))

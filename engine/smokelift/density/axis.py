@@ -29,7 +29,7 @@ only rises gets no thicker, and what piles up at its head moves on."""
 
 NEAR_SIDE = (0.3, 0.45)
 """Distance of the foot from the axis, in reaches of the domain, from which (and from which on entirely) smoke is taken
-to lean back: a box whose smoke rose straight there would stand wrongly."""
+to lean to the other side, so that its mean is on the axis: a box with smoke rising straight there would stand wrongly."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,12 +135,12 @@ def _believed(
 ) -> NDArray[np.float64]:
     """What smoke that started at a depth and a lateral position says about the axis at each height."""
     total = np.sum([row.total for row in rows], 0)
-    raised = np.cumsum(total) / total.sum()
+    raised = np.cumsum(total) / total.sum()  # 1/2 in the smoke's mean
     low, high = NEAR_SIDE
     leaning = np.clip((np.abs(depth) / _reach(domain, view_frame(camera)[1]) - low) / (high - low), 0, 1)
     # what drifts across the picture drifts in depth as well, nobody knows where to
     drift = (_middle(rows) - across) / np.maximum(np.abs(depth), domain.voxel_size)
-    return np.asarray(depth * (1 - leaning * raised) / (1 + drift**2))
+    return np.asarray(depth * (1 - 2 * leaning * raised) / (1 + drift**2))
 
 
 def _middle(rows: Sequence[Upright]) -> NDArray[np.float64]:
