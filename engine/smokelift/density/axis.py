@@ -29,7 +29,7 @@ only rises gets no thicker, and what piles up at its head moves on."""
 
 NEAR_SIDE = (0.3, 0.45)
 """Distance of the foot from the axis, in reaches of the domain, from which (and from which on entirely) smoke is taken
-to lean to the other side, so that its mean is on the axis: a box with smoke rising straight there would stand wrongly."""
+to lean to the other side, so that its mean is on the axis: a box would not be put so beside its smoke."""
 
 
 @dataclass(frozen=True, eq=False)
