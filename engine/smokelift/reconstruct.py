@@ -18,7 +18,8 @@ from typing import Any
 import numpy as np
 
 from smokelift.clip import Clip
-from smokelift.density import Density, depth_guess, reconstruct_density
+from smokelift.density import Density, SmokeAxis, depth_guess, optical_depth, reconstruct_density
+from smokelift.density.axis import estimate_axis
 from smokelift.density.hull import project_voxels
 from smokelift.render.renderer import Image, Volume
 from smokelift.scene import Domain, Scene
@@ -27,6 +28,9 @@ from smokelift.settings import Settings
 from smokelift.shot import Shot, prepare_shot
 from smokelift.transport import SIDES, Velocity, advect
 from smokelift.velocity import estimate_velocity, predict_velocity
+
+AXIS_FRAMES = 16
+"""Frames from which the place in depth is estimated."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,6 +127,7 @@ def _frames(clip: Clip, shot: Shot, settings: Settings, start: Frame | None) -> 
     domain = shot.scene.domain
     dt = 1.0 / clip.fps
     inflow = shot.scene.inflow()
+    axis = smoke_axis(clip, shot, settings)
     before = start
     for index in range(start.number if start else 0, len(clip)):
         began = time.perf_counter()
@@ -133,7 +138,9 @@ def _frames(clip: Clip, shot: Shot, settings: Settings, start: Frame | None) -> 
             predicted = predict_velocity(before.velocity, dt, settings.velocity.closed)
             # pictures correct the mass, but not of what a moving camera does not see
             initial = advect(before.density, predicted, dt, conserve=shot.scene.camera.moves)
-        density = _unseen(domain, initial) if now is None else _corrected(clip.frame(index), now, settings, initial)
+        density = (
+            _unseen(domain, initial) if now is None else _corrected(clip.frame(index), now, settings, axis, initial)
+        )
         fitted = time.perf_counter()
         velocity = Velocity.zero(domain.resolution, domain.voxel_size)
         if before is not None:
@@ -163,14 +170,27 @@ def _frames(clip: Clip, shot: Shot, settings: Settings, start: Frame | None) -> 
         before = frame
 
 
-def _corrected(picture: Image, shot: Shot, settings: Settings, transported: Volume | None) -> Density:
+def smoke_axis(clip: Clip, shot: Shot, settings: Settings) -> SmokeAxis:
+    """Where in depth the smoke of a clip stands: as the settings say, or estimated from some frames."""
+    if settings.axis_depth is not None:
+        return SmokeAxis.upright(settings.axis_depth)
+    if settings.method == "paper" or shot.plate_at is not None:
+        return SmokeAxis.upright()
+    scene = shot.small_scene
+    assert scene.camera is not None and scene.domain is not None
+    pictures = (shot.working.cut(clip.frame(number)) for number in clip.spread(AXIS_FRAMES))
+    amounts = [optical_depth(picture, scene, settings.density, shot.plate) for picture in pictures]
+    return estimate_axis(amounts, scene.camera, scene.domain, [inlet.centre for inlet in scene.inlets])
+
+
+def _corrected(picture: Image, shot: Shot, settings: Settings, axis: SmokeAxis, transported: Volume | None) -> Density:
     """The frame's density from its picture and the density carried along."""
     image, scene, share = shot.working.cut(picture), shot.small_scene, settings.transport
     initial = transported
     if settings.method == "default" and transported is not None and share < 1:
-        guess = depth_guess(image, scene, settings.density, shot.plate)
+        guess = depth_guess(image, scene, settings.density, shot.plate, axis)
         initial = np.float32(1 - share) * guess + np.float32(share) * transported
-    density = reconstruct_density(image, scene, initial, settings.density, plate=shot.plate)
+    density = reconstruct_density(image, scene, initial, settings.density, plate=shot.plate, axis=axis)
     assert shot.scene.camera is not None and scene.camera is not None and scene.domain is not None
     if transported is not None and shot.scene.camera.moves:
         # what a moving camera does not see now it may have seen before

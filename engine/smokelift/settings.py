@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal
@@ -35,6 +36,9 @@ class Settings:
         Share (0 to 1) of the density carried along from the frame before in the first guess of the next; the rest
         is the single picture's depth profile. Over four clips a quarter gave the best new views: it settles what a
         textured background leaves open; with more, the velocity's own errors smear the depth from frame to frame.
+    axis_depth
+        How far behind the domain's centre (metres, away from the camera) the middle of the smoke stands; None estimates
+        it from where the smoke meets the floor, and takes the domain's centre where it does not.
     density, velocity
         Settings of the two parts.
     """
@@ -43,6 +47,7 @@ class Settings:
     quality: Quality = "balanced"
     resolution: tuple[int, int, int] | None = None
     transport: float = 0.25
+    axis_depth: float | None = None
     density: DensitySettings = field(default_factory=DensitySettings)
     velocity: VelocitySettings = field(default_factory=VelocitySettings)
 
@@ -53,6 +58,8 @@ class Settings:
             raise ValueError(f"quality must be one of {', '.join(QUALITIES)}, not {self.quality!r}.")
         if not 0 <= self.transport <= 1:
             raise ValueError(f"transport must be a number from 0 to 1, not {self.transport}.")
+        if self.axis_depth is not None and not math.isfinite(self.axis_depth):
+            raise ValueError(f"axis_depth must be a finite number of metres, not {self.axis_depth}.")
         if self.resolution is not None and (len(self.resolution) != 3 or min(self.resolution) < 8):
             raise ValueError(f"resolution must be three numbers of at least 8 voxels, not {self.resolution}.")
 

@@ -10,12 +10,15 @@ import pytest
 
 from smokelift.background import Plate
 from smokelift.density import Density, DensitySettings, reconstruct_density
+from smokelift.density.axis import SmokeAxis
 from smokelift.density.descent import descend
 from smokelift.density.hull import project_voxels, visual_hull
 from smokelift.density.multiplicative import fit_multiplicative
-from smokelift.density.profile import depth_profile
+from smokelift.density.profile import DepthProfile, inflated
+from smokelift.metrics import streaks
 from smokelift.render import Renderer, render, scene_lights
-from smokelift.scene import Background, Camera, Medium, Scene
+from smokelift.render.rays import ray_through_pixels
+from smokelift.scene import Background, Camera, DirectionalLight, Domain, Medium, Scene
 
 QUICK = DensitySettings(fit_iterations=4, descent_iterations=6)
 FRONT = Camera.look_at((0, -4, 0.8), (0, 0, 0.8), fov_y_degrees=30, size=(24, 32)).matrix
@@ -83,7 +86,8 @@ def test_voxels_outside_the_picture_are_out(plume) -> None:
 def profile_of(amount, domain):
     """The profile at every voxel."""
     everywhere = np.ones(domain.resolution, np.bool_)
-    return depth_profile(amount, GRID, domain, everywhere).reshape(domain.resolution)
+    profile = DepthProfile(amount, GRID, domain, SmokeAxis.upright())
+    return profile.at(project_voxels(GRID, domain), everywhere).reshape(domain.resolution)
 
 
 def amount_of(width: int) -> np.ndarray:
@@ -118,6 +122,104 @@ def test_the_profile_does_not_mind_the_amount(plume) -> None:
     """Thicker smoke of the same outline has the same profile."""
     profiles = [profile_of(amount_of(8) * scale, plume.scene.domain) for scale in (1, 50)]
     np.testing.assert_allclose(profiles[1], profiles[0], rtol=1e-4)
+
+
+def test_the_profile_follows_the_axis(plume) -> None:
+    """At every height its middle is where the axis is."""
+    domain = plume.scene.domain
+    h = domain.voxel_size
+    axis = SmokeAxis(np.array([-8 * h, 8 * h]), np.array([-3 * h, 3 * h]), np.zeros(2))
+    everywhere = np.ones(domain.resolution, np.bool_)
+    profile = DepthProfile(amount_of(6), GRID, domain, axis).at(project_voxels(GRID, domain), everywhere)
+    profile = profile.reshape(domain.resolution)
+    y = (np.arange(24) - 11.5) * h
+    middle = (profile * y[None, :, None]).sum(1)[12] / profile.sum(1)[12]
+    np.testing.assert_allclose(middle[[8, 16, 24]], axis.at((np.array([8, 16, 24]) - 15.5) * h), atol=0.1 * h)
+
+
+def test_columns_behind_one_another_make_it_deeper(plume) -> None:
+    """Where sources are known to stand apart in depth, the smoke reaches from one to the other."""
+    domain = plume.scene.domain
+    h = domain.voxel_size
+    y = (np.arange(24) - 11.5) * h
+    depths = []
+    for apart in (0.0, 8 * h):
+        axis = SmokeAxis(np.zeros(1), np.zeros(1), np.full(1, apart))
+        everywhere = np.ones(domain.resolution, np.bool_)
+        profile = DepthProfile(amount_of(6), GRID, domain, axis).at(project_voxels(GRID, domain), everywhere)
+        profile = profile.reshape(domain.resolution)[12, :, 16]
+        depths.append(np.sqrt((profile * y**2).sum() / profile.sum()))
+    assert depths[1] > 1.8 * depths[0]
+
+
+def test_a_lying_bar_is_as_deep_as_it_is_thick(plume) -> None:
+    """Its row is long, but nothing that long and that thin is as deep as it is long; a standing bar is like it."""
+    domain = plume.scene.domain
+    lying = np.zeros((32, 24), np.float32)
+    lying[13:19, 2:22] = 1
+    standing = amount_of(6)
+    y = (np.arange(24) - 11.5) * domain.voxel_size
+    depths = []
+    for amount in (lying, standing):
+        profile = profile_of(amount, domain)[12, :, 16]
+        depths.append(np.sqrt((profile * y**2).sum() / profile.sum()))
+    assert depths[0] < 2 * depths[1]
+
+
+def test_balls_fill_a_silhouette() -> None:
+    """A disc is inflated to a ball; a bar to a rod, however long it is."""
+    rows, columns = np.indices((61, 61)) - 30
+    distance = np.hypot(rows, columns)
+    half = inflated(distance < 20)
+    expected = np.sqrt(np.maximum(20**2 - distance**2, 0))
+    near = distance < 18
+    np.testing.assert_allclose(half[near], expected[near], atol=2)
+    assert not half[distance >= 20].any()
+    bar = np.zeros((61, 61), np.bool_)
+    bar[25:36, 4:57] = True
+    np.testing.assert_allclose(inflated(bar)[30, 10:50], 6, atol=0.6)
+
+
+def test_rays_that_leave_through_the_floor_meet_less_of_the_profile(small) -> None:
+    """Rays through the middle meet all of it; those that pass the floor or ceiling before the axis less than half."""
+    amount = np.zeros((42, 30), np.float32)
+    amount[:, 12:18] = 1
+    share = DepthProfile(amount, small.camera, small.domain, SmokeAxis.upright()).share_inside()
+    assert share[21, 15] == pytest.approx(1, abs=0.05)
+    top = small.domain.max[2] - small.domain.centre[2]
+    origin, direction = ray_through_pixels(small.camera)
+    height = origin[..., 2] - small.domain.centre[2] - origin[..., 1] / direction[..., 1] * direction[..., 2]
+    outside = np.abs(height[:, 15]) > 1.02 * top
+    assert (share[outside, 15] < 0.5).all()
+    assert ((share >= 0) & (share <= 1)).all()
+
+
+def test_smoke_through_floor_and_ceiling_makes_no_clots() -> None:
+    """A column as high as the box is not much denser at its ends, where rays cross few of its voxels."""
+    domain = Domain((-1, -1, 0), (1, 1, 3), (32, 32, 48))
+    scene = Scene(
+        camera=Camera.look_at((0, -7, 1.5), (0, 0, 1.5), fov_y_degrees=30, size=(75, 113)),
+        domain=domain,
+        medium=Medium(extinction=5.0, albedo=0.9),
+        lights=(DirectionalLight((-0.6, 0.4, -0.7), (8.0, 8.0, 8.0)),),
+    )
+    x = (np.arange(32) + 0.5) / 16 - 1
+    column = np.repeat(((x[:, None] ** 2 + x**2) < 0.06)[..., None], 48, 2).astype(np.float32)
+    layers = reconstruct_density(render(column, scene), scene).values.max((0, 1))
+    assert layers.max() < 1.7 * np.median(layers)
+
+
+def test_texture_breaks_streaks(plume, small) -> None:
+    """On request there is detail along the rays, the same every time, and the picture is still met."""
+    target = render(plume.densities[1], small)
+    plain, rough, again = (
+        reconstruct_density(target, small, settings=DensitySettings(texture=texture)) for texture in (0.0, 0.4, 0.4)
+    )
+    assert streaks(rough.values) > 1.05 * streaks(plain.values)
+    assert rough.figures["psnr"] > 35
+    assert (rough.values == again.values).all()
+    with pytest.raises(ValueError, match="texture"):
+        DensitySettings(texture=1.5)
 
 
 # fit and descent

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from smokelift.metrics import (
+    banding,
     flicker,
     height_mass_error,
+    likeness,
     mass,
     mean_divergence,
     octave_power,
@@ -17,6 +19,7 @@ from smokelift.metrics import (
     shifted_psnr,
     spectrum_distance,
     ssim,
+    streaks,
     velocity_error,
     volume_error,
     warp_error,
@@ -214,3 +217,34 @@ def test_flicker() -> None:
     assert flicker(np.array([1.0, 1.0, 1.0, 1.0]) + 0.1 * np.array([1, -1, 1, -1])) == pytest.approx(0.4, rel=0.01)
     with pytest.raises(ValueError, match="three frames"):
         flicker(steady[:2])
+
+
+def test_streaks() -> None:
+    """A picture drawn out along an axis has no change there; noise has as much everywhere."""
+    rng = np.random.default_rng(3)
+    noise = rng.random((20, 24, 28))
+    assert streaks(noise) == pytest.approx(1, abs=0.02)
+    drawn_out = np.repeat(rng.random((20, 1, 28)), 24, 1)
+    assert streaks(drawn_out) == 0
+    assert streaks(drawn_out, axis=0) > 1.3
+    with pytest.raises(ValueError, match="nx, ny, nz"):
+        streaks(noise[0])
+
+
+def test_banding() -> None:
+    """All detail of rows is banding, next to none of columns or of noise."""
+    rows, columns = np.indices((96, 64))
+    assert banding(2 + np.sin(rows)) == pytest.approx(1, abs=0.01)
+    assert banding(2 + np.sin(columns)) < 0.01
+    assert banding(2 + np.random.default_rng(4).random((96, 64))) < 0.05
+    assert banding(np.zeros((8, 8))) == 0
+
+
+def test_likeness() -> None:
+    """Detail counts, not the outline, nor how strong or bright it is."""
+    one, other = np.random.default_rng(5).random((2, 96, 64))
+    assert likeness(3 * one + 1, one) > 0.99
+    assert abs(likeness(one, other)) < 0.05
+    outline = np.hypot(*np.indices((96, 64)) - 32) < 20
+    assert abs(likeness(outline * (5 + one), outline * (5 + other))) < 0.95
+    assert likeness(np.zeros((8, 8)), np.zeros((8, 8))) == 0

@@ -13,13 +13,15 @@ import pytest
 from smokelift.clip import Clip
 from smokelift.density import DensitySettings
 from smokelift.density.hull import project_voxels, voxel_centres
+from smokelift.density.screen import view_frame
 from smokelift.images import write_image
 from smokelift.metrics import psnr
-from smokelift.reconstruct import Frame, reconstruct
+from smokelift.reconstruct import Frame, reconstruct, smoke_axis
 from smokelift.render import render, scene_renderer
 from smokelift.scene import Background, ClipSource, Inlet, Scene, look_at_matrix
 from smokelift.sequence import Sequence, SequenceError
 from smokelift.settings import Settings
+from smokelift.shot import prepare_shot
 from smokelift.vdb import VdbUnavailable, read_vdb, vdb_module
 from smokelift.velocity import estimate_velocity
 
@@ -62,6 +64,31 @@ def test_density_is_carried_from_the_third_frame_on(plume, draft) -> None:
     for alone, carried in zip(frames[0.0], frames[1.0], strict=True):
         same = np.array_equal(alone.density, carried.density)
         assert same == (alone.number <= 2)
+
+
+def test_the_smoke_stands_where_the_settings_say(plume, draft) -> None:
+    """A given depth of the axis moves the smoke away from the camera, and what is given is not estimated."""
+    depth = view_frame(plume.scene.camera)[1]
+    offset = (voxel_centres(plume.scene.domain) - np.array(plume.scene.domain.centre)) @ depth
+    shift = 3 * plume.scene.domain.voxel_size
+    places = []
+    for given in (0.0, shift):
+        settings = replace(draft, axis_depth=given, transport=0.0)
+        first = frames_of(plume.scene, settings)[0].density
+        places.append(float((first * offset).sum() / first.sum()))
+    assert places[1] - places[0] == pytest.approx(shift, rel=0.2)
+
+
+@pytest.mark.parametrize(("method", "expected"), [("default", 0.12), ("paper", 0.0)])
+def test_the_axis_is_estimated_from_the_clip(plume, draft, tmp_path, method, expected) -> None:
+    """By the default method, from the foot of the smoke; the paper's knows nothing of it."""
+    x, y, z = np.moveaxis(voxel_centres(plume.scene.domain), -1, 0)
+    column = (np.hypot(x, y - 0.15) < 0.15) & (z < 1.2)
+    scene = plume.write(tmp_path, [column.astype(np.float32)] * 2)
+    settings = replace(draft, method=method)
+    with Clip.open(scene.clip) as clip:
+        axis = smoke_axis(clip, prepare_shot(clip, scene, settings), settings)
+    np.testing.assert_allclose(axis.at(np.array([-0.6, 0.0])), expected, atol=0.5 * expected)
 
 
 def test_frames_come_in_order(run, plume) -> None:

@@ -53,6 +53,7 @@ def test_json_holds_all_settings(quality: Any, method: Any) -> None:
         ({"quality": "ultra"}, "quality must be one of draft, balanced, fine"),
         ({"transport": 1.5}, "transport must be a number from 0 to 1"),
         ({"transport": float("nan")}, "transport must be a number from 0 to 1"),
+        ({"axis_depth": float("inf")}, "axis_depth must be a finite number"),
         ({"resolution": (7, 64, 64)}, "at least 8 voxels"),
         ({"resolution": (64, 64)}, "three numbers"),
     ],

@@ -54,7 +54,7 @@ def fit_multiplicative(
     projection
         Where voxels lie in the picture.
     weight : (rows, columns)
-        1 where the picture counts, 0 elsewhere.
+        How much the picture counts, 0 to 1; where it counts less, steps are shorter as well.
     noise : (rows, columns, 3)
         Standard deviation of the target's noise, linear radiance.
     enough
@@ -103,7 +103,7 @@ def _log_scale(
     scale = np.log(wanted) / np.minimum(np.log(np.maximum(transmittance, 1e-30)), -1e-6)
     change = np.sqrt(np.sum((image - background) ** 2, -1))
     sensitivity = np.sqrt(np.sum(secant**2, -1)) / np.maximum(change, 1e-6)
-    gain = sensitivity**2 / (sensitivity**2 + DAMPING**2)
+    gain = weight * sensitivity**2 / (sensitivity**2 + DAMPING**2)
     step = gain * np.log(np.clip(scale, *STEP_RANGE))
     trust = weight * power / (power + floor)
     # one pixel's blur keeps neighbouring rays from fighting over the voxels that they share

@@ -1,42 +1,48 @@
-"""Depth from one view: a flat-topped profile, as deep at each height as the smoke is wide there.
+"""Depth from one view: a flat-topped profile, as deep as the smoke is wide.
 
 One picture says how much smoke lies along a ray, not where. The profile
 
-    rho(x, y, z) = m(x, z) g(y),   g(y) = exp(-(|y - y0| / A(z))^q)
+    rho(x, y, z) = m(x, z) g(y),   g(y) = exp(-(|y - y0| / A)^q)
 
-keeps the picture m as it is and gives every height its own depth A(z), from the lateral spread sigma(z) of the
-smoke in the picture: for a distribution of that form A = sigma sqrt(Gamma(1/q) / Gamma(3/q)). Among the priors
-compared on four simulated scenes it gives the best new views of any that knows one picture only.
+keeps the picture m as it is and spreads it about the smoke's axis y0. For a distribution of that form and standard
+deviation sigma, A = sigma sqrt(Gamma(1/q) / Gamma(3/q)). Its width sigma is the geometric mean of two that the picture
+shows: the spread of the smoke's row, right for what rises as a column, and that of balls which fill the silhouette
+(inflated outlines: Igarashi, Matsuoka and Tanaka 1999), right for what is longer than it is thick in any direction, and
+round. Over four scenes with their axis known the mean was better in new views than either, by 0.4 to 0.9 dB.
 """
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
-from scipy.special import gamma
+from scipy.special import gamma, gammainc
 
+from smokelift.density.axis import SmokeAxis
 from smokelift.density.hull import Projection, voxel_centres
-from smokelift.render.rays import project
+from smokelift.density.screen import upright_rows, view_frame
+from smokelift.render.rays import ray_through_pixels
 from smokelift.scene import Camera, Domain
 
 FLATNESS = 3.5
 """q: between a Gaussian (2) and a box; 3 to 4 were equally good over four scenes."""
 
+SILHOUETTE = 0.05
+"""Share of the smoke's usual amount from which a pixel belongs to the silhouette."""
 
-def view_frame(camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Lateral, depth and height directions (unit, world) in which one picture is understood.
+THINNEST = 0.7
+"""Half the thickness of a silhouette's thinnest parts, in pixels."""
 
-    Height is the world's Z, because smoke rises, unless the camera looks so steeply (over 45 degrees up or down)
-    that its own up direction is the better row of the picture.
-    """
-    matrix = np.array(camera.matrix, np.float64)
-    height = np.array([0.0, 0.0, 1.0])
-    if abs(matrix[2, 2]) > np.sqrt(0.5):
-        height = matrix[:3, 1]
-    depth = -matrix[:3, 2] + (matrix[:3, 2] @ height) * height
-    depth /= np.linalg.norm(depth)
-    return np.cross(depth, height), depth, height
+APART = 0.5
+"""Share of the distance between columns behind one another that lasts on the way up: they draw together."""
+
+SMOOTHING = 1.5
+"""Of the thickness, in pixels."""
+
+GRAIN = 1.5
+"""Standard deviation (voxels) of the blur that makes texture of white noise."""
 
 
 def lateral_spread(
@@ -55,48 +61,119 @@ def lateral_spread(
         Heights (m, along the picture's height direction through the domain's centre) and the spread there, filled
         from the neighbours where there is no smoke and smoothed over two voxels.
     """
-    lateral, _, height = view_frame(camera)
-    centre = np.array(domain.centre)
-    h = domain.voxel_size
-    half = np.abs(np.array(domain.max) - centre)
-    reach_across, reach_up = np.abs(lateral) @ half, np.abs(height) @ half
-    across = np.arange(-reach_across + h / 2, reach_across, h)
-    up = np.arange(-reach_up + h / 2, reach_up, h)
-    points = centre + across[None, :, None] * lateral + up[:, None, None] * height
-    pixels, _ = project(camera, points)
-    values = ndimage.map_coordinates(
-        amount.astype(np.float64), (pixels[..., 1] - 0.5, pixels[..., 0] - 0.5), order=1, mode="constant"
-    )
-    total = values.sum(1)
-    safe = np.where(total > 0, total, 1.0)
-    mean = (values * across).sum(1) / safe
-    variance = (values * (across - mean[:, None]) ** 2).sum(1) / safe
+    rows = upright_rows(amount, camera, domain, per_voxel=1)
     # normalised convolution: heights count by the smoke that they hold
-    weight = ndimage.gaussian_filter1d(total, 2.0) + 1e-6 * max(total.max(initial=0.0), 1e-30)
-    smooth = ndimage.gaussian_filter1d(total * variance, 2.0) / weight
-    known = total > 1e-3 * total.max(initial=0.0)
+    most = rows.total.max(initial=0.0)
+    weight = ndimage.gaussian_filter1d(rows.total, 2.0) + 1e-6 * max(most, 1e-30)
+    smooth = ndimage.gaussian_filter1d(rows.total * rows.spread**2, 2.0) / weight
+    known = rows.total > 1e-3 * most
     if known.any():
-        smooth = np.interp(up, up[known], smooth[known])
-    return up, np.sqrt(np.maximum(smooth, h**2))
+        smooth = np.interp(rows.heights, rows.heights[known], smooth[known])
+    return rows.heights, np.sqrt(np.maximum(smooth, domain.voxel_size**2))
 
 
-def depth_profile(
-    amount: NDArray[np.float32], camera: Camera, domain: Domain, voxels: NDArray[np.bool_]
-) -> NDArray[np.float64]:
-    """Profile g (1/m) along the depth at the marked voxels (n,): unit integral, centred on the domain's axis."""
-    _, depth, height = view_frame(camera)
-    centre = np.array(domain.centre)
-    heights, spread = lateral_spread(amount, camera, domain)
-    offset = voxel_centres(domain)[voxels] - centre
-    width = np.interp(offset @ height, heights, spread) * np.sqrt(gamma(1 / FLATNESS) / gamma(3 / FLATNESS))
-    profile = np.exp(-((np.abs(offset @ depth) / width) ** FLATNESS))
-    return np.asarray(profile / (2 * width * gamma(1 + 1 / FLATNESS)))
+def inflated(mask: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Half the thickness (pixels), seen from the front, of the balls that fill a silhouette (rows, columns).
+
+    About every pixel inside stands the largest ball whose outline stays inside; what a pixel shows of them all is as
+    thick as the one that is thickest there.
+    """
+    # smoke goes on beyond the picture's edge, unless it is everywhere
+    inside = ndimage.distance_transform_edt(np.pad(mask, 1, mode="constant" if mask.all() else "edge"))[1:-1, 1:-1]
+    half = np.where(mask, THINNEST, 0.0)
+    radius = 1.5
+    while (centres := inside >= radius).any():
+        aside = ndimage.distance_transform_edt(~centres)
+        half = np.maximum(half, np.sqrt(np.maximum(radius**2 - aside**2, 0)))
+        radius *= 1.1
+    return half
 
 
-def spread_along_depth(
-    amount: NDArray[np.float32], camera: Camera, domain: Domain, projection: Projection, hull: NDArray[np.bool_]
-) -> NDArray[np.float32]:
-    """Extinction (1/m), (nx, ny, nz), zero outside the hull, whose rays have about the optical depths ``amount``."""
-    extinction = np.zeros(domain.resolution, np.float32)
-    extinction[hull] = projection.read(amount, hull) * depth_profile(amount, camera, domain, hull)
-    return extinction
+def ball_spread(amount: NDArray[np.float32], camera: Camera, domain: Domain) -> NDArray[np.float32]:
+    """Standard deviation (m) along the depth of the balls that fill the silhouette, for each pixel (rows, columns)."""
+    smoky = amount > 0
+    mask = amount > SILHOUETTE * (np.percentile(amount[smoky], 90) if smoky.any() else 1.0)
+    weight = amount + 1e-3 * amount.max(initial=1e-30)
+    total = ndimage.gaussian_filter(weight * mask, SMOOTHING) + 1e-30
+    half = ndimage.gaussian_filter(weight * inflated(mask), SMOOTHING) / total
+    return np.asarray(_pixel_size(camera, domain) * half / np.sqrt(3), np.float32)
+
+
+def _pixel_size(camera: Camera, domain: Domain) -> float:
+    """Width (m) of a pixel at the domain's centre."""
+    if camera.type == "orthographic":
+        return 1 / camera.fx
+    matrix = np.array(camera.matrix, np.float64)
+    distance = (matrix[:3, 3] - np.array(domain.centre)) @ matrix[:3, 2]
+    return float(max(distance, domain.voxel_size) / camera.fx)
+
+
+@lru_cache(maxsize=2)
+def texture_noise(domain: Domain) -> NDArray[np.float32]:
+    """Noise (nx, ny, nz) as coarse as details of smoke, of mean 0 and standard deviation 1; always the same."""
+    white = np.random.default_rng(0).standard_normal(domain.resolution)
+    noise = ndimage.gaussian_filter(white, GRAIN, mode="wrap")
+    return np.asarray((noise - noise.mean()) / noise.std(), np.float32)
+
+
+class DepthProfile:
+    """The profile that a picture suggests.
+
+    Parameters
+    ----------
+    amount : (rows, columns)
+        Optical depth, or anything proportional to it.
+    camera, domain
+        What is seen, from where.
+    axis
+        Where in depth its middle is.
+    texture
+        Standard deviation of the logarithm of the noise (see `texture_noise`) that the profile is multiplied with.
+    """
+
+    def __init__(
+        self, amount: NDArray[np.float32], camera: Camera, domain: Domain, axis: SmokeAxis, texture: float = 0.0
+    ) -> None:
+        self._texture = texture
+        self._camera, self._domain, self._axis = camera, domain, axis
+        self._centre = np.array(domain.centre)
+        _, self._depth, self._height = view_frame(camera)
+        self._heights, self._spread = lateral_spread(amount, camera, domain)
+        self._balls = ball_spread(amount, camera, domain)
+
+    def at(self, projection: Projection, voxels: NDArray[np.bool_]) -> NDArray[np.float64]:
+        """The profile g (1/m), of unit integral along the depth, at the marked voxels (n,)."""
+        offset = voxel_centres(self._domain)[voxels] - self._centre
+        height = offset @ self._height
+        width = self._width(height, projection.read(self._balls, voxels))
+        profile = np.exp(-((np.abs(offset @ self._depth - self._axis.at(height)) / width) ** FLATNESS))
+        profile /= 2 * width * gamma(1 + 1 / FLATNESS)
+        if self._texture > 0:
+            profile *= np.exp(self._texture * texture_noise(self._domain)[voxels])
+        return np.asarray(profile)
+
+    def share_inside(self) -> NDArray[np.float32]:
+        """Share (rows, columns) of the profile that each pixel's ray meets inside the domain."""
+        origin, direction = ray_through_pixels(self._camera)
+        start = origin - self._centre
+        half = np.array(self._domain.max) - self._centre
+        with np.errstate(divide="ignore", invalid="ignore"):
+            sides = np.stack([(-half - start) / direction, (half - start) / direction])
+            near, far = np.nanmax(sides.min(0), -1), np.nanmin(sides.max(0), -1)
+        along = direction @ self._depth
+        missed = (far <= np.maximum(near, 0)) | (along < 1e-3)
+        near, far, along = (np.where(missed, 1.0, value) for value in (np.maximum(near, 0), far, along))
+        here = start @ self._depth
+        meets = np.clip(-here / along, near, far)
+        height = (start + meets[..., None] * direction) @ self._height
+        middle, width = self._axis.at(height), self._width(height, self._balls)
+        ends = [(here + distance * along - middle) / width for distance in (near, far)]
+        low, high = (np.sign(end) * gammainc(1 / FLATNESS, np.abs(end) ** FLATNESS) for end in ends)
+        return np.where(missed, 0, (high - low) / 2).astype(np.float32)
+
+    def _width(self, height: NDArray[np.float64], balls: NDArray[np.float32]) -> NDArray[np.float64]:
+        """A, in metres."""
+        lateral = np.interp(height, self._heights, self._spread)
+        spread = np.sqrt(lateral * balls + (APART * self._axis.spread_at(height)) ** 2)
+        scale = np.sqrt(gamma(1 / FLATNESS) / gamma(3 / FLATNESS))
+        return np.asarray(np.maximum(spread, self._domain.voxel_size) * scale)

@@ -1,0 +1,204 @@
+"""Where in depth the smoke stands: the axis that depth profiles are centred on.
+
+One picture of smoke in parallel light looks the same whether the smoke is near and small or far and large, so its place
+in depth has to come from something else. The floor gives it where smoke rises from there: a disc of smoke on the floor
+begins in the picture where the ray through the floor meets it, within a few rows. Elsewhere the axis of the domain is
+the best guess, because a box is put around its smoke.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smokelift.density.screen import Upright, upright_rows, view_frame
+from smokelift.scene import Camera, Domain, Vector
+
+TRUSTED_FRAMES = 0.6
+"""Share of the frames that have to show the foot."""
+
+CONFIDENCE = 0.8
+"""Share of the foot's distance from the domain's axis that is believed: a pixel is many centimetres on the floor."""
+
+JOINING = 1.45
+"""Growth of the smoke within half its width, in every frame, from which other smoke must have joined it: a column that
+only rises gets no thicker, and what piles up at its head moves on."""
+
+NEAR_SIDE = (0.3, 0.45)
+"""Distance of the foot from the axis, in reaches of the domain, from which (and from which on entirely) smoke is taken
+to lean to the other side, so that its mean is on the axis: a box would not be put so beside its smoke."""
+
+
+@dataclass(frozen=True, eq=False)
+class SmokeAxis:
+    """How far behind the domain's centre the middle of the smoke is, by height.
+
+    Attributes
+    ----------
+    heights : (n,)
+        In metres above the domain's centre, ascending, along `view_frame`'s height.
+    depths : (n,)
+        In metres along `view_frame`'s depth, away from the camera.
+    spreads : (n,)
+        Standard deviation (m) about it of several columns that are known to stand behind one another.
+    """
+
+    heights: NDArray[np.float64]
+    depths: NDArray[np.float64]
+    spreads: NDArray[np.float64]
+
+    @staticmethod
+    def upright(depth: float = 0.0) -> SmokeAxis:
+        """The same depth at all heights."""
+        return SmokeAxis(np.zeros(1), np.full(1, float(depth)), np.zeros(1))
+
+    def at(self, heights: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Depths at some heights."""
+        return np.asarray(np.interp(heights, self.heights, self.depths))
+
+    def spread_at(self, heights: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Spreads at some heights."""
+        return np.asarray(np.interp(heights, self.heights, self.spreads))
+
+
+@dataclass(frozen=True)
+class _Foot:
+    """Where smoke meets the floor: depth and lateral width (m), and the height (m) at which it shows on the axis."""
+
+    depth: float
+    width: float
+    height: float
+
+
+def estimate_axis(
+    amounts: Sequence[NDArray[np.float32]], camera: Camera, domain: Domain, sources: Sequence[Vector] = ()
+) -> SmokeAxis:
+    """The axis of the smoke in some frames of a clip.
+
+    Parameters
+    ----------
+    amounts : sequence of (rows, columns)
+        Optical depths, 0 where there is no smoke.
+    camera
+        A camera that stands still.
+    sources
+        Where smoke is known to enter, in metres; else its foot on the floor is looked for.
+
+    Returns
+    -------
+    SmokeAxis
+        The domain's axis where nothing says otherwise: no smoke that stands on the domain's floor in most frames, or a
+        camera that does not look down on the floor.
+    """
+    rows = [row for row in (upright_rows(amount, camera, domain) for amount in amounts) if row.total.any()]
+    if not rows:
+        return SmokeAxis.upright()
+    heights = rows[0].heights
+    if sources:
+        depth, across, spread = _through(sources, heights, camera, domain)
+        return SmokeAxis(heights, _believed(depth, across, rows, camera, domain), spread)
+    found = [foot for foot in (_foot(row, camera, domain) for row in rows) if foot is not None]
+    if not found or len(found) < TRUSTED_FRAMES * len(amounts):
+        return SmokeAxis.upright()
+    depth = np.full(heights.shape, np.median([foot.depth for foot in found]))
+    width = float(np.median([foot.width for foot in found]))
+    base = float(np.median([foot.height for foot in found]))
+    across = np.full(heights.shape, np.interp(base + width / 4, heights, _middle(rows)))
+    believed = CONFIDENCE * _believed(depth, across, rows, camera, domain)
+    join = _joined(np.array([row.total for row in rows]), heights, base + width / 2, width)
+    if join is not None:
+        believed *= np.clip((join + width / 2 - heights) / width, 0, 1)
+    return SmokeAxis(heights, believed, np.zeros_like(believed))
+
+
+def _through(
+    sources: Sequence[Vector], heights: NDArray[np.float64], camera: Camera, domain: Domain
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Mean depth, mean lateral position and spread in depth (m), at some heights, of the sources below."""
+    lateral, along, height = view_frame(camera)
+    places = np.array(sources) - np.array(domain.centre)
+    places = places[np.argsort(places @ height)]
+    counts = np.arange(1, len(places) + 1)
+    depths = places @ along
+    means = np.cumsum(depths) / counts
+    variances = np.cumsum(depths**2) / counts - means**2
+    quantities = means, np.cumsum(places @ lateral) / counts, np.sqrt(np.maximum(variances, 0))
+    depth, across, spread = (np.interp(heights, places @ height, quantity) for quantity in quantities)
+    return depth, across, spread
+
+
+def _believed(
+    depth: NDArray[np.float64], across: NDArray[np.float64], rows: Sequence[Upright], camera: Camera, domain: Domain
+) -> NDArray[np.float64]:
+    """What smoke that started at a depth and a lateral position says about the axis at each height."""
+    total = np.sum([row.total for row in rows], 0)
+    raised = np.cumsum(total) / total.sum()  # 1/2 in the smoke's mean
+    low, high = NEAR_SIDE
+    leaning = np.clip((np.abs(depth) / _reach(domain, view_frame(camera)[1]) - low) / (high - low), 0, 1)
+    # what drifts across the picture drifts in depth as well, nobody knows where to
+    drift = (_middle(rows) - across) / np.maximum(np.abs(depth), domain.voxel_size)
+    return np.asarray(depth * (1 - 2 * leaning * raised) / (1 + drift**2))
+
+
+def _middle(rows: Sequence[Upright]) -> NDArray[np.float64]:
+    """Mean lateral position (m) of the smoke at each height, over all frames."""
+    total = np.sum([row.total for row in rows], 0)
+    known = total > 0.02 * total.max()
+    mean = np.sum([row.total * row.mean for row in rows], 0)[known] / total[known]
+    return np.asarray(np.interp(rows[0].heights, rows[0].heights[known], mean))
+
+
+def _foot(row: Upright, camera: Camera, domain: Domain) -> _Foot | None:
+    """The foot in one frame, if the lower end of the smoke looks like one."""
+    _, along, height = view_frame(camera)
+    matrix = np.array(camera.matrix, np.float64)
+    centre = np.array(domain.centre)
+    if camera.type != "perspective" or abs(height[2]) < 1 or (matrix[:3, 3] - centre) @ along >= 0:
+        return None
+    above_floor = matrix[2, 3] - domain.min[2]
+    distance = float((centre - matrix[:3, 3]) @ along)
+    reach = _reach(domain, along)
+    # depth of the floor that one row of the picture shows
+    pixel = distance**2 / (max(above_floor, 1e-9) * camera.fy)
+    if pixel > reach / 2:
+        return None
+    heights, total = row.heights, row.total
+    smoky = total > 0.05 * np.percentile(total[total > 0], 75)
+    first = int(np.argmax(smoky))
+    base = heights[first]
+    near = smoky & (heights <= base + 12 * (heights[1] - heights[0]))
+    width = float(2 * np.sqrt(3) * np.average(row.spread[near], weights=total[near]))
+    level = float(np.median(total[smoky & (heights <= base + width)]))
+
+    def floor_depth(share: float) -> float:
+        """Depth at which the floor is seen where the rows first hold so much of their level."""
+        after = int(np.argmax(total > share * level))
+        if after == 0:
+            return -np.inf
+        before = after - 1
+        part = (share * level - total[before]) / (total[after] - total[before])
+        up = heights[before] + part * (heights[after] - heights[before]) + centre[2] - domain.min[2]
+        return distance * up / (above_floor - up) if up < above_floor else np.inf
+
+    front, middle, back = (floor_depth(share) for share in (0.2, 0.5, 0.8))
+    # a disc on the floor is as deep as it is wide; the lower end of what floats takes many more rows
+    if abs(middle) < reach and back - front < width + pixel:
+        return _Foot(middle, width, float(base))
+    return None
+
+
+def _reach(domain: Domain, direction: NDArray[np.float64]) -> float:
+    """Half the domain's extent along a direction."""
+    return float(np.abs(direction) @ (np.array(domain.max) - np.array(domain.centre)))
+
+
+def _joined(totals: NDArray[np.float64], heights: NDArray[np.float64], above: float, width: float) -> float | None:
+    """The height from which on the smoke is not only that of the foot; None if there is none."""
+    step = max(1, round(0.5 * width / (heights[1] - heights[0])))
+    least = 1e-3 * totals.max()
+    growth = np.min(np.maximum(totals[:, step:], least) / np.maximum(totals[:, :-step], least), 0)
+    sudden = (growth > JOINING) & (heights[:-step] > above)
+    return float(heights[:-step][sudden][0]) if sudden.any() else None

@@ -1,0 +1,71 @@
+"""The upright screen through the domain's centre: one picture's rows as heights in the world."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from smokelift.render.rays import project
+from smokelift.scene import Camera, Domain
+
+
+def view_frame(camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Lateral, depth and height directions (unit, world) in which one picture is understood.
+
+    Height is the world's Z, because smoke rises, unless the camera looks so steeply (over 45 degrees up or down)
+    that its own up direction is the better row of the picture.
+    """
+    matrix = np.array(camera.matrix, np.float64)
+    height = np.array([0.0, 0.0, 1.0])
+    if abs(matrix[2, 2]) > np.sqrt(0.5):
+        height = matrix[:3, 1]
+    depth = -matrix[:3, 2] + (matrix[:3, 2] @ height) * height
+    depth /= np.linalg.norm(depth)
+    return np.cross(depth, height), depth, height
+
+
+@dataclass(frozen=True, eq=False)
+class Upright:
+    """A picture on the upright screen through the domain's centre, row by row.
+
+    Attributes
+    ----------
+    heights : (n,)
+        Of the rows, in metres above the centre.
+    total : (n,)
+        Amount in each row, times metres.
+    mean, spread : (n,)
+        Its mean lateral position and standard deviation (m); 0 where there is nothing.
+    """
+
+    heights: NDArray[np.float64]
+    total: NDArray[np.float64]
+    mean: NDArray[np.float64]
+    spread: NDArray[np.float64]
+
+
+def upright_rows(amount: NDArray[np.float32], camera: Camera, domain: Domain, *, per_voxel: int = 2) -> Upright:
+    """Sum a picture (rows, columns) up along the rows of the upright screen, ``per_voxel`` of them to a voxel."""
+    lateral, depth, height = view_frame(camera)
+    centre = np.array(domain.centre)
+    h = domain.voxel_size
+    half = np.abs(np.array(domain.max) - centre)
+    reach_across, reach_up, reach_along = np.abs(lateral) @ half, np.abs(height) @ half, np.abs(depth) @ half
+    across = np.arange(-reach_across + h / 2, reach_across, h)
+    # what stands before the screen shows beyond the domain's ends there
+    ends = reach_up + reach_along / 2
+    up = np.arange(-ends + h / (2 * per_voxel), ends, h / per_voxel)
+    points = centre + across[None, :, None] * lateral + up[:, None, None] * height
+    pixels, distance = project(camera, points)
+    values = ndimage.map_coordinates(
+        amount.astype(np.float64), (pixels[..., 1] - 0.5, pixels[..., 0] - 0.5), order=1, mode="constant"
+    )
+    values[distance <= 0] = 0
+    total = values.sum(1)
+    safe = np.where(total > 0, total, 1.0)
+    mean = (values * across).sum(1) / safe
+    variance = (values * (across - mean[:, None]) ** 2).sum(1) / safe
+    return Upright(up, total * h, mean, np.sqrt(variance))

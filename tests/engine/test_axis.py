@@ -1,0 +1,121 @@
+"""Where in depth smoke stands: found by its foot on the floor, left on the domain's axis where nothing shows it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from smokelift.density.axis import estimate_axis
+from smokelift.render import Renderer
+from smokelift.scene import Camera, Domain, Medium
+
+BOX = Domain((-1, -1, 0), (1, 1, 3), (32, 32, 48))
+FRONT = Camera.look_at((0, -7, 1.5), (0, 0, 1.5), fov_y_degrees=30, size=(75, 113))
+X, Y, Z = (low + (np.arange(n) + 0.5) / 16 for low, n in zip(BOX.min, BOX.resolution, strict=True))
+
+
+def column(depth: float, lean: float = 0.0, low: float = 0.0, high: float = 2.0, radius: float = 0.25) -> np.ndarray:
+    """Smoke between two heights around (0.2 + lean z, depth)."""
+    across = X[:, None, None] - 0.2 - lean * Z
+    inside = across**2 + (Y[None, :, None] - depth) ** 2 < radius**2
+    return (inside & (low < Z) & (high > Z)).astype(np.float32)
+
+
+def seen(*densities: np.ndarray, camera: Camera = FRONT) -> list[np.ndarray]:
+    """Optical depths that a camera sees."""
+    renderer = Renderer(camera, BOX, Medium(extinction=1.0), (), np.ones(3), "absorption")
+    return [-np.log(np.maximum(renderer.image(density)[..., 0], 1e-9)) for density in densities]
+
+
+def rising(depth: float) -> list[np.ndarray]:
+    """A column whose head rises from frame to frame."""
+    return seen(*(column(depth, high=high) for high in (1.4, 1.7, 2.0, 2.3)))
+
+
+@pytest.mark.parametrize("depth", [-0.3, -0.15, 0.0, 0.25])
+def test_smoke_on_the_floor_shows_its_depth(depth) -> None:
+    """To less than a voxel, shrunk towards the axis a little, and the same at all heights."""
+    found = estimate_axis(rising(depth), FRONT, BOX)
+    assert found.at(np.array([-1.2])) == pytest.approx(0.8 * depth, abs=0.05)
+    assert found.at(np.array([0.5])) == pytest.approx(0.8 * depth, abs=0.06)
+
+
+@pytest.mark.parametrize("depth", [-0.3, 0.3])
+def test_floating_smoke_is_left_on_the_axis(depth) -> None:
+    """Its lower end is no foot, wherever it floats."""
+    for low in (0.05, 0.2, 1.0):
+        distance = (X[:, None, None] ** 2 + (Y[None, :, None] - depth) ** 2 + (Z - low - 0.3) ** 2) ** 0.5
+        ball = np.clip(1.5 - 4 * distance, 0, 1).astype(np.float32)
+        assert not estimate_axis(seen(ball, ball), FRONT, BOX).depths.any()
+
+
+def test_smoke_that_joins_ends_what_the_foot_says() -> None:
+    """Above a second source the axis is the domain's again; below it the foot's still holds."""
+    both = column(0.25, radius=0.2) + column(-0.3, low=1.0, radius=0.3)
+    found = estimate_axis(seen(both, both), FRONT, BOX)
+    assert found.at(np.array([-1.2])) == pytest.approx(0.2, abs=0.05)
+    assert abs(found.at(np.array([0.2]))) < 0.02
+
+
+def test_drifting_smoke_is_believed_less() -> None:
+    """What leans across the picture may lean in depth as well."""
+    straight, leaning = (estimate_axis(seen(column(0.25, lean)), FRONT, BOX).at(np.array([0.4])) for lean in (0.0, 0.2))
+    assert 0 < leaning < 0.5 * straight
+
+
+def test_smoke_from_the_side_of_the_box_comes_back() -> None:
+    """A box stands around its smoke, so a column near its side leans to the middle, or it would stand wrongly."""
+    found = estimate_axis(rising(0.6), FRONT, BOX)
+    foot, head = found.at(np.array([-1.3, 0.7]))
+    assert foot > 0.35
+    assert head < 0.25 * foot
+
+
+def test_a_foot_in_few_frames_is_chance() -> None:
+    """Most frames have to show it."""
+    ball = column(0.3, low=1.0)
+    assert not estimate_axis(seen(column(0.3), ball, ball), FRONT, BOX).depths.any()
+
+
+@pytest.mark.parametrize("height", [-0.5, 0.02])
+def test_a_camera_that_does_not_look_down_on_the_floor_sees_no_foot(height) -> None:
+    """The floor is a line to it."""
+    low = Camera.look_at((0, -7, height), (0, 0, 1.5), fov_y_degrees=35, size=(75, 113))
+    assert not estimate_axis(seen(column(0.3), camera=low), low, BOX).depths.any()
+
+
+def test_smoke_that_goes_on_below_the_box_has_no_foot() -> None:
+    """The box cuts it; where it stands is not seen."""
+    deep = Domain((-1, -1, -1), (1, 1, 3), (32, 32, 64))
+    z = -1 + (np.arange(64) + 0.5) / 16
+    inside = (X[:, None, None] ** 2 + (Y[None, :, None] - 0.3) ** 2 < 0.06) & (z < 2)
+    renderer = Renderer(FRONT, deep, Medium(extinction=1.0), (), np.ones(3), "absorption")
+    amount = -np.log(renderer.image(inside.astype(np.float32))[..., 0])
+    assert not estimate_axis([amount], FRONT, BOX).depths.any()
+
+
+CORNER = np.zeros((113, 75), np.float32)
+CORNER[0, 0] = 1
+
+
+@pytest.mark.parametrize("amounts", [[], [0 * CORNER], [CORNER]])
+def test_no_smoke_in_the_box_is_on_the_axis(amounts) -> None:
+    """Nothing to find, nothing refused."""
+    assert not estimate_axis(amounts, FRONT, BOX).depths.any()
+
+
+def test_depth_is_away_from_the_camera() -> None:
+    """From behind, the same smoke is as far the other way."""
+    behind = Camera.look_at((0, 7, 1.5), (0, 0, 1.5), fov_y_degrees=30, size=(75, 113))
+    found = estimate_axis(seen(column(0.25), camera=behind), behind, BOX)
+    assert found.at(np.array([0.0])) == pytest.approx(-0.2, abs=0.06)
+
+
+def test_known_sources_need_no_foot() -> None:
+    """Floating smoke stands where it is said to enter; above the second of two sources, between them."""
+    smoke = seen(column(0.3, low=1.0), column(0.3, low=1.1))
+    one = estimate_axis(smoke, FRONT, BOX, [(0.2, 0.25, 0.5)])
+    np.testing.assert_allclose(one.at(np.array([-1.0, 0.2])), 0.25, atol=0.01)
+    two = estimate_axis(smoke, FRONT, BOX, [(0.2, -0.05, 1.0), (0.2, 0.25, 0.2)])
+    np.testing.assert_allclose(two.at(np.array([-1.3, 0.2])), (0.25, 0.1), atol=0.01)
+    np.testing.assert_allclose(two.spread_at(np.array([-1.3, 0.2])), (0.0, 0.15), atol=0.01)
