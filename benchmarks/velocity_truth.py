@@ -141,6 +141,7 @@ def table(path: Path) -> None:
     rows: dict[str, Iterator[Score]] = {
         "pairs": pairs(truth, usual, unit),
         "after 8 frames": chain(truth, usual, unit),
+        "after 8 frames, walls said": chain(truth, VelocitySettings(closed=truth.closed), unit),
         "pairs, inlet told": pairs(truth, usual, unit, told=True),
         "pairs, paper": pairs(truth, VelocitySettings(method="paper"), unit),
         "pairs, blurred": pairs(truth, usual, unit, blurred),

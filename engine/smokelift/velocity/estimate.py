@@ -35,6 +35,10 @@ REACH = 1.0
 CONFIDENCE_WIDTH = 2.0
 """Standard deviation in voxels over which gradients count: smoothness carries what they show about as far."""
 
+SMALL_STEP = np.float32(0.08)
+"""Voxels. A solve that changed a prediction by less is not linearised around again: with 0.05, as after predictions of
+steady flows, errors stay the same to 0.01, and a third of the time is saved; with 0.1, as in fast jets, they do not."""
+
 WORTHLESS = 0.5
 """Share of the change left unexplained from which a prediction is not used: after a cut, say, or a gust."""
 
@@ -203,12 +207,13 @@ def _default(
             unexplained = _unexplained(linear, centre, pair.noise / level.coarseness**3, settings)
             stiffness = settings.unexplained / max(unexplained, settings.least_unexplained)
             problem, start = least_squares(linear, centre, stiffness, settings), centre if blind else u
-            evidence = linear.direction, linear.weight
+            evidence, smoke = (linear.direction, linear.weight), linear.smoke
             # The solver takes most of the memory: what it does not look at goes before, what it leaves after.
             del linear, centre
             solution, figures = solve(problem, start, settings)
             del problem, start
-            if level is finest and warp == settings.warps - 1:
+            last = warp == settings.warps - 1 or (guided and _step(solution, u, smoke) < SMALL_STEP)
+            if level is finest and last:
                 source = _source(level, u, evidence[1], settings, pair.compressed)
                 confidence = _confidence(*evidence, stiffness, settings)
             u = _within_reach(solution, u, settings)
@@ -216,6 +221,8 @@ def _default(
             iterations += figures["iterations"]
             products += figures["products"]
             projections += figures["projections"]
+            if last:
+                break
         coarsest = False
     measures = {
         "iterations": iterations,
@@ -289,6 +296,13 @@ def _confidence(direction: Faces, weight: Array, stiffness: float, settings: Vel
     shown = _core.blur(shown, CONFIDENCE_WIDTH, 3.0, settings.threads)
     confidence: Array = shown / (shown + np.float32(stiffness * settings.smoothness))
     return confidence
+
+
+def _step(solution: Faces, u: Faces, smoke: npt.NDArray[np.bool_]) -> float:
+    """Root mean square of what a solve changed, in voxels, on the low faces of voxels with smoke."""
+    nx, ny, nz = smoke.shape
+    squares = sum(np.square((new - old)[:nx, :ny, :nz][smoke]).mean() for new, old in zip(solution, u, strict=True))
+    return float(np.sqrt(squares))
 
 
 def _within_reach(solution: Faces, u: Faces, settings: VelocitySettings) -> Faces:
