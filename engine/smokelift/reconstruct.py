@@ -26,7 +26,7 @@ from smokelift.scene import Domain, Scene
 from smokelift.sequence import SequenceWriter
 from smokelift.settings import Settings
 from smokelift.shot import Shot, prepare_shot
-from smokelift.transport import SIDES, Velocity, advect
+from smokelift.transport import SIDES, Array, Velocity, advect
 from smokelift.velocity import estimate_velocity, predict_velocity
 
 AXIS_FRAMES = 16
@@ -111,14 +111,24 @@ def reconstruct(
         start = None
         if state is not None:
             assert shot.scene.domain is not None
-            velocity = Velocity(state.velocity, shot.scene.domain.voxel_size)
+            left = state.extra.get("unexplained_mean"), state.extra.get("unexplained_magnitude")
+            unexplained = None if left[0] is None or left[1] is None else (left[0], left[1])
+            velocity = Velocity(state.velocity, shot.scene.domain.voxel_size, unexplained=unexplained)
             start = Frame(state.number, state.density, velocity, {})
         elif writer.finished:
             return
         for frame in _frames(clip, shot, settings, start):
             if frame.number not in writer.finished:
-                writer.write(frame.number, frame.density, frame.velocity.faces, frame.figures)
+                writer.write(frame.number, frame.density, frame.velocity.faces, frame.figures, _memory(frame.velocity))
                 yield frame
+
+
+def _memory(velocity: Velocity) -> dict[str, Array]:
+    """What the next estimate needs to know of a velocity beside the velocity itself."""
+    if velocity.unexplained is None:
+        return {}
+    mean, magnitude = velocity.unexplained
+    return {"unexplained_mean": mean, "unexplained_magnitude": magnitude}
 
 
 def _frames(clip: Clip, shot: Shot, settings: Settings, start: Frame | None) -> Iterator[Frame]:

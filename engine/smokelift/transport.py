@@ -41,6 +41,9 @@ class Velocity:
         by smoothness and incompressibility.
     source
         Of an estimate, shape (nx, ny, nz): density that enters per second, >= 0.
+    unexplained
+        Of an estimate, two of shape (nx, ny, nz): mean, and mean magnitude, of what it and those before it left of the
+        change around each voxel. The next one tells sources by it.
 
     Raises
     ------
@@ -53,6 +56,7 @@ class Velocity:
     figures: Mapping[str, float] = field(default_factory=dict)
     confidence: Array | None = None
     source: Array | None = None
+    unexplained: tuple[Array, Array] | None = None
 
     def __post_init__(self) -> None:
         require_positive("voxel_size", self.voxel_size)

@@ -28,6 +28,7 @@ from smokelift.velocity.momentum import Motion, Prediction, fit_motion
 from smokelift.velocity.noise import Followed, followed, without_noise
 from smokelift.velocity.pyramid import Level, pyramid, refine
 from smokelift.velocity.settings import VelocitySettings
+from smokelift.velocity.sources import Unexplained, left_unexplained
 
 REACH = 1.0
 """Voxels of the grid at hand up to which a linearisation of the density holds."""
@@ -109,12 +110,13 @@ def estimate_velocity(
         pair = Followed(*blurred, compressed=False)
     else:
         pair = followed(first, second, settings.blur, settings.smoke_threshold, settings.threads)
-    predicted = None
+    predicted = past = None
     if prediction is not None:
         require_same_shape("the prediction", prediction.shape, shape)
+        past = Unexplained(*prediction.unexplained) if prediction.unexplained is not None else None
         predicted = Prediction(prediction.faces, dt / voxel_size)
 
-    finest = Level(pair.before, pair.after, weight)
+    finest = Level(pair.before, pair.after, weight, past=past)
     search = settings.sources and inflow is None
     found = _paper(finest, predicted, settings) if paper else _default(finest, predicted, search, pair, settings)
     if found is None:
@@ -128,6 +130,7 @@ def estimate_velocity(
         {**found.figures, "divergence": divergence},
         confidence=found.confidence,
         source=found.source / np.float32(dt),
+        unexplained=None if found.unexplained is None else (found.unexplained.mean, found.unexplained.magnitude),
     )
 
 
@@ -146,9 +149,9 @@ def predict_velocity(velocity: Velocity, dt: float, closed: tuple[Side, ...] = (
     Returns
     -------
     Velocity
-        Without divergence.
+        Without divergence; `unexplained` stays as it is, because inlets stand still.
     """
-    return project(advect(velocity, velocity, dt), closed)
+    return replace(project(advect(velocity, velocity, dt), closed), unexplained=velocity.unexplained)
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,6 +162,7 @@ class _Found:
     figures: dict[str, float]
     confidence: Array
     source: Array
+    unexplained: Unexplained | None
 
 
 def _paper(level: Level, prediction: Prediction | None, settings: VelocitySettings) -> _Found | None:
@@ -170,7 +174,7 @@ def _paper(level: Level, prediction: Prediction | None, settings: VelocitySettin
     u, figures = solve(least_squares(linear, start, 1.0, settings), start, settings)
     nothing = np.zeros_like(level.after)
     measures = {name: figures[name] for name in ("iterations", "products", "projections", "residual")}
-    return _Found(u, measures, nothing + 1, nothing)
+    return _Found(u, measures, nothing + 1, nothing, None)
 
 
 def _default(
@@ -181,7 +185,7 @@ def _default(
     known = _worthwhile(finest, prediction, search, pair.noise, settings)
     guided = known is not None
     if not guided:
-        prediction = None
+        prediction, finest = None, replace(finest, past=None)
     levels = [finest] if guided else pyramid(finest, settings.levels)
     share = 1.0 if guided else settings.momentum
     iterations = products = projections = 0
@@ -214,7 +218,7 @@ def _default(
             del problem, start
             last = warp == settings.warps - 1 or (guided and _step(solution, u, smoke) < SMALL_STEP)
             if level is finest and last:
-                source = _source(level, u, evidence[1], settings, pair.compressed)
+                source, left = _source(level, u, evidence[1], settings, pair.compressed)
                 confidence = _confidence(*evidence, stiffness, settings)
             u = _within_reach(solution, u, settings)
             del solution, evidence
@@ -233,7 +237,7 @@ def _default(
         "trust": motion.trust,
         "thinning": 1 - (1 - motion.thinning) ** (4 / 3) if pair.compressed else motion.thinning,
     }
-    return _Found(u, measures, confidence, source)
+    return _Found(u, measures, confidence, source, left)
 
 
 def _worthwhile(
@@ -278,13 +282,16 @@ def _unexplained(linear: Linearisation, centre: Faces, noise: float, settings: V
     return max(rest - floor, 0.0) / (whole - floor) if whole > floor else 1.0
 
 
-def _source(level: Level, u: Faces, weight: Array, settings: VelocitySettings, compressed: bool) -> Array:
-    """Density that enters in a frame: what is left unexplained where changes are not motion."""
+def _source(
+    level: Level, u: Faces, weight: Array, settings: VelocitySettings, compressed: bool
+) -> tuple[Array, Unexplained]:
+    """Density that enters in a frame, that is what is left unexplained where changes are not motion; and all of it."""
     carried, after = _core.advect_cells(level.before, u, False, True, settings.threads), level.after
+    left = left_unexplained(after - carried, np.maximum(after, carried), 1.0, level.past, settings.threads)
     if compressed:
         carried, after = expanded(carried), expanded(after)
     source: Array = (1 - weight) * np.maximum(after - carried, 0)
-    return source
+    return source, left
 
 
 def _confidence(direction: Faces, weight: Array, stiffness: float, settings: VelocitySettings) -> Array:

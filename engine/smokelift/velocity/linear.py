@@ -12,7 +12,7 @@ from smokelift import _core
 from smokelift.transport import Array, Faces, closed_flags
 from smokelift.velocity.pyramid import Level
 from smokelift.velocity.settings import VelocitySettings
-from smokelift.velocity.sources import source_weight
+from smokelift.velocity.sources import left_unexplained, source_weight
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,17 +34,11 @@ def linearise(level: Level, u: Faces, search: bool, settings: VelocitySettings) 
     )
     if scale == 0:
         return None
-    weight = _weight(level, residual, density, smoke, search, settings.threads)
+    weight = np.ascontiguousarray(level.weight)
+    if search:
+        unexplained = left_unexplained(residual, density, level.coarseness, level.past, settings.threads)
+        weight = weight * source_weight(unexplained, smoke)
     return Linearisation((gx, gy, gz), offset, carried, weight, smoke, scale)
-
-
-def _weight(
-    level: Level, residual: Array, density: Array, smoke: npt.NDArray[np.bool_], search: bool, threads: int
-) -> Array:
-    """What changes count as motion: what is known beforehand, and without the sources that show."""
-    if not search:
-        return np.ascontiguousarray(level.weight)
-    return level.weight * source_weight(residual, density, smoke, level.coarseness, threads)
 
 
 def least_squares(

@@ -26,8 +26,8 @@ a third moves an estimate by less than smoke's own finest scales do."""
 
 SMOOTHNESS = 0.045
 """The same where no blur is needed at all: what is smooth already, as reconstructed densities are, loses by more
-(0.02 in the errors of densities that are blurred by a voxel). Baked ones have 0.056 to 0.19, blurred by a voxel 0.018 to
-0.043."""
+(0.02 in the errors of densities that are blurred by a voxel). Baked ones have 0.056 to 0.19, blurred by a voxel 0.018
+to 0.043."""
 
 MAD = 0.6745
 """Median magnitude of a normal variable in standard deviations."""

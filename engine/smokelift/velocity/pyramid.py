@@ -8,6 +8,7 @@ import numpy as np
 
 from smokelift import _core
 from smokelift.transport import Array, Faces
+from smokelift.velocity.sources import Unexplained
 
 
 @dataclass(frozen=True)
@@ -22,12 +23,15 @@ class Level:
         How far changes may be taken for motion, as far as it is known beforehand.
     coarseness
         Voxels of the finest grid along one of this.
+    past
+        What velocities left unexplained up to the frame before, on the finest grid.
     """
 
     before: Array
     after: Array
     weight: Array
     coarseness: float = 1.0
+    past: Unexplained | None = None
 
 
 def pyramid(finest: Level, levels: int) -> list[Level]:
