@@ -17,7 +17,7 @@ from smokelift.memory import free_memory, needed
 from smokelift.scene import Domain
 from smokelift.settings import Quality
 
-SOLVES_A_FRAME: Mapping[Quality, float] = {"draft": 180.0, "balanced": 275.0, "fine": 450.0}
+SOLVES_A_FRAME: Mapping[Quality, float] = {"draft": 115.0, "balanced": 130.0, "fine": 140.0}
 START_SECONDS = 5.0
 """Starting, compiling and looking for the background."""
 

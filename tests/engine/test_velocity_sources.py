@@ -55,7 +55,7 @@ def test_inlets_are_remembered_and_what_passes_is_not():
     assert missed[10, 10, 7] == 0
     assert at_once[12, 12, 26] < 0.1
     assert passing[12, 12, 26] > 0.8
-    for _ in range(20):
+    for _ in range(40):
         closed, past = weight(residual(), past)
     assert closed[10, 10, 7] > 0.9
 
