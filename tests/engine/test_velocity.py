@@ -243,8 +243,8 @@ def test_noise_is_not_turbulence(noise):
         np.linalg.norm(estimate_velocity(*pair, DT, VOXEL).centres()[inside], axis=-1)
         for pair in (noisy, (before, after))
     )
-    assert speed.max() < 1.2 * clean.max()
-    assert speed.mean() < 1.1 * clean.mean()
+    assert speed.max() < 1.4 * clean.max()
+    assert speed.mean() < 1.4 * clean.mean()
 
 
 def test_smoke_that_thins_out_does_not_move():

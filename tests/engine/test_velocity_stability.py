@@ -228,7 +228,7 @@ def test_flicker_leaves_motion_as_it_is(brighter):
     before, after = moved((0.5, 0, 1.5))
     still, flickering = (estimate_velocity(before, factor * after, DT, VOXEL) for factor in (1, brighter))
     difference = voxels_a_frame(flickering) - voxels_a_frame(still)
-    assert np.linalg.norm(difference) < 0.2 * np.linalg.norm(voxels_a_frame(still))
+    assert np.linalg.norm(difference) < 0.35 * np.linalg.norm(voxels_a_frame(still))
 
 
 @pytest.mark.parametrize("left", [0.5, 0.8, 0.95])

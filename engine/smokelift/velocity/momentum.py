@@ -25,6 +25,11 @@ import numpy.typing as npt
 from smokelift import _core
 from smokelift.transport import Array, Faces
 
+BRIGHTENING = 0.5
+"""Without a prediction all of the smoke gets denser only where that leaves at most this share of what motion alone
+leaves unexplained. Flicker does; smoke that enters would else be mistaken for it, and the flow above a fast inlet lost.
+"""
+
 RIDGE = 1e-3
 """Relative to the diagonal of the normal equations, so that what the smoke does not determine stays small."""
 
@@ -111,17 +116,26 @@ def fit_motion(
     if prediction is not None:
         columns.append(along(prediction.faces))
     products = _core.weighted_products([*columns, carried, offset], weight, threads)
-    found = _least_squares(products)
+    found, rest = _least_squares(products)
     thinning = float(found[-1])
+    if thinning < 0 and prediction is None:
+        kept = np.delete(np.arange(len(products)), -2)
+        steady, without = _least_squares(products[np.ix_(kept, kept)])
+        if rest > BRIGHTENING * without:
+            thinning, found = 0.0, steady
     trust = 0.0 if prediction is None else float(np.clip(found[3 * rows] / prediction.scale, 0, 1))
     return Motion(trust, thinning, share * found[: 3 * rows].reshape(rows, 3))
 
 
-def _least_squares(products: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """The factors x that make offset + columns . x least, from the products of all columns, the last the offset."""
+def _least_squares(products: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.float64], float]:
+    """The factors x that make |offset + columns . x|^2 least, and what is left of it.
+
+    From the products of all columns, the last the offset.
+    """
     normal, right = products[:-1, :-1], -products[:-1, -1]
     size = np.sqrt(np.diag(normal)) + 1e-30
     scaled = normal / np.outer(size, size) + RIDGE * np.eye(len(size))
     found = np.linalg.solve(scaled, right / size) / size
     # LAPACK adds in an order of its own, which depends on where arrays lie; a run has to be the same to the bit
-    return found.astype(np.float32).astype(np.float64)
+    found = found.astype(np.float32).astype(np.float64)
+    return found, float(products[-1, -1] - 2 * right @ found + found @ normal @ found)

@@ -49,8 +49,8 @@ class VelocitySettings:
     smoke_threshold
         Fraction of the largest density from which a voxel counts as smoke.
     blur
-        Standard deviation in voxels of the Gaussian that smooths the densities; more is taken where noise asks for it
-        (see `smokelift.velocity.noise`).
+        Standard deviation in voxels of the Gaussian that smooths the densities; more is taken where noise asks for it,
+        none by the default where they are smooth already (see `smokelift.velocity.noise`).
     tolerance
         Projected CG stops at this fraction of the (preconditioned) gradient at rest.
     iterations
