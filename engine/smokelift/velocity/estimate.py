@@ -106,7 +106,9 @@ def estimate_velocity(
     if not paper and peaks[0] <= settings.smoke_threshold * peaks[1]:
         return _appeared(first, second, dt, voxel_size)
     if paper:
-        blurred = without_noise(first, second, ((settings.blur, np.inf),), settings.smoke_threshold, settings.threads)
+        blurred, _ = without_noise(
+            first, second, ((settings.blur, np.inf),), settings.smoke_threshold, settings.threads
+        )
         pair = Followed(*blurred, compressed=False)
     else:
         pair = followed(first, second, settings.blur, settings.smoke_threshold, settings.threads)

@@ -67,21 +67,16 @@ def followed(before: Array, after: Array, blur: float, threshold: float, threads
     threads
         Processor cores.
     """
-    smooth = without_noise(before, after, ((0.0, SMOOTHNESS),), threshold, threads)
-    if _is_within(smooth, SMOOTHNESS, threshold):
+    smooth, enough = without_noise(before, after, ((0.0, SMOOTHNESS),), threshold, threads)
+    if enough:
         return Followed(*smooth, compressed=False)
-    sharp = without_noise(compressed(before), compressed(after), ((blur, LARGEST_SHARE),), threshold, threads)
-    if _is_within(sharp, LARGEST_SHARE, threshold):
+    sharp, enough = without_noise(compressed(before), compressed(after), ((blur, LARGEST_SHARE),), threshold, threads)
+    if enough:
         return Followed(*sharp, compressed=True)
     widths = (blur, *(width for width in NOISE_WIDTHS if width > blur))
     limits = tuple((width, LARGEST_SHARE) for width in widths)
-    return Followed(*without_noise(before, after, limits, threshold, threads), compressed=False)
-
-
-def _is_within(found: tuple[Array, Array, float], share: float, threshold: float) -> bool:
-    """Whether the noise that is left is at most a share of the gradient."""
-    _, after, variance = found
-    return bool(np.sqrt(variance) <= share * _gradient(after, after > threshold * after.max()))
+    noisy, _ = without_noise(before, after, limits, threshold, threads)
+    return Followed(*noisy, compressed=False)
 
 
 def noise_level(density: Array, smoke: npt.NDArray[np.bool_]) -> float:
@@ -100,7 +95,7 @@ def noise_level(density: Array, smoke: npt.NDArray[np.bool_]) -> float:
 
 def without_noise(
     before: Array, after: Array, widths: tuple[tuple[float, float], ...], threshold: float, threads: int
-) -> tuple[Array, Array, float]:
+) -> tuple[tuple[Array, Array, float], bool]:
     """Blur two densities as much as their noise asks for.
 
     Parameters
@@ -117,19 +112,20 @@ def without_noise(
 
     Returns
     -------
-    before, after
-        Blurred.
-    variance
-        Of the noise that is left in their difference.
+    before, after, variance
+        Blurred, and the variance of the noise that is left in their difference.
+    enough
+        Whether that is within what the last width may leave.
     """
     smoke = after > threshold * after.max()
     raw = float(np.hypot(noise_level(before, smoke), noise_level(after, smoke)))
     for width, share in widths:
         first, second = (_core.blur(a, width, 4.0, threads) if width > 0 else a for a in (before, after))
         left = raw * _passed(width)
-        if left <= share * _gradient(second, smoke):
+        enough = left <= share * _gradient(second, smoke)
+        if enough:
             break
-    return first, second, left**2
+    return (first, second, left**2), enough
 
 
 def _gradient(density: Array, smoke: npt.NDArray[np.bool_]) -> float:
