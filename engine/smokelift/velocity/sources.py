@@ -113,5 +113,7 @@ def source_weight(found: Unexplained, smoke: npt.NDArray[np.bool_]) -> Array:
 
 def _ramp(values: Array, ends: tuple[float, float]) -> Array:
     low, high = ends
-    ramp: Array = np.clip((values - np.float32(low)) / np.float32(high - low), 0, 1)
+    ramp: Array = (values - np.float32(low)) / np.float32(high - low)
+    np.maximum(ramp, 0, out=ramp)  # together a fraction of what np.clip takes
+    np.minimum(ramp, 1, out=ramp)
     return ramp
