@@ -1,10 +1,12 @@
 """Make the clip of a baked scene with Mitsuba 3, and what no reconstruction may see: linear pictures from four sides.
 
     python benchmarks/truth/picture.py plume-1/truth.npz OUT [--light point] [--background wall] [--check 20]
+        [--scattering multiple] [--linear] [--frames 24]
 
 None of the project's own code takes part. The pictures are single scattering, integrated at half-voxel steps over
 Mitsuba's own sensor, emitters and trilinear grid, so they carry no noise; `--check` compares frames with `volpath`.
-Scattering is isotropic, so that what arrives at a point is one number, found once for all cameras.
+Scattering is isotropic, so that what arrives at a point is one number, found once for all cameras. With multiple
+scattering `volpath` makes the pictures itself, at half the size and with some grain.
 """
 
 from __future__ import annotations
@@ -30,6 +32,7 @@ DISTANCE = 7.0  # of the camera from the axis (m)
 DIRECTIONS = (8, 16)  # of light from the surroundings: Gauss points in z, equal ones in azimuth
 CHECK_BLOCK = 16  # pixels; volpath's noise is averaged over such blocks
 CHECK_PASSES, CHECK_SAMPLES = 4, 4096  # a block
+BOUNCES, SAMPLES = 33, 512  # with multiple scattering
 IRRADIANCE = 8.0  # of a light, at the middle of the box
 LIGHT_DISTANCE = 2.5  # of a point light from there (m)
 
@@ -127,10 +130,12 @@ class Renderer:
         Domain, medium and light as in a scene file.
     cameras
         What `agreement_reference.sensor` takes.
+    multiple
+        Whether light is scattered more than once.
     """
 
-    def __init__(self, scene: dict[str, Any], cameras: list[dict[str, Any]]) -> None:
-        self.medium, self.light, self.cameras = scene["medium"], scene["light"], cameras
+    def __init__(self, scene: dict[str, Any], cameras: list[dict[str, Any]], multiple: bool = False) -> None:
+        self.medium, self.light, self.cameras, self.multiple = scene["medium"], scene["light"], cameras, multiple
         self.low, self.high = (np.array(scene["domain"][key], float) for key in ("min", "max"))
         self.rays = []
         for camera in cameras:
@@ -151,6 +156,8 @@ class Renderer:
             width, height = camera["size"]
             views = march(smoke, source, box, ray, voxel / 2, self.medium["extinction"])
             radiance, transmittance = (view.numpy().reshape(height, width) for view in views)
+            if self.multiple:
+                radiance = self.path_traced(density, camera, 1, BOUNCES, 1, SAMPLES)
             found.append((radiance, transmittance))
         return found
 
@@ -166,8 +173,10 @@ class Renderer:
             dr.eval(total)
         return self.medium["albedo"] / (4 * math.pi) * total.numpy().reshape([fine * n for n in shape])
 
-    def path_traced(self, density: np.ndarray) -> np.ndarray:
-        """The first camera's picture by `volpath` at single scattering; pixels are blocks of the camera's."""
+    def path_traced(
+        self, density: np.ndarray, camera: dict[str, Any], block: int, depth: int, passes: int, samples: int
+    ) -> np.ndarray:
+        """A picture by `volpath` with paths of a depth, 2 for single scattering; pixels are blocks of the camera's."""
         centre, half = (self.low + self.high) / 2, (self.high - self.low) / 2
         interior = {
             "type": "heterogeneous",
@@ -179,8 +188,8 @@ class Renderer:
         scene = mi.load_dict(
             {
                 "type": "scene",
-                "integrator": {"type": "volpath", "max_depth": 2, "hide_emitters": True},
-                "camera": sensor(self.cameras[0], CHECK_BLOCK),
+                "integrator": {"type": "volpath", "max_depth": depth, "hide_emitters": True},
+                "camera": sensor(camera, block),
                 "domain": {
                     "type": "cube",
                     "to_world": mi.ScalarTransform4f().translate(centre).scale(half),
@@ -190,8 +199,7 @@ class Renderer:
                 "light": emitter(self.light),
             }
         )
-        passes = [mi.render(scene, spp=CHECK_SAMPLES, seed=seed).numpy()[..., 0] for seed in range(CHECK_PASSES)]
-        return np.mean(passes, axis=0)
+        return np.mean([mi.render(scene, spp=samples, seed=seed).numpy()[..., 0] for seed in range(passes)], axis=0)
 
 
 def table(name: str, values: dict[str, Any]) -> str:
@@ -206,12 +214,15 @@ def main() -> None:
     parser.add_argument("out", type=Path, help="folder")
     parser.add_argument("--light", choices=("directional", "point", "environment"), default="directional")
     parser.add_argument("--background", choices=("black", "wall"), default="black")
+    parser.add_argument("--scattering", choices=("single", "multiple"), default="single")
+    parser.add_argument("--linear", action="store_true", help="the clip as linear EXR pictures instead of a video")
+    parser.add_argument("--frames", type=int, help="how many, from the first")
     parser.add_argument("--check", type=int, nargs="*", default=[], help="frames to compare with volpath")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
 
     with np.load(options.truth) as file:
-        densities, voxel, fps = file["density"], float(file["voxel_size"]), float(file["fps"])
+        densities, voxel, fps = file["density"][: options.frames], float(file["voxel_size"]), float(file["fps"])
         name = json.loads(str(file["made_by"]))["name"]
     nx, ny, nz = shape = densities.shape[1:]
     rng = np.random.default_rng(list(name.encode()))
@@ -227,18 +238,21 @@ def main() -> None:
         "light": light,
     }
     middle = high[2] / 2
+    multiple = options.scattering == "multiple"
+    pixels = PIXELS // 2 if multiple else PIXELS
     camera = {
         "position": [0.0, -DISTANCE, middle],
         "target": [0.0, 0.0, middle],
         "up": [0.0, 0.0, 1.0],
         "fov_y_degrees": FOV,
-        "size": [PIXELS * nx, PIXELS * nz],
+        "size": [pixels * nx, pixels * nz],
     }
     views = {view: turned(camera, yaw) for view, yaw in YAWS.items()}
-    renderer = Renderer(scene, [camera | {"matrix": matrix.tolist()} for matrix, _ in views.values()])
+    renderer = Renderer(scene, [camera | {"matrix": matrix.tolist()} for matrix, _ in views.values()], multiple)
     for frame in options.check:
         density = densities[frame].astype(np.float32)
-        traced, marched = renderer.path_traced(density), blocks(renderer.images(density)[0][0][..., None])[..., 0]
+        traced = renderer.path_traced(density, renderer.cameras[0], CHECK_BLOCK, 2, CHECK_PASSES, CHECK_SAMPLES)
+        marched = blocks(renderer.images(density)[0][0][..., None])[..., 0]
         difference = np.sqrt(np.mean((marched - traced) ** 2) / np.mean(traced**2))
         print(f"frame {frame}: against volpath {difference:.2%} RMS, {marched.sum() / traced.sum() - 1:+.2%} in all")
 
@@ -252,8 +266,14 @@ def main() -> None:
         for view, pair in zip(views, rendered, strict=True):
             stored[view].append(pair)
         radiance, transmittance = (picture[..., None] for picture in rendered[0])
-        pictures.append(srgb_encode(radiance + transmittance * srgb_decode(plate)))
-    write_video(options.out / "front.mp4", pictures, fps, crf=12)
+        pictures.append(radiance + transmittance * srgb_decode(plate))
+    if options.linear:
+        for number, picture in enumerate(pictures, 1):
+            mi.Bitmap(picture.astype(np.float32)).write(str(options.out / f"front_{number:04d}.exr"))
+        clip = {"path": "front_####.exr", "fps": fps, "transfer": "linear"}
+    else:
+        write_video(options.out / "front.mp4", [srgb_encode(picture) for picture in pictures], fps, crf=12)
+        clip = {"path": "front.mp4", "fps": fps, "transfer": "srgb"}
     for view, pairs in stored.items():
         image, transmittance = (np.stack(half).astype(np.float16) for half in zip(*pairs, strict=True))
         np.savez_compressed(options.out / f"{view}.npz", image=image, transmittance=transmittance)
@@ -263,7 +283,7 @@ def main() -> None:
         np.savez_compressed(options.out / "background_plate.npz", plate=srgb_decode(plate).astype(np.float16))
     said = light | {"image": Path(light["image"]).name} if "image" in light else light
     text = [
-        table("[clip]", {"path": "front.mp4", "fps": fps, "transfer": "srgb"}),
+        table("[clip]", clip),
         views["front"][1],
         table("[domain]", scene["domain"]),
         table("[medium]", scene["medium"]),
