@@ -4,7 +4,8 @@
     python benchmarks/accuracy.py OUT --real FOLDER [--runs balanced billboard black]
 
 A SCENE is a folder with truth.npz and what truth/picture.py makes of it. A run is a quality, "paper", or either with
-changes (`balanced:transport=0`, `fine:velocity.levels=2`, `draft:resolution=32x32x48`), or one of the baselines:
+changes (`balanced:transport=0`, `fine:velocity.levels=2`, `draft:resolution=32x32x48`, `balanced:without=hull`: see
+accuracy_worker.leave_out), or one of the baselines:
 `smear` (front fit, constant along the rays), `billboard` (the front picture, unshifted, in every view), `truth` (the
 true density in our renderer), `black`. Each reconstruction has a process of its own; what is in OUT is not run again.
 
@@ -43,7 +44,7 @@ BASELINES = ("billboard", "truth", "black")
 
 BLACK = np.zeros(3, np.float32)
 SHOWN = ("billboard", "paper")
-"""Runs on the contact sheet, behind the truth and the first run."""
+"""Runs on the contact sheet, behind the truth and the first run, unless others are asked for."""
 
 REAL_SIZE = (270, 480)
 REAL_FRAMES = range(10, 111, 10)
@@ -284,9 +285,10 @@ def write(out: Path, name: str, rows: list[dict[str, Any]], subjects: list[Subje
     (out / f"{name}.md").write_text(page)
 
 
-def contact_sheet(subjects: list[Subject], runs: list[str], folder: Callable[[Subject, str], Path], path: Path) -> None:
-    """The last scored frame: a row a scene; for every view the truth, the first run and what else is to be shown."""
-    shown = [run for run in dict.fromkeys([runs[0], *SHOWN]) if run in runs]
+def contact_sheet(
+    subjects: list[Subject], shown: list[str], folder: Callable[[Subject, str], Path], path: Path
+) -> None:
+    """The last scored frame: a row a scene; for every view the truth and the runs to be shown."""
     rows = []
     for subject in subjects:
         last = subject.scored[-1:]
@@ -310,6 +312,7 @@ def main() -> None:
     parser.add_argument("scenes", type=Path, nargs="*", help="folders with truth.npz and its pictures")
     parser.add_argument("--real", type=Path, metavar="FOLDER", help="the ScalarFlow capture instead of scenes")
     parser.add_argument("--runs", nargs="+", help="qualities, paper, changes of them, baselines")
+    parser.add_argument("--show", nargs="+", metavar="RUN", help="runs on the contact sheet")
     parser.add_argument("--frames", type=int, default=24, help="of every scene, from its first")
     options = parser.parse_args()
     if (options.real is None) == (not options.scenes):
@@ -333,7 +336,8 @@ def main() -> None:
             rows.append(score(subject, run, folder(subject, run)) | said)
             print(markdown(rows[-1:], list(subject.cameras)).splitlines()[-1], flush=True)
         write(options.out, name, rows, subjects[:done])
-        contact_sheet(subjects[:done], runs, folder, options.out / f"{name}.png")
+        shown = options.show or [run for run in dict.fromkeys([runs[0], *SHOWN]) if run in runs]
+        contact_sheet(subjects[:done], shown, folder, options.out / f"{name}.png")
 
 
 if __name__ == "__main__":

@@ -20,10 +20,11 @@ from typing import Any
 
 import numpy as np
 
-from smokelift import Clip, Scene, Settings, reconstruct, reconstruct_density
-from smokelift.bench.machine import poisson_seconds
+from smokelift import Clip, Scene, Settings, density, reconstruct, reconstruct_density
+from smokelift.bench.machine import peak_bytes, poisson_seconds
 from smokelift.density import DensitySettings
 from smokelift.shot import Shot, prepare_shot
+from smokelift.velocity import estimate
 
 SMEAR = "smear"
 SMEAR_SETTINGS = DensitySettings(fit_iterations=24, descent_iterations=0, tolerance=1e-3)
@@ -34,11 +35,14 @@ STARTED = 2
 
 
 def run_settings(run: str) -> Settings:
-    """Settings of a run's name: a quality or "paper", then changes, "balanced:transport=0,velocity.levels=2"."""
+    """Settings of a run's name: a quality or "paper", then changes, "balanced:transport=0,without=hull"."""
     name, _, changes = run.partition(":")
     settings = Settings.preset(method="paper") if name == "paper" else Settings.preset(name)
     for change in filter(None, changes.split(",")):
         key, _, text = change.partition("=")
+        if key == "without":
+            settings = leave_out(text, settings)
+            continue
         if key == "resolution":
             x, y, z = (int(count) for count in text.split("x"))
             settings = replace(settings, resolution=(x, y, z))
@@ -53,6 +57,30 @@ def run_settings(run: str) -> Settings:
     return settings
 
 
+def leave_out(part: str, settings: Settings) -> Settings:
+    """Do without a part of the method: the settings for that, and what settings do not say, for the whole process.
+
+    - transport: every frame begins with its own picture
+    - hull: smoke may be wherever the camera looks
+    - sources: smoke that enters is read as motion
+    - projection: the prediction is the velocity carried along by itself, divergence and all
+    - depth: the first guess is constant along the rays
+    """
+    if part == "transport":
+        return replace(settings, transport=0.0)
+    if part == "sources":
+        return replace(settings, velocity=replace(settings.velocity, sources=False))
+    if part == "hull":
+        density.visual_hull = lambda _mask, projection: projection.visible
+    elif part == "projection":
+        estimate.project = lambda found, _closed: found
+    elif part == "depth":
+        density.DepthProfile.at = lambda _profile, _projection, voxels: np.full(np.count_nonzero(voxels), 0.5)
+    else:
+        raise ValueError(f"without={part}: expected transport, hull, sources, projection or depth.")
+    return settings
+
+
 def smeared(clip: Clip, shot: Shot) -> Iterator[np.ndarray]:
     """The front fit with a density that is constant along the rays inside the domain."""
     domain, medium = shot.scene.domain, shot.scene.medium
@@ -61,18 +89,6 @@ def smeared(clip: Clip, shot: Shot) -> Iterator[np.ndarray]:
     for index in range(len(clip)):
         image = shot.working.cut(clip.frame(index))
         yield reconstruct_density(image, shot.small_scene, fog, settings, plate=shot.plate).values
-
-
-def peak_mib() -> float | None:
-    """The most memory that this process had; None where the system does not say.
-
-    Not getrusage's maximum, which in a started process begins with that of the one that started it.
-    """
-    try:
-        status = Path("/proc/self/status").read_text()
-    except OSError:
-        return None
-    return next(int(line.split()[1]) / 1024 for line in status.splitlines() if line.startswith("VmHWM"))
 
 
 def main() -> None:
@@ -100,11 +116,12 @@ def main() -> None:
             np.savez(out / f"{number:04d}.npz", **arrays)
             began = time.perf_counter()
     clocked = seconds[STARTED:] or seconds
+    peak = peak_bytes()
     result = {
         "frames": len(seconds),
         "seconds": float(np.median(clocked)),
         "solves": float(np.median(clocked) / np.median(units)),
-        "memory_mib": peak_mib(),
+        "memory_mib": None if peak is None else peak / 2**20,
         "scattering": shot.scattering,
         "resolution": list(shot.scene.domain.resolution),
         "method": "baseline" if run == SMEAR else settings.method,

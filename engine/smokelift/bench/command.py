@@ -1,4 +1,4 @@
-"""``smokelift bench renderer | velocity``: their options, and what they do with them."""
+"""``smokelift bench renderer | velocity | pipeline``: their options, and what they do with them."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from typing import Any
 from smokelift.bench.peers import PEERS
 from smokelift.progress import Reporter
 from smokelift.render import device
+from smokelift.settings import METHODS, QUALITIES
 from smokelift.truth import Truth
 
 SMALLEST = 8
@@ -37,11 +38,22 @@ def add_parser(commands: Any) -> None:
     velocity.add_argument("truths", nargs="*", type=Path, metavar="TRUTH.npz", help="known scenes; one is built in")
     velocity.add_argument("--sizes", type=_shapes, default=SHAPES, metavar="XxYxZ,...", help="voxels along x, y and z")
     _add_outputs(velocity, "draw error against time (.png)")
+    pipeline = subjects.add_parser("pipeline", help="whole runs, from a clip to files on disk")
+    pipeline.add_argument("scene", nargs="?", type=Path, metavar="SCENE.toml", help="a clip; one is built in")
+    pipeline.add_argument("--sizes", type=_shapes, default=SHAPES, metavar="XxYxZ,...", help="voxels along x, y and z")
+    pipeline.add_argument("--quality", choices=QUALITIES, default="balanced")
+    pipeline.add_argument("--methods", type=_methods, default=("default",), metavar="A,B", help="default, paper")
+    pipeline.add_argument("--frames", type=_count, default=5, help="that are clocked, after two")
+    _add_json(pipeline)
 
 
 def _add_outputs(parser: argparse.ArgumentParser, chart: str) -> None:
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write every figure")
+    _add_json(parser)
     parser.add_argument("--chart", type=Path, metavar="FILE", help=chart)
+
+
+def _add_json(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write every figure")
     parser.add_argument("--progress", choices=("text", "json"), default="text", help="a table, or JSON objects")
 
 
@@ -57,17 +69,18 @@ def bench(options: argparse.Namespace, say: Reporter) -> None:
     """
     from smokelift.bench import chart  # the other commands do not want this
 
-    for path in (options.json, options.chart):
+    drawn: Path | None = getattr(options, "chart", None)
+    for path in (options.json, drawn):
         if path is not None and not path.absolute().parent.is_dir():
             raise ValueError(f"{path}: the folder {path.parent} does not exist.")
-    if options.chart is not None:
+    if drawn is not None:
         chart.require_matplotlib()
 
     def save(results: dict[str, Any]) -> None:
         if options.json is not None:
             options.json.write_text(json.dumps(results, indent=1) + "\n")
 
-    {"renderer": _renderer, "velocity": _velocity}[options.subject](options, say, save)
+    {"renderer": _renderer, "velocity": _velocity, "pipeline": _pipeline}[options.subject](options, say, save)
 
 
 def _renderer(options: argparse.Namespace, say: Reporter, save: Callable[[dict[str, Any]], None]) -> None:
@@ -95,6 +108,27 @@ def _velocity(options: argparse.Namespace, say: Reporter, save: Callable[[dict[s
     if options.chart is not None:
         chart.draw(results, options.chart)
     say.finish(table.text(results), results)
+
+
+def _pipeline(options: argparse.Namespace, say: Reporter, save: Callable[[dict[str, Any]], None]) -> None:
+    from smokelift.bench.pipeline import run, table
+
+    results = run.run(options.scene, options.sizes, options.methods, options.quality, options.frames, say.note, save)
+    say.finish(table.text(results), results)
+
+
+def _methods(text: str) -> tuple[str, ...]:
+    names = tuple(text.split(","))
+    for name in names:
+        if name not in METHODS:
+            raise argparse.ArgumentTypeError(f"{name!r}: expected some of {', '.join(METHODS)}")
+    return names
+
+
+def _count(text: str) -> int:
+    if not text.isdigit() or int(text) == 0:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected a number of frames")
+    return int(text)
 
 
 def _shapes(text: str) -> tuple[tuple[int, ...], ...]:

@@ -73,6 +73,18 @@ def poisson_seconds(shape: tuple[int, int, int]) -> float:
     return float(np.median(spent))
 
 
+def peak_bytes() -> int | None:
+    """The most memory that this process had; None where the system does not say.
+
+    Not getrusage's maximum, which in a started process begins with that of the one that started it.
+    """
+    try:
+        status = Path("/proc/self/status").read_text()
+    except OSError:
+        return None
+    return next(1024 * int(line.split()[1]) for line in status.splitlines() if line.startswith("VmHWM"))
+
+
 def _processor() -> str:
     try:
         lines = Path("/proc/cpuinfo").read_text().splitlines()

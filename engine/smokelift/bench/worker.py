@@ -24,6 +24,7 @@ import numpy as np
 import psutil
 
 import smokelift
+from smokelift.bench.machine import peak_bytes
 from smokelift.bench.peers import PEERS, Iteration
 from smokelift.bench.scene import BenchScene, bench_scene, plume
 from smokelift.render.device import DeviceName, start
@@ -117,7 +118,7 @@ def measure(peer: str, scene: BenchScene) -> tuple[Result, Any, Any]:
         iteration.run(density)
     ready = time.perf_counter()
     seconds, outcome = _clocked(iteration, density)
-    peak = _peak()
+    peak = peak_bytes()
     image, gradient = iteration.download(*outcome)
     result = Result(
         seconds=tuple(seconds),
@@ -160,14 +161,6 @@ def _reset_peak() -> int | None:
     except OSError:
         return None
     return int(psutil.Process().memory_info().rss)
-
-
-def _peak() -> int | None:
-    try:
-        status = Path("/proc/self/status").read_text()
-    except OSError:
-        return None
-    return next(1024 * int(line.split()[1]) for line in status.splitlines() if line.startswith("VmHWM"))
 
 
 def main() -> None:

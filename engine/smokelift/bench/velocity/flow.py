@@ -20,9 +20,11 @@ size: on a finer grid there is finer smoke, with finer eddies, that moves more v
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from smokelift.bench.velocity.pairs import Pair
 from smokelift.transport import Array
@@ -147,26 +149,59 @@ class Flow:
 
 def built_in_pair(shape: tuple[int, int, int], seed: int) -> Pair:
     """The densities and the motion of a box of so many voxels."""
-    rng = np.random.default_rng(seed)
-    flow, structure = Flow.random(rng, max(shape)), Waves.random(rng, max(shape))
-
-    def smoke(x: Array) -> Array:
-        ball = np.maximum(1 - np.sum(x * x, 0) / np.float32(BALL**2), 0)
-        varied = 1 + STRUCTURE * structure.amplitudes @ np.sin(structure.angles(x))
-        return np.asarray(ball * np.maximum(varied, 0))
-
+    stirred = Stirred.random(shape, seed)
     positions = _positions(shape)
-    near = np.flatnonzero(np.sum(positions * positions, 0) < REACH**2)
+    near = _near(positions)
     before, after = (np.zeros(positions.shape[1], np.float32) for _ in range(2))
     motion = np.zeros_like(positions)
     for start in range(0, len(near), BATCH):
         part = near[start : start + BATCH]
         x = positions[:, part]
-        last = flow.back(x, 1.0, STEPS_A_FRAME)
+        last = stirred.flow.back(x, 1.0, STEPS_A_FRAME)
         motion[:, part] = (x - last) * np.float32(max(shape))
-        before[part], after[part] = (smoke(flow.back(end, STIRRED, round(STIRRED))) for end in (x, last))
+        before[part], after[part] = (stirred.density(end, 0.0) for end in (x, last))
     vectors = np.stack([component.reshape(shape) for component in motion], -1)
     return Pair(before.reshape(shape), after.reshape(shape), vectors, np.zeros(shape, bool))
+
+
+def built_in_densities(shape: tuple[int, int, int], seed: int, frames: int) -> Iterator[Array]:
+    """The densities of a box of so many voxels in frames that follow one another."""
+    stirred = Stirred.random(shape, seed)
+    positions = _positions(shape)
+    near = _near(positions)
+    for frame in range(frames):
+        density = np.zeros(positions.shape[1], np.float32)
+        for start in range(0, len(near), BATCH):
+            part = near[start : start + BATCH]
+            density[part] = stirred.density(positions[:, part], frame)
+        yield density.reshape(shape)
+
+
+@dataclass(frozen=True, eq=False)
+class Stirred:
+    """A ball of smoke with structure that a flow has drawn out."""
+
+    flow: Flow
+    structure: Waves
+
+    @staticmethod
+    def random(shape: tuple[int, int, int], seed: int) -> Stirred:
+        """As fine as a box of so many voxels can show."""
+        rng = np.random.default_rng(seed)
+        return Stirred(Flow.random(rng, max(shape)), Waves.random(rng, max(shape)))
+
+    def density(self, x: Array, frames: float) -> Array:
+        """f(X(x, STIRRED + frames)) at positions (3, points)."""
+        since = STIRRED + frames
+        origin = self.flow.back(x, since, round(since))
+        ball = np.maximum(1 - np.sum(origin * origin, 0) / np.float32(BALL**2), 0)
+        varied = 1 + STRUCTURE * self.structure.amplitudes @ np.sin(self.structure.angles(origin))
+        return np.asarray(ball * np.maximum(varied, 0))
+
+
+def _near(positions: Array) -> npt.NDArray[np.intp]:
+    """Points that smoke can reach."""
+    return np.flatnonzero(np.sum(positions * positions, 0) < REACH**2)
 
 
 def _positions(shape: tuple[int, int, int]) -> Array:
