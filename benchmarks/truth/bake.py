@@ -16,7 +16,7 @@ import sys
 import time
 from pathlib import Path
 
-from scenes import BOX_SIZE, SEEDS, names, scene
+from scenes import BOX_SIZE, FRAMES, SEEDS, names, scene
 
 HERE = Path(__file__).resolve().parent
 ENTER = HERE.parents[1] / "tests" / "blender" / "root" / "enter.sh"
@@ -37,7 +37,7 @@ def debian_root() -> Path:
     return ROOT
 
 
-def bake(name: str, across: int, folder: Path) -> None:
+def bake(name: str, across: int, frames: int, folder: Path) -> None:
     """Bake a scene into a folder, which appears whole or not at all."""
     part = folder.with_suffix(".part")
     shutil.rmtree(part, ignore_errors=True)
@@ -45,7 +45,7 @@ def bake(name: str, across: int, folder: Path) -> None:
     # the root sees one folder of ours only: what runs in there goes with it
     scripts = [shutil.copy(HERE / script, part) for script in ("manta_scene.py", "scenes.py")]
     blender = ("blender", "-b", "--factory-startup", "--python-exit-code", "1", "-P", scripts[0])
-    command = [ENTER, debian_root(), part, *blender, "--", name, str(across), part / "truth.npz"]
+    command = [ENTER, debian_root(), part, *blender, "--", name, str(across), str(frames), part / "truth.npz"]
     log = part / "bake.log"
     with log.open("w") as stream:
         done = subprocess.run(command, stdout=stream, stderr=subprocess.STDOUT)
@@ -72,6 +72,7 @@ def main() -> None:
     parser.add_argument("out", type=Path)
     parser.add_argument("scenes", nargs="+", help="a use (choose, report) or names such as plume-1")
     parser.add_argument("--resolution", type=voxels_across, default=64, help="as 48x48x72; 64x64x96 unless said")
+    parser.add_argument("--frames", type=int, default=FRAMES, help=f"{FRAMES} unless said")
     options = parser.parse_args()
     wanted = [name for word in options.scenes for name in (names(word) if word in SEEDS else [word])]
     try:
@@ -83,7 +84,7 @@ def main() -> None:
         folder = options.out.resolve() / name
         if not folder.exists():
             began = time.monotonic()
-            bake(name, options.resolution, folder)
+            bake(name, options.resolution, options.frames, folder)
             print(f"{folder / 'truth.npz'}: {time.monotonic() - began:.0f} s", flush=True)
 
 

@@ -16,7 +16,7 @@ import bpy
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
-from scenes import BOX_MIN, BOX_SIZE, FPS, FRAMES, Inlet, Scene, scene
+from scenes import BOX_MIN, BOX_SIZE, FPS, Inlet, Scene, scene
 
 DT = 1 / FPS
 COOLING = 0.4  # decay of the heat (1/s)
@@ -220,12 +220,12 @@ class Simulation:
 
 def main() -> None:
     """Bake one scene."""
-    name, across, out = sys.argv[sys.argv.index("--") + 1 :]
+    name, across, frames, out = sys.argv[sys.argv.index("--") + 1 :]
     made = scene(name)
     simulation = Simulation(boot(), made, int(across))
     warm_up = round(made.warm_up * FPS)
     densities, faces, inflows = [], [], []
-    for frame in range(-warm_up, FRAMES):
+    for frame in range(-warm_up, int(frames)):
         cells = simulation.step((frame + warm_up) * DT)
         if frame >= 0:
             density, velocity = simulation.record()
@@ -236,7 +236,7 @@ def main() -> None:
         out,
         density=np.stack(densities),
         **{f"velocity_{axis}": np.stack([f[i] for f in faces]) for i, axis in enumerate("xyz")},
-        velocity_frames=np.arange(FRAMES),
+        velocity_frames=np.arange(int(frames)),
         voxel_size=simulation.voxel,
         fps=FPS,
         inflow_packed=np.stack(inflows),
