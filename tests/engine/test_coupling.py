@@ -100,7 +100,7 @@ def test_without_smoke_the_static_guess_stays(moment, empty) -> None:
 
 
 def test_even_fog_is_no_failure(moment) -> None:
-    """Smoke that changes along the rays only: what it is relative to across them has no end, and the guess is finite."""
+    """Smoke that changes along the rays only, beyond all measure relative to across them, has a finite guess."""
     fog = np.broadcast_to(np.linspace(0.1, 0.2, 24, dtype=np.float32)[:, None], moment.true.shape).copy()
     guess = first_guess(moment.image, moment.scene, moment.plate, "single", fog, fog, moment.before, MOST)
     assert np.isfinite(guess.density).all()
