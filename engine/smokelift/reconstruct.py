@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from smokelift.clip import Clip
+from smokelift.coupling import first_guess
 from smokelift.density import Density, SmokeAxis, depth_guess, optical_depth, reconstruct_density
 from smokelift.density.axis import estimate_axis
 from smokelift.density.hull import project_voxels
@@ -148,9 +149,12 @@ def _frames(clip: Clip, shot: Shot, settings: Settings, start: Frame | None) -> 
             predicted = predict_velocity(before.velocity, dt, settings.velocity.closed)
             # pictures correct the mass, but not of what a moving camera does not see
             initial = advect(before.density, predicted, dt, conserve=shot.scene.camera.moves)
-        density = (
-            _unseen(domain, initial) if now is None else _corrected(clip.frame(index), now, settings, axis, initial)
-        )
+        accepted: Mapping[str, float] = {}
+        if now is None:
+            density = _unseen(domain, initial)
+        else:
+            last = before.density if before is not None else None
+            density, accepted = _corrected(clip.frame(index), now, settings, axis, initial, last)
         fitted = time.perf_counter()
         velocity = Velocity.zero(domain.resolution, domain.voxel_size)
         if before is not None:
@@ -168,6 +172,7 @@ def _frames(clip: Clip, shot: Shot, settings: Settings, start: Frame | None) -> 
         figures = {
             **density.figures,
             "mass": float(density.values.sum(dtype=np.float64)) * domain.voxel_size**3,
+            "transport": dict(accepted),
             "velocity": dict(velocity.figures),
             "seconds_density": fitted - began,
             "seconds_velocity": done - fitted,
@@ -193,20 +198,27 @@ def smoke_axis(clip: Clip, shot: Shot, settings: Settings) -> SmokeAxis:
     return estimate_axis(amounts, scene.camera, scene.domain, [inlet.centre for inlet in scene.inlets])
 
 
-def _corrected(picture: Image, shot: Shot, settings: Settings, axis: SmokeAxis, transported: Volume | None) -> Density:
-    """The frame's density from its picture and the density carried along."""
-    image, scene, share = shot.working.cut(picture), shot.small_scene, settings.transport
-    initial = transported
-    if settings.method == "default" and transported is not None and share < 1:
-        guess = depth_guess(image, scene, settings.density, shot.plate, axis)
-        initial = np.float32(1 - share) * guess + np.float32(share) * transported
+def _corrected(
+    picture: Image, shot: Shot, settings: Settings, axis: SmokeAxis, transported: Volume | None, before: Volume | None
+) -> tuple[Density, Mapping[str, float]]:
+    """The frame's density from its picture and the density carried along, and what was taken over of that."""
+    image, scene = shot.working.cut(picture), shot.small_scene
+    initial: Volume | None = transported
+    accepted: Mapping[str, float] = {}
+    if settings.method == "default" and transported is not None and before is not None:
+        initial = depth_guess(image, scene, settings.density, shot.plate, axis)
+        if settings.transport > 0:
+            guess = first_guess(
+                image, scene, shot.plate, shot.scattering, initial, transported, before, settings.transport
+            )
+            initial, accepted = guess.density, guess.figures
     density = reconstruct_density(image, scene, initial, settings.density, plate=shot.plate, axis=axis)
     assert shot.scene.camera is not None and scene.camera is not None and scene.domain is not None
     if transported is not None and shot.scene.camera.moves:
         # what a moving camera does not see now it may have seen before
         seen = project_voxels(scene.camera, scene.domain).visible
         density = replace(density, values=np.where(seen, density.values, transported))
-    return density
+    return density, accepted
 
 
 def _unseen(domain: Domain, transported: Volume | None) -> Density:

@@ -33,9 +33,10 @@ class Settings:
     resolution
         Voxels along x, y, z; None takes the scene's, or one by quality.
     transport
-        Share (0 to 1) of the density carried along from the frame before in the first guess of the next; the rest
-        is the single picture's depth profile. Over four clips a quarter gave the best new views: it settles what a
-        textured background leaves open; with more, the velocity's own errors smear the depth from frame to frame.
+        Largest share (0 to 1) of the density carried along from the frame before in the first guess of the next; the
+        rest is the single picture's. Every frame takes over as much as proves right (see `smokelift.coupling`), with 0
+        nothing. New views do not change by it, flicker falls by a fifth; with more than a half the velocity's errors
+        smear the depth from frame to frame. The paper's method takes all of it, whatever is said here.
     axis_depth
         How far behind the domain's centre (metres, away from the camera) the middle of the smoke stands; None estimates
         it from where the smoke meets the floor, and takes the domain's centre where it does not.

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from smokelift.clip import Clip
-from smokelift.density import DensitySettings
+from smokelift.density import DensitySettings, reconstruct_density
 from smokelift.density.hull import project_voxels, voxel_centres
 from smokelift.density.screen import view_frame
 from smokelift.images import write_image
@@ -22,6 +22,7 @@ from smokelift.scene import Background, ClipSource, Inlet, Scene, look_at_matrix
 from smokelift.sequence import Sequence, SequenceError
 from smokelift.settings import Settings
 from smokelift.shot import prepare_shot
+from smokelift.transport import advect
 from smokelift.vdb import VdbUnavailable, read_vdb, vdb_module
 from smokelift.velocity import estimate_velocity
 
@@ -384,3 +385,51 @@ def test_the_papers_method_lowers_the_loss(plume, tmp_path) -> None:
         losses[steps] = [frame.figures["loss"] for frame in frames]
         assert all(frame.density.min() >= 0 for frame in frames)
     assert all(late < early for early, late in zip(losses[1], losses[12], strict=True))
+
+
+def test_what_is_taken_over_is_on_record(run) -> None:
+    """From the third frame on a frame says which share it took over, and what decided it."""
+    _, out = run
+    sequence = Sequence.open(out)
+    taken = [sequence.figures(number)["transport"] for number in sequence.frames]
+    assert taken[:2] == [{}, {}]
+    for figures in taken[2:]:
+        assert 0 < figures["share"] <= Settings().transport
+        assert figures["loss_carried"] < figures["loss_before"]
+
+
+def test_the_papers_loop_takes_all(plume, tmp_path, monkeypatch) -> None:
+    """By the paper's method the density carried along is the first guess, as it is."""
+    paper = Settings.preset("draft", "paper")
+    paper = replace(paper, density=replace(paper.density, descent_iterations=1))
+    monkeypatch.setitem(reconstruct.__globals__, "first_guess", None)
+    guesses, carried = [], []
+
+    def fit(image, scene, initial, *rest, **options):
+        guesses.append(initial)
+        return reconstruct_density(image, scene, initial, *rest, **options)
+
+    def carry(*arguments, **options):
+        carried.append(advect(*arguments, **options))
+        return carried[-1]
+
+    monkeypatch.setitem(reconstruct.__globals__, "reconstruct_density", fit)
+    monkeypatch.setitem(reconstruct.__globals__, "advect", carry)
+    frames_of(plume.write(tmp_path / "clip", plume.densities[:4]), paper)
+    assert [guess is None for guess in guesses] == [True, True, False, False]
+    assert all(guess is moved for guess, moved in zip(guesses[2:], carried, strict=True))
+
+
+def test_without_transport_every_picture_stands_alone(plume, draft, monkeypatch) -> None:
+    """With a share of 0 nothing is carried into a guess, and nothing of it is computed."""
+    monkeypatch.setitem(reconstruct.__globals__, "first_guess", None)
+    frames = frames_of(plume.scene, replace(draft, transport=0.0))
+    assert all(frame.figures["transport"] == {} for frame in frames)
+
+
+def test_transport_keeps_the_mass_of_every_height(plume, draft) -> None:
+    """What is taken over moves smoke along the rays: per height it stays within a tenth of what the picture says."""
+    alone, carried = (frames_of(plume.scene, replace(draft, transport=share)) for share in (0.0, 1.0))
+    for one, other in zip(alone, carried, strict=True):
+        expected, found = one.density.sum((0, 1)), other.density.sum((0, 1))
+        assert np.abs(found - expected).sum() < 0.1 * expected.sum()
