@@ -1,0 +1,148 @@
+"""All that is chosen on coarse densities, in the order in which one choice needs the other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from smokelift.background import Plate
+from smokelift.clip import Clip
+from smokelift.density import Density, DensitySettings, reconstruct_density
+from smokelift.render.setup import Scattering
+from smokelift.scene import Scene
+from smokelift.selection.choice import Choice
+from smokelift.selection.coarse import CoarseFrame, coarse_frame
+from smokelift.selection.directions import choose_directions
+from smokelift.selection.motion import choose_levels
+from smokelift.selection.scattering import choose_scattering
+from smokelift.settings import Settings
+from smokelift.velocity.settings import LEVELS
+
+FRAMES = 2
+"""Frames that models are tried on: the one with the most smoke, and one with a middling amount."""
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """What was chosen.
+
+    Attributes
+    ----------
+    scene
+        With a number of directions for each environment.
+    scattering
+        How light is scattered.
+    levels
+        Grids of a velocity without a past.
+    choices
+        All of them, with their figures.
+    """
+
+    scene: Scene
+    scattering: Scattering
+    levels: int
+    choices: tuple[Choice, ...]
+
+
+def choose_model(
+    clip: Clip,
+    scene: Scene,
+    plate_at: Callable[[int], Plate],
+    smoky: Sequence[int],
+    richest: Scattering,
+    settings: Settings,
+) -> Model:
+    """Choose all that is chosen on coarse densities.
+
+    Parameters
+    ----------
+    clip
+        The footage.
+    scene
+        Complete.
+    plate_at
+        Background of each frame.
+    smoky
+        Frames with smoke, those with the most first.
+    richest
+        The richest model of scattering that the known light allows.
+    settings
+        What is said in them is taken.
+    """
+
+    def coarse(number: int) -> CoarseFrame | None:
+        assert scene.camera is not None
+        now = replace(scene, camera=scene.camera.at(number))
+        return coarse_frame(clip.frame(number), now, plate_at(number))
+
+    numbers = [number for number in _tried(smoky) if coarse(number) is not None]
+    by_hand = settings.density.scattering
+    wanted: Scattering = richest if by_hand == "auto" else by_hand
+    if not numbers:
+        return Model(scene, wanted, LEVELS, ())
+    frames = [frame for frame in map(coarse, numbers) if frame is not None]
+    lit, directions = choose_directions(scene, frames, settings.density, wanted)
+    frames = [frame.in_light_of(lit) for frame in frames]
+    if by_hand == "auto":
+        scattering, scattered = choose_scattering(frames, richest, settings.density)
+        if directions and scattering != richest:
+            lit, directions = choose_directions(scene, frames, settings.density, scattering)
+            frames = [frame.in_light_of(lit) for frame in frames]
+    else:
+        scattering, scattered = by_hand, Choice("scattering", by_hand, f"Scattering by hand: {by_hand}.", by_hand=True)
+    fit = replace(settings.density, scattering=scattering)
+    densities = [_density(frame, fit) for frame in frames]
+    if settings.velocity.levels is None:
+        # before the last frame, since something has to follow
+        followed = sorted({min(number, len(clip) - 2) for number in numbers if len(clip) > 1})
+        ends = [(coarse(number), coarse(number + 1)) for number in followed]
+        pairs = [
+            (_density(before.in_light_of(lit), fit).values, _density(after.in_light_of(lit), fit).values)
+            for before, after in ends
+            if before is not None and after is not None
+        ]
+        moved = choose_levels(pairs, frames[0].scene, lit, settings.velocity)
+    else:
+        said = settings.velocity.levels
+        moved = Choice("velocity levels", said, f"Velocity grids by hand: {said}.", by_hand=True)
+    assert isinstance(moved.chosen, int)
+    choices = (_inside(densities, scene), scattered, *directions, _iterations(densities, settings), moved)
+    return Model(lit, scattering, moved.chosen, choices)
+
+
+def _tried(smoky: Sequence[int]) -> tuple[int, ...]:
+    """Frames to measure on."""
+    return tuple(dict.fromkeys((*smoky[:1], *smoky[len(smoky) // 2 : len(smoky) // 2 + 1])))
+
+
+def _density(frame: CoarseFrame, settings: DensitySettings) -> Density:
+    return reconstruct_density(frame.picture, frame.scene, settings=settings, plate=frame.plate)
+
+
+def _inside(densities: Sequence[Density], scene: Scene) -> Choice:
+    """The part of the box that is worked on."""
+    assert scene.domain is not None
+    share = float(np.mean([density.hull.mean() for density in densities]))
+    reason = (
+        f"Domain: only voxels that the picture allows to hold smoke are worked on, {share:.0%} of the box; frames "
+        "without smoke cost nothing."
+    )
+    return Choice("domain", scene.domain.resolution, reason, {"hull_share": share})
+
+
+def _iterations(densities: Sequence[Density], settings: Settings) -> Choice:
+    """How long a density is fitted."""
+    fit = settings.density
+    most = fit.fit_iterations + fit.descent_iterations
+    used = float(np.mean([density.figures["iterations"] for density in densities]))
+    usual = Settings.preset(settings.quality, settings.method).density
+    by_hand = (fit.fit_iterations, fit.descent_iterations, fit.tolerance) != (
+        usual.fit_iterations, usual.descent_iterations, usual.tolerance,
+    )  # fmt: skip
+    reason = (
+        f"Iterations: until one lowers the error by less than {fit.tolerance:.0%} or noise is all that is left, "
+        f"{used:.0f} on the coarse frames, {most} at most{' (by hand)' if by_hand else ''}."
+    )
+    return Choice("iterations", most, reason, {"iterations": used}, fit.tolerance, by_hand)
