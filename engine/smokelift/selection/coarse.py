@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from smokelift.background import Plate
 from smokelift.cameras import CameraError, WorkingPicture, voxel_width, working_picture
 from smokelift.render.renderer import Image
-from smokelift.scene import Domain, Scene
+from smokelift.scene import Camera, Domain, Scene
 
 LONGEST = 32
 """Voxels along the longest side at most: a few per cent of the work of 96, with every large shadow in its place."""
@@ -78,22 +78,24 @@ def coarse_domain(domain: Domain, pixels: float) -> Domain:
     return Domain((x0, y0, z0), (x1, y1, z1), (counts[0], counts[1], counts[2]))
 
 
-def coarse_frame(frame: Image, scene: Scene, plate: Plate) -> CoarseFrame | None:
+def coarse_frame(frame: Image, camera: Camera, scene: Scene, plate: Plate) -> CoarseFrame | None:
     """Make a frame coarse; None if its camera does not see the domain.
 
     Parameters
     ----------
     frame : (rows, columns, 3)
         The full picture, linear radiance.
+    camera
+        Of the full picture, where it is in this frame.
     scene
-        With the frame's own camera.
+        With the domain, the medium and the lights.
     plate
         Of the full picture.
     """
-    assert scene.camera is not None and scene.domain is not None
+    assert scene.domain is not None
     try:
-        domain = coarse_domain(scene.domain, voxel_width(scene.camera, scene.domain))
-        working = working_picture(scene.camera, domain)
+        domain = coarse_domain(scene.domain, voxel_width(camera, scene.domain))
+        working = working_picture(camera, domain)
     except CameraError:
         return None
     small = Plate(working.cut(plate.image), working.cut(plate.confidence), plate.noise)

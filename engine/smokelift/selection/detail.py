@@ -19,8 +19,9 @@ from smokelift.background import Plate, encoded_noise, matte
 from smokelift.images import area_average, linear_to_srgb
 from smokelift.render.renderer import Image
 
-TOLERANCE = 0.02
-"""Share of the smoke's contrast that a grid may lose against the finest that quality allows."""
+TOLERANCE = 0.01
+"""Share of the smoke's contrast that a grid may lose against the finest that quality allows: a quarter of what
+even that one misses of the front of a sharp clip (docs/selection.md)."""
 
 EDGE = 3
 """Voxels around the smoke in which there may be some that is too thin to be found."""

@@ -74,8 +74,7 @@ def choose_model(
 
     def coarse(number: int) -> CoarseFrame | None:
         assert scene.camera is not None
-        now = replace(scene, camera=scene.camera.at(number))
-        return coarse_frame(clip.frame(number), now, plate_at(number))
+        return coarse_frame(clip.frame(number), scene.camera.at(number), scene, plate_at(number))
 
     numbers = [number for number in _tried(smoky) if coarse(number) is not None]
     by_hand = settings.density.scattering
