@@ -227,15 +227,16 @@ def environment(folder: Path, radiance: np.ndarray, **options: int) -> Environme
 
 
 def test_directions_are_doubled_until_the_smoke_looks_the_same(plume, draft, tmp_path) -> None:
-    """One lamp needs fewer than a ring of them; the number is part of the scene from then on."""
-    lamp, ring = np.zeros((32, 64, 3), np.float32), np.zeros((32, 64, 3), np.float32)
-    lamp[8, 40] = 2000
-    ring[12, ::7] = 300
+    """A lamp needs fewer than a sky with a bright half; the number is part of the scene from then on."""
+    lamp, sky = np.zeros((32, 64, 3), np.float32), np.full((32, 64, 3), 0.3, np.float32)
+    lamp[8, 40] = 400
+    sky[4:12, 16:40] = 3
+    forward = replace(plume.scene, medium=Medium(8.0, 0.9, 0.6))
     counts = {}
-    for name, radiance in (("lamp", lamp), ("ring", ring)):
+    for name, radiance in (("lamp", lamp), ("sky", sky)):
         (tmp_path / name).mkdir()
         light = environment(tmp_path / name, radiance)
-        scene = plume.write(tmp_path / name, plume.densities, replace(plume.scene, lights=(light,)))
+        scene = plume.write(tmp_path / name, plume.densities, replace(forward, lights=(light,)))
         shot = shot_of(scene, draft)
         choice = chosen(shot, "environment directions")
         counts[name] = choice.chosen
@@ -243,7 +244,7 @@ def test_directions_are_doubled_until_the_smoke_looks_the_same(plume, draft, tmp
         assert len(scene_lights(shot.scene)) <= choice.chosen
         assert choice.measured["change"] <= choice.tolerance
         assert not choice.by_hand
-    assert counts["lamp"] < counts["ring"]
+    assert counts["lamp"] < counts["sky"]
 
 
 def test_directions_by_hand_win(plume, draft, tmp_path) -> None:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
 from smokelift.background import Plate
 from smokelift.clip import Clip
-from smokelift.density import Density, DensitySettings, reconstruct_density
+from smokelift.density import Density, reconstruct_density
 from smokelift.render.setup import Scattering
 from smokelift.scene import Scene
 from smokelift.selection.choice import Choice
@@ -18,7 +19,6 @@ from smokelift.selection.directions import choose_directions
 from smokelift.selection.motion import choose_levels
 from smokelift.selection.scattering import choose_scattering
 from smokelift.settings import Settings
-from smokelift.velocity.settings import LEVELS
 
 FRAMES = 2
 """Frames that models are tried on: the one with the most smoke, and one with a middling amount."""
@@ -72,36 +72,41 @@ def choose_model(
         What is said in them is taken.
     """
 
+    @cache
     def coarse(number: int) -> CoarseFrame | None:
         assert scene.camera is not None
         return coarse_frame(clip.frame(number), scene.camera.at(number), scene, plate_at(number))
 
-    numbers = [number for number in _tried(smoky) if coarse(number) is not None]
     by_hand = settings.density.scattering
     wanted: Scattering = richest if by_hand == "auto" else by_hand
-    if not numbers:
-        return Model(scene, wanted, LEVELS, ())
+    numbers = [number for number in _tried(smoky) if coarse(number) is not None]
     frames = [frame for frame in map(coarse, numbers) if frame is not None]
+    if not frames:
+        return Model(scene, wanted, settings.velocity.grids, ())
     lit, directions = choose_directions(scene, frames, settings.density, wanted)
     frames = [frame.in_light_of(lit) for frame in frames]
     if by_hand == "auto":
         scattering, scattered = choose_scattering(frames, richest, settings.density)
         if directions and scattering != richest:
             lit, directions = choose_directions(scene, frames, settings.density, scattering)
-            frames = [frame.in_light_of(lit) for frame in frames]
     else:
         scattering, scattered = by_hand, Choice("scattering", by_hand, f"Scattering by hand: {by_hand}.", by_hand=True)
     fit = replace(settings.density, scattering=scattering)
-    densities = [_density(frame, fit) for frame in frames]
+
+    @cache
+    def density(number: int) -> Density | None:
+        frame = coarse(number)
+        if frame is None:
+            return None
+        scene = frame.in_light_of(lit).scene
+        return reconstruct_density(frame.picture, scene, settings=fit, plate=frame.plate)
+
+    densities = [found for found in map(density, numbers) if found is not None]
     if settings.velocity.levels is None:
         # before the last frame, since something has to follow
         followed = sorted({min(number, len(clip) - 2) for number in numbers if len(clip) > 1})
-        ends = [(coarse(number), coarse(number + 1)) for number in followed]
-        pairs = [
-            (_density(before.in_light_of(lit), fit).values, _density(after.in_light_of(lit), fit).values)
-            for before, after in ends
-            if before is not None and after is not None
-        ]
+        ends = [(density(number), density(number + 1)) for number in followed]
+        pairs = [(before.values, after.values) for before, after in ends if before is not None and after is not None]
         moved = choose_levels(pairs, frames[0].scene, lit, settings.velocity)
     else:
         said = settings.velocity.levels
@@ -114,10 +119,6 @@ def choose_model(
 def _tried(smoky: Sequence[int]) -> tuple[int, ...]:
     """Frames to measure on."""
     return tuple(dict.fromkeys((*smoky[:1], *smoky[len(smoky) // 2 : len(smoky) // 2 + 1])))
-
-
-def _density(frame: CoarseFrame, settings: DensitySettings) -> Density:
-    return reconstruct_density(frame.picture, frame.scene, settings=settings, plate=frame.plate)
 
 
 def _inside(densities: Sequence[Density], scene: Scene) -> Choice:
