@@ -16,16 +16,16 @@ from smokelift.velocity.settings import LEVELS
 FASTEST = 99
 """Percentile of the smoke's speed that counts as the largest: single wisps may be wrong."""
 
-MOST = 5
-"""More grids would leave nothing of the smoke on the coarsest."""
+MARGIN = 1.25
+"""By how much grids reach further than the motion that is found, since coarse densities show less than there is."""
 
 
 def levels_for(motion: float) -> int:
-    """Grids that reach a motion (voxels of the finest a frame).
+    """Grids that reach a motion (voxels of the finest a frame), as many as usual at most: more were never better.
 
     Every linearisation reaches a voxel of its own grid, so grids 1, 2, 4, ... voxels wide reach 2^levels - 1 together.
     """
-    return min(max(int(np.ceil(np.log2(motion + 1) - 1e-9)), 1), MOST)
+    return min(max(int(np.ceil(np.log2(MARGIN * motion + 1) - 1e-9)), 1), LEVELS)
 
 
 def choose_levels(
