@@ -41,6 +41,9 @@ STARTED = 2
 DIRECTIONS = 64
 """The richest environment that is compared with."""
 
+SHOWN = 0.3
+"""Brightness (linear) of the brightest in a row of pictures at least."""
+
 RUN = 24
 """Frames of the run that choosing is compared with."""
 
@@ -208,7 +211,8 @@ def main() -> None:
         row, tiles = compare(Path(path), known, options.frames, options.quality)
         rows.append(row)
         small = [area_average(tile, 192, round(192 * tile.shape[0] / tile.shape[1])) for tile in tiles]
-        sheet.append([pictures.eight_bit(np.clip(tile, 0, None)) for tile in small])
+        gain = max(1.0, SHOWN / float(small[0].max()))  # a haze would be black
+        sheet.append([pictures.eight_bit(gain * np.maximum(tile, 0)) for tile in small])
         print(line(row), flush=True)
         (options.out / "selection.json").write_text(json.dumps(rows, indent=1) + "\n")
     head = [
