@@ -216,6 +216,13 @@ def test_grids_by_hand_win(plume, draft) -> None:
     assert (choice.chosen, choice.measured) == (3, {})
 
 
+def test_motion_is_measured_although_the_last_frame_has_the_most_smoke(plume, draft, tmp_path) -> None:
+    """Nothing follows the last frame, so the one before is followed."""
+    growing = [share * density for share, density in zip((0.02, 0.05, 0.15, 0.4, 1), plume.densities, strict=True)]
+    choice = chosen(shot_of(plume.write(tmp_path, growing), draft), "velocity levels")
+    assert choice.measured["voxels_a_frame"] > 0.5
+
+
 # environments
 
 
