@@ -210,7 +210,7 @@ class _Advanced:
             column.prop(settings, name)
         state = context.window_manager.smokelift
         if state.check_scene == context.scene.session_uid and state.notes:
-            layout.label(text="{} x {} x {} voxels. Assumed:".format(*state.resolution))
+            layout.label(text="{} x {} x {} voxels. Assumed and chosen:".format(*state.resolution))
             for note in state.notes.split("\n"):
                 _say(layout, context, note)
         layout.operator("smokelift.check", icon="VIEWZOOM")

@@ -136,7 +136,7 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
 
     longest_side: IntProperty(
         name="Resolution",
-        description="Voxels along the longest side of the box; 0 is chosen by quality",
+        description="Voxels along the box's longest side; 0 is what the clip's detail asks for, at most the quality's",
         default=0,
         min=0,
         max=1024,

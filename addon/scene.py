@@ -77,7 +77,11 @@ def shot_tables(scene: bpy.types.Scene, quick: bool = False) -> dict[str, Any]:
 
 def options(scene: bpy.types.Scene) -> list[str]:
     """The engine's options that are no part of the scene file."""
-    return ["--quality", scene.smokelift.quality, "--device", scene.smokelift.device]
+    settings = scene.smokelift
+    words = ["--quality", settings.quality, "--device", settings.device]
+    if settings.camera_mode == "SCENE" and not settings.longest_side:
+        words += ["--resolution", "auto"]  # in the box, as fine as the clip's detail
+    return words
 
 
 def turned_world(scene: bpy.types.Scene) -> Matrix:

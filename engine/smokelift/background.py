@@ -210,7 +210,7 @@ def changing_plate(plates: Clip, clip: Clip, sample_count: int = 32) -> Callable
 def one_colour(plate: Plate) -> tuple[float, float, float] | None:
     """Return the linear colour of a plate that was estimated from a moving camera, or None if it has more than one."""
     known = plate.confidence > 0.5
-    if known.mean() < 0.5 or _encoded_noise(plate).max() > _MOST_NOISE:
+    if known.mean() < 0.5 or encoded_noise(plate).max() > _MOST_NOISE:
         return None
     red, green, blue = (float(v) for v in np.median(plate.image[known], axis=0))
     colour = np.broadcast_to(np.array([red, green, blue], np.float32), plate.image.shape)
@@ -238,7 +238,7 @@ def matte(frame: npt.ArrayLike, plate: Plate) -> Matte:
         raise ValueError(f"the frame {linear.shape} and the plate {plate.image.shape} must have one shape")
     if not np.isfinite(linear).all():
         raise ValueError("the frame must be finite")
-    deviation = (linear_to_srgb(linear) - linear_to_srgb(plate.image)) / _encoded_noise(plate)
+    deviation = (linear_to_srgb(linear) - linear_to_srgb(plate.image)) / encoded_noise(plate)
     smooth = ndimage.gaussian_filter(deviation, (_SMOOTH, _SMOOTH, 0.0))
     evidence = np.sqrt((smooth**2).mean(axis=2))
     # Exposure and codec drift: a frame that deviates everywhere is judged more mildly, up to a limit, since
@@ -264,10 +264,11 @@ def noise_at(picture: npt.ArrayLike, plate: Plate) -> Picture:
     plate
         For its noise, which is that at its median brightness.
     """
-    return _encoded_noise(plate) * _slope(linear_to_srgb(np.asarray(picture, np.float32)))
+    return encoded_noise(plate) * _slope(linear_to_srgb(np.asarray(picture, np.float32)))
 
 
-def _encoded_noise(plate: Plate) -> Picture:
+def encoded_noise(plate: Plate) -> Picture:
+    """Return the noise of a plate in sRGB values, where it is the same at every brightness, per channel."""
     return plate.noise / _slope(np.median(linear_to_srgb(plate.image), axis=(0, 1)))
 
 

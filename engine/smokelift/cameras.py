@@ -63,15 +63,25 @@ class WorkingPicture:
     width: int
     height: int
 
+    def part(self, picture: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The part of a full picture (rows, columns, ...), at its own resolution."""
+        return picture[self.top : self.top + self.height, self.left : self.left + self.width]
+
     def cut(self, picture: NDArray[np.float32]) -> NDArray[np.float32]:
         """The small picture, area-averaged from a full one (rows, columns, ...)."""
-        part = picture[self.top : self.top + self.height, self.left : self.left + self.width]
         columns, rows = self.camera.size
-        return area_average(part, columns, rows)
+        return area_average(self.part(picture), columns, rows)
 
 
 class CameraError(ValueError):
     """The camera does not see the domain."""
+
+
+def voxel_width(camera: Camera, domain: Domain) -> float:
+    """Width in pixels of a voxel at the domain's centre."""
+    _, depth = project(camera, np.array(domain.centre))
+    near = domain.voxel_size if camera.type == "perspective" else 1.0
+    return max(camera.fx, camera.fy) * domain.voxel_size / max(float(depth), near)
 
 
 def working_picture(camera: Camera, domain: Domain) -> WorkingPicture:
@@ -95,10 +105,7 @@ def working_picture(camera: Camera, domain: Domain) -> WorkingPicture:
         raise CameraError("The camera does not see the domain; move the domain into the picture or turn the camera.")
     left, top = (int(v) for v in np.floor(low))
     right, bottom = (int(v) for v in np.ceil(high))
-    _, centre_depth = project(camera, np.array(domain.centre))
-    near = domain.voxel_size if camera.type == "perspective" else 1.0
-    voxel_in_pixels = max(camera.fx, camera.fy) * domain.voxel_size / max(float(centre_depth), near)
-    shrink = max(1.0, voxel_in_pixels)
+    shrink = max(1.0, voxel_width(camera, domain))
     columns = max(1, round((right - left) / shrink))
     rows = max(1, round((bottom - top) / shrink))
     small = camera.cropped(left, top, right - left, bottom - top).resized(columns, rows)

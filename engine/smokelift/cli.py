@@ -16,6 +16,7 @@ from collections.abc import Sequence as Many
 from dataclasses import asdict, replace
 from pathlib import Path
 from types import FrameType
+from typing import Literal
 
 from smokelift import charts, pictures
 from smokelift.bench import command
@@ -76,7 +77,7 @@ def main(arguments: Many[str] | None = None) -> int:
 
 def _reconstruct(options: argparse.Namespace, say: Reporter) -> None:
     began = time.monotonic()
-    settings = Settings.preset(options.quality, options.method, options.resolution)
+    settings = _settings(options)
     scene = _scene(options.input, options.frames)
     assert scene.clip is not None
     device.start(options.device)
@@ -84,7 +85,7 @@ def _reconstruct(options: argparse.Namespace, say: Reporter) -> None:
         shot = prepare_shot(clip, scene, settings)
         assert shot.scene.domain is not None
         require_memory(shot.scene.domain)
-        for note in shot.notes:
+        for note in (*shot.notes, *(choice.reason for choice in shot.choices)):
             say.note(note)
         frames = reconstruct(clip, scene, settings, options.out, npz=options.npz, resume=options.resume, shot=shot)
         for first in frames:
@@ -107,7 +108,7 @@ def _reconstruct(options: argparse.Namespace, say: Reporter) -> None:
 
 
 def _inspect(options: argparse.Namespace, say: Reporter) -> None:
-    settings = Settings.preset(options.quality, options.method, options.resolution)
+    settings = _settings(options)
     scene = _scene(options.input, options.frames)
     assert scene.clip is not None
     with Clip.open(scene.clip) as clip:
@@ -115,14 +116,19 @@ def _inspect(options: argparse.Namespace, say: Reporter) -> None:
         frames = len(clip)
     domain = shot.scene.domain
     assert domain is not None
-    for note in (*shot.notes, *boundaries(shot.scene, settings)):
+    for note in (*shot.notes, *boundaries(shot.scene, settings), *(choice.reason for choice in shot.choices)):
         say.note(note)
     cost = forecast(domain, frames, settings.quality)
     voxels = " x ".join(map(str, domain.resolution))
     say.finish(
         f"{frames} frames of {voxels} voxels: about {cost.seconds:.0f} s, {cost.memory / 2**30:.1f} GiB of memory "
         f"({cost.memory_free / 2**30:.1f} are free), up to {cost.disk / 1e6:.0f} MB on disk.",
-        {"frames": frames, "scene": scene_to_dict(shot.scene), **asdict(cost)},
+        {
+            "frames": frames,
+            "scene": scene_to_dict(shot.scene),
+            "choices": [choice.as_dict() for choice in shot.choices],
+            **asdict(cost),
+        },
     )
 
 
@@ -210,6 +216,11 @@ _COMMANDS = {
 }
 
 
+def _settings(options: argparse.Namespace) -> Settings:
+    preset = Settings.preset(options.quality, options.method, options.resolution)
+    return replace(preset, density=replace(preset.density, scattering=options.scattering))
+
+
 def _scene(path: Path, frames: tuple[int, int] | None) -> Scene:
     if path.suffix.lower() == ".toml":
         scene = Scene.load(path)
@@ -243,11 +254,13 @@ def _viewer(name: str, sequence: Sequence) -> pictures.Viewer:
     return pictures.Viewer(sequence, turn=(yaw, pitch))
 
 
-def _three_counts(text: str) -> tuple[int, int, int]:
+def _resolution(text: str) -> tuple[int, int, int] | Literal["auto"]:
+    if text == "auto":
+        return "auto"
     try:
         x, y, z = (int(part) for part in text.split(","))
     except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r}: expected three whole numbers X,Y,Z") from None
+        raise argparse.ArgumentTypeError(f"{text!r}: expected three whole numbers X,Y,Z, or auto") from None
     return x, y, z
 
 
@@ -272,7 +285,15 @@ def _parser() -> argparse.ArgumentParser:
     what.add_argument("input", type=Path, help="scene.toml, or a video, or frame_####.png")
     what.add_argument("--quality", choices=QUALITIES, default="balanced")
     what.add_argument("--method", choices=METHODS, default="default", help="paper: the published loop, for comparison")
-    what.add_argument("--resolution", type=_three_counts, metavar="X,Y,Z", help="voxels, if not the scene's")
+    what.add_argument(
+        "--resolution", type=_resolution, metavar="X,Y,Z", help="voxels, if not the scene's; auto measures how many"
+    )
+    what.add_argument(
+        "--scattering",
+        choices=("auto", "absorption", "unshadowed", "single"),
+        default="auto",
+        help="how light is scattered; auto measures which is needed",
+    )
     what.add_argument("--frames", type=_frame_range, metavar="A:B", help="first and last frame, from 0")
 
     job = commands.add_parser("reconstruct", parents=[common, what], help="a clip or scene file to a VDB sequence")

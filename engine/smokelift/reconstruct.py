@@ -100,13 +100,19 @@ def reconstruct(
     settings = replace(
         settings,
         density=replace(settings.density, scattering=shot.scattering),
-        velocity=replace(settings.velocity, closed=tuple(side for side in SIDES if side in walls)),
+        velocity=replace(settings.velocity, closed=tuple(side for side in SIDES if side in walls), levels=shot.levels),
     )
     if out is None:
         yield from _frames(clip, shot, settings, None)
         return
     with SequenceWriter(
-        out, shot.scene, settings.as_dict(), npz=npz, resume=resume, background=shot.estimated_background
+        out,
+        shot.scene,
+        settings.as_dict(),
+        npz=npz,
+        resume=resume,
+        background=shot.estimated_background,
+        choices=[choice.as_dict() for choice in shot.choices],
     ) as writer:
         state = writer.state
         start = None
@@ -145,7 +151,8 @@ def _frames(clip: Clip, shot: Shot, settings: Settings, start: Frame | None) -> 
         now = shot.at(index)
         predicted = None
         initial = None
-        if before is not None and index >= 2:
+        # from where there was no smoke nothing is carried
+        if before is not None and index >= 2 and before.density.any():
             predicted = predict_velocity(before.velocity, dt, settings.velocity.closed)
             # pictures correct the mass, but not of what a moving camera does not see
             initial = advect(before.density, predicted, dt, conserve=shot.scene.camera.moves)

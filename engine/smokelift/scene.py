@@ -449,11 +449,15 @@ class PointLight:
 
 @dataclass(frozen=True)
 class EnvironmentLight:
-    """Light from an equirectangular picture (.exr, .hdr), turned about Z, scaled by ``strength``."""
+    """Light from an equirectangular picture (.exr, .hdr), turned about Z, scaled by ``strength``.
+
+    ``directions`` is the number of parallel lights that stand for it; None takes as many as the smoke needs.
+    """
 
     image: Path
     rotation_degrees: float = 0.0
     strength: float = 1.0
+    directions: int | None = None
 
     def __post_init__(self) -> None:
         """Check the values."""
@@ -465,6 +469,12 @@ class EnvironmentLight:
             raise SceneError(f"strength must be a number not below 0, not {shown(strength)}", key="strength")
         rotation = number(self.rotation_degrees, "rotation_degrees")
         _set(self, image=image, rotation_degrees=rotation, strength=strength)
+        if self.directions is not None:
+            expected = "a whole number from 1"
+            directions = integer(self.directions, "directions", expected)
+            if directions < 1:
+                raise SceneError(f"directions must be {expected}, not {shown(directions)}", key="directions")
+            _set(self, directions=directions)
 
 
 Light = DirectionalLight | PointLight | EnvironmentLight

@@ -44,7 +44,7 @@ _CLIP_KEYS = ("path", "fps", "frames", "transfer")
 _LIGHT_KEYS = {
     "directional": ("direction", "irradiance"),
     "point": ("position", "intensity"),
-    "environment": ("image", "rotation_degrees", "strength"),
+    "environment": ("image", "rotation_degrees", "strength", "directions"),
 }
 
 
@@ -190,6 +190,7 @@ def _light_to_dict(light: Light, base: Path | None) -> dict[str, Any]:
                 "image": _written(light.image, base),
                 "rotation_degrees": light.rotation_degrees,
                 "strength": light.strength,
+                **({} if light.directions is None else {"directions": light.directions}),
             }
 
 

@@ -20,7 +20,7 @@ import platform
 import re
 import sys
 import zipfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
@@ -96,6 +96,9 @@ class SequenceWriter:
         Whether to go on from the finished frames in the directory. An empty directory starts a new run.
     background
         An estimated background of the scene's picture, shape (height, width, 3), kept as `background.exr`.
+    choices
+        What was chosen for the clip and why, as JSON can hold it. Kept, and not compared when a run goes on: what they
+        decided is in the scene and the settings.
 
     Attributes
     ----------
@@ -120,12 +123,14 @@ class SequenceWriter:
         npz: bool = False,
         resume: bool = False,
         background: Array | None = None,
+        choices: Iterable[Mapping[str, Any]] = (),
     ) -> None:
         if scene.domain is None:
             raise SequenceError("a sequence needs a scene with a domain")
         self.directory = Path(directory)
         self._domain: Domain = scene.domain
         self._background = background
+        self._choices = [_jsonable(choice) for choice in choices]
         if background is not None:
             scene = replace(scene, background=Background(image=self.directory / _BACKGROUND))
         self.finished: tuple[int, ...] = ()
@@ -299,6 +304,7 @@ class SequenceWriter:
             "complete": self._complete,
             "versions": software_versions(),
             **self._run,
+            "choices": self._choices,
             "frames": {str(number): self._frames[number] for number in sorted(self._frames)},
         }
         with atomic_path(self.directory / _INDEX) as aside:
@@ -328,6 +334,9 @@ class Sequence:
         Numbers of its frames, in order.
     complete
         Whether the run that made it came to its end.
+    choices
+        What was chosen for the clip: ``what``, ``chosen``, ``reason``, ``measured``, ``tolerance`` and ``by_hand`` of
+        each (see `smokelift.selection`).
     """
 
     directory: Path
@@ -336,6 +345,7 @@ class Sequence:
     versions: Mapping[str, str]
     frames: tuple[int, ...]
     complete: bool
+    choices: tuple[Mapping[str, Any], ...]
     _figures: Mapping[str, Mapping[str, Any]]
 
     @classmethod
@@ -354,7 +364,10 @@ class Sequence:
         except ValueError as error:
             raise SequenceError(str(error)) from error
         frames = tuple(sorted(int(number) for number in index["frames"]))
-        return cls(directory, scene, index["settings"], index["versions"], frames, index["complete"], index["frames"])
+        choices = tuple(index.get("choices", ()))  # early versions made none
+        return cls(
+            directory, scene, index["settings"], index["versions"], frames, index["complete"], choices, index["frames"]
+        )
 
     def density(self, number: int) -> Array:
         """Return the density of a frame, shape (nx, ny, nz): the NumPy twin's if there is one.

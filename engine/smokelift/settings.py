@@ -31,7 +31,8 @@ class Settings:
     quality
         ``"draft"``, ``"balanced"`` or ``"fine"``: resolution (unless given) and iterations.
     resolution
-        Voxels along x, y, z; None takes the scene's, or one by quality.
+        Voxels along x, y, z; None takes the scene's. ``"auto"``, and None where the scene gives none, take as many as
+        the detail of the clip's smoke asks for, at most those of the quality.
     transport
         Largest share (0 to 1) of the density carried along from the frame before in the first guess of the next; the
         rest is the single picture's. Every frame takes over as much as proves right (see `smokelift.coupling`), with 0
@@ -46,7 +47,7 @@ class Settings:
 
     method: Method = "default"
     quality: Quality = "balanced"
-    resolution: tuple[int, int, int] | None = None
+    resolution: tuple[int, int, int] | Literal["auto"] | None = None
     transport: float = 0.25
     axis_depth: float | None = None
     density: DensitySettings = field(default_factory=DensitySettings)
@@ -61,12 +62,16 @@ class Settings:
             raise ValueError(f"transport must be a number from 0 to 1, not {self.transport}.")
         if self.axis_depth is not None and not math.isfinite(self.axis_depth):
             raise ValueError(f"axis_depth must be a finite number of metres, not {self.axis_depth}.")
-        if self.resolution is not None and (len(self.resolution) != 3 or min(self.resolution) < 8):
+        counts = None if self.resolution == "auto" else self.resolution
+        if counts is not None and (len(counts) != 3 or min(counts) < 8):
             raise ValueError(f"resolution must be three numbers of at least 8 voxels, not {self.resolution}.")
 
     @classmethod
     def preset(
-        cls, quality: Quality = "balanced", method: Method = "default", resolution: tuple[int, int, int] | None = None
+        cls,
+        quality: Quality = "balanced",
+        method: Method = "default",
+        resolution: tuple[int, int, int] | Literal["auto"] | None = None,
     ) -> Settings:
         """The settings of a quality and a method."""
         base = cls(method=method, quality=quality, resolution=resolution)

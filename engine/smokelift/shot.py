@@ -5,6 +5,7 @@ What a scene file leaves out is estimated from the clip or defaulted, and every 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -21,12 +22,14 @@ from smokelift.background import (
     one_colour,
     open_plates,
 )
-from smokelift.cameras import CameraError, WorkingPicture, as_matrix, working_picture
+from smokelift.cameras import CameraError, WorkingPicture, as_matrix, voxel_width, working_picture
 from smokelift.clip import Clip
 from smokelift.images import area_average, read_image
 from smokelift.render import scene_lights
 from smokelift.render.setup import Scattering
-from smokelift.scene import Background, Camera, DirectionalLight, Domain, Medium, Scene
+from smokelift.scene import Background, Camera, DirectionalLight, Domain, Light, Medium, Scene
+from smokelift.selection import Choice, Detail, choose_model, smoke_detail
+from smokelift.selection.detail import TOLERANCE as DETAIL_TOLERANCE
 from smokelift.settings import LONGEST_SIDE, Settings
 
 PICTURE_HEIGHT = 2.0
@@ -39,6 +42,10 @@ OPTICAL_DEPTH_AT_ONE = 5.0
 """Optical depth of smoke of density 1 across the domain when the medium is not given: thick, not solid."""
 
 SAMPLES = 16
+DETAIL_FRAMES = 3
+COARSEST = 32
+"""Voxels along the longest side at least: with fewer there is nothing more to save."""
+
 PICTURE_SIDE = 320
 
 
@@ -56,13 +63,18 @@ class Shot:
     plate
         Background of that small picture, with the clip's noise.
     scattering
-        How light is scattered: ``"single"`` where the light is known, else ``"unshadowed"``.
+        How light is scattered: what the settings say, or else the cheapest model that does; never with shadows where
+        the light is not known.
     estimated_background
         Full picture behind the smoke where the scene does not give one, (rows, columns, 3).
     notes
         What was assumed or estimated, a sentence each.
     plate_at
         Background of the full picture in every frame, counted from 0, where camera or background change; else None.
+    levels
+        Grids of a velocity without a past.
+    choices
+        What was chosen by measurement or by hand, with the figures that decided it.
     """
 
     scene: Scene
@@ -72,6 +84,8 @@ class Shot:
     estimated_background: NDArray[np.float32] | None
     notes: tuple[str, ...]
     plate_at: Callable[[int], Plate] | None = None
+    levels: int | None = None
+    choices: tuple[Choice, ...] = ()
 
     def at(self, frame: int) -> Shot | None:
         """The shot as it is in a frame, counted from 0; None if nothing of the domain is in the picture then."""
@@ -102,7 +116,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
     scene
         Whatever is known.
     settings
-        For the resolution.
+        What they leave open is chosen by measurement.
 
     Raises
     ------
@@ -125,7 +139,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
         plate, scene = _plate(clip, scene, notes)
         plate_at = lambda _frame: plate  # noqa: E731
     samples = _smoke_samples(clip, plate_at)
-    camera, domain = _geometry(clip, scene, settings, samples, notes)
+    camera, domain, resolved = _geometry(clip, scene, settings, plate_at, samples, notes)
     medium = scene.medium
     if medium is None:
         width = min(high - low for low, high in zip(domain.min, domain.max, strict=True))
@@ -134,24 +148,49 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
             f"Medium not given: extinction {medium.extinction:.3g} 1/m (density 1 is thick smoke), "
             f"albedo {medium.albedo:g}, isotropic."
         )
-    lights, scattering = scene.lights, settings.density.scattering
-    if medium.albedo == 0:
-        scattering = "absorption"
-    if not lights and scattering != "absorption":
+    lights, richest = scene.lights, _richest(scene.lights, medium, settings)
+    if not lights and richest != "absorption":
         sun = _ambient_sun(samples, medium)
         lights = (sun,)
-        scattering = "unshadowed"
         notes.append(
             "Light not given: as much from everywhere as the thickest smoke shows, "
             f"irradiance {', '.join(f'{v:.2f}' for v in sun.irradiance)}, without shadows."
         )
-    working, shown = _working(camera, domain)
     source = None if scene.clip is None else replace(scene.clip, fps=clip.fps)
     complete = replace(scene, clip=source, camera=camera, domain=domain, medium=medium, lights=lights)
+    working, shown = _working(camera, domain)
     plate = plate_at(shown)
     estimated = plate.image if _unknown(scene.background) else None
     changing = plate_at if moves or plates is not None else None
-    return Shot(complete, working, _small(plate, working), scattering, estimated, tuple(notes), changing)
+    scattering, levels = richest, settings.velocity.levels
+    choices = () if resolved is None else (resolved,)
+    if settings.method != "paper":
+        model = choose_model(clip, complete, plate_at, samples.smoky, richest, settings)
+        complete, scattering, levels = model.scene, model.scattering, model.levels
+        choices = (*choices, *model.choices)
+    return Shot(
+        complete, working, _small(plate, working), scattering, estimated, tuple(notes), changing, levels, choices
+    )
+
+
+def _richest(lights: tuple[Light, ...], medium: Medium, settings: Settings) -> Scattering:
+    """The richest model of scattering that may be used: the one in the settings, or what is known of the light allows.
+
+    Raises
+    ------
+    ValueError
+        If shadows are asked for without a light to cast them.
+    """
+    said = settings.density.scattering
+    if said == "single" and not lights:
+        raise ValueError(
+            'Scattering "single" needs a light that casts the shadows; give one in [[lights]], or leave it to "auto".'
+        )
+    if said != "auto":
+        return said
+    if medium.albedo == 0:
+        return "absorption"
+    return "single" if lights else "unshadowed"
 
 
 def boundaries(scene: Scene, settings: Settings) -> tuple[str, ...]:
@@ -198,12 +237,15 @@ class _SmokeSamples:
         Radiance of all smoke pixels.
     behind : (n, 3)
         Background radiance at the same pixels.
+    smoky
+        Numbers of the frames with smoke, those with the most first.
     """
 
     scale: float
     covered: NDArray[np.bool_]
     colours: NDArray[np.float32]
     behind: NDArray[np.float32]
+    smoky: tuple[int, ...]
 
 
 def _smoke_samples(clip: Clip, plate_at: Callable[[int], Plate]) -> _SmokeSamples:
@@ -212,6 +254,7 @@ def _smoke_samples(clip: Clip, plate_at: Callable[[int], Plate]) -> _SmokeSample
     columns, rows = max(1, round(width / scale)), max(1, round(height / scale))
     covered = np.zeros((rows, columns), np.bool_)
     colours, behind = [], []
+    amounts: dict[int, int] = {}
     for number in clip.spread(SAMPLES):
         plate = plate_at(number)
         small = Plate(
@@ -222,7 +265,10 @@ def _smoke_samples(clip: Clip, plate_at: Callable[[int], Plate]) -> _SmokeSample
         covered |= mask
         colours.append(picture[mask])
         behind.append(small.image[mask])
-    return _SmokeSamples(scale, covered, np.concatenate(colours), np.concatenate(behind))
+        if mask.any():
+            amounts[number] = int(mask.sum())
+    smoky = tuple(sorted(amounts, key=lambda number: -amounts[number]))
+    return _SmokeSamples(scale, covered, np.concatenate(colours), np.concatenate(behind), smoky)
 
 
 def _plate(clip: Clip, scene: Scene, notes: list[str]) -> tuple[Plate, Scene]:
@@ -252,8 +298,13 @@ def _unknown(background: Background | None) -> bool:
 
 
 def _geometry(
-    clip: Clip, scene: Scene, settings: Settings, samples: _SmokeSamples, notes: list[str]
-) -> tuple[Camera, Domain]:
+    clip: Clip,
+    scene: Scene,
+    settings: Settings,
+    plate_at: Callable[[int], Plate],
+    samples: _SmokeSamples,
+    notes: list[str],
+) -> tuple[Camera, Domain, Choice | None]:
     if scene.camera is not None:
         if scene.camera.size[0] * clip.size[1] != scene.camera.size[1] * clip.size[0]:
             raise ValueError(
@@ -263,29 +314,47 @@ def _geometry(
         camera = scene.camera.resized(*clip.size)
         if scene.domain is None:
             raise ValueError("The scene gives a camera but no box in [domain]; give the one that holds the smoke.")
-        return camera, _with_resolution(scene.domain, settings.resolution)
+        if settings.resolution == "auto":
+            grids = _same_shape(scene.domain, LONGEST_SIDE[settings.quality])
+            return camera, *_resolved(clip, camera, grids, plate_at, samples.smoky)
+        domain = _with_resolution(scene.domain, settings.resolution)
+        return camera, domain, _resolution_by_hand(domain)
     if scene.domain is not None:
         raise ValueError("The scene gives a [domain] but no [camera]; give the camera that filmed it.")
     if scene.inlets:
         raise ValueError(
             "The scene marks an [[inlet]] but gives no [camera] and [domain]; give both to say where it is."
         )
-    camera, domain = _uncalibrated(clip, samples, settings)
+    camera, grids = _uncalibrated(clip, samples, settings)
+    if isinstance(settings.resolution, tuple):
+        domain, choice = grids[-1], _resolution_by_hand(grids[-1])
+    elif settings.method == "paper":
+        domain, choice = grids[-1], None
+    else:
+        domain, choice = _resolved(clip, camera, grids, plate_at, samples.smoky)
     notes.append(
         "Camera not given: a level 50 mm lens on 36 mm film, the picture taken to be "
         f"{PICTURE_HEIGHT:g} m high where the smoke is."
     )
     size = " x ".join(f"{high - low:.2f}" for low, high in zip(domain.min, domain.max, strict=True))
     notes.append(f"Domain around the smoke: {size} m, {' x '.join(map(str, domain.resolution))} voxels.")
-    return camera, domain
+    return camera, domain, choice
+
+
+def _resolution_by_hand(domain: Domain) -> Choice:
+    said = " x ".join(map(str, domain.resolution))
+    return Choice("resolution", domain.resolution, f"Resolution by hand: {said} voxels.", by_hand=True)
 
 
 def _with_resolution(domain: Domain, resolution: tuple[int, int, int] | None) -> Domain:
     return domain if resolution is None else replace(domain, resolution=resolution)
 
 
-def _uncalibrated(clip: Clip, samples: _SmokeSamples, settings: Settings) -> tuple[Camera, Domain]:
-    """A level camera that looks along +Y, and the box around the smoke at the picture's distance."""
+def _uncalibrated(clip: Clip, samples: _SmokeSamples, settings: Settings) -> tuple[Camera, tuple[Domain, ...]]:
+    """A level camera that looks along +Y, and the box around the smoke at the picture's distance.
+
+    The box comes with every number of voxels that may be chosen, the fewest first.
+    """
     width, height = clip.size
     focal = LENS * max(width, height)
     metres = PICTURE_HEIGHT / height
@@ -308,19 +377,67 @@ def _uncalibrated(clip: Clip, samples: _SmokeSamples, settings: Settings) -> tup
     across *= 1 + across / (2 * distance)
     centre_x = ((left + right) / 2 - width / 2) * metres
     bottom_z = PICTURE_HEIGHT / 2 - (bottom - height / 2) * metres
-    longest = LONGEST_SIDE[settings.quality]
-    if settings.resolution is not None:
-        resolution = settings.resolution
-        voxel = max(across / resolution[0], across / resolution[1], up / resolution[2])
-    else:
+
+    def box(voxel: float, resolution: tuple[int, int, int]) -> Domain:
+        size = np.array(resolution) * voxel
+        low = np.array([centre_x - size[0] / 2, -size[1] / 2, bottom_z])
+        high = low + size
+        return Domain(
+            (float(low[0]), float(low[1]), float(low[2])), (float(high[0]), float(high[1]), float(high[2])), resolution
+        )
+
+    if isinstance(settings.resolution, tuple):
+        x, y, z = settings.resolution
+        return camera, (box(max(across / x, across / y, up / z), settings.resolution),)
+    grids = []
+    for longest in range(COARSEST, LONGEST_SIDE[settings.quality] + 1, 4):
         voxel = max(across, up) / longest
-        resolution = (_voxels(across, voxel), _voxels(across, voxel), _voxels(up, voxel))
-    size = np.array(resolution) * voxel
-    low = np.array([centre_x - size[0] / 2, -size[1] / 2, bottom_z])
-    high = low + size
-    return camera, Domain(
-        (float(low[0]), float(low[1]), float(low[2])), (float(high[0]), float(high[1]), float(high[2])), resolution
+        grids.append(box(voxel, (_voxels(across, voxel), _voxels(across, voxel), _voxels(up, voxel))))
+    return camera, tuple(grids)
+
+
+def _same_shape(domain: Domain, most: int) -> tuple[Domain, ...]:
+    """The box with every number of cubic voxels that fills it exactly, the fewest first; none finer than allowed."""
+    common = math.gcd(*domain.resolution)
+    x, y, z = (n // common for n in domain.resolution)
+    longest = max(x, y, z)
+    fewest = -(-min(COARSEST, max(domain.resolution)) // longest)
+    return tuple(
+        replace(domain, resolution=(x * times, y * times, z * times))
+        for times in range(fewest, max(most // longest, fewest) + 1)
     )
+
+
+def _resolved(
+    clip: Clip, camera: Camera, grids: tuple[Domain, ...], plate_at: Callable[[int], Plate], smoky: tuple[int, ...]
+) -> tuple[Domain, Choice]:
+    """The coarsest grid of some that loses no more of the smoke's detail than tolerated, and why."""
+    finest = max(grids[-1].resolution)
+    detail = _detail(clip, camera, grids[-1], plate_at, smoky)
+    domain = next((grid for grid in grids if detail.lost(max(grid.resolution)) <= DETAIL_TOLERANCE), grids[-1])
+    lost = detail.lost(max(domain.resolution))
+    reason = (
+        f"Resolution: {' x '.join(map(str, domain.resolution))} voxels, which lose {lost:.1%} of the smoke's contrast "
+        f"against {finest} along the longest side, the most at this quality."
+    )
+    return domain, Choice("resolution", domain.resolution, reason, {"lost": lost}, DETAIL_TOLERANCE)
+
+
+def _detail(
+    clip: Clip, camera: Camera, finest: Domain, plate_at: Callable[[int], Plate], smoky: tuple[int, ...]
+) -> Detail:
+    """The detail of the smoke in some frames, up to that of a grid."""
+    frames = []
+    for number in smoky[:DETAIL_FRAMES]:
+        with suppress(CameraError):
+            now, plate = camera.at(number), plate_at(number)
+            working = working_picture(now, finest)
+            frames.append((working.part(clip.frame(number)), _part(plate, working), voxel_width(now, finest)))
+    return smoke_detail(frames, max(finest.resolution))
+
+
+def _part(plate: Plate, working: WorkingPicture) -> Plate:
+    return Plate(working.part(plate.image), working.part(plate.confidence), plate.noise)
 
 
 def _voxels(extent: float, voxel: float) -> int:

@@ -148,11 +148,13 @@ def test_progress_as_json(plume, tmp_path, capsys) -> None:
     captured = capsys.readouterr()
     told = events(captured.out)
     assert captured.err == ""
-    assert [event["event"] for event in told] == ["note", "start", *["frame"] * 5, "done"]
-    assert told[0]["text"].startswith("Medium not given")
-    assert (told[1]["total"], told[1]["done"]) == (5, 0)
-    assert [(event["frame"], event["done"], event["total"]) for event in told[2:-1]] == [(n, n, 5) for n in range(1, 6)]
-    assert all(event["figures"]["psnr"] > 30 for event in told[2:-1])
+    notes = [event["text"] for event in told if event["event"] == "note"]
+    assert [event["event"] for event in told] == [*["note"] * len(notes), "start", *["frame"] * 5, "done"]
+    assert notes[0].startswith("Medium not given")
+    start, *frames = told[len(notes) : -1]
+    assert (start["total"], start["done"]) == (5, 0)
+    assert [(event["frame"], event["done"], event["total"]) for event in frames] == [(n, n, 5) for n in range(1, 6)]
+    assert all(event["figures"]["psnr"] > 30 for event in frames)
     assert told[-2]["seconds_left"] == 0
     assert (told[-1]["directory"], told[-1]["frames"]) == (str(out), 5)
 
@@ -180,6 +182,39 @@ def test_inspect_says_how_smoke_gets_in_and_out(plume, tmp_path, capsys) -> None
     assert "Closed sides of the box: z-;" in said
     assert done["scene"]["domain"]["closed"] == ["z-"]
     assert done["scene"]["inlet"] == [{"centre": [0.0, 0.0, 0.2], "radius": 0.1}]
+
+
+def test_choices_are_said_and_kept(shot, finished, capsys) -> None:
+    """The same from inspect, as sentences and as JSON, and with the sequence, each with its figures."""
+    kept = Sequence.open(finished).choices
+    assert [choice["what"] for choice in kept] == [
+        "resolution", "domain", "scattering", "iterations", "velocity levels",
+    ]  # fmt: skip
+    assert json.loads((finished / "sequence.json").read_text())["choices"] == list(kept)
+    assert command("inspect", shot, "--progress", "json", *QUICK) == 0
+    *notes, done = events(capsys.readouterr().out)
+    assert done["choices"] == list(kept)
+    said = [event["text"] for event in notes]
+    assert all(choice["reason"] in said for choice in kept)
+    (scattering,) = (choice for choice in kept if choice["what"] == "scattering")
+    assert scattering["chosen"] == Sequence.open(finished).settings["density"]["scattering"] == "single"
+    assert scattering["measured"]["error_unshadowed"] > scattering["tolerance"]
+    assert command("inspect", shot, *QUICK) == 0
+    assert scattering["reason"] in "".join(capsys.readouterr().out.splitlines())
+
+
+def test_scattering_and_resolution_by_option(shot, tmp_path, capsys) -> None:
+    """What is said is used, and said to be by hand; auto measures the resolution of a given box."""
+    out = tmp_path / "out"
+    arguments = ("--npz", "--frames", "0:1", "--scattering", "unshadowed", "--resolution", "auto", *QUICK)
+    assert command("reconstruct", shot, "--out", out, *arguments) == 0
+    sequence = Sequence.open(out)
+    assert sequence.settings["density"]["scattering"] == "unshadowed"
+    by_hand = {choice["what"]: choice["by_hand"] for choice in sequence.choices}
+    assert (by_hand["scattering"], by_hand["resolution"]) == (True, False)
+    assert max(sequence.scene.domain.resolution) > 32
+    assert command("reconstruct", shot, "--out", out, "--resume", *arguments) == 0
+    assert "scattering" in refused(capsys, "reconstruct", shot, "--out", out, "--resume", *arguments[:3], *QUICK)
 
 
 def test_an_inlet_outside_the_box(plume, tmp_path, capsys) -> None:
@@ -255,7 +290,14 @@ def test_frames_in_the_wrong_order(shot, tmp_path, capsys) -> None:
 
 
 @pytest.mark.parametrize(
-    "option", [("--frames", "1-2"), ("--resolution", "64,64"), ("--quality", "best"), ("--resolution", "a,b,c")]
+    "option",
+    [
+        ("--frames", "1-2"),
+        ("--resolution", "64,64"),
+        ("--quality", "best"),
+        ("--resolution", "a,b,c"),
+        ("--scattering", "many"),
+    ],
 )
 def test_options_that_make_no_sense(shot, tmp_path, capsys, option) -> None:
     """Status 2, and the last line names the option."""

@@ -104,6 +104,19 @@ def test_a_sequence_opens_as_it_was_written(tmp_path: Path) -> None:
     np.testing.assert_allclose(opened.velocity(2), Velocity(faces, 1.0).centres(), rtol=1e-3, atol=1e-6)
 
 
+def test_choices_are_kept_and_not_compared(tmp_path: Path, no_vdb: None) -> None:
+    """They say why; a run goes on although a figure changed. Sequences of before there were any open."""
+    cut_off(tmp_path, [1], choices=[{"what": "scattering", "measured": {"error": math.nan}}])
+    assert Sequence.open(tmp_path).choices == ({"what": "scattering", "measured": {"error": None}},)
+    other = ({"what": "scattering", "measured": {"error": 0.2}},)
+    write(tmp_path, [2], resume=True, choices=other)
+    assert Sequence.open(tmp_path).choices == other
+    index = json.loads((tmp_path / "sequence.json").read_text())
+    del index["choices"]
+    (tmp_path / "sequence.json").write_text(json.dumps(index))
+    assert Sequence.open(tmp_path).choices == ()
+
+
 def test_numpy_files_alone_need_no_vdb_module(tmp_path: Path, no_vdb: None) -> None:
     write(tmp_path / "out", [1])
     assert names(tmp_path / "out") == ["sequence.json", "smoke_0001.npz"]

@@ -24,7 +24,7 @@ from smokelift.scene import (
     look_at_matrix,
 )
 from smokelift.settings import LONGEST_SIDE, Settings
-from smokelift.shot import Shot, boundaries, prepare_shot
+from smokelift.shot import COARSEST, Shot, boundaries, prepare_shot
 
 
 def shot_of(scene: Scene, settings: Settings) -> Shot:
@@ -105,11 +105,11 @@ def test_the_background_is_found(guessed) -> None:
 
 
 def test_the_domain_holds_the_smoke(guessed, passing, draft) -> None:
-    """Every clearly smoky pixel lies in the domain's picture; voxels are cubes, as many as the quality says."""
+    """Every clearly smoky pixel lies in the domain's picture; voxels are cubes, no more than the quality says."""
     domain = guessed.scene.domain
     edges = (np.array(domain.max) - domain.min) / domain.resolution
     np.testing.assert_allclose(edges, edges[0], rtol=1e-6)
-    assert LONGEST_SIDE[draft.quality] <= max(domain.resolution) <= LONGEST_SIDE[draft.quality] + 4
+    assert COARSEST <= max(domain.resolution) <= LONGEST_SIDE[draft.quality] + 4
     pixels, depth = project(guessed.scene.camera, domain.corners())
     assert (depth > 0).all()
     with Clip.open(passing.clip) as clip:

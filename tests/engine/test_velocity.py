@@ -110,7 +110,7 @@ def test_smoke_without_a_history_is_not_thrown_far(seed):
     before, after = (np.maximum(ndimage.gaussian_filter(rng.standard_normal(SHAPE), 2), 0) for _ in range(2))
     found = estimate_velocity(before, after, DT, VOXEL).centres() * DT / VOXEL
     settings = VelocitySettings()
-    reach = settings.warps * sum(2**level for level in range(settings.levels))
+    reach = settings.warps * sum(2**level for level in range(settings.grids))
     assert np.abs(found).max() < 1.5 * reach
 
 

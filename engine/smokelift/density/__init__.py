@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,7 +49,8 @@ class DensitySettings:
     method
         ``"default"``, or ``"paper"``: fixed-rate gradient descent, the picture imposed at 90 degrees as well.
     scattering
-        ``"single"`` (self-shadowed), ``"unshadowed"`` or ``"absorption"``.
+        ``"single"`` (self-shadowed), ``"unshadowed"``, ``"absorption"``, or ``"auto"``: for a clip the cheapest that
+        does (see `smokelift.selection`), for a single picture ``"single"``.
     fit_iterations
         Multiplicative iterations at most; the fit is within a few per cent after six, and each further one gains
         less than a step of descent costs.
@@ -66,7 +67,7 @@ class DensitySettings:
     """
 
     method: Literal["default", "paper"] = "default"
-    scattering: Scattering = "single"
+    scattering: Scattering | Literal["auto"] = "auto"
     fit_iterations: int = 6
     descent_iterations: int = 12
     tolerance: float = 0.02
@@ -76,6 +77,14 @@ class DensitySettings:
     def __post_init__(self) -> None:
         if not 0 <= self.texture <= 1:
             raise ValueError(f"texture must be a number from 0 to 1, not {self.texture}.")
+        if self.scattering not in ("auto", *get_args(Scattering)):
+            known = ", ".join(("auto", *get_args(Scattering)))
+            raise ValueError(f"scattering must be one of {known}, not {self.scattering!r}.")
+
+    @property
+    def model(self) -> Scattering:
+        """The model of scattering, the richest where it was left open."""
+        return "single" if self.scattering == "auto" else self.scattering
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +156,7 @@ def reconstruct_density(
         return Density(np.zeros(domain.resolution, np.float32), hull, _figures(0.0, 1, 0, hull))
     if settings.method == "paper":
         return _paper(image, plate.image, scene, initial, settings)
-    renderer = Renderer(camera, domain, medium, lights, plate.image, settings.scattering, hull)
+    renderer = Renderer(camera, domain, medium, lights, plate.image, settings.model, hull)
     counts = reached(mask, projection)
     # a ray that leaves through floor or ceiling crosses few voxels, which must not hold all that it shows
     profile = DepthProfile(optical_depth(image, scene, settings, plate), camera, domain, axis or SmokeAxis.upright())
@@ -204,7 +213,7 @@ def _paper(image: Image, background: Image, scene: Scene, initial: Volume | None
     camera, domain, medium = scene.camera, scene.domain, scene.medium or Medium()
     lights = scene_lights(scene)
     views = (camera, orbit(camera, domain, 90))
-    renderers = [PaperRenderer(view, domain, medium, lights, background, settings.scattering) for view in views]
+    renderers = [PaperRenderer(view, domain, medium, lights, background, settings.model) for view in views]
     # fog of optical depth 0.1 across the domain: thin, because dense media have local minima
     thin = 0.1 / (medium.extinction * (domain.max[0] - domain.min[0]))
     fog = np.full(domain.resolution, thin, np.float32)

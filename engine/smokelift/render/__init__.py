@@ -154,7 +154,7 @@ def scene_lights(scene: Scene, camera: Camera | None = None) -> tuple[FiniteLigh
 def _environment(
     light: EnvironmentLight, camera: Camera, domain: Domain, medium: Medium
 ) -> tuple[DirectionalLight, ...]:
-    return environment_lights(light, environment_count(light, camera, domain, medium))
+    return environment_lights(light, light.directions or environment_count(light, camera, domain, medium))
 
 
 def scene_background(scene: Scene, camera: Camera | None = None) -> Image:

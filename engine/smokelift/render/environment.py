@@ -14,6 +14,7 @@ to twice as many lights for the same picture, and cuts a sun again and again.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import pairwise
 from typing import Any
 
@@ -97,21 +98,50 @@ def environment_count(light: EnvironmentLight, camera: Camera, domain: Domain, m
     smokelift.images.ImageError
         As `environment_lights`.
     """
-    cells = _Cells(light)
     small = _coarse(domain)
     view = _coarse_camera(camera, small)
     ball = _reference_density(small, medium)
 
-    def picture(count: int) -> Image:
-        return Renderer(view, small, medium, cells.lights(count), np.zeros(3, np.float32)).image(ball)
+    def picture(lights: tuple[DirectionalLight, ...]) -> Image:
+        return Renderer(view, small, medium, lights, np.zeros(3, np.float32)).image(ball)
 
-    count, image = FEWEST, picture(FEWEST)
-    while count < MOST:
-        finer = picture(2 * count)
-        if np.linalg.norm(finer - image) <= TOLERANCE * np.linalg.norm(finer):
+    return lights_needed(light, picture)[0]
+
+
+def lights_needed(
+    light: EnvironmentLight, picture: Callable[[tuple[DirectionalLight, ...]], Image]
+) -> tuple[int, float]:
+    """Double the number of lights until that changes a picture by at most the tolerance, or there are 256.
+
+    Parameters
+    ----------
+    light
+        The environment.
+    picture
+        Shows something in some lights.
+
+    Returns
+    -------
+    count
+        The number of lights that doubling did not change any more.
+    change
+        By how much doubling still changes the picture (relative L2 norm).
+
+    Raises
+    ------
+    smokelift.images.ImageError
+        As `environment_lights`.
+    """
+    cells = _Cells(light)
+    count, image = FEWEST, picture(cells.lights(FEWEST))
+    while True:
+        finer = picture(cells.lights(2 * count))
+        bright = float(np.linalg.norm(finer))
+        change = float(np.linalg.norm(finer - image)) / bright if bright > 0 else 0.0
+        if change <= TOLERANCE or 2 * count >= MOST:
             break
         count, image = 2 * count, finer
-    return count
+    return (count if change <= TOLERANCE else MOST), change
 
 
 class _Cells:

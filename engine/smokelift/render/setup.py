@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,6 +69,8 @@ def make_setup(
     support: NDArray[np.bool_] | None,
 ) -> Setup:
     """Set up a renderer; see `smokelift.render.renderer.Renderer` for the parameters."""
+    if scattering not in get_args(Scattering):
+        raise ValueError(f"scattering must be one of {', '.join(get_args(Scattering))}, not {scattering!r}.")
     if support is None:
         support = np.broadcast_to(np.True_, domain.resolution)
     corner, part = _box_around(support)

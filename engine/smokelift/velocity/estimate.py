@@ -192,7 +192,7 @@ def _default(
     guided = known is not None
     if not guided:
         prediction, finest = None, replace(finest, past=None)
-    levels = [finest] if guided else pyramid(finest, settings.levels)
+    levels = [finest] if guided else pyramid(finest, settings.grids)
     share = 1.0 if guided else settings.momentum
     iterations = products = projections = 0
     motion: Motion

@@ -7,6 +7,9 @@ from typing import Literal
 
 from smokelift.transport import Side
 
+LEVELS = 3
+"""Grids where nobody says how many."""
+
 
 @dataclass(frozen=True)
 class VelocitySettings:
@@ -23,7 +26,8 @@ class VelocitySettings:
         ``"projected-cg"``, conjugate gradients on velocities without divergence; ``"primal-dual"``, the
         paper's splitting, with the same minimum at several times the cost; ``"auto"``: the one of the method.
     levels
-        Grids, each half as fine as the one before, for an estimate without a prediction. Three reach motion of several
+        Grids, each half as fine as the one before, for an estimate without a prediction. None takes as many as the
+        motion in a clip asks for (see `smokelift.selection`); between two densities alone three, which reach several
         voxels a frame. With a prediction there is one: fine detail aliases on coarse grids, which costs more than they
         bring.
     warps
@@ -76,7 +80,7 @@ class VelocitySettings:
 
     method: Literal["default", "paper"] = "default"
     solver: Literal["auto", "projected-cg", "primal-dual"] = "auto"
-    levels: int = 3
+    levels: int | None = None
     warps: int = 2
     smoothness: float = 0.03
     irrotational: float = 0.05
@@ -99,3 +103,8 @@ class VelocitySettings:
     inner_iterations: int = 50
     closed: tuple[Side, ...] = ()
     threads: int = 0
+
+    @property
+    def grids(self) -> int:
+        """The number of grids, the usual one where it was left open."""
+        return LEVELS if self.levels is None else self.levels

@@ -342,6 +342,15 @@ def test_a_resolution_of_ones_own(shot, tmp_path) -> None:
     assert engines(shot, tmp_path).domain.resolution == (28, 28, 40)
 
 
+def test_a_resolution_that_is_left_open_is_measured(shot) -> None:
+    """In the scene's box; a box that is guessed always is, and a number of one's own never."""
+    assert module.options(shot)[-2:] == ["--resolution", "auto"]
+    shot.smokelift.longest_side = 40
+    assert "--resolution" not in module.options(shot)
+    shot.smokelift.longest_side, shot.smokelift.camera_mode = 0, "GUESS"
+    assert "--resolution" not in module.options(shot)
+
+
 def test_a_turned_box_turns_everything_else(shot, tmp_path) -> None:
     """The engine sees the same picture: points of the box, in its own axes, fall where Blender sees them."""
     box = shot.smokelift.box

@@ -46,7 +46,7 @@ class LinearProblem:
         finest = Level(clean.before, clean.after, (~pair.inlet).astype(np.float32))
         coarse = pyramid(finest, 2)[0]
         found = estimate_velocity(
-            coarse.before, coarse.after, 1.0, 1.0, replace(settings, levels=settings.levels - 1, blur=0.0)
+            coarse.before, coarse.after, 1.0, 1.0, replace(settings, levels=settings.grids - 1, blur=0.0)
         )
         closed = closed_flags(settings.closed)
         start = refine(found.faces, clean.after.shape, closed, settings.threads)

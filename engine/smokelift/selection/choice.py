@@ -1,0 +1,47 @@
+"""What was chosen for a clip, and the figure that decided it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One choice.
+
+    Attributes
+    ----------
+    what
+        ``"scattering"``, ``"resolution"``, ``"domain"``, ``"environment directions"``, ``"iterations"`` or
+        ``"velocity levels"``.
+    chosen
+        What will be used.
+    reason
+        Why, in a sentence with the figure that decided it.
+    measured
+        Figures by name, without a unit where the name says none; empty where nothing was measured.
+    tolerance
+        What the deciding figure was held against.
+    by_hand
+        Whether the user said so, and nothing was decided.
+    """
+
+    what: str
+    chosen: str | int | tuple[int, int, int]
+    reason: str
+    measured: Mapping[str, float] = field(default_factory=dict)
+    tolerance: float | None = None
+    by_hand: bool = False
+
+    def as_dict(self) -> dict[str, Any]:
+        """The choice as JSON holds it; figures to four digits, since further ones decide nothing."""
+        return {
+            "what": self.what,
+            "chosen": list(self.chosen) if isinstance(self.chosen, tuple) else self.chosen,
+            "reason": self.reason,
+            "measured": {name: float(f"{value:.4g}") for name, value in self.measured.items()},
+            "tolerance": self.tolerance,
+            "by_hand": self.by_hand,
+        }

@@ -1,0 +1,325 @@
+"""Choices by measurement: each clip gets what it needs and no more, and what is said by hand is not measured."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import settings as hypothesis_settings
+from hypothesis import strategies as st
+
+from smokelift.background import CODE, Plate
+from smokelift.clip import Clip
+from smokelift.images import srgb_to_linear, write_image
+from smokelift.reconstruct import reconstruct
+from smokelift.render import scene_lights
+from smokelift.scene import Background, Domain, EnvironmentLight, Medium, PointLight, Scene, SceneError, look_at_matrix
+from smokelift.selection import Choice
+from smokelift.selection.coarse import LONGEST, coarse_domain, coarse_frame
+from smokelift.selection.motion import choose_levels, levels_for
+from smokelift.settings import Settings
+from smokelift.shot import Shot, prepare_shot
+from smokelift.velocity import VelocitySettings
+
+
+def shot_of(scene: Scene, settings: Settings) -> Shot:
+    assert scene.clip is not None
+    with Clip.open(scene.clip) as clip:
+        return prepare_shot(clip, scene, settings)
+
+
+def chosen(shot: Shot, what: str) -> Choice:
+    (choice,) = (choice for choice in shot.choices if choice.what == what)
+    return choice
+
+
+def with_scattering(settings: Settings, model: str) -> Settings:
+    return replace(settings, density=replace(settings.density, scattering=model))
+
+
+@pytest.fixture(scope="module")
+def silhouette(plume, tmp_path_factory) -> Scene:
+    """The blob, dense and unlit, before a bright sky."""
+    dark = replace(plume.scene, medium=Medium(25.0, 0.9), lights=(), background=Background(color=(0.8, 0.9, 1.0)))
+    return plume.write(tmp_path_factory.mktemp("silhouette"), plume.densities, dark)
+
+
+@pytest.fixture(scope="module")
+def thin(plume, tmp_path_factory) -> Scene:
+    """The blob as a haze in strong light."""
+    (sun,) = plume.scene.lights
+    haze = replace(plume.scene, medium=Medium(0.2, 0.9), lights=(replace(sun, irradiance=(80.0, 80.0, 80.0)),))
+    return plume.write(tmp_path_factory.mktemp("thin"), plume.densities, haze)
+
+
+# scattering
+
+
+def test_a_backlit_silhouette_needs_no_light(silhouette, draft) -> None:
+    """Dark smoke before a bright sky only absorbs, and the figures say that more would not be better."""
+    shot = shot_of(silhouette, draft)
+    choice = chosen(shot, "scattering")
+    assert shot.scattering == choice.chosen == "absorption"
+    assert choice.measured["error_absorption"] <= choice.measured["error_unshadowed"] + choice.tolerance
+    assert "absorption only" in choice.reason
+
+
+def test_thick_lit_smoke_needs_shadows(plume, draft) -> None:
+    """Without shadows the richest model sees at once that the density is wrong."""
+    shot = shot_of(plume.scene, draft)
+    choice = chosen(shot, "scattering")
+    assert shot.scattering == choice.chosen == "single"
+    assert choice.measured["error_unshadowed"] > choice.measured["error_single"] + 2 * choice.tolerance
+    assert choice.measured["error_absorption"] > 0.9
+
+
+def test_thin_smoke_needs_no_shadows(thin, draft) -> None:
+    """It is lit, but casts none that are seen."""
+    choice = chosen(shot_of(thin, draft), "scattering")
+    assert choice.chosen == "unshadowed"
+    assert set(choice.measured) == {"error_absorption", "error_unshadowed", "error_single"}
+
+
+@pytest.mark.parametrize("model", ["absorption", "unshadowed", "single"])
+def test_scattering_by_hand_wins(plume, thin, draft, model) -> None:
+    """Whatever the clip shows; nothing is measured for it, and the run keeps it."""
+    for scene in (plume.scene, thin):
+        shot = shot_of(scene, with_scattering(draft, model))
+        choice = chosen(shot, "scattering")
+        assert (shot.scattering, choice.by_hand, choice.measured) == (model, True, {})
+
+
+def test_shadows_need_a_light(silhouette, draft) -> None:
+    """A light that was made up has no direction to cast them in."""
+    with pytest.raises(ValueError, match=r'"single" needs a light .* \[\[lights\]\]'):
+        shot_of(silhouette, with_scattering(draft, "single"))
+
+
+def test_unknown_models_are_refused(draft) -> None:
+    """Where the settings are made."""
+    with pytest.raises(ValueError, match="one of auto, single, unshadowed, absorption, not 'many'"):
+        with_scattering(draft, "many")
+
+
+def test_smoke_that_scatters_nothing_absorbs(plume, draft) -> None:
+    """That is no question of measuring."""
+    dark = replace(plume.scene, medium=Medium(8.0, 0.0))
+    assert shot_of(dark, draft).scattering == "absorption"
+
+
+def test_choices_are_the_same_again(plume, thin, draft) -> None:
+    """To the bit: what is gone on with is what was begun."""
+    for scene in (plume.scene, thin):
+        assert shot_of(scene, draft).choices == shot_of(scene, draft).choices
+
+
+def test_the_papers_method_chooses_nothing(plume) -> None:
+    """It is kept as it is."""
+    shot = shot_of(plume.scene, Settings.preset("draft", "paper"))
+    assert shot.scattering == "single"
+    assert [choice.what for choice in shot.choices] == ["resolution"]
+    assert shot.choices[0].by_hand
+
+
+def test_without_smoke_nothing_is_measured(plume, draft, tmp_path) -> None:
+    """The richest model stands by."""
+    shot = shot_of(plume.write(tmp_path, [0 * plume.densities[0]] * 3), draft)
+    assert shot.scattering == "single"
+    assert [choice.what for choice in shot.choices] == ["resolution"]
+
+
+def test_a_moving_camera_is_no_hindrance(plume, tracked, draft, tmp_path) -> None:
+    """Every frame is measured with its own; one that looks away is left out."""
+    assert chosen(shot_of(tracked, draft), "scattering").chosen == "single"
+    poses = tuple(
+        look_at_matrix((0, -4, 0.8), (0, -9 if away else 0, 0.8), (0, 0, 1))
+        for away in (False, True, True, True, False)
+    )
+    turning = replace(tracked, camera=replace(tracked.camera, matrix=poses[0], matrices=poses))
+    scene = plume.write(tmp_path, plume.densities, turning)
+    assert chosen(shot_of(scene, draft), "scattering").chosen == "single"
+
+
+# what is looked at
+
+
+@given(
+    st.tuples(*[st.integers(8, 160)] * 3),
+    st.floats(0.3, 20),
+)
+@hypothesis_settings(deadline=None, max_examples=60)
+def test_a_coarse_box_stays_in_the_box(resolution, pixels) -> None:
+    """A light beside the box must not come to stand in it; voxels are cubes, few, and not smaller than before."""
+    x, y, z = resolution
+    domain = Domain((0.0, 0.0, 0.0), (0.1 * x, 0.1 * y, 0.1 * z), resolution)
+    coarse = coarse_domain(domain, pixels)
+    assert max(coarse.resolution) <= max(LONGEST, 4)
+    assert coarse.voxel_size >= domain.voxel_size * (1 - 1e-6)
+    assert np.all(np.array(coarse.min) >= np.array(domain.min) - 1e-9)
+    assert np.all(np.array(coarse.max) <= np.array(domain.max) + 1e-9)
+
+
+def test_a_usual_box_keeps_its_corners() -> None:
+    """Where whole numbers of voxels make one, nothing is cut off."""
+    domain = Domain((-1.0, -1.0, 0.0), (1.0, 1.0, 3.0), (64, 64, 96))
+    assert coarse_domain(domain, 4.0) == replace(domain, resolution=(16, 16, 24))
+
+
+def test_the_halves_of_a_picture_are_apart(plume) -> None:
+    """What is wrong in one pixel out of two is seen by one of them only, and both show what all show."""
+    height, width = 112, 80
+    rows, columns = np.indices((height, width))
+    picture = np.repeat(np.where((rows + columns) % 2, 0.5, 0.2)[..., None], 3, -1).astype(np.float32)
+    plate = Plate(np.zeros_like(picture), np.ones((height, width), np.float32), srgb_to_linear(np.full(3, CODE)))
+    scene = replace(plume.scene, camera=plume.scene.camera.resized(width, height))
+    frame = coarse_frame(picture, scene.camera, scene, plate)
+    np.testing.assert_allclose(frame.fitted, 0.2, atol=1e-5)
+    np.testing.assert_allclose(frame.held_out, 0.5, atol=1e-5)
+    assert 0.3 < frame.picture.mean() < 0.4
+    away = plume.scene.camera.look_at((0, -4, 0.8), (0, -9, 0.8), fov_y_degrees=27, size=(width, height))
+    assert coarse_frame(picture, away, scene, plate) is None
+
+
+# velocity
+
+
+@pytest.mark.parametrize(("motion", "levels"), [(0.0, 1), (0.8, 1), (0.9, 2), (2.4, 2), (2.5, 3), (9.0, 3), (500.0, 3)])
+def test_grids_reach_as_far_as_the_smoke_goes(motion, levels) -> None:
+    """1 and 3 voxels, a quarter more than was found, and no further than usual."""
+    assert levels_for(motion) == levels
+
+
+def test_faster_smoke_gets_more_grids(plume) -> None:
+    """In voxels of the final grid, whatever the coarse one is."""
+    scene, finer = plume.scene, replace(plume.scene, domain=replace(plume.scene.domain, resolution=(48, 48, 64)))
+    slow, fast = ([plume.blob(scene, 0.6), plume.blob(scene, 0.6 + rise)] for rise in (0.03, 0.25))
+    found = [
+        choose_levels([pair], scene, final, VelocitySettings()) for pair in (slow, fast) for final in (scene, finer)
+    ]
+    motions = [choice.measured["voxels_a_frame"] for choice in found]
+    assert motions[1] == pytest.approx(2 * motions[0])
+    assert motions[2] > 2 * motions[0]
+    assert [choice.chosen for choice in found] == [levels_for(motion) for motion in motions]
+
+
+def test_grids_by_hand_win(plume, draft) -> None:
+    """And are used; a single frame has no motion, and the usual number."""
+    by_hand = replace(draft, velocity=replace(draft.velocity, levels=1))
+    choice = chosen(shot_of(plume.scene, by_hand), "velocity levels")
+    assert (choice.chosen, choice.by_hand) == (1, True)
+    alone = replace(plume.scene, clip=replace(plume.scene.clip, frames=(0, 0)))
+    choice = chosen(shot_of(alone, draft), "velocity levels")
+    assert (choice.chosen, choice.measured) == (3, {})
+
+
+def test_motion_is_measured_although_the_last_frame_has_the_most_smoke(plume, draft, tmp_path) -> None:
+    """Nothing follows the last frame, so the one before is followed."""
+    growing = [share * density for share, density in zip((0.02, 0.05, 0.15, 0.4, 1), plume.densities, strict=True)]
+    choice = chosen(shot_of(plume.write(tmp_path, growing), draft), "velocity levels")
+    assert choice.measured["voxels_a_frame"] > 0.5
+
+
+# environments
+
+
+def environment(folder: Path, radiance: np.ndarray, **options: int) -> EnvironmentLight:
+    write_image(folder / "sky.exr", radiance, half=False)
+    return EnvironmentLight(folder / "sky.exr", **options)
+
+
+def test_directions_are_doubled_until_the_smoke_looks_the_same(plume, draft, tmp_path) -> None:
+    """A lamp needs fewer than a sky with a bright half; the number is part of the scene from then on."""
+    lamp, sky = np.zeros((32, 64, 3), np.float32), np.full((32, 64, 3), 0.3, np.float32)
+    lamp[8, 40] = 400
+    sky[4:12, 16:40] = 3
+    forward = replace(plume.scene, medium=Medium(8.0, 0.9, 0.6))
+    counts = {}
+    for name, radiance in (("lamp", lamp), ("sky", sky)):
+        (tmp_path / name).mkdir()
+        light = environment(tmp_path / name, radiance)
+        scene = plume.write(tmp_path / name, plume.densities, replace(forward, lights=(light,)))
+        shot = shot_of(scene, draft)
+        choice = chosen(shot, "environment directions")
+        counts[name] = choice.chosen
+        assert shot.scene.lights == (replace(light, directions=choice.chosen),)
+        assert len(scene_lights(shot.scene)) <= choice.chosen
+        assert choice.measured["change"] <= choice.tolerance
+        assert not choice.by_hand
+    assert counts["lamp"] < counts["sky"]
+
+
+def test_directions_by_hand_win(plume, draft, tmp_path) -> None:
+    """They are in the scene file, and go through it."""
+    light = environment(tmp_path, np.full((8, 16, 3), 0.5, np.float32), directions=6)
+    scene = replace(plume.scene, lights=(light,))
+    scene.save(tmp_path / "scene.toml")
+    assert Scene.load(tmp_path / "scene.toml") == scene
+    assert len(scene_lights(scene)) == 6
+    choice = chosen(shot_of(scene, draft), "environment directions")
+    assert (choice.chosen, choice.by_hand) == (6, True)
+    with pytest.raises(SceneError, match="directions must be a whole number from 1, not 0"):
+        replace(light, directions=0)
+
+
+# what is said and kept
+
+
+def test_every_choice_has_a_sentence_and_a_figure(plume, draft) -> None:
+    """JSON holds it, and the sentence says what was chosen."""
+    shot = shot_of(plume.scene, draft)
+    assert [choice.what for choice in shot.choices] == [
+        "resolution", "domain", "scattering", "iterations", "velocity levels",
+    ]  # fmt: skip
+    for choice in shot.choices:
+        told = choice.as_dict()
+        assert json.loads(json.dumps(told, allow_nan=False)) == told
+        assert set(told) == {"what", "chosen", "reason", "measured", "tolerance", "by_hand"}
+        assert told["reason"].endswith(".")
+        assert told["by_hand"] or told["measured"]
+
+
+def test_iterations_by_hand_are_said(plume, draft) -> None:
+    """Those of the quality are not."""
+    by_hand = replace(draft, density=replace(draft.density, descent_iterations=1))
+    found = [chosen(shot_of(plume.scene, settings), "iterations") for settings in (draft, by_hand)]
+    assert [(choice.by_hand, choice.chosen) for choice in found] == [(False, 10), (True, 5)]
+
+
+def test_frames_without_smoke_cost_nothing(plume, draft, tmp_path, monkeypatch) -> None:
+    """Nothing is rendered, predicted or carried where there is no smoke, and the smoke after it is as if alone."""
+    nothing = np.zeros_like(plume.densities[0])
+    clip = [plume.densities[0], nothing, nothing, nothing, plume.densities[1]]
+    scene = plume.write(tmp_path, clip)
+    predicted, rendered = [], []
+    from smokelift.density import Renderer
+    from smokelift.velocity import predict_velocity
+
+    def counted(*arguments):
+        predicted.append(arguments)
+        return predict_velocity(*arguments)
+
+    class Counted(Renderer):
+        def image(self, *arguments, **options):
+            rendered.append(arguments)
+            return super().image(*arguments, **options)
+
+    shot = shot_of(scene, draft)
+    monkeypatch.setitem(reconstruct.__globals__, "predict_velocity", counted)
+    monkeypatch.setattr("smokelift.density.Renderer", Counted)
+    with Clip.open(scene.clip) as opened:
+        work = {frame.number: len(rendered) for frame in reconstruct(opened, scene, draft, shot=shot)}
+    assert not predicted
+    assert work[2] == work[3] == work[4] < work[5]
+
+
+def test_a_light_close_to_the_box_is_no_hindrance(plume, draft, tmp_path) -> None:
+    """The coarse box has to leave it outside."""
+    lamp = PointLight((0.61, 0.0, 0.8), (6.0, 6.0, 6.0))
+    domain = Domain((-0.6, -0.6, 0), (0.6, 0.6, 1.55), (24, 24, 31))
+    near = replace(plume.scene, domain=domain, lights=(lamp,))
+    densities = [density[:, :, :31] for density in plume.densities[:2]]
+    assert shot_of(plume.write(tmp_path, densities, near), draft).choices

@@ -1,0 +1,141 @@
+"""Resolution by measurement: detail asks for voxels; blur and noise do not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import ndimage
+
+from smokelift.background import CODE, Plate
+from smokelift.clip import Clip
+from smokelift.images import linear_to_srgb, srgb_to_linear, write_image
+from smokelift.scene import Camera, ClipSource, Domain, Scene
+from smokelift.selection.detail import Detail, smoke_detail
+from smokelift.settings import LONGEST_SIDE, Settings
+from smokelift.shot import Shot, prepare_shot
+
+SIZE = (192, 256)
+
+
+def textured(grain: float) -> np.ndarray:
+    """A cloud (rows, columns) with details as wide as so many pixels."""
+    width, height = SIZE
+    rows, columns = np.indices((height, width))
+    ball = np.exp(-(((rows - height / 2) / 60) ** 2) - ((columns - width / 2) / 45) ** 2)
+    white = np.random.default_rng(1).standard_normal((height, width))
+    texture = ndimage.gaussian_filter(white, grain)
+    return (0.4 * np.maximum(ball - 0.05, 0) * np.clip(1 + 0.5 * texture / texture.std(), 0, 3)).astype(np.float32)
+
+
+@pytest.fixture
+def filmed(plume, tmp_path) -> Callable[..., Scene]:
+    """A clip of two equal pictures, blurred by so many pixels, in a box of 2 x 2 x 3 parts."""
+
+    def film(blur: float, grain: float = 1.2) -> Scene:
+        folder = tmp_path / f"{blur}-{grain}"
+        folder.mkdir()
+        picture = ndimage.gaussian_filter(textured(grain), blur)
+        for number in range(2):
+            write_image(folder / f"frame_{number}.png", picture)
+        return replace(
+            plume.scene,
+            clip=ClipSource(folder / "frame_#.png", fps=24.0),
+            camera=Camera.look_at((0, -7, 1.5), (0, 0, 1.5), fov_y_degrees=27, size=SIZE),
+            domain=Domain((-1, -1, 0), (1, 1, 3), (32, 32, 48)),
+        )
+
+    return film
+
+
+def shot_of(scene: Scene, settings: Settings) -> Shot:
+    with Clip.open(scene.clip) as clip:
+        return prepare_shot(clip, scene, settings)
+
+
+def longest(scene: Scene, settings: Settings) -> int:
+    return max(shot_of(scene, settings).scene.domain.resolution)
+
+
+AUTO = Settings.preset("draft", resolution="auto")
+
+
+def test_a_blurred_clip_gets_a_coarser_grid(filmed) -> None:
+    """A sharp one gets what the quality allows; in the box that was given, with its proportions."""
+    sharp, soft, blurred = (shot_of(filmed(blur), AUTO) for blur in (0.0, 4.0, 12.0))
+    sides = [max(shot.scene.domain.resolution) for shot in (sharp, soft, blurred)]
+    assert sides[0] >= LONGEST_SIDE["draft"] - 3
+    assert sides[0] > sides[1] >= sides[2]
+    assert sides[2] <= 36
+    for shot in (sharp, soft, blurred):
+        (choice,) = (choice for choice in shot.choices if choice.what == "resolution")
+        assert choice.chosen == shot.scene.domain.resolution
+        assert choice.measured["lost"] <= choice.tolerance
+        assert not choice.by_hand
+        assert (shot.scene.domain.min, shot.scene.domain.max) == ((-1, -1, 0), (1, 1, 3))
+        x, y, z = shot.scene.domain.resolution
+        assert x == y == z / 3 * 2
+
+
+def test_noise_is_no_detail() -> None:
+    """A blurred cloud before grey stays one when the clip is noisy: what is lost is that of the cloud."""
+    grey = np.full((256, 192, 3), 0.2, np.float32)
+    noise = np.random.default_rng(2).normal(0, 3 / 255, grey.shape)
+    clean = grey + ndimage.gaussian_filter(textured(1.2), 8.0)[..., None]
+    noisy = srgb_to_linear((linear_to_srgb(clean) + noise).astype(np.float32))
+    clear = np.ones((256, 192), np.float32)
+    lost = [
+        smoke_detail([(picture, Plate(grey, clear, srgb_to_linear(np.full(3, deviation))), 1.0)], 256).lost(64)
+        for picture, deviation in ((clean, CODE), (noisy, np.float32(3 / 255)))
+    ]
+    assert lost[0] < 0.01
+    assert lost[1] < 0.03
+
+
+def test_a_given_resolution_wins(filmed) -> None:
+    """The scene's, where nothing else is said, and the settings' before it."""
+    scene = filmed(12.0)
+    assert shot_of(scene, Settings.preset("draft")).scene.domain == scene.domain
+    by_hand = shot_of(scene, Settings.preset("draft", resolution=(20, 20, 30)))
+    assert by_hand.scene.domain.resolution == (20, 20, 30)
+    assert by_hand.choices[0].by_hand
+
+
+def test_a_box_that_is_found_is_chosen_for_too(filmed) -> None:
+    """Nothing but the clip and a colour behind it."""
+    for blur, bound in ((0.0, 60), (12.0, 44)):
+        scene = filmed(blur)
+        bare = Scene(clip=scene.clip, background=scene.background)
+        found = longest(bare, Settings.preset("draft"))
+        assert found >= bound if blur == 0.0 else found <= bound
+
+
+def test_quality_is_the_limit(filmed) -> None:
+    """More than it is never chosen."""
+    scene = filmed(0.0, grain=0.8)
+    sides = [longest(scene, Settings.preset(quality, resolution="auto")) for quality in ("draft", "balanced")]
+    assert sides[0] <= LONGEST_SIDE["draft"] < sides[1] <= LONGEST_SIDE["balanced"]
+
+
+def test_a_grid_loses_what_is_finer_than_two_of_its_voxels() -> None:
+    """A wave of six pixels is there with voxels of three and not with four; what there is not is not lost."""
+    columns = np.indices((192, 192))[1]
+    wave = (0.3 + 0.1 * np.cos(2 * np.pi * (columns + 0.5) / 6)).astype(np.float32)
+    plate = Plate(
+        np.zeros((192, 192, 3), np.float32), np.ones((192, 192), np.float32), srgb_to_linear(np.full(3, CODE))
+    )
+    detail = smoke_detail([(np.repeat(wave[..., None], 3, -1), plate, 1.0)], 192)
+    assert detail.lost(192 // 3 + 4) < 0.05
+    assert detail.lost(192 // 4) > 0.1
+    assert detail.lost(192) == 0
+    assert Detail(np.zeros(96), 64).lost(32) == 0
+
+
+def test_settings_know_auto(tmp_path: Path) -> None:
+    """And nothing else that is no three numbers."""
+    assert Settings.preset(resolution="auto").as_dict()["resolution"] == "auto"
+    with pytest.raises(ValueError, match="three numbers"):
+        Settings(resolution="64")  # type: ignore[arg-type]
