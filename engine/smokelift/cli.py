@@ -13,7 +13,7 @@ import signal
 import sys
 import time
 from collections.abc import Sequence as Many
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from types import FrameType
 
@@ -218,7 +218,7 @@ def _scene(path: Path, frames: tuple[int, int] | None) -> Scene:
     else:
         scene = Scene(clip=ClipSource(path))
     assert scene.clip is not None
-    return scene if frames is None else replace(scene, clip=replace(scene.clip, frames=frames))
+    return scene if frames is None else scene.with_frames(*frames)
 
 
 def _viewer(name: str, sequence: Sequence) -> pictures.Viewer:

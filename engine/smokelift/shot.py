@@ -22,11 +22,12 @@ from smokelift.background import (
     open_plates,
 )
 from smokelift.cameras import CameraError, WorkingPicture, as_matrix, working_picture
-from smokelift.clip import Clip
+from smokelift.clip import Clip, is_video
+from smokelift.density import Observation
 from smokelift.images import area_average, read_image
 from smokelift.render import scene_lights
 from smokelift.render.setup import Scattering
-from smokelift.scene import Background, Camera, DirectionalLight, Domain, Medium, Scene
+from smokelift.scene import Background, Camera, ClipSource, DirectionalLight, Domain, Medium, Scene
 from smokelift.settings import LONGEST_SIDE, Settings
 
 PICTURE_HEIGHT = 2.0
@@ -40,6 +41,29 @@ OPTICAL_DEPTH_AT_ONE = 5.0
 
 SAMPLES = 16
 PICTURE_SIDE = 320
+
+
+@dataclass(frozen=True, eq=False)
+class FurtherView:
+    """What another camera saw.
+
+    Attributes
+    ----------
+    clip
+        Its frame 0 is of the same moment as the input's.
+    working
+        The small picture that the grid is fitted to.
+    plate_at
+        Background of that small picture in a frame, with the clip's noise.
+    """
+
+    clip: Clip
+    working: WorkingPicture
+    plate_at: Callable[[int], Plate]
+
+    def seen(self, frame: int) -> Observation:
+        """What it saw in a frame, counted from 0."""
+        return Observation(self.working.camera, self.working.cut(self.clip.frame(frame)), self.plate_at(frame))
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +87,8 @@ class Shot:
         What was assumed or estimated, a sentence each.
     plate_at
         Background of the full picture in every frame, counted from 0, where camera or background change; else None.
+    views
+        Further cameras.
     """
 
     scene: Scene
@@ -72,6 +98,7 @@ class Shot:
     estimated_background: NDArray[np.float32] | None
     notes: tuple[str, ...]
     plate_at: Callable[[int], Plate] | None = None
+    views: tuple[FurtherView, ...] = ()
 
     def at(self, frame: int) -> Shot | None:
         """The shot as it is in a frame, counted from 0; None if nothing of the domain is in the picture then."""
@@ -113,6 +140,10 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
     if clip.warning:
         notes.append(clip.warning)
     moves = scene.camera is not None and scene.camera.moves
+    if scene.views and (scene.camera is None or scene.domain is None):
+        raise ValueError("Further [[views]] need the input's [camera] and the [domain], in the same metres as theirs.")
+    if scene.views and (moves or any(view.camera.moves for view in scene.views)):
+        raise ValueError("With further [[views]] no camera may move; give one matrix a camera, or one view only.")
     if scene.camera is not None and moves and len(scene.camera.matrices) != len(clip):
         raise ValueError(
             f"[camera] matrices are given for {len(scene.camera.matrices)} frames, and {len(clip)} frames of the clip "
@@ -151,7 +182,8 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
     plate = plate_at(shown)
     estimated = plate.image if _unknown(scene.background) else None
     changing = plate_at if moves or plates is not None else None
-    return Shot(complete, working, _small(plate, working), scattering, estimated, tuple(notes), changing)
+    views = tuple(_further_view(number, clip, complete, notes) for number in range(len(scene.views)))
+    return Shot(complete, working, _small(plate, working), scattering, estimated, tuple(notes), changing, views)
 
 
 def boundaries(scene: Scene, settings: Settings) -> tuple[str, ...]:
@@ -178,6 +210,70 @@ def _working(camera: Camera, domain: Domain) -> tuple[WorkingPicture, int]:
         with suppress(CameraError):
             return working_picture(camera.at(frame), domain), frame
     return working_picture(camera, domain), 0
+
+
+def _further_view(number: int, clip: Clip, scene: Scene, notes: list[str]) -> FurtherView:
+    """Open a further view of a complete scene and find its background."""
+    view, name = scene.views[number], f"View {number + 1}"
+    assert scene.camera is not None and scene.domain is not None
+    opened = _opened(view.clip, clip, scene)
+    if opened.warning:
+        notes.append(opened.warning)
+    if abs(opened.fps - clip.fps) > 0.01 * clip.fps:
+        raise ValueError(
+            f"{opened.path}: has {opened.fps:g} frames a second, the input {clip.fps:g}; all views need the same, so "
+            "convert one, or give fps in the [clip] whose file says it wrongly."
+        )
+    camera = _fitting(view.camera, opened)
+    try:
+        working = working_picture(camera, scene.domain)
+    except CameraError as error:
+        raise ValueError(f"{name}: {error}") from error
+    background = view.background
+    if background is None and scene.background is not None and scene.background.color is not None:
+        background = scene.background
+    found: list[str] = []
+    own = replace(scene, camera=camera, background=background, views=())
+    plates = open_plates(own)
+    if plates is not None:
+        changing = changing_plate(plates, opened)
+        plate_at = lambda frame: _small(changing(frame), working)  # noqa: E731
+    else:
+        plate = _small(_plate(opened, own, found)[0], working)
+        plate_at = lambda _frame: plate  # noqa: E731
+    axes = [np.array(each.matrix)[:3, 2] for each in (scene.camera, camera)]
+    angle = np.degrees(np.arccos(np.clip(axes[0] @ axes[1], -1, 1)))
+    frames = f"frames {opened.first} to {opened.first + len(opened) - 1}"
+    notes.append(" ".join([f"{name}: {opened.path.name}, {angle:.0f} degrees from the input, {frames}.", *found]))
+    return FurtherView(opened, working, plate_at)
+
+
+def _opened(source: ClipSource, clip: Clip, scene: Scene) -> Clip:
+    """The part of a view's clip that shows what the input does."""
+    first = clip.first
+    if source.frames is not None:
+        first += source.first - (scene.clip.first if scene.clip is not None else clip.first)
+    # pictures carry no rate of their own
+    fps = clip.fps if source.fps is None and not is_video(source.path) else source.fps
+    with Clip.open(replace(source, fps=fps, frames=None)) as whole:
+        have = len(whole)
+    last = first + len(clip) - 1
+    if first < 0 or last >= have:
+        raise ValueError(
+            f"{source.path}: has frames 0 to {have - 1}, but {first} to {last} are those of the input's moments; use "
+            "fewer frames of the input, or say with frames in the view's [clip] which ones belong to them."
+        )
+    return Clip.open(source, fps=fps, frames=(first, last))
+
+
+def _fitting(camera: Camera, clip: Clip) -> Camera:
+    """The camera with as many pixels as its clip."""
+    if camera.size[0] * clip.size[1] != camera.size[1] * clip.size[0]:
+        raise ValueError(
+            f"The camera's picture is {camera.size[0]} x {camera.size[1]}, the clip's {clip.size[0]} x {clip.size[1]} "
+            f"({clip.path.name}); [camera] size must have the clip's shape."
+        )
+    return camera.resized(*clip.size)
 
 
 def _small(plate: Plate, working: WorkingPicture) -> Plate:
@@ -255,12 +351,7 @@ def _geometry(
     clip: Clip, scene: Scene, settings: Settings, samples: _SmokeSamples, notes: list[str]
 ) -> tuple[Camera, Domain]:
     if scene.camera is not None:
-        if scene.camera.size[0] * clip.size[1] != scene.camera.size[1] * clip.size[0]:
-            raise ValueError(
-                f"The camera's picture is {scene.camera.size[0]} x {scene.camera.size[1]}, the clip's "
-                f"{clip.size[0]} x {clip.size[1]}; [camera] size must have the clip's shape."
-            )
-        camera = scene.camera.resized(*clip.size)
+        camera = _fitting(scene.camera, clip)
         if scene.domain is None:
             raise ValueError("The scene gives a camera but no box in [domain]; give the one that holds the smoke.")
         return camera, _with_resolution(scene.domain, settings.resolution)
