@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -361,6 +362,19 @@ def test_a_further_views_background(two_views, draft, tmp_path) -> None:
     assert pictured.plate.image.mean() == pytest.approx(0.5, abs=1e-2)
     assert pictured.views[0].seen(0).plate.image.mean() < 0.2
     assert "Background estimated from the clip" in pictured.notes[0]
+
+
+@pytest.mark.parametrize("wrong", ["camera", "background"])
+def test_views_that_do_not_agree_are_noted(two_views, draft, wrong) -> None:
+    """A camera that stands elsewhere, or another background: nothing is refused, but it is said."""
+    (view,) = two_views.views
+    if wrong == "camera":
+        lower = look_at_matrix((4, 0, 0.2), (0, 0, 0.2), (0, 0, 1))
+        view = replace(view, camera=replace(view.camera, matrix=lower))
+    else:
+        view = replace(view, background=Background(color=(0.5, 0.5, 0.5)))
+    notes = shot_of(replace(two_views, views=(view,)), draft).notes
+    assert any(re.match(r"The views agree on [0-7]?\d% of the smoke", note) for note in notes)
 
 
 def spoilt(scene: Scene, what: str, folder: Path) -> Scene:
