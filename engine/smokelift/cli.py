@@ -117,7 +117,7 @@ def _inspect(options: argparse.Namespace, say: Reporter) -> None:
     assert domain is not None
     for note in (*shot.notes, *boundaries(shot.scene, settings)):
         say.note(note)
-    cost = forecast(domain, frames, settings.quality)
+    cost = forecast(domain, frames, settings.quality, len(shot.views))
     voxels = " x ".join(map(str, domain.resolution))
     say.finish(
         f"{frames} frames of {voxels} voxels: about {cost.seconds:.0f} s, {cost.memory / 2**30:.1f} GiB of memory "

@@ -10,7 +10,7 @@ import pytest
 
 from smokelift.background import Plate
 from smokelift.cameras import orbit
-from smokelift.density import Density, DensitySettings, Observation, reconstruct_density
+from smokelift.density import Density, DensitySettings, Observation, depth_guess, reconstruct_density
 from smokelift.density.axis import SmokeAxis
 from smokelift.density.descent import descend
 from smokelift.density.fit import Target
@@ -406,6 +406,55 @@ def test_a_second_view_tells_the_depth(plume, small, degrees) -> None:
     new = orbit(small.camera, small.domain, degrees / 2)
     assert psnr(render(found.values, small, new), render(truth, small, new)) > 30
     assert np.abs(found.values - truth).sum() < 0.5 * np.abs(alone - truth).sum()
+
+
+def ray_target(scene: Scene, observation: Observation) -> RayTarget:
+    """A picture before black to be met by any voxel."""
+    camera, image = observation.camera, observation.image
+    renderer = Renderer(camera, scene.domain, scene.medium, scene_lights(scene), np.zeros_like(image))
+    weight = np.ones(image.shape[:2], np.float32)
+    noise = np.full(image.shape, 1e-3, np.float32)
+    return RayTarget(renderer, image, weight, np.zeros_like(image), noise, project_voxels(camera, scene.domain))
+
+
+@pytest.mark.parametrize("way", ["multiplicative", "descent"])
+def test_every_picture_is_fitted(plume, small, way) -> None:
+    """From smoke that one view is right with, the other's error falls, and the sum of both never rises."""
+    smeared = np.repeat(plume.densities[1].mean(1, keepdims=True), 24, axis=1)
+    targets = [
+        ray_target(small, Observation(small.camera, render(smeared, small))),
+        ray_target(small, observed(plume.densities[1], small, 90)),
+    ]
+
+    def fitted(count: int) -> tuple[float, ...]:
+        if way == "multiplicative":
+            return fit_multiplicative(targets, smeared, 0.0, count, 0.0).losses
+        return descend(targets, smeared, np.ones(smeared.shape, np.bool_), 0.0, count, 0.0).losses
+
+    losses = [fitted(count) for count in range(6)]
+    assert all(sum(after) <= sum(before) for before, after in itertools.pairwise(losses))
+    assert losses[0][0] < 1e-6
+    assert losses[-1][1] < 0.3 * losses[0][1]
+
+
+def test_a_picture_scales_only_what_it_shows(plume, small) -> None:
+    """Voxels beside it stay as they are, whatever its border says."""
+    half = small.camera.cropped(0, 0, 15, 42)
+    target = ray_target(small, Observation(half, 0.5 * render(plume.densities[1], small, half)))
+    found = fit_multiplicative([target], plume.densities[1], 0.0, 2, 0.0).density
+    beside = ~target.projection.visible
+    np.testing.assert_array_equal(found[beside], plume.densities[1][beside])
+    assert found[~beside].sum() < 0.8 * plume.densities[1][~beside].sum()
+
+
+def test_the_first_guess_of_two_views(plume, small) -> None:
+    """It is in its place before anything is fitted, and holds about as much as one picture alone tells."""
+    truth = moved(plume.densities[1], 5)
+    plate = noisy_plate(np.zeros((42, 30, 3)))
+    target = render(truth, small)
+    guess = depth_guess(target, small, QUICK, plate, views=[observed(truth, small, 90)])
+    np.testing.assert_allclose(mean_place(guess), mean_place(truth), atol=0.7)
+    assert guess.sum() == pytest.approx(depth_guess(target, small, QUICK, plate).sum(), rel=0.3)
 
 
 def test_the_figures_of_further_views_are_their_pictures(plume, small) -> None:

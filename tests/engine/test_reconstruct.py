@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from smokelift.clip import Clip
-from smokelift.density import DensitySettings
+from smokelift.density import DensitySettings, reconstruct_density
 from smokelift.density.hull import project_voxels, voxel_centres
 from smokelift.density.screen import view_frame
 from smokelift.images import write_image
@@ -263,6 +263,20 @@ def test_further_views_put_the_smoke_in_its_place(plume, two_views, draft, tmp_p
     with pytest.raises(SequenceError, match="was begun differently"):
         cut_off(two_views, draft, tmp_path / "cut", 3)
         frames_of(replace(two_views, views=()), draft, tmp_path / "cut", npz=True, resume=True)
+
+
+def test_with_nothing_carried_along_a_frame_is_that_of_its_pictures(two_views, draft) -> None:
+    """The pictures of all views of that moment, and nothing else."""
+    settings = replace(draft, transport=0.0)
+    scene = two_views.with_frames(0, 2)
+    frames = frames_of(scene, settings)
+    with Clip.open(scene.clip) as clip:
+        shot = prepare_shot(clip, scene, settings)
+        views = [view.seen(2) for view in shot.views]
+        alone = reconstruct_density(
+            shot.working.cut(clip.frame(2)), shot.small_scene, None, settings.density, plate=shot.plate, views=views
+        )
+    np.testing.assert_array_equal(frames[2].density, alone.values)
 
 
 def test_smoke_from_a_moving_camera_stands_where_it_stood(plume, tracked, draft, tmp_path) -> None:

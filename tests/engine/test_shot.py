@@ -337,9 +337,10 @@ def test_a_further_view_is_opened_in_step(two_views, draft) -> None:
 @pytest.mark.parametrize(("asked", "first"), [((0, 4), 1), ((2, 3), 3)])
 def test_a_further_view_follows_the_clip_that_is_used(two_views, draft, asked, first) -> None:
     """Also one that was opened at other frames than the scene's."""
-    with Clip.open(two_views.clip, frames=asked) as clip:
-        (view,) = prepare_shot(clip, two_views, draft).views
-    assert (view.clip.first, len(view.clip)) == (first, asked[1] - asked[0] + 1)
+    for scene in (two_views, two_views.with_frames(1, 3)):
+        with Clip.open(two_views.clip, frames=asked) as clip:
+            (view,) = prepare_shot(clip, scene, draft).views
+        assert (view.clip.first, len(view.clip)) == (first, asked[1] - asked[0] + 1)
 
 
 def test_a_further_view_has_the_same_numbers_if_nothing_is_said(two_views, draft) -> None:
