@@ -21,7 +21,7 @@ from smokelift.clip import Clip
 from smokelift.density import Density, SmokeAxis, depth_guess, optical_depth, reconstruct_density
 from smokelift.density.axis import estimate_axis
 from smokelift.density.hull import project_voxels
-from smokelift.render.renderer import Volume
+from smokelift.render.renderer import Image, Volume
 from smokelift.scene import Domain, Scene
 from smokelift.sequence import SequenceWriter
 from smokelift.settings import Settings
@@ -148,7 +148,9 @@ def _frames(clip: Clip, shot: Shot, settings: Settings, start: Frame | None) -> 
             predicted = predict_velocity(before.velocity, dt, settings.velocity.closed)
             # pictures correct the mass, but not of what a moving camera does not see
             initial = advect(before.density, predicted, dt, conserve=shot.scene.camera.moves)
-        density = _unseen(domain, initial) if now is None else _corrected(clip, index, now, settings, axis, initial)
+        density = (
+            _unseen(domain, initial) if now is None else _corrected(clip.frame(index), now, settings, axis, initial)
+        )
         fitted = time.perf_counter()
         velocity = Velocity.zero(domain.resolution, domain.voxel_size)
         if before is not None:
@@ -191,17 +193,16 @@ def smoke_axis(clip: Clip, shot: Shot, settings: Settings) -> SmokeAxis:
     return estimate_axis(amounts, scene.camera, scene.domain, [inlet.centre for inlet in scene.inlets])
 
 
-def _corrected(
-    clip: Clip, index: int, shot: Shot, settings: Settings, axis: SmokeAxis, transported: Volume | None
-) -> Density:
+def _corrected(picture: Image, shot: Shot, settings: Settings, axis: SmokeAxis, transported: Volume | None) -> Density:
     """The frame's density from its pictures and the density carried along."""
-    image, scene, share = shot.working.cut(clip.frame(index)), shot.small_scene, settings.transport
-    views = [view.seen(index) for view in shot.views]
+    image, scene, share = shot.working.cut(picture), shot.small_scene, settings.transport
     initial = transported
     if settings.method == "default" and transported is not None and share < 1:
-        guess = depth_guess(image, scene, settings.density, shot.plate, axis, views)
+        guess = depth_guess(image, scene, settings.density, shot.plate, axis, shot.beside)
         initial = np.float32(1 - share) * guess + np.float32(share) * transported
-    density = reconstruct_density(image, scene, initial, settings.density, plate=shot.plate, axis=axis, views=views)
+    density = reconstruct_density(
+        image, scene, initial, settings.density, plate=shot.plate, axis=axis, views=shot.beside
+    )
     assert shot.scene.camera is not None and scene.camera is not None and scene.domain is not None
     if transported is not None and shot.scene.camera.moves:
         # what a moving camera does not see now it may have seen before

@@ -99,6 +99,8 @@ class Shot:
         Background of the full picture in every frame, counted from 0, where camera or background change; else None.
     views
         Further cameras.
+    beside
+        What those saw in the frame that this is the shot in; see `at`.
     """
 
     scene: Scene
@@ -109,11 +111,13 @@ class Shot:
     notes: tuple[str, ...]
     plate_at: Callable[[int], Plate] | None = None
     views: tuple[FurtherView, ...] = ()
+    beside: tuple[Observation, ...] = ()
 
     def at(self, frame: int) -> Shot | None:
         """The shot as it is in a frame, counted from 0; None if nothing of the domain is in the picture then."""
+        beside = tuple(view.seen(frame) for view in self.views)
         if self.plate_at is None:
-            return self
+            return replace(self, beside=beside)
         assert self.scene.camera is not None and self.scene.domain is not None
         try:
             working = working_picture(self.scene.camera.at(frame), self.scene.domain)
@@ -121,7 +125,8 @@ class Shot:
             return None
         # An environment is as many lights as one camera needs; were they chosen anew, the light would flicker.
         lit = replace(self.scene, lights=scene_lights(self.small_scene))
-        return replace(self, scene=lit, working=working, plate=_small(self.plate_at(frame), working))
+        plate = _small(self.plate_at(frame), working)
+        return replace(self, scene=lit, working=working, plate=plate, beside=beside)
 
     @property
     def small_scene(self) -> Scene:

@@ -329,6 +329,8 @@ def test_a_further_view_is_opened_in_step(two_views, draft) -> None:
     seen = view.seen(2)
     assert seen.image.shape == seen.plate.image.shape == (*seen.camera.size[::-1], 3)
     np.testing.assert_array_equal(seen.image, view.working.cut(view.clip.frame(2)))
+    (beside,) = shot.at(2).beside
+    np.testing.assert_array_equal(beside.image, seen.image)
     (note,) = shot.notes
     assert note == "View 1: frame_####.png, 90 degrees from the input, frames 1 to 5."
     assert shot.scene == two_views
@@ -363,6 +365,11 @@ def test_a_further_views_background(two_views, draft, tmp_path) -> None:
     assert pictured.plate.image.mean() == pytest.approx(0.5, abs=1e-2)
     assert pictured.views[0].seen(0).plate.image.mean() < 0.2
     assert "Background estimated from the clip" in pictured.notes[0]
+    for n in range(6):
+        write_image(tmp_path / f"wall_{n}.exr", np.full((56, 40, 3), n / 10, np.float32))
+    changing = replace(view, background=Background(image=tmp_path / "wall_#.exr"))
+    (found,) = shot_of(replace(two_views, views=(changing,)), draft).views
+    assert found.seen(2).plate.image.mean() == pytest.approx(0.3, abs=1e-3)
 
 
 @pytest.mark.parametrize("wrong", ["camera", "background"])
