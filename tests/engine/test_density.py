@@ -487,6 +487,16 @@ def test_a_view_says_nothing_about_what_it_does_not_show(plume, small) -> None:
     assert found.figures["psnr"] > 35
 
 
+def test_what_views_disagree_about_is_not_put_where_only_one_looks(plume, small) -> None:
+    """A darker second camera that shows all smoke, but not the box's far side: nothing gathers there."""
+    side = orbit(small.camera, small.domain, 90).cropped(0, 0, 23, 42)
+    darker = Observation(side, 0.7 * render(plume.densities[1], small, side))
+    beside = ~project_voxels(side, small.domain).visible
+    assert not plume.densities[1][beside].any()
+    found = reconstruct_density(render(plume.densities[1], small), small, views=[darker]).values
+    assert found[beside].sum() < 0.01 * found.sum()
+
+
 def test_views_that_contradict_each_other_leave_nothing(plume, small) -> None:
     """Smoke that the other picture rules out is not made up, and the figures say how far off that is."""
     target = render(plume.densities[1], small)

@@ -172,7 +172,9 @@ def reconstruct_density(
     if initial is None:
         initial = _guess(seen, scene)
     start = np.where(hull, initial, 0).astype(np.float32)
-    fit = fit_multiplicative(targets, start, enough, settings.fit_iterations, settings.tolerance)
+    # what several pictures have in common takes as many times longer to be found
+    iterations = settings.fit_iterations * len(targets)
+    fit = fit_multiplicative(targets, start, enough, iterations, settings.tolerance)
     final = descend(targets, fit.density, hull, enough, settings.descent_iterations, settings.tolerance)
     return Density(
         _without_traces(final.density),

@@ -107,11 +107,14 @@ class Evidence:
         """What several profiles have in common, layer by layer as much as the most complete guess."""
         hull = self.hull
         seen = [view.projection.visible[hull] for view in self.views]
+        count = np.sum(seen, axis=0)
         # a round blob's two profiles make it up, and more of them must not make it smaller
-        power = np.minimum(1, 2 / np.sum(seen, axis=0))
-        values = np.ones(power.shape)
+        power = np.minimum(1, 2 / count)
+        # what only one shows it would fill with all that the others contradict
+        least = np.where(count > 1, LEAST_SHAPE, 0)
+        values = np.ones(count.shape)
         for view, profile, visible in zip(self.views, self.profiles, seen, strict=True):
-            shape = np.maximum(profile.shape(view.projection, hull), LEAST_SHAPE)
+            shape = np.maximum(profile.shape(view.projection, hull), least)
             values *= np.where(visible, shape**power, 1)
         layer = np.nonzero(hull)[2]
         wanted = np.max([np.bincount(layer, np.where(*pair, 0)) for pair in zip(seen, guesses, strict=True)], axis=0)
@@ -124,16 +127,20 @@ class Evidence:
         offset = voxel_centres(self._domain)[self.hull] - np.array(self._domain.centre)
         if not offset.size:
             return SmokeAxis.upright()
-        weight = np.ones(len(offset))
-        for other in self.views:
-            shown = other.projection.visible[self.hull]
-            weight *= np.where(shown, other.projection.read(other.amount, self.hull), 1)
         level = np.rint(offset @ height / self._domain.voxel_size).astype(int)
         lowest = level.min()
-        total = np.bincount(level - lowest, weight)
+        level -= lowest
+        shown = [other.projection.visible[self.hull] for other in self.views]
+        count = np.sum(shown, axis=0)
+        most = np.zeros(level.max() + 1, count.dtype)
+        np.maximum.at(most, level, count)
+        weight = (count == most[level]).astype(np.float64)  # those that fewer views show are known worse
+        for other, visible in zip(self.views, shown, strict=True):
+            weight *= np.where(visible, other.projection.read(other.amount, self.hull), 1)
+        total = np.bincount(level, weight)
         known = total > 0
         if not known.any():
             return SmokeAxis.upright()
-        mean = np.bincount(level - lowest, weight * (offset @ depth))[known] / total[known]
+        mean = np.bincount(level, weight * (offset @ depth))[known] / total[known]
         heights = (np.nonzero(known)[0] + lowest) * self._domain.voxel_size
         return SmokeAxis(heights, mean, np.zeros(heights.shape))
