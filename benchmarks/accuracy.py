@@ -5,7 +5,8 @@
 
 A SCENE is a folder with truth.npz and what truth/picture.py makes of it. A run is a quality, "paper", or either with
 changes (`balanced:transport=0`, `fine:velocity.levels=2`, `draft:resolution=32x32x48`, `balanced:without=hull`: see
-accuracy_worker.leave_out), or one of the baselines:
+accuracy_worker.leave_out) or further views that are used (`balanced+90`, `balanced+90+45`; with --real
+`balanced+camera00`), or one of the baselines:
 `smear` (front fit, constant along the rays), `billboard` (the front picture, unshifted, in every view), `truth` (the
 true density in our renderer), `black`. Each reconstruction has a process of its own; what is in OUT is not run again.
 
@@ -26,7 +27,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from accuracy_worker import SMEAR
+from accuracy_worker import SMEAR, VIEWS, run_views
 
 from smokelift import Camera, Clip, Scene, pictures
 from smokelift.bench.machine import describe
@@ -35,9 +36,6 @@ from smokelift.render import Renderer, scene_renderer
 from smokelift.render.rays import project, ray_through_pixels
 from smokelift.scores import PictureScore, VolumeScore
 from smokelift.truth import Truth
-
-VIEWS = {"0": "front", "20": "nov20", "45": "nov45", "90": "side"}
-"""Degrees about the vertical, and the files of picture.py."""
 
 BASELINES = ("billboard", "truth", "black")
 """Runs without a reconstruction."""
@@ -207,9 +205,10 @@ def score(subject: Subject, run: str, folder: Path) -> dict[str, Any]:
         for view, image in shown.items():
             scores[view].add(image, subject.seen(view, frame))
     found = {view: judge.figures() for view, judge in scores.items()}
+    used = {next(iter(subject.cameras)), *run_views(run)}
     for name in VIEW_FIGURES if subject.scored.step == 1 else VIEW_FIGURES[:-2]:  # flicker is of frames in a row
         row |= {f"{name}_{view}": figures[name] for view, figures in found.items()}
-        new = [figures[name] for figures in list(found.values())[1:] if figures[name] is not None]
+        new = [figures[name] for view, figures in found.items() if view not in used and figures[name] is not None]
         row[f"{name}_new"] = float(np.mean(new)) if new else None
     if subject.truth is not None and run not in BASELINES:
         judge = VolumeScore(subject.truth)

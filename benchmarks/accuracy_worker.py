@@ -2,9 +2,10 @@
 
     python accuracy_worker.py scene.toml RUN FIRST LAST OUT
 
-reads the clip's frames FIRST to LAST and leaves OUT/0001.npz, ... (density; velocity at centres in m/s, if the run has
-one), OUT/scene.toml with what was estimated, and OUT/run.json. Only the reconstruction is clocked, from decoding the
-clip to OpenVDB files on disk; the arrays are written between frames.
+reads the clip's frames FIRST to LAST (and those of further views, if RUN names some: "balanced+90") and leaves
+OUT/0001.npz, ... (density; velocity at centres in m/s, if the run has one), OUT/scene.toml with what was estimated, and
+OUT/run.json. Only the reconstruction is clocked, from decoding the clip to OpenVDB files on disk; the arrays are
+written between frames.
 """
 
 from __future__ import annotations
@@ -20,11 +21,15 @@ from typing import Any
 
 import numpy as np
 
-from smokelift import Clip, Scene, Settings, density, reconstruct, reconstruct_density
+from smokelift import Clip, ClipSource, Scene, Settings, View, density, reconstruct, reconstruct_density
 from smokelift.bench.machine import peak_bytes, poisson_seconds
 from smokelift.density import DensitySettings
+from smokelift.images import write_image
 from smokelift.shot import Shot, prepare_shot
 from smokelift.velocity import estimate
+
+VIEWS = {"0": "front", "20": "nov20", "45": "nov45", "90": "side"}
+"""Degrees about the vertical, and the files of picture.py."""
 
 SMEAR = "smear"
 SMEAR_SETTINGS = DensitySettings(fit_iterations=24, descent_iterations=0, tolerance=1e-3)
@@ -34,9 +39,27 @@ STARTED = 2
 """Frames that are not clocked: the first two come together, and compilers work before them."""
 
 
+def run_views(run: str) -> list[str]:
+    """Names of the further views of a run, "90" and "45" of "balanced+90+45:transport=0"."""
+    return run.partition(":")[0].split("+")[1:]
+
+
+def further_view(name: str, scene_path: Path, last: int, folder: Path) -> View:
+    """A view of a scene's folder: its camera's clip, or one of 8-bit pictures made of what the camera saw."""
+    seen = Scene.load(scene_path.with_name(f"{VIEWS.get(name, name)}.toml"))
+    if seen.clip is not None:
+        return View(seen.camera, seen.clip)
+    with np.load(scene_path.with_name(f"{VIEWS[name]}.npz")) as file:
+        pictures = file["image"][: last + 1]
+    for number, picture in enumerate(pictures):
+        write_image(folder / f"{name}_{number:04d}.png", np.repeat(picture[..., None].astype(np.float32), 3, -1))
+    return View(seen.camera, ClipSource(folder / f"{name}_####.png"))
+
+
 def run_settings(run: str) -> Settings:
     """Settings of a run's name: a quality or "paper", then changes, "balanced:transport=0,without=hull"."""
     name, _, changes = run.partition(":")
+    name = name.split("+")[0]
     settings = Settings.preset(method="paper") if name == "paper" else Settings.preset(name)
     for change in filter(None, changes.split(",")):
         key, _, text = change.partition("=")
@@ -93,12 +116,14 @@ def smeared(clip: Clip, shot: Shot) -> Iterator[np.ndarray]:
 
 def main() -> None:
     """Do the run."""
-    scene_path, run, first, last, out = (*sys.argv[1:5], Path(sys.argv[5]))
+    scene_path, run, first, last, out = (Path(sys.argv[1]), *sys.argv[2:5], Path(sys.argv[5]))
     scene = Scene.load(scene_path)
     source = replace(scene.clip, frames=(int(first), int(last)))
     settings = Settings.preset() if run == SMEAR else run_settings(run)
     seconds, units = [], []
     with tempfile.TemporaryDirectory() as folder, Clip.open(source) as clip:
+        views = tuple(further_view(name, scene_path, int(last), Path(folder)) for name in run_views(run))
+        scene = replace(scene, views=views)
         shot = prepare_shot(clip, scene, settings)
         shot.scene.save(out / "scene.toml")
         if run == SMEAR:

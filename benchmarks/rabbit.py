@@ -17,6 +17,7 @@ from scipy import ndimage
 
 from smokelift.cameras import orbit
 from smokelift.density.descent import descend
+from smokelift.density.fit import Target
 from smokelift.density.paper import fit_paper
 from smokelift.images import linear_to_srgb
 from smokelift.render import Renderer
@@ -73,9 +74,10 @@ def step(renderer: Renderer, target: np.ndarray, density: np.ndarray, count: int
 
     The descent measures each voxel in units of its start, which is far from the answer here: hence the restarts.
     """
-    everywhere, weight = np.ones(density.shape, bool), np.ones(target.shape[:2], np.float32)
+    everywhere = np.ones(density.shape, bool)
+    aim = Target(renderer, target, np.ones(target.shape[:2], np.float32))
     for _ in range(count // RESTART):
-        density = descend(renderer, target, density, everywhere, weight, 0.0, RESTART, 0.0).density
+        density = descend([aim], density, everywhere, 0.0, RESTART, 0.0).density
     return density
 
 
@@ -83,7 +85,7 @@ def by_the_paper(target: np.ndarray) -> np.ndarray:
     """Descend with the paper's derivative at its fixed rate, from the rabbit."""
     renderer = PaperRenderer(CAMERA, DOMAIN, MEDIUM, (SUN,), WALL)
     fog = np.full(DOMAIN.resolution, 0.1 / MEDIUM.extinction, np.float32)
-    return fit_paper([renderer], target, rabbit(), fog, PAPER_RATE, 1e-6, PAPER_STEPS).density
+    return fit_paper([renderer], [target], rabbit(), fog, PAPER_RATE, 1e-6, PAPER_STEPS).density
 
 
 def rabbit() -> np.ndarray:

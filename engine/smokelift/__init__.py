@@ -5,7 +5,7 @@ The data flows clip -> shot -> density (renderer) <-> velocity, transport -> seq
 
 from smokelift import metrics
 from smokelift.clip import Clip
-from smokelift.density import Density, DensitySettings, reconstruct_density
+from smokelift.density import Density, DensitySettings, Observation, reconstruct_density
 from smokelift.reconstruct import Frame, reconstruct
 from smokelift.render import render, render_gradient
 from smokelift.scene import (
@@ -41,6 +41,7 @@ __all__ = [
     "Frame",
     "Inlet",
     "Medium",
+    "Observation",
     "PointLight",
     "Scene",
     "Sequence",

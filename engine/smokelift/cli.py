@@ -118,7 +118,7 @@ def _inspect(options: argparse.Namespace, say: Reporter) -> None:
     assert domain is not None
     for note in (*shot.notes, *boundaries(shot.scene, settings), *(choice.reason for choice in shot.choices)):
         say.note(note)
-    cost = forecast(domain, frames, settings.quality)
+    cost = forecast(domain, frames, settings.quality, len(shot.views))
     voxels = " x ".join(map(str, domain.resolution))
     say.finish(
         f"{frames} frames of {voxels} voxels: about {cost.seconds:.0f} s, {cost.memory / 2**30:.1f} GiB of memory "
@@ -229,7 +229,7 @@ def _scene(path: Path, frames: tuple[int, int] | None) -> Scene:
     else:
         scene = Scene(clip=ClipSource(path))
     assert scene.clip is not None
-    return scene if frames is None else replace(scene, clip=replace(scene.clip, frames=frames))
+    return scene if frames is None else scene.with_frames(*frames)
 
 
 def _viewer(name: str, sequence: Sequence) -> pictures.Viewer:

@@ -18,6 +18,9 @@ from smokelift.scene import Domain
 from smokelift.settings import Quality
 
 SOLVES_A_FRAME: Mapping[Quality, float] = {"draft": 115.0, "balanced": 130.0, "fine": 140.0}
+SHARE_A_VIEW = 0.5
+"""Of a frame's time that every further view takes on top."""
+
 START_SECONDS = 5.0
 """Starting, compiling and looking for the background."""
 
@@ -48,11 +51,12 @@ class Forecast:
     disk: int
 
 
-def forecast(domain: Domain, frames: int, quality: Quality) -> Forecast:
-    """Foretell a run over so many frames."""
+def forecast(domain: Domain, frames: int, quality: Quality, views: int = 0) -> Forecast:
+    """Foretell a run over so many frames, with so many further views."""
     voxels = domain.resolution[0] * domain.resolution[1] * domain.resolution[2]
     return Forecast(
-        START_SECONDS + frames * SOLVES_A_FRAME[quality] * _solve_seconds(domain.resolution),
+        START_SECONDS
+        + frames * SOLVES_A_FRAME[quality] * (1 + SHARE_A_VIEW * views) * _solve_seconds(domain.resolution),
         needed(domain.resolution),
         free_memory(),
         frames * voxels * BYTES_A_VOXEL_ON_DISK,

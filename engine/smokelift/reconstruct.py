@@ -196,7 +196,7 @@ def smoke_axis(clip: Clip, shot: Shot, settings: Settings) -> SmokeAxis:
     """Where in depth the smoke of a clip stands: as the settings say, or estimated from some frames."""
     if settings.axis_depth is not None:
         return SmokeAxis.upright(settings.axis_depth)
-    if settings.method == "paper" or shot.plate_at is not None:
+    if settings.method == "paper" or shot.plate_at is not None or shot.views:
         return SmokeAxis.upright()
     scene = shot.small_scene
     assert scene.camera is not None and scene.domain is not None
@@ -208,18 +208,20 @@ def smoke_axis(clip: Clip, shot: Shot, settings: Settings) -> SmokeAxis:
 def _corrected(
     picture: Image, shot: Shot, settings: Settings, axis: SmokeAxis, transported: Volume | None, before: Volume | None
 ) -> tuple[Density, Mapping[str, float]]:
-    """The frame's density from its picture and the density carried along, and what was taken over of that."""
+    """The frame's density from its pictures and the density carried along, and what was taken over of that."""
     image, scene = shot.working.cut(picture), shot.small_scene
     initial: Volume | None = transported
     accepted: Mapping[str, float] = {}
     if settings.method == "default" and transported is not None and before is not None:
-        initial = depth_guess(image, scene, settings.density, shot.plate, axis)
+        initial = depth_guess(image, scene, settings.density, shot.plate, axis, shot.beside)
         if settings.transport > 0:
             guess = first_guess(
                 image, scene, shot.plate, shot.scattering, initial, transported, before, settings.transport
             )
             initial, accepted = guess.density, guess.figures
-    density = reconstruct_density(image, scene, initial, settings.density, plate=shot.plate, axis=axis)
+    density = reconstruct_density(
+        image, scene, initial, settings.density, plate=shot.plate, axis=axis, views=shot.beside
+    )
     assert shot.scene.camera is not None and scene.camera is not None and scene.domain is not None
     if transported is not None and shot.scene.camera.moves:
         # what a moving camera does not see now it may have seen before

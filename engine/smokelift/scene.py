@@ -547,10 +547,21 @@ class ClipSource:
 
 @dataclass(frozen=True)
 class View:
-    """A further calibrated camera with its own clip."""
+    """A further calibrated camera with its own clip.
+
+    Attributes
+    ----------
+    camera
+        One that stands still.
+    clip
+        Its ``frames`` are those at the moments of the scene's; None takes the same numbers.
+    background
+        What it sees behind the smoke; None takes the scene's if that is one colour, and else estimates it.
+    """
 
     camera: Camera
     clip: ClipSource
+    background: Background | None = None
 
 
 @dataclass(frozen=True)
@@ -613,6 +624,31 @@ class Scene:
             frames = range(len(camera.matrices) or 1)
             if not any(sees(camera.at(frame), self.domain) for frame in frames):
                 raise SceneError("does not see the domain: no part of the box is in its picture", table=table)
+
+    def with_frames(self, first: int, last: int) -> Scene:
+        """Return the scene with another range of its clip's frames; the further views keep step with it.
+
+        Raises
+        ------
+        SceneError
+            If the scene has no clip, or a range is none.
+        """
+        if self.clip is None:
+            raise SceneError("a scene without a clip has no frames", table="clip")
+        skipped = first - self.clip.first
+        views = []
+        for index, view in enumerate(self.views):
+            if view.clip.frames is not None:
+                start = view.clip.first + skipped
+                if start < 0:
+                    raise SceneError(
+                        f"its clip begins {-start} frames after frame {first} of the input; begin later",
+                        key="frames",
+                        table=f"views.{index}.clip",
+                    )
+                view = replace(view, clip=replace(view.clip, frames=(start, start + last - first)))
+            views.append(view)
+        return replace(self, clip=replace(self.clip, frames=(first, last)), views=tuple(views))
 
     def inflow(self) -> npt.NDArray[np.bool_] | None:
         """Return the voxels of the domain where smoke enters, shape (nx, ny, nz); None if no inlet is marked."""

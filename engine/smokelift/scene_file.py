@@ -119,16 +119,25 @@ def scene_to_dict(scene: Scene, base: Path | None = None) -> dict[str, Any]:
     if scene.lights:
         data["lights"] = [_light_to_dict(light, base) for light in scene.lights]
     if scene.background is not None:
-        table: dict[str, Any] = {}
-        if scene.background.color is not None:
-            table["color"] = list(scene.background.color)
-        if scene.background.image is not None:
-            table["image"] = _written(scene.background.image, base)
-        data["background"] = table
+        data["background"] = _background_to_dict(scene.background, base)
     if scene.views:
-        data["views"] = [
-            {"camera": _camera_to_dict(view.camera), "clip": _clip_to_dict(view.clip, base)} for view in scene.views
-        ]
+        data["views"] = [_view_to_dict(view, base) for view in scene.views]
+    return data
+
+
+def _background_to_dict(background: Background, base: Path | None) -> dict[str, Any]:
+    table: dict[str, Any] = {}
+    if background.color is not None:
+        table["color"] = list(background.color)
+    if background.image is not None:
+        table["image"] = _written(background.image, base)
+    return table
+
+
+def _view_to_dict(view: View, base: Path | None) -> dict[str, Any]:
+    data: dict[str, Any] = {"camera": _camera_to_dict(view.camera), "clip": _clip_to_dict(view.clip, base)}
+    if view.background is not None:
+        data["background"] = _background_to_dict(view.background, base)
     return data
 
 
@@ -322,12 +331,14 @@ class _Reader:
         return DirectionalLight(**values) if kind == "directional" else PointLight(**values)
 
     def _view(self, place: Place, data: Table) -> View:
-        self._known(place, data, ("camera", "clip"))
+        readers: dict[str, Callable[[Place, Table], Any]] = {
+            "camera": self._camera,
+            "clip": self._clip,
+            "background": self._background,
+        }
+        self._known(place, data, tuple(readers))
         self._needed(data, "camera", "clip")
-        return View(
-            camera=self._table(self._camera)((*place, "camera"), data["camera"]),
-            clip=self._table(self._clip)((*place, "clip"), data["clip"]),
-        )
+        return View(**{key: self._table(readers[key])((*place, key), value) for key, value in data.items()})
 
     def _camera(self, place: Place, data: Table) -> Camera:
         kind = data.get("type", "perspective")

@@ -6,7 +6,7 @@ What a scene file leaves out is estimated from the clip or defaulted, and every 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -23,11 +23,13 @@ from smokelift.background import (
     open_plates,
 )
 from smokelift.cameras import CameraError, WorkingPicture, as_matrix, voxel_width, working_picture
-from smokelift.clip import Clip
+from smokelift.clip import Clip, is_video
+from smokelift.density import Observation
+from smokelift.density.hull import agreement, project_voxels
 from smokelift.images import area_average, read_image
 from smokelift.render import scene_lights
 from smokelift.render.setup import Scattering
-from smokelift.scene import Background, Camera, DirectionalLight, Domain, Light, Medium, Scene
+from smokelift.scene import Background, Camera, ClipSource, DirectionalLight, Domain, Light, Medium, Scene
 from smokelift.selection import Choice, Detail, choose_model, smoke_detail
 from smokelift.selection.detail import TOLERANCE as DETAIL_TOLERANCE
 from smokelift.settings import LONGEST_SIDE, Settings
@@ -41,12 +43,44 @@ LENS = 50 / 36
 OPTICAL_DEPTH_AT_ONE = 5.0
 """Optical depth of smoke of density 1 across the domain when the medium is not given: thick, not solid."""
 
+AGREEMENT_SAMPLES = 4
+LEAST_AGREED = 0.9
+"""Share of the smoke's pixels. True views of four baked scenes and a captured one agreed on all of it; upside down ones
+on a tenth to nine tenths, but for smoke that fills the picture."""
+
 SAMPLES = 16
 DETAIL_FRAMES = 3
 COARSEST = 32
 """Voxels along the longest side at least: with fewer there is nothing more to save."""
 
 PICTURE_SIDE = 320
+
+
+@dataclass(frozen=True, eq=False)
+class FurtherView:
+    """What another camera saw.
+
+    Attributes
+    ----------
+    clip
+        Its frame 0 is of the same moment as the input's.
+    working
+        The small picture that the grid is fitted to.
+    plate_at
+        Background of that small picture in a frame, with the clip's noise.
+    """
+
+    clip: Clip
+    working: WorkingPicture
+    plate_at: Callable[[int], Plate]
+
+    def cut(self, frame: int) -> NDArray[np.float32]:
+        """The small picture of a frame, counted from 0."""
+        return self.working.cut(self.clip.frame(frame))
+
+    def seen(self, frame: int) -> Observation:
+        """What it saw in a frame, counted from 0."""
+        return Observation(self.working.camera, self.cut(frame), self.plate_at(frame))
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +109,10 @@ class Shot:
         Grids of a velocity without a past.
     choices
         What was chosen by measurement or by hand, with the figures that decided it.
+    views
+        Further cameras.
+    beside
+        What those saw in the frame that this is the shot in; see `at`.
     """
 
     scene: Scene
@@ -86,11 +124,14 @@ class Shot:
     plate_at: Callable[[int], Plate] | None = None
     levels: int | None = None
     choices: tuple[Choice, ...] = ()
+    views: tuple[FurtherView, ...] = ()
+    beside: tuple[Observation, ...] = ()
 
     def at(self, frame: int) -> Shot | None:
         """The shot as it is in a frame, counted from 0; None if nothing of the domain is in the picture then."""
+        beside = tuple(view.seen(frame) for view in self.views)
         if self.plate_at is None:
-            return self
+            return replace(self, beside=beside)
         assert self.scene.camera is not None and self.scene.domain is not None
         try:
             working = working_picture(self.scene.camera.at(frame), self.scene.domain)
@@ -98,7 +139,8 @@ class Shot:
             return None
         # An environment is as many lights as one camera needs; were they chosen anew, the light would flicker.
         lit = replace(self.scene, lights=scene_lights(self.small_scene))
-        return replace(self, scene=lit, working=working, plate=_small(self.plate_at(frame), working))
+        plate = _small(self.plate_at(frame), working)
+        return replace(self, scene=lit, working=working, plate=plate, beside=beside)
 
     @property
     def small_scene(self) -> Scene:
@@ -127,6 +169,10 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
     if clip.warning:
         notes.append(clip.warning)
     moves = scene.camera is not None and scene.camera.moves
+    if scene.views and (scene.camera is None or scene.domain is None):
+        raise ValueError("Further [[views]] need the input's [camera] and the [domain], in the same metres as theirs.")
+    if scene.views and (moves or any(view.camera.moves for view in scene.views)):
+        raise ValueError("With further [[views]] no camera may move; give one matrix a camera, or one view only.")
     if scene.camera is not None and moves and len(scene.camera.matrices) != len(clip):
         raise ValueError(
             f"[camera] matrices are given for {len(scene.camera.matrices)} frames, and {len(clip)} frames of the clip "
@@ -168,8 +214,26 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
         model = choose_model(clip, complete, plate_at, samples.smoky, richest, settings)
         complete, scattering, levels = model.scene, model.scattering, model.levels
         choices = (*choices, *model.choices)
+    views = tuple(_further_view(number, clip, complete, notes) for number in range(len(scene.views)))
+    if views:
+        first = FurtherView(clip, working, lambda frame: _small(plate_at(frame), working))
+        agreed = _agreed((first, *views), domain, clip.spread(AGREEMENT_SAMPLES))
+        if agreed < LEAST_AGREED:
+            notes.append(
+                f"The views agree on {agreed:.0%} of the smoke that they show: check where their cameras stand, which "
+                "frames belong together and what stands behind the smoke."
+            )
     return Shot(
-        complete, working, _small(plate, working), scattering, estimated, tuple(notes), changing, levels, choices
+        complete,
+        working,
+        _small(plate, working),
+        scattering,
+        estimated,
+        tuple(notes),
+        changing,
+        levels,
+        choices,
+        views,
     )
 
 
@@ -217,6 +281,77 @@ def _working(camera: Camera, domain: Domain) -> tuple[WorkingPicture, int]:
         with suppress(CameraError):
             return working_picture(camera.at(frame), domain), frame
     return working_picture(camera, domain), 0
+
+
+def _further_view(number: int, clip: Clip, scene: Scene, notes: list[str]) -> FurtherView:
+    """Open a further view of a complete scene and find its background."""
+    view, name = scene.views[number], f"View {number + 1}"
+    assert scene.camera is not None and scene.domain is not None
+    opened = _opened(view.clip, clip, scene)
+    if opened.warning:
+        notes.append(opened.warning)
+    if abs(opened.fps - clip.fps) > 0.01 * clip.fps:
+        raise ValueError(
+            f"{opened.path}: has {opened.fps:g} frames a second, the input {clip.fps:g}; all views need the same, so "
+            "convert one, or give fps in the [clip] whose file says it wrongly."
+        )
+    camera = _fitting(view.camera, opened)
+    try:
+        working = working_picture(camera, scene.domain)
+    except CameraError as error:
+        raise ValueError(f"{name}: {error}") from error
+    background = view.background
+    if background is None and scene.background is not None and scene.background.color is not None:
+        background = scene.background
+    found: list[str] = []
+    own = replace(scene, camera=camera, background=background, views=())
+    plates = open_plates(own)
+    if plates is not None:
+        changing = changing_plate(plates, opened)
+        plate_at = lambda frame: _small(changing(frame), working)  # noqa: E731
+    else:
+        plate = _small(_plate(opened, own, found)[0], working)
+        plate_at = lambda _frame: plate  # noqa: E731
+    axes = [np.array(each.matrix)[:3, 2] for each in (scene.camera, camera)]
+    angle = np.degrees(np.arccos(np.clip(axes[0] @ axes[1], -1, 1)))
+    frames = f"frames {opened.first} to {opened.first + len(opened) - 1}"
+    notes.append(" ".join([f"{name}: {opened.path.name}, {angle:.0f} degrees from the input, {frames}.", *found]))
+    return FurtherView(opened, working, plate_at)
+
+
+def _agreed(views: Sequence[FurtherView], domain: Domain, frames: Sequence[int]) -> float:
+    """Median share, over some frames, of the smoke in all views that voxels of the domain can explain."""
+    projections = [project_voxels(view.working.camera, domain) for view in views]
+    seen = ([(view.cut(frame), view.plate_at(frame)) for view in views] for frame in frames)
+    return float(np.median([agreement([matte(*pair).mask for pair in pairs], projections) for pairs in seen]))
+
+
+def _opened(source: ClipSource, clip: Clip, scene: Scene) -> Clip:
+    """The part of a view's clip that shows what the input does."""
+    first = clip.first
+    if source.frames is not None:
+        first += source.first - (scene.clip.first if scene.clip is not None else clip.first)
+    # pictures carry no rate of their own
+    fps = clip.fps if source.fps is None and not is_video(source.path) else source.fps
+    with Clip.open(replace(source, fps=fps, frames=None)) as whole:
+        have = len(whole)
+    last = first + len(clip) - 1
+    if first < 0 or last >= have:
+        raise ValueError(
+            f"{source.path}: has frames 0 to {have - 1}, but {first} to {last} are those of the input's moments; use "
+            "fewer frames of the input, or say with frames in the view's [clip] which ones belong to them."
+        )
+    return Clip.open(source, fps=fps, frames=(first, last))
+
+
+def _fitting(camera: Camera, clip: Clip) -> Camera:
+    """The camera with as many pixels as its clip."""
+    if camera.size[0] * clip.size[1] != camera.size[1] * clip.size[0]:
+        raise ValueError(
+            f"The camera's picture is {camera.size[0]} x {camera.size[1]}, the clip's {clip.size[0]} x {clip.size[1]} "
+            f"({clip.path.name}); [camera] size must have the clip's shape."
+        )
+    return camera.resized(*clip.size)
 
 
 def _small(plate: Plate, working: WorkingPicture) -> Plate:
@@ -306,12 +441,7 @@ def _geometry(
     notes: list[str],
 ) -> tuple[Camera, Domain, Choice | None]:
     if scene.camera is not None:
-        if scene.camera.size[0] * clip.size[1] != scene.camera.size[1] * clip.size[0]:
-            raise ValueError(
-                f"The camera's picture is {scene.camera.size[0]} x {scene.camera.size[1]}, the clip's "
-                f"{clip.size[0]} x {clip.size[1]}; [camera] size must have the clip's shape."
-            )
-        camera = scene.camera.resized(*clip.size)
+        camera = _fitting(scene.camera, clip)
         if scene.domain is None:
             raise ValueError("The scene gives a camera but no box in [domain]; give the one that holds the smoke.")
         if settings.resolution == "auto":

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from smokelift.cameras import orbit
 from smokelift.images import write_image
 from smokelift.render import render
 from smokelift.scene import (
@@ -19,6 +20,7 @@ from smokelift.scene import (
     Domain,
     Medium,
     Scene,
+    View,
     look_at_matrix,
 )
 from smokelift.settings import Settings
@@ -100,6 +102,19 @@ def tracked(plume: Plume, tmp_path_factory: pytest.TempPathFactory) -> Scene:
     ]
     scene = replace(plume.scene, camera=replace(camera, matrix=poses[0], matrices=tuple(poses)))
     return plume.write(tmp_path_factory.mktemp("tracked"), plume.densities, scene)
+
+
+@pytest.fixture(scope="session")
+def two_views(plume: Plume, tmp_path_factory: pytest.TempPathFactory) -> Scene:
+    """The blob behind the middle of the box, from the front and from the side, whose clip began a frame earlier."""
+    truth = [np.roll(density, 5, axis=1) for density in plume.densities]
+    folder = tmp_path_factory.mktemp("two_views")
+    front = plume.write(folder / "front", truth)
+    assert front.camera is not None and front.domain is not None
+    camera = orbit(front.camera, front.domain, 90)
+    side = plume.write(folder / "side", [np.zeros_like(truth[0]), *truth], replace(front, camera=camera)).clip
+    assert side is not None
+    return replace(front, views=(View(camera, replace(side, frames=(1, FRAMES))),))
 
 
 @pytest.fixture(scope="session")

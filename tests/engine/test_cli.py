@@ -159,6 +159,19 @@ def test_progress_as_json(plume, tmp_path, capsys) -> None:
     assert (told[-1]["directory"], told[-1]["frames"]) == (str(out), 5)
 
 
+def test_further_views_of_a_scene_file_are_used(two_views, tmp_path, capsys) -> None:
+    """They are named before the run, keep step with a range of frames, and their fit is on record."""
+    two_views.save(tmp_path / "scene.toml")
+    told = "View 1: frame_####.png, 90 degrees from the input, frames 3 to 4."
+    assert command("inspect", tmp_path / "scene.toml", "--frames", "2:3", *QUICK) == 0
+    assert told in " ".join(capsys.readouterr().out.split())
+    arguments = ("--npz", "--frames", "2:3", *QUICK)
+    assert command("reconstruct", tmp_path / "scene.toml", "--out", tmp_path / "out", *arguments) == 0
+    assert told in " ".join(capsys.readouterr().out.split())
+    sequence = Sequence.open(tmp_path / "out")
+    assert all(sequence.figures(number)["psnr_view_1"] > 30 for number in (1, 2))
+
+
 def test_a_clip_alone_is_enough(plume, tmp_path, capsys) -> None:
     """A pattern of pictures instead of a scene file, with a range of frames and a resolution."""
     out = tmp_path / "out"

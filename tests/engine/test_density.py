@@ -9,13 +9,15 @@ import numpy as np
 import pytest
 
 from smokelift.background import Plate
-from smokelift.density import Density, DensitySettings, reconstruct_density
+from smokelift.cameras import orbit
+from smokelift.density import Density, DensitySettings, Observation, depth_guess, reconstruct_density
 from smokelift.density.axis import SmokeAxis
 from smokelift.density.descent import descend
-from smokelift.density.hull import project_voxels, visual_hull
-from smokelift.density.multiplicative import fit_multiplicative
+from smokelift.density.fit import Target
+from smokelift.density.hull import common_hull, project_voxels, visual_hull
+from smokelift.density.multiplicative import RayTarget, fit_multiplicative
 from smokelift.density.profile import DepthProfile, inflated
-from smokelift.metrics import streaks
+from smokelift.metrics import psnr, streaks
 from smokelift.render import Renderer, render, scene_lights
 from smokelift.render.rays import ray_through_pixels
 from smokelift.scene import Background, Camera, DirectionalLight, Domain, Medium, Scene
@@ -233,12 +235,8 @@ def test_the_multiplicative_fit_gets_better(plume, small) -> None:
     projection = project_voxels(small.camera, small.domain)
     start, weight = 0.5 * plume.densities[1], np.ones((42, 30), np.float32)
     noise = np.full((42, 30, 3), 1e-3, np.float32)
-    losses = [
-        fit_multiplicative(
-            renderer, target, background, start, projection, weight, noise, 0.0, count, 0.0
-        ).loss
-        for count in range(6)
-    ]  # fmt: skip
+    aim = RayTarget(renderer, target, weight, background, noise, projection)
+    losses = [fit_multiplicative([aim], start, 0.0, count, 0.0).loss for count in range(6)]
     assert all(after <= before for before, after in itertools.pairwise(losses))
     assert losses[-1] < 0.1 * losses[0]
 
@@ -254,7 +252,8 @@ def test_descent_never_raises_the_loss(plume, small, thickness) -> None:
     renderer = Renderer(scene.camera, scene.domain, scene.medium, scene_lights(scene), np.zeros(3), support=hull)
     start = np.where(hull, np.float32(0.02), np.float32(0))
     weight = np.ones(mask.shape, np.float32)
-    losses = [descend(renderer, target, start, hull, weight, 0.0, steps, 0.0).loss for steps in range(40)]
+    aim = Target(renderer, target, weight)
+    losses = [descend([aim], start, hull, 0.0, steps, 0.0).loss for steps in range(40)]
     assert all(after <= before for before, after in itertools.pairwise(losses))
     assert losses[-1] < 0.2 * losses[0]
 
@@ -375,7 +374,164 @@ def test_a_pattern_behind_the_smoke_does_not_print_through(plume, small, scatter
     assert error.std() < 0.2 * truth[inside].mean()
 
 
+# several views
+
+
+def moved(density: np.ndarray, voxels: int) -> np.ndarray:
+    """The same smoke so many voxels further away from the camera."""
+    return np.roll(density, voxels, axis=1)
+
+
+def observed(density: np.ndarray, scene: Scene, degrees: float) -> Observation:
+    """What a camera sees that was carried around the box."""
+    camera = orbit(scene.camera, scene.domain, degrees)
+    return Observation(camera, render(density, scene, camera))
+
+
+def mean_place(density: np.ndarray) -> np.ndarray:
+    """Centre of mass, in voxels."""
+    return np.average(np.indices(density.shape).reshape(3, -1), axis=1, weights=density.ravel())
+
+
+@pytest.mark.parametrize("degrees", [40.0, 90.0])
+def test_a_second_view_tells_the_depth(plume, small, degrees) -> None:
+    """Smoke off the middle of the box stands where it stood, which one picture cannot know; all pictures are met."""
+    truth = moved(plume.densities[1], 5)
+    target = render(truth, small)
+    alone = reconstruct_density(target, small).values
+    found = reconstruct_density(target, small, views=[observed(truth, small, degrees)])
+    assert mean_place(alone)[1] < mean_place(truth)[1] - 4
+    np.testing.assert_allclose(mean_place(found.values), mean_place(truth), atol=0.5)
+    assert min(found.figures["psnr"], found.figures["psnr_view_1"]) > 35
+    new = orbit(small.camera, small.domain, degrees / 2)
+    assert psnr(render(found.values, small, new), render(truth, small, new)) > 30
+    assert np.abs(found.values - truth).sum() < 0.5 * np.abs(alone - truth).sum()
+
+
+def ray_target(scene: Scene, observation: Observation) -> RayTarget:
+    """A picture before black to be met by any voxel."""
+    camera, image = observation.camera, observation.image
+    renderer = Renderer(camera, scene.domain, scene.medium, scene_lights(scene), np.zeros_like(image))
+    weight = np.ones(image.shape[:2], np.float32)
+    noise = np.full(image.shape, 1e-3, np.float32)
+    return RayTarget(renderer, image, weight, np.zeros_like(image), noise, project_voxels(camera, scene.domain))
+
+
+@pytest.mark.parametrize("way", ["multiplicative", "descent"])
+def test_every_picture_is_fitted(plume, small, way) -> None:
+    """From smoke that one view is right with, the other's error falls, and the sum of both never rises."""
+    smeared = np.repeat(plume.densities[1].mean(1, keepdims=True), 24, axis=1)
+    targets = [
+        ray_target(small, Observation(small.camera, render(smeared, small))),
+        ray_target(small, observed(plume.densities[1], small, 90)),
+    ]
+
+    def fitted(count: int) -> tuple[float, ...]:
+        if way == "multiplicative":
+            return fit_multiplicative(targets, smeared, 0.0, count, 0.0).losses
+        return descend(targets, smeared, np.ones(smeared.shape, np.bool_), 0.0, count, 0.0).losses
+
+    losses = [fitted(count) for count in range(6)]
+    assert all(sum(after) <= sum(before) for before, after in itertools.pairwise(losses))
+    assert losses[0][0] < 1e-6
+    assert losses[-1][1] < 0.3 * losses[0][1]
+
+
+def test_a_picture_scales_only_what_it_shows(plume, small) -> None:
+    """Voxels beside it stay as they are, whatever its border says."""
+    half = small.camera.cropped(0, 0, 15, 42)
+    target = ray_target(small, Observation(half, 0.5 * render(plume.densities[1], small, half)))
+    found = fit_multiplicative([target], plume.densities[1], 0.0, 2, 0.0).density
+    beside = ~target.projection.visible
+    np.testing.assert_array_equal(found[beside], plume.densities[1][beside])
+    assert found[~beside].sum() < 0.8 * plume.densities[1][~beside].sum()
+
+
+def test_the_first_guess_of_two_views(plume, small) -> None:
+    """It is in its place before anything is fitted, and holds about as much as one picture alone tells."""
+    truth = moved(plume.densities[1], 5)
+    plate = noisy_plate(np.zeros((42, 30, 3)))
+    for extinction in (1.0, 16.0):
+        scene = replace(small, medium=Medium(extinction=extinction))
+        target = render(truth, scene)
+        guess = depth_guess(target, scene, QUICK, plate, views=[observed(truth, scene, 90)])
+        np.testing.assert_allclose(mean_place(guess), mean_place(truth), atol=1)
+        assert guess.sum() == pytest.approx(depth_guess(target, scene, QUICK, plate).sum(), rel=0.3)
+
+
+def test_the_figures_of_further_views_are_their_pictures(plume, small) -> None:
+    """The loss is that of all pictures, each PSNR that of one over the pixels that the smoke can change."""
+    side = observed(plume.densities[1], small, 90)
+    target = render(plume.densities[1], small)
+    found = reconstruct_density(target, small, settings=QUICK, views=[side])
+    errors = [
+        np.square(render(found.values, small, camera) - image, dtype=np.float64).sum()
+        for camera, image in ((None, target), (side.camera, side.image))
+    ]
+    assert found.figures["loss"] == pytest.approx(sum(errors), rel=1e-3)
+    apart = found.figures["psnr"] - found.figures["psnr_view_1"]
+    assert apart == pytest.approx(10 * np.log10(errors[1] / errors[0]), abs=1)
+
+
+def test_a_view_says_nothing_about_what_it_does_not_show(plume, small) -> None:
+    """Beside its picture smoke is allowed that it would have to show inside."""
+    half = replace(GRID, size=(12, 32))
+    projections = [project_voxels(camera, plume.scene.domain) for camera in (GRID, half)]
+    masks = [np.ones((32, 24), np.bool_), np.zeros((32, 12), np.bool_)]
+    hull = common_hull(masks, projections)
+    assert not hull[:12].any()
+    assert hull[12:].all()
+    camera = small.camera.cropped(0, 0, 30, 21)
+    upper = Observation(camera, render(plume.densities[1], small, camera))
+    found = reconstruct_density(render(plume.densities[1], small), small, views=[upper])
+    assert found.figures["psnr"] > 35
+
+
+def test_what_views_disagree_about_is_not_put_where_only_one_looks(plume, small) -> None:
+    """A darker second camera that shows all smoke, but not the box's far side: nothing gathers there."""
+    side = orbit(small.camera, small.domain, 90).cropped(0, 0, 23, 42)
+    darker = Observation(side, 0.7 * render(plume.densities[1], small, side))
+    beside = ~project_voxels(side, small.domain).visible
+    assert not plume.densities[1][beside].any()
+    found = reconstruct_density(render(plume.densities[1], small), small, views=[darker]).values
+    assert found[beside].sum() < 0.01 * found.sum()
+
+
+def test_views_that_contradict_each_other_leave_nothing(plume, small) -> None:
+    """Smoke that the other picture rules out is not made up, and the figures say how far off that is."""
+    target = render(plume.densities[1], small)
+    side = observed(np.zeros_like(plume.densities[1]), small, 90)
+    found = reconstruct_density(target, small, views=[side])
+    assert not found.values.any()
+    assert found.figures["hull_share"] == 0
+    assert found.figures["loss"] == pytest.approx(np.square(target, dtype=np.float64).sum(), rel=1e-3)
+    assert found.figures["psnr"] < 30
+
+
+def test_the_paper_takes_true_views_instead_of_its_own(plume, small) -> None:
+    """The side that is seen comes before the one that is made up."""
+    truth = moved(plume.densities[1], 5)
+    target = render(truth, small)
+    paper = DensitySettings(method="paper", descent_iterations=15)
+    alone, both = (
+        reconstruct_density(target, small, settings=paper, views=views).values
+        for views in ((), (observed(truth, small, 90),))
+    )
+    assert mean_place(both)[1] > mean_place(alone)[1] + 1
+
+
 # what is refused
+
+
+def test_a_view_of_another_size_or_that_moves_is_refused(plume, small) -> None:
+    """Each picture has to fit its camera, and each camera stands somewhere."""
+    target = render(plume.densities[1], small)
+    side = observed(plume.densities[1], small, 90)
+    with pytest.raises(ValueError, match=r"\(42, 30, 3\)"):
+        reconstruct_density(target, small, views=[replace(side, image=side.image[1:])])
+    moving = replace(side.camera, matrices=(side.camera.matrix, side.camera.matrix))
+    with pytest.raises(ValueError, match="camera moves"):
+        reconstruct_density(target, small, views=[replace(side, camera=moving)])
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])

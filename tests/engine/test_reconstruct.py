@@ -245,6 +245,41 @@ def centroid(density: np.ndarray, scene: Scene) -> np.ndarray:
     return np.average(voxel_centres(scene.domain).reshape(-1, 3), axis=0, weights=density.ravel())
 
 
+def test_further_views_put_the_smoke_in_its_place(plume, two_views, draft, tmp_path) -> None:
+    """From the front alone the blob stands in the middle of the box; with the side where it stood, in every frame."""
+    voxel = two_views.domain.voxel_size
+    truth = [centroid(np.roll(density, 5, axis=1), two_views) for density in plume.densities]
+    alone = frames_of(replace(two_views, views=()), draft)
+    both = frames_of(two_views, draft, tmp_path / "out", npz=True)
+    for frames, near in ((alone, False), (both, True)):
+        off = [np.linalg.norm(centroid(f.density, two_views) - t) / voxel for f, t in zip(frames, truth, strict=True)]
+        assert max(off) < 0.7 if near else min(off) > 3
+    sequence = Sequence.open(tmp_path / "out")
+    assert sequence.scene == two_views
+    for number in sequence.frames:
+        assert min(sequence.figures(number)["psnr"], sequence.figures(number)["psnr_view_1"]) > 35
+    cut_off(two_views, draft, tmp_path / "again", 3)
+    rest = frames_of(two_views, draft, tmp_path / "again", npz=True, resume=True)
+    np.testing.assert_array_equal(rest[-1].density, both[-1].density)
+    with pytest.raises(SequenceError, match="was begun differently"):
+        cut_off(two_views, draft, tmp_path / "cut", 3)
+        frames_of(replace(two_views, views=()), draft, tmp_path / "cut", npz=True, resume=True)
+
+
+def test_with_nothing_carried_along_a_frame_is_that_of_its_pictures(two_views, draft) -> None:
+    """The pictures of all views of that moment, and nothing else."""
+    settings = replace(draft, transport=0.0)
+    scene = two_views.with_frames(0, 2)
+    frames = frames_of(scene, settings)
+    with Clip.open(scene.clip) as clip:
+        shot = prepare_shot(clip, scene, settings)
+        views = [view.seen(2) for view in shot.views]
+        alone = reconstruct_density(
+            shot.working.cut(clip.frame(2)), shot.small_scene, None, settings.density, plate=shot.plate, views=views
+        )
+    np.testing.assert_array_equal(frames[2].density, alone.values)
+
+
 def test_smoke_from_a_moving_camera_stands_where_it_stood(plume, tracked, draft, tmp_path) -> None:
     """The pictures are met, the smoke is in its place to half a voxel; a still camera's would drift off."""
     still = replace(tracked, camera=tracked.camera.at(0))

@@ -108,6 +108,22 @@ def test_every_table_is_read(tmp_path: Path) -> None:
     assert view.camera.fx == view.camera.fy == 100.0
     assert view.camera.position == (7.0, 0.0, 1.5)
     assert view.clip.path == tmp_path / "side" / "frame_####.exr"
+    assert view.background is None
+    (view,) = load(tmp_path, f'{GOOD}[views.background]\nimage = "wall.png"\n').views
+    assert view.background == Background(image=tmp_path / "wall.png")
+
+
+def test_further_views_keep_step_with_another_range(tmp_path: Path) -> None:
+    """Frames that were said to belong to the clip's move with them; those that were not have the same numbers."""
+    scene = load(tmp_path, GOOD)
+    (view,) = scene.views
+    said = replace(view, clip=replace(view.clip, frames=(5, 15)))
+    later = replace(scene, views=(view, said)).with_frames(3, 7)
+    assert later.clip == replace(scene.clip, frames=(3, 7))
+    assert [each.clip.frames for each in later.views] == [None, (8, 12)]
+    began = replace(scene, clip=replace(scene.clip, frames=(6, 10)), views=(said,))
+    with pytest.raises(SceneError, match="its clip begins 1 frames after frame 0 of the input"):
+        began.with_frames(0, 4)
 
 
 def test_walls_and_inlets_are_read(tmp_path: Path) -> None:
@@ -450,6 +466,7 @@ domains = st.builds(
 )
 
 
+backgrounds = st.none() | st.just(Background()) | st.builds(Background, color=colours)
 walls = st.lists(st.sampled_from(SIDES), max_size=6).map(tuple)
 
 
@@ -471,8 +488,8 @@ def scenes(draw: st.DrawFn) -> Scene:
             )
         ),
         lights=tuple(draw(st.lists(lights, max_size=3))),
-        background=draw(st.none() | st.just(Background()) | st.builds(Background, color=colours)),
-        views=tuple(draw(st.lists(st.builds(View, cameras(), clips), max_size=2))),
+        background=draw(backgrounds),
+        views=tuple(draw(st.lists(st.builds(View, cameras(), clips, backgrounds), max_size=2))),
     )
 
 

@@ -6,8 +6,8 @@ by ray until it is nearly right, ``descent`` follows the exact gradient from the
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Literal, get_args
 
 import numpy as np
@@ -17,10 +17,11 @@ from smokelift.background import CODE, Plate, matte, noise_at
 from smokelift.cameras import orbit
 from smokelift.density.axis import SmokeAxis
 from smokelift.density.descent import descend
-from smokelift.density.hull import project_voxels, reached, visual_hull
-from smokelift.density.multiplicative import fit_multiplicative
+from smokelift.density.evidence import Evidence, ViewEvidence
+from smokelift.density.hull import project_voxels, reached
+from smokelift.density.multiplicative import RayTarget, fit_multiplicative
+from smokelift.density.observation import Observation
 from smokelift.density.paper import fit_paper
-from smokelift.density.profile import DepthProfile
 from smokelift.images import srgb_to_linear
 from smokelift.render import Renderer, scene_background, scene_lights
 from smokelift.render.lights import unshadowed_source
@@ -28,7 +29,15 @@ from smokelift.render.renderer import Image, Volume
 from smokelift.render.setup import Scattering
 from smokelift.scene import Camera, Domain, Medium, Scene
 
-__all__ = ["Density", "DensitySettings", "SmokeAxis", "depth_guess", "optical_depth", "reconstruct_density"]
+__all__ = [
+    "Density",
+    "DensitySettings",
+    "Observation",
+    "SmokeAxis",
+    "depth_guess",
+    "optical_depth",
+    "reconstruct_density",
+]
 
 
 TRACE = 1e-9
@@ -63,7 +72,7 @@ class DensitySettings:
         no figure; see docs/measurements.md for what more and less do.
     texture
         Noise along the depth, 0 to 1: without any, smoke is smooth from the side. 0.4 looks most like smoke and costs
-        0.1 to 0.2 dB in new views; the noise stands still while the smoke moves.
+        0.1 to 0.2 dB in new views; the noise stands still while the smoke moves. Only for one view.
     """
 
     method: Literal["default", "paper"] = "default"
@@ -95,10 +104,11 @@ class Density:
     ----------
     values : (nx, ny, nz) float32
     hull : (nx, ny, nz) bool
-        Voxels that the picture allows to hold smoke.
+        Voxels that the pictures allow to hold smoke.
     figures
-        ``loss`` (sum of squares) and ``psnr`` (dB, peak 1) of the picture, in linear radiance, over the pixels that
-        voxels of the hull can change; ``iterations``; ``hull_share``, the hull's share of the voxels.
+        ``loss`` (sum of squares over all pictures) and ``psnr`` (dB, peak 1) of the picture, in linear radiance, over
+        the pixels that its smoke's voxels can change; ``psnr_view_1``, ... of further views; ``iterations``;
+        ``hull_share``, the hull's share of the voxels.
     """
 
     values: Volume
@@ -114,8 +124,9 @@ def reconstruct_density(
     *,
     plate: Plate | None = None,
     axis: SmokeAxis | None = None,
+    views: Sequence[Observation] = (),
 ) -> Density:
-    """Find a density that renders to a picture (algorithm 3).
+    """Find a density that renders to a picture, or to several (algorithm 3).
 
     Parameters
     ----------
@@ -124,73 +135,102 @@ def reconstruct_density(
     scene
         Needs camera and domain.
     initial : (nx, ny, nz), optional
-        First guess; by default the depth profile of `profile`.
+        First guess; by default that of `depth_guess`.
     settings
         How to fit.
     plate
         Background with its noise; by default the scene's background and the noise of 8 bits.
     axis
-        Where in depth the smoke stands; by default on the domain's axis.
+        Where in depth the smoke stands; by default on the domain's axis. Further views know better.
+    views
+        The same smoke at the same moment as other cameras saw it. What a picture does not show it says nothing about.
 
     Raises
     ------
     ValueError
-        If the picture is not finite or has another size than the camera, if the initial density is negative, not
-        finite or of another shape than the domain, or if the scene lacks a camera or a domain.
+        If a picture is not finite or has another size than its camera, if a camera moves, if the initial density is
+        negative, not finite or of another shape than the domain, or if the scene lacks a camera or a domain.
     """
     settings = settings or DensitySettings()
     if scene.camera is None or scene.domain is None:
         raise ValueError("A reconstruction needs a scene with a camera and a domain.")
-    if scene.camera.moves:
-        raise ValueError("The camera moves; give the scene the one of the picture's frame, camera.at(frame).")
-    camera, domain, medium = scene.camera, scene.domain, scene.medium or Medium()
-    image = _checked_image(image, camera)
-    plate = plate or _clean_plate(scene, camera)
-    lights = scene_lights(scene)
-    mask = matte(image, plate).mask
-    projection = project_voxels(camera, domain)
-    hull = visual_hull(mask, projection)
+    domain, medium = scene.domain, scene.medium or Medium()
+    seen = _evidence((Observation(scene.camera, image, plate), *views), scene, settings, axis)
     if initial is not None:
         initial = _checked_initial(initial, domain)
+    hull = seen.hull
+    pixels = [int(view.counts.sum()) for view in seen.views]
     if not hull.any():
-        return Density(np.zeros(domain.resolution, np.float32), hull, _figures(0.0, 1, 0, hull))
+        # one picture without smoke, or several that contradict each other
+        left = [(view.image - view.plate.image)[view.counts] for view in seen.views]
+        losses = [float(np.sum(np.square(part, dtype=np.float64))) for part in left]
+        return Density(np.zeros(domain.resolution, np.float32), hull, _figures(losses, pixels, 0, hull))
     if settings.method == "paper":
-        return _paper(image, plate.image, scene, initial, settings)
-    renderer = Renderer(camera, domain, medium, lights, plate.image, settings.model, hull)
-    counts = reached(mask, projection)
-    # a ray that leaves through floor or ceiling crosses few voxels, which must not hold all that it shows
-    profile = DepthProfile(optical_depth(image, scene, settings, plate), camera, domain, axis or SmokeAxis.upright())
-    weight = counts * np.maximum(profile.share_inside(), LEAST_SHARE)
-    noise = noise_at(image, plate)
+        return _paper(seen, scene, initial, settings)
+    lights = scene_lights(scene)
     # beyond this the fit would reproduce noise (discrepancy principle)
-    enough = float(np.sum(np.square(noise[counts], dtype=np.float64)))
+    enough = 0.0
+    targets = []
+    for view, profile in zip(seen.views, seen.profiles, strict=True):
+        renderer = Renderer(view.camera, domain, medium, lights, view.plate.image, settings.model, hull)
+        # a ray that leaves through floor or ceiling crosses few voxels, which must not hold all that it shows
+        weight = view.counts * np.maximum(profile.share_inside(), LEAST_SHARE)
+        noise = noise_at(view.image, view.plate)
+        enough += float(np.sum(np.square(noise[view.counts], dtype=np.float64)))
+        targets.append(RayTarget(renderer, view.image, weight, view.plate.image, noise, view.projection))
     if initial is None:
-        initial = depth_guess(image, scene, settings, plate, axis)
+        initial = _guess(seen, scene)
     start = np.where(hull, initial, 0).astype(np.float32)
-    fit = fit_multiplicative(
-        renderer, image, plate.image, start, projection, weight, noise, enough,
-        settings.fit_iterations, settings.tolerance,
-    )  # fmt: skip
-    final = descend(renderer, image, fit.density, hull, weight, enough, settings.descent_iterations, settings.tolerance)
+    # what several pictures have in common takes as many times longer to be found
+    iterations = settings.fit_iterations * len(targets)
+    fit = fit_multiplicative(targets, start, enough, iterations, settings.tolerance)
+    final = descend(targets, fit.density, hull, enough, settings.descent_iterations, settings.tolerance)
     return Density(
         _without_traces(final.density),
         hull,
-        _figures(final.loss, int(counts.sum()), fit.iterations + final.iterations, hull),
+        _figures(final.losses, pixels, fit.iterations + final.iterations, hull),
     )
 
 
 def depth_guess(
-    image: Image, scene: Scene, settings: DensitySettings, plate: Plate, axis: SmokeAxis | None = None
+    image: Image,
+    scene: Scene,
+    settings: DensitySettings,
+    plate: Plate,
+    axis: SmokeAxis | None = None,
+    views: Sequence[Observation] = (),
 ) -> Volume:
-    """Density (nx, ny, nz) from one picture alone: unshadowed optical depths, spread by the depth profile."""
-    assert scene.camera is not None and scene.domain is not None
+    """Density (nx, ny, nz) from pictures alone: unshadowed optical depths, spread by the depth profiles.
+
+    The parameters are those of `reconstruct_density`.
+    """
+    assert scene.camera is not None
+    return _guess(_evidence((Observation(scene.camera, image, plate), *views), scene, settings, axis), scene)
+
+
+def _guess(seen: Evidence, scene: Scene) -> Volume:
+    return seen.guess() / np.float32((scene.medium or Medium()).extinction)
+
+
+def _evidence(
+    observations: Sequence[Observation], scene: Scene, settings: DensitySettings, axis: SmokeAxis | None
+) -> Evidence:
+    assert scene.domain is not None
+    views = [_view(observation, scene, settings) for observation in observations]
+    return Evidence(views, scene.domain, axis or SmokeAxis.upright(), settings.texture)
+
+
+def _view(observation: Observation, scene: Scene, settings: DensitySettings) -> ViewEvidence:
+    assert scene.domain is not None
+    camera = observation.camera
+    if camera.moves:
+        raise ValueError("The camera moves; give the scene the one of the picture's frame, camera.at(frame).")
+    image = _checked_image(observation.image, camera)
+    plate = observation.plate or _clean_plate(scene, camera)
+    mask = matte(image, plate).mask
+    projection = project_voxels(camera, scene.domain)
     amount = optical_depth(image, scene, settings, plate)
-    projection = project_voxels(scene.camera, scene.domain)
-    hull = visual_hull(matte(image, plate).mask, projection)
-    profile = DepthProfile(amount, scene.camera, scene.domain, axis or SmokeAxis.upright(), settings.texture)
-    density = np.zeros(scene.domain.resolution, np.float32)
-    density[hull] = projection.read(amount, hull) * profile.at(projection, hull)
-    return density / np.float32((scene.medium or Medium()).extinction)
+    return ViewEvidence(camera, image, plate, mask, amount, projection, reached(mask, projection))
 
 
 def optical_depth(image: Image, scene: Scene, settings: DensitySettings, plate: Plate) -> NDArray[np.float32]:
@@ -206,24 +246,27 @@ def optical_depth(image: Image, scene: Scene, settings: DensitySettings, plate: 
     return np.where(matte(image, plate).mask, depth, 0).astype(np.float32)
 
 
-def _paper(image: Image, background: Image, scene: Scene, initial: Volume | None, settings: DensitySettings) -> Density:
+def _paper(seen: Evidence, scene: Scene, initial: Volume | None, settings: DensitySettings) -> Density:
     from smokelift.render.paper import PaperRenderer  # here, because Taichi takes long to import
 
-    assert scene.camera is not None and scene.domain is not None
-    camera, domain, medium = scene.camera, scene.domain, scene.medium or Medium()
+    assert scene.domain is not None
+    domain, medium = scene.domain, scene.medium or Medium()
     lights = scene_lights(scene)
-    views = (camera, orbit(camera, domain, 90))
-    renderers = [PaperRenderer(view, domain, medium, lights, background, settings.model) for view in views]
+    views = seen.views
+    if len(views) == 1:
+        # the paper's own way: the picture again as if from the side
+        views = (views[0], replace(views[0], camera=orbit(views[0].camera, domain, 90)))
+    renderers = [PaperRenderer(view.camera, domain, medium, lights, view.plate.image, settings.model) for view in views]
     # fog of optical depth 0.1 across the domain: thin, because dense media have local minima
     thin = 0.1 / (medium.extinction * (domain.max[0] - domain.min[0]))
     fog = np.full(domain.resolution, thin, np.float32)
     start = fog if initial is None else initial
-    fit = fit_paper(renderers, image, start, fog, settings.paper_rate, 1e-4, settings.descent_iterations)
-    loss = float(np.sum(np.square(renderers[0].image(fit.density) - image, dtype=np.float64)))
+    pictures = [view.image for view in views]
+    fit = fit_paper(renderers, pictures, start, fog, settings.paper_rate, 1e-4, settings.descent_iterations)
+    pixels = [view.mask.size for view in seen.views]
     everywhere = np.ones(domain.resolution, np.bool_)
-    return Density(
-        _without_traces(fit.density), everywhere, _figures(loss, image.size // 3, fit.iterations, everywhere)
-    )
+    losses = fit.losses[: len(pixels)]
+    return Density(_without_traces(fit.density), everywhere, _figures(losses, pixels, fit.iterations, everywhere))
 
 
 def _without_traces(density: Volume) -> Volume:
@@ -237,15 +280,19 @@ def _without_traces(density: Volume) -> Volume:
 
 def _clean_plate(scene: Scene, camera: Camera) -> Plate:
     width, height = camera.size
-    picture = np.broadcast_to(scene_background(scene), (height, width, 3)).astype(np.float32)
+    picture = np.broadcast_to(scene_background(scene, camera), (height, width, 3)).astype(np.float32)
     return Plate(picture, np.ones((height, width), np.float32), srgb_to_linear(np.full(3, CODE)))
 
 
-def _figures(loss: float, pixels: int, iterations: int, hull: NDArray[np.bool_]) -> dict[str, float]:
-    error = loss / (3 * pixels)
+def _figures(
+    losses: Sequence[float], pixels: Sequence[int], iterations: int, hull: NDArray[np.bool_]
+) -> dict[str, float]:
+    errors = [loss / (3 * max(count, 1)) for loss, count in zip(losses, pixels, strict=True)]
+    decibels = [float(-10 * np.log10(max(error, 1e-12))) for error in errors]
     return {
-        "loss": loss,
-        "psnr": float(-10 * np.log10(max(error, 1e-12))),
+        "loss": sum(losses),
+        "psnr": decibels[0],
+        **{f"psnr_view_{number}": value for number, value in enumerate(decibels[1:], 1)},
         "iterations": float(iterations),
         "hull_share": float(hull.mean()),
     }

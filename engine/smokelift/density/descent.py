@@ -1,6 +1,6 @@
 """Projected descent on the exact gradient, preconditioned per voxel, with a step that needs no tuning.
 
-    minimise  sum |L(rho) - I|^2   subject to rho >= 0, rho = 0 outside the hull
+    minimise  sum_views sum_pixels |L(rho) - I|^2   subject to rho >= 0, rho = 0 outside the hull
 
 Every voxel is measured in units of its own scale w = rho_start + floor: in these units the steepest descent changes
 a ray's smoke in proportion to what is there, so the depth profile of the start survives what the picture says
@@ -10,11 +10,14 @@ as in the spectral projected gradient method of Birgin, Martinez and Raydan, 200
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.density.fit import Fit
-from smokelift.render.renderer import Image, Renderer, Volume
+from smokelift.density.fit import Fit, Target
+from smokelift.render.renderer import Image, Volume
 
 FLOOR = 0.1
 """Scale of an empty voxel of the hull, in mean densities of the start: it may fill, but more slowly than others."""
@@ -24,31 +27,25 @@ SHORTEN = 0.3
 
 
 def descend(
-    renderer: Renderer,
-    target: Image,
+    targets: Sequence[Target],
     density: Volume,
     hull: NDArray[np.bool_],
-    weight: NDArray[np.float32],
     enough: float,
     iterations: int,
     tolerance: float,
 ) -> Fit:
-    """Minimise the picture's error from a start; see the module.
+    """Minimise the pictures' error from a start; see the module.
 
     Parameters
     ----------
-    renderer
-        Made with the hull as its support.
-    target : (rows, columns, 3)
-        Linear radiance.
+    targets
+        Their renderers made with the hull as support.
     density : (nx, ny, nz)
         Start.
     hull : (nx, ny, nz) bool
         Voxels that may hold smoke.
-    weight : (rows, columns)
-        Weight of each pixel.
     enough
-        Loss at which the target's noise begins to be fitted; nothing is done below it.
+        Loss at which the targets' noise begins to be fitted; nothing is done below it.
     iterations
         At most so many steps.
     tolerance
@@ -59,17 +56,24 @@ def descend(
     current = density.ravel()[where]
     scale = current + np.float32(FLOOR * (current.mean() if current.size else 0.0))
 
-    def evaluate(candidate: NDArray[np.float32]) -> tuple[float, Image]:
+    def evaluate(candidate: NDArray[np.float32]) -> tuple[tuple[float, ...], list[Image]]:
         volume.ravel()[where] = candidate
-        residual = weight[..., None] * (renderer.image(volume, keep_record=True) - target)
-        return float(np.sum(np.square(residual, dtype=np.float64))), residual
+        residuals = [
+            target.weight[..., None] * (target.renderer.image(volume, keep_record=True) - target.image)
+            for target in targets
+        ]
+        return tuple(float(np.sum(np.square(part, dtype=np.float64))) for part in residuals), residuals
 
-    def gradient_of(residual: Image) -> NDArray[np.float32]:
+    def gradient_of(residuals: list[Image]) -> NDArray[np.float32]:
         """Derivative of the loss in units of the scale, for the last density evaluated."""
-        return renderer.gradient(2 * weight[..., None] * residual).ravel()[where] * scale
+        parts = (
+            target.renderer.gradient(2 * target.weight[..., None] * residual).ravel()[where]
+            for target, residual in zip(targets, residuals, strict=True)
+        )
+        return functools.reduce(np.add, parts) * scale
 
-    loss, residual = evaluate(current)
-    gradient = gradient_of(residual)
+    losses, residuals = evaluate(current)
+    loss, gradient = sum(losses), gradient_of(residuals)
     step: float | None = None
     done = 0
     while done < iterations and loss > enough:
@@ -80,22 +84,23 @@ def descend(
         while True:
             candidate = np.maximum(current - np.float32(trial) * scale * gradient, 0)
             moved = (candidate - current) / scale
-            new_loss, residual = evaluate(candidate)
+            new_losses, residuals = evaluate(candidate)
+            new_loss = sum(new_losses)
             if new_loss <= loss + SUFFICIENT * _dot(gradient, moved):
                 break
             trial *= SHORTEN
             if trial * slope < 1e-9 * loss:
                 volume.ravel()[where] = current
-                return Fit(volume, loss, done)
-        new_gradient = gradient_of(residual)
+                return Fit(volume, losses, done)
+        new_gradient = gradient_of(residuals)
         curvature = _dot(moved, new_gradient - gradient)
         step = _dot(moved, moved) / curvature if curvature > 0 else 4 * trial
         gained = loss - new_loss
-        current, loss, gradient = candidate, new_loss, new_gradient
+        current, losses, loss, gradient = candidate, new_losses, new_loss, new_gradient
         done += 1
         if gained < tolerance * loss:
             break
-    return Fit(volume, loss, done)
+    return Fit(volume, losses, done)
 
 
 def _dot(a: NDArray[np.float32], b: NDArray[np.float32]) -> float:

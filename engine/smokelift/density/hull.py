@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -75,3 +76,30 @@ def visual_hull(mask: NDArray[np.bool_], projection: Projection) -> NDArray[np.b
     rows = np.clip(np.rint(projection.rows), 0, height - 1).astype(np.intp)
     columns = np.clip(np.rint(projection.columns), 0, width - 1).astype(np.intp)
     return np.asarray(grown[rows, columns] & projection.visible)
+
+
+def common_hull(masks: Sequence[NDArray[np.bool_]], projections: Sequence[Projection]) -> NDArray[np.bool_]:
+    """Voxels (nx, ny, nz) that a picture shows, and that every picture which shows them allows to hold smoke."""
+    allowed = [visual_hull(mask, projection) for mask, projection in zip(masks, projections, strict=True)]
+    seen = np.any([projection.visible for projection in projections], axis=0)
+    for part, projection in zip(allowed, projections, strict=True):
+        seen &= part | ~projection.visible
+    return np.asarray(seen)
+
+
+def agreement(masks: Sequence[NDArray[np.bool_]], projections: Sequence[Projection]) -> float:
+    """Share of all pictures' smoke pixels behind which voxels lie that no picture rules out; 1 without any smoke.
+
+    About 1 for true views of the same smoke; little for cameras that are not where they are said to be.
+    """
+    hull = common_hull(masks, projections)
+    explained = shown = 0
+    for mask, projection in zip(masks, projections, strict=True):
+        voxels = hull & projection.visible
+        covered = np.zeros(mask.shape, np.bool_)
+        pixels = (np.rint(part[voxels]).astype(np.intp) for part in (projection.rows, projection.columns))
+        covered[tuple(pixels)] = True
+        covered = ndimage.binary_dilation(covered, iterations=2 * _radius(projection))
+        explained += np.count_nonzero(mask & covered)
+        shown += np.count_nonzero(mask)
+    return explained / shown if shown else 1.0

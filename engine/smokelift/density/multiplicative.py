@@ -7,17 +7,23 @@ the ray is scaled by s, the picture becomes J (1 - T^s) + T^s B; the transmittan
 
 Where shadows or thickness make the picture insensitive to s, the step is damped by the true sensitivity dL / d ln s,
 and where smoke and background look alike the picture says little, so the neighbours' step counts instead.
+
+Of several pictures each has its turn, so that the density becomes the one nearest to the start that all agree with:
+multiplicative algebraic reconstruction (Gordon, Bender and Herman 1970).
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from smokelift.density.fit import Fit
+from smokelift.density.fit import Fit, Target
 from smokelift.density.hull import Projection
-from smokelift.render.renderer import Image, Renderer, Volume
+from smokelift.render.renderer import Image, Volume
 
 STEP_RANGE = (0.4, 2.5)
 """Largest change of a ray's smoke in one iteration."""
@@ -30,76 +36,83 @@ PROBE = 1.05
 """Scale of the density for the secant dL / d ln s."""
 
 
+@dataclass(frozen=True, eq=False)
+class RayTarget(Target):
+    """A picture whose rays' smoke can be scaled; where it counts less, steps are shorter as well.
+
+    Attributes
+    ----------
+    background : (rows, columns, 3)
+        Linear radiance behind the smoke.
+    noise : (rows, columns, 3)
+        Standard deviation of the picture's noise, linear radiance.
+    projection
+        Where voxels lie in the picture.
+    """
+
+    background: Image
+    noise: Image
+    projection: Projection
+
+
 def fit_multiplicative(
-    renderer: Renderer,
-    target: Image,
-    background: Image,
-    density: Volume,
-    projection: Projection,
-    weight: NDArray[np.float32],
-    noise: Image,
-    enough: float,
-    iterations: int,
-    tolerance: float,
+    targets: Sequence[RayTarget], density: Volume, enough: float, iterations: int, tolerance: float
 ) -> Fit:
-    """Scale the smoke of every ray until the picture matches; returns the best density seen.
+    """Scale the smoke of every ray until the pictures match; returns the best density seen.
 
     Parameters
     ----------
-    renderer, background : (rows, columns, 3)
-    target : (rows, columns, 3)
-        Linear radiance.
+    targets
+        What is to be met.
     density : (nx, ny, nz)
         Start; voxels at zero stay there.
-    projection
-        Where voxels lie in the picture.
-    weight : (rows, columns)
-        How much the picture counts, 0 to 1; where it counts less, steps are shorter as well.
-    noise : (rows, columns, 3)
-        Standard deviation of the target's noise, linear radiance.
     enough
-        Loss at which the target's noise begins to be fitted; nothing is done below it.
+        Loss at which the targets' noise begins to be fitted; nothing is done below it.
     iterations
-        At most so many.
+        At most so many, in each of which every target has a turn.
     tolerance
         Stop when an iteration lowers the loss by less than this share.
     """
-    best, best_loss, current, done = density, np.inf, density, 0
+    best, current, done = Fit(density, (np.inf,), 0), density, 0
     filled = density > 0
     for done in range(iterations + 1):
-        image = renderer.image(current)
-        transmittance = renderer.transmittance
-        loss = float(np.sum(weight[..., None] * np.square(image - target, dtype=np.float64)))
-        gained = best_loss - loss
-        if loss < best_loss:
-            best, best_loss = current, loss
+        images = [target.renderer.image(current) for target in targets]
+        losses = tuple(
+            float(np.sum(target.weight[..., None] * np.square(image - target.image, dtype=np.float64)))
+            for target, image in zip(targets, images, strict=True)
+        )
+        loss = sum(losses)
+        gained = best.loss - loss
+        if loss < best.loss:
+            best = Fit(current, losses, done)
         if done == iterations or loss <= enough or (done > 2 and gained < tolerance * loss):
             break
-        secant = (renderer.image(current * np.float32(PROBE)) - image) / np.log(PROBE)
-        step = _log_scale(image, transmittance, secant, target, background, weight, noise)
-        scaled = current.copy()
-        scaled[filled] *= np.exp(RELAXATION * projection.read(step, filled))
-        current = scaled
-    return Fit(best, best_loss, done)
+        for turn, target in enumerate(targets):
+            image = images[0] if turn == 0 else target.renderer.image(current)
+            current = _scaled(current, filled, target, image)
+    return Fit(best.density, best.losses, done)
 
 
-def _log_scale(
-    image: Image,
-    transmittance: Image,
-    secant: Image,
-    target: Image,
-    background: Image,
-    weight: NDArray[np.float32],
-    noise: Image,
-) -> NDArray[np.float32]:
+def _scaled(density: Volume, filled: NDArray[np.bool_], target: RayTarget, image: Image) -> Volume:
+    """The density whose picture is nearer to a target, from the one with a picture."""
+    transmittance = target.renderer.transmittance
+    secant = (target.renderer.image(density * np.float32(PROBE)) - image) / np.log(PROBE)
+    step = target.projection.read(_log_scale(image, transmittance, secant, target), filled)
+    scaled = density.copy()
+    scaled[filled] *= np.exp(RELAXATION * np.where(target.projection.visible[filled], step, np.float32(0)))
+    return scaled
+
+
+def _log_scale(image: Image, transmittance: Image, secant: Image, target: RayTarget) -> NDArray[np.float32]:
     """Logarithm of each pixel's scale, damped and smoothed, (rows, columns)."""
+    background, weight = target.background, target.weight
     clear = transmittance[..., None]
     solid = np.maximum(1 - clear, 1e-6)
     source = (image - clear * background) / solid
     contrast = background - source
     power = np.sum(contrast**2, -1)
-    floor = np.mean(noise**2, -1)
-    wanted = np.clip(np.sum((target - source) * contrast, -1) / (power + 1e-20), 1e-4, 1.0)
+    floor = np.mean(target.noise**2, -1)
+    wanted = np.clip(np.sum((target.image - source) * contrast, -1) / (power + 1e-20), 1e-4, 1.0)
     scale = np.log(wanted) / np.minimum(np.log(np.maximum(transmittance, 1e-30)), -1e-6)
     change = np.sqrt(np.sum((image - background) ** 2, -1))
     sensitivity = np.sqrt(np.sum(secant**2, -1)) / np.maximum(change, 1e-6)

@@ -4,8 +4,9 @@
 
 Picture and record are the paper's own too (`smokelift.render.paper`). Two slips of the listing are mended (the sign
 of the difference, which ascends as printed, and the missing rho >= 0); the fixed rate, the start from thin fog and the
-imposed side view are the paper's. Its derivative is none voxel by voxel, so in thick smoke the loss falls at first and
-then rises without bound, at any rate; hence one thing that the listing has not: the best density seen is kept.
+imposed side view, where no other is given, are the paper's. Its derivative is none voxel by voxel, so in thick smoke
+the loss falls at first and then rises without bound, at any rate; hence one thing that the listing has not: the best
+density seen is kept.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 
 def fit_paper(
     renderers: Sequence[PaperRenderer],
-    target: Image,
+    targets: Sequence[Image],
     density: Volume,
     thin: Volume,
     rate: float,
@@ -36,9 +37,9 @@ def fit_paper(
     Parameters
     ----------
     renderers
-        One for each view; the target is the same for all.
-    target : (rows, columns, 3)
-        Linear radiance.
+        One for each view.
+    targets : (rows, columns, 3)
+        What each should show, linear radiance.
     density : (nx, ny, nz)
         Start.
     thin : (nx, ny, nz)
@@ -46,30 +47,31 @@ def fit_paper(
     rate
         Change of density that one step makes in the steepest voxel of the thin fog.
     minimum_loss
-        Mean squared difference, in units of the mean squared target, at which to stop.
+        Mean squared difference, in units of the targets' mean square, at which to stop.
     iterations
         At most so many.
     """
-    _, slope = _loss_and_gradient(renderers, target, thin)
+    _, slope = _losses_and_gradient(renderers, targets, thin)
     factor = np.float32(rate / (float(np.abs(slope).max()) or 1.0))
-    enough = minimum_loss * float(np.sum(np.square(target, dtype=np.float64))) * len(renderers)
-    current = best = density
-    loss, gradient = _loss_and_gradient(renderers, target, current)
-    least = loss
-    done = 0
-    while done < iterations and loss > enough:
+    enough = minimum_loss * sum(float(np.sum(np.square(target, dtype=np.float64))) for target in targets)
+    current = density
+    losses, gradient = _losses_and_gradient(renderers, targets, current)
+    best, done = Fit(current, losses, 0), 0
+    while done < iterations and sum(losses) > enough:
         current = np.maximum(current - factor * gradient, 0)
-        loss, gradient = _loss_and_gradient(renderers, target, current)
+        losses, gradient = _losses_and_gradient(renderers, targets, current)
         done += 1
-        if loss < least:
-            best, least = current, loss
-    return Fit(best, least, done)
+        if sum(losses) < best.loss:
+            best = Fit(current, losses, done)
+    return Fit(best.density, best.losses, done)
 
 
-def _loss_and_gradient(renderers: Sequence[PaperRenderer], target: Image, density: Volume) -> tuple[float, Volume]:
-    loss, gradient = 0.0, np.zeros_like(density)
-    for renderer in renderers:
+def _losses_and_gradient(
+    renderers: Sequence[PaperRenderer], targets: Sequence[Image], density: Volume
+) -> tuple[tuple[float, ...], Volume]:
+    losses, gradient = [], np.zeros_like(density)
+    for renderer, target in zip(renderers, targets, strict=True):
         difference = renderer.image(density) - target
-        loss += float(np.sum(np.square(difference, dtype=np.float64)))
+        losses.append(float(np.sum(np.square(difference, dtype=np.float64))))
         gradient += renderer.gradient(2 * difference)
-    return loss, gradient
+    return tuple(losses), gradient

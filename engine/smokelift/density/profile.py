@@ -143,14 +143,15 @@ class DepthProfile:
 
     def at(self, projection: Projection, voxels: NDArray[np.bool_]) -> NDArray[np.float64]:
         """The profile g (1/m), of unit integral along the depth, at the marked voxels (n,)."""
-        offset = voxel_centres(self._domain)[voxels] - self._centre
-        height = offset @ self._height
-        width = self._width(height, projection.read(self._balls, voxels))
-        profile = np.exp(-((np.abs(offset @ self._depth - self._axis.at(height)) / width) ** FLATNESS))
+        profile, width = self._shape_and_width(projection, voxels)
         profile /= 2 * width * gamma(1 + 1 / FLATNESS)
         if self._texture > 0:
             profile *= np.exp(self._texture * texture_noise(self._domain)[voxels])
         return np.asarray(profile)
+
+    def shape(self, projection: Projection, voxels: NDArray[np.bool_]) -> NDArray[np.float64]:
+        """The profile without texture at the marked voxels (n,), in units of its height in the middle."""
+        return self._shape_and_width(projection, voxels)[0]
 
     def share_inside(self) -> NDArray[np.float32]:
         """Share (rows, columns) of the profile that each pixel's ray meets inside the domain."""
@@ -170,6 +171,14 @@ class DepthProfile:
         ends = [(here + distance * along - middle) / width for distance in (near, far)]
         low, high = (np.sign(end) * gammainc(1 / FLATNESS, np.abs(end) ** FLATNESS) for end in ends)
         return np.where(missed, 0, (high - low) / 2).astype(np.float32)
+
+    def _shape_and_width(
+        self, projection: Projection, voxels: NDArray[np.bool_]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        offset = voxel_centres(self._domain)[voxels] - self._centre
+        height = offset @ self._height
+        width = self._width(height, projection.read(self._balls, voxels))
+        return np.exp(-((np.abs(offset @ self._depth - self._axis.at(height)) / width) ** FLATNESS)), width
 
     def _width(self, height: NDArray[np.float64], balls: NDArray[np.float32]) -> NDArray[np.float64]:
         """A, in metres."""
