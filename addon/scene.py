@@ -77,7 +77,11 @@ def shot_tables(scene: bpy.types.Scene, quick: bool = False) -> dict[str, Any]:
 
 def options(scene: bpy.types.Scene) -> list[str]:
     """The engine's options that are no part of the scene file."""
-    return ["--quality", scene.smokelift.quality, "--device", scene.smokelift.device]
+    settings = scene.smokelift
+    words = ["--quality", settings.quality, "--device", settings.device]
+    if settings.use_axis_depth:
+        words.append(f"--axis-depth={settings.axis_depth:g}")  # one word, for "-1e-05" alone is an option
+    return words
 
 
 def turned_world(scene: bpy.types.Scene) -> Matrix:

@@ -76,7 +76,7 @@ def main(arguments: Many[str] | None = None) -> int:
 
 def _reconstruct(options: argparse.Namespace, say: Reporter) -> None:
     began = time.monotonic()
-    settings = Settings.preset(options.quality, options.method, options.resolution)
+    settings = _settings(options)
     scene = _scene(options.input, options.frames)
     assert scene.clip is not None
     device.start(options.device)
@@ -107,7 +107,7 @@ def _reconstruct(options: argparse.Namespace, say: Reporter) -> None:
 
 
 def _inspect(options: argparse.Namespace, say: Reporter) -> None:
-    settings = Settings.preset(options.quality, options.method, options.resolution)
+    settings = _settings(options)
     scene = _scene(options.input, options.frames)
     assert scene.clip is not None
     with Clip.open(scene.clip) as clip:
@@ -210,6 +210,11 @@ _COMMANDS = {
 }
 
 
+def _settings(options: argparse.Namespace) -> Settings:
+    preset = Settings.preset(options.quality, options.method, options.resolution)
+    return replace(preset, axis_depth=options.axis_depth)
+
+
 def _scene(path: Path, frames: tuple[int, int] | None) -> Scene:
     if path.suffix.lower() == ".toml":
         scene = Scene.load(path)
@@ -274,6 +279,12 @@ def _parser() -> argparse.ArgumentParser:
     what.add_argument("--method", choices=METHODS, default="default", help="paper: the published loop, for comparison")
     what.add_argument("--resolution", type=_three_counts, metavar="X,Y,Z", help="voxels, if not the scene's")
     what.add_argument("--frames", type=_frame_range, metavar="A:B", help="first and last frame, from 0")
+    what.add_argument(
+        "--axis-depth",
+        type=float,
+        metavar="METRES",
+        help="how far behind the middle of the box the smoke stands (before it: less than 0), if you know",
+    )
 
     job = commands.add_parser("reconstruct", parents=[common, what], help="a clip or scene file to a VDB sequence")
     job.add_argument("--out", type=Path, required=True, help="directory for the sequence")

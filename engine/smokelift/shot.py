@@ -23,6 +23,7 @@ from smokelift.background import (
 )
 from smokelift.cameras import CameraError, WorkingPicture, as_matrix, working_picture
 from smokelift.clip import Clip
+from smokelift.density import SmokeAxis
 from smokelift.images import area_average, read_image
 from smokelift.render import scene_lights
 from smokelift.render.setup import Scattering
@@ -126,6 +127,8 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
         plate_at = lambda _frame: plate  # noqa: E731
     samples = _smoke_samples(clip, plate_at)
     camera, domain = _geometry(clip, scene, settings, samples, notes)
+    if settings.axis_depth is not None:
+        SmokeAxis.given(settings.axis_depth, camera, domain)  # before anything is spent on what cannot be
     medium = scene.medium
     if medium is None:
         width = min(high - low for low, high in zip(domain.min, domain.max, strict=True))

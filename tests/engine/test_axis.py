@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from smokelift.density.axis import estimate_axis
+from smokelift.density.axis import SmokeAxis, estimate_axis
 from smokelift.render import Renderer
 from smokelift.scene import Camera, Domain, Medium
 
@@ -119,3 +119,16 @@ def test_known_sources_need_no_foot() -> None:
     two = estimate_axis(smoke, FRONT, BOX, [(0.2, -0.05, 1.0), (0.2, 0.25, 0.2)])
     np.testing.assert_allclose(two.at(np.array([-1.3, 0.2])), (0.25, 0.1), atol=0.01)
     np.testing.assert_allclose(two.spread_at(np.array([-1.3, 0.2])), (0.0, 0.15), atol=0.01)
+
+
+@pytest.mark.parametrize("depth", [-0.9, 0.9])
+def test_a_depth_that_is_given_holds_at_all_heights(depth) -> None:
+    """Before and behind the middle, up to the sides of the box."""
+    np.testing.assert_array_equal(SmokeAxis.given(depth, FRONT, BOX).at(np.array([-1.5, 0.0, 1.5])), depth)
+
+
+@pytest.mark.parametrize("depth", [-1.0, 1.2])
+def test_a_depth_outside_the_box_is_refused(depth) -> None:
+    """How far the box reaches is said."""
+    with pytest.raises(ValueError, match=rf"depth {depth:g} m is outside the box, which reaches 1 m"):
+        SmokeAxis.given(depth, FRONT, BOX)

@@ -55,6 +55,23 @@ class SmokeAxis:
         """The same depth at all heights."""
         return SmokeAxis(np.zeros(1), np.full(1, float(depth)), np.zeros(1))
 
+    @staticmethod
+    def given(depth: float, camera: Camera, domain: Domain) -> SmokeAxis:
+        """The depth that somebody says, at all heights.
+
+        Raises
+        ------
+        ValueError
+            If it is outside the domain.
+        """
+        reach = _reach(domain, view_frame(camera)[1])
+        if abs(depth) >= reach:
+            raise ValueError(
+                f"The axis depth {depth:g} m is outside the box, which reaches {reach:.3g} m before and behind its "
+                "middle; give a number between."
+            )
+        return SmokeAxis.upright(depth)
+
     def at(self, heights: NDArray[np.float64]) -> NDArray[np.float64]:
         """Depths at some heights."""
         return np.asarray(np.interp(heights, self.heights, self.depths))
