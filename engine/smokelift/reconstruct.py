@@ -190,7 +190,7 @@ def smoke_axis(clip: Clip, shot: Shot, settings: Settings) -> SmokeAxis:
         return SmokeAxis.upright()
     pictures = (shot.working.cut(clip.frame(number)) for number in clip.spread(AXIS_FRAMES))
     amounts = [optical_depth(picture, scene, settings.density, shot.plate) for picture in pictures]
-    return estimate_axis(amounts, scene.camera, scene.domain, [inlet.centre for inlet in scene.inlets])
+    return estimate_axis(amounts, scene.camera, scene.domain, scene.inlets)
 
 
 def _corrected(picture: Image, shot: Shot, settings: Settings, axis: SmokeAxis, transported: Volume | None) -> Density:
