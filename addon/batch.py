@@ -95,6 +95,8 @@ def _scene(choices: argparse.Namespace) -> bpy.types.Scene:
         settings.first, settings.last = choices.frames
     if choices.quality:
         settings.quality = choices.quality
+    if choices.axis_depth is not None:
+        settings.use_axis_depth, settings.axis_depth = True, choices.axis_depth
     if choices.output:
         settings.output = str(choices.output.absolute())
     if settings.clip is None:
@@ -118,6 +120,12 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--clip", type=Path, help="another clip than the scene's")
     parser.add_argument("--frames", type=_frames, metavar="A:B", help="first and last frame of the clip, from 1")
     parser.add_argument("--quality", choices=("draft", "balanced", "fine"))
+    parser.add_argument(
+        "--axis-depth",
+        type=float,
+        metavar="METRES",
+        help="how far behind the middle of the box the smoke stands",
+    )
     parser.add_argument("--output", type=Path, help="folder for the results")
     parser.add_argument("--resume", action="store_true", help="go on with the last unfinished run")
     parser.add_argument("--set-up", action="store_true", help="make renders look like the clip, as Set Up Shot does")

@@ -202,6 +202,11 @@ class _Advanced:
         row = layout.row()
         row.active = settings.camera_mode == "SCENE"
         row.prop(settings, "longest_side")
+        row = layout.row(heading="Known Depth")
+        row.prop(settings, "use_axis_depth", text="")
+        value = row.row()
+        value.active = settings.use_axis_depth
+        value.prop(settings, "axis_depth", text="")
         for name in ("fps", "transfer", "speed", "device", "use_medium"):
             layout.prop(settings, name)
         column = layout.column()

@@ -142,6 +142,18 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
         max=1024,
         update=_changed,
     )
+    use_axis_depth: BoolProperty(
+        name="Known Depth",
+        description="Say how far behind the middle of the box the smoke stands; else it is estimated",
+        update=_changed,
+    )
+    axis_depth: FloatProperty(
+        name="Depth",
+        description="From the middle of the box to the middle of the smoke, away from the camera; below 0 is nearer",
+        subtype="DISTANCE",
+        default=0.0,
+        update=_changed,
+    )
     fps: FloatProperty(
         name="Captured At",
         description="Frames a second at which the camera ran, if the clip is in slow motion; 0 is the clip's own rate",

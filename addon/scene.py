@@ -81,6 +81,8 @@ def options(scene: bpy.types.Scene) -> list[str]:
     words = ["--quality", settings.quality, "--device", settings.device]
     if settings.camera_mode == "SCENE" and not settings.longest_side:
         words += ["--resolution", "auto"]  # in the box, as fine as the clip's detail
+    if settings.use_axis_depth:
+        words.append(f"--axis-depth={settings.axis_depth:g}")  # one word, for "-1e-05" alone is an option
     return words
 
 

@@ -29,13 +29,19 @@ from typing import Any
 import numpy as np
 from accuracy_worker import SMEAR, VIEWS, run_views
 
-from smokelift import Camera, Clip, Scene, pictures
+from smokelift import Camera, Clip, Scene, metrics, pictures
 from smokelift.bench.machine import describe
 from smokelift.images import area_average
 from smokelift.render import Renderer, scene_renderer
 from smokelift.render.rays import project, ray_through_pixels
-from smokelift.scores import PictureScore, VolumeScore
+from smokelift.scores import PictureScore, VolumeScore, eight_bit_values, finite_mean
 from smokelift.truth import Truth
+
+FRONT, SIDE = "0", "90"
+"""Views between which a guess of the depth shows most: bands, and the front's picture seen from the side."""
+
+ALONG_RAYS = 1
+"""Axis of the voxels that the front camera looks along."""
 
 BASELINES = ("billboard", "truth", "black")
 """Runs without a reconstruction."""
@@ -201,9 +207,14 @@ def score(subject: Subject, run: str, folder: Path) -> dict[str, Any]:
         row |= {name: about[name] for name in (*RUN_FIGURES, "method")}
         row["resolution"] = "x".join(map(str, about["resolution"]))
     scores = {view: PictureScore(BLACK) for view in subject.cameras}
+    guessed: list[dict[str, float]] = []
     for frame, shown in images(subject, run, folder, subject.scored):
         for view, image in shown.items():
             scores[view].add(image, subject.seen(view, frame))
+        if SIDE in shown:
+            seen = {view: subject.seen(view, frame) for view in (FRONT, SIDE)}
+            of_truth = {f"{name}_truth": value for name, value in from_the_side(seen).items()}
+            guessed.append(from_the_side(shown) | of_truth)
     found = {view: judge.figures() for view, judge in scores.items()}
     used = {next(iter(subject.cameras)), *run_views(run)}
     for name in VIEW_FIGURES if subject.scored.step == 1 else VIEW_FIGURES[:-2]:  # flicker is of frames in a row
@@ -212,13 +223,24 @@ def score(subject: Subject, run: str, folder: Path) -> dict[str, Any]:
         row[f"{name}_new"] = float(np.mean(new)) if new else None
     if subject.truth is not None and run not in BASELINES:
         judge = VolumeScore(subject.truth)
-        for frame in subject.scored:
+        for number, frame in enumerate(subject.scored):
             arrays = volume(folder, subject, frame)
             judge.add(frame, arrays["density"], arrays.get("velocity"))
+            guessed[number] |= {
+                "streaks": metrics.streaks(arrays["density"], ALONG_RAYS),
+                "streaks_truth": metrics.streaks(subject.truth.density(frame), ALONG_RAYS),
+            }
         figures = judge.figures()
         row |= {name: figures.get(name) for name in VOLUME_FIGURES}
         row |= {f"layer_{name}": figures[name] for name in ("flicker", "flicker_truth")}
+    row |= {name: finite_mean(figures[name] for figures in guessed) for name in (guessed[0] if guessed else ())}
     return row
+
+
+def from_the_side(shown: dict[str, np.ndarray]) -> dict[str, float]:
+    """What a bad guess of the depth looks like from the side: bands, and the picture of the front."""
+    front, side = (eight_bit_values(shown[view]).mean(axis=-1) for view in (FRONT, SIDE))
+    return {"banding": metrics.banding(side), "likeness": metrics.likeness(side, front)}
 
 
 def means(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -247,6 +269,9 @@ def markdown(rows: list[dict[str, Any]], views: list[str]) -> str:
         "shifted, new": lambda row: _join(row, ["psnr_shifted_new"], ".1f"),
         "spectrum, new": lambda row: _join(row, ["spectrum_distance_new"], ".1f"),
         "flicker (true), new": lambda row: _join(row, ["flicker_new", "flicker_truth_new"], ".4f"),
+        "streaks (true)": lambda row: _join(row, ["streaks", "streaks_truth"], ".2f"),
+        "bands (true)": lambda row: _join(row, ["banding", "banding_truth"], ".2f"),
+        "front in side (true)": lambda row: _join(row, ["likeness", "likeness_truth"], ".2f"),
         "density": lambda row: _join(row, ["density_error"], ".2f"),
         "height mass": lambda row: _join(row, ["height_mass_error"], ".2f"),
         "mass": lambda row: _join(row, ["mass_ratio"], ".2f"),

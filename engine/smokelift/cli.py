@@ -218,7 +218,8 @@ _COMMANDS = {
 
 def _settings(options: argparse.Namespace) -> Settings:
     preset = Settings.preset(options.quality, options.method, options.resolution)
-    return replace(preset, density=replace(preset.density, scattering=options.scattering))
+    density = replace(preset.density, scattering=options.scattering)
+    return replace(preset, density=density, axis_depth=options.axis_depth)
 
 
 def _scene(path: Path, frames: tuple[int, int] | None) -> Scene:
@@ -295,6 +296,12 @@ def _parser() -> argparse.ArgumentParser:
         help="how light is scattered; auto measures which is needed",
     )
     what.add_argument("--frames", type=_frame_range, metavar="A:B", help="first and last frame, from 0")
+    what.add_argument(
+        "--axis-depth",
+        type=float,
+        metavar="METRES",
+        help="how far behind the middle of the box the smoke stands (before it: less than 0), if you know",
+    )
 
     job = commands.add_parser("reconstruct", parents=[common, what], help="a clip or scene file to a VDB sequence")
     job.add_argument("--out", type=Path, required=True, help="directory for the sequence")

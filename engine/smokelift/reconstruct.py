@@ -194,15 +194,15 @@ def _frames(clip: Clip, shot: Shot, settings: Settings, start: Frame | None) -> 
 
 def smoke_axis(clip: Clip, shot: Shot, settings: Settings) -> SmokeAxis:
     """Where in depth the smoke of a clip stands: as the settings say, or estimated from some frames."""
-    if settings.axis_depth is not None:
-        return SmokeAxis.upright(settings.axis_depth)
-    if settings.method == "paper" or shot.plate_at is not None or shot.views:
-        return SmokeAxis.upright()
     scene = shot.small_scene
     assert scene.camera is not None and scene.domain is not None
+    if settings.axis_depth is not None:
+        return SmokeAxis.given(settings.axis_depth, scene.camera, scene.domain)
+    if settings.method == "paper" or shot.plate_at is not None or shot.views:
+        return SmokeAxis.upright()
     pictures = (shot.working.cut(clip.frame(number)) for number in clip.spread(AXIS_FRAMES))
     amounts = [optical_depth(picture, scene, settings.density, shot.plate) for picture in pictures]
-    return estimate_axis(amounts, scene.camera, scene.domain, [inlet.centre for inlet in scene.inlets])
+    return estimate_axis(amounts, scene.camera, scene.domain, scene.inlets)
 
 
 def _corrected(

@@ -24,7 +24,7 @@ from smokelift.background import (
 )
 from smokelift.cameras import CameraError, WorkingPicture, as_matrix, voxel_width, working_picture
 from smokelift.clip import Clip, is_video
-from smokelift.density import Observation
+from smokelift.density import Observation, SmokeAxis
 from smokelift.density.hull import agreement, project_voxels
 from smokelift.images import area_average, read_image
 from smokelift.render import scene_lights
@@ -186,6 +186,8 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
         plate_at = lambda _frame: plate  # noqa: E731
     samples = _smoke_samples(clip, plate_at)
     camera, domain, resolved = _geometry(clip, scene, settings, plate_at, samples, notes)
+    if settings.axis_depth is not None:
+        SmokeAxis.given(settings.axis_depth, camera, domain)  # before anything is spent on what cannot be
     medium = scene.medium
     if medium is None:
         width = min(high - low for low, high in zip(domain.min, domain.max, strict=True))

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from smokelift.density.axis import estimate_axis
+from smokelift.density.axis import SmokeAxis, estimate_axis
 from smokelift.render import Renderer
-from smokelift.scene import Camera, Domain, Medium
+from smokelift.scene import Camera, Domain, Inlet, Medium
 
 BOX = Domain((-1, -1, 0), (1, 1, 3), (32, 32, 48))
 FRONT = Camera.look_at((0, -7, 1.5), (0, 0, 1.5), fov_y_degrees=30, size=(75, 113))
@@ -114,8 +114,63 @@ def test_depth_is_away_from_the_camera() -> None:
 def test_known_sources_need_no_foot() -> None:
     """Floating smoke stands where it is said to enter; above the second of two sources, between them."""
     smoke = seen(column(0.3, low=1.0), column(0.3, low=1.1))
-    one = estimate_axis(smoke, FRONT, BOX, [(0.2, 0.25, 0.5)])
+    one = estimate_axis(smoke, FRONT, BOX, [Inlet((0.2, 0.25, 0.5), 0.2)])
     np.testing.assert_allclose(one.at(np.array([-1.0, 0.2])), 0.25, atol=0.01)
-    two = estimate_axis(smoke, FRONT, BOX, [(0.2, -0.05, 1.0), (0.2, 0.25, 0.2)])
+    sources = [Inlet((0.2, -0.05, 1.0), 0.2), Inlet((0.2, 0.25, 0.2), 0.2)]
+    two = estimate_axis(smoke, FRONT, BOX, sources)
     np.testing.assert_allclose(two.at(np.array([-1.3, 0.2])), (0.25, 0.1), atol=0.01)
     np.testing.assert_allclose(two.spread_at(np.array([-1.3, 0.2])), (0.0, 0.15), atol=0.01)
+
+
+@pytest.mark.parametrize("depth", [-0.9, 0.9])
+def test_a_depth_that_is_given_holds_at_all_heights(depth) -> None:
+    """Before and behind the middle, up to the sides of the box."""
+    np.testing.assert_array_equal(SmokeAxis.given(depth, FRONT, BOX).at(np.array([-1.5, 0.0, 1.5])), depth)
+
+
+@pytest.mark.parametrize("depth", [-1.0, 1.2])
+def test_a_depth_outside_the_box_is_refused(depth) -> None:
+    """How far the box reaches is said."""
+    with pytest.raises(ValueError, match=rf"depth {depth:g} m is outside the box, which reaches 1 m"):
+        SmokeAxis.given(depth, FRONT, BOX)
+
+
+NEAR_RIGHT, FAR_LEFT = Inlet((0.45, -0.3, 0.1), 0.25), Inlet((-0.35, 0.3, 0.5), 0.25)
+
+
+def beside(lean: float = 0.0) -> np.ndarray:
+    """The smoke of two inlets: one near and to the right, one far and to the left, which begins higher."""
+    far = np.roll(column(0.3, low=0.5, lean=lean), round(-0.55 * 16), 0)
+    return np.maximum(np.roll(column(-0.3, lean=-lean), round(0.25 * 16), 0), far)
+
+
+def test_columns_beside_one_another_have_depths_of_their_own() -> None:
+    """Each as deep as its source, and as wide as it is itself, however far apart they stand."""
+    found = estimate_axis(seen(beside(), beside()), FRONT, BOX, [NEAR_RIGHT, FAR_LEFT])
+    heights, right, left = np.array([-0.9, 0.0, 0.4]), np.full(3, 0.45), np.full(3, -0.35)
+    np.testing.assert_allclose(found.at(heights, right), -0.3, atol=0.03)
+    np.testing.assert_allclose(found.at(heights, left), 0.3, atol=0.03)
+    np.testing.assert_allclose(found.spread_at(heights, left), 0.0, atol=0.1)
+    assert (found.width_at(heights, left) < 0.27).all()  # the row of both has 0.42
+    # before the far one begins there is only the near one
+    np.testing.assert_allclose(found.at(np.array([-1.4, -1.4]), np.array([-0.35, 0.45])), -0.3, atol=0.03)
+
+
+def test_where_columns_meet_both_may_stand() -> None:
+    """Between them the depth is the mean, and the spread says how far they are apart."""
+    found = estimate_axis(seen(beside(), beside()), FRONT, BOX, [NEAR_RIGHT, FAR_LEFT])
+    middle = np.array([0.05])
+    assert abs(found.at(np.array([0.0]), middle)[0]) < 0.1
+    assert found.spread_at(np.array([0.0]), middle)[0] == pytest.approx(0.3, abs=0.05)
+
+
+def test_columns_are_followed_where_they_lean() -> None:
+    """A column keeps its depth on its way across the picture, and is believed less the further it went."""
+    smoke = beside(lean=0.12)
+    found = estimate_axis(seen(smoke, smoke), FRONT, BOX, [NEAR_RIGHT, FAR_LEFT])
+    heights = np.array([-1.2, -0.5])
+    np.testing.assert_allclose(
+        found.columns[0].middles[np.searchsorted(found.heights, heights)], (0.41, 0.33), atol=0.03
+    )
+    low, high = found.at(heights, 0.45 - 0.12 * (heights + 1.5))
+    assert -0.3 < low < -0.28 < high < -0.22

@@ -184,6 +184,24 @@ def test_a_clip_alone_is_enough(plume, tmp_path, capsys) -> None:
     assert sequence.scene.domain.resolution == (16, 16, 24)
 
 
+def test_the_smoke_stands_where_the_command_says(shot, finished, tmp_path) -> None:
+    """The depth of its axis reaches the settings and the smoke; before the middle of the box it is negative."""
+    assert command("reconstruct", shot, "--out", tmp_path / "out", "--npz", "--axis-depth", "-0.2", *QUICK) == 0
+    near, plain = Sequence.open(tmp_path / "out"), Sequence.open(finished)
+    assert (near.settings["axis_depth"], plain.settings["axis_depth"]) == (-0.2, None)
+    y = np.arange(24) * 1.2 / 24
+    moved = [np.average(y, weights=sequence.density(1).sum(axis=(0, 2))) for sequence in (near, plain)]
+    assert moved[0] - moved[1] == pytest.approx(-0.2, abs=0.04)
+
+
+def test_a_depth_outside_the_box(shot, tmp_path, capsys) -> None:
+    """One sentence, also before a run, and nothing is written."""
+    for words in (("reconstruct", shot, "--out", tmp_path / "out"), ("inspect", shot)):
+        sentence = refused(capsys, *words, "--axis-depth", "0.7", *QUICK)
+        assert "outside the box, which reaches 0.6 m" in sentence
+    assert not (tmp_path / "out").exists()
+
+
 def test_inspect_says_how_smoke_gets_in_and_out(plume, tmp_path, capsys) -> None:
     """Marked inlets and closed sides, and the scene that would be run."""
     scene = replace(plume.scene, closed=("z-",), inlets=(Inlet((0, 0, 0.2), 0.1),))
@@ -310,6 +328,7 @@ def test_frames_in_the_wrong_order(shot, tmp_path, capsys) -> None:
         ("--quality", "best"),
         ("--resolution", "a,b,c"),
         ("--scattering", "many"),
+        ("--axis-depth", "far"),
     ],
 )
 def test_options_that_make_no_sense(shot, tmp_path, capsys, option) -> None:

@@ -3,7 +3,8 @@
 One picture of smoke in parallel light looks the same whether the smoke is near and small or far and large, so its place
 in depth has to come from something else. The floor gives it where smoke rises from there: a disc of smoke on the floor
 begins in the picture where the ray through the floor meets it, within a few rows. Elsewhere the axis of the domain is
-the best guess, because a box is put around its smoke.
+the best guess, because a box is put around its smoke. Where several columns rise from known places, each has an axis of
+its own, and the picture says whose smoke stands where.
 """
 
 from __future__ import annotations
@@ -14,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.density.screen import Upright, upright_rows, view_frame
-from smokelift.scene import Camera, Domain, Vector
+from smokelift.density.screen import Screen, Upright, upright_screen, view_frame
+from smokelift.scene import Camera, Domain, Inlet
 
 TRUSTED_FRAMES = 0.6
 """Share of the frames that have to show the foot."""
@@ -32,9 +33,34 @@ NEAR_SIDE = (0.3, 0.45)
 to lean to the other side, so that its mean is on the axis: a box would not be put so beside its smoke."""
 
 
+WIDENING = 0.15
+"""Growth of a column's radius per metre on its way up: it takes in air."""
+
+FOLLOWING = 0.5
+"""Share of its smoke by which a column stays where it was a row below: what else is there may not be its own."""
+
+
+@dataclass(frozen=True, eq=False)
+class Column:
+    """One of several columns of smoke, by height.
+
+    Attributes
+    ----------
+    begins
+        Height (m above the domain's centre) of its lower end.
+    middles, widths, depths : (n,)
+        Lateral place of its axis, lateral standard deviation and depth, in metres, at the heights of its `SmokeAxis`.
+    """
+
+    begins: float
+    middles: NDArray[np.float64]
+    widths: NDArray[np.float64]
+    depths: NDArray[np.float64]
+
+
 @dataclass(frozen=True, eq=False)
 class SmokeAxis:
-    """How far behind the domain's centre the middle of the smoke is, by height.
+    """How far behind the domain's centre the middle of the smoke is, by height, and by column where there are several.
 
     Attributes
     ----------
@@ -44,24 +70,69 @@ class SmokeAxis:
         In metres along `view_frame`'s depth, away from the camera.
     spreads : (n,)
         Standard deviation (m) about it of several columns that are known to stand behind one another.
+    columns
+        Known columns, if there are several. Beside one another they have depths of their own.
     """
 
     heights: NDArray[np.float64]
     depths: NDArray[np.float64]
     spreads: NDArray[np.float64]
+    columns: tuple[Column, ...] = ()
 
     @staticmethod
     def upright(depth: float = 0.0) -> SmokeAxis:
         """The same depth at all heights."""
         return SmokeAxis(np.zeros(1), np.full(1, float(depth)), np.zeros(1))
 
-    def at(self, heights: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Depths at some heights."""
-        return np.asarray(np.interp(heights, self.heights, self.depths))
+    @staticmethod
+    def given(depth: float, camera: Camera, domain: Domain) -> SmokeAxis:
+        """The depth that somebody says, at all heights.
 
-    def spread_at(self, heights: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Spreads at some heights."""
-        return np.asarray(np.interp(heights, self.heights, self.spreads))
+        Raises
+        ------
+        ValueError
+            If it is outside the domain.
+        """
+        reach = _reach(domain, view_frame(camera)[1])
+        if abs(depth) >= reach:
+            raise ValueError(
+                f"The axis depth {depth:g} m is outside the box, which reaches {reach:.3g} m before and behind its "
+                "middle; give a number between."
+            )
+        return SmokeAxis.upright(depth)
+
+    def at(self, heights: NDArray[np.float64], laterals: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+        """Depths at some heights, and lateral places if it is not to be the mean over the columns."""
+        if not self.columns or laterals is None:
+            return np.asarray(np.interp(heights, self.heights, self.depths))
+        return self._mean([column.depths for column in self.columns], heights, laterals)
+
+    def spread_at(
+        self, heights: NDArray[np.float64], laterals: NDArray[np.float64] | None = None
+    ) -> NDArray[np.float64]:
+        """Spreads at some heights, and lateral places."""
+        if not self.columns or laterals is None:
+            return np.asarray(np.interp(heights, self.heights, self.spreads))
+        square = self._mean([column.depths**2 for column in self.columns], heights, laterals)
+        return np.asarray(np.sqrt(np.maximum(square - self.at(heights, laterals) ** 2, 0)))
+
+    def width_at(self, heights: NDArray[np.float64], laterals: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Lateral standard deviation (m) of the columns at some heights and lateral places."""
+        return self._mean([column.widths for column in self.columns], heights, laterals)
+
+    def _mean(
+        self, values: Sequence[NDArray[np.float64]], heights: NDArray[np.float64], laterals: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Mean over the columns that may hold the smoke at some places."""
+        total, shares = np.zeros(np.shape(heights)), np.zeros(np.shape(heights))
+        for column, value in zip(self.columns, values, strict=True):
+            middle, width = (np.interp(heights, self.heights, of) for of in (column.middles, column.widths))
+            share = _likelihood(laterals, middle, width) * (heights >= column.begins)
+            total += share * np.interp(heights, self.heights, value)
+            shares += share
+        lowest = min(range(len(values)), key=lambda k: self.columns[k].begins)
+        below = np.interp(heights, self.heights, values[lowest])
+        return np.where(shares > 0, total / np.maximum(shares, 1e-30), below)
 
 
 @dataclass(frozen=True)
@@ -74,7 +145,7 @@ class _Foot:
 
 
 def estimate_axis(
-    amounts: Sequence[NDArray[np.float32]], camera: Camera, domain: Domain, sources: Sequence[Vector] = ()
+    amounts: Sequence[NDArray[np.float32]], camera: Camera, domain: Domain, sources: Sequence[Inlet] = ()
 ) -> SmokeAxis:
     """The axis of the smoke in some frames of a clip.
 
@@ -85,7 +156,7 @@ def estimate_axis(
     camera
         A camera that stands still.
     sources
-        Where smoke is known to enter, in metres; else its foot on the floor is looked for.
+        Where smoke is known to enter; else its foot on the floor is looked for.
 
     Returns
     -------
@@ -93,13 +164,17 @@ def estimate_axis(
         The domain's axis where nothing says otherwise: no smoke that stands on the domain's floor in most frames, or a
         camera that does not look down on the floor.
     """
-    rows = [row for row in (upright_rows(amount, camera, domain) for amount in amounts) if row.total.any()]
-    if not rows:
+    screens = [
+        screen for screen in (upright_screen(amount, camera, domain) for amount in amounts) if screen.values.any()
+    ]
+    if not screens:
         return SmokeAxis.upright()
+    rows = [screen.rows() for screen in screens]
     heights = rows[0].heights
     if sources:
         depth, across, spread = _through(sources, heights, camera, domain)
-        return SmokeAxis(heights, _believed(depth, across, rows, camera, domain), spread)
+        columns = _columns(sources, screens, camera, domain) if len(sources) > 1 else ()
+        return SmokeAxis(heights, _believed(depth, across, rows, camera, domain), spread, columns)
     found = [foot for foot in (_foot(row, camera, domain) for row in rows) if foot is not None]
     if not found or len(found) < TRUSTED_FRAMES * len(amounts):
         return SmokeAxis.upright()
@@ -115,11 +190,11 @@ def estimate_axis(
 
 
 def _through(
-    sources: Sequence[Vector], heights: NDArray[np.float64], camera: Camera, domain: Domain
+    sources: Sequence[Inlet], heights: NDArray[np.float64], camera: Camera, domain: Domain
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Mean depth, mean lateral position and spread in depth (m), at some heights, of the sources below."""
     lateral, along, height = view_frame(camera)
-    places = np.array(sources) - np.array(domain.centre)
+    places = np.array([source.centre for source in sources]) - np.array(domain.centre)
     places = places[np.argsort(places @ height)]
     counts = np.arange(1, len(places) + 1)
     depths = places @ along
@@ -128,6 +203,43 @@ def _through(
     quantities = means, np.cumsum(places @ lateral) / counts, np.sqrt(np.maximum(variances, 0))
     depth, across, spread = (np.interp(heights, places @ height, quantity) for quantity in quantities)
     return depth, across, spread
+
+
+def _columns(sources: Sequence[Inlet], screens: Sequence[Screen], camera: Camera, domain: Domain) -> tuple[Column, ...]:
+    """The columns above several sources, followed upwards in the mean picture.
+
+    In every row the smoke is shared out among the columns that have begun (a mixture of Gaussians, by expectation
+    maximisation), each expected where it was in the row below and as wide as a rising column becomes; were the widths
+    free, one column would swallow the others.
+    """
+    lateral, along, up = view_frame(camera)
+    places = np.array([source.centre for source in sources]) - np.array(domain.centre)
+    radii = np.array([source.radius for source in sources])
+    starts, depths, begins = places @ lateral, places @ along, places @ up - radii
+    heights, across = screens[0].heights, screens[0].laterals
+    # a disc's standard deviation is half its radius
+    widths = (radii[:, None] + WIDENING * np.maximum(heights - begins[:, None], 0)) / 2
+    picture = np.sum([screen.values for screen in screens], 0)
+    picture /= np.maximum(picture.sum(1, keepdims=True), 1e-30)
+    middles = np.empty_like(widths)
+    now = starts.copy()
+    for row, smoke in enumerate(picture):
+        begun = heights[row] >= begins
+        for _ in range(3):
+            share = _likelihood(across, now[begun, None], widths[begun, row, None])
+            part = smoke * share / np.maximum(share.sum(0), 1e-30)
+            now[begun] = (FOLLOWING * now[begun] + part @ across) / (FOLLOWING + part.sum(1))
+        middles[:, row] = now
+    drift = (middles - starts[:, None]) / np.maximum(np.abs(depths), domain.voxel_size)[:, None]
+    believed = depths[:, None] / (1 + drift**2)
+    return tuple(Column(float(begins[k]), middles[k], widths[k], believed[k]) for k in range(len(sources)))
+
+
+def _likelihood(
+    places: NDArray[np.float64], middles: NDArray[np.float64], widths: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """How likely smoke at some lateral places belongs to columns; never quite impossible."""
+    return np.asarray(np.exp(-(((places - middles) / widths) ** 2) / 2) + 1e-9)
 
 
 def _believed(

@@ -137,7 +137,7 @@ class DepthProfile:
         self._texture = texture
         self._camera, self._domain, self._axis = camera, domain, axis
         self._centre = np.array(domain.centre)
-        _, self._depth, self._height = view_frame(camera)
+        self._lateral, self._depth, self._height = view_frame(camera)
         self._heights, self._spread = lateral_spread(amount, camera, domain)
         self._balls = ball_spread(amount, camera, domain)
 
@@ -166,8 +166,9 @@ class DepthProfile:
         near, far, along = (np.where(missed, 1.0, value) for value in (np.maximum(near, 0), far, along))
         here = start @ self._depth
         meets = np.clip(-here / along, near, far)
-        height = (start + meets[..., None] * direction) @ self._height
-        middle, width = self._axis.at(height), self._width(height, self._balls)
+        place = start + meets[..., None] * direction
+        height, lateral = place @ self._height, place @ self._lateral
+        middle, width = self._axis.at(height, lateral), self._width(height, lateral, self._balls)
         ends = [(here + distance * along - middle) / width for distance in (near, far)]
         low, high = (np.sign(end) * gammainc(1 / FLATNESS, np.abs(end) ** FLATNESS) for end in ends)
         return np.where(missed, 0, (high - low) / 2).astype(np.float32)
@@ -176,13 +177,19 @@ class DepthProfile:
         self, projection: Projection, voxels: NDArray[np.bool_]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         offset = voxel_centres(self._domain)[voxels] - self._centre
-        height = offset @ self._height
-        width = self._width(height, projection.read(self._balls, voxels))
-        return np.exp(-((np.abs(offset @ self._depth - self._axis.at(height)) / width) ** FLATNESS)), width
+        height, lateral = offset @ self._height, offset @ self._lateral
+        width = self._width(height, lateral, projection.read(self._balls, voxels))
+        distance = np.abs(offset @ self._depth - self._axis.at(height, lateral))
+        return np.exp(-((distance / width) ** FLATNESS)), width
 
-    def _width(self, height: NDArray[np.float64], balls: NDArray[np.float32]) -> NDArray[np.float64]:
+    def _width(
+        self, height: NDArray[np.float64], lateral: NDArray[np.float64], balls: NDArray[np.float32]
+    ) -> NDArray[np.float64]:
         """A, in metres."""
-        lateral = np.interp(height, self._heights, self._spread)
-        spread = np.sqrt(lateral * balls + (APART * self._axis.spread_at(height)) ** 2)
+        if self._axis.columns:
+            across = self._axis.width_at(height, lateral)
+        else:
+            across = np.interp(height, self._heights, self._spread)
+        spread = np.sqrt(across * balls + (APART * self._axis.spread_at(height, lateral)) ** 2)
         scale = np.sqrt(gamma(1 / FLATNESS) / gamma(3 / FLATNESS))
         return np.asarray(np.maximum(spread, self._domain.voxel_size) * scale)

@@ -47,8 +47,41 @@ class Upright:
     spread: NDArray[np.float64]
 
 
+@dataclass(frozen=True, eq=False)
+class Screen:
+    """A picture on the upright screen through the domain's centre.
+
+    Attributes
+    ----------
+    heights : (n,)
+        Of the rows, in metres above the centre.
+    laterals : (m,)
+        Of the columns, in metres from the centre.
+    values : (n, m)
+        What the picture shows there.
+    """
+
+    heights: NDArray[np.float64]
+    laterals: NDArray[np.float64]
+    values: NDArray[np.float64]
+
+    def rows(self, part: slice = slice(None)) -> Upright:
+        """Sums along the rows, of some of the columns."""
+        across, values = self.laterals[part], self.values[:, part]
+        total = values.sum(1)
+        safe = np.where(total > 0, total, 1.0)
+        mean = (values * across).sum(1) / safe
+        variance = (values * (across - mean[:, None]) ** 2).sum(1) / safe
+        return Upright(self.heights, total * (self.laterals[1] - self.laterals[0]), mean, np.sqrt(variance))
+
+
 def upright_rows(amount: NDArray[np.float32], camera: Camera, domain: Domain, *, per_voxel: int = 2) -> Upright:
     """Sum a picture (rows, columns) up along the rows of the upright screen, ``per_voxel`` of them to a voxel."""
+    return upright_screen(amount, camera, domain, per_voxel=per_voxel).rows()
+
+
+def upright_screen(amount: NDArray[np.float32], camera: Camera, domain: Domain, *, per_voxel: int = 2) -> Screen:
+    """Put a picture (rows, columns) on the upright screen, ``per_voxel`` rows to a voxel and one column."""
     lateral, depth, height = view_frame(camera)
     centre = np.array(domain.centre)
     h = domain.voxel_size
@@ -64,8 +97,4 @@ def upright_rows(amount: NDArray[np.float32], camera: Camera, domain: Domain, *,
         amount.astype(np.float64), (pixels[..., 1] - 0.5, pixels[..., 0] - 0.5), order=1, mode="constant"
     )
     values[distance <= 0] = 0
-    total = values.sum(1)
-    safe = np.where(total > 0, total, 1.0)
-    mean = (values * across).sum(1) / safe
-    variance = (values * (across - mean[:, None]) ** 2).sum(1) / safe
-    return Upright(up, total * h, mean, np.sqrt(variance))
+    return Screen(up, across, values)

@@ -69,15 +69,16 @@ def test_a_shot_from_the_command_line(saved, tmp_path) -> None:
 
 
 def test_options_override_the_file(saved, tmp_path) -> None:
-    """Clip, frames, quality, folder."""
+    """Clip, frames, quality, place in depth, folder."""
     clip = tmp_path / "other.mp4"
     clip.write_bytes((EXAMPLE / "clip.mp4").read_bytes())
-    words = ("--clip", clip, "--frames", "2:3", "--quality", "fine", "--output", tmp_path / "elsewhere")
-    assert blender(saved, *words).returncode == 0
+    words = ("--clip", clip, "--frames", "2:3", "--quality", "fine", "--axis-depth", "-0.1")
+    assert blender(saved, *words, "--output", tmp_path / "elsewhere").returncode == 0
     sequence = Sequence.open(tmp_path / "elsewhere" / "take_0001")
     assert sequence.scene.clip.path == clip
     assert sequence.scene.clip.frames == (1, 2)
     assert sequence.settings["quality"] == "fine"
+    assert sequence.settings["axis_depth"] == pytest.approx(-0.1)
 
 
 @pytest.mark.parametrize(
@@ -87,6 +88,7 @@ def test_options_override_the_file(saved, tmp_path) -> None:
         (("--frames", "40:60"), 2, "frames 1 to 48"),
         (("--frames", "5"), 2, "--frames"),
         (("--quality", "best"), 2, "--quality"),
+        (("--axis-depth", "far"), 2, "--axis-depth"),
         (("--unknown",), 2, "--unknown"),
         (("--help",), 0, ""),
     ],

@@ -402,6 +402,16 @@ def test_an_inlet(shot, tmp_path) -> None:
     assert engines(shot, tmp_path).inlets == ()
 
 
+def test_a_known_depth(shot) -> None:
+    """Said to the engine if it is known, in one word even where it is negative; zero is a depth as well."""
+    shot.smokelift.axis_depth = -0.25
+    assert not any(word.startswith("--axis-depth") for word in module.options(shot))
+    shot.smokelift.use_axis_depth = True
+    assert "--axis-depth=-0.25" in module.options(shot)
+    shot.smokelift.axis_depth = 0.0
+    assert "--axis-depth=0" in module.options(shot)
+
+
 def test_an_inlet_needs_a_box_of_its_own(shot) -> None:
     """In a box that is found it would stand anywhere."""
     add_inlet(shot)
