@@ -3,8 +3,8 @@
 One picture's guess is that of its depth profile, about an axis that comes from elsewhere. Of several, each is shown by
 the others where its smoke stands; the guess then is what all their profiles have in common, in every layer as much as
 the pictures show. It need not look like any of them: scaling ray by ray, the multiplicative fit keeps nothing of it but
-how one ray's smoke hangs together with another's, and for that round smoke was better than any that fills the hull's
-corners (by 1 to 3 dB in new views over four scenes).
+how one ray's smoke hangs together with another's. For that round smoke was better in new views than smoke that fills
+the hull's corners (docs/accuracy.md).
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from smokelift.render.renderer import Image, Volume
 from smokelift.scene import Camera, Domain
 
 LEAST_SHAPE = 0.05
-"""Of several profiles each has everywhere in the hull so much of its height: others may show smoke there. Over four
-scenes 0.05 was the best in new views; 0.02 left the pictures worse met, 0.1 cost 0.3 dB."""
+"""Of several profiles each has everywhere in the hull so much of its height: others may show smoke there. 0.1 cost
+0.3 dB in new views over four scenes; with less the pictures are met less well."""
 
 
 @dataclass(frozen=True, eq=False)
