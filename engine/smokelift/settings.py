@@ -38,7 +38,7 @@ class Settings:
         textured background leaves open; with more, the velocity's own errors smear the depth from frame to frame.
     axis_depth
         How far behind the domain's centre (metres, away from the camera) the middle of the smoke stands; None estimates
-        it from where the smoke meets the floor, and takes the domain's centre where it does not.
+        it from where the smoke meets the floor and from the light of coloured lamps, else takes the domain's centre.
     density, velocity
         Settings of the two parts.
     """
