@@ -22,6 +22,7 @@ from smokelift.coupling import first_guess
 from smokelift.density import Density, SmokeAxis, depth_guess, optical_depth, reconstruct_density
 from smokelift.density.axis import estimate_axis
 from smokelift.density.hull import project_voxels
+from smokelift.density.light import refine_axis
 from smokelift.render.renderer import Image, Volume
 from smokelift.scene import Domain, Scene
 from smokelift.sequence import SequenceWriter
@@ -32,6 +33,9 @@ from smokelift.velocity import estimate_velocity, predict_velocity
 
 AXIS_FRAMES = 16
 """Frames from which the place in depth is estimated."""
+
+LIGHT_FRAMES = 4
+"""Those of them whose light is looked at as well: it costs 200 pictures on a coarse grid for each."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,9 +204,13 @@ def smoke_axis(clip: Clip, shot: Shot, settings: Settings) -> SmokeAxis:
         return SmokeAxis.given(settings.axis_depth, scene.camera, scene.domain)
     if settings.method == "paper" or shot.plate_at is not None or shot.views:
         return SmokeAxis.upright()
-    pictures = (shot.working.cut(clip.frame(number)) for number in clip.spread(AXIS_FRAMES))
+    pictures = [shot.working.cut(clip.frame(number)) for number in clip.spread(AXIS_FRAMES)]
     amounts = [optical_depth(picture, scene, settings.density, shot.plate) for picture in pictures]
-    return estimate_axis(amounts, scene.camera, scene.domain, scene.inlets)
+    axis = estimate_axis(amounts, scene.camera, scene.domain, scene.inlets)
+    if scene.inlets or shot.scattering != "single":
+        return axis
+    looks = list(zip(pictures, amounts, strict=True))[:: AXIS_FRAMES // LIGHT_FRAMES]
+    return refine_axis(axis, [look for look in looks if look[1].any()], scene, shot.plate)
 
 
 def _corrected(

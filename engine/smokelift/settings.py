@@ -40,8 +40,8 @@ class Settings:
         smear the depth from frame to frame. The paper's method takes all of it, whatever is said here.
     axis_depth
         How far behind the domain's centre (metres, away from the camera) the middle of the smoke stands; None estimates
-        it from where the smoke meets the floor, and takes the domain's centre where it does not. Further views tell it
-        better than either.
+        it from where the smoke meets the floor and from the light of coloured lamps, else takes the domain's centre.
+        Further views tell it better than either.
     density, velocity
         Settings of the two parts.
     """

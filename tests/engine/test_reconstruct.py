@@ -18,7 +18,7 @@ from smokelift.images import write_image
 from smokelift.metrics import psnr
 from smokelift.reconstruct import Frame, reconstruct, smoke_axis
 from smokelift.render import render, scene_renderer
-from smokelift.scene import Background, ClipSource, Inlet, Scene, look_at_matrix
+from smokelift.scene import Background, ClipSource, Inlet, Medium, PointLight, Scene, look_at_matrix
 from smokelift.sequence import Sequence, SequenceError
 from smokelift.settings import Settings
 from smokelift.shot import prepare_shot
@@ -90,6 +90,19 @@ def test_the_axis_is_estimated_from_the_clip(plume, draft, tmp_path, method, exp
     with Clip.open(scene.clip) as clip:
         axis = smoke_axis(clip, prepare_shot(clip, scene, settings), settings)
     np.testing.assert_allclose(axis.at(np.array([-0.6, 0.0])), expected, atol=0.5 * expected)
+
+
+@pytest.mark.parametrize(("scattering", "expected"), [("single", -0.15), ("unshadowed", 0.0)])
+def test_coloured_lamps_show_the_depth_of_a_clip(plume, draft, tmp_path, scattering, expected) -> None:
+    """Of smoke that floats, where the light is known; where it is not, the light says nothing."""
+    x, y, z = np.moveaxis(voxel_centres(plume.scene.domain), -1, 0)
+    ball = np.clip(2 - np.sqrt(x**2 + (y + 0.15) ** 2 + (z - 0.8) ** 2) / 0.15, 0, 1).astype(np.float32)
+    lamps = PointLight((0.8, -1.2, 1.6), (20, 10, 3)), PointLight((-0.8, 1.2, 1.6), (3, 10, 20))
+    scene = plume.write(tmp_path, [ball] * 2, replace(plume.scene, lights=lamps, medium=Medium(2.0, 0.9)))
+    with Clip.open(scene.clip) as clip:
+        shot = replace(prepare_shot(clip, scene, draft), scattering=scattering)
+        axis = smoke_axis(clip, shot, draft)
+    assert axis.at(np.array([0.0]))[0] == pytest.approx(expected, abs=0.06)
 
 
 def test_frames_come_in_order(run, plume) -> None:

@@ -1,0 +1,86 @@
+"""Depth from lamps of different colours: found where they tell, left alone where they do not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from smokelift.background import Plate
+from smokelift.density import DensitySettings, SmokeAxis, optical_depth
+from smokelift.density.hull import voxel_centres
+from smokelift.density.light import refine_axis
+from smokelift.images import linear_to_srgb, srgb_to_linear
+from smokelift.render import render
+from smokelift.scene import Background, Camera, DirectionalLight, Domain, Medium, PointLight, Scene
+
+RED, BLUE, GREY = (36.0, 18.0, 6.0), (6.0, 18.0, 36.0), (20.0, 20.0, 20.0)
+FRONT, BACK, LEFT = (-1.2, -1.9, 2.3), (1.2, 1.9, 2.3), (-2.2, 0.0, 2.3)
+SCENE = Scene(
+    camera=Camera.look_at((0, -7, 1), (0, 0, 1), fov_y_degrees=18, size=(32, 32)),
+    domain=Domain((-1, -1, 0), (1, 1, 2), (32, 32, 32)),
+    medium=Medium(extinction=1.5, albedo=0.9),
+    lights=(PointLight(FRONT, RED), PointLight(BACK, BLUE)),
+    background=Background(color=(0.0, 0.0, 0.0)),
+)
+
+
+def column(depth: float, lean: float) -> np.ndarray:
+    """Smoke that is soft at its edge, half a metre and more from floor and ceiling."""
+    x, y, z = np.moveaxis(voxel_centres(SCENE.domain), -1, 0)
+    z = z - 1
+    inside = np.clip(1.5 - np.hypot(x, y - depth - lean * z) / 0.2, 0, 1) * np.clip(5 * (0.5 - np.abs(z)), 0, 1)
+    return inside.astype(np.float32)
+
+
+def found(scene: Scene, depth: float, lean: float = 0.0) -> tuple[SmokeAxis, SmokeAxis]:
+    """The axis before and after a look at an 8-bit picture."""
+    picture = linear_to_srgb(render(column(depth, lean), scene))
+    picture = srgb_to_linear(np.rint(255 * picture) / 255).astype(np.float32)
+    noise = np.full(3, 1e-3, np.float32)
+    plate = Plate(np.zeros_like(picture), np.ones(picture.shape[:2], np.float32), noise)
+    before = SmokeAxis.upright()
+    looks = [(picture, optical_depth(picture, scene, DensitySettings(), plate))]
+    return before, refine_axis(before, looks, scene, plate)
+
+
+@pytest.mark.parametrize("depth", [-0.25, 0.3])
+def test_lamps_before_and_behind_show_the_depth(depth) -> None:
+    """What is redder is nearer to the red lamp."""
+    _, axis = found(SCENE, depth)
+    assert axis.at(np.array([0.0]))[0] == pytest.approx(depth, abs=0.1)
+
+
+def test_lamps_before_and_behind_show_the_lean() -> None:
+    """Top and bottom of a column that leans away are lit by different lamps."""
+    _, axis = found(SCENE, 0.0, lean=0.4)
+    low, high = axis.at(np.array([-0.4, 0.4]))
+    assert high - low == pytest.approx(0.8 * 0.4, abs=0.15)
+
+
+@pytest.mark.parametrize(
+    "lights",
+    [
+        (PointLight(FRONT, GREY), PointLight(BACK, GREY)),
+        (PointLight(FRONT, RED), PointLight((-1.1, -1.9, 2.3), BLUE)),
+        (PointLight(LEFT, RED), PointLight((2.2, 0.1, 2.3), BLUE)),
+        (DirectionalLight((0, 0.7, -0.7), RED), DirectionalLight((0, -0.7, -0.7), BLUE)),
+        (PointLight(FRONT, RED), DirectionalLight((0, -0.7, -0.7), BLUE)),
+        (),
+    ],
+    ids=["one colour", "one place", "left and right", "parallel", "one lamp", "none"],
+)
+def test_other_lights_say_nothing(lights) -> None:
+    """The axis is what it was."""
+    before, after = found(replace(SCENE, lights=lights), 0.3)
+    assert after is before
+
+
+def test_no_pictures_say_nothing() -> None:
+    """Nothing to look at, or nothing in it."""
+    plate = Plate(np.zeros((32, 32, 3), np.float32), np.ones((32, 32), np.float32), np.full(3, 1e-3, np.float32))
+    axis = SmokeAxis.upright(0.1)
+    assert refine_axis(axis, [], SCENE, plate) is axis
+    black = np.zeros((32, 32, 3), np.float32)
+    assert refine_axis(axis, [(black, black[..., 0])], SCENE, plate) is axis
