@@ -47,6 +47,7 @@ _SMOOTH = 1.5  # pixels
 _FAINT, _SURE = 4.0, 8.0  # noise; thresholds of the mask
 _LEAST_SURE = 1e-4  # share of the picture that must be surely smoke in a patch of the mask
 _MOST_NOISE = np.float32(6 / 255)  # a pixel that varies more while the camera moves sees more than one colour
+_SWAMPED = 3.0  # times what pixels beside the smoke say, from which noise over time is taken to be smoke's
 _WORST_FRAME = 2.0  # how many times more than the clip a frame may be taken to deviate as a whole
 
 
@@ -146,8 +147,11 @@ def known_plate(background: npt.ArrayLike, clip: Clip, sample_count: int = 32) -
         linear = np.broadcast_to(linear, (height, width, 3))
     if linear.ndim != 3 or linear.shape[2] != 3 or not np.isfinite(linear).all():
         raise ValueError(f"a background must be a finite colour or RGB picture, not of shape {linear.shape}")
-    sigma = _temporal_noise(_samples(clip, sample_count, _NOISE_STEP))
     encoded = linear_to_srgb(area_average(linear, width, height))
+    samples = _decoded(_samples(clip, sample_count, _NOISE_STEP))
+    over_time, beside = _noise_of(samples), _noise_beside(samples, encoded[::_NOISE_STEP, ::_NOISE_STEP])
+    # where smoke passes over most of the picture, what changes over time is smoke
+    sigma = np.where(over_time > _SWAMPED * beside, beside, over_time)
     return _plate(encoded, np.ones((height, width), np.float32), sigma)
 
 
@@ -305,6 +309,16 @@ def _temporal_noise(samples: npt.NDArray[np.uint16]) -> Picture:
 def _noise_of(frames: Picture) -> Picture:
     spread = frames.std(axis=0).reshape(-1, 3)
     noise: Picture = np.maximum(np.median(spread, axis=0), CODE).astype(np.float32)
+    return noise
+
+
+def _noise_beside(frames: Picture, plate: Picture) -> Picture:
+    """Return the noise per channel of the tenth of the pixels that stay nearest to a known plate, in sRGB values.
+
+    Smoke may pass over nine tenths of the picture.
+    """
+    apart = np.sqrt(np.mean((frames - plate) ** 2, axis=0)).reshape(-1, 3)
+    noise: Picture = np.maximum(np.quantile(apart, 0.1, axis=0), CODE).astype(np.float32)
     return noise
 
 

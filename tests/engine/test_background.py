@@ -125,6 +125,23 @@ def test_a_known_black_background(tmp_path: Path) -> None:
     assert picture.image.shape == (HEIGHT, WIDTH, 3)
 
 
+def test_smoke_over_most_of_the_picture_is_not_noise(tmp_path: Path) -> None:
+    def billows(n: int) -> np.ndarray:
+        rows, columns = np.mgrid[:HEIGHT, :WIDTH]
+        return np.where(columns < 0.65 * WIDTH, 0.3 + 0.25 * np.sin(rows / 4 + 0.8 * n), 0.0)
+
+    for name, behind in (("black", np.zeros((HEIGHT, WIDTH, 3))), ("wall", wall(0.2, 0.5))):
+        (tmp_path / name).mkdir()
+        clip = film(tmp_path / name, behind, billows, 0.9)
+        plate = known_plate(behind, clip)
+        noise = linear_to_srgb(np.median(behind, axis=(0, 1)) + plate.noise) - linear_to_srgb(
+            np.median(behind, axis=(0, 1))
+        )
+        assert 0.5 < noise.mean() * 255 < 2.0
+        for n in (4, 12, 20):
+            assert overlap(matte(clip.frame(n), plate).mask, billows(n) > 0.002) > 0.9
+
+
 def test_one_frame_is_its_own_plate(tmp_path: Path) -> None:
     write_image(tmp_path / "still.png", wall(0.2, 0.8))
     clip = Clip.open(tmp_path / "still.png")

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
-from smokelift.background import CODE, Plate
+from smokelift.background import CODE, Plate, matte
 from smokelift.clip import Clip
 from smokelift.images import srgb_to_linear, write_image
 from smokelift.reconstruct import reconstruct
@@ -130,6 +130,17 @@ def test_without_smoke_nothing_is_measured(plume, draft, tmp_path) -> None:
     shot = shot_of(plume.write(tmp_path, [0 * plume.densities[0]] * 3), draft)
     assert shot.scattering == "single"
     assert [choice.what for choice in shot.choices] == ["resolution"]
+
+
+def test_where_coarse_pictures_show_no_smoke_the_richest_model_stays(plume, draft, monkeypatch) -> None:
+    def blind(frame, plate):
+        judged = matte(frame, plate)
+        return replace(judged, mask=np.zeros_like(judged.mask))
+
+    monkeypatch.setattr("smokelift.selection.model.matte", blind)
+    shot = shot_of(plume.scene, draft)
+    assert shot.scattering == "single"
+    assert not any(choice.what == "scattering" for choice in shot.choices)
 
 
 def test_a_moving_camera_is_no_hindrance(plume, tracked, draft, tmp_path) -> None:

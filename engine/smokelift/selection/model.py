@@ -8,7 +8,7 @@ from functools import cache
 
 import numpy as np
 
-from smokelift.background import Plate
+from smokelift.background import Plate, matte
 from smokelift.clip import Clip
 from smokelift.density import Density, reconstruct_density
 from smokelift.render.setup import Scattering
@@ -77,9 +77,13 @@ def choose_model(
         assert scene.camera is not None
         return coarse_frame(clip.frame(number), scene.camera.at(number), scene, plate_at(number))
 
+    def shows_smoke(number: int) -> bool:
+        frame = coarse(number)
+        return frame is not None and bool(matte(frame.picture, frame.plate).mask.any())
+
     by_hand = settings.density.scattering
     wanted: Scattering = richest if by_hand == "auto" else by_hand
-    numbers = [number for number in _tried(smoky) if coarse(number) is not None]
+    numbers = [number for number in _tried(smoky) if shows_smoke(number)]
     frames = [frame for frame in map(coarse, numbers) if frame is not None]
     if not frames:
         return Model(scene, wanted, settings.velocity.grids, ())
