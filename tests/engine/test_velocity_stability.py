@@ -269,3 +269,15 @@ def test_blocks_that_stand_still_do_not_hold_the_smoke(amount):
     clean = estimate_velocity(before, after, DT, VOXEL)
     assert mean_motion(found, after) == pytest.approx(motion, abs=0.2)
     assert error(found, after, motion) < error(clean, after, motion) + 0.15
+
+
+@pytest.mark.parametrize("times", [20, 60])
+def test_a_prediction_that_ran_away_is_not_followed(times):
+    before, after = turned(0.0), turned(0.06)
+    alone = estimate_velocity(before, after, DT, VOXEL)
+    wild = Velocity(
+        (np.float32(times) * alone.faces[0], np.float32(times) * alone.faces[1], np.float32(times) * alone.faces[2]),
+        VOXEL,
+    )
+    found = estimate_velocity(before, after, DT, VOXEL, prediction=wild)
+    assert mean_speed(found, after) < 1.2 * mean_speed(alone, after)

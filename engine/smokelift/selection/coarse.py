@@ -69,7 +69,8 @@ def coarse_domain(domain: Domain, pixels: float) -> Domain:
             if max(counts) >= most / 2:
                 return replace(domain, resolution=(counts[0], counts[1], counts[2]))
             break
-    times_finer = max(longest / max(most, FEWEST), 1.0)
+    # nor so coarse that a side has less than one
+    times_finer = min(max(longest / max(most, FEWEST), 1.0), min(domain.resolution))
     voxel = domain.voxel_size * times_finer
     # never beyond the box, where a light may stand
     counts = [max(1, math.floor(n / times_finer + 1e-6)) for n in domain.resolution]

@@ -251,12 +251,17 @@ def _default(
 def _worthwhile(
     finest: Level, prediction: Prediction | None, search: bool, noise: float, settings: VelocitySettings
 ) -> Linearisation | None:
-    """The change around the prediction, if the prediction as it stands explains it well enough."""
+    """The change around the prediction, if that as it stands explains it well enough, and better than no motion."""
     if prediction is None or not any(component.any() for component in prediction.faces):
         return None
     u = prediction.displacement()
     linear = linearise(finest, u, search, settings)
-    return linear if linear is not None and _unexplained(linear, u, noise, settings) < WORTHLESS else None
+    if linear is None or _unexplained(linear, u, noise, settings) >= WORTHLESS:
+        return None
+    _, rest, _ = _core.evidence(linear.direction, linear.offset, linear.weight, linear.smoke, u, settings.threads)
+    # The linearised change grows with the prediction, however wrong that is, so that long runs would run away.
+    change = (finest.after - finest.before) / np.float32(linear.scale)
+    return linear if rest < float(np.sum(linear.weight * change**2, dtype=np.float64)) else None
 
 
 def _fit(
