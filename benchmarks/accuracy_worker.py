@@ -21,9 +21,9 @@ from typing import Any
 
 import numpy as np
 
-from smokelift import Clip, ClipSource, Scene, Settings, View, density, reconstruct, reconstruct_density
+from smokelift import Clip, ClipSource, Scene, Settings, View, reconstruct, reconstruct_density
 from smokelift.bench.machine import peak_bytes, poisson_seconds
-from smokelift.density import DensitySettings
+from smokelift.density import DensitySettings, evidence
 from smokelift.images import write_image
 from smokelift.shot import Shot, prepare_shot
 from smokelift.velocity import estimate
@@ -94,11 +94,11 @@ def leave_out(part: str, settings: Settings) -> Settings:
     if part == "sources":
         return replace(settings, velocity=replace(settings.velocity, sources=False))
     if part == "hull":
-        density.visual_hull = lambda _mask, projection: projection.visible
+        evidence.common_hull = lambda _masks, projections: np.any([p.visible for p in projections], axis=0)
     elif part == "projection":
         estimate.project = lambda found, _closed: found
     elif part == "depth":
-        density.DepthProfile.at = lambda _profile, _projection, voxels: np.full(np.count_nonzero(voxels), 0.5)
+        evidence.DepthProfile.at = lambda _profile, _projection, voxels: np.full(np.count_nonzero(voxels), 0.5)
     else:
         raise ValueError(f"without={part}: expected transport, hull, sources, projection or depth.")
     return settings
