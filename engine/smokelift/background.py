@@ -70,6 +70,10 @@ class Plate:
     confidence: Picture
     noise: Picture
 
+    def through(self, cut: Callable[[Picture], Picture]) -> Plate:
+        """The plate of a part of the picture, or of a smaller one, as a function cuts it from (height, width, ...)."""
+        return Plate(cut(self.image), cut(self.confidence), self.noise)
+
 
 @dataclass(frozen=True)
 class Matte:

@@ -139,7 +139,7 @@ class Shot:
             return None
         # An environment is as many lights as one camera needs; were they chosen anew, the light would flicker.
         lit = replace(self.scene, lights=scene_lights(self.small_scene))
-        plate = _small(self.plate_at(frame), working)
+        plate = self.plate_at(frame).through(working.cut)
         return replace(self, scene=lit, working=working, plate=plate, beside=beside)
 
     @property
@@ -218,7 +218,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
         choices = (*choices, *model.choices)
     views = tuple(_further_view(number, clip, complete, notes) for number in range(len(scene.views)))
     if views:
-        first = FurtherView(clip, working, lambda frame: _small(plate_at(frame), working))
+        first = FurtherView(clip, working, lambda frame: plate_at(frame).through(working.cut))
         agreed = _agreed((first, *views), domain, clip.spread(AGREEMENT_SAMPLES))
         if agreed < LEAST_AGREED:
             notes.append(
@@ -228,7 +228,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
     return Shot(
         complete,
         working,
-        _small(plate, working),
+        plate.through(working.cut),
         scattering,
         estimated,
         tuple(notes),
@@ -310,9 +310,9 @@ def _further_view(number: int, clip: Clip, scene: Scene, notes: list[str]) -> Fu
     plates = open_plates(own)
     if plates is not None:
         changing = changing_plate(plates, opened)
-        plate_at = lambda frame: _small(changing(frame), working)  # noqa: E731
+        plate_at = lambda frame: changing(frame).through(working.cut)  # noqa: E731
     else:
-        plate = _small(_plate(opened, own, found)[0], working)
+        plate = _plate(opened, own, found)[0].through(working.cut)
         plate_at = lambda _frame: plate  # noqa: E731
     axes = [np.array(each.matrix)[:3, 2] for each in (scene.camera, camera)]
     angle = np.degrees(np.arccos(np.clip(axes[0] @ axes[1], -1, 1)))
@@ -356,10 +356,6 @@ def _fitting(camera: Camera, clip: Clip) -> Camera:
     return camera.resized(*clip.size)
 
 
-def _small(plate: Plate, working: WorkingPicture) -> Plate:
-    return Plate(working.cut(plate.image), working.cut(plate.confidence), plate.noise)
-
-
 @dataclass(frozen=True, eq=False)
 class _SmokeSamples:
     """Where and how bright smoke is in some frames, at reduced size.
@@ -394,9 +390,7 @@ def _smoke_samples(clip: Clip, plate_at: Callable[[int], Plate]) -> _SmokeSample
     amounts: dict[int, int] = {}
     for number in clip.spread(SAMPLES):
         plate = plate_at(number)
-        small = Plate(
-            area_average(plate.image, columns, rows), area_average(plate.confidence, columns, rows), plate.noise
-        )
+        small = plate.through(lambda whole: area_average(whole, columns, rows))
         picture = area_average(clip.frame(number), columns, rows)
         mask = matte(picture, small).mask
         covered |= mask
@@ -564,12 +558,8 @@ def _detail(
         with suppress(CameraError):
             now, plate = camera.at(number), plate_at(number)
             working = working_picture(now, finest)
-            frames.append((working.part(clip.frame(number)), _part(plate, working), voxel_width(now, finest)))
+            frames.append((working.part(clip.frame(number)), plate.through(working.part), voxel_width(now, finest)))
     return smoke_detail(frames, max(finest.resolution))
-
-
-def _part(plate: Plate, working: WorkingPicture) -> Plate:
-    return Plate(working.part(plate.image), working.part(plate.confidence), plate.noise)
 
 
 def _voxels(extent: float, voxel: float) -> int:

@@ -99,12 +99,11 @@ def coarse_frame(frame: Image, camera: Camera, scene: Scene, plate: Plate) -> Co
         working = working_picture(camera, domain)
     except CameraError:
         return None
-    small = Plate(working.cut(plate.image), working.cut(plate.confidence), plate.noise)
     rows, columns = np.indices(frame.shape[:2])
     odd = ((rows + columns) % 2).astype(np.float32)
     return CoarseFrame(
         replace(scene, camera=working.camera, domain=domain),
-        small,
+        plate.through(working.cut),
         working.cut(frame),
         _part(frame, 1 - odd, working),
         _part(frame, odd, working),
