@@ -229,12 +229,18 @@ def _view(observation: Observation, scene: Scene, settings: DensitySettings) -> 
     plate = observation.plate or _clean_plate(scene, camera)
     mask = matte(image, plate).mask
     projection = project_voxels(camera, scene.domain)
-    amount = optical_depth(image, scene, settings, plate)
+    amount = _amount(image, scene, settings, plate, mask)
     return ViewEvidence(camera, image, plate, mask, amount, projection, reached(mask, projection))
 
 
 def optical_depth(image: Image, scene: Scene, settings: DensitySettings, plate: Plate) -> NDArray[np.float32]:
     """Optical depth (rows, columns) of unshadowed smoke that explains the picture: I = J (1 - t) + t B."""
+    return _amount(image, scene, settings, plate, matte(image, plate).mask)
+
+
+def _amount(
+    image: Image, scene: Scene, settings: DensitySettings, plate: Plate, mask: NDArray[np.bool_]
+) -> NDArray[np.float32]:
     assert scene.domain is not None
     source = np.zeros(3)
     if settings.scattering != "absorption":
@@ -243,7 +249,7 @@ def optical_depth(image: Image, scene: Scene, settings: DensitySettings, plate: 
     power = np.sum(contrast**2, -1)
     clear = np.sum((image - source) * contrast, -1) / np.maximum(power, 1e-12)
     depth = -np.log(np.clip(clear, 0.05, 1.0))
-    return np.where(matte(image, plate).mask, depth, 0).astype(np.float32)
+    return np.where(mask, depth, 0).astype(np.float32)
 
 
 def _paper(seen: Evidence, scene: Scene, initial: Volume | None, settings: DensitySettings) -> Density:

@@ -216,7 +216,7 @@ def _default(
                 motion = motion.finer()
             centre = motion.velocity(prediction, level.after, closed, threads)
             linear = _thinned(linear, motion.thinning)
-            unexplained = _unexplained(linear, centre, pair.noise / level.coarseness**3, settings)
+            unexplained, _ = _unexplained(linear, centre, pair.noise / level.coarseness**3, settings)
             stiffness = settings.unexplained / max(unexplained, settings.least_unexplained)
             problem, start = least_squares(linear, centre, stiffness, settings), centre if blind else u
             evidence, smoke = (linear.direction, linear.weight), linear.smoke
@@ -256,9 +256,11 @@ def _worthwhile(
         return None
     u = prediction.displacement()
     linear = linearise(finest, u, search, settings)
-    if linear is None or _unexplained(linear, u, noise, settings) >= WORTHLESS:
+    if linear is None:
         return None
-    _, rest, _ = _core.evidence(linear.direction, linear.offset, linear.weight, linear.smoke, u, settings.threads)
+    share, rest = _unexplained(linear, u, noise, settings)
+    if share >= WORTHLESS:
+        return None
     # The linearised change grows with the prediction, however wrong that is, so that long runs would run away.
     change = (finest.after - finest.before) / np.float32(linear.scale)
     return linear if rest < float(np.sum(linear.weight * change**2, dtype=np.float64)) else None
@@ -286,13 +288,13 @@ def _thinned(linear: Linearisation, thinning: float) -> Linearisation:
     return replace(linear, offset=linear.offset + np.float32(thinning) * linear.carried) if thinning else linear
 
 
-def _unexplained(linear: Linearisation, centre: Faces, noise: float, settings: VelocitySettings) -> float:
-    """Share of the squared change that a velocity leaves, beyond what noise of a variance accounts for."""
+def _unexplained(linear: Linearisation, centre: Faces, noise: float, settings: VelocitySettings) -> tuple[float, float]:
+    """What a velocity leaves of the squared change: the share beyond what noise of a variance accounts for, and all."""
     whole, rest, inside = _core.evidence(
         linear.direction, linear.offset, linear.weight, linear.smoke, centre, settings.threads
     )
     floor = noise / linear.scale**2 * inside
-    return max(rest - floor, 0.0) / (whole - floor) if whole > floor else 1.0
+    return (max(rest - floor, 0.0) / (whole - floor) if whole > floor else 1.0), rest
 
 
 def _source(
