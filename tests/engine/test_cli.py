@@ -10,7 +10,6 @@ import signal
 import subprocess
 import sys
 import zipfile
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -33,14 +32,6 @@ from smokelift.vdb import VdbUnavailable, vdb_module
 MODULE = [sys.executable, "-m", "smokelift"]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(Path(smokelift.__file__).parents[1])}
 QUICK = ("--quality", "draft")
-
-
-@pytest.fixture(autouse=True)
-def own_signals() -> Iterator[None]:
-    """The command line takes SIGTERM; give it back."""
-    before = signal.getsignal(signal.SIGTERM)
-    yield
-    signal.signal(signal.SIGTERM, before)
 
 
 @pytest.fixture(scope="module")

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import signal
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,14 +20,6 @@ from smokelift.transport import Velocity
 
 RISE = 1.5
 """Voxels a frame of the tiny plume."""
-
-
-@pytest.fixture(autouse=True)
-def own_signals() -> Iterator[None]:
-    """The command line takes SIGTERM; give it back."""
-    before = signal.getsignal(signal.SIGTERM)
-    yield
-    signal.signal(signal.SIGTERM, before)
 
 
 def write(folder: Path, scene: Scene, densities, speed: float = 1.0) -> Path:
