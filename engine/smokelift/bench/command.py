@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +31,9 @@ def add_parser(commands: Any) -> None:
     subjects = bench.add_subparsers(dest="subject", required=True)
     renderer = subjects.add_parser("renderer", help="one iteration, image and gradient")
     renderer.add_argument("--sizes", type=_sizes, default=(32, 64, 128, 256), metavar="N,N", help="voxels a side")
-    renderer.add_argument("--peers", type=_peers, default=tuple(PEERS), metavar="A,B", help=f"of {', '.join(PEERS)}")
+    renderer.add_argument(
+        "--peers", type=_some_of(PEERS), default=tuple(PEERS), metavar="A,B", help=f"of {', '.join(PEERS)}"
+    )
     renderer.add_argument("--device", choices=("cpu", "gpu"), default="cpu", help="for ours; peers use the processor")
     _add_outputs(renderer, "draw time against size and against share (.png)")
     velocity = subjects.add_parser("velocity", help="error against time, of both solvers and of whole estimates")
@@ -42,7 +44,9 @@ def add_parser(commands: Any) -> None:
     pipeline.add_argument("scene", nargs="?", type=Path, metavar="SCENE.toml", help="a clip; one is built in")
     pipeline.add_argument("--sizes", type=_shapes, default=SHAPES, metavar="XxYxZ,...", help="voxels along x, y and z")
     pipeline.add_argument("--quality", choices=QUALITIES, default="balanced")
-    pipeline.add_argument("--methods", type=_methods, default=("default",), metavar="A,B", help="default, paper")
+    pipeline.add_argument(
+        "--methods", type=_some_of(METHODS), default=("default",), metavar="A,B", help="default, paper"
+    )
     pipeline.add_argument("--frames", type=_count, default=5, help="that are clocked, after two")
     _add_json(pipeline)
 
@@ -117,14 +121,6 @@ def _pipeline(options: argparse.Namespace, say: Reporter, save: Callable[[dict[s
     say.finish(table.text(results), results)
 
 
-def _methods(text: str) -> tuple[str, ...]:
-    names = tuple(text.split(","))
-    for name in names:
-        if name not in METHODS:
-            raise argparse.ArgumentTypeError(f"{name!r}: expected some of {', '.join(METHODS)}")
-    return names
-
-
 def _count(text: str) -> int:
     if not text.isdigit() or int(text) == 0:
         raise argparse.ArgumentTypeError(f"{text!r}: expected a number of frames")
@@ -153,9 +149,14 @@ def _sizes(text: str) -> tuple[int, ...]:
     return sizes
 
 
-def _peers(text: str) -> tuple[str, ...]:
-    names = tuple(text.split(","))
-    for name in names:
-        if name not in PEERS:
-            raise argparse.ArgumentTypeError(f"{name!r}: expected some of {', '.join(PEERS)}")
-    return names
+def _some_of(known: Collection[str]) -> Callable[[str], tuple[str, ...]]:
+    """What reads names of these, with commas between them."""
+
+    def read(text: str) -> tuple[str, ...]:
+        names = tuple(text.split(","))
+        for name in names:
+            if name not in known:
+                raise argparse.ArgumentTypeError(f"{name!r}: expected some of {', '.join(known)}")
+        return names
+
+    return read

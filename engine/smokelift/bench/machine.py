@@ -43,6 +43,13 @@ def versions(libraries: Iterable[str]) -> dict[str, str]:
     return found
 
 
+def provenance(results: dict[str, Any], where: str = "") -> str:
+    """Say in two lines on what machine, when and with what libraries results came about."""
+    computer = results["machine"]
+    libraries = ", ".join(f"{name} {version}" for name, version in results["versions"].items())
+    return f"{computer['processor']}, {computer['cores']} cores{where}, {results['date']}\n{libraries}"
+
+
 def copy_milliseconds(size: int) -> float:
     """Median time to copy ten volumes of size^3 floats, with two threads: the floor of an iteration."""
     source = np.ones((COPY_THREADS, 10 * size**3 // COPY_THREADS), np.float32)

@@ -8,6 +8,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from smokelift.bench.machine import provenance
 from smokelift.bench.peers import OURS, PEERS
 from smokelift.bench.renderer import EXACT
 
@@ -44,10 +45,7 @@ def text(results: dict[str, Any]) -> str:
 
 
 def _title(results: dict[str, Any]) -> str:
-    computer = results["machine"]
-    libraries = ", ".join(f"{name} {version}" for name, version in results["versions"].items())
-    where = "" if results["device"] == "cpu" else f", ours on the {results['device'].upper()}"
-    return f"{computer['processor']}, {computer['cores']} cores{where}, {results['date']}\n{libraries}"
+    return provenance(results, "" if results["device"] == "cpu" else f", ours on the {results['device'].upper()}")
 
 
 def _cells(row: dict[str, Any]) -> list[str]:

@@ -16,6 +16,7 @@ from typing import Any
 from smokelift.bench import machine
 from smokelift.bench.pipeline.clip import with_grid, write_clip
 from smokelift.bench.pipeline.worker import STARTED, run_apart
+from smokelift.bench.velocity.run import size_text
 from smokelift.scene import Scene
 from smokelift.settings import Method, Quality
 
@@ -73,6 +74,6 @@ def run(
                 found = run_apart(path, shape, method, quality, frames, folder)
                 results["runs"].append(asdict(found))
                 outcome = found.failure or f"{found.seconds:.3g} s a frame, {found.solves:.0f} solves"
-                say(f"{'x'.join(map(str, shape))}, {method}: {outcome}")
+                say(f"{size_text(shape)}, {method}: {outcome}")
                 save(results)
     return results

@@ -8,6 +8,9 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from smokelift.bench.machine import provenance
+from smokelift.bench.velocity.run import size_text
+
 WIDTH = 110
 
 PAPER = {(64, 64, 96): (0.08, 6.13), (128, 128, 192): (0.12, 8.75), (256, 256, 288): (0.78, 21.31)}
@@ -18,19 +21,17 @@ def text(results: dict[str, Any]) -> str:
     """Return the table and how to read it."""
     output = io.StringIO()
     console = Console(file=output, width=WIDTH)
-    computer = results["machine"]
-    libraries = ", ".join(f"{name} {version}" for name, version in results["versions"].items())
-    console.print(f"{computer['processor']}, {computer['cores']} cores, {results['date']}\n{libraries}")
+    console.print(provenance(results))
     table = Table(title=f"{results['clip']} clip, {results['quality']}", title_justify="left")
     table.add_column("voxels, method")
     for heading in ("density s", "velocity s", "frame s", "solves", "MiB", "front dB", "paper's s"):
         table.add_column(heading, justify="right")
     for run in results["runs"]:
-        table.add_row(f"{'x'.join(map(str, run['size']))}, {run['method']}", *_cells(run))
+        table.add_row(f"{size_text(run['size'])}, {run['method']}", *_cells(run))
     console.print(table)
     for run in results["runs"]:
         if run["failure"]:
-            console.print(f"{'x'.join(map(str, run['size']))}, {run['method']}: {run['failure']}")
+            console.print(f"{size_text(run['size'])}, {run['method']}: {run['failure']}")
     console.print(
         "Medians over the frames, from decoding the clip to OpenVDB files on disk. solves: the frame in Poisson solves "
         "by cosine transforms (scipy) of the same grid, timed between the frames. MiB: peak of the process. front: the "

@@ -19,6 +19,7 @@ from typing import cast
 import numpy as np
 
 from smokelift.bench.machine import peak_bytes, poisson_seconds
+from smokelift.bench.velocity.run import size_text
 from smokelift.bench.worker import environment
 from smokelift.clip import Clip
 from smokelift.reconstruct import reconstruct
@@ -68,8 +69,15 @@ def run_apart(
     """Time a run in a process of its own."""
     result = folder / "run.json"
     result.unlink(missing_ok=True)
-    size = "x".join(map(str, shape))
-    command = [sys.executable, "-m", "smokelift.bench.pipeline.worker", str(scene_path), size, method, quality]
+    command = [
+        sys.executable,
+        "-m",
+        "smokelift.bench.pipeline.worker",
+        str(scene_path),
+        size_text(shape),
+        method,
+        quality,
+    ]
     ended = subprocess.run(
         [*command, str(frames), str(folder)],
         env=environment(),

@@ -10,6 +10,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from smokelift.bench.machine import provenance
 from smokelift.bench.velocity.run import size_text
 
 WIDTH = 110
@@ -24,9 +25,7 @@ def text(results: dict[str, Any]) -> str:
     """Return for each size the linear problem and the estimates, and how to read them."""
     output = io.StringIO()
     console = Console(file=output, width=WIDTH)
-    computer = results["machine"]
-    libraries = ", ".join(f"{name} {version}" for name, version in results["versions"].items())
-    console.print(f"{computer['processor']}, {computer['cores']} cores, {results['date']}\n{libraries}")
+    console.print(provenance(results))
     for row in results["sizes"]:
         console.print(
             f"\n{size_text(row['size'])}, {row['scene']}: {row['voxels_a_frame']:.2g} voxels a frame on average; "
