@@ -19,7 +19,7 @@ import numpy as np
 
 from smokelift.clip import Clip
 from smokelift.coupling import first_guess
-from smokelift.density import Density, SmokeAxis, depth_guess, optical_depth, reconstruct_density
+from smokelift.density import Density, SmokeAxis, depth_guess, fit_density, gather_evidence, optical_depth
 from smokelift.density.axis import estimate_axis
 from smokelift.density.hull import project_voxels
 from smokelift.density.light import refine_axis
@@ -218,23 +218,22 @@ def _corrected(
 ) -> tuple[Density, Mapping[str, float]]:
     """The frame's density from its pictures and the density carried along, and what was taken over of that."""
     image, scene = shot.working.cut(picture), shot.small_scene
+    seen = gather_evidence(image, scene, settings.density, shot.plate, axis, shot.beside)
     initial: Volume | None = transported
     accepted: Mapping[str, float] = {}
     if settings.method == "default" and transported is not None and before is not None:
-        initial = depth_guess(image, scene, settings.density, shot.plate, axis, shot.beside)
+        initial = depth_guess(seen, scene)
         if settings.transport > 0:
             guess = first_guess(
                 image, scene, shot.plate, shot.scattering, initial, transported, before, settings.transport
             )
             initial, accepted = guess.density, guess.figures
-    density = reconstruct_density(
-        image, scene, initial, settings.density, plate=shot.plate, axis=axis, views=shot.beside
-    )
+    density = fit_density(seen, scene, initial, settings.density)
     assert shot.scene.camera is not None and scene.camera is not None and scene.domain is not None
     if transported is not None and shot.scene.camera.moves:
         # what a moving camera does not see now it may have seen before
-        seen = project_voxels(scene.camera, scene.domain).visible
-        density = replace(density, values=np.where(seen, density.values, transported))
+        visible = project_voxels(scene.camera, scene.domain).visible
+        density = replace(density, values=np.where(visible, density.values, transported))
     return density, accepted
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from smokelift.background import Plate
 from smokelift.coupling import AMOUNTS, Guess, first_guess
-from smokelift.density import DensitySettings, depth_guess
+from smokelift.density import DensitySettings, depth_guess, gather_evidence
 from smokelift.render import render
 from smokelift.render.renderer import Volume
 from smokelift.scene import Scene
@@ -38,7 +38,8 @@ def moment(plume) -> Moment:
     scene, before, true = plume.scene, *plume.densities[1:3]
     image = render(true, scene)
     plate = Plate(np.zeros_like(image), np.ones(image.shape[:2], np.float32), np.full(3, 1e-4))
-    return Moment(scene, image, plate, depth_guess(image, scene, DensitySettings(), plate), true, before)
+    static = depth_guess(gather_evidence(image, scene, DensitySettings(), plate), scene)
+    return Moment(scene, image, plate, static, true, before)
 
 
 def test_what_proves_right_is_taken_over(moment) -> None:

@@ -35,6 +35,8 @@ __all__ = [
     "Observation",
     "SmokeAxis",
     "depth_guess",
+    "fit_density",
+    "gather_evidence",
     "optical_depth",
     "reconstruct_density",
 ]
@@ -154,11 +156,36 @@ def reconstruct_density(
     settings = settings or DensitySettings()
     if scene.camera is None or scene.domain is None:
         raise ValueError("A reconstruction needs a scene with a camera and a domain.")
-    domain, medium = scene.domain, scene.medium or Medium()
-    seen = _evidence((Observation(scene.camera, image, plate), *views), scene, settings, axis)
+    seen = gather_evidence(image, scene, settings, plate, axis, views)
     if initial is not None:
-        initial = _checked_initial(initial, domain)
-    hull = seen.hull
+        initial = _checked_initial(initial, scene.domain)
+    return fit_density(seen, scene, initial, settings)
+
+
+def gather_evidence(
+    image: Image,
+    scene: Scene,
+    settings: DensitySettings,
+    plate: Plate | None = None,
+    axis: SmokeAxis | None = None,
+    views: Sequence[Observation] = (),
+) -> Evidence:
+    """What the pictures say before anything is fitted; the parameters are those of `reconstruct_density`."""
+    assert scene.camera is not None and scene.domain is not None
+    observations = (Observation(scene.camera, image, plate), *views)
+    seen = [_view(observation, scene, settings) for observation in observations]
+    return Evidence(seen, scene.domain, axis or SmokeAxis.upright(), settings.texture)
+
+
+def depth_guess(seen: Evidence, scene: Scene) -> Volume:
+    """Density (nx, ny, nz) from pictures alone: unshadowed optical depths, spread by the depth profiles."""
+    return seen.guess() / np.float32((scene.medium or Medium()).extinction)
+
+
+def fit_density(seen: Evidence, scene: Scene, initial: Volume | None, settings: DensitySettings) -> Density:
+    """Find a density that explains what was seen, from a first guess; by default that of `depth_guess`."""
+    assert scene.domain is not None
+    domain, medium, hull = scene.domain, scene.medium or Medium(), seen.hull
     pixels = [int(view.counts.sum()) for view in seen.views]
     if not hull.any():
         # one picture without smoke, or several that contradict each other
@@ -179,7 +206,7 @@ def reconstruct_density(
         enough += float(np.sum(np.square(noise[view.counts], dtype=np.float64)))
         targets.append(RayTarget(renderer, view.image, weight, view.plate.image, noise, view.projection))
     if initial is None:
-        initial = _guess(seen, scene)
+        initial = depth_guess(seen, scene)
     start = np.where(hull, initial, 0).astype(np.float32)
     # what several pictures have in common takes as many times longer to be found
     iterations = settings.fit_iterations * len(targets)
@@ -190,34 +217,6 @@ def reconstruct_density(
         hull,
         _figures(final.losses, pixels, fit.iterations + final.iterations, hull),
     )
-
-
-def depth_guess(
-    image: Image,
-    scene: Scene,
-    settings: DensitySettings,
-    plate: Plate,
-    axis: SmokeAxis | None = None,
-    views: Sequence[Observation] = (),
-) -> Volume:
-    """Density (nx, ny, nz) from pictures alone: unshadowed optical depths, spread by the depth profiles.
-
-    The parameters are those of `reconstruct_density`.
-    """
-    assert scene.camera is not None
-    return _guess(_evidence((Observation(scene.camera, image, plate), *views), scene, settings, axis), scene)
-
-
-def _guess(seen: Evidence, scene: Scene) -> Volume:
-    return seen.guess() / np.float32((scene.medium or Medium()).extinction)
-
-
-def _evidence(
-    observations: Sequence[Observation], scene: Scene, settings: DensitySettings, axis: SmokeAxis | None
-) -> Evidence:
-    assert scene.domain is not None
-    views = [_view(observation, scene, settings) for observation in observations]
-    return Evidence(views, scene.domain, axis or SmokeAxis.upright(), settings.texture)
 
 
 def _view(observation: Observation, scene: Scene, settings: DensitySettings) -> ViewEvidence:

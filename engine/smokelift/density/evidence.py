@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from smokelift.background import Plate
 from smokelift.density.axis import SmokeAxis
-from smokelift.density.hull import Projection, common_hull, voxel_centres
+from smokelift.density.hull import Projection, centres_of, common_hull
 from smokelift.density.profile import DepthProfile
 from smokelift.density.screen import view_frame
 from smokelift.render.renderer import Image, Volume
@@ -124,7 +124,7 @@ class Evidence:
     def _axis(self, view: ViewEvidence) -> SmokeAxis:
         """How far behind the domain's centre all pictures together put the middle of the smoke, by height."""
         _, depth, height = view_frame(view.camera)
-        offset = voxel_centres(self._domain)[self.hull] - np.array(self._domain.centre)
+        offset = centres_of(self.hull, self._domain) - np.array(self._domain.centre)
         if not offset.size:
             return SmokeAxis.upright()
         level = np.rint(offset @ height / self._domain.voxel_size).astype(int)

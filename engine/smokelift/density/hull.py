@@ -41,9 +41,19 @@ class Projection:
 
 def voxel_centres(domain: Domain) -> NDArray[np.float64]:
     """World positions (nx, ny, nz, 3) of the voxel centres."""
+    return np.stack(np.meshgrid(*_axes(domain), indexing="ij"), -1)
+
+
+def centres_of(voxels: NDArray[np.bool_], domain: Domain) -> NDArray[np.float64]:
+    """World positions (n, 3) of the centres of the marked voxels."""
+    places = [axis[index] for axis, index in zip(_axes(domain), np.nonzero(voxels), strict=True)]
+    return np.stack(places, -1)
+
+
+def _axes(domain: Domain) -> list[NDArray[np.float64]]:
+    """World coordinates of the voxel centres along x, y and z."""
     h = domain.voxel_size
-    axes = [low + (np.arange(n) + 0.5) * h for low, n in zip(domain.min, domain.resolution, strict=True)]
-    return np.stack(np.meshgrid(*axes, indexing="ij"), -1)
+    return [low + (np.arange(n) + 0.5) * h for low, n in zip(domain.min, domain.resolution, strict=True)]
 
 
 @lru_cache(maxsize=8)

@@ -21,7 +21,7 @@ from scipy import ndimage
 from scipy.special import gamma, gammainc
 
 from smokelift.density.axis import SmokeAxis
-from smokelift.density.hull import Projection, voxel_centres
+from smokelift.density.hull import Projection, centres_of
 from smokelift.density.screen import upright_rows, view_frame
 from smokelift.render.rays import ray_through_pixels
 from smokelift.scene import Camera, Domain
@@ -176,7 +176,7 @@ class DepthProfile:
     def _shape_and_width(
         self, projection: Projection, voxels: NDArray[np.bool_]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        offset = voxel_centres(self._domain)[voxels] - self._centre
+        offset = centres_of(voxels, self._domain) - self._centre
         height, lateral = offset @ self._height, offset @ self._lateral
         width = self._width(height, lateral, projection.read(self._balls, voxels))
         distance = np.abs(offset @ self._depth - self._axis.at(height, lateral))
