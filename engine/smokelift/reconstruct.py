@@ -104,7 +104,12 @@ def reconstruct(
     settings = replace(
         settings,
         density=replace(settings.density, scattering=shot.scattering),
-        velocity=replace(settings.velocity, closed=tuple(side for side in SIDES if side in walls), levels=shot.levels),
+        velocity=replace(
+            settings.velocity,
+            closed=tuple(side for side in SIDES if side in walls),
+            halvings=shot.halvings,
+            levels=shot.levels,
+        ),
     )
     if out is None:
         yield from _frames(clip, shot, settings, None)
@@ -157,7 +162,9 @@ def _frames(clip: Clip, shot: Shot, settings: Settings, start: Frame | None) -> 
         initial = None
         # from where there was no smoke nothing is carried
         if before is not None and index >= 2 and before.density.any():
-            predicted = predict_velocity(before.velocity, dt, settings.velocity.closed)
+            predicted = predict_velocity(
+                before.velocity, dt, settings.velocity.closed, halvings=settings.velocity.halvings or 0
+            )
             # pictures correct the mass, but not of what a moving camera does not see
             initial = advect(before.density, predicted, dt, conserve=shot.scene.camera.moves)
         accepted: Mapping[str, float] = {}

@@ -61,8 +61,8 @@ class ResumeState:
     ----------
     number
         The last finished frame.
-    density, before
-        Its density and the one of the frame before it (None at the first), shape (nx, ny, nz).
+    density
+        Its density, shape (nx, ny, nz).
     velocity
         Its velocity on faces, m/s.
     extra
@@ -71,7 +71,6 @@ class ResumeState:
 
     number: int
     density: Array
-    before: Array | None
     velocity: Faces
     extra: Mapping[str, npt.NDArray[Any]]
 
@@ -215,13 +214,11 @@ class SequenceWriter:
         if number < 0:
             raise ValueError(f"a frame's number must not be negative, as {number} is")
         rho, faces = _checked(density, velocity_faces, self._domain.shape)
-        before = self.state.density if self.state is not None else None
         entry = {name: _jsonable(value) for name, value in (figures or {}).items()}
         # The caller may use its arrays again; what is kept here must not change with them.
         state = ResumeState(
             number,
             rho.copy(),
-            before,
             faces,
             {key: np.asarray(value) for key, value in (extra or {}).items()},
         )
@@ -531,7 +528,6 @@ def _save_state(path: Path, state: ResumeState) -> None:
     arrays: dict[str, npt.NDArray[Any]] = {
         "number": np.array(state.number),
         "density": state.density,
-        **({} if state.before is None else {"before": state.before}),
         **{f"velocity_{axis}": face for axis, face in zip("xyz", state.velocity, strict=True)},
         **{f"extra_{name}": value for name, value in state.extra.items()},
     }
@@ -553,9 +549,8 @@ def _load_state(path: Path) -> ResumeState | None:
     try:
         with path.open("rb") as file, np.load(file) as data:
             extra = {name[6:]: data[name] for name in data.files if name.startswith("extra_")}
-            before = data["before"] if "before" in data.files else None
             velocity = data["velocity_x"], data["velocity_y"], data["velocity_z"]
-            return ResumeState(int(data["number"]), data["density"], before, velocity, extra)
+            return ResumeState(int(data["number"]), data["density"], velocity, extra)
     except (OSError, ValueError, LookupError, EOFError, zipfile.BadZipFile) as error:
         raise SequenceError(f"{path}: is damaged, so this run cannot be resumed: {error}") from error
 

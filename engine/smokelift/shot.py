@@ -105,8 +105,8 @@ class Shot:
         What was assumed or estimated, a sentence each.
     plate_at
         Background of the full picture in every frame, counted from 0, where camera or background change; else None.
-    levels
-        Grids of a velocity without a past.
+    halvings, levels
+        Of the grid of the velocity, and grids of one without a past.
     choices
         What was chosen by measurement or by hand, with the figures that decided it.
     views
@@ -122,6 +122,7 @@ class Shot:
     estimated_background: NDArray[np.float32] | None
     notes: tuple[str, ...]
     plate_at: Callable[[int], Plate] | None = None
+    halvings: int | None = None
     levels: int | None = None
     choices: tuple[Choice, ...] = ()
     views: tuple[FurtherView, ...] = ()
@@ -210,11 +211,12 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
     plate = plate_at(shown)
     estimated = plate.image if _unknown(scene.background) else None
     changing = plate_at if moves or plates is not None else None
-    scattering, levels = richest, settings.velocity.levels
+    scattering, halvings, levels = richest, settings.velocity.halvings, settings.velocity.levels
     choices = () if resolved is None else (resolved,)
     if settings.method != "paper":
         model = choose_model(clip, complete, plate_at, samples.smoky, richest, settings)
-        complete, scattering, levels = model.scene, model.scattering, model.levels
+        complete, scattering = model.scene, model.scattering
+        halvings, levels = model.halvings, model.levels
         choices = (*choices, *model.choices)
     views = tuple(_further_view(number, clip, complete, notes) for number in range(len(scene.views)))
     if views:
@@ -233,6 +235,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
         estimated,
         tuple(notes),
         changing,
+        halvings,
         levels,
         choices,
         views,

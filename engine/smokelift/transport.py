@@ -42,8 +42,8 @@ class Velocity:
     source
         Of an estimate, shape (nx, ny, nz): density that enters per second, >= 0.
     unexplained
-        Of an estimate, two of shape (nx, ny, nz): mean, and mean magnitude, of what it and those before it left of the
-        change around each voxel. The next one tells sources by it.
+        Of an estimate, two on its grid: mean, and mean magnitude, of what it and those before it left of the change
+        around each voxel. The next one tells sources by it.
 
     Raises
     ------

@@ -130,15 +130,17 @@ def write_vdb(
         raise ValueError("density must not be negative")
 
     limit = np.float32(np.finfo(np.float16).max)
-    rho, velocity = np.minimum(rho, limit), np.clip(velocity, -limit, limit)
+    box = _around(rho > 0.0, VELOCITY_MARGIN)
+    corner = tuple(side.start for side in box)
+    rho, velocity = np.minimum(rho[box], limit), np.clip(velocity[box], -limit, limit)
     near = rho > 0.0
     if near.any():
         near = ndimage.maximum_filter(near, 2 * VELOCITY_MARGIN + 1, mode="constant")
     density_grid = vdb.FloatGrid()
-    density_grid.copyFromArray(rho)
+    density_grid.copyFromArray(rho, ijk=corner)
     density_grid.gridClass = vdb.GridClass.FOG_VOLUME
     velocity_grid = vdb.Vec3SGrid()
-    velocity_grid.copyFromArray(np.where(near[..., None], velocity, np.float32(0.0)))
+    velocity_grid.copyFromArray(np.where(near[..., None], velocity, np.float32(0.0)), ijk=corner)
     h = domain.voxel_size
     x, y, z = (low + 0.5 * h for low in domain.min)
     for grid, name in ((density_grid, "density"), (velocity_grid, "velocity")):
@@ -156,6 +158,17 @@ def write_vdb(
         except RuntimeError as error:
             raise OSError(f"{path}: cannot be written: {error}") from error
         _ensure_written(aside)
+
+
+def _around(marked: npt.NDArray[np.bool_], margin: int) -> tuple[slice, ...]:
+    """The smallest box that holds the marked voxels and so many more on each side; all of it without any."""
+    found = ndimage.find_objects(marked.astype(np.int8))
+    if not found:
+        return tuple(slice(0, n) for n in marked.shape)
+    return tuple(
+        slice(max(side.start - margin, 0), min(side.stop + margin, n))
+        for side, n in zip(found[0], marked.shape, strict=True)
+    )
 
 
 def _ensure_written(path: Path) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from smokelift.clip import Clip
-from smokelift.density import DensitySettings, reconstruct_density
+from smokelift.density import DensitySettings, fit_density, reconstruct_density
 from smokelift.density.hull import project_voxels, voxel_centres
 from smokelift.density.screen import view_frame
 from smokelift.images import write_image
@@ -453,15 +453,15 @@ def test_the_papers_loop_takes_all(plume, tmp_path, monkeypatch) -> None:
     monkeypatch.setitem(reconstruct.__globals__, "first_guess", None)
     guesses, carried = [], []
 
-    def fit(image, scene, initial, *rest, **options):
+    def fit(seen, scene, initial, settings):
         guesses.append(initial)
-        return reconstruct_density(image, scene, initial, *rest, **options)
+        return fit_density(seen, scene, initial, settings)
 
     def carry(*arguments, **options):
         carried.append(advect(*arguments, **options))
         return carried[-1]
 
-    monkeypatch.setitem(reconstruct.__globals__, "reconstruct_density", fit)
+    monkeypatch.setitem(reconstruct.__globals__, "fit_density", fit)
     monkeypatch.setitem(reconstruct.__globals__, "advect", carry)
     frames_of(plume.write(tmp_path / "clip", plume.densities[:4]), paper)
     assert [guess is None for guess in guesses] == [True, True, False, False]

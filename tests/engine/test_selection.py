@@ -20,7 +20,7 @@ from smokelift.render import scene_lights
 from smokelift.scene import Background, Domain, EnvironmentLight, Medium, PointLight, Scene, SceneError, look_at_matrix
 from smokelift.selection import Choice
 from smokelift.selection.coarse import LONGEST, coarse_domain, coarse_frame
-from smokelift.selection.motion import choose_levels, levels_for
+from smokelift.selection.motion import choose_halvings, choose_levels, levels_for
 from smokelift.settings import Settings
 from smokelift.shot import Shot, prepare_shot
 from smokelift.velocity import VelocitySettings
@@ -228,6 +228,17 @@ def test_grids_by_hand_win(plume, draft) -> None:
     assert (choice.chosen, choice.measured) == (3, {})
 
 
+def test_the_velocity_grid_is_as_coarse_as_the_depth_is_unknown(plume, draft) -> None:
+    """However fine the densities are; by hand it is what was said, and thin boxes keep eight voxels a side."""
+    free = draft.velocity
+    shapes = [(24, 24, 36), (32, 32, 48), (64, 64, 96), (128, 128, 192), (256, 256, 288), (31, 20, 150)]
+    choices = [choose_halvings(Domain((0.0, 0.0, 0.0), shape, shape), free) for shape in shapes]
+    assert [choice.chosen for choice in choices] == [0, 1, 2, 3, 3, 1]
+    assert [choice.measured["voxels"] for choice in choices] == [36, 24, 24, 24, 36, 75]
+    by_hand = choose_halvings(plume.scene.domain, replace(free, halvings=0))
+    assert (by_hand.chosen, by_hand.by_hand) == (0, True)
+
+
 def test_motion_is_measured_although_the_last_frame_has_the_most_smoke(plume, draft, tmp_path) -> None:
     """Nothing follows the last frame, so the one before is followed."""
     growing = [share * density for share, density in zip((0.02, 0.05, 0.15, 0.4, 1), plume.densities, strict=True)]
@@ -284,7 +295,7 @@ def test_every_choice_has_a_sentence_and_a_figure(plume, draft) -> None:
     """JSON holds it, and the sentence says what was chosen."""
     shot = shot_of(plume.scene, draft)
     assert [choice.what for choice in shot.choices] == [
-        "resolution", "domain", "scattering", "iterations", "velocity levels",
+        "resolution", "domain", "scattering", "iterations", "velocity halvings", "velocity levels",
     ]  # fmt: skip
     for choice in shot.choices:
         told = choice.as_dict()

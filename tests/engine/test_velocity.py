@@ -11,8 +11,9 @@ import pytest
 from scipy import ndimage
 
 from smokelift import _core
-from smokelift.transport import divergence
+from smokelift.transport import divergence, face_shapes, project
 from smokelift.velocity import Velocity, VelocitySettings, estimate_velocity, predict_velocity
+from smokelift.velocity.pyramid import halve_faces
 
 OPEN = [False] * 6
 SHAPE = (32, 28, 40)
@@ -78,6 +79,36 @@ def test_recovers_a_translation(motion):
     velocity = estimate_velocity(before, after, DT, VOXEL, SMOOTH)
     assert error_in_smoke(velocity, after, truth) < 0.05
     assert velocity.figures["divergence"] < 1e-5
+
+
+@pytest.mark.parametrize(("halvings", "limit"), [(1, 0.08), (2, 0.25)])
+def test_a_coarser_grid_finds_what_is_large(halvings, limit):
+    """Waves of 16 voxels, in a box that does not halve evenly; what comes out has the grid of the densities."""
+    motion = np.array((0.6, -1.0, 1.6))
+    before, after, truth = translation(motion, (49, 46, 51), 14.0)
+    velocity = estimate_velocity(before, after, DT, VOXEL, dataclasses.replace(SMOOTH, halvings=halvings))
+    assert error_in_smoke(velocity, after, truth) < limit
+    assert velocity.figures["divergence"] < 1e-5
+    assert velocity.shape == velocity.confidence.shape == velocity.source.shape == after.shape
+    assert velocity.voxel_size == VOXEL
+
+
+def test_a_coarser_grid_knows_inlets_and_predictions():
+    """They are put onto it: marked voxels are not taken for motion, and a true prediction is trusted."""
+    before, after, truth = translation(np.array((0.8, 0.4, 1.2)), (44, 44, 44), 10.0)
+    coarse = dataclasses.replace(SMOOTH, halvings=1)
+    inflow = np.zeros(after.shape, bool)
+    inflow[20:24, 20:24, 2:6] = True
+    new = after + 2 * inflow
+    marked, not_marked = (
+        error_in_smoke(estimate_velocity(before, new, DT, VOXEL, coarse, inflow=where), after, truth)
+        for where in (inflow, None)
+    )
+    assert marked < 0.1 < not_marked
+    faces = tuple(np.full(n, v * VOXEL / DT) for n, v in zip(face_shapes(after.shape), truth[0, 0, 0], strict=True))
+    guided = estimate_velocity(before, after, DT, VOXEL, coarse, prediction=Velocity(faces, VOXEL))
+    assert guided.figures["trust"] > 0.95
+    assert error_in_smoke(guided, after, truth) < 0.03
 
 
 @pytest.mark.parametrize("angle", [0.12, -0.12])
@@ -303,6 +334,17 @@ def test_steps_that_do_not_converge_are_refused(steps):
     settings = dataclasses.replace(PAPER, **steps)
     with pytest.raises(ValueError, match=r"sigma = .*tau = .*theta = .*do not converge"):
         estimate_velocity(before, after, DT, VOXEL, settings)
+
+
+@pytest.mark.parametrize("shape", [(8, 6, 10), (7, 9, 5)])
+def test_half_as_fine_a_flow_is_as_free_of_divergence(shape):
+    """What goes through a coarse face is what went through its four fine ones."""
+    rng = np.random.default_rng(0)
+    rough = Velocity(tuple(rng.standard_normal(n).astype(np.float32) for n in face_shapes(shape)), 1.0)
+    coarse = Velocity(halve_faces(project(rough).faces), 2.0)
+    assert coarse.shape == tuple((n + 1) // 2 for n in shape)
+    inner = tuple(slice(0, n // 2) for n in shape)  # an odd last voxel is continued outwards
+    assert np.abs(divergence(coarse)[inner]).max() < 1e-5
 
 
 def test_prediction_is_free_of_divergence_and_keeps_a_uniform_flow():

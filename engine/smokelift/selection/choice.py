@@ -14,8 +14,8 @@ class Choice:
     Attributes
     ----------
     what
-        ``"scattering"``, ``"resolution"``, ``"domain"``, ``"environment directions"``, ``"iterations"`` or
-        ``"velocity levels"``.
+        ``"scattering"``, ``"resolution"``, ``"domain"``, ``"environment directions"``, ``"iterations"``,
+        ``"velocity halvings"`` or ``"velocity levels"``.
     chosen
         What will be used.
     reason

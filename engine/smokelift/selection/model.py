@@ -16,7 +16,7 @@ from smokelift.scene import Scene
 from smokelift.selection.choice import Choice
 from smokelift.selection.coarse import CoarseFrame, coarse_frame
 from smokelift.selection.directions import choose_directions
-from smokelift.selection.motion import choose_levels
+from smokelift.selection.motion import choose_halvings, choose_levels
 from smokelift.selection.scattering import choose_scattering
 from smokelift.settings import Settings
 
@@ -34,14 +34,15 @@ class Model:
         With a number of directions for each environment.
     scattering
         How light is scattered.
-    levels
-        Grids of a velocity without a past.
+    halvings, levels
+        Of the grid of the velocity, and grids of one without a past.
     choices
         All of them, with their figures.
     """
 
     scene: Scene
     scattering: Scattering
+    halvings: int
     levels: int
     choices: tuple[Choice, ...]
 
@@ -85,8 +86,11 @@ def choose_model(
     wanted: Scattering = richest if by_hand == "auto" else by_hand
     numbers = [number for number in _tried(smoky) if shows_smoke(number)]
     frames = [frame for frame in map(coarse, numbers) if frame is not None]
+    assert scene.domain is not None
+    halved = choose_halvings(scene.domain, settings.velocity)
+    assert isinstance(halved.chosen, int)
     if not frames:
-        return Model(scene, wanted, settings.velocity.grids, ())
+        return Model(scene, wanted, halved.chosen, settings.velocity.grids, ())
     lit, directions = choose_directions(scene, frames, settings.density, wanted)
     frames = [frame.in_light_of(lit) for frame in frames]
     if by_hand == "auto":
@@ -111,13 +115,14 @@ def choose_model(
         followed = sorted({min(number, len(clip) - 2) for number in numbers if len(clip) > 1})
         ends = [(density(number), density(number + 1)) for number in followed]
         pairs = [(before.values, after.values) for before, after in ends if before is not None and after is not None]
-        moved = choose_levels(pairs, frames[0].scene, lit, settings.velocity)
+        velocity = replace(settings.velocity, halvings=halved.chosen)
+        moved = choose_levels(pairs, frames[0].scene, lit, velocity)
     else:
         said = settings.velocity.levels
         moved = Choice("velocity levels", said, f"Velocity grids by hand: {said}.", by_hand=True)
     assert isinstance(moved.chosen, int)
-    choices = (_inside(densities, scene), scattered, *directions, _iterations(densities, settings), moved)
-    return Model(lit, scattering, moved.chosen, choices)
+    choices = (_inside(densities, scene), scattered, *directions, _iterations(densities, settings), halved, moved)
+    return Model(lit, scattering, halved.chosen, moved.chosen, choices)
 
 
 def _tried(smoky: Sequence[int]) -> tuple[int, ...]:

@@ -26,7 +26,7 @@ from smokelift.velocity.contrast import expanded
 from smokelift.velocity.linear import Linearisation, least_squares, linearise, solve
 from smokelift.velocity.momentum import Motion, Prediction, fit_motion
 from smokelift.velocity.noise import Followed, followed, without_noise
-from smokelift.velocity.pyramid import Level, pyramid, refine
+from smokelift.velocity.pyramid import Level, halve, halve_faces, pyramid, refine
 from smokelift.velocity.settings import VelocitySettings
 from smokelift.velocity.sources import Unexplained, left_unexplained
 
@@ -109,6 +109,8 @@ def estimate_velocity(
     peaks = sorted(float(density.max()) for density in (first, second))
     if not paper and peaks[0] <= settings.smoke_threshold * peaks[1]:
         return _appeared(first, second, dt, voxel_size)
+    if settings.halvings and not paper:
+        return _on_half_grid(first, second, dt, voxel_size, settings, inflow, prediction)
     if paper:
         blurred, _ = without_noise(
             first, second, ((settings.blur, np.inf),), settings.smoke_threshold, settings.threads
@@ -140,7 +142,7 @@ def estimate_velocity(
     )
 
 
-def predict_velocity(velocity: Velocity, dt: float, closed: tuple[Side, ...] = ()) -> Velocity:
+def predict_velocity(velocity: Velocity, dt: float, closed: tuple[Side, ...] = (), *, halvings: int = 0) -> Velocity:
     """The velocity of the next frame if no force acts: carried along by itself, then projected.
 
     Parameters
@@ -151,13 +153,63 @@ def predict_velocity(velocity: Velocity, dt: float, closed: tuple[Side, ...] = (
         Time between frames in seconds.
     closed
         Sides of the box that are walls.
+    halvings
+        Carry it on a coarser grid: see `VelocitySettings`.
 
     Returns
     -------
     Velocity
         Without divergence; `unexplained` stays as it is, because inlets stand still.
     """
+    if halvings:
+        coarse = predict_velocity(_halved(velocity), dt, closed, halvings=halvings - 1)
+        return _refined(coarse, velocity.shape, closed)
     return replace(project(advect(velocity, velocity, dt), closed), unexplained=velocity.unexplained)
+
+
+def _on_half_grid(
+    before: Array,
+    after: Array,
+    dt: float,
+    voxel_size: float,
+    settings: VelocitySettings,
+    inflow: npt.NDArray[np.bool_] | None,
+    prediction: Velocity | None,
+) -> Velocity:
+    """The estimate from densities half as fine."""
+    nx, ny, nz = before.shape
+    found = estimate_velocity(
+        halve(before),
+        halve(after),
+        dt,
+        2 * voxel_size,
+        replace(settings, halvings=(settings.halvings or 1) - 1),
+        inflow=None if inflow is None else halve(inflow.astype(np.float32)) > 0,
+        prediction=None if prediction is None else _halved(prediction),
+    )
+    return _refined(found, (nx, ny, nz), settings.closed, settings.threads)
+
+
+def _halved(velocity: Velocity) -> Velocity:
+    """A velocity on a grid half as fine; what was left unexplained is on that already."""
+    return Velocity(halve_faces(velocity.faces), 2 * velocity.voxel_size, unexplained=velocity.unexplained)
+
+
+def _refined(coarse: Velocity, shape: tuple[int, int, int], closed: tuple[Side, ...], threads: int = 0) -> Velocity:
+    """A velocity on a grid twice as fine, without divergence there; what was left unexplained stays as it is."""
+    x, y, z = refine(coarse.faces, shape, closed_flags(closed), threads)
+    for component in (x, y, z):
+        component *= np.float32(0.5)  # refined are voxels, of which there are twice as many to the way
+    figures = dict(coarse.figures)
+    if figures:
+        largest = max(float(np.abs(component).max()) for component in (x, y, z))
+        left = float(np.abs(_core.divergence((x, y, z), threads)).max())
+        figures["divergence"] = left / largest if largest > 0 else 0.0
+    confidence, source = (
+        None if values is None else values.repeat(2, 0).repeat(2, 1).repeat(2, 2)[: shape[0], : shape[1], : shape[2]]
+        for values in (coarse.confidence, coarse.source)
+    )
+    return Velocity((x, y, z), coarse.voxel_size / 2, figures, confidence, source, coarse.unexplained)
 
 
 @dataclass(frozen=True, eq=False)

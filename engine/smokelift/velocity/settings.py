@@ -25,6 +25,10 @@ class VelocitySettings:
     solver
         ``"projected-cg"``, conjugate gradients on velocities without divergence; ``"primal-dual"``, the
         paper's splitting, with the same minimum at several times the cost; ``"auto"``: the one of the method.
+    halvings
+        How often the grid of the estimate is half as fine as that of the densities, which the velocity is then
+        interpolated to. None takes as many in a clip as what its pictures show asks for (see `smokelift.selection`);
+        between two densities alone there are none.
     levels
         Grids, each half as fine as the one before, for an estimate without a prediction. None takes as many as the
         motion in a clip asks for (see `smokelift.selection`); between two densities alone three, which reach several
@@ -80,6 +84,7 @@ class VelocitySettings:
 
     method: Literal["default", "paper"] = "default"
     solver: Literal["auto", "projected-cg", "primal-dual"] = "auto"
+    halvings: int | None = None
     levels: int | None = None
     warps: int = 2
     smoothness: float = 0.03
