@@ -539,7 +539,7 @@ def _write_archive(path: Path, arrays: Mapping[str, npt.NDArray[Any]], save: Cal
     buffer = io.BytesIO()
     save(buffer, **arrays)
     with atomic_path(path) as aside:
-        aside.write_bytes(buffer.getvalue())
+        aside.write_bytes(buffer.getbuffer())
 
 
 def _load_state(path: Path) -> ResumeState | None:

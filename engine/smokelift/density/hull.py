@@ -35,8 +35,14 @@ class Projection:
 
     def read(self, picture: NDArray[np.float32], voxels: NDArray[np.bool_]) -> NDArray[np.float32]:
         """The picture (rows, columns) read bilinearly at some voxels (n,); the nearest pixel's value outside."""
-        at = (self.rows[voxels], self.columns[voxels])
-        return np.asarray(ndimage.map_coordinates(picture, at, order=1, mode="nearest"), np.float32)
+        return read_bilinearly(picture, self.rows[voxels], self.columns[voxels])
+
+
+def read_bilinearly(
+    picture: NDArray[np.float32], rows: NDArray[np.float32], columns: NDArray[np.float32]
+) -> NDArray[np.float32]:
+    """A picture (rows, columns) at places (n,) in pixels; the nearest pixel's value outside."""
+    return np.asarray(ndimage.map_coordinates(picture, (rows, columns), order=1, mode="nearest"), np.float32)
 
 
 def voxel_centres(domain: Domain) -> NDArray[np.float64]:

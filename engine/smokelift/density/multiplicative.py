@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from smokelift.density.fit import Fit, Target
-from smokelift.density.hull import Projection
+from smokelift.density.hull import Projection, read_bilinearly
 from smokelift.render.renderer import Image, Volume
 
 STEP_RANGE = (0.4, 2.5)
@@ -74,7 +74,8 @@ def fit_multiplicative(
         Stop when an iteration lowers the loss by less than this share.
     """
     best, current, done = Fit(density, (np.inf,), 0), density, 0
-    filled = density > 0
+    filled = np.flatnonzero(density)
+    places = [_Places.of(filled, target.projection) for target in targets]
     for done in range(iterations + 1):
         images = [target.renderer.image(current) for target in targets]
         losses = tuple(
@@ -87,19 +88,33 @@ def fit_multiplicative(
             best = Fit(current, losses, done)
         if done == iterations or loss <= enough or (done > 2 and gained < tolerance * loss):
             break
-        for turn, target in enumerate(targets):
+        for turn, (target, place) in enumerate(zip(targets, places, strict=True)):
             image = images[0] if turn == 0 else target.renderer.image(current)
-            current = _scaled(current, filled, target, image)
+            current = _scaled(current, filled, place, target, image)
     return Fit(best.density, best.losses, done)
 
 
-def _scaled(density: Volume, filled: NDArray[np.bool_], target: RayTarget, image: Image) -> Volume:
+@dataclass(frozen=True, eq=False)
+class _Places:
+    """Where some voxels (n,) lie in a picture: rows, columns, and whether they are in it."""
+
+    rows: NDArray[np.float32]
+    columns: NDArray[np.float32]
+    visible: NDArray[np.bool_]
+
+    @staticmethod
+    def of(voxels: NDArray[np.intp], projection: Projection) -> _Places:
+        rows, columns = (values.ravel()[voxels] for values in (projection.rows, projection.columns))
+        return _Places(rows, columns, projection.visible.ravel()[voxels])
+
+
+def _scaled(density: Volume, filled: NDArray[np.intp], places: _Places, target: RayTarget, image: Image) -> Volume:
     """The density whose picture is nearer to a target, from the one with a picture."""
     transmittance = target.renderer.transmittance
     secant = (target.renderer.image(density * np.float32(PROBE)) - image) / np.log(PROBE)
-    step = target.projection.read(_log_scale(image, transmittance, secant, target), filled)
+    step = read_bilinearly(_log_scale(image, transmittance, secant, target), places.rows, places.columns)
     scaled = density.copy()
-    scaled[filled] *= np.exp(RELAXATION * np.where(target.projection.visible[filled], step, np.float32(0)))
+    scaled.ravel()[filled] *= np.exp(RELAXATION * np.where(places.visible, step, np.float32(0)))
     return scaled
 
 
