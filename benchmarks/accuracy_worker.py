@@ -21,12 +21,21 @@ from typing import Any
 
 import numpy as np
 
-from smokelift import Clip, ClipSource, Scene, Settings, View, reconstruct, reconstruct_density
+from smokelift import (
+    Clip,
+    ClipSource,
+    Scene,
+    Settings,
+    Velocity,
+    View,
+    advect,
+    reconstruct,
+    reconstruct_density,
+)
 from smokelift.bench.machine import peak_bytes, poisson_seconds
 from smokelift.density import DensitySettings, evidence
 from smokelift.images import write_image
 from smokelift.shot import Shot, prepare_shot
-from smokelift.velocity import estimate
 
 VIEWS = {"0": "front", "20": "nov20", "45": "nov45", "90": "side"}
 """Degrees about the vertical, and the files of picture.py."""
@@ -96,12 +105,17 @@ def leave_out(part: str, settings: Settings) -> Settings:
     if part == "hull":
         evidence.common_hull = lambda _masks, projections: np.any([p.visible for p in projections], axis=0)
     elif part == "projection":
-        estimate.project = lambda found, _closed: found
+        reconstruct.__globals__["predict_velocity"] = carried_by_itself
     elif part == "depth":
         evidence.DepthProfile.at = lambda _profile, _projection, voxels: np.full(np.count_nonzero(voxels), 0.5)
     else:
         raise ValueError(f"without={part}: expected transport, hull, sources, projection or depth.")
     return settings
+
+
+def carried_by_itself(velocity: Velocity, dt: float, *_: Any, **__: Any) -> Velocity:
+    """What is predicted without pressure projection."""
+    return replace(advect(velocity, velocity, dt), unexplained=velocity.unexplained)
 
 
 def smeared(clip: Clip, shot: Shot) -> Iterator[np.ndarray]:

@@ -1,4 +1,4 @@
-"""Speed against accuracy: seconds a frame against three errors, from the figures of benchmarks/accuracy.py."""
+"""Speed against accuracy: seconds a frame against four errors, from the figures of benchmarks/accuracy.py."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ import numpy as np
 from smokelift.files import atomic_path
 
 ERRORS = {
+    "input_error": "error of the input view (RMS of sRGB values, white is 1)",
     "view_error": "error of new views (RMS of sRGB values, white is 1)",
     "density_error": "error of the density (relative L2)",
     "velocity_error": "error of the velocity in smoke (relative L2)",
@@ -33,9 +34,11 @@ class Run:
     Attributes
     ----------
     name
-        What it is called on the chart.
+        A quality, "paper" or a baseline, and after a colon what was changed: "fine:resolution=32x32x48".
     method
-        Runs of one method share a colour: "default", "paper", "baseline".
+        "default", "paper" or "baseline".
+    resolution
+        "64x64x96"; empty for a baseline that has none.
     seconds
         A frame; None for a baseline that nothing was computed for.
     errors
@@ -44,8 +47,20 @@ class Run:
 
     name: str
     method: str
+    resolution: str
     seconds: float | None
     errors: dict[str, float]
+
+    @property
+    def series(self) -> str:
+        """What it is called without the changes; runs of one series share a colour."""
+        return self.name.partition(":")[0]
+
+    @property
+    def changes(self) -> str:
+        """What was changed besides the resolution."""
+        changes = self.name.partition(":")[2].split(",")
+        return ", ".join(change for change in changes if change and not change.startswith("resolution="))
 
 
 @dataclass(frozen=True)
@@ -76,7 +91,8 @@ def read_runs(path: Path) -> Runs:
         with path.open(newline="", encoding="utf-8") as file:
             reader = csv.DictReader(file)
             rows = list(reader)
-            missing = [name for name in (*_NEEDED, *_SAID) if name not in (reader.fieldnames or ())]
+            columns = reader.fieldnames or ()
+            missing = [name for name in (*_NEEDED, *_SAID) if name not in columns]
     except FileNotFoundError:
         raise ValueError(f"{path}: no such file.") from None
     except (OSError, UnicodeDecodeError, csv.Error) as error:
@@ -91,11 +107,14 @@ def read_runs(path: Path) -> Runs:
     shared = sorted(set.intersection(*(set(scenes) for scenes in by_run.values())))
     if not shared:
         raise ValueError(f"{path}: there is no scene that all runs share; measure all of them on the same scenes.")
-    runs = tuple(_mean(path, name, [scenes[scene] for scene in shared]) for name, scenes in by_run.items())
+    decibels = {"view_error": "psnr_new"}
+    if (first := next(name for name in columns if name.startswith("psnr_"))) != "psnr_new":
+        decibels = {"input_error": first, **decibels}
+    runs = tuple(_mean(path, name, [scenes[scene] for scene in shared], decibels) for name, scenes in by_run.items())
     return Runs(runs, _caption([scenes[scene] for scenes in by_run.values() for scene in shared], shared))
 
 
-def _mean(path: Path, name: str, rows: list[dict[str, str]]) -> Run:
+def _mean(path: Path, name: str, rows: list[dict[str, str]], decibels: dict[str, str]) -> Run:
     def mean(column: str) -> float | None:
         try:
             values = [float(row[column]) for row in rows if row[column] != ""]
@@ -104,11 +123,14 @@ def _mean(path: Path, name: str, rows: list[dict[str, str]]) -> Run:
         return float(np.mean(values)) if len(values) == len(rows) and np.isfinite(values).all() else None
 
     errors = {"density_error": mean("density_error"), "velocity_error": mean("velocity_error")}
-    if (decibels := mean("psnr_new")) is not None:
-        errors["view_error"] = 10 ** (-decibels / 20)
+    for key, column in decibels.items():
+        if (value := mean(column)) is not None:
+            errors[key] = 10 ** (-value / 20)
     known = {key: value for key, value in errors.items() if value is not None and value > 0}
     seconds = mean("seconds")
-    return Run(name, rows[0]["method"], seconds if seconds is not None and seconds > 0 else None, known)
+    if seconds is not None and seconds <= 0:
+        seconds = None
+    return Run(name, rows[0]["method"], rows[0].get("resolution") or "", seconds, known)
 
 
 def _caption(rows: list[dict[str, str]], scenes: Many[str]) -> str:
@@ -143,11 +165,16 @@ def draw(runs: Runs, path: Path) -> None:
         from matplotlib.figure import Figure
     except ImportError:
         raise ValueError("smokelift chart needs matplotlib: pip install matplotlib.") from None
-    figure = Figure(figsize=(5.2 * len(shown), 5.0), layout="constrained")
-    methods = list(dict.fromkeys(run.method for run in runs.runs))
-    colours = {method: f"C{index}" for index, method in enumerate(methods)}
-    for axes, key in zip(np.atleast_1d(figure.subplots(1, len(shown))), shown, strict=True):
+    across = min(len(shown), 2)
+    down = -(-len(shown) // across)
+    figure = Figure(figsize=(6.5 * across, 5.2 * down), layout="constrained")
+    series = dict.fromkeys(run.series for run in runs.runs)
+    colours = {name: f"C{index}" for index, name in enumerate(series)}
+    panels = np.atleast_1d(figure.subplots(down, across)).ravel()
+    for axes, key in zip(panels, shown, strict=False):
         _panel(axes, [run for run in runs.runs if key in run.errors], key, colours)
+    for axes in panels[len(shown) :]:
+        axes.set_axis_off()
     figure.supxlabel(runs.caption, fontsize=7)
     with atomic_path(path) as aside:
         figure.savefig(aside, dpi=130, format="png")
@@ -161,22 +188,37 @@ def _panel(axes: Any, runs: list[Run], key: str, colours: dict[str, str]) -> Non
         [timed[i][2] for i in front],
         color="black", linewidth=1, marker="o", markersize=11, fillstyle="none", label="Pareto front",
     )  # fmt: skip
-    for method in dict.fromkeys(run.method for run, _, _ in timed):
-        mine = [(seconds, error) for run, seconds, error in timed if run.method == method]
-        axes.plot(*zip(*mine, strict=True), color=colours[method], marker="o", linestyle="none", label=method)
-    for run, seconds, error in timed:
-        axes.annotate(run.name, (seconds, error), (7, 5), textcoords="offset points", fontsize=8)
+    for name in dict.fromkeys(run.series for run, _, _ in timed):
+        plain = sorted((seconds, error) for run, seconds, error in timed if run.series == name and not run.changes)
+        changed = [(seconds, error) for run, seconds, error in timed if run.series == name and run.changes]
+        if plain:
+            axes.plot(*zip(*plain, strict=True), color=colours[name], marker="o", linewidth=0.8, label=name)
+        if changed:
+            axes.plot(*zip(*changed, strict=True), color=colours[name], marker="D", fillstyle="none", linestyle="none")
+    for text, seconds, error in _labels(timed):
+        axes.annotate(text, (seconds, error), (7, 5), textcoords="offset points", fontsize=7)
     for run in runs:
         if run.seconds is None:
-            axes.axhline(run.errors[key], color=colours[run.method], linestyle="--", linewidth=1)
-            across = axes.get_yaxis_transform()
-            axes.text(0.99, run.errors[key], run.name, fontsize=8, ha="right", va="bottom", transform=across)
+            axes.axhline(run.errors[key], color=colours[run.series], linestyle="--", linewidth=1)
+            whole_width = axes.get_yaxis_transform()
+            axes.text(0.99, run.errors[key], run.name, fontsize=8, ha="right", va="bottom", transform=whole_width)
     axes.set(xscale="log", yscale="log", xlabel="seconds a frame", title=ERRORS[key])
     axes.title.set_fontsize(9)
     _readable(axes.xaxis, [seconds for _, seconds, _ in timed], room=2.5)  # for the names at the right
     _readable(axes.yaxis, [run.errors[key] for run in runs], room=1.3)
     axes.grid(alpha=0.3, which="both")
     axes.legend(fontsize=8, frameon=False, loc="lower left")
+
+
+def _labels(timed: list[tuple[Run, float, float]]) -> list[tuple[str, float, float]]:
+    """What is written beside which point: every change, and every resolution of a method once, at its slowest run."""
+    labels = [(run.changes, seconds, error) for run, seconds, error in timed if run.changes]
+    slowest: dict[tuple[str, str], tuple[str, float, float]] = {}
+    for run, seconds, error in timed:
+        beside = (run.method, run.resolution)
+        if not run.changes and (beside not in slowest or seconds > slowest[beside][1]):
+            slowest[beside] = (run.resolution, seconds, error)
+    return [*labels, *slowest.values()]
 
 
 def _readable(axis: Any, values: list[float], room: float) -> None:

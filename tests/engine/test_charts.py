@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from smokelift.charts import pareto_front, read_runs
+from smokelift.charts import Run, pareto_front, read_runs
 from smokelift.cli import main
 
 HEADER = "scene,run,method,frames,seconds,psnr_new,density_error,velocity_error,machine,date\n"
@@ -47,6 +47,23 @@ def test_runs_are_means_over_the_scenes(tmp_path) -> None:
     assert billboard.seconds is None
     assert list(billboard.errors) == ["view_error"]
     assert found.caption == "a, b; 24 frames; box; 2026-01-01, 2026-01-02"
+
+
+def test_the_input_view_counts_where_it_is_known(tmp_path) -> None:
+    """It is the first of the views."""
+    text = (HEADER + ROWS).replace("seconds,psnr_new", "seconds,psnr_0,psnr_new")
+    text = text.replace(",20,", ",40,20,").replace(",30,", ",40,30,").replace(",60,", ",60,60,")
+    draft, _, billboard = read_runs(write(tmp_path, text)).runs
+    assert draft.errors["input_error"] == pytest.approx(0.01)
+    assert draft.errors["view_error"] == pytest.approx(10 ** (-25 / 20))
+    assert set(billboard.errors) == {"input_error", "view_error"}
+
+
+def test_a_run_says_what_was_changed() -> None:
+    """Runs that differ in resolution alone belong together."""
+    run = Run("fine:resolution=32x32x48,transport=0", "default", "32x32x48", 1.0, {})
+    assert (run.series, run.changes) == ("fine", "transport=0")
+    assert Run("fine:resolution=32x32x48", "default", "32x32x48", 1.0, {}).changes == ""
 
 
 def test_only_scenes_that_all_share_count(tmp_path) -> None:
