@@ -58,9 +58,11 @@ class Run:
 
     @property
     def changes(self) -> str:
-        """What was changed besides the resolution."""
+        """What was changed besides the resolution, "halvings=0" for "velocity.halvings=0"."""
         changes = self.name.partition(":")[2].split(",")
-        return ", ".join(change for change in changes if change and not change.startswith("resolution="))
+        return ", ".join(
+            change.rpartition(".")[2] for change in changes if change and not change.startswith("resolution=")
+        )
 
 
 @dataclass(frozen=True)
@@ -175,6 +177,8 @@ def draw(runs: Runs, path: Path) -> None:
         _panel(axes, [run for run in runs.runs if key in run.errors], key, colours)
     for axes in panels[len(shown) :]:
         axes.set_axis_off()
+    handles = {name: handle for axes in panels for handle, name in zip(*axes.get_legend_handles_labels(), strict=True)}
+    figure.legend(handles.values(), handles, loc="outside upper center", ncols=len(handles), fontsize=9, frameon=False)
     figure.supxlabel(runs.caption, fontsize=7)
     with atomic_path(path) as aside:
         figure.savefig(aside, dpi=130, format="png")
@@ -195,8 +199,10 @@ def _panel(axes: Any, runs: list[Run], key: str, colours: dict[str, str]) -> Non
             axes.plot(*zip(*plain, strict=True), color=colours[name], marker="o", linewidth=0.8, label=name)
         if changed:
             axes.plot(*zip(*changed, strict=True), color=colours[name], marker="D", fillstyle="none", linestyle="none")
+    middle = math.sqrt(timed[0][1] * max(seconds for _, seconds, _ in timed)) if timed else 0.0
     for text, seconds, error in _labels(timed):
-        axes.annotate(text, (seconds, error), (7, 5), textcoords="offset points", fontsize=7)
+        aside, side = ((-7, 5), "right") if seconds > middle else ((7, 5), "left")
+        axes.annotate(text, (seconds, error), aside, textcoords="offset points", fontsize=7, ha=side)
     for run in runs:
         if run.seconds is None:
             axes.axhline(run.errors[key], color=colours[run.series], linestyle="--", linewidth=1)
@@ -204,10 +210,9 @@ def _panel(axes: Any, runs: list[Run], key: str, colours: dict[str, str]) -> Non
             axes.text(0.99, run.errors[key], run.name, fontsize=8, ha="right", va="bottom", transform=whole_width)
     axes.set(xscale="log", yscale="log", xlabel="seconds a frame", title=ERRORS[key])
     axes.title.set_fontsize(9)
-    _readable(axes.xaxis, [seconds for _, seconds, _ in timed], room=2.5)  # for the names at the right
+    _readable(axes.xaxis, [seconds for _, seconds, _ in timed], room=1.5)
     _readable(axes.yaxis, [run.errors[key] for run in runs], room=1.3)
     axes.grid(alpha=0.3, which="both")
-    axes.legend(fontsize=8, frameon=False, loc="lower left")
 
 
 def _labels(timed: list[tuple[Run, float, float]]) -> list[tuple[str, float, float]]:

@@ -17,7 +17,7 @@ from smokelift.memory import free_memory, needed
 from smokelift.scene import Domain
 from smokelift.settings import Quality
 
-SOLVES_A_FRAME: Mapping[Quality, float] = {"draft": 115.0, "balanced": 130.0, "fine": 140.0}
+SOLVES_A_FRAME: Mapping[Quality, float] = {"draft": 65.0, "balanced": 70.0, "fine": 76.0}
 SHARE_A_VIEW = 0.5
 """Of a frame's time that every further view takes on top."""
 

@@ -8,8 +8,9 @@ import psutil
 
 from smokelift.scene import Domain
 
-BYTES_A_VOXEL = 320
-"""Peak of a whole run over a tiny one, measured from 48x48x72 to 128x128x192; the velocity estimate sets it."""
+BYTES_A_VOXEL = 220
+"""Peak of a whole run over a tiny one: 110 to 200 were measured from 48x48x72 to 256x256x288, most where smoke fills
+much of the box."""
 
 BASE_BYTES = 350 * 2**20
 """Interpreter, libraries, compiled kernels and decoded pictures."""

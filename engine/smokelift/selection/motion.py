@@ -13,7 +13,7 @@ from smokelift.selection.choice import Choice
 from smokelift.velocity import VelocitySettings, estimate_velocity
 from smokelift.velocity.settings import LEVELS
 
-FINEST_SIDE = 36
+FINEST_SIDE = 30
 """Voxels along the longest side of the grid that the motion of a reconstruction is looked for on, at most: one view
 leaves the depth open, and finer velocities follow its errors. docs/selection.md has what more and fewer do."""
 
