@@ -16,7 +16,7 @@ from smokelift.density.hull import project_voxels, voxel_centres
 from smokelift.density.screen import view_frame
 from smokelift.images import write_image
 from smokelift.metrics import psnr
-from smokelift.reconstruct import Frame, reconstruct, smoke_axis
+from smokelift.reconstruct import Frame, reconstruct, smoke_axis, without_clots
 from smokelift.render import render, scene_renderer
 from smokelift.scene import Background, ClipSource, Inlet, Medium, PointLight, Scene, look_at_matrix
 from smokelift.sequence import Sequence, SequenceError
@@ -466,6 +466,31 @@ def test_the_papers_loop_takes_all(plume, tmp_path, monkeypatch) -> None:
     frames_of(plume.write(tmp_path / "clip", plume.densities[:4]), paper)
     assert [guess is None for guess in guesses] == [True, True, False, False]
     assert all(guess is moved for guess, moved in zip(guesses[2:], carried, strict=True))
+
+
+def test_clots_are_no_motion(plume) -> None:
+    """A voxel of fifty times the smoke's density, each time elsewhere, leaves the velocity nearly as it is without."""
+    before, after = plume.densities[1:3]
+    rng = np.random.default_rng(0)
+
+    def with_clots(density):
+        clotted, where = density.copy(), np.flatnonzero(density > 0.2 * density.max())
+        clotted.ravel()[rng.choice(where)] = 50 * density.max()
+        return clotted
+
+    def velocity(*densities):
+        return estimate_velocity(*densities, 1 / 24, plume.scene.domain.voxel_size).centres()
+
+    clotted = [with_clots(density) for density in (before, after)]
+    smoke = after > 0.1 * after.max()
+    clean = velocity(before, after)[smoke]
+    cut, as_they_are = (
+        np.linalg.norm(velocity(*densities)[smoke] - clean) / np.linalg.norm(clean)
+        for densities in ([without_clots(density) for density in clotted], clotted)
+    )
+    assert cut < 0.3 < as_they_are
+    np.testing.assert_array_equal(without_clots(before), before)
+    assert without_clots(0 * before).max() == 0
 
 
 def test_without_transport_every_picture_stands_alone(plume, draft, monkeypatch) -> None:
