@@ -318,6 +318,11 @@ def test_smoke_at_rest_has_no_velocity(method):
         ({"voxel_size": -1.0}, "voxel_size must be positive"),
         ({"inflow": np.ones((3, 3, 3), bool)}, "inflow has shape"),
         ({"prediction": Velocity.zero((3, 3, 3), VOXEL)}, "prediction has shape"),
+        # half of it would fit half of the densities
+        (
+            {"prediction": Velocity.zero((31, 28, 40), VOXEL), "settings": VelocitySettings(halvings=1)},
+            "prediction has shape",
+        ),
         ({"settings": VelocitySettings(closed=("top",))}, "unknown side 'top'"),
     ],
 )

@@ -100,17 +100,21 @@ def estimate_velocity(
     require_same_shape("after", second.shape, first.shape)
     nx, ny, nz = shape = first.shape
     closed = closed_flags(settings.closed)
-    weight: Array = np.broadcast_to(np.float32(1), shape)
     if inflow is not None:
         require_same_shape("inflow", inflow.shape, shape)
-        # blur and gradients take the change there one voxel further
-        weight = (~ndimage.binary_dilation(inflow)).astype(np.float32)
+    if prediction is not None:
+        require_same_shape("the prediction", prediction.shape, shape)
     paper = settings.method == "paper"
     peaks = sorted(float(density.max()) for density in (first, second))
     if not paper and peaks[0] <= settings.smoke_threshold * peaks[1]:
         return _appeared(first, second, dt, voxel_size)
     if settings.halvings and not paper:
-        return _on_half_grid(first, second, dt, voxel_size, settings, inflow, prediction)
+        coarser = replace(settings, halvings=settings.halvings - 1)
+        return _on_half_grid(first, second, dt, voxel_size, coarser, inflow, prediction)
+    weight: Array = np.broadcast_to(np.float32(1), shape)
+    if inflow is not None:
+        # blur and gradients take the change there one voxel further
+        weight = (~ndimage.binary_dilation(inflow)).astype(np.float32)
     if paper:
         blurred, _ = without_noise(
             first, second, ((settings.blur, np.inf),), settings.smoke_threshold, settings.threads
@@ -120,7 +124,6 @@ def estimate_velocity(
         pair = followed(first, second, settings.blur, settings.smoke_threshold, settings.threads)
     predicted = past = None
     if prediction is not None:
-        require_same_shape("the prediction", prediction.shape, shape)
         past = Unexplained(*prediction.unexplained) if prediction.unexplained is not None else None
         predicted = Prediction(prediction.faces, dt / voxel_size)
 
@@ -176,14 +179,14 @@ def _on_half_grid(
     inflow: npt.NDArray[np.bool_] | None,
     prediction: Velocity | None,
 ) -> Velocity:
-    """The estimate from densities half as fine."""
+    """The estimate from densities half as fine, with the settings for these."""
     nx, ny, nz = before.shape
     found = estimate_velocity(
         halve(before),
         halve(after),
         dt,
         2 * voxel_size,
-        replace(settings, halvings=(settings.halvings or 1) - 1),
+        settings,
         inflow=None if inflow is None else halve(inflow.astype(np.float32)) > 0,
         prediction=None if prediction is None else _halved(prediction),
     )
