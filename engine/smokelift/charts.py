@@ -199,7 +199,8 @@ def _panel(axes: Any, runs: list[Run], key: str, colours: dict[str, str]) -> Non
             axes.plot(*zip(*plain, strict=True), color=colours[name], marker="o", linewidth=0.8, label=name)
         if changed:
             axes.plot(*zip(*changed, strict=True), color=colours[name], marker="D", fillstyle="none", linestyle="none")
-    middle = math.sqrt(timed[0][1] * max(seconds for _, seconds, _ in timed)) if timed else 0.0
+    times = [seconds for _, seconds, _ in timed]
+    middle = math.sqrt(min(times) * max(times))
     for text, seconds, error in _labels(timed):
         aside, side = ((-7, 5), "right") if seconds > middle else ((7, 5), "left")
         axes.annotate(text, (seconds, error), aside, textcoords="offset points", fontsize=7, ha=side)
@@ -210,7 +211,7 @@ def _panel(axes: Any, runs: list[Run], key: str, colours: dict[str, str]) -> Non
             axes.text(0.99, run.errors[key], run.name, fontsize=8, ha="right", va="bottom", transform=whole_width)
     axes.set(xscale="log", yscale="log", xlabel="seconds a frame", title=ERRORS[key])
     axes.title.set_fontsize(9)
-    _readable(axes.xaxis, [seconds for _, seconds, _ in timed], room=1.5)
+    _readable(axes.xaxis, times, room=1.5)
     _readable(axes.yaxis, [run.errors[key] for run in runs], room=1.3)
     axes.grid(alpha=0.3, which="both")
 
