@@ -37,7 +37,6 @@ AXIS_FRAMES = 16
 LIGHT_FRAMES = 4
 """Those of them whose light is looked at as well: it costs 200 pictures on a coarse grid for each."""
 
-
 CLOT = 1.5
 """Multiple of the density that one voxel of smoke in a thousand exceeds, beyond which none says anything about motion.
 True densities and good reconstructions end there. Voxels that the errors of many rays end in, where smoke leaves by the

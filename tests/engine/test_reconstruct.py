@@ -24,7 +24,7 @@ from smokelift.settings import Settings
 from smokelift.shot import prepare_shot
 from smokelift.transport import advect
 from smokelift.vdb import VdbUnavailable, read_vdb, vdb_module
-from smokelift.velocity import estimate_velocity
+from smokelift.velocity import estimate_velocity, predict_velocity
 
 
 def frames_of(scene: Scene, settings: Settings, out: Path | None = None, **options: bool) -> list[Frame]:
@@ -491,6 +491,35 @@ def test_clots_are_no_motion(plume) -> None:
     assert cut < 0.3 < as_they_are
     np.testing.assert_array_equal(without_clots(before), before)
     assert without_clots(0 * before).max() == 0
+
+
+@pytest.mark.parametrize("method", ["default", "paper"])
+def test_the_loop_looks_for_motion_as_coarsely_as_was_chosen_and_without_clots(
+    plume, draft, tmp_path, monkeypatch, method
+) -> None:
+    """Prediction and estimate have the same grid; the paper's method takes the densities as they are."""
+    settings = draft if method == "default" else Settings.preset("draft", "paper")
+    halvings = 1 if method == "default" else None
+    settings = replace(settings, velocity=replace(settings.velocity, halvings=halvings))
+    estimated, predicted = [], []
+
+    def estimate(before, after, dt, voxel_size, settings, **options):
+        estimated.append((after, settings.halvings))
+        return estimate_velocity(before, after, dt, voxel_size, settings, **options)
+
+    def predict(*arguments, **options):
+        predicted.append(options["halvings"])
+        return predict_velocity(*arguments, **options)
+
+    monkeypatch.setitem(reconstruct.__globals__, "estimate_velocity", estimate)
+    monkeypatch.setitem(reconstruct.__globals__, "predict_velocity", predict)
+    monkeypatch.setitem(reconstruct.__globals__, "CLOT", 0.5)  # so that there is something to cut
+    frames = frames_of(plume.write(tmp_path / "clip", plume.densities[:3]), settings)
+    assert predicted == [halvings or 0]
+    assert [said for _, said in estimated] == [halvings] * 2
+    for frame, (followed, _) in zip(frames[1:], estimated, strict=True):
+        cut = followed.max() < 0.6 * frame.density.max()
+        assert cut == (method == "default")
 
 
 def test_without_transport_every_picture_stands_alone(plume, draft, monkeypatch) -> None:
