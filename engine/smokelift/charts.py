@@ -200,9 +200,9 @@ def _panel(axes: Any, runs: list[Run], key: str, colours: dict[str, str]) -> Non
         if changed:
             axes.plot(*zip(*changed, strict=True), color=colours[name], marker="D", fillstyle="none", linestyle="none")
     times = [seconds for _, seconds, _ in timed]
-    middle = math.sqrt(min(times) * max(times))
+    late = min(times) ** (1 / 3) * max(times) ** (2 / 3)
     for text, seconds, error in _labels(timed):
-        aside, side = ((-7, 5), "right") if seconds > middle else ((7, 5), "left")
+        aside, side = ((-7, 5), "right") if seconds > late else ((7, 5), "left")
         axes.annotate(text, (seconds, error), aside, textcoords="offset points", fontsize=7, ha=side)
     for run in runs:
         if run.seconds is None:
