@@ -500,7 +500,7 @@ def test_the_loop_looks_for_motion_as_coarsely_as_was_chosen_and_without_clots(
     """Prediction and estimate have the same grid; the paper's method takes the densities as they are."""
     settings = draft if method == "default" else Settings.preset("draft", "paper")
     halvings = 1 if method == "default" else None
-    settings = replace(settings, velocity=replace(settings.velocity, halvings=halvings))
+    monkeypatch.setattr("smokelift.selection.motion.FINEST_SIDE", max(plume.scene.domain.resolution) - 1)
     estimated, predicted = [], []
 
     def estimate(before, after, dt, voxel_size, settings, **options):
