@@ -24,6 +24,11 @@ TRUSTED_FRAMES = 0.6
 CONFIDENCE = 0.8
 """Share of the foot's distance from the domain's axis that is believed: a pixel is many centimetres on the floor."""
 
+BEHIND = 0.3
+"""Distance of the foot behind the axis, in reaches of the domain, over which that belief falls (the standard deviation
+of a normal curve): smoke that begins somewhat above the floor shows the same picture as smoke further back on it. Where
+it seems far back, a box that stands around its smoke makes the former likelier."""
+
 JOINING = 1.45
 """Growth of the smoke within half its width, in every frame, from which other smoke must have joined it: a column that
 only rises gets no thicker, and what piles up at its head moves on."""
@@ -178,11 +183,13 @@ def estimate_axis(
     found = [foot for foot in (_foot(row, camera, domain) for row in rows) if foot is not None]
     if not found or len(found) < TRUSTED_FRAMES * len(amounts):
         return SmokeAxis.upright()
-    depth = np.full(heights.shape, np.median([foot.depth for foot in found]))
+    deep = float(np.median([foot.depth for foot in found]))
+    depth = np.full(heights.shape, deep)
     width = float(np.median([foot.width for foot in found]))
     base = float(np.median([foot.height for foot in found]))
     across = np.full(heights.shape, np.interp(base + width / 4, heights, _middle(rows)))
-    believed = CONFIDENCE * _believed(depth, across, rows, camera, domain)
+    behind = max(deep, 0.0) / (BEHIND * _reach(domain, view_frame(camera)[1]))
+    believed = CONFIDENCE * np.exp(-(behind**2) / 2) * _believed(depth, across, rows, camera, domain)
     join = _joined(np.array([row.total for row in rows]), heights, base + width / 2, width)
     if join is not None:
         believed *= np.clip((join + width / 2 - heights) / width, 0, 1)
