@@ -37,11 +37,6 @@ AXIS_FRAMES = 16
 LIGHT_FRAMES = 4
 """Those of them whose light is looked at as well: it costs 200 pictures on a coarse grid for each."""
 
-CLOT = 1.5
-"""Multiple of the density that one voxel of smoke in a thousand exceeds, beyond which none says anything about motion.
-True densities and good reconstructions end there. Voxels that the errors of many rays end in, where smoke leaves by the
-floor or the ceiling, may be ten times as dense, others in every frame, and would set all the smoke in motion."""
-
 
 @dataclass(frozen=True, eq=False)
 class Frame:
@@ -181,16 +176,14 @@ def _frames(clip: Clip, shot: Shot, settings: Settings, start: Frame | None) -> 
         fitted = time.perf_counter()
         velocity = Velocity.zero(domain.resolution, domain.voxel_size)
         if before is not None:
-            prediction, ends = None, (before.density, density.values)
-            if settings.method == "default":
-                prediction, ends = predicted, (without_clots(ends[0]), without_clots(ends[1]))
             velocity = estimate_velocity(
-                *ends,
+                before.density,
+                density.values,
                 dt,
                 domain.voxel_size,
                 settings.velocity,
                 inflow=inflow,
-                prediction=prediction,
+                prediction=predicted if settings.method == "default" else None,
             )
         done = time.perf_counter()
         figures = {
@@ -207,15 +200,6 @@ def _frames(clip: Clip, shot: Shot, settings: Settings, start: Frame | None) -> 
         if index > 0 or len(clip) == 1:
             yield frame
         before = frame
-
-
-def without_clots(density: Volume) -> Volume:
-    """The density (nx, ny, nz) with its few densest voxels cut to what motion may be read from."""
-    smoke = density[density > 0]
-    if smoke.size == 0:
-        return density
-    rank = smoke.size - 1 - smoke.size // 1000
-    return np.minimum(density, np.float32(CLOT) * np.partition(smoke, rank)[rank])
 
 
 def smoke_axis(clip: Clip, shot: Shot, settings: Settings) -> SmokeAxis:

@@ -10,7 +10,15 @@ import pytest
 
 from smokelift.background import Plate
 from smokelift.cameras import orbit
-from smokelift.density import Density, DensitySettings, Observation, depth_guess, gather_evidence, reconstruct_density
+from smokelift.density import (
+    Density,
+    DensitySettings,
+    Observation,
+    depth_guess,
+    fit_density,
+    gather_evidence,
+    reconstruct_density,
+)
 from smokelift.density.axis import SmokeAxis
 from smokelift.density.descent import descend
 from smokelift.density.fit import Target
@@ -211,6 +219,28 @@ def test_smoke_through_floor_and_ceiling_makes_no_clots() -> None:
     assert layers.max() < 1.7 * np.median(layers)
 
 
+def test_smoke_that_the_picture_hardly_shows_does_not_grow() -> None:
+    """In the shadow of a thick column, even where the density is carried along and ten times too high at first."""
+    domain = Domain((-1, -1, 0), (1, 1, 3), (32, 32, 48))
+    scene = Scene(
+        camera=Camera.look_at((0, -7, 1.5), (0, 0, 1.5), fov_y_degrees=30, size=(75, 113)),
+        domain=domain,
+        medium=Medium(extinction=5.0, albedo=0.9),
+        lights=(DirectionalLight((0.3, 0.3, -1.0), (8.0, 8.0, 8.0)),),
+    )
+    x = (np.arange(32) + 0.5) / 16 - 1
+    column = np.repeat(((x[:, None] ** 2 + x**2) < 0.25)[..., None], 48, 2).astype(np.float32)
+    seen = gather_evidence(render(column, scene), scene, QUICK)
+    static = depth_guess(seen, scene)
+    density = static.copy()
+    density[14:18, 16:19, 3:6] *= 10
+    for _ in range(4):
+        fitted = fit_density(seen, scene, (3 * static + density) / 4, QUICK)
+        density = fitted.values
+    assert density.max() < 1.2
+    assert fitted.figures["psnr"] > 40
+
+
 def test_texture_breaks_streaks(plume, small) -> None:
     """On request there is detail along the rays, the same every time, and the picture is still met."""
     target = render(plume.densities[1], small)
@@ -256,6 +286,20 @@ def test_descent_never_raises_the_loss(plume, small, thickness) -> None:
     losses = [descend([aim], start, hull, 0.0, steps, 0.0).loss for steps in range(40)]
     assert all(after <= before for before, after in itertools.pairwise(losses))
     assert losses[-1] < 0.2 * losses[0]
+
+
+def test_descent_makes_nothing_denser_than_it_may_be(plume, small) -> None:
+    """The loss falls all the same, by what other voxels can do."""
+    target = render(plume.densities[1], small)
+    hull = visual_hull(target.max(-1) > 0.01, project_voxels(small.camera, small.domain))
+    renderer = Renderer(small.camera, small.domain, small.medium, scene_lights(small), np.zeros(3), support=hull)
+    aim = Target(renderer, target, np.ones(target.shape[:2], np.float32))
+    start = np.where(hull, np.float32(0.02), np.float32(0))
+    free = descend([aim], start, hull, 0.0, 20, 0.0)
+    most = np.full_like(start, 0.5 * free.density.max())
+    bound = descend([aim], start, hull, 0.0, 20, 0.0, most)
+    assert bound.density.max() == most.max()
+    assert free.loss < bound.loss < 0.5 * descend([aim], start, hull, 0.0, 0, 0.0).loss
 
 
 def test_the_figures_are_those_of_the_density(plume, small) -> None:

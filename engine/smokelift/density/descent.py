@@ -1,6 +1,6 @@
 """Projected descent on the exact gradient, preconditioned per voxel, with a step that needs no tuning.
 
-    minimise  sum_views sum_pixels |L(rho) - I|^2   subject to rho >= 0, rho = 0 outside the hull
+    minimise  sum_views sum_pixels |L(rho) - I|^2   subject to 0 <= rho <= densest, rho = 0 outside the hull
 
 Every voxel is measured in units of its own scale w = rho_start + floor: in these units the steepest descent changes
 a ray's smoke in proportion to what is there, so the depth profile of the start survives what the picture says
@@ -33,6 +33,7 @@ def descend(
     enough: float,
     iterations: int,
     tolerance: float,
+    densest: Volume | None = None,
 ) -> Fit:
     """Minimise the pictures' error from a start; see the module.
 
@@ -50,10 +51,13 @@ def descend(
         At most so many steps.
     tolerance
         Stop when a step lowers the loss by less than this share.
+    densest : (nx, ny, nz), optional
+        What no voxel may exceed; the start must not.
     """
     where = np.flatnonzero(hull)
     volume = np.zeros_like(density)
     current = density.ravel()[where]
+    most = densest.ravel()[where] if densest is not None else np.float32(np.inf)
     scale = current + np.float32(FLOOR * (current.mean() if current.size else 0.0))
 
     def evaluate(candidate: NDArray[np.float32]) -> tuple[tuple[float, ...], list[Image]]:
@@ -82,7 +86,7 @@ def descend(
             break
         trial = step or 0.1 * loss / slope
         while True:
-            candidate = np.maximum(current - np.float32(trial) * scale * gradient, 0)
+            candidate = np.clip(current - np.float32(trial) * scale * gradient, 0, most)
             moved = (candidate - current) / scale
             new_losses, residuals = evaluate(candidate)
             new_loss = sum(new_losses)
