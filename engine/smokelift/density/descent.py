@@ -33,7 +33,7 @@ def descend(
     enough: float,
     iterations: int,
     tolerance: float,
-    densest: Volume | None = None,
+    densest: float = np.inf,
 ) -> Fit:
     """Minimise the pictures' error from a start; see the module.
 
@@ -51,13 +51,12 @@ def descend(
         At most so many steps.
     tolerance
         Stop when a step lowers the loss by less than this share.
-    densest : (nx, ny, nz), optional
+    densest
         What no voxel may exceed; the start must not.
     """
     where = np.flatnonzero(hull)
     volume = np.zeros_like(density)
     current = density.ravel()[where]
-    most = densest.ravel()[where] if densest is not None else np.float32(np.inf)
     scale = current + np.float32(FLOOR * (current.mean() if current.size else 0.0))
 
     def evaluate(candidate: NDArray[np.float32]) -> tuple[tuple[float, ...], list[Image]]:
@@ -86,7 +85,7 @@ def descend(
             break
         trial = step or 0.1 * loss / slope
         while True:
-            candidate = np.clip(current - np.float32(trial) * scale * gradient, 0, most)
+            candidate = np.clip(current - np.float32(trial) * scale * gradient, 0, densest)
             moved = (candidate - current) / scale
             new_losses, residuals = evaluate(candidate)
             new_loss = sum(new_losses)
