@@ -286,6 +286,15 @@ def test_descent_never_raises_the_loss(plume, small, thickness) -> None:
     assert losses[-1] < 0.2 * losses[0]
 
 
+def test_descent_does_not_end_with_one_poor_step(plume, small) -> None:
+    """Where no step is good enough it takes two."""
+    target = render(plume.densities[1], small)
+    hull = visual_hull(target.max(-1) > 0.01, project_voxels(small.camera, small.domain))
+    renderer = Renderer(small.camera, small.domain, small.medium, scene_lights(small), np.zeros(3), support=hull)
+    aim = Target(renderer, target, np.ones(target.shape[:2], np.float32))
+    assert descend([aim], np.where(hull, np.float32(0.02), np.float32(0)), hull, 0.0, 20, np.inf).iterations == 2
+
+
 def test_descent_makes_nothing_denser_than_it_may_be(plume, small) -> None:
     """The loss falls all the same, by what other voxels can do."""
     target = render(plume.densities[1], small)

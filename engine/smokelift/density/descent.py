@@ -22,6 +22,10 @@ from smokelift.render.renderer import Image, Volume
 FLOOR = 0.1
 """Scale of an empty voxel of the hull, in mean densities of the start: it may fill, but more slowly than others."""
 
+PATIENCE = 2
+"""Steps in turn without gain that end the descent. Of Barzilai and Borwein's one may gain little and the next one much;
+ended by the first, some frames of a clip kept twice the error of others, and the smoke flickered."""
+
 SUFFICIENT = 1e-4
 SHORTEN = 0.3
 
@@ -50,7 +54,7 @@ def descend(
     iterations
         At most so many steps.
     tolerance
-        Stop when a step lowers the loss by less than this share.
+        Stop when `PATIENCE` steps in turn lower the loss by less than this share each.
     densest
         What no voxel may exceed; the start must not.
     """
@@ -78,7 +82,7 @@ def descend(
     losses, residuals = evaluate(current)
     loss, gradient = sum(losses), gradient_of(residuals)
     step: float | None = None
-    done = 0
+    done = idle = 0
     while done < iterations and loss > enough:
         slope = _dot(gradient, gradient)
         if slope <= 0:
@@ -101,7 +105,8 @@ def descend(
         gained = loss - new_loss
         current, losses, loss, gradient = candidate, new_losses, new_loss, new_gradient
         done += 1
-        if gained < tolerance * loss:
+        idle = idle + 1 if gained < tolerance * loss else 0
+        if idle == PATIENCE:
             break
     return Fit(volume, losses, done)
 
