@@ -52,10 +52,9 @@ profile says is missing in the picture; with more, clots grow at the floor and t
 
 DENSEST = 3.0
 """Multiple of the densest in the pictures' own guess (or in a denser start) beyond which nothing is made denser. The
-guess knows of no shadows and is smooth, so more is needed; with 2 the picture is met worse, with 4 and 6 velocities
-are worse and flicker is larger (six scenes). Where the picture hardly changes with the smoke, in shadow or before what
-hides it, nothing else ends its growth: carried along it grew from frame to frame, to thousands of times the density
-around it."""
+guess knows of no shadows and is smooth, so more than once is needed; from 3 on the picture is met as without a bound.
+Where it hardly changes with the smoke, in shadow or before what hides it, nothing else ends the smoke's growth: carried
+along it grew from frame to frame, to thousands of times the density around it (docs/accuracy.md)."""
 
 
 @dataclass(frozen=True)
