@@ -204,32 +204,29 @@ def test_rays_that_leave_through_the_floor_meet_less_of_the_profile(small) -> No
     assert ((share >= 0) & (share <= 1)).all()
 
 
-def test_smoke_through_floor_and_ceiling_makes_no_clots() -> None:
-    """A column as high as the box is not much denser at its ends, where rays cross few of its voxels."""
+def tall_column(square: float, light: tuple[float, float, float]) -> tuple[Scene, np.ndarray]:
+    """A column as high as its box, of a squared radius (m2), in the light of a direction."""
     domain = Domain((-1, -1, 0), (1, 1, 3), (32, 32, 48))
     scene = Scene(
         camera=Camera.look_at((0, -7, 1.5), (0, 0, 1.5), fov_y_degrees=30, size=(75, 113)),
         domain=domain,
         medium=Medium(extinction=5.0, albedo=0.9),
-        lights=(DirectionalLight((-0.6, 0.4, -0.7), (8.0, 8.0, 8.0)),),
+        lights=(DirectionalLight(light, (8.0, 8.0, 8.0)),),
     )
     x = (np.arange(32) + 0.5) / 16 - 1
-    column = np.repeat(((x[:, None] ** 2 + x**2) < 0.06)[..., None], 48, 2).astype(np.float32)
+    return scene, np.repeat(((x[:, None] ** 2 + x**2) < square)[..., None], 48, 2).astype(np.float32)
+
+
+def test_smoke_through_floor_and_ceiling_makes_no_clots() -> None:
+    """A column as high as the box is not much denser at its ends, where rays cross few of its voxels."""
+    scene, column = tall_column(0.06, (-0.6, 0.4, -0.7))
     layers = reconstruct_density(render(column, scene), scene).values.max((0, 1))
     assert layers.max() < 1.7 * np.median(layers)
 
 
 def test_smoke_that_the_picture_hardly_shows_does_not_grow() -> None:
     """In the shadow of a thick column, where a density that is carried along would be denser in every frame."""
-    domain = Domain((-1, -1, 0), (1, 1, 3), (32, 32, 48))
-    scene = Scene(
-        camera=Camera.look_at((0, -7, 1.5), (0, 0, 1.5), fov_y_degrees=30, size=(75, 113)),
-        domain=domain,
-        medium=Medium(extinction=5.0, albedo=0.9),
-        lights=(DirectionalLight((0.3, 0.3, -1.0), (8.0, 8.0, 8.0)),),
-    )
-    x = (np.arange(32) + 0.5) / 16 - 1
-    column = np.repeat(((x[:, None] ** 2 + x**2) < 0.4)[..., None], 48, 2).astype(np.float32)
+    scene, column = tall_column(0.4, (0.3, 0.3, -1.0))
     seen = gather_evidence(render(column, scene), scene, QUICK)
     density = static = depth_guess(seen, scene)
     for _ in range(8):
@@ -269,18 +266,20 @@ def test_the_multiplicative_fit_gets_better(plume, small) -> None:
     assert losses[-1] < 0.1 * losses[0]
 
 
+def even_start(density: np.ndarray, scene: Scene) -> tuple[Target, np.ndarray, np.ndarray]:
+    """What to descend to, the picture of a density; its hull; and thin smoke all over that, to start from."""
+    target = render(density, scene)
+    hull = visual_hull(target.max(-1) > 0.01, project_voxels(scene.camera, scene.domain))
+    renderer = Renderer(scene.camera, scene.domain, scene.medium, scene_lights(scene), np.zeros(3), support=hull)
+    aim = Target(renderer, target, np.ones(target.shape[:2], np.float32))
+    return aim, hull, np.where(hull, np.float32(0.02), np.float32(0))
+
+
 @pytest.mark.parametrize("thickness", [1.0, 30.0])
 def test_descent_never_raises_the_loss(plume, small, thickness) -> None:
     """Each further step leaves the picture as near or nearer, in thick smoke too, where bare steps overshoot."""
     scene = replace(small, medium=replace(small.medium, extinction=thickness * small.medium.extinction))
-    target = render(plume.densities[1], scene)
-    mask = target.max(-1) > 0.01
-    projection = project_voxels(scene.camera, scene.domain)
-    hull = visual_hull(mask, projection)
-    renderer = Renderer(scene.camera, scene.domain, scene.medium, scene_lights(scene), np.zeros(3), support=hull)
-    start = np.where(hull, np.float32(0.02), np.float32(0))
-    weight = np.ones(mask.shape, np.float32)
-    aim = Target(renderer, target, weight)
+    aim, hull, start = even_start(plume.densities[1], scene)
     losses = [descend([aim], start, hull, 0.0, steps, 0.0).loss for steps in range(40)]
     assert all(after <= before for before, after in itertools.pairwise(losses))
     assert losses[-1] < 0.2 * losses[0]
@@ -288,20 +287,13 @@ def test_descent_never_raises_the_loss(plume, small, thickness) -> None:
 
 def test_descent_does_not_end_with_one_poor_step(plume, small) -> None:
     """Where no step is good enough it takes two."""
-    target = render(plume.densities[1], small)
-    hull = visual_hull(target.max(-1) > 0.01, project_voxels(small.camera, small.domain))
-    renderer = Renderer(small.camera, small.domain, small.medium, scene_lights(small), np.zeros(3), support=hull)
-    aim = Target(renderer, target, np.ones(target.shape[:2], np.float32))
-    assert descend([aim], np.where(hull, np.float32(0.02), np.float32(0)), hull, 0.0, 20, np.inf).iterations == 2
+    aim, hull, start = even_start(plume.densities[1], small)
+    assert descend([aim], start, hull, 0.0, 20, np.inf).iterations == 2
 
 
 def test_descent_makes_nothing_denser_than_it_may_be(plume, small) -> None:
     """The loss falls all the same, by what other voxels can do."""
-    target = render(plume.densities[1], small)
-    hull = visual_hull(target.max(-1) > 0.01, project_voxels(small.camera, small.domain))
-    renderer = Renderer(small.camera, small.domain, small.medium, scene_lights(small), np.zeros(3), support=hull)
-    aim = Target(renderer, target, np.ones(target.shape[:2], np.float32))
-    start = np.where(hull, np.float32(0.02), np.float32(0))
+    aim, hull, start = even_start(plume.densities[1], small)
     free = descend([aim], start, hull, 0.0, 20, 0.0)
     most = 0.5 * float(free.density.max())
     bound = descend([aim], start, hull, 0.0, 20, 0.0, most)

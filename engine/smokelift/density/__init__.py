@@ -185,7 +185,7 @@ def gather_evidence(
 
 def depth_guess(seen: Evidence, scene: Scene) -> Volume:
     """Density (nx, ny, nz) from pictures alone: unshadowed optical depths, spread by the depth profiles."""
-    return seen.guess() / np.float32((scene.medium or Medium()).extinction)
+    return seen.guess / np.float32((scene.medium or Medium()).extinction)
 
 
 def fit_density(seen: Evidence, scene: Scene, initial: Volume | None, settings: DensitySettings) -> Density:
@@ -217,8 +217,7 @@ def fit_density(seen: Evidence, scene: Scene, initial: Volume | None, settings: 
     iterations = settings.fit_iterations * len(targets)
     fit = fit_multiplicative(targets, start, enough, iterations, settings.tolerance)
     densest = float(max(DENSEST * guess.max(), start.max()))
-    without_clots = np.minimum(fit.density, np.float32(densest))
-    final = descend(targets, without_clots, hull, enough, settings.descent_iterations, settings.tolerance, densest)
+    final = descend(targets, fit.density, hull, enough, settings.descent_iterations, settings.tolerance, densest)
     return Density(
         _without_traces(final.density),
         hull,

@@ -56,11 +56,11 @@ def descend(
     tolerance
         Stop when `PATIENCE` steps in turn lower the loss by less than this share each.
     densest
-        What no voxel may exceed; the start must not.
+        What no voxel may exceed; where the start does it is cut.
     """
     where = np.flatnonzero(hull)
     volume = np.zeros_like(density)
-    current = density.ravel()[where]
+    current = np.minimum(density.ravel()[where], np.float32(densest))
     scale = current + np.float32(FLOOR * (current.mean() if current.size else 0.0))
 
     def evaluate(candidate: NDArray[np.float32]) -> tuple[tuple[float, ...], list[Image]]:

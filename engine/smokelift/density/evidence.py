@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -92,6 +93,7 @@ class Evidence:
             for view, middle in zip(views, axes, strict=True)
         )
 
+    @cached_property
     def guess(self) -> Volume:
         """Optical depth per metre (nx, ny, nz) that is plausible: see the module."""
         hull = self.hull
