@@ -29,13 +29,15 @@ from typing import Any
 import numpy as np
 from accuracy_worker import SMEAR, VIEWS, run_views
 
-from smokelift import Camera, Clip, Scene, metrics, pictures
+from smokelift import Camera, Clip, Scene
 from smokelift.bench.machine import describe
-from smokelift.images import area_average
+from smokelift.evaluation import metrics
+from smokelift.evaluation.scores import PictureScore, VolumeScore, eight_bit_values, finite_mean
+from smokelift.evaluation.truth import Truth
+from smokelift.footage.images import area_average
+from smokelift.output import pictures
 from smokelift.render import Renderer, scene_renderer
-from smokelift.render.rays import project, ray_through_pixels
-from smokelift.scores import PictureScore, VolumeScore, eight_bit_values, finite_mean
-from smokelift.truth import Truth
+from smokelift.scene.projection import project, ray_through_pixels
 
 FRONT, SIDE = "0", "90"
 """Views between which a guess of the depth shows most: bands, and the front's picture seen from the side."""

@@ -34,8 +34,8 @@ from smokelift import (
 )
 from smokelift.bench.machine import peak_bytes, poisson_seconds
 from smokelift.density import DensitySettings, evidence
-from smokelift.images import write_image
-from smokelift.shot import Shot, prepare_shot
+from smokelift.output.images import write_image
+from smokelift.setup.shot import Shot, prepare_shot
 
 VIEWS = {"0": "front", "20": "nov20", "45": "nov45", "90": "side"}
 """Degrees about the vertical, and the files of picture.py."""

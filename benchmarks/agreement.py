@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from scipy import ndimage
 
-from smokelift.images import write_image
+from smokelift.output.images import write_image
 from smokelift.render import Renderer
 from smokelift.render.environment import environment_count, environment_lights
 from smokelift.scene import Camera, DirectionalLight, Domain, EnvironmentLight, Light, Medium, PointLight

@@ -20,9 +20,9 @@ import numpy.typing as npt
 
 from smokelift.density import axis
 from smokelift.density.axis import SmokeAxis, estimate_axis
+from smokelift.evaluation.truth import Truth
 from smokelift.render import Renderer
 from smokelift.scene import Camera, Domain, Medium
-from smokelift.truth import Truth
 
 FRAMES, LOOKS = 24, 16
 BOX = (-1.0, -1.0, 0.0), (1.0, 1.0, 3.0)

@@ -15,8 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
+from smokelift.baselines.renderer import PaperRenderer
 from smokelift.render import Renderer
-from smokelift.render.paper import PaperRenderer
 from smokelift.scene import Camera, DirectionalLight, Domain, Medium
 
 # the float64 sums belong to the tests

@@ -15,14 +15,14 @@ import numpy as np
 from PIL import Image, ImageDraw
 from scipy import ndimage
 
-from smokelift.cameras import orbit
+from smokelift.baselines.descent import fit_paper
+from smokelift.baselines.renderer import PaperRenderer
 from smokelift.density.descent import descend
 from smokelift.density.fit import Target
-from smokelift.density.paper import fit_paper
-from smokelift.images import linear_to_srgb
+from smokelift.footage.images import linear_to_srgb
 from smokelift.render import Renderer
-from smokelift.render.paper import PaperRenderer
 from smokelift.scene import Camera, DirectionalLight, Domain, Medium
+from smokelift.scene.cameras import orbit
 
 SIZE, PIXELS = 64, 160
 DOMAIN = Domain((-0.5, -0.5, 0.0), (0.5, 0.5, 1.0), (SIZE,) * 3)

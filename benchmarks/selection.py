@@ -23,14 +23,15 @@ from typing import Any
 
 import numpy as np
 
-from smokelift import Clip, Frame, Scene, Settings, pictures, reconstruct
-from smokelift.images import area_average
-from smokelift.metrics import psnr
+from smokelift import Clip, Frame, Scene, Settings, reconstruct
+from smokelift.evaluation.metrics import psnr
+from smokelift.evaluation.scores import resampled
+from smokelift.evaluation.truth import Truth
+from smokelift.footage.images import area_average
+from smokelift.output import pictures
 from smokelift.render import scene_renderer
 from smokelift.scene import Background, EnvironmentLight
-from smokelift.scores import resampled
-from smokelift.shot import Shot, prepare_shot
-from smokelift.truth import Truth
+from smokelift.setup.shot import Shot, prepare_shot
 from smokelift.velocity.settings import LEVELS
 
 VIEWS = {"0": "front", "20": "nov20", "45": "nov45", "90": "side"}

@@ -16,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
+from smokelift.evaluation.truth import Truth
 from smokelift.transport import advect, project
-from smokelift.truth import Truth
 
 FRAMES = range(6, 22)
 Array = npt.NDArray[np.float32]

@@ -20,8 +20,8 @@ import numpy.typing as npt
 from scipy import ndimage
 
 from smokelift.bench.machine import poisson_seconds
+from smokelift.evaluation.truth import Truth
 from smokelift.transport import advect
-from smokelift.truth import Truth
 from smokelift.velocity import Velocity, VelocitySettings, estimate_velocity, predict_velocity
 
 PAIRS = range(6, 38, 4)

@@ -15,8 +15,8 @@ import matplotlib
 import numpy as np
 from scipy import ndimage
 
+from smokelift.evaluation.truth import Truth
 from smokelift.transport import advect, divergence
-from smokelift.truth import Truth
 
 matplotlib.use("Agg")
 from matplotlib import pyplot

@@ -3,10 +3,11 @@
 The data flows clip -> shot -> density (renderer) <-> velocity, transport -> sequence.
 """
 
-from smokelift import metrics
-from smokelift.clip import Clip
 from smokelift.density import Density, DensitySettings, Observation, reconstruct_density
-from smokelift.reconstruct import Frame, reconstruct
+from smokelift.evaluation import metrics
+from smokelift.footage.clip import Clip
+from smokelift.output.sequence import Sequence
+from smokelift.pipeline import Frame, reconstruct
 from smokelift.render import render, render_gradient
 from smokelift.scene import (
     Background,
@@ -21,8 +22,7 @@ from smokelift.scene import (
     Scene,
     View,
 )
-from smokelift.sequence import Sequence
-from smokelift.settings import Settings
+from smokelift.setup.settings import Settings
 from smokelift.transport import Velocity, advect, project
 from smokelift.velocity import VelocitySettings, estimate_velocity
 

@@ -2,6 +2,6 @@
 
 import sys
 
-from smokelift.cli import main
+from smokelift.app.cli import main
 
 sys.exit(main())

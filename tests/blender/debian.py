@@ -19,8 +19,8 @@ import pytest
 from PIL import Image
 
 from engine_wheels import ROOT
-from smokelift.clip import Clip
-from smokelift.images import area_average, linear_to_srgb
+from smokelift.footage.clip import Clip
+from smokelift.footage.images import area_average, linear_to_srgb
 from tests.blender.setting import LIFECYCLE, WORK, ZIP, pytest_words, run, unavailable, user_folder, variables
 
 SCRIPTS = ROOT / "tests" / "blender" / "root"

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from PIL import Image
 
-from smokelift.clip import Clip
-from smokelift.images import area_average, linear_to_srgb
+from smokelift.footage.clip import Clip
+from smokelift.footage.images import area_average, linear_to_srgb
 
 ROOT = Path(__file__).parents[2]
 SEEN = ROOT / "build" / "test-blender" / "pictures"

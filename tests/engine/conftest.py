@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from smokelift.cameras import orbit
-from smokelift.images import write_image
+from smokelift.output.images import write_image
 from smokelift.render import render
 from smokelift.scene import (
     Background,
@@ -24,7 +23,8 @@ from smokelift.scene import (
     View,
     look_at_matrix,
 )
-from smokelift.settings import Settings
+from smokelift.scene.cameras import orbit
+from smokelift.setup.settings import Settings
 
 FRAMES = 5
 FIRST_HEIGHT = 0.45

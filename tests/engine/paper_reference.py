@@ -6,7 +6,7 @@ Like ``renderer_reference`` it takes complex densities, for derivatives by a com
 import numpy as np
 from renderer_reference import inscatter_of
 
-from smokelift.render.rays import ray_through_pixels
+from smokelift.scene.projection import ray_through_pixels
 
 
 def _trilinear(volume, position):

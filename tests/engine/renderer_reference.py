@@ -7,7 +7,7 @@ differences of two pictures can resolve.
 
 import numpy as np
 
-from smokelift.render.rays import ray_through_pixels
+from smokelift.scene.projection import ray_through_pixels
 
 
 def _interpolate(plane, b, c):

@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from smokelift.background import changing_plate, estimate_plate, known_plate, matte, one_colour
-from smokelift.clip import Clip
-from smokelift.images import linear_to_srgb, srgb_to_linear, write_image
+from smokelift.footage.clip import Clip
+from smokelift.footage.images import linear_to_srgb, srgb_to_linear
+from smokelift.footage.plate import changing_plate, estimate_plate, known_plate, matte, one_colour
+from smokelift.output.images import write_image
 
 HEIGHT, WIDTH, COUNT = 72, 56, 24
 DATA = Path(__file__).parents[3] / "shared" / "data"

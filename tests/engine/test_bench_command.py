@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from smokelift.app.cli import main
 from smokelift.bench import chart, renderer, worker
 from smokelift.bench.peers import OURS, PEERS
 from smokelift.bench.scene import bench_scene
-from smokelift.cli import main
 from smokelift.render import device
 
 

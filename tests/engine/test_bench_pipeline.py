@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from smokelift.app.cli import main
 from smokelift.bench.pipeline import clip, run
 from smokelift.bench.pipeline.clip import with_grid, write_clip
 from smokelift.bench.pipeline.table import text
 from smokelift.bench.pipeline.worker import Run, measure
 from smokelift.bench.velocity.flow import built_in_densities, built_in_pair
-from smokelift.cli import main
-from smokelift.vdb import VdbUnavailable, vdb_module
+from smokelift.output.vdb import VdbUnavailable, vdb_module
 
 SHAPE = (16, 16, 24)
 

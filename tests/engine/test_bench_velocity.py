@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from smokelift.app.cli import main
 from smokelift.bench import machine
 from smokelift.bench.velocity import run
 from smokelift.bench.velocity.flow import built_in_pair
 from smokelift.bench.velocity.linear import LinearProblem
 from smokelift.bench.velocity.table import estimate_name, solves_to_reach
-from smokelift.cli import main
 from smokelift.transport import Velocity
 
 SHAPE = (16, 16, 24)

@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from smokelift.cameras import CameraError, orbit, working_picture
-from smokelift.render.rays import project
+from smokelift.footage.working import CameraError, working_picture
 from smokelift.scene import Camera, Domain
+from smokelift.scene.cameras import orbit
+from smokelift.scene.projection import project
 
 DOMAIN = Domain((-0.6, -0.6, 0), (0.6, 0.6, 1.6), (24, 24, 32))
 CENTRE = np.array([0, 0, 0.8])

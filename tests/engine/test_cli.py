@@ -19,15 +19,16 @@ import numpy as np
 import pytest
 
 import smokelift
-from smokelift import memory, pictures
-from smokelift.cameras import orbit
-from smokelift.cli import main
-from smokelift.clip import Clip
-from smokelift.images import read_image
+from smokelift.app import memory
+from smokelift.app.cli import main
+from smokelift.footage.clip import Clip
+from smokelift.footage.images import read_image
+from smokelift.output import pictures
+from smokelift.output.sequence import Sequence
+from smokelift.output.vdb import VdbUnavailable, vdb_module
 from smokelift.render import device, render
 from smokelift.scene import Camera, Inlet, Scene
-from smokelift.sequence import Sequence
-from smokelift.vdb import VdbUnavailable, vdb_module
+from smokelift.scene.cameras import orbit
 
 MODULE = [sys.executable, "-m", "smokelift"]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(Path(smokelift.__file__).parents[1])}

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from smokelift.clip import Clip, ClipError
-from smokelift.images import linear_to_srgb, srgb_to_linear, write_image
+from smokelift.footage.clip import Clip, ClipError
+from smokelift.footage.images import linear_to_srgb, srgb_to_linear
+from smokelift.output.images import write_image
 from smokelift.scene import ClipSource
 
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from smokelift.background import Plate
-from smokelift.coupling import AMOUNTS, Guess, first_guess
 from smokelift.density import DensitySettings, depth_guess, gather_evidence
+from smokelift.density.initial import AMOUNTS, Guess, first_guess
+from smokelift.footage.plate import Plate
 from smokelift.render import render
 from smokelift.render.renderer import Volume
 from smokelift.scene import Scene

@@ -8,8 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from smokelift.background import Plate
-from smokelift.cameras import orbit
 from smokelift.density import (
     Density,
     DensitySettings,
@@ -25,10 +23,12 @@ from smokelift.density.fit import Target
 from smokelift.density.hull import common_hull, project_voxels, visual_hull
 from smokelift.density.multiplicative import RayTarget, fit_multiplicative
 from smokelift.density.profile import DepthProfile, inflated
-from smokelift.metrics import psnr, streaks
+from smokelift.evaluation.metrics import psnr, streaks
+from smokelift.footage.plate import Plate
 from smokelift.render import Renderer, render, scene_lights
-from smokelift.render.rays import ray_through_pixels
 from smokelift.scene import Background, Camera, DirectionalLight, Domain, Medium, Scene
+from smokelift.scene.cameras import orbit
+from smokelift.scene.projection import ray_through_pixels
 
 QUICK = DensitySettings(fit_iterations=4, descent_iterations=6)
 FRONT = Camera.look_at((0, -4, 0.8), (0, 0, 0.8), fov_y_degrees=30, size=(24, 32)).matrix

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from smokelift.images import ImageError, write_image
+from smokelift.footage.images import ImageError
+from smokelift.output.images import write_image
 from smokelift.render.environment import environment_count, environment_lights
 from smokelift.render.renderer import Renderer
 from smokelift.scene import Camera, Domain, EnvironmentLight, Medium

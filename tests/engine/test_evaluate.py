@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from smokelift.cameras import orbit
-from smokelift.cli import main
-from smokelift.images import write_image
+from smokelift.app.cli import main
+from smokelift.output.images import write_image
+from smokelift.output.sequence import SequenceWriter
 from smokelift.render import render
 from smokelift.scene import Background, ClipSource, Domain, Scene
-from smokelift.sequence import SequenceWriter
+from smokelift.scene.cameras import orbit
 from smokelift.transport import Velocity
 
 RISE = 1.5

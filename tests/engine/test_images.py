@@ -12,15 +12,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from smokelift.images import (
+from smokelift.footage.images import (
     ImageError,
     area_average,
     decode_integers,
     linear_to_srgb,
     read_image,
     srgb_to_linear,
-    write_image,
 )
+from smokelift.output.images import write_image
 
 
 def colours(height: int = 6, width: int = 5) -> np.ndarray:

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from smokelift.background import Plate
 from smokelift.density import DensitySettings, SmokeAxis, optical_depth
 from smokelift.density.hull import voxel_centres
 from smokelift.density.light import refine_axis
-from smokelift.images import linear_to_srgb, srgb_to_linear
+from smokelift.footage.images import linear_to_srgb, srgb_to_linear
+from smokelift.footage.plate import Plate
 from smokelift.render import render
 from smokelift.scene import Background, Camera, DirectionalLight, Domain, Medium, PointLight, Scene
 

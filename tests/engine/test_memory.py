@@ -8,8 +8,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from smokelift import memory
-from smokelift.memory import NotEnoughMemoryError, needed, require_memory
+from smokelift.app import memory
+from smokelift.app.memory import NotEnoughMemoryError, needed, require_memory
 from smokelift.scene import Domain
 
 DOMAINS = {

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from smokelift.metrics import (
+from smokelift.evaluation.metrics import (
     banding,
     flicker,
     height_mass_error,

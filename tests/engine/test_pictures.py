@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from smokelift.cameras import orbit
-from smokelift.clip import Clip
-from smokelift.images import write_image
-from smokelift.pictures import (
+from smokelift.footage.clip import Clip
+from smokelift.output.images import write_image
+from smokelift.output.pictures import (
     SHEET_ANGLES,
     TILE_HEIGHT,
     Viewer,
@@ -20,9 +19,10 @@ from smokelift.pictures import (
     write_preview,
     write_video,
 )
+from smokelift.output.sequence import Sequence, SequenceWriter
 from smokelift.render import render
 from smokelift.scene import Background
-from smokelift.sequence import Sequence, SequenceWriter
+from smokelift.scene.cameras import orbit
 from smokelift.transport import Velocity
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from smokelift.progress import reporter
+from smokelift.app.progress import reporter
 
 
 def figures(seconds: float, hull_share: float = 0.1) -> dict[str, Any]:

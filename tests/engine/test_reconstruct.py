@@ -10,20 +10,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from smokelift.clip import Clip
 from smokelift.density import DensitySettings, fit_density, reconstruct_density
 from smokelift.density.hull import project_voxels, voxel_centres
 from smokelift.density.screen import view_frame
-from smokelift.images import write_image
-from smokelift.metrics import psnr
-from smokelift.reconstruct import Frame, reconstruct, smoke_axis
+from smokelift.evaluation.metrics import psnr
+from smokelift.footage.clip import Clip
+from smokelift.output.images import write_image
+from smokelift.output.sequence import Sequence, SequenceError
+from smokelift.output.vdb import VdbUnavailable, read_vdb, vdb_module
+from smokelift.pipeline import Frame, reconstruct, smoke_axis
 from smokelift.render import render, scene_renderer
 from smokelift.scene import Background, ClipSource, Inlet, Medium, PointLight, Scene, look_at_matrix
-from smokelift.sequence import Sequence, SequenceError
-from smokelift.settings import Settings
-from smokelift.shot import prepare_shot
+from smokelift.setup.settings import Settings
+from smokelift.setup.shot import prepare_shot
 from smokelift.transport import advect
-from smokelift.vdb import VdbUnavailable, read_vdb, vdb_module
 from smokelift.velocity import estimate_velocity, predict_velocity
 
 
@@ -483,7 +483,7 @@ def test_the_loop_looks_for_motion_as_coarsely_as_was_chosen(plume, draft, tmp_p
     """Prediction and estimate have the same grid; the paper's method knows of none."""
     settings = draft if method == "default" else Settings.preset("draft", "paper")
     halvings = 1 if method == "default" else None
-    monkeypatch.setattr("smokelift.selection.motion.FINEST_SIDE", max(plume.scene.domain.resolution) - 1)
+    monkeypatch.setattr("smokelift.setup.motion.FINEST_SIDE", max(plume.scene.domain.resolution) - 1)
     estimated, predicted = [], []
 
     def estimate(before, after, dt, voxel_size, settings, **options):

@@ -6,8 +6,8 @@ import numpy as np
 import paper_reference as reference
 import pytest
 
+from smokelift.baselines.renderer import PaperRenderer
 from smokelift.render import Renderer
-from smokelift.render.paper import PaperRenderer
 from smokelift.scene import Camera, DirectionalLight, Domain, Medium, PointLight
 
 SHAPE = (9, 8, 10)

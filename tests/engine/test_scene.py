@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from smokelift.scene import (
+    SIDES,
     Background,
     Camera,
     ClipSource,
@@ -26,8 +27,7 @@ from smokelift.scene import (
     View,
     look_at_matrix,
 )
-from smokelift.scene_file import scene_from_dict, scene_to_dict
-from smokelift.transport import SIDES
+from smokelift.scene.file import scene_from_dict, scene_to_dict
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
 FRONT = ((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, -1.0, -7.0), (0.0, 1.0, 0.0, 1.5), (0.0, 0.0, 0.0, 1.0))

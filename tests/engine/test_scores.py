@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from smokelift.scores import PictureScore, VolumeScore, eight_bit_values, finite_mean, resampled
+from smokelift.evaluation.scores import PictureScore, VolumeScore, eight_bit_values, finite_mean, resampled
+from smokelift.evaluation.truth import Truth
 from smokelift.transport import Velocity
-from smokelift.truth import Truth
 
 SHAPE = (16, 16, 24)
 VOXEL = 0.05

@@ -12,17 +12,18 @@ from hypothesis import example, given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
-from smokelift.background import CODE, Plate, matte
-from smokelift.clip import Clip
-from smokelift.images import srgb_to_linear, write_image
-from smokelift.reconstruct import reconstruct
+from smokelift.footage.clip import Clip
+from smokelift.footage.images import srgb_to_linear
+from smokelift.footage.plate import CODE, Plate, matte
+from smokelift.output.images import write_image
+from smokelift.pipeline import reconstruct
 from smokelift.render import scene_lights
 from smokelift.scene import Background, Domain, EnvironmentLight, Medium, PointLight, Scene, SceneError, look_at_matrix
-from smokelift.selection import Choice
-from smokelift.selection.coarse import LONGEST, coarse_domain, coarse_frame
-from smokelift.selection.motion import choose_halvings, choose_levels, levels_for
-from smokelift.settings import Settings
-from smokelift.shot import Shot, prepare_shot
+from smokelift.setup.choice import Choice
+from smokelift.setup.coarse import LONGEST, coarse_domain, coarse_frame
+from smokelift.setup.motion import choose_halvings, choose_levels, levels_for
+from smokelift.setup.settings import Settings
+from smokelift.setup.shot import Shot, prepare_shot
 from smokelift.velocity import VelocitySettings
 
 
@@ -137,7 +138,7 @@ def test_where_coarse_pictures_show_no_smoke_the_richest_model_stays(plume, draf
         judged = matte(frame, plate)
         return replace(judged, mask=np.zeros_like(judged.mask))
 
-    monkeypatch.setattr("smokelift.selection.model.matte", blind)
+    monkeypatch.setattr("smokelift.setup.model.matte", blind)
     shot = shot_of(plume.scene, draft)
     assert shot.scattering == "single"
     assert not any(choice.what == "scattering" for choice in shot.choices)

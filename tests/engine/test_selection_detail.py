@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from smokelift.background import CODE, Plate
-from smokelift.clip import Clip
-from smokelift.images import linear_to_srgb, srgb_to_linear, write_image
+from smokelift.footage.clip import Clip
+from smokelift.footage.images import linear_to_srgb, srgb_to_linear
+from smokelift.footage.plate import CODE, Plate
+from smokelift.output.images import write_image
 from smokelift.scene import Camera, ClipSource, Domain, Scene
-from smokelift.selection.detail import Detail, smoke_detail
-from smokelift.settings import LONGEST_SIDE, Settings
-from smokelift.shot import Shot, prepare_shot
+from smokelift.setup.detail import Detail, smoke_detail
+from smokelift.setup.settings import LONGEST_SIDE, Settings
+from smokelift.setup.shot import Shot, prepare_shot
 
 SIZE = (192, 256)
 

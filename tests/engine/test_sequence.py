@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from smokelift import sequence, vdb
+from smokelift.output import sequence, vdb
+from smokelift.output.sequence import ResumeState, Sequence, SequenceError, SequenceWriter
 from smokelift.scene import Camera, ClipSource, DirectionalLight, Domain, Scene
-from smokelift.sequence import ResumeState, Sequence, SequenceError, SequenceWriter
 from smokelift.transport import Velocity
 
 SCENE = Scene(

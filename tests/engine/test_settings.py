@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from smokelift.settings import LONGEST_SIDE, METHODS, QUALITIES, Settings
+from smokelift.setup.settings import LONGEST_SIDE, METHODS, QUALITIES, Settings
 
 
 def test_better_qualities_cost_more() -> None:

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 import smokelift
-from smokelift.background import matte
-from smokelift.images import linear_to_srgb
-from smokelift.metrics import psnr
+from smokelift.evaluation.metrics import psnr
+from smokelift.footage.images import linear_to_srgb
+from smokelift.footage.plate import matte
+from smokelift.output.vdb import VdbUnavailable, read_vdb, vdb_module
 from smokelift.render import Renderer
-from smokelift.shot import prepare_shot
-from smokelift.vdb import VdbUnavailable, read_vdb, vdb_module
+from smokelift.setup.shot import prepare_shot
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
 

@@ -10,9 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from smokelift.clip import Clip
-from smokelift.images import write_image
-from smokelift.render.rays import project
+from smokelift.footage.clip import Clip
+from smokelift.output.images import write_image
 from smokelift.scene import (
     Background,
     Camera,
@@ -26,8 +25,9 @@ from smokelift.scene import (
     SceneError,
     look_at_matrix,
 )
-from smokelift.settings import LONGEST_SIDE, Settings
-from smokelift.shot import COARSEST, Shot, boundaries, prepare_shot
+from smokelift.scene.projection import project
+from smokelift.setup.settings import LONGEST_SIDE, Settings
+from smokelift.setup.shot import COARSEST, Shot, boundaries, prepare_shot
 
 
 def shot_of(scene: Scene, settings: Settings) -> Shot:

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from smokelift import _core
-from smokelift.transport import SIDES, Velocity, advect, divergence, project
+from smokelift.scene import SIDES
+from smokelift.transport import Velocity, advect, divergence, project
 
 SHAPE = (13, 10, 17)
 ALL_SIDES = list(itertools.product([False, True], repeat=6))

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from smokelift import vdb
+from smokelift.output import vdb
 from smokelift.scene import Domain
 
 DOMAIN = Domain((-1.0, 0.5, 2.0), (-0.5, 0.75, 2.75), (20, 10, 30))
@@ -100,7 +100,7 @@ def test_a_full_disk_is_noticed(tmp_path: Path) -> None:
     code = f"""
 import resource, signal, numpy as np
 from smokelift.scene import Domain
-from smokelift.vdb import write_vdb
+from smokelift.output.vdb import write_vdb
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (9000, 9000))
 rho = np.random.default_rng(0).random((20, 10, 30), np.float32)
@@ -128,7 +128,7 @@ def test_damaged_files_are_named(tmp_path: Path) -> None:
 
 @needs_vdb
 def test_bpy_is_not_imported_for_it() -> None:
-    code = "import sys; from smokelift.vdb import vdb_module; vdb_module(); print('bpy' in sys.modules)"
+    code = "import sys; from smokelift.output.vdb import vdb_module; vdb_module(); print('bpy' in sys.modules)"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert run.stdout.split()[-1] == "False"
 

@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from smokelift.transport import SIDES, Velocity, advect
+from smokelift.scene import SIDES
+from smokelift.transport import Velocity, advect
 from smokelift.velocity import VelocitySettings, estimate_velocity, predict_velocity
 
 DT, VOXEL = 1 / 24, 0.03

@@ -9,11 +9,11 @@ from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import Any
 
+from smokelift.app.progress import Reporter
 from smokelift.bench.peers import PEERS
-from smokelift.progress import Reporter
+from smokelift.evaluation.truth import Truth
 from smokelift.render import device
-from smokelift.settings import METHODS, QUALITIES
-from smokelift.truth import Truth
+from smokelift.setup.settings import METHODS, QUALITIES
 
 SMALLEST = 8
 """Voxels a side for the renderer."""

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.bench.scene import BenchScene
-from smokelift.render.rays import ray_through_pixels
+from smokelift.scene.projection import ray_through_pixels
 
 Array = NDArray[np.float64]
 

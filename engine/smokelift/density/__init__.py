@@ -13,21 +13,20 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.background import CODE, Plate, matte, noise_at
-from smokelift.cameras import orbit
+from smokelift.baselines.descent import fit_paper
 from smokelift.density.axis import SmokeAxis
 from smokelift.density.descent import descend
 from smokelift.density.evidence import Evidence, ViewEvidence
 from smokelift.density.hull import project_voxels, reached
 from smokelift.density.multiplicative import RayTarget, fit_multiplicative
 from smokelift.density.observation import Observation
-from smokelift.density.paper import fit_paper
-from smokelift.images import srgb_to_linear
+from smokelift.footage.images import srgb_to_linear
+from smokelift.footage.plate import CODE, Plate, matte, noise_at
 from smokelift.render import Renderer, scene_background, scene_lights
 from smokelift.render.lights import unshadowed_source
 from smokelift.render.renderer import Image, Volume
-from smokelift.render.setup import Scattering
-from smokelift.scene import Camera, Domain, Medium, Scene
+from smokelift.scene import Camera, Domain, Medium, Scattering, Scene
+from smokelift.scene.cameras import orbit
 
 __all__ = [
     "Density",
@@ -67,7 +66,7 @@ class DensitySettings:
         ``"default"``, or ``"paper"``: fixed-rate gradient descent, the picture imposed at 90 degrees as well.
     scattering
         ``"single"`` (self-shadowed), ``"unshadowed"``, ``"absorption"``, or ``"auto"``: for a clip the cheapest that
-        does (see `smokelift.selection`), for a single picture ``"single"``.
+        does (see `smokelift.setup`), for a single picture ``"single"``.
     fit_iterations
         Multiplicative iterations at most; the fit is within a few per cent after six, and each further one gains
         less than a step of descent costs.
@@ -258,7 +257,7 @@ def _amount(
 
 
 def _paper(seen: Evidence, scene: Scene, initial: Volume | None, settings: DensitySettings) -> Density:
-    from smokelift.render.paper import PaperRenderer  # here, because Taichi takes long to import
+    from smokelift.baselines.renderer import PaperRenderer  # here, because Taichi takes long to import
 
     assert scene.domain is not None
     domain, medium = scene.domain, scene.medium or Medium()

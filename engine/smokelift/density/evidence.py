@@ -16,11 +16,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.background import Plate
 from smokelift.density.axis import SmokeAxis
 from smokelift.density.hull import Projection, centres_of, common_hull
 from smokelift.density.profile import DepthProfile
 from smokelift.density.screen import view_frame
+from smokelift.footage.plate import Plate
 from smokelift.render.renderer import Image, Volume
 from smokelift.scene import Camera, Domain
 

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from smokelift.render.rays import project
 from smokelift.scene import Camera, Domain
+from smokelift.scene.projection import project
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,12 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from smokelift.background import Plate, matte, noise_at
 from smokelift.density.axis import SmokeAxis
 from smokelift.density.hull import project_voxels, visual_hull
 from smokelift.density.profile import DepthProfile
 from smokelift.density.screen import upright_rows, view_frame
-from smokelift.images import area_average
+from smokelift.footage.images import area_average
+from smokelift.footage.plate import Plate, matte, noise_at
 from smokelift.render import Renderer, scene_lights
 from smokelift.render.lights import lighting
 from smokelift.render.renderer import Image

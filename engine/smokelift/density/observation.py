@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from smokelift.background import Plate
+from smokelift.footage.plate import Plate
 from smokelift.render.renderer import Image
 from smokelift.scene import Camera
 

@@ -23,8 +23,8 @@ from scipy.special import gamma, gammainc
 from smokelift.density.axis import SmokeAxis
 from smokelift.density.hull import Projection, centres_of
 from smokelift.density.screen import upright_rows, view_frame
-from smokelift.render.rays import ray_through_pixels
 from smokelift.scene import Camera, Domain
+from smokelift.scene.projection import ray_through_pixels
 
 FLATNESS = 3.5
 """q: between a Gaussian (2) and a box; 3 to 4 were equally good over four scenes."""

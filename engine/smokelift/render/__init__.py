@@ -12,14 +12,13 @@ from typing import overload
 
 import numpy as np
 
-from smokelift import images
-from smokelift.background import open_plates
+from smokelift.footage import images
+from smokelift.footage.plate import open_plates
 from smokelift.render.device import DeviceError, start
 from smokelift.render.environment import environment_count, environment_lights
 from smokelift.render.lights import FiniteLight
 from smokelift.render.renderer import Image, Renderer, Volume
-from smokelift.render.setup import Scattering
-from smokelift.scene import Camera, DirectionalLight, Domain, EnvironmentLight, Medium, Scene
+from smokelift.scene import Camera, DirectionalLight, Domain, EnvironmentLight, Medium, Scattering, Scene
 
 __all__ = ["DeviceError", "Renderer", "render", "render_gradient", "start"]
 
@@ -135,7 +134,7 @@ def scene_lights(scene: Scene, camera: Camera | None = None) -> tuple[FiniteLigh
     ------
     ValueError
         If a scene with an environment lacks a camera or a domain.
-    smokelift.images.ImageError
+    smokelift.footage.images.ImageError
         If an environment's picture cannot be read.
     """
     lights: list[FiniteLight] = []

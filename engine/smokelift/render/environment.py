@@ -21,10 +21,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.images import ImageError, read_image
-from smokelift.render.rays import project
+from smokelift.footage.images import ImageError, read_image
 from smokelift.render.renderer import Image, Renderer, Volume
 from smokelift.scene import Camera, DirectionalLight, Domain, EnvironmentLight, Medium
+from smokelift.scene.projection import project
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -71,7 +71,7 @@ def environment_lights(light: EnvironmentLight, count: int) -> tuple[Directional
 
     Raises
     ------
-    smokelift.images.ImageError
+    smokelift.footage.images.ImageError
         If the picture cannot be read or holds values that are not finite.
     ValueError
         If ``count`` is below 1.
@@ -95,7 +95,7 @@ def environment_count(light: EnvironmentLight, camera: Camera, domain: Domain, m
 
     Raises
     ------
-    smokelift.images.ImageError
+    smokelift.footage.images.ImageError
         As `environment_lights`.
     """
     small = _coarse(domain)
@@ -129,7 +129,7 @@ def lights_needed(
 
     Raises
     ------
-    smokelift.images.ImageError
+    smokelift.footage.images.ImageError
         As `environment_lights`.
     """
     cells = _Cells(light)

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from smokelift.render import device
 from smokelift.render.lights import FiniteLight
-from smokelift.render.setup import Scattering, make_setup
-from smokelift.scene import Camera, Domain, Medium
+from smokelift.render.setup import make_setup
+from smokelift.scene import Camera, Domain, Medium, Scattering
 
 Image = NDArray[np.float32]
 Volume = NDArray[np.float32]

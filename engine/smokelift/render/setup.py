@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.render.lights import Box, FiniteLight, Lighting, lighting
 from smokelift.render.rays import Rays, camera_rays
-from smokelift.scene import Camera, Domain, Medium
+from smokelift.scene import Camera, Domain, Medium, Scattering
 
 Slices = tuple[slice, slice, slice]
-Scattering = Literal["single", "unshadowed", "absorption"]
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,10 +10,10 @@ import numpy.typing as npt
 from scipy import ndimage
 
 from smokelift import _core
+from smokelift.scene import Side
 from smokelift.transport import (
     Array,
     Faces,
-    Side,
     Velocity,
     advect,
     closed_flags,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from smokelift.transport import Side
+from smokelift.scene import Side
 
 LEVELS = 3
 """Grids where nobody says how many."""
@@ -27,11 +27,11 @@ class VelocitySettings:
         paper's splitting, with the same minimum at several times the cost; ``"auto"``: the one of the method.
     halvings
         How often the grid of the estimate is half as fine as that of the densities, which the velocity is then
-        interpolated to. None takes as many in a clip as what its pictures show asks for (see `smokelift.selection`);
+        interpolated to. None takes as many in a clip as what its pictures show asks for (see `smokelift.setup`);
         between two densities alone there are none.
     levels
         Grids, each half as fine as the one before, for an estimate without a prediction. None takes as many as the
-        motion in a clip asks for (see `smokelift.selection`); between two densities alone three, which reach several
+        motion in a clip asks for (see `smokelift.setup`); between two densities alone three, which reach several
         voxels a frame. With a prediction there is one: fine detail aliases on coarse grids, which costs more than they
         bring.
     warps

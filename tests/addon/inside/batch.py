@@ -14,7 +14,7 @@ from conftest import quietly
 
 from addon import batch, volume
 from addon.take import Take
-from smokelift.sequence import Sequence
+from smokelift.output.sequence import Sequence
 from tests.example_shot import EXAMPLE
 
 SCRIPT = Path(batch.__file__)

@@ -14,8 +14,8 @@ from mathutils import Euler, Matrix, Vector
 from addon import scene as module
 from addon.scene import ShotError, shot_tables
 from addon.take import Take
-from smokelift.render.rays import project
 from smokelift.scene import Scene
+from smokelift.scene.projection import project
 from tests.example_shot import EXAMPLE, add
 
 CORNERS = [(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (0.0, 3.0)]
@@ -331,7 +331,7 @@ def test_the_box_becomes_cubes(shot, tmp_path, quality, longest) -> None:
 
 def test_the_engine_has_the_same_qualities() -> None:
     """Said twice, because the add-on imports nothing of the engine."""
-    from smokelift.settings import LONGEST_SIDE
+    from smokelift.setup.settings import LONGEST_SIDE
 
     assert dict(LONGEST_SIDE) == module.LONGEST_SIDE
 

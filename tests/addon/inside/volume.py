@@ -17,11 +17,11 @@ from mathutils import Vector
 from addon import look, run, volume
 from addon.scene import box_corners
 from addon.take import Take
-from smokelift.images import write_image
-from smokelift.pictures import write_video
+from smokelift.output.images import write_image
+from smokelift.output.pictures import write_video
+from smokelift.output.vdb import write_vdb
 from smokelift.scene import Domain, Medium, Scene
-from smokelift.scene_file import scene_to_dict
-from smokelift.vdb import write_vdb
+from smokelift.scene.file import scene_to_dict
 from tests.example_shot import EXAMPLE
 
 FRAMES = 6

@@ -14,13 +14,14 @@ import smokelift
 from addon import run, volume
 from addon.scene import point_intensity, shot_tables, sun_irradiance
 from addon.take import Take
-from smokelift.clip import Clip
 from smokelift.density.hull import voxel_centres
-from smokelift.images import area_average, linear_to_srgb, write_image
+from smokelift.footage.clip import Clip
+from smokelift.footage.images import area_average, linear_to_srgb
+from smokelift.output.images import write_image
+from smokelift.output.sequence import Sequence
 from smokelift.scene import Scene
-from smokelift.scene_file import scene_from_dict
-from smokelift.sequence import Sequence
-from smokelift.settings import Settings
+from smokelift.scene.file import scene_from_dict
+from smokelift.setup.settings import Settings
 from tests.example_shot import EXAMPLE, add
 
 FIRST, LAST = 27, 30

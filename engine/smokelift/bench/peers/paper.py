@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from smokelift.baselines.renderer import PaperRenderer
 from smokelift.bench.peers import Iteration
 from smokelift.bench.scene import BenchScene
-from smokelift.render.paper import PaperRenderer
 
 Volume = NDArray[np.float32]
 

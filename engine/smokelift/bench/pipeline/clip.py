@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from smokelift.bench.velocity.flow import built_in_densities
-from smokelift.images import write_image
+from smokelift.output.images import write_image
 from smokelift.render import render
 from smokelift.scene import Background, Camera, ClipSource, DirectionalLight, Domain, Medium, Scene
 

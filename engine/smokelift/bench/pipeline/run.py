@@ -18,7 +18,7 @@ from smokelift.bench.pipeline.clip import with_grid, write_clip
 from smokelift.bench.pipeline.worker import STARTED, run_apart
 from smokelift.bench.velocity.run import size_text
 from smokelift.scene import Scene
-from smokelift.settings import Method, Quality
+from smokelift.setup.settings import Method, Quality
 
 Shape = tuple[int, int, int]
 

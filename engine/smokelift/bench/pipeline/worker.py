@@ -21,10 +21,10 @@ import numpy as np
 from smokelift.bench.machine import peak_bytes, poisson_seconds
 from smokelift.bench.velocity.run import size_text
 from smokelift.bench.worker import environment
-from smokelift.clip import Clip
-from smokelift.reconstruct import reconstruct
+from smokelift.footage.clip import Clip
+from smokelift.pipeline import reconstruct
 from smokelift.scene import Scene
-from smokelift.settings import Method, Quality, Settings
+from smokelift.setup.settings import Method, Quality, Settings
 
 STARTED = 2
 """Frames that are not clocked: the first two come together, and compilers work before them."""

@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
+from smokelift.evaluation.truth import Truth
 from smokelift.transport import Array
-from smokelift.truth import Truth
 
 SMOKE = 0.01
 """Fraction of the largest density from which a voxel counts as smoke."""

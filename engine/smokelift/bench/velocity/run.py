@@ -23,7 +23,7 @@ from smokelift.bench import machine
 from smokelift.bench.velocity.flow import built_in_pair
 from smokelift.bench.velocity.linear import LinearProblem, Solver
 from smokelift.bench.velocity.pairs import Pair, frames_for_pairs, pair_of_truth, relative_error
-from smokelift.truth import Truth
+from smokelift.evaluation.truth import Truth
 from smokelift.velocity import Velocity, VelocitySettings, estimate_velocity
 
 Shape = tuple[int, int, int]

@@ -1,0 +1,1 @@
+"""The paper's own method, part by part, for comparison."""

@@ -1,0 +1,115 @@
+"""Scenes whose flow is known, to compare results with: the files that benchmarks/truth/bake.py writes."""
+
+from __future__ import annotations
+
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from smokelift.scene import Side
+from smokelift.transport import Velocity, face_shapes
+
+Array = npt.NDArray[np.float32]
+
+
+class TruthError(ValueError):
+    """A file that holds no truth, and why."""
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """Densities, velocities and inlet of one scene.
+
+    Attributes
+    ----------
+    densities
+        float16 [frame, x, y, z]; a density times the medium's extinction is in 1/m.
+    faces
+        Velocities (m/s) on x, y and z faces, float16 [frame, x, y, z]; those of frame f carry density f to f + 1, at
+        the points of arrival. Known within 6 voxels of smoke, zero elsewhere.
+    inflow_packed
+        np.packbits of the cells where smoke was put into the density of a frame, [frame, byte].
+    voxel_size
+        Edge of a voxel (m).
+    fps
+        Frames a second.
+    closed
+        Names of the sides that are walls.
+    """
+
+    densities: npt.NDArray[np.float16]
+    faces: tuple[npt.NDArray[np.float16], ...]
+    inflow_packed: npt.NDArray[np.uint8]
+    voxel_size: float
+    fps: float
+    closed: tuple[Side, ...]
+
+    @staticmethod
+    def load(path: Path) -> Truth:
+        """Read a truth.npz.
+
+        Raises
+        ------
+        TruthError
+            If there is no such file, it is damaged, or it holds something else.
+        """
+        try:
+            with path.open("rb") as opened, np.load(opened) as file:
+                truth = Truth(
+                    densities=file["density"],
+                    faces=tuple(file[f"velocity_{axis}"] for axis in "xyz"),
+                    inflow_packed=file["inflow_packed"],
+                    voxel_size=float(file["voxel_size"]),
+                    fps=float(file["fps"]),
+                    closed=tuple(file["closed"].tolist()) if "closed" in file else (),
+                )
+        except FileNotFoundError:
+            raise TruthError(f"{path}: no such file.") from None
+        except KeyError as missing:
+            raise TruthError(f"{path}: is no truth.npz: {missing.args[0]}.") from None
+        except (OSError, ValueError, EOFError, TypeError, AttributeError, zipfile.BadZipFile) as error:
+            raise TruthError(f"{path}: cannot be read as a truth.npz: {error}.") from error
+        truth._check(path)
+        return truth
+
+    def _check(self, path: Path) -> None:
+        if self.densities.ndim != 4:
+            raise TruthError(f"{path}: density must be [frame, x, y, z], not of shape {self.densities.shape}.")
+        wanted = [(self.frames, *shape) for shape in face_shapes(self.shape)]
+        if (found := [face.shape for face in self.faces]) != wanted:
+            raise TruthError(f"{path}: velocity on faces must have the shapes {wanted}, not {found}.")
+        if not (self.voxel_size > 0 and self.fps > 0):
+            raise TruthError(f"{path}: voxel_size and fps must be positive, not {self.voxel_size} and {self.fps}.")
+
+    @property
+    def frames(self) -> int:
+        """How many frames there are."""
+        return len(self.densities)
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Voxels along x, y and z."""
+        nx, ny, nz = self.densities.shape[1:]
+        return nx, ny, nz
+
+    @property
+    def dt(self) -> float:
+        """Seconds from one frame to the next."""
+        return 1 / self.fps
+
+    def density(self, frame: int) -> Array:
+        """Density of a frame, [x, y, z]."""
+        return np.asarray(self.densities[frame], np.float32)
+
+    def velocity(self, frame: int) -> Velocity:
+        """What carries the density of a frame to the next one."""
+        x, y, z = (component[frame].astype(np.float32) for component in self.faces)
+        return Velocity((x, y, z), self.voxel_size)
+
+    def inflow(self, frame: int) -> npt.NDArray[np.bool_]:
+        """Cells where smoke was put into the density of a frame, [x, y, z]."""
+        count = int(np.prod(self.shape))
+        return np.unpackbits(self.inflow_packed[frame], count=count).reshape(self.shape).astype(bool)

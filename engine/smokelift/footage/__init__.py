@@ -1,0 +1,1 @@
+"""Pictures in linear light, and the smoke in them apart from its background."""

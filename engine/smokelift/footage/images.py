@@ -1,0 +1,210 @@
+"""Single pictures as linear float32 arrays [row, column, rgb], row 0 at the top.
+
+Integer pictures (PNG, JPEG) are sRGB unless said otherwise, EXR and HDR are linear. A grey picture gets three
+equal channels. Alpha is shown over black: EXR colours carry it already (premultiplied, by the format's rule),
+PNG colours are multiplied by it in linear light.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any, Literal
+
+import av
+import numpy as np
+import numpy.typing as npt
+import OpenEXR
+import scipy.sparse
+from PIL import Image, ImageOps
+
+Picture = npt.NDArray[np.float32]
+Transfer = Literal["srgb", "linear"]
+
+READABLE = (".png", ".jpg", ".jpeg", ".exr", ".hdr")
+
+
+class ImageError(ValueError):
+    """A picture that cannot be read or written."""
+
+
+def srgb_to_linear(encoded: npt.ArrayLike) -> Picture:
+    """Decode sRGB values (1 is white) to linear ones; the exact piecewise curve, continued above 1."""
+    e = np.asarray(encoded, np.float32)
+    curve = ((np.maximum(e, np.float32(0.04)) + np.float32(0.055)) / np.float32(1.055)) ** np.float32(2.4)
+    linear: Picture = np.where(e <= np.float32(0.04045), e / np.float32(12.92), curve)
+    return linear
+
+
+def linear_to_srgb(linear: npt.ArrayLike) -> Picture:
+    """Encode linear values as sRGB (1 is white); the exact piecewise curve, continued above 1."""
+    v = np.asarray(linear, np.float32)
+    curve = np.float32(1.055) * np.maximum(v, np.float32(0.003)) ** np.float32(1 / 2.4) - np.float32(0.055)
+    encoded: Picture = np.where(v <= np.float32(0.0031308), v * np.float32(12.92), curve)
+    return encoded
+
+
+def decode_integers(codes: npt.NDArray[np.uint8] | npt.NDArray[np.uint16], transfer: Transfer | None = None) -> Picture:
+    """Return integer pixels [row, column, rgb or rgba] as linear RGB, alpha over black.
+
+    Parameters
+    ----------
+    codes
+        8 or 16 bit values whose largest is white.
+    transfer
+        How they encode light; None is ``"srgb"``.
+    """
+    top = np.iinfo(codes.dtype).max
+    steps = np.arange(top + 1, dtype=np.float32) / np.float32(top)
+    table = steps if transfer == "linear" else srgb_to_linear(steps)
+    linear: Picture = table[codes[..., :3]]
+    if codes.shape[-1] == 4:
+        linear *= steps[codes[..., 3:]]
+    return linear
+
+
+def read_image(path: str | Path, transfer: Transfer | None = None) -> Picture:
+    """Read a PNG, JPEG, EXR or HDR file.
+
+    Parameters
+    ----------
+    path
+        The file; its suffix says what it is.
+    transfer
+        ``"srgb"`` or ``"linear"``; None takes srgb for PNG and JPEG and linear for EXR and HDR.
+
+    Returns
+    -------
+    Linear float32 array of shape (height, width, 3). Of an EXR it is the display window.
+
+    Raises
+    ------
+    ImageError
+        With the path, if there is no such file or it is damaged or of another kind.
+    """
+    path = Path(path)
+    suffix = path.suffix.lower()
+    if suffix not in READABLE:
+        raise ImageError(f"{path}: is none of {', '.join(READABLE)}")
+    if not path.is_file():
+        raise ImageError(f"{path}: no such file")
+    try:
+        if suffix in (".exr", ".hdr"):
+            values = _read_exr(path) if suffix == ".exr" else _read_radiance(path)
+            return srgb_to_linear(values) if transfer == "srgb" else values
+        return decode_integers(_read_integers(path), transfer)
+    except ImageError:
+        raise
+    # Three libraries, each with its own exceptions; to the caller they all say the same.
+    except (RuntimeError, ValueError, SyntaxError, OSError) as error:
+        raise ImageError(f"{path}: cannot be read: {error}") from error
+
+
+def _read_with_ffmpeg(path: Path, pixels: str) -> npt.NDArray[Any]:
+    with av.open(str(path)) as container:
+        return next(container.decode(video=0)).to_ndarray(format=pixels)
+
+
+def _read_radiance(path: Path) -> npt.NDArray[Any]:
+    """A Radiance .hdr of the ordinary kind; FFmpeg takes the rare others for that, upside down or in wrong colours."""
+    with path.open("rb") as file:
+        head = file.read(4096)
+    if b"FORMAT=32-bit_rle_xyze" in head or re.search(rb"\n(\+Y|[+-]X) \d+ [+-][XY] \d+\n|\n-Y \d+ -X \d+\n", head):
+        raise ImageError(f"{path}: is turned, mirrored or in XYZ colours; save it as an ordinary .hdr, or as .exr")
+    return _read_with_ffmpeg(path, "gbrpf32le")
+
+
+def _read_integers(path: Path) -> npt.NDArray[Any]:
+    with path.open("rb") as file:
+        head = file.read(25)
+    if head.startswith(b"\x89PNG") and head[24:] == b"\x10":
+        return _read_with_ffmpeg(path, "rgba64le")  # Pillow would cut 16 bit colour to 8
+    with Image.open(path) as picture:
+        upright = ImageOps.exif_transpose(picture)
+        return np.asarray(upright.convert("RGBA" if upright.has_transparency_data else "RGB"))
+
+
+def _read_exr(path: Path) -> Picture:
+    parts = OpenEXR.File(str(path), separate_channels=True).parts
+    if not parts:  # the library's way to say that it met damaged pixels
+        raise ImageError(f"{path}: cannot be read: it is truncated or damaged")
+    part = parts[0]
+    left, top = (int(v) for v in part.header["displayWindow"][0])
+    right, bottom = (int(v) for v in part.header["displayWindow"][1])
+    x0, y0 = (int(v) for v in part.header["dataWindow"][0])
+    image = np.zeros((bottom - top + 1, right - left + 1, 3), np.float32)
+    rows, columns = slice(max(0, y0 - top), None), slice(max(0, x0 - left), None)
+    for channel, name in enumerate(_exr_channels(path, tuple(part.channels))):
+        pixels = part.channels[name].pixels[max(0, top - y0) :, max(0, left - x0) :]
+        target = image[rows, columns, channel]
+        height, width = min(target.shape[0], pixels.shape[0]), min(target.shape[1], pixels.shape[1])
+        target[:height, :width] = pixels[:height, :width]
+    return image
+
+
+def _exr_channels(path: Path, names: tuple[str, ...]) -> tuple[str, str, str]:
+    """Choose red, green and blue: plain ones, else Blender's combined pass, else any layer, else grey."""
+    layers = [name[:-1] for name in names if name.endswith(".R")]
+    for prefix in ("", *sorted(layers, key=lambda layer: not layer.endswith("Combined."))):
+        rgb = (f"{prefix}R", f"{prefix}G", f"{prefix}B")
+        if set(rgb) <= set(names):
+            return rgb
+    for grey in ("Y", *(names if len(names) == 1 else ())):
+        if grey in names:
+            return grey, grey, grey
+    raise ImageError(f"{path}: holds neither RGB nor Y channels, but {', '.join(names)}")
+
+
+def area_average(image: npt.ArrayLike, width: int, height: int) -> Picture:
+    """Resize a picture so that every new pixel is the mean of the area that it covers.
+
+    Parameters
+    ----------
+    image
+        Shape (rows, columns) or (rows, columns, channels).
+    width, height
+        The new size in pixels. An axis that grows is interpolated linearly instead.
+
+    Returns
+    -------
+    float32 array of shape (height, width) or (height, width, channels).
+
+    Raises
+    ------
+    ValueError
+        If a size is below 1.
+    """
+    if min(width, height) < 1:
+        raise ValueError(f"a picture needs at least one pixel, not {width} x {height}")
+    values = np.asarray(image, np.float32)
+    rows, columns = values.shape[:2]
+    if rows != height:
+        values = (_weights(rows, height) @ values.reshape(rows, -1)).reshape(height, *values.shape[1:])
+    if columns != width:
+        turned = np.swapaxes(values, 0, 1)
+        turned = (_weights(columns, width) @ turned.reshape(columns, -1)).reshape(width, *turned.shape[1:])
+        values = np.swapaxes(turned, 0, 1)
+    return np.ascontiguousarray(values)
+
+
+def _weights(old: int, new: int) -> scipy.sparse.csr_array:
+    """Return the sparse (new, old) matrix whose rows are the weights of one new pixel."""
+    if new > old:
+        position = np.clip((np.arange(new) + 0.5) * (old / new) - 0.5, 0.0, old - 1.0)
+        low = np.minimum(position.astype(np.int64), max(old - 2, 0))
+        share = position - low
+        rows = np.repeat(np.arange(new), 2)
+        columns = np.stack([low, np.minimum(low + 1, old - 1)], axis=1).ravel()
+        values = np.stack([1.0 - share, share], axis=1).ravel()
+    else:
+        # In units of 1 / (old new) of the picture all edges are whole numbers: the overlaps are exact.
+        reach = -(-old // new) + 1
+        first = np.arange(new) * old // new
+        columns = np.minimum(first[:, None] + np.arange(reach), old - 1)
+        inside = first[:, None] + np.arange(reach) < old
+        start, stop = np.arange(new)[:, None] * old, (np.arange(new)[:, None] + 1) * old
+        overlap = np.minimum(stop, (columns + 1) * new) - np.maximum(start, columns * new)
+        rows = np.repeat(np.arange(new), reach)
+        values = (np.maximum(overlap, 0) * inside / old).ravel()
+        columns = columns.ravel()
+    return scipy.sparse.csr_array((values.astype(np.float32), (rows, columns)), shape=(new, old))

@@ -1,0 +1,79 @@
+"""The small picture that a grid is fitted to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smokelift.footage.images import area_average
+from smokelift.scene import Camera, Domain
+from smokelift.scene.projection import project
+
+
+@dataclass(frozen=True)
+class WorkingPicture:
+    """The part of the camera's picture that the domain covers, at a resolution that fits the grid.
+
+    Attributes
+    ----------
+    camera
+        Camera of the small picture.
+    left, top, width, height
+        The part of the full picture, in its pixels.
+    """
+
+    camera: Camera
+    left: int
+    top: int
+    width: int
+    height: int
+
+    def part(self, picture: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The part of a full picture (rows, columns, ...), at its own resolution."""
+        return picture[self.top : self.top + self.height, self.left : self.left + self.width]
+
+    def cut(self, picture: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The small picture, area-averaged from a full one (rows, columns, ...)."""
+        columns, rows = self.camera.size
+        return area_average(self.part(picture), columns, rows)
+
+
+class CameraError(ValueError):
+    """The camera does not see the domain."""
+
+
+def voxel_width(camera: Camera, domain: Domain) -> float:
+    """Width in pixels of a voxel at the domain's centre."""
+    _, depth = project(camera, np.array(domain.centre))
+    near = domain.voxel_size if camera.type == "perspective" else 1.0
+    return max(camera.fx, camera.fy) * domain.voxel_size / max(float(depth), near)
+
+
+def working_picture(camera: Camera, domain: Domain) -> WorkingPicture:
+    """Choose the picture that a grid is fitted to.
+
+    Finer pixels than voxels hold detail that the grid cannot show, coarser ones lose some that it can, so a pixel
+    is as wide as a voxel at the domain's centre (unless the footage is coarser than that).
+
+    Raises
+    ------
+    CameraError
+        If no part of the domain is in the picture.
+    """
+    corners = domain.corners()
+    pixels, depth = project(camera, corners)
+    width, height = camera.size
+    low, high = np.zeros(2), np.array([width, height], np.float64)
+    if (depth > 0).all():
+        low, high = np.maximum(pixels.min(0), low), np.minimum(pixels.max(0), high)
+    if (depth <= 0).all() or (high - low < 1).any():
+        raise CameraError("The camera does not see the domain; move the domain into the picture or turn the camera.")
+    left, top = (int(v) for v in np.floor(low))
+    right, bottom = (int(v) for v in np.ceil(high))
+    shrink = max(1.0, voxel_width(camera, domain))
+    columns = max(1, round((right - left) / shrink))
+    rows = max(1, round((bottom - top) / shrink))
+    small = camera.cropped(left, top, right - left, bottom - top).resized(columns, rows)
+    return WorkingPicture(small, left, top, right - left, bottom - top)

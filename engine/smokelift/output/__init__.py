@@ -1,0 +1,1 @@
+"""What a run leaves on disk: the OpenVDB sequence and pictures of it."""

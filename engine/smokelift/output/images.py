@@ -1,0 +1,53 @@
+"""Pictures on disk that appear whole or not at all."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import OpenEXR
+from PIL import Image
+
+from smokelift.footage.images import ImageError, linear_to_srgb
+from smokelift.output.files import atomic_path
+
+
+def write_image(path: str | Path, image: npt.ArrayLike, *, half: bool = True) -> None:
+    """Write a linear picture as EXR (linear) or PNG (8 bit sRGB, clipped to 0..1).
+
+    Parameters
+    ----------
+    path
+        Ends in ``.exr`` or ``.png``. The file appears whole or not at all.
+    image
+        Linear values, shape (height, width, 3) or (height, width).
+    half
+        EXR: 16 bit floats, else 32 bit ones.
+
+    Raises
+    ------
+    ImageError
+        If the suffix or the shape is another, or a value is not finite.
+    """
+    path = Path(path)
+    values = np.asarray(image, np.float32)
+    if values.ndim == 2:
+        values = np.repeat(values[..., None], 3, axis=2)
+    if values.ndim != 3 or values.shape[2] != 3 or values.size == 0:
+        raise ImageError(f"{path}: a picture must have the shape (height, width, 3), not {values.shape}")
+    if not np.isfinite(values).all():
+        raise ImageError(f"{path}: the picture holds values that are not finite")
+    suffix = path.suffix.lower()
+    if suffix == ".png":
+        codes = np.rint(np.clip(linear_to_srgb(values), 0.0, 1.0) * 255.0).astype(np.uint8)
+        with atomic_path(path) as aside:
+            Image.fromarray(codes).save(aside, format="PNG")
+    elif suffix == ".exr":
+        limit = float(np.finfo(np.float16).max)
+        pixels = np.clip(values, -limit, limit).astype(np.float16) if half else values
+        header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+        with atomic_path(path) as aside:
+            OpenEXR.File(header, {"RGB": np.ascontiguousarray(pixels)}).write(str(aside))
+    else:
+        raise ImageError(f"{path}: can only write .exr and .png")

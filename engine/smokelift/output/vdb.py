@@ -1,0 +1,221 @@
+"""OpenVDB files as Blender expects them: a fog volume `density` and a vector grid `velocity` in m/s.
+
+No package index carries an OpenVDB module for Python. One is taken where it is: already importable, or
+inside an installed `bpy` wheel, whose module folder lies aside from `sys.path`; bpy itself is never imported.
+
+OpenVDB puts the value of voxel (i, j, k) at its integer coordinates, so the transform sends (i, j, k) to the
+voxel's centre, `min + (i + 1/2) h`.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import json
+import os
+import sys
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy import ndimage
+
+from smokelift.output.files import atomic_path
+from smokelift.scene import Domain
+
+Array = npt.NDArray[np.float32]
+
+VELOCITY_MARGIN = 2
+"""Voxels around the smoke in which velocity is kept: motion blur looks a little beyond the edge."""
+
+SETTINGS = "smokelift_settings"
+"""Name of the grid metadata that holds the settings as JSON."""
+
+_SPARE_BYTES = 65536
+
+
+class VdbUnavailable(RuntimeError):  # noqa: N818  (it says what is the matter better than ...Error)
+    """No OpenVDB module can be found."""
+
+
+@cache
+def vdb_module() -> ModuleType:
+    """Return the OpenVDB module, looking inside an installed bpy wheel if need be.
+
+    Raises
+    ------
+    VdbUnavailable
+        If there is none, with what to install.
+    """
+    for name in ("openvdb", "pyopenvdb"):
+        try:
+            return importlib.import_module(name)
+        except ImportError:
+            continue
+    for folder in _bpy_folders():
+        sys.path.insert(0, str(folder))
+        try:
+            return importlib.import_module("openvdb")
+        except ImportError:
+            continue
+        finally:
+            sys.path.remove(str(folder))
+    raise VdbUnavailable(
+        "no OpenVDB module was found: install one with \"pip install 'smokelift[vdb]'\" (for Python 3.11 and "
+        "3.13; there is none for 3.12), or write NumPy files only with --npz"
+    )
+
+
+def _bpy_folders() -> list[Path]:
+    """Return the module folders inside an installed bpy wheel, for the running Python."""
+    found = importlib.util.find_spec("bpy")
+    if found is None or not found.submodule_search_locations:
+        return []
+    version = f"python{sys.version_info.major}.{sys.version_info.minor}"
+    places = [Path(place) for place in found.submodule_search_locations]
+    # Linux and macOS wheels have lib/pythonX.Y, Windows ones only lib.
+    patterns = (f"*/python/lib/{version}/site-packages", "*/python/lib/site-packages")
+    return [folder for place in places for pattern in patterns for folder in sorted(place.glob(pattern))]
+
+
+def write_vdb(
+    path: str | Path,
+    density: npt.ArrayLike,
+    velocity_centres: npt.ArrayLike,
+    domain: Domain,
+    metadata: Mapping[str, Any] | None = None,
+) -> None:
+    """Write one frame; the file appears whole or not at all.
+
+    Values are stored as 16 bit floats (three digits; larger ones than they reach are cut). Density is stored
+    where it is not zero, velocity within two voxels of that.
+
+    Parameters
+    ----------
+    path
+        The ``.vdb`` file.
+    density
+        Shape (nx, ny, nz), not negative.
+    velocity_centres
+        m/s at voxel centres, shape (nx, ny, nz, 3).
+    domain
+        Where the voxels lie.
+    metadata
+        Settings to keep with the density grid, as JSON can hold them.
+
+    Raises
+    ------
+    ValueError
+        If a shape does not fit the domain, a value is not finite, or a density negative.
+    VdbUnavailable
+        If there is no OpenVDB module.
+    OSError
+        If the file cannot be written.
+    """
+    vdb = vdb_module()
+    # OpenVDB scrambles arrays of any other layout or type, without a word.
+    rho = np.ascontiguousarray(density, np.float32)
+    velocity = np.ascontiguousarray(velocity_centres, np.float32)
+    if rho.shape != domain.shape or velocity.shape != (*domain.shape, 3):
+        raise ValueError(
+            f"density {rho.shape} and velocity {velocity.shape} do not fit the domain's {domain.shape} voxels"
+        )
+    if not (np.isfinite(rho).all() and np.isfinite(velocity).all()):
+        raise ValueError("density and velocity must be finite")
+    if rho.min() < 0.0:
+        raise ValueError("density must not be negative")
+
+    limit = np.float32(np.finfo(np.float16).max)
+    box = _around(rho > 0.0, VELOCITY_MARGIN)
+    corner = tuple(side.start for side in box)
+    rho, velocity = np.minimum(rho[box], limit), np.clip(velocity[box], -limit, limit)
+    near = rho > 0.0
+    if near.any():
+        near = ndimage.maximum_filter(near, 2 * VELOCITY_MARGIN + 1, mode="constant")
+    density_grid = vdb.FloatGrid()
+    density_grid.copyFromArray(rho, ijk=corner)
+    density_grid.gridClass = vdb.GridClass.FOG_VOLUME
+    velocity_grid = vdb.Vec3SGrid()
+    velocity_grid.copyFromArray(np.where(near[..., None], velocity, np.float32(0.0)), ijk=corner)
+    h = domain.voxel_size
+    x, y, z = (low + 0.5 * h for low in domain.min)
+    for grid, name in ((density_grid, "density"), (velocity_grid, "velocity")):
+        grid.name = name
+        grid.creator = "Smokelift"
+        grid.saveFloatAsHalf = True
+        # The binding's default tolerance does not fit vector grids, so it is spelt out.
+        grid.prune(tolerance=grid.zeroValue)
+        grid.transform = vdb.createLinearTransform([[h, 0, 0, 0], [0, h, 0, 0], [0, 0, h, 0], [x, y, z, 1]])
+    if metadata is not None:
+        density_grid[SETTINGS] = json.dumps(dict(metadata), sort_keys=True)
+    with atomic_path(path) as aside:
+        try:
+            vdb.write(str(aside), grids=[density_grid, velocity_grid])
+        except RuntimeError as error:
+            raise OSError(f"{path}: cannot be written: {error}") from error
+        _ensure_written(aside)
+
+
+def _around(marked: npt.NDArray[np.bool_], margin: int) -> tuple[slice, ...]:
+    """The smallest box that holds the marked voxels and so many more on each side; all of it without any."""
+    found = ndimage.find_objects(marked.astype(np.int8))
+    if not found:
+        return tuple(slice(0, n) for n in marked.shape)
+    return tuple(
+        slice(max(side.start - margin, 0), min(side.stop + margin, n))
+        for side, n in zip(found[0], marked.shape, strict=True)
+    )
+
+
+def _ensure_written(path: Path) -> None:
+    """Raise OSError if the disk is full: OpenVDB cuts the file short then, without a word."""
+    size = path.stat().st_size
+    with path.open("r+b", buffering=0) as file:
+        file.seek(size)
+        file.write(bytes(_SPARE_BYTES))
+        file.truncate(size)
+
+
+def read_vdb(path: str | Path, shape: tuple[int, int, int]) -> tuple[Array, Array]:
+    """Read the density and the velocity that :func:`write_vdb` wrote.
+
+    Parameters
+    ----------
+    path
+        The ``.vdb`` file.
+    shape
+        Voxels along x, y, z of the domain.
+
+    Returns
+    -------
+    Density, shape (nx, ny, nz), and velocity in m/s at voxel centres, shape (nx, ny, nz, 3); both float32 and
+    zero where nothing is stored.
+
+    Raises
+    ------
+    OSError
+        If the file is missing or damaged, or lacks one of the grids.
+    VdbUnavailable
+        If there is no OpenVDB module.
+    """
+    vdb = vdb_module()
+    if not Path(path).is_file():
+        raise FileNotFoundError(f"{path}: no such file")
+    density = np.zeros(shape, np.float32)
+    velocity = np.zeros((*shape, 3), np.float32)
+    try:
+        for name, array in (("density", density), ("velocity", velocity)):
+            vdb.read(str(path), gridname=name).copyToArray(array)
+    except (RuntimeError, LookupError, TypeError) as error:
+        raise OSError(f"{path}: is damaged or lacks density or velocity: {error}") from error
+    return density, velocity
+
+
+def read_settings(path: str | Path) -> dict[str, Any]:
+    """Return the settings kept in a file that :func:`write_vdb` wrote; empty if there are none."""
+    grid = vdb_module().read(os.fspath(path), gridname="density")
+    return dict(json.loads(grid.metadata.get(SETTINGS, "{}")))

@@ -1,0 +1,93 @@
+"""A scene in which nothing is left open: what a renderer needs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from smokelift.scene.description import (
+    Background,
+    Camera,
+    ClipSource,
+    Domain,
+    Inlet,
+    Light,
+    Medium,
+    Scattering,
+    Scene,
+    Side,
+    View,
+)
+
+
+@dataclass(frozen=True)
+class CompleteScene:
+    """A `Scene` with every choice made.
+
+    Attributes
+    ----------
+    camera, domain, medium, lights
+        As in `Scene`; without lights the smoke only absorbs.
+    background
+        Behind the smoke.
+    scattering
+        How light is scattered: ``"single"`` with self-shadowing, ``"unshadowed"`` or ``"absorption"``.
+    clip, views, closed, inlets
+        As in `Scene`; a scene that was never filmed has no clip.
+    """
+
+    camera: Camera
+    domain: Domain
+    medium: Medium
+    lights: tuple[Light, ...]
+    background: Background
+    scattering: Scattering
+    clip: ClipSource | None = None
+    views: tuple[View, ...] = ()
+    closed: tuple[Side, ...] = ()
+    inlets: tuple[Inlet, ...] = ()
+
+    def inflow(self) -> npt.NDArray[np.bool_] | None:
+        """Return the voxels where smoke enters, shape (nx, ny, nz); None if no inlet is marked."""
+        if not self.inlets:
+            return None
+        inflow = np.zeros(self.domain.shape, np.bool_)
+        for inlet in self.inlets:
+            inflow |= inlet.voxels(self.domain)
+        return inflow
+
+
+def completed(scene: Scene | CompleteScene, camera: Camera | None = None) -> CompleteScene:
+    """Complete a description with defaults, without looking at any footage.
+
+    Parameters
+    ----------
+    scene
+        Needs a domain, and a camera unless one is given. A complete scene stays as it is, but for the camera.
+    camera
+        Takes the place of the scene's.
+
+    Raises
+    ------
+    ValueError
+        If there is no camera or no domain.
+    """
+    camera = camera or scene.camera
+    if camera is None:
+        raise ValueError("The scene has no camera; give one.")
+    if scene.domain is None:
+        raise ValueError("The scene has no domain; give its corners and its resolution.")
+    return CompleteScene(
+        camera=camera,
+        domain=scene.domain,
+        medium=scene.medium or Medium(),
+        lights=scene.lights,
+        background=scene.background or Background(color=(0.0, 0.0, 0.0)),
+        scattering=scene.scattering or "single",
+        clip=scene.clip,
+        views=scene.views,
+        closed=scene.closed,
+        inlets=scene.inlets,
+    )

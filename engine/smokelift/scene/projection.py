@@ -1,0 +1,58 @@
+"""Where points of the world lie in a camera's picture, and the rays through its pixels."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smokelift.scene.description import Camera
+
+Array = NDArray[np.float64]
+
+
+def world_to_pixel(camera: Camera) -> Array:
+    """Homogeneous 3x4 map from world points (m) to (x depth, y depth, depth) in pixels."""
+    matrix = np.array(camera.matrix, np.float64)
+    rotation, eye = matrix[:3, :3], matrix[:3, 3]
+    to_camera = np.hstack([rotation.T, -rotation.T @ eye[:, None]])
+    if camera.type == "perspective":
+        intrinsics = np.array([[camera.fx, 0, -camera.cx], [0, -camera.fy, -camera.cy], [0, 0, -1.0]])
+        return np.asarray(intrinsics @ to_camera)
+    rows = np.array([[camera.fx, 0, 0], [0, -camera.fy, 0], [0, 0, 0]]) @ to_camera
+    rows[:, 3] += (camera.cx, camera.cy, 1.0)
+    return np.asarray(rows)
+
+
+def project(camera: Camera, points: Array) -> tuple[Array, Array]:
+    """Project world points (..., 3) to pixels.
+
+    Returns
+    -------
+    pixels : (..., 2)
+        x and y in pixels.
+    depth : (...)
+        Distance along the optical axis for a perspective camera (negative: behind it), 1 for an orthographic one.
+    """
+    matrix = world_to_pixel(camera)
+    homogeneous = points @ matrix[:, :3].T + matrix[:, 3]
+    depth = homogeneous[..., 2]
+    safe = np.where(np.abs(depth) < 1e-12, 1e-12, depth)
+    return homogeneous[..., :2] / safe[..., None], depth
+
+
+def ray_through_pixels(camera: Camera) -> tuple[Array, Array]:
+    """Origins and unit directions, each (rows, columns, 3), in world space, of the rays through pixel centres."""
+    width, height = camera.size
+    x = (np.arange(width) + 0.5 - camera.cx) / camera.fx
+    y = -(np.arange(height) + 0.5 - camera.cy) / camera.fy
+    grid_x, grid_y = np.meshgrid(x, y)
+    matrix = np.array(camera.matrix, np.float64)
+    rotation, eye = matrix[:3, :3], matrix[:3, 3]
+    if camera.type == "perspective":
+        local = np.stack([grid_x, grid_y, np.full_like(grid_x, -1.0)], -1)
+        direction = local @ rotation.T
+        direction /= np.linalg.norm(direction, axis=-1, keepdims=True)
+        return np.broadcast_to(eye, direction.shape), direction
+    local = np.stack([grid_x, grid_y, np.zeros_like(grid_x)], -1)
+    origin = local @ rotation.T + eye
+    return origin, np.broadcast_to(-rotation[:, 2], origin.shape)

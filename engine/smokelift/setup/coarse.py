@@ -1,0 +1,116 @@
+"""A few frames of a clip at low resolution: what choices are measured on."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smokelift.footage.plate import Plate
+from smokelift.footage.working import CameraError, WorkingPicture, voxel_width, working_picture
+from smokelift.render.renderer import Image
+from smokelift.scene import Camera, Domain, Scene
+
+LONGEST = 32
+"""Voxels along the longest side at most: a few per cent of the work of 96, with every large shadow in its place."""
+
+FEWEST = 4
+"""Voxels along the shortest side at least."""
+
+PIXELS = 2.0
+"""Pixels of the clip along a voxel at least, so that each half of them shows every voxel."""
+
+
+@dataclass(frozen=True, eq=False)
+class CoarseFrame:
+    """One frame before a coarse grid.
+
+    Attributes
+    ----------
+    scene
+        With the camera of the small picture, the coarse domain and the medium.
+    plate
+        Of the small picture.
+    picture : (rows, columns, 3)
+        The small picture, linear radiance.
+    fitted, held_out : (rows, columns, 3)
+        The same from one half of the clip's pixels each, those of one colour of a chequerboard.
+    """
+
+    scene: Scene
+    plate: Plate
+    picture: Image
+    fitted: Image
+    held_out: Image
+
+    def in_light_of(self, scene: Scene) -> CoarseFrame:
+        """The frame with the lights of a scene."""
+        return replace(self, scene=replace(self.scene, lights=scene.lights))
+
+
+def coarse_domain(domain: Domain, pixels: float) -> Domain:
+    """The box with fewer voxels: a whole number of fine ones in each if that is possible, else a little less of it.
+
+    Parameters
+    ----------
+    domain
+        The box with its own voxels.
+    pixels
+        Pixels of the clip along one of them.
+    """
+    longest = max(domain.resolution)
+    most = min(LONGEST, int(longest * pixels / PIXELS))
+    common = math.gcd(*domain.resolution)
+    for times in (n for n in range(1, common + 1) if common % n == 0):
+        counts = [n // times for n in domain.resolution]
+        if max(counts) <= most and min(counts) >= FEWEST:
+            if max(counts) >= most / 2:
+                return replace(domain, resolution=(counts[0], counts[1], counts[2]))
+            break
+    # nor so coarse that a side has less than one
+    times_finer = min(max(longest / max(most, FEWEST), 1.0), min(domain.resolution))
+    voxel = domain.voxel_size * times_finer
+    # never beyond the box, where a light may stand
+    counts = [max(1, math.floor(n / times_finer + 1e-6)) for n in domain.resolution]
+    low, high = (np.array(domain.centre) + side * np.array(counts) * voxel / 2 for side in (-1, 1))
+    (x0, y0, z0), (x1, y1, z1) = (tuple(float(v) for v in corner) for corner in (low, high))
+    return Domain((x0, y0, z0), (x1, y1, z1), (counts[0], counts[1], counts[2]))
+
+
+def coarse_frame(frame: Image, camera: Camera, scene: Scene, plate: Plate) -> CoarseFrame | None:
+    """Make a frame coarse; None if its camera does not see the domain.
+
+    Parameters
+    ----------
+    frame : (rows, columns, 3)
+        The full picture, linear radiance.
+    camera
+        Of the full picture, where it is in this frame.
+    scene
+        With the domain, the medium and the lights.
+    plate
+        Of the full picture.
+    """
+    assert scene.domain is not None
+    try:
+        domain = coarse_domain(scene.domain, voxel_width(camera, scene.domain))
+        working = working_picture(camera, domain)
+    except CameraError:
+        return None
+    rows, columns = np.indices(frame.shape[:2])
+    odd = ((rows + columns) % 2).astype(np.float32)
+    return CoarseFrame(
+        replace(scene, camera=working.camera, domain=domain),
+        plate.through(working.cut),
+        working.cut(frame),
+        _part(frame, 1 - odd, working),
+        _part(frame, odd, working),
+    )
+
+
+def _part(frame: Image, share: NDArray[np.float32], working: WorkingPicture) -> Image:
+    """The small picture from some of the full one's pixels."""
+    weight = np.maximum(working.cut(share), np.float32(1e-6))
+    return np.asarray(working.cut(frame * share[..., None]) / weight[..., None], np.float32)

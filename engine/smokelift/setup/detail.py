@@ -1,0 +1,100 @@
+"""How fine a grid a clip needs: as fine as the detail of its smoke, in so far as that stands out from the noise.
+
+The spectrum of what the smoke changes in the picture (cosine transform, in sRGB values, where a clip's noise is even)
+is compared with that of the noise, which is what differs from the background where there never is smoke. A grid shows
+what is coarser than two of its voxels; the share of the smoke's contrast that is finer is what it loses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from smokelift.footage.images import area_average, linear_to_srgb
+from smokelift.footage.plate import Plate, encoded_noise, matte
+from smokelift.render.renderer import Image
+
+TOLERANCE = 0.01
+"""Share of the smoke's contrast that a grid may lose against the finest that quality allows: a quarter of what
+even that one misses of the front of a sharp clip (docs/selection.md)."""
+
+EDGE = 3
+"""Voxels around the smoke in which there may be some that is too thin to be found."""
+
+LEAST_STILL = 0.05
+"""Share of the picture without smoke from which its noise is measured there."""
+
+RINGS = 96
+"""Into which spatial frequencies are sorted."""
+
+
+@dataclass(frozen=True, eq=False)
+class Detail:
+    """The energy of the smoke's picture beyond the noise, by spatial frequency.
+
+    Attributes
+    ----------
+    energy : (RINGS,)
+        In rings from no detail to that of single voxels of the finest grid.
+    finest
+        Voxels along the longest side of that grid.
+    """
+
+    energy: NDArray[np.float64]
+    finest: int
+
+    def lost(self, longest: int) -> float:
+        """Share of the contrast (root of the energy) that is finer than a grid of so many voxels shows."""
+        whole = float(self.energy.sum())
+        if whole <= 0:
+            return 0.0
+        above = self.energy[round(RINGS * min(longest / self.finest, 1.0)) :]
+        return float(np.sqrt(above.sum() / whole))
+
+
+def smoke_detail(frames: Iterable[tuple[Image, Plate, float]], finest: int) -> Detail:
+    """Measure the detail in some frames.
+
+    Parameters
+    ----------
+    frames
+        Of each: the part of the picture (rows, columns, 3) where the box is, linear; the plate behind it; and the
+        pixels along a voxel of the finest grid.
+    finest
+        Voxels along the longest side of the finest grid.
+    """
+    energy = np.zeros(RINGS)
+    for picture, plate, pixels in frames:
+        rows, columns = (max(1, round(n / max(pixels, 1.0))) for n in picture.shape[:2])
+        image, behind = (area_average(whole, columns, rows) for whole in (picture, plate.image))
+        change = (linear_to_srgb(image) - linear_to_srgb(behind)).mean(-1, dtype=np.float64)
+        smoke = matte(image, Plate(behind, area_average(plate.confidence, columns, rows), plate.noise)).mask
+        still = ~ndimage.binary_dilation(smoke, iterations=EDGE)
+        noise = _noise(change, still, float(encoded_noise(plate).mean()) / max(pixels, 1.0))
+        energy += _beyond_noise(change, noise, min(pixels, 1.0))
+    return Detail(energy, finest)
+
+
+def _noise(change: NDArray[np.float64], still: NDArray[np.bool_], otherwise: float) -> float:
+    """Standard deviation of the noise: of the still pixels, if there are enough."""
+    return float(np.sqrt(np.mean(change[still] ** 2))) if still.mean() > LEAST_STILL else otherwise
+
+
+def _beyond_noise(change: NDArray[np.float64], noise: float, pixels: float) -> NDArray[np.float64]:
+    """Energy of a picture in each ring, less that of white noise of a standard deviation."""
+    # a cosine transform goes on beyond the edge as in a mirror, so that smoke which is cut off there is no detail
+    power = np.square(scipy.fft.dctn(change, norm="ortho"))
+    across = [np.arange(n) / n for n in change.shape]
+    # in voxels of the finest grid: 1 alternates from voxel to voxel
+    frequency = np.hypot(across[0][:, None], across[1]) * pixels
+    ring = np.minimum((frequency * RINGS).astype(int), RINGS - 1)
+    inside = frequency < 1
+    total = np.bincount(ring[inside], power[inside], RINGS)
+    count = np.bincount(ring[inside], minlength=RINGS)
+    beyond: NDArray[np.float64] = np.maximum(total - count * noise**2, 0)
+    return beyond

@@ -1,0 +1,89 @@
+"""Grids that velocities are looked for on: as fine as pictures can tell, and as coarse as the fastest smoke needs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from smokelift.render.renderer import Volume
+from smokelift.scene import Domain, Scene
+from smokelift.setup.choice import Choice
+from smokelift.velocity import VelocitySettings, estimate_velocity
+from smokelift.velocity.settings import LEVELS
+
+FINEST_SIDE = 30
+"""Voxels along the longest side of the grid that the motion of a reconstruction is looked for on, at most: one view
+leaves the depth open, and finer velocities follow its errors. docs/selection.md has what more and fewer do."""
+
+FASTEST = 99
+"""Percentile of the smoke's speed that counts as the largest: single wisps may be wrong."""
+
+MARGIN = 1.25
+"""By how much grids reach further than the motion that is found, since coarse densities show less than there is."""
+
+
+def choose_halvings(domain: Domain, settings: VelocitySettings) -> Choice:
+    """Choose how much coarser than the densities the grid of the velocity is, and leave at least eight voxels a side.
+
+    Parameters
+    ----------
+    domain
+        With its final resolution.
+    settings
+        How velocities are estimated.
+    """
+    what = "velocity halvings"
+    if settings.halvings is not None:
+        reason = f"Velocity grid by hand: halved {settings.halvings} times."
+        return Choice(what, settings.halvings, reason, by_hand=True)
+    halvings, longest, shortest = 0, max(domain.resolution), min(domain.resolution)
+    while longest > FINEST_SIDE and shortest >= 16:
+        halvings, longest, shortest = halvings + 1, -(-longest // 2), -(-shortest // 2)
+    reason = f"Velocity grid: {longest} voxels along the longest side, because the depth of the smoke is a guess."
+    return Choice(what, halvings, reason, {"voxels": float(longest)}, FINEST_SIDE)
+
+
+def levels_for(motion: float) -> int:
+    """Grids that reach a motion (voxels of the finest a frame), as many as usual at most: more were never better.
+
+    Every linearisation reaches a voxel of its own grid, so grids 1, 2, 4, ... voxels wide reach 2^levels - 1 together.
+    """
+    return min(max(int(np.ceil(np.log2(MARGIN * motion + 1) - 1e-9)), 1), LEVELS)
+
+
+def choose_levels(
+    pairs: Sequence[tuple[Volume, Volume]], coarse: Scene, scene: Scene, settings: VelocitySettings
+) -> Choice:
+    """Choose the number of grids.
+
+    Parameters
+    ----------
+    pairs
+        Coarse densities (nx, ny, nz) of frames that follow one another.
+    coarse
+        Scene with their domain.
+    scene
+        Scene with the final domain.
+    settings
+        How velocities are estimated.
+    """
+    assert coarse.domain is not None and scene.domain is not None
+    if not pairs:
+        return Choice("velocity levels", LEVELS, f"Velocity grids: {LEVELS}, since there is no motion to measure.")
+    finer = coarse.domain.voxel_size / scene.domain.voxel_size
+    motion = finer * max(_motion(before, after, settings) for before, after in pairs)
+    levels = levels_for(motion / 2 ** (settings.halvings or 0))
+    reason = f"Velocity grids: {levels}, because the fastest smoke goes {motion:.1f} voxels a frame."
+    return Choice("velocity levels", levels, reason, {"voxels_a_frame": motion})
+
+
+def _motion(before: Volume, after: Volume, settings: VelocitySettings) -> float:
+    """Speed of the fastest smoke, in voxels a frame."""
+    settings = replace(settings, method="default", halvings=0, levels=LEVELS)
+    velocity = estimate_velocity(before, after, 1.0, 1.0, settings)
+    smoke = after > settings.smoke_threshold * after.max(initial=0.0)
+    if not smoke.any():
+        return 0.0
+    return float(np.percentile(np.linalg.norm(velocity.centres()[smoke], axis=-1), FASTEST))

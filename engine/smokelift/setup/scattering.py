@@ -1,0 +1,114 @@
+"""How light is scattered: the cheapest model that finds as good a density as the richest.
+
+    absorption -> unshadowed -> single (with self-shadowing)
+
+What a wrong model does is not to be seen in its own picture: before black, smoke without shadows explains any picture,
+by thinner smoke where there is shadow. So every model fits a coarse density to one half of the clip's pixels, and the
+richest one, which holds the others as special cases, shows that density; the error of the other half says how good it
+is. Where smoke is brighter than its background, absorption is not even tried.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from smokelift.density import DensitySettings, reconstruct_density
+from smokelift.density.hull import project_voxels, reached
+from smokelift.footage.plate import matte
+from smokelift.render import Renderer, scene_lights
+from smokelift.scene import Medium, Scattering
+from smokelift.setup.choice import Choice
+from smokelift.setup.coarse import CoarseFrame
+
+MODELS: tuple[Scattering, ...] = ("absorption", "unshadowed", "single")
+"""From the cheapest to the richest."""
+
+TOLERANCE = 0.02
+"""Error, in shares of what the smoke changes in the picture, that a cheaper model may add. Without shadows that is
+reached at an optical depth of about 0.15, where the smoke's mass comes out 5 % too small (docs/selection.md)."""
+
+_WORDS: Mapping[str, str] = {
+    "absorption": "absorption only",
+    "unshadowed": "scattering without shadows",
+    "single": "single scattering with shadows",
+}
+
+
+def choose_scattering(
+    frames: Sequence[CoarseFrame], richest: Scattering, settings: DensitySettings
+) -> tuple[Scattering, Choice]:
+    """Choose the model of scattering.
+
+    Parameters
+    ----------
+    frames
+        At least one; the lights of their scenes are finite.
+    richest
+        What the light that is known allows: shadows need its direction.
+    settings
+        How to fit.
+    """
+    errors = {richest: _error(frames, richest, richest, settings)}
+    chosen = richest
+    for model in MODELS[: MODELS.index(richest)]:
+        if model == "absorption" and (brightened := _brightened(frames)) > errors[richest] + TOLERANCE:
+            errors[model] = brightened
+            continue
+        errors[model] = _error(frames, model, richest, settings)
+        if errors[model] <= errors[richest] + TOLERANCE:
+            chosen = model
+            break
+    return chosen, _choice(chosen, richest, errors)
+
+
+def _choice(chosen: Scattering, richest: Scattering, errors: Mapping[Scattering, float]) -> Choice:
+    said = f"Scattering: {_WORDS[chosen]}"
+    if chosen != richest:
+        reason = (
+            f"{said}; held-out pixels differ by {errors[chosen]:.1%} of the smoke's contrast, with {_WORDS[richest]} "
+            f"by {errors[richest]:.1%}."
+        )
+    elif len(errors) > 1:
+        cheaper = MODELS[MODELS.index(richest) - 1]
+        reason = (
+            f"{said}; with {_WORDS[cheaper]} held-out pixels differ by {errors[cheaper]:.1%} of the smoke's contrast "
+            f"instead of {errors[richest]:.1%}."
+        )
+    else:
+        reason = f"{said}."
+    return Choice("scattering", chosen, reason, {f"error_{name}": value for name, value in errors.items()}, TOLERANCE)
+
+
+def _brightened(frames: Sequence[CoarseFrame]) -> float:
+    """Share of what the smoke changes that is brighter than the background: the least error of absorption."""
+    brighter = change = 0.0
+    for frame in frames:
+        smoke = matte(frame.picture, frame.plate).mask
+        difference = (frame.held_out - frame.plate.image)[smoke]
+        brighter += float(np.sum(np.square(np.maximum(difference, 0), dtype=np.float64)))
+        change += float(np.sum(np.square(difference, dtype=np.float64)))
+    return float(np.sqrt(brighter / max(change, 1e-30)))
+
+
+def _error(frames: Sequence[CoarseFrame], model: Scattering, judge: Scattering, settings: DensitySettings) -> float:
+    """Error of what the judge shows of a model's densities, in the other half of the pixels.
+
+    Root mean square, in shares of what the smoke changes there.
+    """
+    fit = replace(settings, scattering=model)
+    wrong = change = 0.0
+    for frame in frames:
+        scene, plate = frame.scene, frame.plate
+        assert scene.camera is not None and scene.domain is not None
+        density = reconstruct_density(frame.fitted, scene, settings=fit, plate=plate)
+        renderer = Renderer(
+            scene.camera, scene.domain, scene.medium or Medium(), scene_lights(scene), plate.image, judge, density.hull
+        )
+        seen = reached(matte(frame.picture, plate).mask, project_voxels(scene.camera, scene.domain))
+        shown = renderer.image(density.values)
+        wrong += float(np.sum(np.square(shown - frame.held_out, dtype=np.float64)[seen]))
+        change += float(np.sum(np.square(frame.held_out - plate.image, dtype=np.float64)[seen]))
+    return float(np.sqrt(wrong / max(change, 1e-30)))
