@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from smokelift.scene import (
+    SCATTERINGS,
     SIDES,
     Background,
     Camera,
@@ -25,6 +26,7 @@ from smokelift.scene import (
     Scene,
     SceneError,
     View,
+    completed,
     look_at_matrix,
 )
 from smokelift.scene.file import scene_from_dict, scene_to_dict
@@ -145,6 +147,22 @@ def test_walls_of_a_box_that_is_not_given(tmp_path: Path) -> None:
         load(tmp_path, "[domain]\n")
 
 
+def test_the_scattering_stands_with_the_medium(tmp_path: Path) -> None:
+    scene = load(tmp_path, GOOD.replace("[medium]", '[medium]\nscattering = "unshadowed"'))
+    assert scene == replace(load(tmp_path, GOOD), scattering="unshadowed")
+    assert load(tmp_path, GOOD).scattering is None
+
+
+def test_scattering_alone_leaves_the_medium_open(tmp_path: Path) -> None:
+    scene = load(tmp_path, '[medium]\nscattering = "absorption"\n')
+    assert scene == Scene(scattering="absorption")
+
+
+def test_a_complete_scene_comes_back_as_it_was_written(tmp_path: Path) -> None:
+    scene = completed(replace(load(tmp_path, GOOD), scattering="absorption"))
+    assert completed(scene_from_dict(scene_to_dict(scene))) == scene
+
+
 def test_an_inlet_is_the_voxels_in_its_ball() -> None:
     domain = Domain((-1, -1, 0), (1, 1, 3), (64, 64, 96))
     inlet = Inlet((0.1, -0.2, 0), 0.4)
@@ -192,6 +210,12 @@ def test_a_file_may_hold_any_one_table(tmp_path: Path) -> None:
             "anisotropy = 1",
             "line 22: [medium] anisotropy must be a number between -1 and 1, not 1",
         ),
+        (
+            "albedo = 0.5",
+            'scattering = "double"',
+            'line 22: [medium] scattering must be one of "single", "unshadowed", "absorption", not "double"',
+        ),
+        ("albedo = 0.5", "scattering = [1]", "line 22: [medium] scattering must be one of"),
         ("albedo = 0.5", "extinction = 0", "line 22: [medium] extinction must be a number above 0"),
         (
             "albedo = 0.5",
@@ -487,6 +511,7 @@ def scenes(draw: st.DrawFn) -> Scene:
                 Medium, positive, st.floats(0, 1, allow_subnormal=False), st.floats(-0.99, 0.99, allow_subnormal=False)
             )
         ),
+        scattering=draw(st.sampled_from([None, *SCATTERINGS])),
         lights=tuple(draw(st.lists(lights, max_size=3))),
         background=draw(backgrounds),
         views=tuple(draw(st.lists(st.builds(View, cameras(), clips, backgrounds), max_size=2))),

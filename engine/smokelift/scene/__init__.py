@@ -2,6 +2,7 @@
 
 from smokelift.scene.complete import CompleteScene, completed
 from smokelift.scene.description import (
+    SCATTERINGS,
     SIDES,
     Background,
     Camera,
@@ -32,6 +33,7 @@ from smokelift.scene.description import (
 )
 
 __all__ = [
+    "SCATTERINGS",
     "SIDES",
     "Background",
     "Camera",

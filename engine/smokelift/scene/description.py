@@ -22,6 +22,7 @@ import numpy.typing as npt
 Vector = tuple[float, float, float]
 Side = Literal["x-", "x+", "y-", "y+", "z-", "z+"]
 Scattering = Literal["single", "unshadowed", "absorption"]
+SCATTERINGS: tuple[Scattering, ...] = ("single", "unshadowed", "absorption")
 SIDES: tuple[Side, ...] = ("x-", "x+", "y-", "y+", "z-", "z+")
 Matrix = tuple[tuple[float, float, float, float], ...]
 
@@ -583,7 +584,7 @@ class Scene:
     ------
     SceneError
         If a camera can see the domain in no frame, a point light stands inside it, an inlet lies outside, or a side
-        is unknown.
+        or the kind of scattering is unknown.
     """
 
     clip: ClipSource | None = None
@@ -601,6 +602,11 @@ class Scene:
         """Check what no table can check alone."""
         _set(self, lights=tuple(self.lights), views=tuple(self.views), inlets=tuple(self.inlets))
         _set(self, closed=_sides(self.closed))
+        if self.scattering not in (None, *SCATTERINGS):
+            known = ", ".join(f'"{name}"' for name in SCATTERINGS)
+            raise SceneError(
+                f"scattering must be one of {known}, not {shown(self.scattering)}", key="scattering", table="medium"
+            )
         if self.domain is None:
             return
         for index, inlet in enumerate(self.inlets):

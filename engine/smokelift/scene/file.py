@@ -2,6 +2,9 @@
 
 The standard TOML reader gives values without positions; a small scanner finds the line of every table and
 key. The same plain dictionaries serve the scene that a sequence keeps in its JSON.
+
+``[medium] scattering`` is how light is scattered: ``"single"`` (once, with shadows), ``"unshadowed"`` (once, without
+them) or ``"absorption"`` (never). A ``[medium]`` that holds nothing else leaves the medium to be estimated.
 """
 
 from __future__ import annotations
@@ -16,6 +19,7 @@ from typing import Any
 import tomli_w
 
 from smokelift.output.files import atomic_path
+from smokelift.scene.complete import CompleteScene
 from smokelift.scene.description import (
     Background,
     Camera,
@@ -90,13 +94,13 @@ def scene_from_dict(data: Table, name: str = "scene", base: Path | None = None) 
     return _Reader(name, (base or Path()).absolute(), {}).scene(data)
 
 
-def scene_to_dict(scene: Scene, base: Path | None = None) -> dict[str, Any]:
+def scene_to_dict(scene: Scene | CompleteScene, base: Path | None = None) -> dict[str, Any]:
     """Return a scene as the tables of a scene file: dictionaries, lists, strings and numbers only.
 
     Parameters
     ----------
     scene
-        Any scene.
+        Any scene. A complete one is what `completed` makes of the description that is read back.
     base
         Paths below this folder become relative to it; all others absolute.
     """
@@ -109,13 +113,8 @@ def scene_to_dict(scene: Scene, base: Path | None = None) -> dict[str, Any]:
         data["domain"] = _domain_to_dict(scene)
     if scene.inlets:
         data["inlet"] = [{"centre": list(inlet.centre), "radius": inlet.radius} for inlet in scene.inlets]
-    if scene.medium is not None:
-        medium = scene.medium
-        data["medium"] = {
-            "extinction": medium.extinction,
-            "albedo": medium.albedo,
-            "anisotropy": medium.anisotropy,
-        }
+    if scene.medium is not None or scene.scattering is not None:
+        data["medium"] = _medium_to_dict(scene)
     if scene.lights:
         data["lights"] = [_light_to_dict(light, base) for light in scene.lights]
     if scene.background is not None:
@@ -141,7 +140,15 @@ def _view_to_dict(view: View, base: Path | None) -> dict[str, Any]:
     return data
 
 
-def _domain_to_dict(scene: Scene) -> dict[str, Any]:
+def _medium_to_dict(scene: Scene | CompleteScene) -> dict[str, Any]:
+    medium = scene.medium
+    table: dict[str, Any] = {}
+    if medium is not None:
+        table = {"extinction": medium.extinction, "albedo": medium.albedo, "anisotropy": medium.anisotropy}
+    return table if scene.scattering is None else {**table, "scattering": scene.scattering}
+
+
+def _domain_to_dict(scene: Scene | CompleteScene) -> dict[str, Any]:
     domain = scene.domain
     box: dict[str, Any] = {}
     if domain is not None:
@@ -228,6 +235,8 @@ class _Reader:
             parts["domain"], parts["closed"] = parts["domain"]
         if "inlet" in parts:
             parts["inlets"] = parts.pop("inlet")
+        if "medium" in parts:
+            parts["medium"], parts["scattering"] = parts["medium"]
         try:
             return Scene(**parts)
         except SceneError as error:
@@ -308,9 +317,13 @@ class _Reader:
         self._needed(data, *keys)
         return Inlet(**data)
 
-    def _medium(self, place: Place, data: Table) -> Medium:
-        self._known(place, data, ("extinction", "albedo", "anisotropy"))
-        return Medium(**data)
+    def _medium(self, place: Place, data: Table) -> tuple[Medium | None, Any]:
+        """Read the medium and how it scatters light. Scattering alone is that of the medium that will be found."""
+        self._known(place, data, ("extinction", "albedo", "anisotropy", "scattering"))
+        properties = {key: value for key, value in data.items() if key != "scattering"}
+        if not properties and "scattering" in data:
+            return None, data["scattering"]
+        return Medium(**properties), data.get("scattering")
 
     def _background(self, place: Place, data: Table) -> Background:
         self._known(place, data, ("color", "image"))
