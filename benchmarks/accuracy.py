@@ -229,8 +229,8 @@ def score(subject: Subject, run: str, folder: Path) -> dict[str, Any]:
             arrays = volume(folder, subject, frame)
             judge.add(frame, arrays["density"], arrays.get("velocity"))
             guessed[number] |= {
-                "streaks": metrics.streaks(arrays["density"], ALONG_RAYS),
-                "streaks_truth": metrics.streaks(subject.truth.density(frame), ALONG_RAYS),
+                "depth_anisotropy": metrics.depth_anisotropy(arrays["density"], ALONG_RAYS),
+                "depth_anisotropy_truth": metrics.depth_anisotropy(subject.truth.density(frame), ALONG_RAYS),
             }
         figures = judge.figures()
         row |= {name: figures.get(name) for name in VOLUME_FIGURES}
@@ -242,7 +242,10 @@ def score(subject: Subject, run: str, folder: Path) -> dict[str, Any]:
 def from_the_side(shown: dict[str, np.ndarray]) -> dict[str, float]:
     """What a bad guess of the depth looks like from the side: bands, and the picture of the front."""
     front, side = (eight_bit_values(shown[view]).mean(axis=-1) for view in (FRONT, SIDE))
-    return {"banding": metrics.banding(side), "likeness": metrics.likeness(side, front)}
+    return {
+        "row_constant_detail": metrics.row_constant_detail(side),
+        "detail_correlation": metrics.detail_correlation(side, front),
+    }
 
 
 def means(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -271,9 +274,11 @@ def markdown(rows: list[dict[str, Any]], views: list[str]) -> str:
         "shifted, new": lambda row: _join(row, ["psnr_shifted_new"], ".1f"),
         "spectrum, new": lambda row: _join(row, ["spectrum_distance_new"], ".1f"),
         "flicker (true), new": lambda row: _join(row, ["flicker_new", "flicker_truth_new"], ".4f"),
-        "streaks (true)": lambda row: _join(row, ["streaks", "streaks_truth"], ".2f"),
-        "bands (true)": lambda row: _join(row, ["banding", "banding_truth"], ".2f"),
-        "front in side (true)": lambda row: _join(row, ["likeness", "likeness_truth"], ".2f"),
+        "depth anisotropy (true)": lambda row: _join(row, ["depth_anisotropy", "depth_anisotropy_truth"], ".2f"),
+        "row-constant detail (true)": lambda row: _join(
+            row, ["row_constant_detail", "row_constant_detail_truth"], ".2f"
+        ),
+        "front in side (true)": lambda row: _join(row, ["detail_correlation", "detail_correlation_truth"], ".2f"),
         "density": lambda row: _join(row, ["density_error"], ".2f"),
         "height mass": lambda row: _join(row, ["height_mass_error"], ".2f"),
         "mass": lambda row: _join(row, ["mass_ratio"], ".2f"),

@@ -17,13 +17,14 @@ from smokelift.density import (
     gather_evidence,
     reconstruct_density,
 )
+from smokelift.density.anisotropy import depth_anisotropy
 from smokelift.density.axis import SmokeAxis
 from smokelift.density.descent import descend
 from smokelift.density.fit import Target
 from smokelift.density.hull import common_hull, project_voxels, visual_hull
 from smokelift.density.multiplicative import RayTarget, fit_multiplicative
 from smokelift.density.profile import DepthProfile, inflated
-from smokelift.evaluation.metrics import psnr, streaks
+from smokelift.evaluation.metrics import psnr
 from smokelift.footage.plate import Plate
 from smokelift.render import Renderer, render, scene_lights
 from smokelift.scene import Background, Camera, DirectionalLight, Domain, Medium, Scene
@@ -236,13 +237,13 @@ def test_smoke_that_the_picture_hardly_shows_does_not_grow() -> None:
     assert fitted.figures["psnr"] > 42
 
 
-def test_texture_breaks_streaks(plume, small) -> None:
+def test_texture_raises_depth_anisotropy(plume, small) -> None:
     """On request there is detail along the rays, the same every time, and the picture is still met."""
     target = render(plume.densities[1], small)
     plain, rough, again = (
         reconstruct_density(target, small, settings=DensitySettings(texture=texture)) for texture in (0.0, 0.4, 0.4)
     )
-    assert streaks(rough.values) > 1.05 * streaks(plain.values)
+    assert depth_anisotropy(rough.values) > 1.05 * depth_anisotropy(plain.values)
     assert rough.figures["psnr"] > 35
     assert (rough.values == again.values).all()
     with pytest.raises(ValueError, match="texture"):

@@ -26,9 +26,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from smokelift.density.anisotropy import depth_anisotropy
 from smokelift.density.hull import project_voxels
 from smokelift.density.screen import view_frame
-from smokelift.evaluation.metrics import streaks
 from smokelift.footage.plate import Plate, noise_at
 from smokelift.render import Renderer, scene_lights
 from smokelift.render.renderer import Image, Volume
@@ -45,11 +45,12 @@ FAINT = 0.02
 """Optical depth, beside the largest, below which carried says nothing about amounts."""
 
 UNLIKE_SMOKE = 0.3
-"""Departure of `streaks` from 1 that true smoke does not reach: 0.87 to 1.15 on four scenes at two resolutions."""
+"""Departure of the depth anisotropy from 1 that true smoke does not reach: 0.87 to 1.15 on four scenes at two
+resolutions."""
 
 WORST = 1.5
-"""Departure of carried's `streaks` from 1, beside the static guess's, from which nothing is taken over. Up to 1 all is;
-a threshold instead would make smoke flicker."""
+"""Departure of carried's depth anisotropy from 1, beside the static guess's, from which nothing is taken over. Up to 1
+all is; a threshold instead would make smoke flicker."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +63,7 @@ class Guess:
     figures
         ``share`` of the density that was carried along and ``amounts``, the share of its amounts; what decided them:
         ``loss_static``, ``loss_carried`` and ``loss_before`` (sums of squares over the picture, linear radiance),
-        ``streaks_static`` and ``streaks_carried``.
+        ``anisotropy_static`` and ``anisotropy_carried``.
     """
 
     density: Volume
@@ -113,9 +114,9 @@ def first_guess(
     loss_before, _ = look(before)
     noise = float(np.sum(np.square(noise_at(image, plate), dtype=np.float64)))
     along = int(np.argmax(np.abs(view_frame(scene.camera)[1])))
-    streaks_static, streaks_carried = streaks(static, along), streaks(carried, along)
+    anisotropy_static, anisotropy_carried = (depth_anisotropy(each, along) for each in (static, carried))
     amounts = AMOUNTS * _better(loss_carried, loss_static + noise)
-    unlike = _departure(streaks_carried) / _departure(streaks_static)
+    unlike = _departure(anisotropy_carried) / _departure(anisotropy_static)
     share = most * _better(loss_carried, loss_before + noise) * float(np.clip((WORST - unlike) / (WORST - 1), 0, 1))
     guess = _with_amounts(static, scene, depth_static, depth_carried, amounts)
     return Guess(
@@ -126,8 +127,8 @@ def first_guess(
             "loss_static": loss_static,
             "loss_carried": loss_carried,
             "loss_before": loss_before,
-            "streaks_static": streaks_static,
-            "streaks_carried": streaks_carried,
+            "anisotropy_static": anisotropy_static,
+            "anisotropy_carried": anisotropy_carried,
         },
     )
 
@@ -137,9 +138,9 @@ def _better(loss: float, other: float) -> float:
     return max(0.0, 1 - loss / other) if other > 0 else 0.0
 
 
-def _departure(streaks_found: float) -> float:
+def _departure(anisotropy: float) -> float:
     """From 1, beyond what is usual; what changes along the rays only (a picture full of even fog) has no end."""
-    return float(np.clip(abs(streaks_found - 1), UNLIKE_SMOKE, 100.0))
+    return float(np.clip(abs(anisotropy - 1), UNLIKE_SMOKE, 100.0))
 
 
 def _with_amounts(

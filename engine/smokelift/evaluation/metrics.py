@@ -13,6 +13,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy import fft, ndimage
 
+from smokelift.density.anisotropy import depth_anisotropy as depth_anisotropy
+
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
@@ -346,35 +348,7 @@ def spectrum_distance(power: npt.ArrayLike, truth: npt.ArrayLike) -> tuple[float
     return float(np.sqrt(np.mean(ratios**2))), np.asarray(ratios, np.float64)
 
 
-def streaks(density: npt.ArrayLike, axis: int = 1) -> float:
-    """Return how much a volume changes from voxel to voxel along one axis, relative to across it.
-
-    Parameters
-    ----------
-    density
-        Shape (nx, ny, nz).
-    axis
-        The one that the camera looks along.
-
-    Returns
-    -------
-    RMS of the differences between neighbours along the axis over that along the other two: about 1 for smoke, near 0
-    for a picture drawn out into the depth.
-
-    Raises
-    ------
-    ValueError
-        If a value is not finite or the volume has not three axes.
-    """
-    values = _finite(density)
-    if values.ndim != 3:
-        raise ValueError(f"streaks need a volume (nx, ny, nz), not one of shape {values.shape}")
-    changes = [float(np.sum(np.diff(values, axis=k) ** 2)) for k in range(3)]
-    along = changes.pop(axis)
-    return _ratio(math.sqrt(along), math.sqrt(sum(changes) / 2))
-
-
-def banding(picture: npt.ArrayLike) -> float:
+def row_constant_detail(picture: npt.ArrayLike) -> float:
     """Return the share of a picture's fine detail that is constant along rows: smoke turned on a lathe.
 
     Parameters
@@ -399,13 +373,13 @@ def banding(picture: npt.ArrayLike) -> float:
     return _ratio(float(np.sum(detail.sum(1) ** 2 / counts)), float(np.sum(detail**2)))
 
 
-def likeness(a: npt.ArrayLike, b: npt.ArrayLike) -> float:
+def detail_correlation(a: npt.ArrayLike, b: npt.ArrayLike) -> float:
     """Return the correlation of two pictures' fine details: near 1 where one view shows what another does.
 
     Parameters
     ----------
     a, b
-        Shape (rows, columns): the smoke alone. Detail is as in `banding`, where either picture shows smoke.
+        Shape (rows, columns): the smoke alone. Detail is as in `row_constant_detail`, where either picture shows smoke.
 
     Raises
     ------
