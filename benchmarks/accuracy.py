@@ -37,6 +37,7 @@ from smokelift.evaluation.truth import Truth
 from smokelift.footage.images import area_average
 from smokelift.output import pictures
 from smokelift.render import Renderer, scene_renderer
+from smokelift.scene import completed
 from smokelift.scene.projection import project, ray_through_pixels
 
 FRONT, SIDE = "0", "90"
@@ -177,8 +178,8 @@ def volume(folder: Path, subject: Subject, frame: int) -> dict[str, np.ndarray]:
 
 def renderers(subject: Subject, scene: Scene, scattering: str, shape: tuple[int, ...]) -> dict[str, Renderer]:
     """For all views, before black."""
-    scene = replace(scene, domain=replace(scene.domain, resolution=shape))
-    return {view: scene_renderer(scene, camera, scattering, BLACK) for view, camera in subject.cameras.items()}
+    scene = completed(replace(scene, domain=replace(scene.domain, resolution=shape), scattering=scattering))
+    return {view: scene_renderer(scene, camera, BLACK) for view, camera in subject.cameras.items()}
 
 
 def images(subject: Subject, run: str, folder: Path, frames: range) -> Images:

@@ -30,7 +30,7 @@ from smokelift.evaluation.truth import Truth
 from smokelift.footage.images import area_average
 from smokelift.output import pictures
 from smokelift.render import scene_renderer
-from smokelift.scene import Background, EnvironmentLight
+from smokelift.scene import EnvironmentLight, completed
 from smokelift.setup.shot import Shot, prepare_shot
 from smokelift.velocity.settings import LEVELS
 
@@ -79,8 +79,8 @@ class Known:
 
     def shown(self, density: np.ndarray, view: str) -> np.ndarray:
         """What a volume shows in the same light."""
-        scene = replace(self.scene, domain=replace(self.scene.domain, resolution=density.shape))
-        return scene_renderer(scene, self.cameras[view], "single", BLACK).image(density)[..., 0]
+        scene = completed(replace(self.scene, domain=replace(self.scene.domain, resolution=density.shape)))
+        return scene_renderer(scene, self.cameras[view], BLACK).image(density)[..., 0]
 
 
 def sides(clip: Clip, scene: Scene, quality: str) -> dict[str, tuple[Scene, Settings]]:
@@ -140,8 +140,7 @@ def residual(side: Side, clip: Clip) -> float:
         shot = side.shot
         picture = clip.frame(frame.number - 1)
         plate = shot.estimated_background
-        scene = shot.scene if plate is None else replace(shot.scene, background=Background(color=(0.0, 0.0, 0.0)))
-        renderer = scene_renderer(scene, None, shot.scattering, plate)
+        renderer = scene_renderer(completed(replace(shot.scene, scattering=shot.scattering)), background=plate)
         behind = renderer.image(np.zeros_like(frame.density))
         wrong += float(np.sum(np.square(renderer.image(frame.density) - picture, dtype=np.float64)))
         change += float(np.sum(np.square(behind - picture, dtype=np.float64)))
@@ -188,8 +187,8 @@ def compare(path: Path, known: Known | None, frames: int, quality: str) -> tuple
         tiles = [clip.frame(frames - 1)]
         for side in both.values():
             plate = side.shot.estimated_background
-            scene = side.shot.scene if plate is None else replace(side.shot.scene, background=None)
-            tiles.append(scene_renderer(scene, None, side.shot.scattering, plate).image(side.found[-1].density))
+            scene = completed(replace(side.shot.scene, scattering=side.shot.scattering))
+            tiles.append(scene_renderer(scene, background=plate).image(side.found[-1].density))
         if known is not None:
             tiles.append(np.repeat(known.seen("90", frames - 1)[..., None], 3, -1))
             tiles += [np.repeat(known.shown(side.found[-1].density, "90")[..., None], 3, -1) for side in both.values()]

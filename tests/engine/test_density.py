@@ -328,7 +328,7 @@ def test_the_unit_of_density_does_not_matter(plume, small, factor) -> None:
 def test_every_model_of_scattering_is_met(plume, small, scattering) -> None:
     """A picture made with a model is found again with it, before a dark wall."""
     scene = replace(small, medium=Medium(extinction=4.0), background=Background(color=(0.1, 0.1, 0.1)))
-    target = render(plume.densities[1], scene, scattering=scattering)
+    target = render(plume.densities[1], replace(scene, scattering=scattering))
     found = reconstruct_density(target, scene, settings=replace(QUICK, scattering=scattering))
     assert found.figures["psnr"] >= 35
     assert found.values.sum() == pytest.approx(plume.densities[1].sum(), rel=0.15)
@@ -392,7 +392,7 @@ def test_the_papers_descent_lowers_the_loss(plume, small) -> None:
 def recovered_depth(density: np.ndarray, scene: Scene) -> np.ndarray:
     """Optical depth of every pixel's ray."""
     clear = replace(scene, lights=(), background=Background(color=(1.0, 1.0, 1.0)))
-    return -np.log(render(density, clear, scattering="absorption")[..., 0])
+    return -np.log(render(density, replace(clear, scattering="absorption"))[..., 0])
 
 
 @pytest.mark.parametrize("scattering", ["single", "unshadowed", "absorption"])

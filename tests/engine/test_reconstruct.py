@@ -20,7 +20,7 @@ from smokelift.output.sequence import Sequence, SequenceError
 from smokelift.output.vdb import VdbUnavailable, read_vdb, vdb_module
 from smokelift.pipeline import Frame, reconstruct, smoke_axis
 from smokelift.render import render, scene_renderer
-from smokelift.scene import Background, ClipSource, Inlet, Medium, PointLight, Scene, look_at_matrix
+from smokelift.scene import Background, ClipSource, Inlet, Medium, PointLight, Scene, completed, look_at_matrix
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import prepare_shot
 from smokelift.transport import advect
@@ -355,7 +355,7 @@ def test_a_clean_plate_for_every_frame(plume, tracked, draft, tmp_path) -> None:
     for n, density in enumerate(plume.densities):
         plate = np.ascontiguousarray(wide[:, 3 * n : 3 * n + 40])
         write_image(tmp_path / f"plate_{n}.exr", plate)
-        renderer = scene_renderer(tracked, tracked.camera.at(n), "single", plate)
+        renderer = scene_renderer(completed(tracked), tracked.camera.at(n), plate)
         write_image(tmp_path / f"frame_{n}.exr", renderer.image(density))
     clip = ClipSource(tmp_path / "frame_#.exr", fps=24)
     scene = replace(tracked, clip=clip, background=Background(image=tmp_path / "plate_#.exr"))

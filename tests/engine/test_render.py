@@ -157,11 +157,19 @@ def voxels_of_three_kinds(density, camera, medium):
 @pytest.mark.parametrize("scattering", MODELS)
 def test_render_gradient_of_every_model(density, wall, scattering):
     """loss, gradient and image of the public function agree with each other and with finite differences."""
-    scene = Scene(camera=make_camera((0.3, -2.0, 0.9)), domain=DOMAIN, medium=Medium(4.0, 0.8, -0.4), lights=(SUN,))
-    target = wall
-    loss, gradient, image = render_gradient(density, scene, target, scattering=scattering)
+    target, scene = (
+        wall,
+        Scene(
+            camera=make_camera((0.3, -2.0, 0.9)),
+            domain=DOMAIN,
+            medium=Medium(4.0, 0.8, -0.4),
+            lights=(SUN,),
+            scattering=scattering,
+        ),
+    )
+    loss, gradient, image = render_gradient(density, scene, target)
     assert loss == pytest.approx(np.sum((image.astype(np.float64) - target) ** 2), rel=1e-6)
-    np.testing.assert_array_equal(image, render(density, scene, scattering=scattering))
+    np.testing.assert_array_equal(image, render(density, scene))
     direction = np.random.default_rng(7).random(SHAPE) * (density > 0)
 
     def at(step):
@@ -268,6 +276,6 @@ def test_background_colour_is_attenuated(density):
     """Absorption only: what is left of the background is the transmittance."""
     camera, medium = make_camera((0.3, -2.0, 0.9)), medium_of_depth(density, 3)
     scene = Scene(camera=camera, domain=DOMAIN, medium=medium, background=Background(color=(1.0, 0.5, 0.25)))
-    image = render(density, scene, scattering="absorption")
+    image = render(density, replace(scene, scattering="absorption"))
     np.testing.assert_allclose(image[..., 1], image[..., 0] / 2, rtol=1e-5)
     assert image[..., 0].min() == pytest.approx(np.exp(-3), rel=0.5)

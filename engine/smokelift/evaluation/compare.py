@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,15 +13,16 @@ from PIL import Image as Pillow
 
 from smokelift.evaluation.scores import Figures, PictureScore, VolumeScore, resampled
 from smokelift.evaluation.truth import Truth
+from smokelift.footage.background import background_picture
 from smokelift.footage.clip import Clip, ClipError
 from smokelift.footage.images import area_average
 from smokelift.footage.plate import open_plates
 from smokelift.output import pictures
 from smokelift.output.files import atomic_path
 from smokelift.output.sequence import Sequence
-from smokelift.render import scene_background, scene_renderer
+from smokelift.render import scene_renderer
 from smokelift.render.renderer import Image, Volume
-from smokelift.scene import Camera, Scene
+from smokelift.scene import Camera, Scene, completed
 
 LONGEST_SIDE = 480
 """Pixels of the pictures that are compared, which are larger ones' means over areas; finer than any usual grid."""
@@ -208,18 +209,18 @@ def _view(name: str, camera: Camera, own: Scene, clip: Clip, first: int, sequenc
     scale = min(1.0, LONGEST_SIDE / max(clip.size))
     camera = camera.resized(*(max(1, round(side * scale)) for side in clip.size))
     # the sequence's background picture is the input camera's; others stand before its mean
-    behind = scene_background(own) if own.background is not None else scene_background(sequence.scene, camera)
+    behind = background_picture(own) if own.background is not None else background_picture(sequence.scene, camera)
     return SeenView(name, camera, area_average(behind, *camera.size) if behind.ndim == 3 else behind, clip, first)
 
 
 def _against_view(sequence: Sequence, view: SeenView, tiles: Tiles) -> Figures:
-    scene, scattering = sequence.scene, sequence.settings["density"]["scattering"]
+    scene = completed(replace(sequence.scene, scattering=sequence.settings["density"]["scattering"]))
     renderer = None
     score = PictureScore(view.background)
     for number in sequence.frames:
         if renderer is None or view.camera.moves:
             camera = view.camera.at(view.first + number - 1)
-            renderer = scene_renderer(scene, camera, scattering, view.background)
+            renderer = scene_renderer(scene, camera, view.background)
         seen, image = view.seen(number), renderer.image(sequence.density(number))
         score.add(image, seen)
         if number in tiles:

@@ -28,7 +28,7 @@ from scipy import ndimage
 
 from smokelift.footage.clip import Clip, is_video
 from smokelift.footage.images import Picture, area_average, linear_to_srgb, srgb_to_linear
-from smokelift.scene import Scene
+from smokelift.scene import CompleteScene, Scene
 
 CODE = np.float32(1 / 255)
 """One step of 8 bit video: no noise is taken to be smaller."""
@@ -159,7 +159,7 @@ def known_plate(background: npt.ArrayLike, clip: Clip, sample_count: int = 32) -
     return _plate(encoded, np.ones((height, width), np.float32), sigma)
 
 
-def open_plates(scene: Scene) -> Clip | None:
+def open_plates(scene: Scene | CompleteScene) -> Clip | None:
     """Open a scene's clean plate as a clip if it changes from frame to frame, and return None if it does not.
 
     Its frames are counted as those of the clip's file. A numbered picture stands for itself before a still camera, and

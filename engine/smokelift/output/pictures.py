@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from collections.abc import Sequence as Many
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -14,15 +15,16 @@ from numpy.typing import NDArray
 from PIL import Image as Pillow
 from PIL import ImageDraw
 
+from smokelift.footage.background import background_picture
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import area_average, linear_to_srgb
 from smokelift.footage.plate import open_plates
 from smokelift.output.files import atomic_path
 from smokelift.output.sequence import Sequence
 from smokelift.pipeline import Frame
-from smokelift.render import Renderer, scene_background, scene_renderer
+from smokelift.render import Renderer, scene_renderer
 from smokelift.render.renderer import Image, Volume
-from smokelift.scene import Camera
+from smokelift.scene import Camera, completed
 from smokelift.scene.cameras import orbit
 from smokelift.setup.shot import Shot
 
@@ -74,7 +76,7 @@ class Viewer:
         self._sequence, self._turn = sequence, turn
         self._plates = open_plates(scene) if own else None
         # the picture of its background belongs to the scene's own camera
-        self._background = scene_background(scene, None if own else self._at(0))
+        self._background = background_picture(scene, None if own else self._at(0))
         self._changes = camera.moves or self._plates is not None
         self._renderers: dict[int, Renderer] = {}
 
@@ -91,7 +93,8 @@ class Viewer:
             background = self._plates.frame(frame + (scene.clip.first if scene.clip is not None else 0))
         if background.ndim == 3:
             background = area_average(background, *camera.size)
-        return scene_renderer(scene, camera, self._sequence.settings["density"]["scattering"], background)
+        known = replace(scene, scattering=self._sequence.settings["density"]["scattering"])
+        return scene_renderer(completed(known), camera, background)
 
     def _at(self, frame: int) -> Camera:
         domain = self._sequence.scene.domain
@@ -164,7 +167,8 @@ def write_thumbnail(path: Path, clip: Clip, shot: Shot, frame: Frame) -> None:
     if now is None:  # nothing of the domain is in this frame's picture: the picture of the last one stays
         return
     seen = now.working.cut(clip.frame(frame.number - 1))
-    renderer = scene_renderer(now.small_scene, None, now.scattering, now.plate.image)
+    scene = completed(replace(now.small_scene, scattering=now.scattering))
+    renderer = scene_renderer(scene, background=now.plate.image)
     wide = seen.shape[1] > seen.shape[0]
     both = eight_bit(np.concatenate([seen, renderer.image(frame.density)], 0 if wide else 1))
     with atomic_path(path) as aside:

@@ -3,13 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from smokelift.footage.background import background_picture
+from smokelift.render.environment import environment_count, environment_lights
 from smokelift.render.lights import FiniteLight
 from smokelift.render.renderer import Image, Renderer
-from smokelift.scene import Camera, Domain, Medium, Scattering
+from smokelift.scene import (
+    Camera,
+    CompleteScene,
+    DirectionalLight,
+    Domain,
+    EnvironmentLight,
+    Medium,
+    Scattering,
+    Scene,
+    completed,
+)
 
 
 @dataclass(frozen=True)
@@ -34,3 +47,50 @@ class Optics:
     def renderer(self, camera: Camera, background: Image, support: NDArray[np.bool_] | None = None) -> Renderer:
         """The renderer of a camera before a background; see `Renderer` for the parameters."""
         return Renderer(camera, self.domain, self.medium, self.lights, background, self.scattering, support)
+
+
+def scene_optics(scene: CompleteScene) -> Optics:
+    """The optics of a scene, in which an environment has become as many parallel lights as it needs.
+
+    That number is found with the scene's own camera, where it is in the first frame. It is the same for every other
+    camera and frame, so that a sequence is lit alike from all sides.
+
+    Raises
+    ------
+    smokelift.footage.images.ImageError
+        If an environment's picture cannot be read.
+    """
+    lights: list[FiniteLight] = []
+    for light in scene.lights:
+        if isinstance(light, EnvironmentLight):
+            lights += _environment(light, scene.camera.at(0), scene.domain, scene.medium)
+        else:
+            lights.append(light)
+    return Optics(scene.domain, scene.medium, tuple(lights), scene.scattering)
+
+
+def scene_lights(scene: Scene | CompleteScene) -> tuple[FiniteLight, ...]:
+    """The lights of `scene_optics`."""
+    return scene_optics(completed(scene)).lights
+
+
+def scene_renderer(scene: CompleteScene, camera: Camera | None = None, background: Image | None = None) -> Renderer:
+    """The renderer of a scene: by default for its own camera, before its own background.
+
+    Raises
+    ------
+    ValueError
+        If the camera moves.
+    """
+    view = camera or scene.camera
+    if view.moves:
+        raise ValueError("The camera moves; give the one of a frame, camera.at(frame).")
+    behind = background_picture(scene, view) if background is None else background
+    return scene_optics(scene).renderer(view, behind)
+
+
+@lru_cache(maxsize=4)
+def _environment(
+    light: EnvironmentLight, camera: Camera, domain: Domain, medium: Medium
+) -> tuple[DirectionalLight, ...]:
+    return environment_lights(light, light.directions or environment_count(light, camera, domain, medium))

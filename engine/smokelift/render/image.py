@@ -1,0 +1,148 @@
+"""The renderer's two public functions: a density as a camera sees it, and how far it is from a target."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import overload
+
+import numpy as np
+
+from smokelift.footage.background import background_picture
+from smokelift.render.optics import scene_renderer
+from smokelift.render.renderer import Image, Renderer, Volume
+from smokelift.scene import Camera, CompleteScene, Domain, Scene, completed
+
+
+def render(density: Volume, scene: Scene | CompleteScene, camera: Camera | None = None) -> Image:
+    """Render a density as a camera sees it, by the scene's scattering model (method section 1).
+
+    Parameters
+    ----------
+    density : (nx, ny, nz)
+        Density at voxel centres, >= 0.
+    scene
+        Needs a domain, and a camera unless one is given. What else it leaves open takes the defaults of
+        `smokelift.scene.completed`: single scattering, and black behind the smoke.
+    camera
+        Another camera than the scene's. The scene's background picture belongs to the scene's camera, so before
+        another camera a picture is replaced by its mean colour.
+
+    Returns
+    -------
+    (rows, columns, 3) float32
+        Linear radiance, row 0 at the top.
+
+    Raises
+    ------
+    ValueError
+        If the density is not finite, is negative or does not fit the domain, or if the scene lacks something.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from smokelift import Camera, DirectionalLight, Domain, Scene, render
+    >>> scene = Scene(
+    ...     camera=Camera.look_at((0.0, -3.0, 0.5), (0.0, 0.0, 0.5), fov_y_degrees=40, size=(32, 24)),
+    ...     domain=Domain((-0.5, -0.5, 0.0), (0.5, 0.5, 1.0), (16, 16, 16)),
+    ...     lights=(DirectionalLight(direction=(0.0, 0.6, -0.8), irradiance=(3.0, 3.0, 3.0)),),
+    ... )
+    >>> image = render(np.ones((16, 16, 16), np.float32), scene)
+    >>> image.shape, image.dtype
+    ((24, 32, 3), dtype('float32'))
+    """
+    renderer = _renderer(scene, camera)
+    return renderer.image(_checked(density, renderer.domain))
+
+
+@overload
+def render_gradient(
+    density: Volume, scene: Scene | CompleteScene, target: Image, camera: Camera | None = None
+) -> tuple[float, Volume, Image]: ...
+@overload
+def render_gradient(
+    density: Volume, scene: Scene | CompleteScene, target: Sequence[Image], camera: Sequence[Camera]
+) -> tuple[float, Volume, list[Image]]: ...
+def render_gradient(
+    density: Volume,
+    scene: Scene | CompleteScene,
+    target: Image | Sequence[Image],
+    camera: Camera | Sequence[Camera] | None = None,
+) -> tuple[float, Volume, Image | list[Image]]:
+    """Squared difference between the rendered and a target image, with its derivative (method section 2).
+
+    Parameters
+    ----------
+    density, scene
+        As in `render`.
+    target : (rows, columns, 3), or a sequence of such
+        Linear radiance.
+    camera
+        As in `render`; or several cameras, with as many targets, whose losses are added up.
+
+    Returns
+    -------
+    loss : float
+        Sum over views, pixels and channels of (image - target)^2.
+    gradient : (nx, ny, nz) float32
+        dloss / ddensity: the exact derivative of the discrete images, shadows included.
+    image : (rows, columns, 3) float32, or a list of such
+
+    Raises
+    ------
+    ValueError
+        As in `render`, if a target is not finite or has another shape than its image, or if there are not as many
+        targets as cameras.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from smokelift import Camera, Domain, Background, Scene, render_gradient
+    >>> scene = Scene(
+    ...     camera=Camera.look_at((0.0, -3.0, 0.5), (0.0, 0.0, 0.5), fov_y_degrees=40, size=(32, 24)),
+    ...     domain=Domain((-0.5, -0.5, 0.0), (0.5, 0.5, 1.0), (16, 16, 16)),
+    ...     background=Background(color=(1.0, 1.0, 1.0)),
+    ... )
+    >>> target = np.ones((24, 32, 3), np.float32)
+    >>> loss, gradient, image = render_gradient(np.ones((16, 16, 16), np.float32), scene, target)
+    >>> gradient.shape, image.shape, bool(gradient.max() > 0)  # less smoke is nearer to the clear target
+    ((16, 16, 16), (24, 32, 3), True)
+    """
+    if camera is None or isinstance(camera, Camera):
+        return _of_view(density, _renderer(scene, camera), np.asarray(target, np.float32))
+    if len(camera) != len(target) or not camera:
+        raise ValueError(f"There must be one target a camera, not {len(target)} for {len(camera)}.")
+    views = [
+        _of_view(density, _renderer(scene, view), np.asarray(goal, np.float32))
+        for view, goal in zip(camera, target, strict=True)
+    ]
+    losses, gradients, images = zip(*views, strict=True)
+    return sum(losses), sum(gradients[1:], gradients[0]), list(images)
+
+
+def _renderer(scene: Scene | CompleteScene, camera: Camera | None) -> Renderer:
+    """The renderer of a camera; the scene's own, if it has one, still decides how an environment is sampled."""
+    whole = completed(scene, scene.camera or camera)
+    return scene_renderer(whole, camera, background_picture(scene, camera))
+
+
+def _of_view(density: Volume, renderer: Renderer, target: Image) -> tuple[float, Volume, Image]:
+    width, height = renderer.camera.size
+    if target.shape != (height, width, 3):
+        raise ValueError(f"The target image must have the shape {(height, width, 3)}, not {target.shape}.")
+    if not np.isfinite(target).all():
+        raise ValueError("The target image holds values that are not finite.")
+    image = renderer.image(_checked(density, renderer.domain), keep_record=True)
+    difference = image - target
+    loss = float(np.sum(np.square(difference, dtype=np.float64)))
+    return loss, renderer.gradient(2 * difference), image
+
+
+def _checked(density: Volume, domain: Domain) -> Volume:
+    density = np.asarray(density, np.float32)
+    if density.shape != domain.resolution:
+        raise ValueError(f"The density has the shape {density.shape}, the domain {domain.resolution}; they must agree.")
+    if not np.isfinite(density).all():
+        raise ValueError("The density holds values that are not finite.")
+    if density.min(initial=0.0) < 0:
+        raise ValueError("The density holds negative values.")
+    return density
