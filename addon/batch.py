@@ -82,7 +82,7 @@ def _wait(job: Any) -> None:
 
 def _scene(choices: argparse.Namespace) -> bpy.types.Scene:
     """The scene with what the options override."""
-    from .scene import ShotError
+    from .scene import ShotError, use_frames
 
     scene = bpy.context.scene
     settings = scene.smokelift
@@ -91,8 +91,6 @@ def _scene(choices: argparse.Namespace) -> bpy.types.Scene:
             settings.clip = bpy.data.movieclips.load(str(choices.clip.absolute()))
         except RuntimeError:
             raise ShotError(f"The clip {choices.clip} cannot be opened.") from None
-    if choices.frames:
-        settings.first, settings.last = choices.frames
     if choices.quality:
         settings.quality = choices.quality
     if choices.axis_depth is not None:
@@ -101,6 +99,8 @@ def _scene(choices: argparse.Namespace) -> bpy.types.Scene:
         settings.output = str(choices.output.absolute())
     if settings.clip is None:
         raise ShotError("The scene has no clip for Smokelift: give one with --clip.")
+    if choices.frames:
+        use_frames(scene, *choices.frames)
     return scene
 
 
@@ -118,7 +118,7 @@ def _render(scene: bpy.types.Scene, path: Path) -> None:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="smokelift", description="Turn the scene's clip into a volume of smoke.")
     parser.add_argument("--clip", type=Path, help="another clip than the scene's")
-    parser.add_argument("--frames", type=_frames, metavar="A:B", help="first and last frame of the clip, from 1")
+    parser.add_argument("--frames", type=_frames, metavar="A:B", help="first and last frame of the clip, from 0")
     parser.add_argument("--quality", choices=("draft", "balanced", "fine"))
     parser.add_argument(
         "--axis-depth",
@@ -140,7 +140,7 @@ def _frames(text: str) -> tuple[int, int]:
     try:
         first, last = (int(part) for part in text.split(":"))
     except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r}: expected the first and last frame A:B, from 1") from None
+        raise argparse.ArgumentTypeError(f"{text!r}: expected the first and last frame A:B, from 0") from None
     return first, last
 
 

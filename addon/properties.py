@@ -52,8 +52,20 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
         type=bpy.types.MovieClip,
         update=_clip_chosen,
     )
-    first: IntProperty(name="First", description="First frame of the clip to use", default=1, min=1, update=_changed)
-    last: IntProperty(name="Last", description="Last frame of the clip to use", default=1, min=1, update=_changed)
+    first: IntProperty(
+        name="First",
+        description="First frame of the clip to use, counted from 1 as Blender does; the command line counts from 0",
+        default=1,
+        min=1,
+        update=_changed,
+    )
+    last: IntProperty(
+        name="Last",
+        description="Last frame of the clip to use, counted from 1 as Blender does; the command line counts from 0",
+        default=1,
+        min=1,
+        update=_changed,
+    )
     plate_mode: EnumProperty(
         name="Background",
         description="What the picture shows where there is no smoke",

@@ -107,12 +107,7 @@ def clip_table(scene: bpy.types.Scene) -> dict[str, Any]:
     clip = settings.clip
     if clip is None:
         raise ShotError("Choose a clip first.")
-    path = clip_path(clip)
-    if not path.is_file():
-        raise ShotError(f"The clip {path} is not there: choose it again, or use File > External Data.")
-    count = clip.frame_duration
-    if count < 1:  # Blender takes any file for a clip
-        raise ShotError(f"The clip {path} is no video and no picture that Blender can read: choose another.")
+    path, count = clip_path(clip), _frame_count(clip)
     if not 1 <= settings.first <= settings.last <= count:
         raise ShotError(f"Frames {settings.first} to {settings.last} are not in the clip: it has frames 1 to {count}.")
     before = clip.frame_offset - 1
@@ -124,6 +119,31 @@ def clip_table(scene: bpy.types.Scene) -> dict[str, Any]:
     if settings.transfer != "AUTO":
         table["transfer"] = settings.transfer
     return table
+
+
+def _frame_count(clip: bpy.types.MovieClip) -> int:
+    path = clip_path(clip)
+    if not path.is_file():
+        raise ShotError(f"The clip {path} is not there: choose it again, or use File > External Data.")
+    if clip.frame_duration < 1:  # Blender takes any file for a clip
+        raise ShotError(f"The clip {path} is no video and no picture that Blender can read: choose another.")
+    return clip.frame_duration
+
+
+def use_frames(scene: bpy.types.Scene, first: int, last: int) -> None:
+    """Use some frames of the clip's file, counted from 0 as the engine counts them.
+
+    Raises
+    ------
+    ShotError
+        If the clip does not have them.
+    """
+    settings = scene.smokelift
+    lowest = settings.clip.frame_offset
+    highest = lowest + _frame_count(settings.clip) - 1
+    if not lowest <= first <= last <= highest:
+        raise ShotError(f"Frames {first} to {last} are not in the clip: it has frames {lowest} to {highest}, from 0.")
+    settings.first, settings.last = first - lowest + 1, last - lowest + 1
 
 
 def frame_rate(scene: bpy.types.Scene) -> float:

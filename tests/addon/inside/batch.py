@@ -31,6 +31,7 @@ def saved(shot, tmp_path) -> Path:
     """The shot as a file, small and short."""
     settings = shot.smokelift
     settings.first, settings.last, settings.longest_side = 27, 30, 32
+    shot.cycles.samples, shot.render.resolution_percentage = 1, 25
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
     return tmp_path / "shot.blend"
 
@@ -72,7 +73,7 @@ def test_options_override_the_file(saved, tmp_path) -> None:
     """Clip, frames, quality, place in depth, folder."""
     clip = tmp_path / "other.mp4"
     clip.write_bytes((EXAMPLE / "clip.mp4").read_bytes())
-    words = ("--clip", clip, "--frames", "2:3", "--quality", "fine", "--axis-depth", "-0.1")
+    words = ("--clip", clip, "--frames", "1:2", "--quality", "fine", "--axis-depth", "-0.1")
     assert blender(saved, *words, "--output", tmp_path / "elsewhere").returncode == 0
     sequence = Sequence.open(tmp_path / "elsewhere" / "take_0001")
     assert sequence.scene.clip.path == clip
@@ -85,7 +86,9 @@ def test_options_override_the_file(saved, tmp_path) -> None:
     ("words", "status", "said"),
     [
         (("--clip", "none.mp4"), 2, "none.mp4"),
-        (("--frames", "40:60"), 2, "frames 1 to 48"),
+        (("--frames", "40:48"), 2, "frames 0 to 47"),
+        (("--frames", "-1:3"), 2, "--frames"),
+        (("--frames=-1:3",), 2, "frames 0 to 47"),
         (("--frames", "5"), 2, "--frames"),
         (("--quality", "best"), 2, "--quality"),
         (("--axis-depth", "far"), 2, "--axis-depth"),
@@ -112,7 +115,7 @@ def test_the_command_wants_its_verb(shot, capsys) -> None:
     assert batch.command([]) == 2
     assert "reconstruct" in capsys.readouterr().err
     assert batch.command(["reconstruct", "--frames", "40:60"]) == 2
-    assert "frames 1 to 48" in capsys.readouterr().err
+    assert "frames 0 to 47" in capsys.readouterr().err
 
 
 def test_an_engine_that_fails(shot, tmp_path, capsys) -> None:
@@ -127,7 +130,7 @@ def test_an_engine_that_fails(shot, tmp_path, capsys) -> None:
 @pytest.fixture
 def running(saved) -> Iterator[subprocess.Popen[str]]:
     """A run whose first frames are finished."""
-    words = command(saved, "--frames", "1:48", "--quality", "fine")
+    words = command(saved, "--frames", "0:47", "--quality", "fine")
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         for line in process.stdout:

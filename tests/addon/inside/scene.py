@@ -12,7 +12,7 @@ from bpy_extras.object_utils import world_to_camera_view
 from mathutils import Euler, Matrix, Vector
 
 from addon import scene as module
-from addon.scene import ShotError, shot_tables
+from addon.scene import ShotError, shot_tables, use_frames
 from addon.take import Take
 from smokelift.scene import Scene
 from smokelift.scene.projection import project
@@ -267,6 +267,17 @@ def test_frames_are_counted_from_nought(shot) -> None:
     shot.smokelift.first, shot.smokelift.last = 5, 9
     table = shot_tables(shot)["clip"]
     assert table == {"path": str(EXAMPLE / "clip.mp4"), "frames": [4, 8]}
+
+
+@pytest.mark.parametrize("offset", [0, 2])
+def test_frames_for_the_command_line_are_those_of_the_scene_file(shot, offset) -> None:
+    """Counted from 0 in the file, wherever Blender starts to play it."""
+    shot.smokelift.clip.frame_offset = offset
+    use_frames(shot, 3, 9)
+    assert (shot.smokelift.first, shot.smokelift.last) == (4 - offset, 10 - offset)
+    assert shot_tables(shot)["clip"]["frames"] == [3, 9]
+    with pytest.raises(ShotError, match=f"it has frames {offset} to {47 + offset}, from 0"):
+        use_frames(shot, offset - 1, 9)
 
 
 def test_a_new_clip_is_used_whole(shot, tmp_path) -> None:
