@@ -9,7 +9,7 @@ import pytest
 import smokelift
 from smokelift.evaluation.metrics import psnr
 from smokelift.footage.images import linear_to_srgb
-from smokelift.footage.plate import matte
+from smokelift.footage.matte import matte
 from smokelift.output.vdb import VdbUnavailable, read_vdb, vdb_module
 from smokelift.render import Renderer
 from smokelift.setup.shot import prepare_shot

@@ -21,7 +21,9 @@ from smokelift.density.hull import project_voxels, reached
 from smokelift.density.multiplicative import RayTarget, fit_multiplicative
 from smokelift.density.observation import Observation
 from smokelift.footage.images import srgb_to_linear
-from smokelift.footage.plate import CODE, Plate, matte, noise_at
+from smokelift.footage.matte import matte
+from smokelift.footage.noise import EIGHT_BIT_STEP
+from smokelift.footage.plate import Plate, noise_at
 from smokelift.render import Renderer, scene_background, scene_lights
 from smokelift.render.lights import unshadowed_source
 from smokelift.render.renderer import Image, Volume
@@ -291,7 +293,7 @@ def _without_traces(density: Volume) -> Volume:
 def _clean_plate(scene: Scene, camera: Camera) -> Plate:
     width, height = camera.size
     picture = np.broadcast_to(scene_background(scene, camera), (height, width, 3)).astype(np.float32)
-    return Plate(picture, np.ones((height, width), np.float32), srgb_to_linear(np.full(3, CODE)))
+    return Plate(picture, np.ones((height, width), np.float32), srgb_to_linear(np.full(3, EIGHT_BIT_STEP)))
 
 
 def _figures(

@@ -24,7 +24,8 @@ from smokelift.density.hull import project_voxels, visual_hull
 from smokelift.density.profile import DepthProfile
 from smokelift.density.screen import upright_rows, view_frame
 from smokelift.footage.images import area_average
-from smokelift.footage.plate import Plate, matte, noise_at
+from smokelift.footage.matte import matte
+from smokelift.footage.plate import Plate, noise_at
 from smokelift.render import Renderer, scene_lights
 from smokelift.render.lights import lighting
 from smokelift.render.renderer import Image

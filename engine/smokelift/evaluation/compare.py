@@ -13,10 +13,9 @@ from PIL import Image as Pillow
 
 from smokelift.evaluation.scores import Figures, PictureScore, VolumeScore, resampled
 from smokelift.evaluation.truth import Truth
-from smokelift.footage.background import background_picture
+from smokelift.footage.background import background_picture, open_plates
 from smokelift.footage.clip import Clip, ClipError
 from smokelift.footage.images import area_average
-from smokelift.footage.plate import open_plates
 from smokelift.output import pictures
 from smokelift.output.files import atomic_path
 from smokelift.output.sequence import Sequence

@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 from PIL import Image as Pillow
 from PIL import ImageDraw
 
-from smokelift.footage.background import background_picture
+from smokelift.footage.background import background_picture, open_plates
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import area_average, linear_to_srgb
-from smokelift.footage.plate import open_plates
 from smokelift.output.files import atomic_path
 from smokelift.output.sequence import Sequence
 from smokelift.pipeline import Frame

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from smokelift.footage.images import area_average, linear_to_srgb
-from smokelift.footage.plate import Plate, encoded_noise, matte
+from smokelift.footage.matte import matte
+from smokelift.footage.plate import Plate, encoded_noise
 from smokelift.render.renderer import Image
 
 TOLERANCE = 0.01

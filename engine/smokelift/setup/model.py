@@ -10,7 +10,8 @@ import numpy as np
 
 from smokelift.density import Density, reconstruct_density
 from smokelift.footage.clip import Clip
-from smokelift.footage.plate import Plate, matte
+from smokelift.footage.matte import matte
+from smokelift.footage.plate import Plate
 from smokelift.scene import Scattering, Scene
 from smokelift.setup.choice import Choice
 from smokelift.setup.coarse import CoarseFrame, coarse_frame

@@ -17,7 +17,7 @@ import numpy as np
 
 from smokelift.density import DensitySettings, reconstruct_density
 from smokelift.density.hull import project_voxels, reached
-from smokelift.footage.plate import matte
+from smokelift.footage.matte import matte
 from smokelift.render import Renderer, scene_lights
 from smokelift.scene import Medium, Scattering
 from smokelift.setup.choice import Choice

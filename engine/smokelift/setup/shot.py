@@ -15,9 +15,12 @@ from numpy.typing import NDArray
 
 from smokelift.density import Observation, SmokeAxis
 from smokelift.density.hull import agreement, project_voxels
+from smokelift.footage.background import open_plates
 from smokelift.footage.clip import Clip, is_video
 from smokelift.footage.images import area_average, read_image
-from smokelift.footage.plate import Plate, changing_plate, estimate_plate, known_plate, matte, one_colour, open_plates
+from smokelift.footage.matte import matte
+from smokelift.footage.plate import Plate, changing_plate, known_plate
+from smokelift.footage.plate_estimation import estimate_plate, one_colour
 from smokelift.footage.working import CameraError, WorkingPicture, voxel_width, working_picture
 from smokelift.render import scene_lights
 from smokelift.scene import Background, Camera, ClipSource, DirectionalLight, Domain, Light, Medium, Scattering, Scene
@@ -175,10 +178,10 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
         )
     plates = open_plates(scene)
     if plates is not None:
-        plate_at = changing_plate(plates, clip)
+        plate_at: Callable[[int], Plate] = changing_plate(plates, clip).at
     else:
         plate, scene = _plate(clip, scene, notes)
-        plate_at = lambda _frame: plate  # noqa: E731
+        plate_at = plate.at
     samples = _smoke_samples(clip, plate_at)
     camera, domain, resolved = _geometry(clip, scene, settings, plate_at, samples, notes)
     if settings.axis_depth is not None:
@@ -306,11 +309,10 @@ def _further_view(number: int, clip: Clip, scene: Scene, notes: list[str]) -> Fu
     own = replace(scene, camera=camera, background=background, views=())
     plates = open_plates(own)
     if plates is not None:
-        changing = changing_plate(plates, opened)
-        plate_at = lambda frame: changing(frame).through(working.cut)  # noqa: E731
+        plate_at: Callable[[int], Plate] = changing_plate(plates, opened).through(working.cut).at
     else:
         plate = _plate(opened, own, found)[0].through(working.cut)
-        plate_at = lambda _frame: plate  # noqa: E731
+        plate_at = plate.at
     axes = [np.array(each.matrix)[:3, 2] for each in (scene.camera, camera)]
     angle = np.degrees(np.arccos(np.clip(axes[0] @ axes[1], -1, 1)))
     frames = f"frames {opened.first} to {opened.first + len(opened) - 1}"

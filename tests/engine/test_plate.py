@@ -10,7 +10,9 @@ import pytest
 
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import linear_to_srgb, srgb_to_linear
-from smokelift.footage.plate import changing_plate, estimate_plate, known_plate, matte, one_colour
+from smokelift.footage.matte import matte
+from smokelift.footage.plate import changing_plate, known_plate
+from smokelift.footage.plate_estimation import estimate_plate, one_colour
 from smokelift.output.images import write_image
 
 HEIGHT, WIDTH, COUNT = 72, 56, 24
@@ -70,10 +72,10 @@ def test_plate_and_matte(tmp_path: Path, low: float, high: float, colour: float)
     for n in (4, 12, 20):
         result = matte(clip.frame(n), plate)
         contrast = puff(n) * np.abs(linear_to_srgb(truth) - linear_to_srgb(colour)).mean(axis=2) * 255
-        assert result.evidence.dtype == np.float32
+        assert result.deviation.dtype == np.float32
         assert result.mask[contrast > 12].mean() > 0.95
         assert result.mask[puff(n) == 0.0].mean() < 0.08
-        assert np.median(result.evidence[puff(n) == 0.0]) < 1.5
+        assert np.median(result.deviation[puff(n) == 0.0]) < 1.5
 
 
 def test_noise_is_measured(tmp_path: Path) -> None:
@@ -206,10 +208,10 @@ def test_a_plate_for_every_frame(tmp_path: Path) -> None:
     wide = passing_wall()
     clip = pan(tmp_path / "clip", wide, 1.0)
     plates = pan(tmp_path / "plate", wide, 0.0)
-    plate_at = changing_plate(plates, clip)
+    changing = changing_plate(plates, clip)
     slope = (srgb_to_linear(linear_to_srgb(0.1) + 0.01) - 0.1) / 0.01
     for n in (4, 12, 20):
-        plate = plate_at(n)
+        plate = changing.at(n)
         assert codes_apart(plate.image, wide[:, 2 * n : 2 * n + WIDTH]).max() < 6
         assert plate.noise.mean() < 2.5 / 255 * slope
         mask = matte(clip.frame(n), plate).mask
@@ -225,7 +227,7 @@ def test_plates_are_counted_as_the_clips_file(tmp_path: Path) -> None:
     pan(tmp_path / "clip", wide, 1.0)
     plates = pan(tmp_path / "plate", wide, 0.0)
     late = Clip.open(tmp_path / "clip" / "frame_###.png", fps=24, frames=(10, 15))
-    assert codes_apart(changing_plate(plates, late)(2).image, wide[:, 24 : 24 + WIDTH]).max() < 6
+    assert codes_apart(changing_plate(plates, late).at(2).image, wide[:, 24 : 24 + WIDTH]).max() < 6
     few = Clip.open(tmp_path / "plate" / "frame_###.png", fps=24, frames=(0, 12))
     with pytest.raises(ValueError, match="has 13 of the frames 0 to 15 that are needed"):
         changing_plate(few, late)

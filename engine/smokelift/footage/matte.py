@@ -1,0 +1,76 @@
+"""Where a frame shows smoke: its deviation from the background, in units of the clip's noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy import ndimage
+
+from smokelift.footage.images import Picture, linear_to_srgb
+from smokelift.footage.plate import Plate, encoded_noise
+
+SMOKE_THRESHOLD = 4.0
+"""Deviation of a pixel that may be smoke, in units of noise. Twice as much is smoke for certain (hysteresis:
+Canny, "A computational approach to edge detection", 1986)."""
+
+CERTAIN_AREA = 1e-4
+"""Share of the picture that has to be smoke for certain in a patch of smoke; less is an accident of the noise."""
+
+SMOOTHING = 1.5
+"""Standard deviation of the Gaussian that smooths the deviation, in pixels."""
+
+GLOBAL_DEVIATION = 2.0
+"""Most that the median deviation of a frame, in units of noise, is taken for a drift of exposure or of the codec and
+not for smoke that fills the picture."""
+
+
+@dataclass(frozen=True, eq=False)
+class Matte:
+    """Where a frame shows smoke.
+
+    Attributes
+    ----------
+    deviation : (rows, columns)
+        From the plate, in units of noise, smoothed over two pixels. About 1 or less without smoke; at least 8 where
+        the plate is less than half certain, since such a pixel was never seen without smoke.
+    mask : (rows, columns) bool
+        Patches of a deviation above `SMOKE_THRESHOLD` in which `CERTAIN_AREA` of the picture exceeds twice as much.
+    """
+
+    deviation: Picture
+    mask: npt.NDArray[np.bool_]
+
+
+def matte(frame: npt.ArrayLike, plate: Plate) -> Matte:
+    """Find the smoke in a frame.
+
+    Parameters
+    ----------
+    frame : (rows, columns, 3)
+        Linear.
+    plate
+        The background of the same size.
+
+    Raises
+    ------
+    ValueError
+        If the sizes differ or the frame is not finite.
+    """
+    linear = np.asarray(frame, np.float32)
+    if linear.shape != plate.image.shape:
+        raise ValueError(f"the frame {linear.shape} and the plate {plate.image.shape} must have one shape")
+    if not np.isfinite(linear).all():
+        raise ValueError("the frame must be finite")
+    difference = (linear_to_srgb(linear) - linear_to_srgb(plate.image)) / encoded_noise(plate)
+    smooth = ndimage.gaussian_filter(difference, (SMOOTHING, SMOOTHING, 0.0))
+    deviation = np.sqrt((smooth**2).mean(axis=2))
+    deviation /= np.clip(np.median(deviation), 1.0, GLOBAL_DEVIATION)
+    # A pixel that was never seen clear has smoke in every frame.
+    certain = 2.0 * SMOKE_THRESHOLD
+    deviation = np.maximum(deviation, np.float32(2.0 * certain) * (1.0 - plate.confidence))
+    patches, count = ndimage.label(deviation > SMOKE_THRESHOLD, structure=np.ones((3, 3)))
+    certain_pixels = np.bincount(patches[deviation > certain], minlength=count + 1)
+    is_smoke = certain_pixels > CERTAIN_AREA * patches.size
+    return Matte(deviation, is_smoke[patches])
