@@ -1,6 +1,6 @@
 """Bake scenes with a known flow: Mantaflow, inside a Blender of Debian's that is fetched for it.
 
-    python benchmarks/truth/bake.py OUT [choose | report | NAME ...] [--resolution 64x64x96]
+    python -m benchmarks.truth.bake OUT [choose | report | NAME ...] [--resolution 64x64x96]
 
 writes OUT/NAME/truth.npz for each scene that is not there yet. Needs root on Linux and mmdebstrap.
 """
@@ -16,7 +16,7 @@ import sys
 import time
 from pathlib import Path
 
-from scenes import BOX_SIZE, FRAMES, SEEDS, names, scene
+from benchmarks.truth.scenes import BOX_SIZE, FRAMES, SEEDS, names, scene
 
 HERE = Path(__file__).resolve().parent
 ENTER = HERE.parents[1] / "tests" / "blender" / "root" / "enter.sh"

@@ -1,6 +1,6 @@
 """Look at baked scenes: figures of the flow in every frame, and a sheet with pictures of them all.
 
-    python benchmarks/truth/check.py SHEET.png plume-1/truth.npz ... [--frames]
+    python -m benchmarks.truth.check SHEET.png plume-1/truth.npz ... [--frames]
 
 Means and extremes over the frames are printed, and every frame on request.
 """

@@ -1,6 +1,6 @@
 """Make the clip of a baked scene with Mitsuba 3, and what no reconstruction may see: linear pictures from four sides.
 
-    python benchmarks/truth/picture.py plume-1/truth.npz OUT [--light point] [--background wall] [--check 20]
+    python -m benchmarks.truth.picture plume-1/truth.npz OUT [--light point] [--background wall] [--check 20]
         [--scattering multiple] [--linear] [--frames 24]
 
 None of the project's own code takes part. The pictures are single scattering, integrated at half-voxel steps over
@@ -14,7 +14,6 @@ from __future__ import annotations
 import argparse
 import json
 import math
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -22,9 +21,8 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from agreement_reference import emitter, integral, sensor, volume
-from example.render import YAWS, blocks, crop, srgb_decode, srgb_encode, turned, wall, write_png, write_video
+from benchmarks.example.render import YAWS, blocks, crop, srgb_decode, srgb_encode, turned, wall, write_png, write_video
+from benchmarks.renderer.mitsuba_pictures import emitter, integral, sensor, volume
 
 PIXELS = 4  # a voxel
 FOV = 30.0
@@ -129,7 +127,7 @@ class Renderer:
     scene
         Domain, medium and light as in a scene file.
     cameras
-        What `agreement_reference.sensor` takes.
+        What `mitsuba_pictures.sensor` takes.
     multiple
         Whether light is scattered more than once.
     """

@@ -1,7 +1,7 @@
 """How velocity estimates fail in the field, one by one: whatever is put in, what comes out stays sound.
 
 Smooth, textured blobs without noise are not what the default's weights are for (turbulent smoke is, see
-benchmarks/velocity_truth.py), so the bounds here are those of a sound estimate, not of an exact one.
+benchmarks/velocity/accuracy.py), so the bounds here are those of a sound estimate, not of an exact one.
 """
 
 from __future__ import annotations

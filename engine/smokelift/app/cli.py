@@ -22,7 +22,6 @@ from smokelift.app.doctor import report
 from smokelift.app.forecast import forecast
 from smokelift.app.memory import require_memory
 from smokelift.app.progress import Reporter, reporter
-from smokelift.bench import command
 from smokelift.evaluation import charts
 from smokelift.evaluation.compare import evaluate
 from smokelift.footage.clip import Clip
@@ -195,6 +194,20 @@ def _chart(options: argparse.Namespace, say: Reporter) -> None:
     say.finish(f"{options.out} written.", {"file": str(options.out)})
 
 
+def _bench(options: argparse.Namespace, say: Reporter) -> None:
+    sys.path.append("")  # a console script does not look into the current folder, as `python -m` does
+    try:
+        from benchmarks import command
+    except ModuleNotFoundError as missing:
+        if missing.name is None or not missing.name.startswith("benchmarks"):
+            raise
+        raise ValueError(
+            "The benchmarks come with Smokelift's source, not with its wheel: "
+            "run smokelift bench, or python -m benchmarks, in the folder of the source, which has them in benchmarks/."
+        ) from None
+    command.run(options.arguments, say)
+
+
 def _require_folder(path: Path | None) -> None:
     if path is not None and not path.absolute().parent.is_dir():
         raise ValueError(f"{path}: the folder {path.parent} does not exist.")
@@ -213,7 +226,7 @@ _COMMANDS = {
     "evaluate": _evaluate,
     "chart": _chart,
     "doctor": _doctor,
-    "bench": command.bench,
+    "bench": _bench,
 }
 
 
@@ -340,11 +353,15 @@ def _parser() -> argparse.ArgumentParser:
     judge.add_argument("--picture", type=Path, metavar="FILE.png", help="truth and sequence side by side")
 
     drawing = commands.add_parser("chart", parents=[common], help="speed against accuracy, from measured runs")
-    drawing.add_argument("csv", type=Path, help="written by benchmarks/accuracy.py")
+    drawing.add_argument("csv", type=Path, help="written by python -m benchmarks.accuracy")
     drawing.add_argument("--out", type=Path, required=True, metavar="chart.png")
 
     commands.add_parser("doctor", parents=[common], help="versions, devices and what is missing")
-    command.add_parser(commands)
+    # every word, options too, goes to the benchmarks' own parser
+    bench = commands.add_parser(
+        "bench", help="speed and error beside others on the same machine", prefix_chars="+", add_help=False
+    )
+    bench.add_argument("arguments", nargs="*")
     return parser
 
 

@@ -1,4 +1,4 @@
-"""Speed against accuracy: seconds a frame against four errors, from the figures of benchmarks/accuracy.py."""
+"""Speed against accuracy: seconds a frame against four errors, from the figures of `python -m benchmarks.accuracy`."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ class Runs:
 
 
 def read_runs(path: Path) -> Runs:
-    """Read the figures that benchmarks/accuracy.py wrote.
+    """Read the figures that `python -m benchmarks.accuracy` wrote.
 
     Raises
     ------
@@ -100,7 +100,7 @@ def read_runs(path: Path) -> Runs:
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise ValueError(f"{path}: cannot be read as CSV: {error}.") from error
     if missing:
-        raise ValueError(f"{path}: has no column {missing[0]!r}; give the CSV that benchmarks/accuracy.py writes.")
+        raise ValueError(f"{path}: has no column {missing[0]!r}; give the CSV of python -m benchmarks.accuracy.")
     by_run: dict[str, dict[str, dict[str, str]]] = {}
     for row in (row for row in rows if row["method"] != _REFERENCE):
         by_run.setdefault(row["run"], {})[row["scene"]] = row

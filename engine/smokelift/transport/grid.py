@@ -146,7 +146,7 @@ def advect(
     misses the point of origin by 0.05 voxels at a voxel a step, by 0.4 at three and by 4.6 at ten. Yet on baked
     scenes of two to six voxels a frame neither a midpoint step nor two half steps paid: they predict the next
     velocity to 0.057 both, one step to 0.048, and the density carried by that to 0.052 both, one step to 0.048
-    (benchmarks/transport_truth.py). Those scenes were made with straight steps themselves.
+    (benchmarks/velocity/transport.py). Those scenes were made with straight steps themselves.
     """
     require_positive("dt", dt)
     if scheme not in ("maccormack", "semi-lagrangian"):

@@ -1,0 +1,11 @@
+"""Measurements of Smokelift. They live in the source only and are part of no wheel.
+
+- ``renderer``: the renderer beside other ways to do the same work, and beside exact answers
+- ``velocity``: error against time of the velocity solver, and its error on known flows
+- ``pipeline``: seconds a frame and memory of whole runs
+- ``accuracy``: reconstructions beside known volumes and other views
+- ``truth``, ``example``: make the scenes that are known, and the example clip
+
+``python -m benchmarks renderer|velocity|pipeline`` runs the first three (so does ``smokelift bench``); the other
+commands are modules of their own, such as ``python -m benchmarks.accuracy``. All run in the folder of the checkout.
+"""

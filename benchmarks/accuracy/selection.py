@@ -1,0 +1,262 @@
+"""What the choices save, and what they cost: each clip once as chosen and once with the richest model, side by side.
+
+    python -m benchmarks.accuracy.selection OUT CLIP[=SCENE:FIRST:STEP] ... [--frames 10] [--quality balanced]
+
+A CLIP is a scene file. SCENE is a folder of truth/picture.py with the same smoke in the light of a sun: its frame FIRST
++ STEP n is the clip's frame n, and what is measured against it is the volume: its density, and what it shows in that
+light from 20, 45 and 90 degrees. The two sides take turns, frame by frame, so that both have the same machine; time is
+the processor's, of all cores. What is chosen is compared with the most that can be said by hand: the scene's own voxels
+(of a box that is found the most of the quality), 64 directions, three grids, shadows where the light is known.
+
+OUT gets selection.md, selection.json and selection.png.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from smokelift import Clip, Frame, Scene, Settings, reconstruct
+from smokelift.evaluation.metrics import psnr
+from smokelift.evaluation.scores import resampled
+from smokelift.evaluation.truth import Truth
+from smokelift.footage.images import area_average
+from smokelift.output import pictures
+from smokelift.render import scene_renderer
+from smokelift.scene import EnvironmentLight, completed
+from smokelift.setup.shot import Shot, prepare_shot
+from smokelift.velocity.settings import LEVELS
+
+VIEWS = {"0": "front", "20": "nov20", "45": "nov45", "90": "side"}
+BLACK = np.zeros(3, np.float32)
+STARTED = 2
+"""Frames that are not clocked: the first two come together."""
+
+DIRECTIONS = 64
+"""The richest environment that is compared with."""
+
+SHOWN = 0.3
+"""Brightness (linear) of the brightest in a row of pictures at least."""
+
+RUN = 24
+"""Frames of the run that choosing is compared with."""
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """The same smoke in the light of a sun, from a folder of truth/picture.py."""
+
+    scene: Scene
+    truth: Truth
+    first: int
+    step: int
+    stored: dict[str, np.ndarray]
+    cameras: dict[str, Any]
+
+    @staticmethod
+    def load(text: str) -> Known:
+        """From FOLDER:FIRST:STEP."""
+        name, first, step = text.split(":")
+        folder = Path(name)
+        stored, cameras = {}, {}
+        for view, file in VIEWS.items():
+            with np.load(folder / f"{file}.npz") as data:
+                stored[view] = data["image"]
+            cameras[view] = Scene.load(folder / f"{file}.toml").camera
+        scene = Scene.load(folder / "scene.toml")
+        return Known(scene, Truth.load(folder / "truth.npz"), int(first), int(step), stored, cameras)
+
+    def seen(self, view: str, frame: int) -> np.ndarray:
+        """The picture of the smoke alone (rows, columns)."""
+        return self.stored[view][self.first + self.step * frame].astype(np.float32)
+
+    def shown(self, density: np.ndarray, view: str) -> np.ndarray:
+        """What a volume shows in the same light."""
+        scene = completed(replace(self.scene, domain=replace(self.scene.domain, resolution=density.shape)))
+        return scene_renderer(scene, self.cameras[view], BLACK).image(density)[..., 0]
+
+
+def sides(clip: Clip, scene: Scene, quality: str) -> dict[str, tuple[Scene, Settings]]:
+    """What is compared: everything left open, and the richest of everything."""
+    chosen = Settings.preset(quality, resolution="auto")
+    rich = Settings.preset(quality)
+    if scene.domain is None:  # the paper's method takes the most
+        most = prepare_shot(clip, scene, Settings.preset(quality, "paper")).scene.domain
+        rich = replace(rich, resolution=most.resolution)
+    lights = tuple(
+        replace(light, directions=DIRECTIONS) if isinstance(light, EnvironmentLight) else light
+        for light in scene.lights
+    )
+    model = "single" if lights else "unshadowed"
+    richest = replace(
+        rich, density=replace(rich.density, scattering=model), velocity=replace(rich.velocity, levels=LEVELS)
+    )
+    return {"chosen": (scene, chosen), "richest": (replace(scene, lights=lights), richest)}
+
+
+@dataclass(eq=False)
+class Side:
+    """One of two reconstructions that take turns."""
+
+    shot: Shot
+    choosing: float
+    frames: Iterator[Frame]
+    spent: list[float]
+    found: list[Frame]
+
+    @staticmethod
+    def begin(clip: Clip, scene: Scene, settings: Settings) -> Side:
+        """Prepare it, and clock what that takes beyond the paper's method, which chooses nothing."""
+        clocks = []
+        for each in (Settings.preset(settings.quality, "paper"), settings):
+            began = time.process_time()
+            shot = prepare_shot(clip, scene, each)
+            clocks.append(time.process_time() - began)
+        return Side(shot, clocks[1] - clocks[0], iter(reconstruct(clip, scene, settings, shot=shot)), [], [])
+
+    def step(self) -> None:
+        """One more frame."""
+        began = time.process_time()
+        self.found.append(next(self.frames))
+        self.spent.append(time.process_time() - began)
+
+    @property
+    def seconds(self) -> float:
+        """Of a frame, the median."""
+        return float(np.median(self.spent[STARTED:]))
+
+
+def residual(side: Side, clip: Clip) -> float:
+    """Error of the front picture over all frames, in shares of what the smoke changes there."""
+    wrong = change = 0.0
+    for frame in side.found:
+        shot = side.shot
+        picture = clip.frame(frame.number - 1)
+        plate = shot.estimated_background
+        renderer = scene_renderer(completed(replace(shot.scene, scattering=shot.scattering)), background=plate)
+        behind = renderer.image(np.zeros_like(frame.density))
+        wrong += float(np.sum(np.square(renderer.image(frame.density) - picture, dtype=np.float64)))
+        change += float(np.sum(np.square(behind - picture, dtype=np.float64)))
+    return float(np.sqrt(wrong / change))
+
+
+def against(side: Side, known: Known) -> dict[str, float]:
+    """Error of the density, and PSNR of new views, means over the frames."""
+    errors, decibels = [], []
+    for frame in side.found:
+        at = frame.number - 1
+        true = known.truth.density(known.first + known.step * at)
+        found = resampled(frame.density, true.shape)
+        errors.append(float(np.linalg.norm(found - true) / np.linalg.norm(true)))
+        decibels += [psnr(known.shown(frame.density, view), known.seen(view, at)) for view in list(VIEWS)[1:]]
+    return {"density_error": float(np.mean(errors)), "psnr_new": float(np.mean(decibels))}
+
+
+def compare(path: Path, known: Known | None, frames: int, quality: str) -> tuple[dict[str, Any], list[np.ndarray]]:
+    """Both sides of a clip: figures, and pictures of the last frame."""
+    scene = Scene.load(path)
+    first = scene.clip.first
+    source = replace(scene.clip, frames=(first, first + frames - 1))
+    row: dict[str, Any] = {"clip": path.parent.name, "frames": frames}
+    with Clip.open(source) as clip:
+        scene = replace(scene, clip=source)
+        both = {name: Side.begin(clip, *side) for name, side in sides(clip, scene, quality).items()}
+        for _ in range(frames):
+            for side in both.values():
+                side.step()
+        for name, side in both.items():
+            shot = side.shot
+            row[name] = {
+                "scattering": shot.scattering,
+                "resolution": list(shot.scene.domain.resolution),
+                "directions": [light.directions for light in shot.scene.lights if isinstance(light, EnvironmentLight)],
+                "levels": shot.levels,
+                "seconds": side.seconds,
+                "choosing": side.choosing,
+                "residual": residual(side, clip),
+                **({} if known is None else against(side, known)),
+            }
+        row["choices"] = [choice.as_dict() for choice in both["chosen"].shot.choices]
+        tiles = [clip.frame(frames - 1)]
+        for side in both.values():
+            plate = side.shot.estimated_background
+            scene = completed(replace(side.shot.scene, scattering=side.shot.scattering))
+            tiles.append(scene_renderer(scene, background=plate).image(side.found[-1].density))
+        if known is not None:
+            tiles.append(np.repeat(known.seen("90", frames - 1)[..., None], 3, -1))
+            tiles += [np.repeat(known.shown(side.found[-1].density, "90")[..., None], 3, -1) for side in both.values()]
+    return row, tiles
+
+
+def main() -> None:
+    """Compare, and write table, figures and pictures."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("out", type=Path)
+    parser.add_argument("clips", nargs="+", help="scene.toml, or scene.toml=FOLDER:FIRST:STEP")
+    parser.add_argument("--frames", type=int, default=10)
+    parser.add_argument("--quality", default="balanced")
+    options = parser.parse_args()
+    options.out.mkdir(parents=True, exist_ok=True)
+    rows, sheet = [], []
+    for text in options.clips:
+        path, _, truth = text.partition("=")
+        known = Known.load(truth) if truth else None
+        row, tiles = compare(Path(path), known, options.frames, options.quality)
+        rows.append(row)
+        small = [area_average(tile, 192, round(192 * tile.shape[0] / tile.shape[1])) for tile in tiles]
+        gain = max(1.0, SHOWN / float(small[0].max()))  # a haze would be black
+        sheet.append([pictures.eight_bit(gain * np.maximum(tile, 0)) for tile in small])
+        print(line(row), flush=True)
+        (options.out / "selection.json").write_text(json.dumps(rows, indent=1) + "\n")
+    head = [
+        "clip",
+        "scattering",
+        "voxels",
+        "directions",
+        "grids",
+        "time",
+        "choosing",
+        "front",
+        "density",
+        "new views, dB",
+    ]
+    table = [f"| {' | '.join(head)} |", "|" + " --- |" * len(head), *map(line, rows)]
+    (options.out / "selection.md").write_text("\n".join(table) + "\n")
+    titles = ["clip", "chosen", "richest", "truth, 90", "chosen, 90", "richest, 90"]
+    full = [row for row in sheet if len(row) == len(titles)]
+    if full:
+        labels = [row["clip"] for row, tiles in zip(rows, sheet, strict=True) if len(tiles) == len(titles)]
+        pictures.sheet(full, titles, labels).save(options.out / "selection.png")
+
+
+def line(row: dict[str, Any]) -> str:
+    """A row of the table: as chosen, and in brackets the richest."""
+    chosen, richest = row["chosen"], row["richest"]
+
+    def pair(key: str, form: str) -> str:
+        return f"{chosen[key]:{form}} ({richest[key]:{form}})" if key in chosen else "-"
+
+    cells = [
+        row["clip"],
+        f"{chosen['scattering']} ({richest['scattering']})",
+        " x ".join(map(str, chosen["resolution"])) + f" ({' x '.join(map(str, richest['resolution']))})",
+        f"{chosen['directions'][0]} ({richest['directions'][0]})" if chosen["directions"] else "-",
+        f"{chosen['levels']} ({richest['levels']})",
+        f"{chosen['seconds'] / richest['seconds']:.2f}",
+        f"{chosen['choosing'] / (RUN * richest['seconds']):.1%}",
+        pair("residual", ".1%"),
+        pair("density_error", ".2f"),
+        pair("psnr_new", ".1f"),
+    ]
+    return f"| {' | '.join(cells)} |"
+
+
+if __name__ == "__main__":
+    main()

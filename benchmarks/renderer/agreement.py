@@ -1,0 +1,335 @@
+"""How well the renderer's pictures agree with Mitsuba 3's, as the grid is refined; writes docs/agreement.md.
+
+    python -m benchmarks.renderer.agreement --mitsuba /path/to/python [--folder KEPT] [--out docs/agreement.md]
+
+One field of density, trilinear between the centres of 32^3 voxels, is the truth. Mitsuba renders it as it is
+(mitsuba_pictures.py, in a process of its own, since Mitsuba need not live in the same environment); we sample it
+onto finer grids, and a step shrinks with the voxel.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy import ndimage
+
+from smokelift.output.images import write_image
+from smokelift.render import Renderer
+from smokelift.render.environment import environment_count, environment_lights
+from smokelift.scene import Camera, DirectionalLight, Domain, EnvironmentLight, Light, Medium, PointLight
+
+VOXELS = 32
+GRIDS = (32, 64, 128, 192)
+LOW, HIGH = (-0.5, -0.5, 0.0), (0.5, 0.5, 1.0)
+FOV, SIZE = 32.0, (96, 96)
+CAMERA = Camera.look_at((1.6, -2.1, 1.7), (0.0, 0.0, 0.5), fov_y_degrees=FOV, size=SIZE)
+ALBEDO = 0.9
+DEPTHS = (1.0, 15.0)
+ANISOTROPIES = (0.0, 0.6)
+BACKGROUND = np.array([0.05, 0.08, 0.12], np.float32)
+SUN = DirectionalLight((0.57, 0.456, -0.684), (6.0, 5.0, 4.0))
+LIGHTS = {
+    "directional": SUN,
+    "point": PointLight((-0.9, -0.6, 1.5), (6.0, 5.0, 4.0)),
+    "point, close": PointLight((-0.1, -0.7, 0.7), (0.6, 0.5, 0.4)),
+}
+ROTATION = 40.0
+COUNTS = (4, 8, 16, 32, 64, 128, 256)
+BLOCK = 8  # pixels, as mitsuba_pictures.py has it
+
+
+def truth() -> np.ndarray:
+    """Lumps and hollows in a ball that stays clear of the box's sides, (32, 32, 32), at most 1."""
+    rng = np.random.default_rng(7)
+    x, y, z = np.meshgrid(*[(np.arange(VOXELS) + 0.5) / VOXELS * 2 - 1] * 3, indexing="ij")
+    noise = sum(
+        weight * ndimage.gaussian_filter(rng.standard_normal(x.shape), size, mode="wrap")
+        for size, weight in ((1.2, 1.3), (2.4, 5.6))
+    )
+    ball = np.maximum(1 - (x / 0.75) ** 2 - (y / 0.75) ** 2 - (z / 0.85) ** 2, 0)
+    field = np.sqrt(ball) * np.maximum(1 + 1.2 * noise / noise.std(), 0)
+    return np.asarray(field / field.max(), np.float32)
+
+
+def sampled(field: np.ndarray, count: int) -> np.ndarray:
+    """The trilinear field at the centres of count^3 voxels."""
+    at = (np.arange(count) + 0.5) * VOXELS / count - 0.5
+    corners = np.meshgrid(at, at, at, indexing="ij")
+    return np.asarray(ndimage.map_coordinates(field, corners, order=1, mode="nearest"), np.float32)
+
+
+def surroundings(rows: int = 512) -> np.ndarray:
+    """A sky with a broad cold and a narrower warm light in it, (rows, 2 rows, 3)."""
+    elevation = np.pi * (0.5 - (np.arange(rows)[:, None] + 0.5) / rows)
+    azimuth = 2 * np.pi * (0.5 - (np.arange(2 * rows) + 0.5) / (2 * rows))
+    level = np.cos(elevation)
+    axes = np.broadcast_arrays(level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation))
+    towards = np.stack(axes, -1)
+    z = towards[..., 2:]
+    radiance = 0.3 * (1 + z) * np.array([0.5, 0.7, 1.0]) + 0.4 * (1 - z) * np.array([0.3, 0.2, 0.1])
+    for centre, sharpness, colour in (((0.6, -0.5, 0.62), 20, (4, 3, 2)), ((-0.8, 0.1, 0.2), 8, (0.5, 1, 2))):
+        cosine = towards @ centre / np.linalg.norm(centre)
+        radiance = radiance + np.exp(sharpness * (cosine - 1))[..., None] * np.array(colour)
+    return np.asarray(radiance, np.float32)
+
+
+def extinctions(field: np.ndarray) -> list[float]:
+    """Extinction for each of DEPTHS through the thickest column along an axis."""
+    thickest = max(field.sum(axis).max() for axis in range(3)) * (HIGH[0] - LOW[0]) / VOXELS
+    return [depth / float(thickest) for depth in DEPTHS]
+
+
+def described(light: Light) -> dict[str, Any]:
+    """A light as JSON takes it."""
+    kind = {DirectionalLight: "directional", PointLight: "point", EnvironmentLight: "environment"}[type(light)]
+    return {"type": kind} | {key: str(v) if isinstance(v, Path) else v for key, v in asdict(light).items()}
+
+
+def prepare(folder: Path, field: np.ndarray) -> EnvironmentLight:
+    """Write what Mitsuba's side reads, and remove its pictures of another scene; returns the environment."""
+    environment = EnvironmentLight(folder / "surroundings.exr", rotation_degrees=ROTATION)
+    write_image(environment.image, surroundings(), half=False)
+    np.savez_compressed(folder / "fields.npz", **{str(n): sampled(field, n) for n in GRIDS})
+    lights = {name: described(light) for name, light in (*LIGHTS.items(), ("environment", environment))}
+    scene = {
+        "domain": {"min": LOW, "max": HIGH},
+        "camera": {"matrix": CAMERA.matrix, "fov_y_degrees": FOV, "size": SIZE},
+        "albedo": ALBEDO,
+        "extinctions": extinctions(field),
+        "anisotropies": ANISOTROPIES,
+        "lights": lights,
+    }
+    written, text = folder / "scene.json", json.dumps(scene)
+    if not written.exists() or written.read_text() != text:
+        (folder / "reference.npz").unlink(missing_ok=True)
+        written.write_text(text)
+    return environment
+
+
+def difference(picture: np.ndarray, reference: np.ndarray) -> float:
+    """Relative L2 difference in percent."""
+    return 100 * float(np.linalg.norm(picture - reference) / np.linalg.norm(reference))
+
+
+def blocks(picture: np.ndarray) -> np.ndarray:
+    """Averages over blocks of pixels."""
+    rows, columns = picture.shape[0] // BLOCK, picture.shape[1] // BLOCK
+    return picture.reshape(rows, BLOCK, columns, BLOCK, -1).mean(axis=(1, 3))
+
+
+def table(header: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
+    """A Markdown table."""
+    header = list(header)
+    lines = [header, ["---"] * len(header), *rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+class Comparison:
+    """Our pictures against Mitsuba's.
+
+    Parameters
+    ----------
+    field : (32, 32, 32)
+        The truth.
+    reference
+        What mitsuba_pictures.py wrote.
+    environment
+        The light whose picture Mitsuba saw too.
+    """
+
+    def __init__(self, field: np.ndarray, reference: dict[str, np.ndarray], environment: EnvironmentLight) -> None:
+        self.reference, self.environment = reference, environment
+        self.extinctions = extinctions(field)
+        self.densities = {count: sampled(field, count) for count in GRIDS}
+        self.cases = [(d, a) for d in range(len(DEPTHS)) for a in range(len(ANISOTROPIES))]
+
+    def pictures(self, kind: str) -> dict[int, np.ndarray]:
+        """A light's pictures, ever finer."""
+        names = [name for name in self.reference if name.rpartition("/")[0] == kind]
+        return {int(name.rpartition("/")[2]): self.reference[name] for name in names if "volpath" not in name}
+
+    def finest(self, kind: str) -> np.ndarray:
+        """A light's most exact pictures."""
+        return list(self.pictures(kind).values())[-1]
+
+    def medium(self, case: tuple[int, int]) -> Medium:
+        return Medium(self.extinctions[case[0]], ALBEDO, ANISOTROPIES[case[1]])
+
+    def errors(self, kind: str, case: tuple[int, int], lights: tuple, grid: int) -> tuple[float, float]:
+        """Difference of the scattered light alone, and of the picture before the background where smoke is."""
+        renderer = Renderer(CAMERA, Domain(LOW, HIGH, (grid,) * 3), self.medium(case), lights, np.zeros(3, np.float32))
+        scattered = renderer.image(self.densities[grid])
+        ours = scattered + renderer.transmittance[..., None] * BACKGROUND
+        true = self.finest(kind)[case]
+        transmittance = self.reference["transmittance"][case[0]]
+        smoke = transmittance < 1
+        whole = true + transmittance[..., None] * BACKGROUND
+        return difference(scattered, true), difference(ours[smoke], whole[smoke])
+
+    def named(self, case: tuple[int, int]) -> list[str]:
+        return [f"{DEPTHS[case[0]]:g}", f"{ANISOTROPIES[case[1]]:g}"]
+
+    def grids(self) -> str:
+        """Every light at every grid."""
+        sets = {name: (light,) for name, light in LIGHTS.items()}
+        sets["environment"] = environment_lights(self.environment, COUNTS[-1])
+        rows, worst = [], dict.fromkeys(GRIDS, 0.0)
+        for name, lights in sets.items():
+            for case in self.cases:
+                errors = {grid: self.errors(name, case, lights, grid) for grid in GRIDS}
+                rows.append([name, *self.named(case), *(f"{a:.2f} / {b:.2f}" for a, b in errors.values())])
+                worst = {grid: max(worst[grid], *errors[grid]) for grid in GRIDS}
+        rows.append(["largest", "", "", *(f"{value:.2f}" for value in worst.values())])
+        return table(["light", "depth", "g", *(f"{grid}³" for grid in GRIDS)], rows)
+
+    def counts(self, grid: int = 128) -> str:
+        """The environment by the number of lights."""
+        rows = []
+        domain = Domain(LOW, HIGH, (grid,) * 3)
+        for case in self.cases:
+            sets = [environment_lights(self.environment, count) for count in COUNTS]
+            cells = [f"{self.errors('environment', case, lights, grid)[0]:.2f}" for lights in sets]
+            chosen = environment_count(self.environment, CAMERA, domain, self.medium(case))
+            rows.append([*self.named(case), *cells, str(chosen)])
+        return table(["depth", "g", *map(str, COUNTS), "chosen"], rows)
+
+    def parts(self) -> str:
+        """What of the difference is the sampling of the field, and what the rendering of the samples."""
+        rows = []
+        true = self.finest("directional")
+        for case in self.cases:
+            cells = []
+            for grid in GRIDS:
+                same_voxels = self.reference[f"grid/{grid}"][case]
+                renderer = Renderer(
+                    CAMERA, Domain(LOW, HIGH, (grid,) * 3), self.medium(case), (SUN,), np.zeros(3, np.float32)
+                )
+                ours = renderer.image(self.densities[grid])
+                cells.append(f"{difference(same_voxels, true[case]):.2f} + {difference(ours, same_voxels):.2f}")
+            rows.append([*self.named(case), *cells])
+        return table(["depth", "g", *(f"{grid}³" for grid in GRIDS)], rows)
+
+    def convergence(self) -> str:
+        """How far the references are from being exact."""
+        rows = []
+        for kind in (*LIGHTS, "environment"):
+            *coarser, best = self.pictures(kind)
+            pictures = self.pictures(kind)
+            for number in coarser:
+                cells = [f"{difference(pictures[number][c], pictures[best][c]):.3f}" for c in self.cases]
+                rows.append([kind, str(number), str(best), *cells])
+        return table(
+            ["light", "steps a voxel or directions", "against", *(", ".join(self.named(case)) for case in self.cases)],
+            rows,
+        )
+
+    def path_traced(self) -> str:
+        """The references against volpath, over blocks."""
+        rows = []
+        for kind in (*LIGHTS, "environment"):
+            cells = []
+            for case in self.cases:
+                mean, error = self.reference[f"{kind}/volpath"][case]
+                true = blocks(self.finest(kind)[case])
+                noise = 100 * np.linalg.norm(error) / np.linalg.norm(true)
+                cells.append(f"{difference(mean, true):.2f} ({noise:.2f}), {100 * (mean.sum() / true.sum() - 1):+.2f}")
+            rows.append([kind, *cells])
+        return table(["light", *(", ".join(self.named(case)) for case in self.cases)], rows)
+
+    def transmittance(self) -> str:
+        """Mitsuba's transmittance as volpath has it, over blocks."""
+        cells = []
+        for depth, traced in enumerate(self.reference["transmittance/volpath"]):
+            mean, error = traced[..., :1]
+            true = blocks(self.reference["transmittance"][depth])
+            noise = 100 * np.linalg.norm(error) / np.linalg.norm(true)
+            cells.append(f"{difference(mean, true):.2f} ({noise:.2f}) at depth {DEPTHS[depth]:g}")
+        return ", ".join(cells)
+
+    def page(self) -> str:
+        """All of docs/agreement.md."""
+        return f"""# Agreement with Mitsuba 3
+
+Made by
+
+    python -m benchmarks.renderer.agreement --mitsuba PYTHON
+
+with the Python of an environment that has Mitsuba (3.9.1 here, with LLVM 19 in DRJIT_LIBLLVM_PATH); it takes about half
+an hour on two cores. Everything below is a relative L2 difference in percent.
+
+The truth is one field of density, trilinear between the centres of {VOXELS}³ voxels, structured down to two of them, in
+a box of 1 m. Mitsuba's perspective camera looks at it obliquely, {SIZE[0]} x {SIZE[1]} pixels. Optical depth is that of
+the thickest column along an axis; albedo {ALBEDO:g}; coloured lights: a parallel one, a point 0.65 m from the box, a
+point 0.2 m from it, and an environment of which both read the same file, turned by {ROTATION:g} degrees. The reference
+integrates single scattering over Mitsuba's own sensor, emitters, phase function and trilinear texture by the midpoint
+rule, every sample on a camera ray with a march to the light. We see the field only as voxels sampled from it, and step
+once a voxel.
+
+## Picture against the reference, as voxel and step shrink
+
+The scattered light alone / the picture before a constant background, where there is smoke. The environment as
+{COUNTS[-1]} parallel lights.
+
+{self.grids()}
+
+## Environment: scattered light by the number of parallel lights
+
+128³ voxels. "Chosen" is what the renderer's own test of convergence takes.
+
+{self.counts()}
+
+## Which side, which term
+
+Directional light, scattered light: the part that comes from seeing the field as samples (Mitsuba's picture of our
+voxels, interpolated trilinearly, against its picture of the field) + the part that is our renderer's (our picture
+against Mitsuba's of the same voxels).
+
+{self.parts()}
+
+## How exact the references are
+
+Columns are optical depth, anisotropy. The step is a fraction of the field's voxel; for the environment it is the number
+of directions of a product rule over the sphere that varies.
+
+{self.convergence()}
+
+`volpath`, single scattering (max_depth 2), against the reference over blocks of {BLOCK} x {BLOCK} pixels: difference,
+in brackets the standard error that its noise alone would give, and the difference of the sums.
+
+{self.path_traced()}
+
+Transmittance, `volpath` before a constant emitter: {self.transmittance()}.
+"""
+
+
+def main() -> None:
+    """Run Mitsuba's side, then ours, then write the page."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--mitsuba", default=sys.executable, help="Python of an environment that has Mitsuba")
+    parser.add_argument("--folder", type=Path, help="where Mitsuba's pictures are kept; they are used again")
+    parser.add_argument("--out", type=Path, default=Path("docs/agreement.md"))
+    options = parser.parse_args()
+    field = truth()
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = options.folder or Path(temporary)
+        folder.mkdir(parents=True, exist_ok=True)
+        environment = prepare(folder, field)
+        if not (folder / "reference.npz").exists():
+            script = Path(__file__).with_name("mitsuba_pictures.py")
+            subprocess.run([options.mitsuba, str(script), str(folder)], check=True)
+        with np.load(folder / "reference.npz") as reference:
+            page = Comparison(field, dict(reference), environment).page()
+    options.out.write_text(page)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,298 @@
+"""Mitsuba 3's pictures of the scenes of `agreement`, which starts this file with the Python that has Mitsuba.
+
+    python mitsuba_pictures.py FOLDER     (scene.json and fields.npz in it; writes reference.npz)
+
+Single scattering, integrated by the midpoint rule over Mitsuba's own sensor, emitters, phase function and trilinear
+grid, so the pictures carry no noise; the step is halved until nothing changes. Block averages of `volpath`, which
+shares no integrator with that, check it.
+"""
+
+import json
+import math
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+mi.set_variant("llvm_ad_rgb")
+
+STEPS = (4, 8, 16)  # a voxel; the last is the reference
+ENVIRONMENT_STEPS = 4
+DIRECTIONS = ((8, 16), (12, 24), (16, 32))  # Gauss points in z, equal ones in azimuth; the last is the reference
+BLOCK = 8  # pixels; volpath's noise is averaged over such blocks
+PASSES, SAMPLES = 16, 4096  # a block
+# Mitsuba's environment has its pole along +Y and looks up atan2(x, -z).
+ENVIRONMENT_TO_WORLD = mi.ScalarTransform4f(np.array([[0.0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]]))
+
+
+def volume(values: np.ndarray, low: np.ndarray, high: np.ndarray) -> dict[str, Any]:
+    """Describe values [x, y, z] at voxel centres of a box."""
+    return {
+        "type": "gridvolume",
+        "grid": mi.VolumeGrid(np.ascontiguousarray(values.transpose(2, 1, 0)[..., None], np.float32)),
+        "filter_type": "trilinear",
+        "wrap_mode": "clamp",
+        "raw": True,
+        "to_world": mi.ScalarTransform4f().translate(low).scale(high - low),
+    }
+
+
+def sensor(camera: dict[str, Any], block: int = 1) -> dict[str, Any]:
+    """Describe the camera; Mitsuba's look along +Z. `block` makes pixels that much larger."""
+    width, height = camera["size"]
+    return {
+        "type": "perspective",
+        "fov": camera["fov_y_degrees"],
+        "fov_axis": "y",
+        "to_world": mi.ScalarTransform4f(np.array(camera["matrix"]) @ np.diag([-1.0, 1.0, -1.0, 1.0])),
+        "film": {"type": "hdrfilm", "width": width // block, "height": height // block, "rfilter": {"type": "box"}},
+    }
+
+
+def emitter(light: dict[str, Any]) -> dict[str, Any]:
+    """Describe a light."""
+    if light["type"] == "directional":
+        return {
+            "type": "directional",
+            "direction": light["direction"],
+            "irradiance": {"type": "rgb", "value": light["irradiance"]},
+        }
+    if light["type"] == "point":
+        return {
+            "type": "point",
+            "position": light["position"],
+            "intensity": {"type": "rgb", "value": light["intensity"]},
+        }
+    return {
+        "type": "envmap",
+        "filename": light["image"],
+        "scale": light["strength"],
+        "to_world": mi.ScalarTransform4f().rotate([0, 0, 1], -light["rotation_degrees"]) @ ENVIRONMENT_TO_WORLD,
+    }
+
+
+def phase_value(function: Any, towards_eye: Any, towards_light: Any) -> Any:
+    """Evaluate Mitsuba's phase function."""
+    medium = dr.zeros(mi.MediumInteraction3f, dr.width(towards_eye))
+    medium.wi = towards_eye
+    medium.sh_frame = mi.Frame3f(towards_eye)
+    value, _ = function.eval_pdf(mi.PhaseFunctionContext(None), medium, towards_light)
+    return value
+
+
+@dr.syntax
+def integral(texture: Any, box: Any, points: Any, direction: Any, step: float) -> Any:
+    """Integrate a grid from points to the edge of its box by the midpoint rule."""
+    ray = mi.Ray3f(points, direction)
+    _, _, far = box.ray_intersect(ray)
+    count = dr.maximum(mi.UInt32(dr.ceil(far / step)), 1)
+    width = far / mi.Float(count)
+    where = dr.zeros(mi.Interaction3f, dr.width(points))
+    total = mi.Float(0.0)
+    i = mi.UInt32(0)
+    while i < count:
+        where.p = ray((mi.Float(i) + 0.5) * width)
+        total += texture.eval_1(where)
+        i += 1
+    return total * width
+
+
+@dr.syntax
+def march(smoke: Any, box: Any, ray: Any, step: float, extinctions: list, phases: list, light: Any, shade: Any) -> Any:
+    """March through the smoke, in several media at once.
+
+    Parameters
+    ----------
+    smoke
+        The density.
+    box
+        Where it is.
+    ray
+        The camera's rays.
+    step
+        Largest step (m).
+    extinctions, phases
+        Of the media.
+    light
+        Of points: direction towards the light, irradiance.
+    shade
+        Of points and that direction: the integral of density towards the light.
+
+    Returns
+    -------
+    list
+        Radiance for each extinction and phase function, extinctions first, for an albedo of 1.
+    list
+        Transmittance of the ray for each extinction.
+    """
+    hit, near, far = box.ray_intersect(ray)
+    length = dr.select(hit, far - near, 0.0)
+    count = mi.UInt32(dr.ceil(length / step))
+    width = length / mi.Float(dr.maximum(count, 1))
+    where = dr.zeros(mi.Interaction3f, dr.width(ray))
+    radiance = [mi.Color3f(0.0) for _ in extinctions for _ in phases]
+    transmittance = [mi.Float(1.0) for _ in extinctions]
+
+    def add_sample(where: Any, radiance: list, transmittance: list) -> tuple[list, list]:
+        density = smoke.eval_1(where)
+        towards, irradiance = light(where)
+        shadow = shade(where, towards)
+        scattered = [irradiance * phase_value(function, -ray.d, towards) for function in phases]
+        passed = [dr.exp(-e * density * width) for e in extinctions]
+        lit = [t * (1 - p) * dr.exp(-e * shadow) for t, p, e in zip(transmittance, passed, extinctions, strict=True)]
+        arriving = [weight * colour for weight in lit for colour in scattered]
+        brighter = [r + a for r, a in zip(radiance, arriving, strict=True)]
+        return brighter, [t * p for t, p in zip(transmittance, passed, strict=True)]
+
+    i = mi.UInt32(0)
+    while i < count:
+        where.p = ray(near + (mi.Float(i) + 0.5) * width)
+        radiance, transmittance = add_sample(where, radiance, transmittance)
+        i += 1
+    return radiance, transmittance
+
+
+class Reference:
+    """One field of density in the lights and media of a scene.json."""
+
+    def __init__(self, scene: dict[str, Any], field: np.ndarray) -> None:
+        self.field = field
+        self.camera, self.lights, self.albedo = scene["camera"], scene["lights"], scene["albedo"]
+        self.extinctions, self.anisotropies = scene["extinctions"], scene["anisotropies"]
+        self.low, self.high = (np.array(scene["domain"][key], float) for key in ("min", "max"))
+        self.voxel = float(self.high[0] - self.low[0]) / len(self.field)
+        self.smoke = mi.load_dict(volume(self.field, self.low, self.high))
+        self.box = mi.BoundingBox3f(mi.ScalarPoint3f(self.low), mi.ScalarPoint3f(self.high))
+        self.phases = [mi.load_dict({"type": "hg", "g": g}) for g in self.anisotropies]
+        # through the centres of the pixels, row by row
+        width, height = self.camera["size"]
+        index = dr.arange(mi.UInt32, width * height)
+        pixel = mi.Point2f((mi.Float(index % width) + 0.5) / width, (mi.Float(index // width) + 0.5) / height)
+        self.rays, _ = mi.load_dict(sensor(self.camera)).sample_ray(0.0, 0.5, pixel, mi.Point2f(0.5))
+
+    def single(self, light: Any, steps: int) -> tuple[np.ndarray, np.ndarray]:
+        """Render one light; every sample on a camera ray marches to it. Radiance and transmittance."""
+        step = self.voxel / steps
+
+        def shade(where: Any, towards: Any) -> Any:
+            return integral(self.smoke, self.box, where.p, towards, step)
+
+        radiance, transmittance = march(
+            self.smoke, self.box, self.rays, step, self.extinctions, self.phases, light, shade
+        )
+        width, height = self.camera["size"]
+        pictures = np.stack([np.array(picture).T.reshape(height, width, 3) for picture in radiance])
+        pictures = pictures.reshape(len(self.extinctions), len(self.anisotropies), height, width, 3)
+        return self.albedo * pictures, np.stack([t.numpy().reshape(height, width) for t in transmittance])
+
+    def lit(self, name: str, steps: int) -> tuple[np.ndarray, np.ndarray]:
+        """Render a directional or a point light."""
+        scene = mi.load_dict({"type": "scene", "domain": self.cube(), "light": emitter(self.lights[name])})
+        source = scene.emitters()[0]
+
+        def light(where: Any) -> tuple[Any, Any]:
+            sample, irradiance = source.sample_direction(where, mi.Point2f(0.5))
+            return sample.d, irradiance
+
+        return self.single(light, steps)
+
+    def surrounded(self, directions: tuple[int, int], steps: int) -> np.ndarray:
+        """Render the environment by a product rule over the sphere."""
+        source = mi.load_dict(emitter(self.lights["environment"]))
+        total: Any = 0.0
+        heights, weights = np.polynomial.legendre.leggauss(directions[0])
+        for z, weight in zip(heights.tolist(), weights.tolist(), strict=True):
+            for azimuth in 2 * math.pi * (np.arange(directions[1]) + 0.5) / directions[1]:
+                level = math.sqrt(1 - z * z)
+                towards = mi.Vector3f(level * math.cos(azimuth), level * math.sin(azimuth), z)
+                looking = dr.zeros(mi.SurfaceInteraction3f)
+                looking.wi = -towards
+                irradiance = source.eval(looking) * (weight * 2 * math.pi / directions[1])
+                dr.make_opaque(towards, irradiance)  # one kernel for all directions
+                radiance, _ = self.single(lambda _, d=towards, e=irradiance: (d, e), steps)
+                total = total + radiance
+        return total
+
+    def cube(self, extinction: float = 1.0, anisotropy: float = 0.0) -> dict[str, Any]:
+        """Describe the smoke for Mitsuba's own integrators."""
+        centre, half = (self.low + self.high) / 2, (self.high - self.low) / 2
+        return {
+            "type": "cube",
+            "to_world": mi.ScalarTransform4f().translate(centre).scale(half),
+            "bsdf": {"type": "null"},
+            "interior": {
+                "type": "heterogeneous",
+                "sigma_t": volume(self.field, self.low, self.high),
+                "scale": extinction,
+                "albedo": self.albedo,
+                "phase": {"type": "hg", "g": anisotropy},
+            },
+        }
+
+    def path_traced(self, light: dict[str, Any], extinction: float, anisotropy: float, depth: int) -> np.ndarray:
+        """Render with `volpath`; pixels are blocks of the camera's.
+
+        Returns
+        -------
+        numpy.ndarray
+            Mean over passes and its standard error, [2, row, column, rgb].
+        """
+        scene = mi.load_dict(
+            {
+                "type": "scene",
+                "integrator": {"type": "volpath", "max_depth": depth, "hide_emitters": depth > 1},
+                "camera": sensor(self.camera, BLOCK),
+                "domain": self.cube(extinction, anisotropy),
+                "light": light,
+            }
+        )
+        passes = [mi.render(scene, spp=SAMPLES, seed=seed).numpy()[..., :3] for seed in range(PASSES)]
+        return np.stack([np.mean(passes, axis=0), np.std(passes, axis=0, ddof=1) / math.sqrt(PASSES)])
+
+
+def main() -> None:
+    """Render every light, and what says how converged that is."""
+    folder = Path(sys.argv[1])
+    scene = json.loads((folder / "scene.json").read_text())
+    fields = np.load(folder / "fields.npz")
+    voxels = min(int(name) for name in fields)
+    reference = Reference(scene, fields[str(voxels)])
+    kept: dict[str, np.ndarray] = {}
+
+    def keep(began: float, **pictures: np.ndarray) -> None:
+        kept.update(pictures)
+        np.savez_compressed(folder / "reference.npz", **kept)
+        print(f"{', '.join(pictures)}: {time.perf_counter() - began:.0f} s", flush=True)
+
+    for name in reference.lights:
+        if name != "environment":
+            for steps in STEPS:
+                began = time.perf_counter()
+                picture, transmittance = reference.lit(name, steps)
+                keep(began, **{f"{name}/{steps}": picture}, transmittance=transmittance)
+    for count in fields:
+        began = time.perf_counter()
+        steps = max(STEPS) * voxels // int(count)
+        keep(began, **{f"grid/{count}": Reference(scene, fields[count]).lit("directional", steps)[0]})
+    for directions in DIRECTIONS:
+        began = time.perf_counter()
+        picture = reference.surrounded(directions, ENVIRONMENT_STEPS)
+        keep(began, **{f"environment/{directions[0] * directions[1]}": picture})
+    for name, light in reference.lights.items():
+        began = time.perf_counter()
+        traced = [
+            [reference.path_traced(emitter(light), e, g, 2) for g in reference.anisotropies]
+            for e in reference.extinctions
+        ]
+        keep(began, **{f"{name}/volpath": np.array(traced)})
+    began = time.perf_counter()
+    traced = [reference.path_traced({"type": "constant"}, e, 0.0, 1) for e in reference.extinctions]
+    keep(began, **{"transmittance/volpath": np.array(traced)})
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,82 @@
+"""The competitors, one module each, and us.
+
+Every module has one function, ``prepare(scene, *arguments) -> Iteration``, and imports its framework at its top: only
+the process that runs it needs it. All but Mitsuba and the paper compute the same discrete sums (see
+`benchmarks.renderer.reference`), each in the way that is fastest in its framework. What all of them may know beforehand
+(rays, columns, the phase function) is tabulated before the clock starts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.util import find_spec
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class Iteration:
+    """One step of an optimisation, ready to run.
+
+    Attributes
+    ----------
+    upload
+        From a density (n, n, n) float32 to what ``run`` takes. Not timed: an optimisation keeps it where it is.
+    run
+        From that to the image and the derivative of the loss, both there when it returns. This is what is timed.
+    download
+        From the two to arrays (rows, columns, 3) and (n, n, n). Not timed.
+    """
+
+    upload: Callable[[NDArray[np.float32]], Any]
+    run: Callable[[Any], tuple[Any, Any]]
+    download: Callable[[Any, Any], tuple[NDArray[np.float32], NDArray[np.float32]]]
+
+
+@dataclass(frozen=True)
+class Peer:
+    """A way to do the work.
+
+    Attributes
+    ----------
+    title
+        As the table names it.
+    module
+        Of this package.
+    packages
+        What pip has to install for it, named as they are imported.
+    arguments
+        Of its ``prepare``, after the scene.
+    before_black
+        Renders, and is compared, without a background.
+    """
+
+    title: str
+    module: str
+    packages: tuple[str, ...] = ()
+    arguments: tuple[Any, ...] = ()
+    before_black: bool = False
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """The packages that are not there."""
+        return tuple(name for name in self.packages if find_spec(name) is None)
+
+
+OURS = "smokelift"
+
+PEERS = {
+    OURS: Peer("Smokelift", "ours"),
+    "drjit": Peer("Dr.Jit, loops and adjoint by hand", "drjit_loops", ("drjit",)),
+    "drjit-wavefront": Peer("Dr.Jit, wavefront, dr.backward", "drjit_wavefront", ("drjit",)),
+    "pytorch": Peer("PyTorch autograd", "pytorch", ("torch",)),
+    "jax": Peer("JAX, jit and grad", "jax_grad", ("jax",)),
+    "taichi": Peer("Taichi autodiff", "taichi_autodiff"),
+    "paper": Peer("The paper's algorithms 2 and 3", "paper"),
+    "mitsuba-1": Peer("Mitsuba 3 prbvolpath, 1 sample", "mitsuba_prbvolpath", ("mitsuba",), (1,), True),
+    "mitsuba-4": Peer("Mitsuba 3 prbvolpath, 4 samples", "mitsuba_prbvolpath", ("mitsuba",), (4,), True),
+    "mitsuba-16": Peer("Mitsuba 3 prbvolpath, 16 samples", "mitsuba_prbvolpath", ("mitsuba",), (16,), True),
+}

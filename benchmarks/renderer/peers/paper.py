@@ -1,0 +1,24 @@
+"""The paper's own algorithms 2 and 3 (gradRec), in Taichi: its Riemann sum, and a derivative that is none by voxel."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.renderer.peers import Iteration
+from benchmarks.renderer.scene import BenchScene
+from smokelift.baselines.renderer import PaperRenderer
+
+Volume = NDArray[np.float32]
+
+
+def prepare(scene: BenchScene) -> Iteration:
+    """Set up the renderer and its record."""
+    background = np.array(scene.background, np.float32)
+    renderer = PaperRenderer(scene.camera, scene.domain, scene.medium, scene.lights, background)
+
+    def run(density: Volume) -> tuple[Volume, Volume]:
+        image = renderer.image(density)
+        return image, renderer.gradient(2 * (image - scene.target))
+
+    return Iteration(upload=np.asarray, run=run, download=lambda image, gradient: (image, gradient))

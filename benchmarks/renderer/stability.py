@@ -1,0 +1,83 @@
+"""What happens to image and gradient as smoke gets thinner and thicker: a table for docs/renderer.md.
+
+    python -m benchmarks.renderer.stability
+
+A plume of 40^3 voxels, albedo 1, the sun at 45 degrees, a camera at an oblique angle; the sums in float64 with their
+exact derivative are the truth. The last column is the brightest pixel of the same smoke in a white room (radiance 1
+from everywhere, before a white wall): above 1 light would have been created.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from benchmarks.renderer.reference import image_and_gradient
+from benchmarks.renderer.scene import BenchScene, bench_scene, plume
+from smokelift.render import Renderer
+from smokelift.scene import DirectionalLight, Medium
+
+SIZE = 40
+DEPTHS = (0.001, 0.01, 0.1, 1.0, 10.0, 100.0)
+ANISOTROPIES = (-0.9, 0.0, 0.9)
+ROOM_LIGHTS = 64
+
+
+def main() -> None:
+    """Print the table."""
+    print(
+        "| optical depth | anisotropy | image error | gradient error | worst of the ten steepest voxels | white room |"
+    )
+    print("|---|---|---|---|---|---|")
+    density = plume(SIZE, 0.18)
+    for depth in DEPTHS:
+        for anisotropy in ANISOTROPIES:
+            print(row(at_depth(density, depth, anisotropy), depth, anisotropy))
+
+
+def at_depth(density: np.ndarray, depth: float, anisotropy: float) -> BenchScene:
+    """Return the benchmark's scene with this optical depth."""
+    scene = bench_scene(density, np.full((SIZE, SIZE, 3), 0.1, np.float32))
+    extinction = depth / float(density.sum(1).max() * scene.domain.voxel_size)
+    return replace(scene, medium=Medium(extinction, 1.0, anisotropy))
+
+
+def row(scene: BenchScene, depth: float, anisotropy: float) -> str:
+    """Measure one scene."""
+    background = np.array(scene.background, np.float32)
+    renderer = Renderer(
+        scene.camera, scene.domain, scene.medium, scene.lights[:1], background, support=scene.density > 0
+    )
+    image = renderer.image(scene.density, keep_record=True)
+    gradient = renderer.gradient(2 * (image - scene.target))
+    exact_image, exact_gradient = image_and_gradient(scene)
+    exact_gradient = np.where(scene.density > 0, exact_gradient, 0)
+    steepest = np.argsort(np.abs(exact_gradient), axis=None)[-10:]
+    worst = np.abs(gradient.flat[steepest] / exact_gradient.flat[steepest] - 1).max()
+    return (
+        f"| {depth:g} | {anisotropy:g} | {error(image, exact_image):.1e} | {error(gradient, exact_gradient):.1e} "
+        f"| {worst:.1e} | {white_room(scene):.4f} |"
+    )
+
+
+def error(values: np.ndarray, exact: np.ndarray) -> float:
+    """Relative L2 distance."""
+    return float(np.linalg.norm(values - exact) / np.linalg.norm(exact))
+
+
+def white_room(scene: BenchScene) -> float:
+    """Brightest pixel where radiance 1 arrives from every side, in isotropic smoke."""
+    spiral = (np.arange(ROOM_LIGHTS) + 0.5) / ROOM_LIGHTS
+    height, turn = 1 - 2 * spiral, np.pi * (1 + 5**0.5) * np.arange(ROOM_LIGHTS)
+    level = np.sqrt(1 - height**2)
+    irradiance = (4 * np.pi / ROOM_LIGHTS,) * 3
+    lights = [
+        DirectionalLight((float(x), float(y), float(z)), irradiance)
+        for x, y, z in zip(level * np.cos(turn), level * np.sin(turn), height, strict=True)
+    ]
+    room = replace(scene.medium, anisotropy=0.0)
+    wall = np.ones(3, np.float32)
+    return float(Renderer(scene.camera, scene.domain, room, lights, wall).image(scene.density).max())
+
+
+if __name__ == "__main__":
+    main()

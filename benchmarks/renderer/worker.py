@@ -1,0 +1,159 @@
+"""One peer, one scene, one process: clean thread pools and a peak of memory that is its own.
+
+    python -m benchmarks.renderer.worker PEER FOLDER LIGHTS DEVICE
+
+reads density.npy and target.npy from the folder and writes image.npy, gradient.npy and result.json there.
+Whatever a framework prints goes nowhere.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+import psutil
+
+from benchmarks.machine import peak_bytes
+from benchmarks.process import run_module, why_it_ended
+from benchmarks.renderer.peers import PEERS, Iteration
+from benchmarks.renderer.scene import BenchScene, bench_scene, plume
+from smokelift.render.device import DeviceName, start
+
+WARM_UPS = 2
+FEWEST, MOST = 5, 25
+ENOUGH_SECONDS = 2.0
+SLOW_SECONDS = 5.0
+"""An iteration that takes longer is run twice only."""
+
+TINY = 6
+"""Voxels a side of the grid that is run first, so that compilers have done their work before memory is counted."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a peer did.
+
+    Attributes
+    ----------
+    seconds
+        Of each iteration, image and gradient.
+    compile_seconds
+        Import, set-up and first iteration of a tiny grid.
+    setup_seconds
+        Set-up and warm-up of the grid itself beyond what an iteration takes.
+    peak_bytes
+        The most memory beyond what stood before the set-up: imports, compiler, density and target do not count. None
+        where the system does not tell.
+    failure
+        One sentence if there is nothing else.
+    """
+
+    seconds: tuple[float, ...] = ()
+    compile_seconds: float = 0.0
+    setup_seconds: float = 0.0
+    peak_bytes: int | None = None
+    failure: str = ""
+
+
+def run_apart(peer: str, folder: Path, lights: int = 1, device: DeviceName = "cpu") -> Result:
+    """Run a peer on the scene in a folder, in a process of its own; the arrays it makes are left there.
+
+    The device is that of our own renderer: what others use is theirs to say.
+    """
+    result = folder / "result.json"
+    result.unlink(missing_ok=True)
+    ended = run_module("benchmarks.renderer.worker", peer, str(folder), str(lights), device)
+    if result.exists():
+        found = json.loads(result.read_text())
+        return Result(**{**found, "seconds": tuple(found["seconds"])})
+    return Result(failure=why_it_ended(ended))
+
+
+def measure(peer: str, scene: BenchScene) -> tuple[Result, Any, Any]:
+    """Run a peer in this process; also its image and gradient."""
+    began = time.perf_counter()
+    prepare = prepare_function(peer)
+    small = bench_scene(plume(TINY, 0.5), np.zeros((TINY, TINY, 3), np.float32), len(scene.lights))
+    tiny = prepare(small)
+    tiny.run(tiny.upload(small.density))
+    del tiny
+    compiled = time.perf_counter()
+    before = _reset_peak()
+    iteration = prepare(scene)
+    density = iteration.upload(scene.density)
+    for _ in range(WARM_UPS):
+        iteration.run(density)
+    ready = time.perf_counter()
+    seconds, outcome = _clocked(iteration, density)
+    peak = peak_bytes()
+    image, gradient = iteration.download(*outcome)
+    result = Result(
+        seconds=tuple(seconds),
+        compile_seconds=compiled - began,
+        setup_seconds=max(ready - compiled - WARM_UPS * float(np.median(seconds)), 0),
+        peak_bytes=None if peak is None or before is None else max(peak - before, 0),
+    )
+    return result, image, gradient
+
+
+def prepare_function(peer: str) -> Callable[[BenchScene], Iteration]:
+    """Import a peer; what is returned sets it up for a scene."""
+    described = PEERS[peer]
+    module = importlib.import_module(f"benchmarks.renderer.peers.{described.module}")
+
+    def prepare(scene: BenchScene) -> Iteration:
+        if described.before_black:
+            scene = replace(scene, background=(0.0, 0.0, 0.0))
+        iteration: Iteration = module.prepare(scene, *described.arguments)
+        return iteration
+
+    return prepare
+
+
+def _clocked(iteration: Iteration, density: Any) -> tuple[list[float], Any]:
+    seconds: list[float] = []
+    while len(seconds) < FEWEST or (len(seconds) < MOST and sum(seconds) < ENOUGH_SECONDS):
+        began = time.perf_counter()
+        outcome = iteration.run(density)
+        seconds.append(time.perf_counter() - began)
+        if len(seconds) == 2 and min(seconds) > SLOW_SECONDS:
+            break
+    return seconds, outcome
+
+
+def _reset_peak() -> int | None:
+    """Forget the peak of memory so far; bytes in use now, None where the system does not count."""
+    try:
+        Path("/proc/self/clear_refs").write_text("5")
+    except OSError:
+        return None
+    return int(psutil.Process().memory_info().rss)
+
+
+def main() -> None:
+    """Do what the command line says."""
+    peer, folder, lights, device = sys.argv[1], Path(sys.argv[2]), int(sys.argv[3]), cast(DeviceName, sys.argv[4])
+    try:
+        scene = bench_scene(np.load(folder / "density.npy"), np.load(folder / "target.npy"), lights)
+        start(device)
+        result, image, gradient = measure(peer, scene)
+    except MemoryError:
+        result = Result(failure="Out of memory.")
+    except Exception as error:  # whatever a framework raises, the others go on
+        lines = str(error).strip().splitlines() or [type(error).__name__]
+        result = Result(failure=lines[-1])
+    else:
+        np.save(folder / "image.npy", image)
+        np.save(folder / "gradient.npy", gradient)
+    (folder / "result.json").write_text(json.dumps(asdict(result)))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""Scenes with known volumes and velocities: baked by Mantaflow, pictured by Mitsuba. README.md says how."""

@@ -1,0 +1,204 @@
+"""Velocity estimates against known velocities, in many circumstances: a table in Markdown.
+
+    python -m benchmarks.velocity.accuracy [--picture SLICES.png] plume-1/truth.npz jet-1/truth.npz ...
+
+benchmarks/truth bakes such files and says what is in them. No estimate is told where smoke enters, except where the
+row says so. Means over at least eight frames, inside the smoke and the two voxels around it, without the inlet's cells,
+which have a column of their own. Time is in scipy's cosine-transform Poisson solves of the same grid in the same run.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from scipy import ndimage
+
+from benchmarks.machine import poisson_seconds
+from smokelift.evaluation.truth import Truth
+from smokelift.transport import advect
+from smokelift.velocity import Velocity, VelocitySettings, estimate_velocity, predict_velocity
+
+PAIRS = range(6, 38, 4)
+CHAIN = range(6, 22)
+SETTLED = 8
+"""Frames after which a chain of predictions counts."""
+
+Array = npt.NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Score:
+    """How near an estimate is to the truth.
+
+    Attributes
+    ----------
+    error
+        Relative L2 error.
+    cosine
+        Of the two velocity fields as one vector each.
+    mean, largest
+        Mean and largest speed over the truth's.
+    inlet
+        Error in the cells where smoke enters.
+    warp
+        Error of the density carried by the estimate over that of the density carried by the truth. Below one is no
+        success: it fits what the truth does not do.
+    solves
+        Time in Poisson solves.
+    """
+
+    error: float
+    cosine: float
+    mean: float
+    largest: float
+    inlet: float
+    warp: float
+    solves: float
+
+
+def score(truth: Truth, frame: int, found: Velocity, solves: float, step: int = 1) -> Score:
+    """Compare an estimate from a frame to the one `step` later; with more than one, by the mean of the true ones."""
+    after, inlet = truth.density(frame + step), truth.inflow(frame + step)
+    wanted = np.mean([truth.velocity(frame + k).centres() for k in range(step)], axis=0)
+    around = ndimage.binary_dilation(after > 0.01 * after.max(), iterations=2)
+    moving = around & ~ndimage.binary_dilation(inlet, iterations=1)
+    u, v = found.centres(), wanted
+
+    def error(where: npt.NDArray[np.bool_]) -> float:
+        return float(np.linalg.norm((u - v)[where]) / np.linalg.norm(v[where])) if where.any() else np.nan
+
+    speed, true_speed = np.linalg.norm(u[moving], axis=-1), np.linalg.norm(v[moving], axis=-1)
+    carried = [advect(truth.density(frame), velocity, step * truth.dt) for velocity in (found, truth.velocity(frame))]
+    ours, best = (float(np.linalg.norm((c - after)[moving])) for c in carried)
+    return Score(
+        error(moving),
+        float(np.sum(u[moving] * v[moving]) / np.linalg.norm(u[moving]) / np.linalg.norm(v[moving])),
+        float(speed.mean() / true_speed.mean()),
+        float(speed.max() / true_speed.max()),
+        error(around & inlet),
+        ours / best if step == 1 else np.nan,
+        solves,
+    )
+
+
+def pairs(
+    truth: Truth,
+    settings: VelocitySettings,
+    unit: float,
+    change: Callable[[Array], Array] = lambda density: density,
+    told: bool = False,
+    step: int = 1,
+) -> Iterator[Score]:
+    """Estimates from two densities each, without a past."""
+    for frame in PAIRS:
+        before, after = (change(truth.density(f)) for f in (frame, frame + step))
+        start = time.perf_counter()
+        inflow = truth.inflow(frame + step) if told else None
+        found = estimate_velocity(before, after, step * truth.dt, truth.voxel_size, settings, inflow=inflow)
+        yield score(truth, frame, found, (time.perf_counter() - start) / unit, step)
+
+
+def chain(truth: Truth, settings: VelocitySettings, unit: float) -> Iterator[Score]:
+    """Estimates that each have the one before for a prediction."""
+    prediction = None
+    for frame in CHAIN:
+        densities = truth.density(frame), truth.density(frame + 1)
+        start = time.perf_counter()
+        found = estimate_velocity(*densities, truth.dt, truth.voxel_size, settings, prediction=prediction)
+        prediction = predict_velocity(found, truth.dt, settings.closed)
+        seconds = time.perf_counter() - start
+        if frame >= CHAIN.start + SETTLED:
+            yield score(truth, frame, found, seconds / unit)
+
+
+def blurred(density: Array) -> Array:
+    """As reconstructed densities are."""
+    return np.asarray(ndimage.gaussian_filter(density, 1.0), np.float32)
+
+
+def noisy(share: float) -> Callable[[Array], Array]:
+    """White noise in the smoke, of a standard deviation relative to the largest density."""
+    rng = np.random.default_rng(0)
+
+    def change(density: Array) -> Array:
+        noise = share * density.max() * rng.standard_normal(density.shape).astype(np.float32)
+        return np.maximum(density + noise * (density > 0), 0)
+
+    return change
+
+
+def table(path: Path) -> None:
+    """Print the rows of one scene."""
+    truth = Truth.load(path)
+    unit = poisson_seconds(truth.shape)
+    usual = VelocitySettings()
+    rows: dict[str, Iterator[Score]] = {
+        "pairs": pairs(truth, usual, unit),
+        "after 8 frames": chain(truth, usual, unit),
+        "after 8 frames, walls said": chain(truth, VelocitySettings(closed=truth.closed), unit),
+        "pairs, inlet told": pairs(truth, usual, unit, told=True),
+        "pairs, paper": pairs(truth, VelocitySettings(method="paper"), unit),
+        "pairs, blurred": pairs(truth, usual, unit, blurred),
+        "pairs, noise 1 %": pairs(truth, usual, unit, noisy(0.01)),
+        "pairs, noise 3 %": pairs(truth, usual, unit, noisy(0.03)),
+        "pairs, noise 10 %": pairs(truth, usual, unit, noisy(0.10)),
+        "pairs, every second frame": pairs(truth, usual, unit, step=2),
+    }
+    for name, scores in rows.items():
+        found = list(scores)
+        cells = [f"{np.nanmean([getattr(s, f.name) for s in found]):.2f}" for f in fields(Score)[:-1]]
+        worst = max(s.error for s in found)
+        solves = np.median([s.solves for s in found])
+        print(f"| {path.parent.name} | {name} | {' | '.join(cells)} | {worst:.2f} | {solves:.0f} |", flush=True)
+
+
+def draw(paths: list[Path], out: Path) -> None:
+    """Centre slices of the velocity after a chain, beside the truth's, from the front and from the side."""
+    from matplotlib import pyplot
+
+    figure, axes = pyplot.subplots(len(paths), 4, figsize=(10, 3.6 * len(paths)), squeeze=False)
+    for row, path in zip(axes, paths, strict=True):
+        truth = Truth.load(path)
+        prediction, frame = None, CHAIN.start
+        for frame in CHAIN:
+            densities = truth.density(frame), truth.density(frame + 1)
+            found = estimate_velocity(*densities, truth.dt, truth.voxel_size, prediction=prediction)
+            prediction = predict_velocity(found, truth.dt)
+        smoke = ndimage.binary_dilation(truth.density(frame + 1) > 0.01 * truth.density(frame + 1).max(), iterations=2)
+        heaviest = [int(truth.density(frame).sum(axis=tuple(d for d in range(3) if d != a)).argmax()) for a in (0, 1)]
+        limit = float(np.abs(truth.velocity(frame).centres()[smoke]).max())
+        for column, (axis, name) in enumerate([(1, "front"), (0, "side")]):
+            for k, (what, velocity) in enumerate([("truth", truth.velocity(frame)), ("estimate", found)]):
+                upward = np.where(smoke, velocity.centres()[..., 2], np.nan)
+                plot = row[2 * column + k]
+                picture = upward.take(heaviest[axis], axis).T
+                plot.imshow(picture, origin="lower", cmap="RdBu_r", vmin=-limit, vmax=limit)
+                plot.set_title(f"{path.parent.name}, {name}: {what}", fontsize=8)
+                plot.axis("off")
+    figure.suptitle("Upward velocity in the slices with most smoke", fontsize=10)
+    figure.tight_layout()
+    figure.savefig(out, dpi=70)
+
+
+def main() -> None:
+    """Print the table, draw the slices."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("truths", nargs="+", type=Path, metavar="TRUTH.npz")
+    parser.add_argument("--picture", type=Path, metavar="PNG")
+    options = parser.parse_args()
+    print("| scene | | error | cosine | mean | largest | inlet | warp | worst | solves |")
+    print("|---|---|---|---|---|---|---|---|---|---|")
+    for path in options.truths:
+        table(path)
+    if options.picture:
+        draw(options.truths, options.picture)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,271 @@
+"""The two solvers on one linear problem, and whole estimates against known motion, at several sizes.
+
+A size is measured on the known scenes of that size, or on the built-in one where there is none: averaged to a coarser
+grid a scene would not be what a solver makes there, and interpolated to a finer one it would have nothing fine.
+
+The machine may be anything and noisy, so no time stands alone: cosine-transform Poisson solves of the same grid run
+just before and just after everything that is timed, and times are given in them.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from typing import Any, TypeVar
+
+import numpy as np
+
+from benchmarks import machine
+from benchmarks.tables import size_text
+from benchmarks.velocity.flow import built_in_pair
+from benchmarks.velocity.linear import LinearProblem, Solver
+from benchmarks.velocity.pairs import Pair, frames_for_pairs, pair_of_truth, relative_error
+from smokelift.evaluation.truth import Truth
+from smokelift.velocity import Velocity, VelocitySettings, estimate_velocity
+
+Shape = tuple[int, int, int]
+Made = TypeVar("Made")
+Say = Callable[[str], None]
+
+LIBRARIES = ("numpy", "scipy")
+
+ENOUGH_SECONDS = 2.0
+MOST = 5
+"""Something is timed again and again until one of the two is reached."""
+
+BUILT_IN = "built-in"
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How much is measured at a size.
+
+    Attributes
+    ----------
+    pairs
+        Of densities; the first one makes the linear problem.
+    steps
+        Iterations of each solver on the linear problem.
+    reference
+        Iterations of projected CG at most for its optimum.
+    iterations
+        Of projected CG in each solve of an estimate.
+    primal_dual_iterations
+        Of the splitting in each.
+    others
+        Other ways to estimate, by what is changed in the settings.
+    """
+
+    pairs: int
+    steps: Mapping[Solver, tuple[int, ...]]
+    reference: int
+    iterations: tuple[int, ...]
+    primal_dual_iterations: tuple[int, ...]
+    others: tuple[Mapping[str, Any], ...]
+
+
+USUAL = Plan(
+    pairs=3,
+    steps={"projected-cg": (1, 2, 3, 5, 8, 12, 20, 40), "primal-dual": (1, 2, 5, 10, 20, 50, 100)},
+    reference=300,
+    iterations=(2, 3, 5, 10, 20),
+    primal_dual_iterations=(2, 5, 20, 100),
+    others=({"warps": 1}, {"warps": 3}, {"levels": 1}, {"levels": 2}, {"method": "paper"}),
+)
+
+SHORT = Plan(
+    pairs=1,
+    steps={"projected-cg": (2, 5, 12, 25, 40), "primal-dual": (1, 2, 5, 10)},
+    reference=100,
+    iterations=(2, 5, 10),
+    primal_dual_iterations=(2,),
+    others=({"warps": 1},),
+)
+"""Where the usual plan would take hours."""
+
+MANY_VOXELS = 1 << 20
+"""Above it the plan is the short one."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """A solver after some iterations.
+
+    Attributes
+    ----------
+    solver, iterations
+        What ran, from where the next coarser grid ends.
+    distance
+        Relative L2 distance from the optimum, in the smoke.
+    seconds, solves
+        It took, also in Poisson solves.
+    """
+
+    solver: str
+    iterations: int
+    distance: float
+    seconds: float
+    solves: float
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One way to estimate, without a past.
+
+    Attributes
+    ----------
+    setting
+        What is varied: ``iterations``, ``primal_dual_iterations``, ``warps``, ``levels`` or ``method``.
+    value
+        Of it.
+    default
+        Whether these are the default settings.
+    error
+        Relative L2 error in the smoke, mean over the pairs.
+    errors
+        Of each pair.
+    seconds, solves
+        It took, also in Poisson solves; medians over the pairs.
+    """
+
+    setting: str
+    value: int | str
+    default: bool
+    error: float
+    errors: tuple[float, ...]
+    seconds: float
+    solves: float
+
+
+def run(
+    sizes: Sequence[Shape],
+    truths: Sequence[tuple[str, Truth]],
+    say: Say,
+    save: Callable[[dict[str, Any]], None],
+) -> dict[str, Any]:
+    """Run the whole benchmark.
+
+    Parameters
+    ----------
+    sizes
+        Voxels along x, y and z.
+    truths
+        Known scenes with their names.
+    say
+        Is told what happens.
+    save
+        Gets the results so far after each size, should the rest be cancelled.
+
+    Returns
+    -------
+    dict
+        ``date``, ``machine``, ``versions`` and ``sizes``: each with ``size``, ``scene`` (names, or "built-in"),
+        ``voxels_a_frame`` (mean motion in the smoke), ``poisson_ms``, ``start`` (distance of the first guess from the
+        linear problem's optimum), ``steps`` (of `Step`) and ``estimates`` (of `Estimate`). Ready for JSON.
+
+    Raises
+    ------
+    ValueError
+        If a known scene has too few frames or no smoke.
+    """
+    results: dict[str, Any] = {
+        **machine.provenance(LIBRARIES),
+        "sizes": [],
+    }
+    known = [
+        (name, truth, frame)
+        for name, truth in truths
+        for frame in frames_for_pairs(name, truth, _plan(truth.shape).pairs)
+    ]
+    for shape in sizes:
+        plan = _plan(shape)
+        here = [(name, truth, frame) for name, truth, frame in known if truth.shape == shape]
+        name = ", ".join(dict.fromkeys(name for name, _, _ in here)) or BUILT_IN
+        say(f"{size_text(shape)}, {name}")
+        pairs = [pair_of_truth(truth, frame) for _, truth, frame in here]
+        if not pairs:
+            pairs = [built_in_pair(shape, seed) for seed in range(plan.pairs)]
+        clock = _Clock(shape)
+        row: dict[str, Any] = {"size": shape, "scene": name, "voxels_a_frame": _mean_motion(pairs)}
+        row["start"], steps = _steps(pairs[0], plan, clock, say)
+        row["steps"] = [asdict(step) for step in steps]
+        row["estimates"] = [asdict(estimate) for estimate in _estimates(pairs, plan, clock, say)]
+        row["poisson_ms"] = 1e3 * float(np.median(clock.units))
+        results["sizes"].append(row)
+        save(results)
+    return results
+
+
+def _plan(shape: Shape) -> Plan:
+    return USUAL if math.prod(shape) <= MANY_VOXELS else SHORT
+
+
+class _Clock:
+    """Times what is done on one grid, in seconds and in Poisson solves just before and just after."""
+
+    def __init__(self, shape: Shape) -> None:
+        self._shape = shape
+        self.units: list[float] = []
+
+    def time(self, work: Callable[[], Made]) -> tuple[float, float, Made]:
+        """Seconds and solves, medians, and what the work made."""
+        seconds: list[float] = []
+        solves: list[float] = []
+        before = self._unit()
+        while len(seconds) < MOST and sum(seconds) < ENOUGH_SECONDS:
+            began = time.perf_counter()
+            made = work()
+            seconds.append(time.perf_counter() - began)
+            after = self._unit()
+            solves.append(2 * seconds[-1] / (before + after))
+            before = after
+        return float(np.median(seconds)), float(np.median(solves)), made
+
+    def _unit(self) -> float:
+        self.units.append(machine.poisson_seconds(self._shape))
+        return self.units[-1]
+
+
+def _steps(pair: Pair, plan: Plan, clock: _Clock, say: Say) -> tuple[float, list[Step]]:
+    """How far from the optimum the solvers begin, and where they are after some iterations."""
+    problem = LinearProblem.of_pair(pair)
+    say("  the linear problem's optimum")
+    optimum = problem.solve("projected-cg", plan.reference)
+    steps = []
+    for solver, counts in plan.steps.items():
+        for count in counts:
+            seconds, solves, found = clock.time(partial(problem.solve, solver, count))
+            steps.append(Step(solver, count, problem.distance(found, optimum), seconds, solves))
+            say(f"  {solver}, {count}: {100 * steps[-1].distance:.2g} % from the optimum, {solves:.0f} solves")
+    return problem.distance(Velocity(problem.start, 1.0).centres(), optimum), steps
+
+
+def _estimates(pairs: Sequence[Pair], plan: Plan, clock: _Clock, say: Say) -> list[Estimate]:
+    usual = VelocitySettings()
+    ways = [{"iterations": count} for count in plan.iterations]
+    ways += [{"primal_dual_iterations": count} for count in plan.primal_dual_iterations]
+    estimates = []
+    for way in (*ways, *plan.others):
+        ((setting, value),) = way.items()
+        settings = replace(usual, **way)
+        if setting == "primal_dual_iterations":
+            settings = replace(settings, solver="primal-dual")
+        found = [_against_truth(pair, settings, clock) for pair in pairs]
+        errors = tuple(error for error, _, _ in found)
+        seconds, solves = (float(np.median(column)) for column in list(zip(*found, strict=True))[1:])
+        estimates.append(Estimate(setting, value, settings == usual, float(np.mean(errors)), errors, seconds, solves))
+        say(f"  {setting} {value}: error {estimates[-1].error:.3f}, {solves:.0f} solves")
+    return estimates
+
+
+def _against_truth(pair: Pair, settings: VelocitySettings, clock: _Clock) -> tuple[float, float, float]:
+    """Error, seconds, solves."""
+    seconds, solves, found = clock.time(lambda: estimate_velocity(pair.before, pair.after, 1.0, 1.0, settings))
+    return relative_error(found.centres(), pair.motion, pair.counted), seconds, solves
+
+
+def _mean_motion(pairs: Sequence[Pair]) -> float:
+    return float(np.mean([np.linalg.norm(pair.motion[pair.counted], axis=-1).mean() for pair in pairs]))
