@@ -1,6 +1,6 @@
-"""How well the renderer's pictures agree with Mitsuba 3's, as the grid is refined; writes docs/agreement.md.
+"""How well the renderer's pictures agree with Mitsuba 3's, as the grid is refined: the tables of docs/renderer.md.
 
-    python -m benchmarks.renderer.agreement --mitsuba /path/to/python [--folder KEPT] [--out docs/agreement.md]
+    python -m benchmarks.renderer.agreement --mitsuba /path/to/python [--folder KEPT] [--out agreement.md]
 
 One field of density, trilinear between the centres of 32^3 voxels, is the truth. Mitsuba renders it as it is
 (mitsuba_pictures.py, in a process of its own, since Mitsuba need not live in the same environment); we sample it
@@ -256,7 +256,7 @@ class Comparison:
         return ", ".join(cells)
 
     def page(self) -> str:
-        """All of docs/agreement.md."""
+        """All tables as one page of Markdown."""
         return f"""# Agreement with Mitsuba 3
 
 Made by
@@ -316,7 +316,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--mitsuba", default=sys.executable, help="Python of an environment that has Mitsuba")
     parser.add_argument("--folder", type=Path, help="where Mitsuba's pictures are kept; they are used again")
-    parser.add_argument("--out", type=Path, default=Path("docs/agreement.md"))
+    parser.add_argument("--out", type=Path, default=Path("agreement.md"))
     options = parser.parse_args()
     field = truth()
     with tempfile.TemporaryDirectory() as temporary:
