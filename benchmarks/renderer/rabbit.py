@@ -21,8 +21,7 @@ from smokelift.density.descent import descend
 from smokelift.density.fit import Target
 from smokelift.footage.images import linear_to_srgb
 from smokelift.render import Renderer
-from smokelift.scene import Camera, DirectionalLight, Domain, Medium
-from smokelift.scene.cameras import orbit
+from smokelift.scene import Camera, DirectionalLight, Domain, Medium, orbit
 
 SIZE, PIXELS = 64, 160
 DOMAIN = Domain((-0.5, -0.5, 0.0), (0.5, 0.5, 1.0), (SIZE,) * 3)

@@ -21,8 +21,8 @@ from smokelift.scene import (
     Scene,
     View,
     look_at_matrix,
+    orbit,
 )
-from smokelift.scene.cameras import orbit
 from smokelift.setup.settings import Settings
 
 FRAMES = 5

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from smokelift.footage.working import CameraError, working_picture
-from smokelift.scene import Camera, Domain
-from smokelift.scene.cameras import orbit
+from smokelift.scene import Camera, Domain, orbit
 from smokelift.scene.projection import project
 
 DOMAIN = Domain((-0.6, -0.6, 0), (0.6, 0.6, 1.6), (24, 24, 32))

@@ -27,8 +27,7 @@ from smokelift.output import pictures
 from smokelift.output.sequence import Sequence
 from smokelift.output.vdb import VdbUnavailable, vdb_module
 from smokelift.render import device, render
-from smokelift.scene import Camera, Inlet, Scene
-from smokelift.scene.cameras import orbit
+from smokelift.scene import Camera, Inlet, Scene, orbit
 
 MODULE = [sys.executable, "-m", "smokelift"]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(Path(smokelift.__file__).parents[1])}

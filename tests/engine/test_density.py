@@ -27,8 +27,7 @@ from smokelift.density.profile import DepthProfile, inflated
 from smokelift.evaluation.metrics import psnr
 from smokelift.footage.plate import Plate
 from smokelift.render import Renderer, render, scene_lights
-from smokelift.scene import Background, Camera, DirectionalLight, Domain, Medium, Scene
-from smokelift.scene.cameras import orbit
+from smokelift.scene import Background, Camera, DirectionalLight, Domain, Medium, Scene, orbit
 from smokelift.scene.projection import ray_through_pixels
 
 QUICK = DensitySettings(fit_iterations=4, descent_iterations=6)

@@ -14,8 +14,7 @@ from smokelift.app.cli import main
 from smokelift.output.images import write_image
 from smokelift.output.sequence import SequenceWriter
 from smokelift.render import render
-from smokelift.scene import Background, ClipSource, Domain, Scene
-from smokelift.scene.cameras import orbit
+from smokelift.scene import Background, ClipSource, Domain, Scene, orbit
 from smokelift.transport import Velocity
 
 RISE = 1.5

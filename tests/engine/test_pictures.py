@@ -21,8 +21,7 @@ from smokelift.output.pictures import (
 )
 from smokelift.output.sequence import Sequence, SequenceWriter
 from smokelift.render import render
-from smokelift.scene import Background
-from smokelift.scene.cameras import orbit
+from smokelift.scene import Background, orbit
 from smokelift.transport import Velocity
 
 

@@ -28,8 +28,9 @@ from smokelift.scene import (
     View,
     completed,
     look_at_matrix,
+    scene_from_dict,
+    scene_to_dict,
 )
-from smokelift.scene.file import scene_from_dict, scene_to_dict
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
 FRONT = ((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, -1.0, -7.0), (0.0, 1.0, 0.0, 1.5), (0.0, 0.0, 0.0, 1.0))

@@ -32,8 +32,7 @@ from smokelift.output.sequence import Sequence
 from smokelift.output.vdb import VdbUnavailable
 from smokelift.pipeline import reconstruct
 from smokelift.render import DeviceError, device
-from smokelift.scene import ClipSource, Scene
-from smokelift.scene.file import scene_to_dict
+from smokelift.scene import ClipSource, Scene, scene_to_dict
 from smokelift.setup.settings import METHODS, QUALITIES, Settings
 from smokelift.setup.shot import boundaries, prepare_shot
 

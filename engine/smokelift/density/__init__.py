@@ -27,8 +27,7 @@ from smokelift.footage.plate import Plate, noise_at
 from smokelift.render import Renderer, scene_background, scene_lights
 from smokelift.render.lights import unshadowed_source
 from smokelift.render.renderer import Image, Volume
-from smokelift.scene import Camera, Domain, Medium, Scattering, Scene
-from smokelift.scene.cameras import orbit
+from smokelift.scene import Camera, Domain, Medium, Scattering, Scene, orbit
 
 __all__ = [
     "Density",

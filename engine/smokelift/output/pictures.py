@@ -23,8 +23,7 @@ from smokelift.output.sequence import Sequence
 from smokelift.pipeline import Frame
 from smokelift.render import Renderer, scene_renderer
 from smokelift.render.renderer import Image, Volume
-from smokelift.scene import Camera, completed
-from smokelift.scene.cameras import orbit
+from smokelift.scene import Camera, completed, orbit
 from smokelift.setup.shot import Shot
 
 SHEET_ANGLES = (0, 20, 45, 90)

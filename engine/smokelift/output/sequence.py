@@ -34,8 +34,7 @@ import numpy.typing as npt
 from smokelift.output.files import atomic_path
 from smokelift.output.images import write_image
 from smokelift.output.vdb import read_vdb, vdb_module, write_vdb
-from smokelift.scene import Background, Domain, Scene
-from smokelift.scene.file import scene_from_dict, scene_to_dict
+from smokelift.scene import Background, Domain, Scene, scene_from_dict, scene_to_dict
 from smokelift.transport import Velocity
 
 Array = npt.NDArray[np.float32]

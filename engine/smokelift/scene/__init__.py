@@ -1,36 +1,19 @@
-"""What is in front of the lens: camera, domain, medium, lights, background; and its file."""
+"""What is in front of the lens: camera, domain, medium, lights, background; and its file.
 
+``description`` holds `Scene`, what a user gives, and ``complete`` holds `CompleteScene`, in which nothing is left open.
+"""
+
+from smokelift.scene.background import Background
+from smokelift.scene.camera import Camera, Matrix, as_matrix, look_at_matrix, orbit
+from smokelift.scene.checks import SceneError, Vector
+from smokelift.scene.clip_source import ClipSource
 from smokelift.scene.complete import CompleteScene, completed
-from smokelift.scene.description import (
-    SCATTERINGS,
-    SIDES,
-    Background,
-    Camera,
-    ClipSource,
-    DirectionalLight,
-    Domain,
-    EnvironmentLight,
-    Inlet,
-    Light,
-    Matrix,
-    Medium,
-    PointLight,
-    Scattering,
-    Scene,
-    SceneError,
-    Side,
-    Vector,
-    View,
-    focal_length,
-    integer,
-    items,
-    look_at_matrix,
-    number,
-    picture_size,
-    sees,
-    shown,
-    vector,
-)
+from smokelift.scene.description import Scene
+from smokelift.scene.dictionary import scene_from_dict, scene_to_dict
+from smokelift.scene.domain import SIDES, Domain, Inlet, Side
+from smokelift.scene.lights import DirectionalLight, EnvironmentLight, Light, PointLight
+from smokelift.scene.medium import SCATTERINGS, Medium, Scattering
+from smokelift.scene.view import View
 
 __all__ = [
     "SCATTERINGS",
@@ -53,14 +36,10 @@ __all__ = [
     "Side",
     "Vector",
     "View",
+    "as_matrix",
     "completed",
-    "focal_length",
-    "integer",
-    "items",
     "look_at_matrix",
-    "number",
-    "picture_size",
-    "sees",
-    "shown",
-    "vector",
+    "orbit",
+    "scene_from_dict",
+    "scene_to_dict",
 ]

@@ -5,21 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
+from numpy.typing import NDArray
 
-from smokelift.scene.description import (
-    Background,
-    Camera,
-    ClipSource,
-    Domain,
-    Inlet,
-    Light,
-    Medium,
-    Scattering,
-    Scene,
-    Side,
-    View,
-)
+from smokelift.scene.background import Background
+from smokelift.scene.camera import Camera
+from smokelift.scene.clip_source import ClipSource
+from smokelift.scene.description import Scene
+from smokelift.scene.domain import Domain, Inlet, Side, inflow
+from smokelift.scene.lights import Light
+from smokelift.scene.medium import Medium, Scattering
+from smokelift.scene.view import View
 
 
 @dataclass(frozen=True)
@@ -49,14 +44,9 @@ class CompleteScene:
     closed: tuple[Side, ...] = ()
     inlets: tuple[Inlet, ...] = ()
 
-    def inflow(self) -> npt.NDArray[np.bool_] | None:
+    def inflow(self) -> NDArray[np.bool_] | None:
         """Return the voxels where smoke enters, shape (nx, ny, nz); None if no inlet is marked."""
-        if not self.inlets:
-            return None
-        inflow = np.zeros(self.domain.shape, np.bool_)
-        for inlet in self.inlets:
-            inflow |= inlet.voxels(self.domain)
-        return inflow
+        return inflow(self.inlets, self.domain)
 
 
 def completed(scene: Scene | CompleteScene, camera: Camera | None = None) -> CompleteScene:

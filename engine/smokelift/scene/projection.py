@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.scene.description import Camera
+from smokelift.scene.camera import Camera
+from smokelift.scene.domain import Domain
 
 Array = NDArray[np.float64]
 
@@ -56,3 +57,19 @@ def ray_through_pixels(camera: Camera) -> tuple[Array, Array]:
     local = np.stack([grid_x, grid_y, np.zeros_like(grid_x)], -1)
     origin = local @ rotation.T + eye
     return origin, np.broadcast_to(-rotation[:, 2], origin.shape)
+
+
+def sees(camera: Camera, domain: Domain) -> bool:
+    """Return False if all of the box lies outside one side of what a still camera sees.
+
+    That test is exact for every box except one that passes by a corner of the picture, which counts as seen.
+    """
+    to_world = np.array(camera.matrix)
+    x, y, z = ((domain.corners() - to_world[:3, 3]) @ to_world[:3, :3]).T
+    depth = -z
+    scale = depth if camera.type == "perspective" else np.ones_like(depth)
+    column = camera.fx * x + camera.cx * scale  # times depth: no division, so points behind do no harm
+    row = -camera.fy * y + camera.cy * scale
+    width, height = camera.size
+    outside = (depth <= 0.0, column < 0.0, column > width * scale, row < 0.0, row > height * scale)
+    return not any(bool(side.all()) for side in outside)

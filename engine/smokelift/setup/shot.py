@@ -23,8 +23,18 @@ from smokelift.footage.plate import Plate, changing_plate, known_plate
 from smokelift.footage.plate_estimation import estimate_plate, one_colour
 from smokelift.footage.working import CameraError, WorkingPicture, voxel_width, working_picture
 from smokelift.render import scene_lights
-from smokelift.scene import Background, Camera, ClipSource, DirectionalLight, Domain, Light, Medium, Scattering, Scene
-from smokelift.scene.cameras import as_matrix
+from smokelift.scene import (
+    Background,
+    Camera,
+    ClipSource,
+    DirectionalLight,
+    Domain,
+    Light,
+    Medium,
+    Scattering,
+    Scene,
+    as_matrix,
+)
 from smokelift.setup.choice import Choice
 from smokelift.setup.detail import TOLERANCE as DETAIL_TOLERANCE
 from smokelift.setup.detail import Detail, smoke_detail

@@ -20,8 +20,7 @@ from addon.take import Take
 from smokelift.output.images import write_image
 from smokelift.output.pictures import write_video
 from smokelift.output.vdb import write_vdb
-from smokelift.scene import Domain, Medium, Scene
-from smokelift.scene.file import scene_to_dict
+from smokelift.scene import Domain, Medium, Scene, scene_to_dict
 from tests.example_shot import EXAMPLE
 
 FRAMES = 6

@@ -19,8 +19,7 @@ from smokelift.footage.clip import Clip
 from smokelift.footage.images import area_average, linear_to_srgb
 from smokelift.output.images import write_image
 from smokelift.output.sequence import Sequence
-from smokelift.scene import Scene
-from smokelift.scene.file import scene_from_dict
+from smokelift.scene import Scene, scene_from_dict
 from smokelift.setup.settings import Settings
 from tests.example_shot import EXAMPLE, add
 

@@ -1,0 +1,220 @@
+"""Cameras: what one is, and how to point one at something or carry it around."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any, Literal, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smokelift.scene.checks import SceneError, Vector, integer, items, number, set_fields, shown, unexpected, vector
+from smokelift.scene.domain import Domain
+
+Matrix = tuple[tuple[float, float, float, float], ...]
+"""4x4, row-major."""
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A pinhole or an orthographic camera.
+
+    Attributes
+    ----------
+    type
+        ``"perspective"`` or ``"orthographic"``.
+    matrix
+        4x4 camera to world, row-major, rigid (rotation and translation).
+    size
+        Picture width and height in pixels.
+    fx, fy
+        Perspective: focal lengths in pixels. Orthographic: pixels per metre.
+    cx, cy
+        Where the optical axis meets the picture, in pixels.
+    matrices
+        Of a camera that moves: its matrix in every frame of the clip that is used, ``matrix`` the first of them.
+        Empty for one that stands still.
+
+    Raises
+    ------
+    SceneError
+        If a matrix is not rigid, or a size or focal length is not positive.
+    """
+
+    type: Literal["perspective", "orthographic"]
+    matrix: Matrix
+    size: tuple[int, int]
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    matrices: tuple[Matrix, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Check every value and store plain tuples."""
+        if self.type not in ("perspective", "orthographic"):
+            raise unexpected(self.type, "type", '"perspective" or "orthographic"')
+        set_fields(self, matrices=tuple(_rigid(matrix, "matrices") for matrix in self.matrices))
+        set_fields(self, matrix=_rigid(self.matrix), size=picture_size(self.size))
+        if self.matrices and self.matrix != self.matrices[0]:
+            raise SceneError("matrix must be the first of matrices", key="matrices")
+        for key in ("fx", "fy"):
+            value = number(getattr(self, key), key, "a number above 0", lambda v: v > 0.0)
+            set_fields(self, **{key: value})
+        set_fields(self, cx=number(self.cx, "cx"), cy=number(self.cy, "cy"))
+
+    @classmethod
+    def look_at(
+        cls,
+        position: Vector,
+        target: Vector,
+        up: Vector = (0.0, 0.0, 1.0),
+        *,
+        fov_y_degrees: float,
+        size: tuple[int, int],
+    ) -> Camera:
+        """Return a perspective camera that looks from one point at another.
+
+        Parameters
+        ----------
+        position, target
+            Points in metres.
+        up
+            A direction that is up in the picture.
+        fov_y_degrees
+            Angle between the lower and the upper edge of the picture.
+        size
+            Width and height in pixels.
+
+        Raises
+        ------
+        SceneError
+            If the points coincide, or ``up`` is parallel to the line of sight.
+        """
+        width, height = picture_size(size)
+        focal = focal_length(fov_y_degrees, height)
+        matrix = look_at_matrix(position, target, up)
+        return cls("perspective", matrix, (width, height), focal, focal, width / 2, height / 2)
+
+    @property
+    def position(self) -> Vector:
+        """Where the camera is, in metres."""
+        return self.matrix[0][3], self.matrix[1][3], self.matrix[2][3]
+
+    @property
+    def moves(self) -> bool:
+        """Whether it has a matrix for every frame."""
+        return bool(self.matrices)
+
+    def at(self, frame: int) -> Camera:
+        """Return the camera as it stands in a frame, counted from 0 at the first that is used.
+
+        Raises
+        ------
+        SceneError
+            If it moves, and has no matrix for that frame.
+        """
+        if not self.moves:
+            return self
+        if not 0 <= frame < len(self.matrices):
+            raise SceneError(f"matrices are given for frames 0 to {len(self.matrices) - 1}, not for {frame}")
+        return replace(self, matrix=self.matrices[frame], matrices=())
+
+    def resized(self, width: int, height: int) -> Camera:
+        """Return the same camera with another number of pixels over the same field of view."""
+        across, down = width / self.size[0], height / self.size[1]
+        return replace(
+            self,
+            size=(width, height),
+            fx=self.fx * across,
+            fy=self.fy * down,
+            cx=self.cx * across,
+            cy=self.cy * down,
+        )
+
+    def cropped(self, x0: int, y0: int, width: int, height: int) -> Camera:
+        """Return the camera of a part of the picture whose top left pixel is (x0, y0)."""
+        return replace(self, size=(width, height), cx=self.cx - x0, cy=self.cy - y0)
+
+
+def picture_size(value: Any) -> tuple[int, int]:
+    """Return a picture's width and height in pixels, checked."""
+    expected = "[width, height] in pixels, both at least 1"
+    width, height = (integer(v, "size", expected) for v in items(value, 2, "size", expected))
+    if min(width, height) < 1:
+        raise unexpected([width, height], "size", expected)
+    return width, height
+
+
+def focal_length(fov_y_degrees: Any, height: int) -> float:
+    """Return the focal length in pixels of a picture ``height`` pixels high."""
+    degrees = number(fov_y_degrees, "fov_y_degrees", "a number between 0 and 180", lambda v: 0.0 < v < 180.0)
+    return 0.5 * height / math.tan(math.radians(degrees) / 2)
+
+
+def look_at_matrix(position: Any, target: Any, up: Any) -> Matrix:
+    """Return the camera to world matrix of a camera at ``position`` that looks at ``target``."""
+    eye = np.array(vector(position, "position"))
+    back = eye - np.array(vector(target, "target"))
+    distance = float(np.linalg.norm(back))
+    if distance == 0.0:
+        raise SceneError("target must differ from position", key="target")
+    back /= distance
+    right = np.cross(np.array(vector(up, "up")), back)
+    sine = float(np.linalg.norm(right))
+    if sine < 1e-6 * max(1.0, float(np.linalg.norm(up))):
+        raise SceneError(f"up must not be zero or along the line of sight, not {shown(up)}", key="up")
+    right /= sine
+    rows = np.column_stack([right, np.cross(back, right), back, eye])
+    return cast(Matrix, tuple(tuple(row) for row in [*rows.tolist(), [0.0, 0.0, 0.0, 1.0]]))
+
+
+def _rigid(value: Any, key: str = "matrix") -> Matrix:
+    """Check a camera to world matrix. A few rounded digits in a file (1e-3) are forgiven."""
+    name = key if key == "matrix" else f"every one of {key}"
+    expected = "four rows of four numbers, camera to world"
+    rows = [[number(v, key, expected) for v in items(row, 4, key, expected)] for row in items(value, 4, key, expected)]
+    rotation = np.array(rows)[:3, :3]
+    if rows[3] != [0.0, 0.0, 0.0, 1.0]:
+        raise SceneError(f"{name} must end with the row [0, 0, 0, 1], not {shown(rows[3])}", key=key)
+    if np.abs(rotation.T @ rotation - np.eye(3)).max() > 1e-3:
+        raise SceneError(
+            f"{name} must be rigid: its upper left 3x3 part must be a rotation without scale or shear", key=key
+        )
+    if np.linalg.det(rotation) < 0.0:
+        raise SceneError(f"{name} must be rigid: its upper left 3x3 part mirrors", key=key)
+    return cast(Matrix, tuple(tuple(row) for row in rows))
+
+
+def as_matrix(values: NDArray[np.float64]) -> Matrix:
+    """A 4x4 array as the nested tuples that a frozen camera holds."""
+    rows = [tuple(float(v) for v in row) for row in values]
+    return tuple((r[0], r[1], r[2], r[3]) for r in rows)
+
+
+def orbit(camera: Camera, domain: Domain, yaw_degrees: float, pitch_degrees: float = 0.0) -> Camera:
+    """The camera carried around the domain's centre, still looking at it from the same distance.
+
+    Parameters
+    ----------
+    yaw_degrees
+        Turn about the world's Z, counter-clockwise seen from above: 90 looks from the right side.
+    pitch_degrees
+        Then raise the camera by so much; negative lowers it.
+    """
+    centre = np.array(domain.centre)
+    matrix = np.array(camera.matrix, np.float64)
+    right = matrix[:3, 0]
+    turn = _rotation(np.array([0.0, 0.0, 1.0]), yaw_degrees) @ _rotation(right, -pitch_degrees)
+    moved = matrix.copy()
+    moved[:3, :3] = turn @ matrix[:3, :3]
+    moved[:3, 3] = centre + turn @ (matrix[:3, 3] - centre)
+    return replace(camera, matrix=as_matrix(moved))
+
+
+def _rotation(axis: NDArray[np.float64], degrees: float) -> NDArray[np.float64]:
+    """Rotation matrix about a unit axis (Rodrigues)."""
+    angle = np.radians(degrees)
+    cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    return np.asarray(np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross)

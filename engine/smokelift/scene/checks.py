@@ -1,0 +1,98 @@
+"""Checks of the values in a scene: what is refused, and in which words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+Vector = tuple[float, float, float]
+"""x, y, z or red, green, blue."""
+
+
+class SceneError(ValueError):
+    """A scene that cannot be used: what was expected, and what was found.
+
+    Attributes
+    ----------
+    table, key
+        Where in a scene file the value would stand; empty when unknown.
+    """
+
+    def __init__(self, message: str, *, key: str = "", table: str = "") -> None:
+        super().__init__(message)
+        self.key = key
+        self.table = table
+
+
+def shown(value: object) -> str:
+    """Return a value as a scene file would have it, cut to a readable length."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    text = f'"{value}"' if isinstance(value, str) else repr(value).replace("(", "[").replace(")", "]")
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def unexpected(value: object, key: str, expected: str, table: str = "") -> SceneError:
+    """Return the error that says what was expected under ``key`` and what was found."""
+    return SceneError(f"{key} must be {expected}, not {shown(value)}", key=key, table=table)
+
+
+def one_of(names: Iterable[str]) -> str:
+    """Return the values that a key may have, as a message lists them."""
+    return ", ".join(f'"{name}"' for name in names)
+
+
+def number(value: Any, key: str, expected: str = "a number", valid: Callable[[float], bool] = math.isfinite) -> float:
+    """Return ``value`` as a finite float that is ``valid``, or raise a SceneError that names ``key``."""
+    if isinstance(value, int | float | np.number) and not isinstance(value, bool):
+        result = float(value)
+        if math.isfinite(result) and valid(result):
+            return result
+    raise unexpected(value, key, expected)
+
+
+def integer(value: Any, key: str, expected: str = "a whole number", least: int | None = None) -> int:
+    """Return ``value`` as an int that is not below ``least``, or raise a SceneError that names ``key``."""
+    if isinstance(value, int | np.integer) and not isinstance(value, bool) and (least is None or value >= least):
+        return int(value)
+    raise unexpected(value, key, expected)
+
+
+def items(value: Any, count: int, key: str, expected: str) -> list[Any]:
+    """Return ``value`` as a list of ``count`` items, or raise a SceneError that names ``key``."""
+    listed = value.tolist() if isinstance(value, np.ndarray) else value
+    if not isinstance(listed, list | tuple) or len(listed) != count:
+        raise unexpected(listed, key, expected)
+    return list(listed)
+
+
+def vector(value: Any, key: str, expected: str = "three numbers [x, y, z]") -> Vector:
+    """Return ``value`` as three finite floats, or raise a SceneError that names ``key``."""
+    x, y, z = (number(v, key, expected) for v in items(value, 3, key, expected))
+    return x, y, z
+
+
+def colour(value: Any, key: str) -> Vector:
+    """Return ``value`` as linear red, green and blue, or raise a SceneError that names ``key``."""
+    expected = "three numbers [r, g, b], none below 0"
+    rgb = vector(value, key, expected)
+    if min(rgb) < 0.0:
+        raise unexpected(list(rgb), key, expected)
+    return rgb
+
+
+def set_fields(instance: object, **values: object) -> None:
+    """Set fields of a frozen dataclass; for its ``__post_init__`` only."""
+    for name, value in values.items():
+        object.__setattr__(instance, name, value)
+
+
+def file_path(value: Any, key: str) -> Path:
+    """Return ``value`` as the path of a file, or raise a SceneError that names ``key``."""
+    if not isinstance(value, str | Path) or not str(value):
+        raise unexpected(value, key, "the path of a file")
+    return Path(value)

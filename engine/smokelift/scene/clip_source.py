@@ -1,0 +1,50 @@
+"""Where a clip lies and how to read it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from smokelift.scene.checks import file_path, integer, items, number, set_fields, unexpected
+
+
+@dataclass(frozen=True)
+class ClipSource:
+    """Where a clip lies and how to read it.
+
+    Attributes
+    ----------
+    path
+        A video, or an image sequence written ``frame_####.png``.
+    fps
+        Frames a second of the captured motion; None takes it from the file.
+    frames
+        First and last frame, both included, counted from 0; None takes all.
+    transfer
+        ``"srgb"`` or ``"linear"``; None takes srgb for 8 to 16 bit integers and linear for EXR.
+    """
+
+    path: Path
+    fps: float | None = None
+    frames: tuple[int, int] | None = None
+    transfer: Literal["srgb", "linear"] | None = None
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        set_fields(self, path=file_path(self.path, "path"))
+        if self.fps is not None:
+            set_fields(self, fps=number(self.fps, "fps", "a number above 0", lambda v: v > 0.0))
+        if self.frames is not None:
+            expected = "[first, last], whole numbers from 0, first not after last"
+            first, last = (integer(v, "frames", expected) for v in items(self.frames, 2, "frames", expected))
+            if not 0 <= first <= last:
+                raise unexpected([first, last], "frames", expected)
+            set_fields(self, frames=(first, last))
+        if self.transfer not in (None, "srgb", "linear"):
+            raise unexpected(self.transfer, "transfer", '"srgb" or "linear"')
+
+    @property
+    def first(self) -> int:
+        """First frame, counted from 0."""
+        return 0 if self.frames is None else self.frames[0]

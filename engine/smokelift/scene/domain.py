@@ -1,0 +1,137 @@
+"""The box that holds the smoke: its voxels, its walls and the places where smoke enters."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smokelift.scene.checks import SceneError, Vector, integer, items, number, one_of, set_fields, unexpected, vector
+
+Side = Literal["x-", "x+", "y-", "y+", "z-", "z+"]
+SIDES: tuple[Side, ...] = ("x-", "x+", "y-", "y+", "z-", "z+")
+
+
+@dataclass(frozen=True)
+class Domain:
+    """The box that holds the smoke; voxels are cubes.
+
+    Attributes
+    ----------
+    min, max
+        Corners in metres.
+    resolution
+        Voxels along x, y, z.
+
+    Raises
+    ------
+    SceneError
+        If the box is empty, or its voxels are not cubes to 0.1 %.
+    """
+
+    min: Vector
+    max: Vector
+    resolution: tuple[int, int, int]
+
+    def __post_init__(self) -> None:
+        """Check every value and store plain tuples."""
+        set_fields(self, min=vector(self.min, "min"), max=vector(self.max, "max"))
+        expected = "three whole numbers [nx, ny, nz], all at least 1"
+        counts = tuple(integer(v, "resolution", expected) for v in items(self.resolution, 3, "resolution", expected))
+        if min(counts) < 1:
+            raise unexpected(list(counts), "resolution", expected)
+        set_fields(self, resolution=counts)
+        for axis, low, high in zip("xyz", self.min, self.max, strict=True):
+            if not low < high:
+                raise SceneError(
+                    f"max must be above min on every axis; along {axis} min is {low:g} and max {high:g}",
+                    key="max",
+                )
+        edges = [(high - low) / n for low, high, n in zip(self.min, self.max, counts, strict=True)]
+        if max(edges) > 1.001 * min(edges):
+            raise SceneError(
+                "resolution must make cubic voxels; they would be "
+                + " x ".join(f"{edge:.6g}" for edge in edges)
+                + " m",
+                key="resolution",
+            )
+
+    @property
+    def voxel_size(self) -> float:
+        """Voxel edge in metres."""
+        return (self.max[0] - self.min[0]) / self.resolution[0]
+
+    @property
+    def centre(self) -> Vector:
+        """Middle of the box in metres."""
+        x, y, z = ((low + high) / 2 for low, high in zip(self.min, self.max, strict=True))
+        return x, y, z
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Shape of an array of voxels, the same as ``resolution``."""
+        return self.resolution
+
+    def contains(self, point: Vector) -> bool:
+        """Return whether a point lies inside the box or on its surface."""
+        return all(low <= p <= high for low, p, high in zip(self.min, point, self.max, strict=True))
+
+    def corners(self) -> np.ndarray[Any, np.dtype[np.float64]]:
+        """Return the eight corners in metres, shape (8, 3)."""
+        axes = np.meshgrid(*zip(self.min, self.max, strict=True), indexing="ij")
+        corners: np.ndarray[Any, np.dtype[np.float64]] = np.stack(axes, axis=-1).reshape(8, 3)
+        return corners
+
+
+@dataclass(frozen=True)
+class Inlet:
+    """A place where smoke enters: a ball.
+
+    Attributes
+    ----------
+    centre
+        In metres.
+    radius
+        In metres, above 0.
+    """
+
+    centre: Vector
+    radius: float
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        radius = number(self.radius, "radius", "a number of metres above 0", lambda v: v > 0.0)
+        set_fields(self, centre=vector(self.centre, "centre"), radius=radius)
+
+    def reaches(self, domain: Domain) -> bool:
+        """Return whether any of it lies in a box."""
+        nearest = np.clip(self.centre, domain.min, domain.max)
+        return math.dist(self.centre, nearest) <= self.radius
+
+    def voxels(self, domain: Domain) -> NDArray[np.bool_]:
+        """Return where it is, shape (nx, ny, nz): voxels whose centres lie in it, or the nearest if none does."""
+        places = zip(domain.min, self.centre, domain.resolution, strict=True)
+        x, y, z = np.ix_(*(low + (np.arange(n) + 0.5) * domain.voxel_size - centre for low, centre, n in places))
+        squares = x**2 + y**2 + z**2
+        inside: NDArray[np.bool_] = squares <= max(self.radius**2, squares.min())
+        return inside
+
+
+def inflow(inlets: Sequence[Inlet], domain: Domain) -> NDArray[np.bool_] | None:
+    """Return the voxels where smoke enters, shape (nx, ny, nz); None if no inlet is marked."""
+    if not inlets:
+        return None
+    entries: NDArray[np.bool_] = np.logical_or.reduce([inlet.voxels(domain) for inlet in inlets])
+    return entries
+
+
+def checked_sides(value: Any) -> tuple[Side, ...]:
+    """Check the names of walls and put them in order."""
+    given = list(value) if isinstance(value, tuple) else value
+    if not isinstance(given, list) or any(name not in SIDES for name in given):
+        raise unexpected(given, "closed", f"a list of sides of the box, of {one_of(SIDES)}", "domain")
+    return tuple(side for side in SIDES if side in given)

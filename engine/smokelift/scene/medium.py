@@ -1,0 +1,51 @@
+"""What the smoke does to light."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from smokelift.scene.checks import number, one_of, set_fields, unexpected
+
+Scattering = Literal["single", "unshadowed", "absorption"]
+"""How light is scattered: once and with self-shadowing, once without, or not at all."""
+
+SCATTERINGS: tuple[Scattering, ...] = ("single", "unshadowed", "absorption")
+
+
+@dataclass(frozen=True)
+class Medium:
+    """Optical properties of the smoke.
+
+    Attributes
+    ----------
+    extinction
+        Extinction cross-section, 1/m per unit density.
+    albedo
+        Single-scattering albedo, 0 to 1.
+    anisotropy
+        Henyey-Greenstein g, -1 < g < 1.
+    """
+
+    extinction: float = 5.0
+    albedo: float = 0.9
+    anisotropy: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check every value."""
+        set_fields(
+            self,
+            extinction=number(self.extinction, "extinction", "a number above 0", lambda v: v > 0.0),
+            albedo=number(self.albedo, "albedo", "a number from 0 to 1", lambda v: 0.0 <= v <= 1.0),
+            anisotropy=number(self.anisotropy, "anisotropy", "a number between -1 and 1", lambda v: -1.0 < v < 1.0),
+        )
+
+
+def checked_scattering(value: Any) -> Scattering | None:
+    """Return how light is scattered, or None where that is open; raise a SceneError if there is no such way."""
+    if value is None:
+        return None
+    for name in SCATTERINGS:
+        if value == name:
+            return name
+    raise unexpected(value, "scattering", f"one of {one_of(SCATTERINGS)}", "medium")

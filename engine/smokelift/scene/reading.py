@@ -1,0 +1,266 @@
+"""Reading scene files, with the file, the line and the key of whatever is wrong in the message.
+
+A scene file holds the tables [clip], [camera], [domain], [[inlet]], [medium], [[lights]], [background] and [[views]],
+each of them optional. Their keys are the fields of the classes of the same names, with these exceptions:
+
+- ``[domain] closed`` lists the walls of the box. A ``[domain]`` that holds nothing else leaves the box to be estimated.
+- ``[medium] scattering`` is how light is scattered: ``"single"`` (once, with shadows), ``"unshadowed"`` (once, without)
+  or ``"absorption"`` (not at all). A ``[medium]`` that holds nothing else leaves the medium to be estimated.
+- ``[camera]`` takes ``position``, ``target`` and ``up`` in place of ``matrix``, and ``fov_y_degrees``, or the
+  ``height`` in metres of an orthographic picture, in place of ``fx`` and ``fy``.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+from smokelift.scene.background import Background
+from smokelift.scene.camera import Camera, focal_length, look_at_matrix, picture_size
+from smokelift.scene.checks import SceneError, number, one_of, shown, unexpected
+from smokelift.scene.clip_source import ClipSource
+from smokelift.scene.domain import Domain, Inlet
+from smokelift.scene.lights import DirectionalLight, EnvironmentLight, Light, PointLight
+from smokelift.scene.medium import Medium
+from smokelift.scene.toml_lines import Place, find_lines
+from smokelift.scene.view import View
+
+Table = Mapping[str, Any]
+Described = TypeVar("Described")
+
+_LIGHT_KEYS = {
+    "directional": ("direction", "irradiance"),
+    "point": ("position", "intensity"),
+    "environment": ("image", "rotation_degrees", "strength", "directions"),
+}
+
+
+def read_file(path: Path, build: Callable[..., Described]) -> Described:
+    """Read a scene file; relative paths in it are relative to the file.
+
+    Parameters
+    ----------
+    path
+        The file.
+    build
+        Makes the scene from its fields, given by name.
+
+    Raises
+    ------
+    SceneError
+        With the file, the line, the key, what was expected and what was found.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise SceneError(f"{path}: cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise SceneError(f"{path}: is not a text file in UTF-8") from error
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise SceneError(f"{path.name}: is not valid TOML: {error}") from error
+    return _Reader(path.name, path.absolute().parent, find_lines(text)).scene(data, build)
+
+
+def from_tables(data: Table, build: Callable[..., Described], name: str, base: Path | None) -> Described:
+    """Make a scene from the tables of a scene file; see `smokelift.scene.scene_from_dict`."""
+    return _Reader(name, (base or Path()).absolute(), {}).scene(data, build)
+
+
+@dataclass(frozen=True)
+class _Reader:
+    """Makes the parts of a scene from the tables of one file and puts file and line into every message."""
+
+    name: str
+    base: Path
+    lines: Mapping[Place, int]
+
+    def scene(self, data: Table, build: Callable[..., Described]) -> Described:
+        readers: dict[str, Callable[[Place, Any], Any]] = {
+            "clip": self._table(self._clip),
+            "camera": self._table(self._camera),
+            "domain": self._table(self._domain),
+            "inlet": self._tables(self._inlet),
+            "medium": self._table(self._medium),
+            "lights": self._tables(self._light),
+            "background": self._table(self._background),
+            "views": self._tables(self._view),
+        }
+        self._known((), data, tuple(readers))
+        parts = {name: readers[name]((name,), value) for name, value in data.items()}
+        if "domain" in parts:
+            parts["domain"], parts["closed"] = parts["domain"]
+        if "medium" in parts:
+            parts["medium"], parts["scattering"] = parts["medium"]
+        if "inlet" in parts:
+            parts["inlets"] = parts.pop("inlet")
+        try:
+            return build(**parts)
+        except SceneError as error:
+            place = tuple(int(part) if part.isdigit() else part for part in error.table.split("."))
+            raise self._error(place, str(error), error.key) from error
+
+    def _error(self, place: Place, message: str, key: str = "") -> SceneError:
+        """Return an error that names the file, the line of the key (or of its table) and the table."""
+        where = (*place, key) if key else place
+        while where and where not in self.lines:
+            where = where[:-1]
+        line = f", line {self.lines[where]}" if where else ""
+        header = ".".join(part for part in place if isinstance(part, str))
+        if place:
+            header = f"[[{header}]] " if isinstance(place[-1], int) else f"[{header}] "
+        return SceneError(f"{self.name}{line}: {header}{message}", key=key, table=".".join(map(str, place)))
+
+    def _known(self, place: Place, data: Table, keys: tuple[str, ...]) -> None:
+        for key in data:
+            if key not in keys:
+                what = "key" if place else "table"
+                known = ", ".join(keys)
+                raise self._error(place, f"there is no {what} {shown(key)} here; known are {known}", key)
+
+    def _table(self, build: Callable[[Place, Table], Any]) -> Callable[[Place, Any], Any]:
+        """Return a reader of one table that turns a SceneError without a place into one with it."""
+
+        def read(place: Place, data: Any) -> Any:
+            if not isinstance(data, dict):
+                raise self._error(place, f"must be a table, not {shown(data)}")
+            try:
+                return build(place, data)
+            except SceneError as error:
+                if error.table:
+                    raise
+                raise self._error(place, str(error), error.key) from error
+
+        return read
+
+    def _tables(self, build: Callable[[Place, Table], Any]) -> Callable[[Place, Any], tuple[Any, ...]]:
+        def read(place: Place, data: Any) -> tuple[Any, ...]:
+            if not isinstance(data, list):
+                raise self._error(place, f"must be a list of tables, written [[{place[0]}]]")
+            return tuple(self._table(build)((*place, index), item) for index, item in enumerate(data))
+
+        return read
+
+    def _with_path(self, data: Table, key: str) -> dict[str, Any]:
+        """Return the table with the path under ``key`` made absolute."""
+        if isinstance(data.get(key), str) and data[key]:
+            return {**data, key: self.base / data[key]}
+        return dict(data)
+
+    def _clip(self, place: Place, data: Table) -> ClipSource:
+        self._known(place, data, ("path", "fps", "frames", "transfer"))
+        _require(data, "path")
+        return ClipSource(**self._with_path(data, "path"))
+
+    def _domain(self, place: Place, data: Table) -> tuple[Domain | None, Any]:
+        """Read the box and its walls."""
+        keys = ("min", "max", "resolution")
+        self._known(place, data, (*keys, "closed"))
+        box = {key: value for key, value in data.items() if key != "closed"}
+        closed = data.get("closed", ())
+        if not box and "closed" in data:
+            return None, closed
+        _require(data, *keys)
+        return Domain(**box), closed
+
+    def _inlet(self, place: Place, data: Table) -> Inlet:
+        keys = ("centre", "radius")
+        self._known(place, data, keys)
+        _require(data, *keys)
+        return Inlet(**data)
+
+    def _medium(self, place: Place, data: Table) -> tuple[Medium | None, Any]:
+        """Read the medium and how it scatters light."""
+        self._known(place, data, ("extinction", "albedo", "anisotropy", "scattering"))
+        properties = {key: value for key, value in data.items() if key != "scattering"}
+        if not properties and "scattering" in data:
+            return None, data["scattering"]
+        return Medium(**properties), data.get("scattering")
+
+    def _background(self, place: Place, data: Table) -> Background:
+        self._known(place, data, ("color", "image"))
+        return Background(**self._with_path(data, "image"))
+
+    def _light(self, place: Place, data: Table) -> Light:
+        _require(data, "type")
+        kind = data["type"]
+        if not isinstance(kind, str) or kind not in _LIGHT_KEYS:
+            raise unexpected(kind, "type", f"one of {one_of(_LIGHT_KEYS)}")
+        values = {key: value for key, value in data.items() if key != "type"}
+        self._known(place, values, _LIGHT_KEYS[kind])
+        if kind == "environment":
+            _require(data, "image")
+            return EnvironmentLight(**self._with_path(values, "image"))
+        _require(data, *_LIGHT_KEYS[kind])
+        return DirectionalLight(**values) if kind == "directional" else PointLight(**values)
+
+    def _view(self, place: Place, data: Table) -> View:
+        readers: dict[str, Callable[[Place, Table], Any]] = {
+            "camera": self._camera,
+            "clip": self._clip,
+            "background": self._background,
+        }
+        self._known(place, data, tuple(readers))
+        _require(data, "camera", "clip")
+        return View(**{key: self._table(readers[key])((*place, key), value) for key, value in data.items()})
+
+    def _camera(self, place: Place, data: Table) -> Camera:
+        kind = data.get("type", "perspective")
+        lens = "height" if kind == "orthographic" else "fov_y_degrees"
+        pose = ("matrices", "matrix", "position", "target", "up")
+        self._known(place, data, ("type", "size", *pose, "fx", "fy", "cx", "cy", lens))
+        _require(data, "size")
+        width, height = picture_size(data["size"])
+        matrices = _matrices(data)
+        fx, fy = _scales(data, lens, height)
+        centre = data.get("cx", width / 2), data.get("cy", height / 2)
+        moving = matrices if "matrices" in data else ()
+        return Camera(kind, matrices[0], (width, height), fx, fy, *centre, moving)
+
+
+def _require(data: Table, *keys: str) -> None:
+    for key in keys:
+        if key not in data:
+            raise SceneError(f"lacks {key}")
+
+
+def _exclude(data: Table, given: str, *others: str) -> None:
+    """Refuse what would say the same as a key that is given."""
+    for key in others:
+        if key in data:
+            raise SceneError(f"takes {given} or {key}, not both", key=key)
+
+
+def _matrices(data: Table) -> tuple[Any, ...]:
+    """Return the camera to world matrix of every frame, or the one of a camera that stands still."""
+    look_at = ("position", "target", "up")
+    if "matrices" in data:
+        _exclude(data, "matrices", "matrix", *look_at)
+        matrices = data["matrices"]
+        if not isinstance(matrices, list) or not matrices:
+            raise unexpected(matrices, "matrices", "a list of 4x4 matrices, camera to world, one a frame")
+        return tuple(matrices)
+    if "matrix" in data:
+        _exclude(data, "matrix", *look_at)
+        return (data["matrix"],)
+    if "position" not in data or "target" not in data:
+        raise SceneError("needs matrix, or position and target")
+    return (look_at_matrix(data["position"], data["target"], data.get("up", (0.0, 0.0, 1.0))),)
+
+
+def _scales(data: Table, lens: str, height: int) -> tuple[Any, Any]:
+    """Return fx and fy of a camera whose picture is ``height`` pixels high."""
+    if lens not in data:
+        if "fx" not in data:
+            raise SceneError(f"needs {lens} or fx")
+        return data["fx"], data.get("fy", data["fx"])
+    _exclude(data, lens, "fx", "fy")
+    if lens == "fov_y_degrees":
+        focal = focal_length(data[lens], height)
+    else:
+        focal = height / number(data[lens], lens, "a number of metres above 0", lambda v: v > 0.0)
+    return focal, focal

@@ -1,0 +1,28 @@
+"""A further camera and what it filmed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from smokelift.scene.background import Background
+from smokelift.scene.camera import Camera
+from smokelift.scene.clip_source import ClipSource
+
+
+@dataclass(frozen=True)
+class View:
+    """A further calibrated camera with its own clip.
+
+    Attributes
+    ----------
+    camera
+        One that stands still.
+    clip
+        Its ``frames`` are those at the moments of the scene's; None takes the same numbers.
+    background
+        What it sees behind the smoke; None takes the scene's if that is one colour, and else estimates it.
+    """
+
+    camera: Camera
+    clip: ClipSource
+    background: Background | None = None
