@@ -11,12 +11,12 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from conftest import quietly, rendered
 from mathutils import Vector
 
 from addon import look, run, volume
 from addon.scene import box_corners
 from addon.take import Take
+from conftest import quietly, rendered
 from smokelift.output.images import write_image
 from smokelift.output.pictures import write_video
 from smokelift.output.vdb import write_vdb

@@ -8,12 +8,12 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from conftest import rendered
 
 import smokelift
 from addon import run, volume
 from addon.scene import point_intensity, shot_tables, sun_irradiance
 from addon.take import Take
+from conftest import rendered
 from smokelift.density.hull import voxel_centres
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import area_average, linear_to_srgb
