@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from smokelift.baselines.velocity import PaperVelocity
 from smokelift.density import Density, SmokeAxis, depth_guess, fit_density, gather_evidence, optical_depth
 from smokelift.density.axis import estimate_axis
 from smokelift.density.hull import project_voxels
@@ -25,11 +26,11 @@ from smokelift.density.light import refine_axis
 from smokelift.footage.clip import Clip
 from smokelift.output.sequence import SequenceWriter
 from smokelift.render.renderer import Image, Volume
-from smokelift.scene import SIDES, Domain, Scene
+from smokelift.scene import Domain, Scene
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot, prepare_shot
-from smokelift.transport import Array, Velocity, advect
-from smokelift.velocity import estimate_velocity, predict_velocity
+from smokelift.transport import Array, ResidualMeans, Velocity, advect
+from smokelift.velocity import CoarseToFine, VelocityEstimator
 
 AXIS_FRAMES = 16
 """Frames from which the place in depth is estimated."""
@@ -100,14 +101,12 @@ def reconstruct(
     """
     settings = settings or Settings.preset()
     shot = shot or prepare_shot(clip, scene, settings)
-    walls = {*settings.velocity.closed, *shot.scene.closed}
     settings = replace(
         settings,
         density=replace(settings.density, scattering=shot.scattering),
         velocity=replace(
             settings.velocity,
-            closed=tuple(side for side in SIDES if side in walls),
-            halvings=shot.halvings,
+            coarsening=shot.coarsening,
             levels=shot.levels,
         ),
     )
@@ -128,8 +127,9 @@ def reconstruct(
         if state is not None:
             assert shot.scene.domain is not None
             left = state.extra.get("unexplained_mean"), state.extra.get("unexplained_magnitude")
-            unexplained = None if left[0] is None or left[1] is None else (left[0], left[1])
-            velocity = Velocity(state.velocity, shot.scene.domain.voxel_size, unexplained=unexplained)
+            residual = None if left[0] is None or left[1] is None else ResidualMeans(left[0], left[1])
+            size, closed = shot.scene.domain.voxel_size, shot.scene.closed
+            velocity = Velocity(state.velocity, size, closed, residual=residual)
             start = Frame(state.number, state.density, velocity, {})
         elif writer.finished:
             return
@@ -141,10 +141,9 @@ def reconstruct(
 
 def _memory(velocity: Velocity) -> dict[str, Array]:
     """What the next estimate needs to know of a velocity beside the velocity itself."""
-    if velocity.unexplained is None:
+    if velocity.residual is None:
         return {}
-    mean, magnitude = velocity.unexplained
-    return {"unexplained_mean": mean, "unexplained_magnitude": magnitude}
+    return {"unexplained_mean": velocity.residual.mean, "unexplained_magnitude": velocity.residual.magnitude}
 
 
 def _frames(clip: Clip, shot: Shot, settings: Settings, start: Frame | None) -> Iterator[Frame]:
@@ -154,6 +153,7 @@ def _frames(clip: Clip, shot: Shot, settings: Settings, start: Frame | None) -> 
     dt = 1.0 / clip.fps
     inflow = shot.scene.inflow()
     axis = smoke_axis(clip, shot, settings)
+    estimator: VelocityEstimator = PaperVelocity() if settings.method == "paper" else CoarseToFine(settings.velocity)
     before = start
     for index in range(start.number if start else 0, len(clip)):
         began = time.perf_counter()
@@ -162,9 +162,7 @@ def _frames(clip: Clip, shot: Shot, settings: Settings, start: Frame | None) -> 
         initial = None
         # from where there was no smoke nothing is carried
         if before is not None and index >= 2 and before.density.any():
-            predicted = predict_velocity(
-                before.velocity, dt, settings.velocity.closed, halvings=settings.velocity.halvings or 0
-            )
+            predicted = estimator.predict(before.velocity, dt)
             # pictures correct the mass, but not of what a moving camera does not see
             initial = advect(before.density, predicted, dt, conserve=shot.scene.camera.moves)
         accepted: Mapping[str, float] = {}
@@ -174,16 +172,16 @@ def _frames(clip: Clip, shot: Shot, settings: Settings, start: Frame | None) -> 
             last = before.density if before is not None else None
             density, accepted = _corrected(clip.frame(index), now, settings, axis, initial, last)
         fitted = time.perf_counter()
-        velocity = Velocity.zero(domain.resolution, domain.voxel_size)
+        velocity = Velocity.zero(domain.resolution, domain.voxel_size, shot.scene.closed)
         if before is not None:
-            velocity = estimate_velocity(
+            velocity = estimator.estimate(
                 before.density,
                 density.values,
                 dt,
                 domain.voxel_size,
-                settings.velocity,
+                closed=shot.scene.closed,
                 inflow=inflow,
-                prediction=predicted if settings.method == "default" else None,
+                prediction=predicted,
             )
         done = time.perf_counter()
         figures = {

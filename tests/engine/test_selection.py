@@ -23,7 +23,7 @@ from smokelift.render import scene_lights
 from smokelift.scene import Background, Domain, EnvironmentLight, Medium, PointLight, Scene, SceneError, look_at_matrix
 from smokelift.setup.choice import Choice
 from smokelift.setup.coarse import LONGEST, coarse_domain, coarse_frame
-from smokelift.setup.motion import choose_halvings, choose_levels, levels_for
+from smokelift.setup.motion import choose_coarsening, choose_levels, levels_for
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot, prepare_shot
 from smokelift.velocity import VelocitySettings
@@ -237,10 +237,10 @@ def test_the_velocity_grid_is_as_coarse_as_the_depth_is_unknown(plume, draft) ->
     """However fine the densities are; by hand it is what was said, and thin boxes keep eight voxels a side."""
     free = draft.velocity
     shapes = [(20, 20, 30), (32, 32, 48), (64, 64, 96), (128, 128, 192), (256, 256, 288), (31, 20, 150)]
-    choices = [choose_halvings(Domain((0.0, 0.0, 0.0), shape, shape), free) for shape in shapes]
+    choices = [choose_coarsening(Domain((0.0, 0.0, 0.0), shape, shape), free) for shape in shapes]
     assert [choice.chosen for choice in choices] == [0, 1, 2, 3, 4, 1]
     assert [choice.measured["voxels"] for choice in choices] == [30, 24, 24, 24, 18, 75]
-    by_hand = choose_halvings(plume.scene.domain, replace(free, halvings=0))
+    by_hand = choose_coarsening(plume.scene.domain, replace(free, coarsening=0))
     assert (by_hand.chosen, by_hand.by_hand) == (0, True)
 
 
@@ -300,7 +300,7 @@ def test_every_choice_has_a_sentence_and_a_figure(plume, draft) -> None:
     """JSON holds it, and the sentence says what was chosen."""
     shot = shot_of(plume.scene, draft)
     assert [choice.what for choice in shot.choices] == [
-        "resolution", "domain", "scattering", "iterations", "velocity halvings", "velocity levels",
+        "resolution", "domain", "scattering", "iterations", "velocity grid coarsening", "velocity levels",
     ]  # fmt: skip
     for choice in shot.choices:
         told = choice.as_dict()

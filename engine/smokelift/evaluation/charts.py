@@ -58,7 +58,7 @@ class Run:
 
     @property
     def changes(self) -> str:
-        """What was changed besides the resolution, "halvings=0" for "velocity.halvings=0"."""
+        """What was changed besides the resolution, "coarsening=0" for "velocity.coarsening=0"."""
         changes = self.name.partition(":")[2].split(",")
         return ", ".join(
             change.rpartition(".")[2] for change in changes if change and not change.startswith("resolution=")

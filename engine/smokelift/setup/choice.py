@@ -15,7 +15,7 @@ class Choice:
     ----------
     what
         ``"scattering"``, ``"resolution"``, ``"domain"``, ``"environment directions"``, ``"iterations"``,
-        ``"velocity halvings"`` or ``"velocity levels"``.
+        ``"velocity grid coarsening"`` or ``"velocity levels"``.
     chosen
         What will be used.
     reason

@@ -16,7 +16,7 @@ from smokelift.scene import Scattering, Scene
 from smokelift.setup.choice import Choice
 from smokelift.setup.coarse import CoarseFrame, coarse_frame
 from smokelift.setup.directions import choose_directions
-from smokelift.setup.motion import choose_halvings, choose_levels
+from smokelift.setup.motion import choose_coarsening, choose_levels
 from smokelift.setup.scattering import choose_scattering
 from smokelift.setup.settings import Settings
 
@@ -34,7 +34,7 @@ class Model:
         With a number of directions for each environment.
     scattering
         How light is scattered.
-    halvings, levels
+    coarsening, levels
         Of the grid of the velocity, and grids of one without a past.
     choices
         All of them, with their figures.
@@ -42,7 +42,7 @@ class Model:
 
     scene: Scene
     scattering: Scattering
-    halvings: int
+    coarsening: int
     levels: int
     choices: tuple[Choice, ...]
 
@@ -87,7 +87,7 @@ def choose_model(
     numbers = [number for number in _tried(smoky) if shows_smoke(number)]
     frames = [frame for frame in map(coarse, numbers) if frame is not None]
     assert scene.domain is not None
-    halved = choose_halvings(scene.domain, settings.velocity)
+    halved = choose_coarsening(scene.domain, settings.velocity)
     assert isinstance(halved.chosen, int)
     if not frames:
         return Model(scene, wanted, halved.chosen, settings.velocity.grids, ())
@@ -115,7 +115,7 @@ def choose_model(
         followed = sorted({min(number, len(clip) - 2) for number in numbers if len(clip) > 1})
         ends = [(density(number), density(number + 1)) for number in followed]
         pairs = [(before.values, after.values) for before, after in ends if before is not None and after is not None]
-        velocity = replace(settings.velocity, halvings=halved.chosen)
+        velocity = replace(settings.velocity, coarsening=halved.chosen)
         moved = choose_levels(pairs, frames[0].scene, lit, velocity)
     else:
         said = settings.velocity.levels

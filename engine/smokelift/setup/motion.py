@@ -24,7 +24,7 @@ MARGIN = 1.25
 """By how much grids reach further than the motion that is found, since coarse densities show less than there is."""
 
 
-def choose_halvings(domain: Domain, settings: VelocitySettings) -> Choice:
+def choose_coarsening(domain: Domain, settings: VelocitySettings) -> Choice:
     """Choose how much coarser than the densities the grid of the velocity is, and leave at least eight voxels a side.
 
     Parameters
@@ -34,15 +34,15 @@ def choose_halvings(domain: Domain, settings: VelocitySettings) -> Choice:
     settings
         How velocities are estimated.
     """
-    what = "velocity halvings"
-    if settings.halvings is not None:
-        reason = f"Velocity grid by hand: halved {settings.halvings} times."
-        return Choice(what, settings.halvings, reason, by_hand=True)
-    halvings, longest, shortest = 0, max(domain.resolution), min(domain.resolution)
+    what = "velocity grid coarsening"
+    if settings.coarsening is not None:
+        reason = f"Velocity grid by hand: coarsened {settings.coarsening} times."
+        return Choice(what, settings.coarsening, reason, by_hand=True)
+    coarsening, longest, shortest = 0, max(domain.resolution), min(domain.resolution)
     while longest > FINEST_SIDE and shortest >= 16:
-        halvings, longest, shortest = halvings + 1, -(-longest // 2), -(-shortest // 2)
+        coarsening, longest, shortest = coarsening + 1, -(-longest // 2), -(-shortest // 2)
     reason = f"Velocity grid: {longest} voxels along the longest side, because the depth of the smoke is a guess."
-    return Choice(what, halvings, reason, {"voxels": float(longest)}, FINEST_SIDE)
+    return Choice(what, coarsening, reason, {"voxels": float(longest)}, FINEST_SIDE)
 
 
 def levels_for(motion: float) -> int:
@@ -74,14 +74,14 @@ def choose_levels(
         return Choice("velocity levels", LEVELS, f"Velocity grids: {LEVELS}, since there is no motion to measure.")
     finer = coarse.domain.voxel_size / scene.domain.voxel_size
     motion = finer * max(_motion(before, after, settings) for before, after in pairs)
-    levels = levels_for(motion / 2 ** (settings.halvings or 0))
+    levels = levels_for(motion / 2 ** (settings.coarsening or 0))
     reason = f"Velocity grids: {levels}, because the fastest smoke goes {motion:.1f} voxels a frame."
     return Choice("velocity levels", levels, reason, {"voxels_a_frame": motion})
 
 
 def _motion(before: Volume, after: Volume, settings: VelocitySettings) -> float:
     """Speed of the fastest smoke, in voxels a frame."""
-    settings = replace(settings, method="default", halvings=0, levels=LEVELS)
+    settings = replace(settings, coarsening=0, levels=LEVELS)
     velocity = estimate_velocity(before, after, 1.0, 1.0, settings)
     smoke = after > settings.smoke_threshold * after.max(initial=0.0)
     if not smoke.any():

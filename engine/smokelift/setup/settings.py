@@ -82,7 +82,6 @@ class Settings:
                 base,
                 transport=1.0,
                 density=DensitySettings(method="paper", descent_iterations=60),
-                velocity=VelocitySettings(method="paper"),
             )
         fit, descent = {"draft": (4, 6), "balanced": (6, 12), "fine": (8, 30)}[quality]
         return replace(base, density=DensitySettings(fit_iterations=fit, descent_iterations=descent))

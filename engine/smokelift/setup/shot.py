@@ -112,7 +112,7 @@ class Shot:
         What was assumed or estimated, a sentence each.
     plate_at
         Background of the full picture in every frame, counted from 0, where camera or background change; else None.
-    halvings, levels
+    coarsening, levels
         Of the grid of the velocity, and grids of one without a past.
     choices
         What was chosen by measurement or by hand, with the figures that decided it.
@@ -129,7 +129,7 @@ class Shot:
     estimated_background: NDArray[np.float32] | None
     notes: tuple[str, ...]
     plate_at: Callable[[int], Plate] | None = None
-    halvings: int | None = None
+    coarsening: int | None = None
     levels: int | None = None
     choices: tuple[Choice, ...] = ()
     views: tuple[FurtherView, ...] = ()
@@ -218,12 +218,12 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
     plate = plate_at(shown)
     estimated = plate.image if _unknown(scene.background) else None
     changing = plate_at if moves or plates is not None else None
-    scattering, halvings, levels = richest, settings.velocity.halvings, settings.velocity.levels
+    scattering, coarsening, levels = richest, settings.velocity.coarsening, settings.velocity.levels
     choices = () if resolved is None else (resolved,)
     if settings.method != "paper":
         model = choose_model(clip, complete, plate_at, samples.smoky, richest, settings)
         complete, scattering = model.scene, model.scattering
-        halvings, levels = model.halvings, model.levels
+        coarsening, levels = model.coarsening, model.levels
         choices = (*choices, *model.choices)
     views = tuple(_further_view(number, clip, complete, notes) for number in range(len(scene.views)))
     if views:
@@ -242,7 +242,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
         estimated,
         tuple(notes),
         changing,
-        halvings,
+        coarsening,
         levels,
         choices,
         views,
@@ -273,7 +273,7 @@ def boundaries(scene: Scene, settings: Settings) -> tuple[str, ...]:
     """How smoke gets in and out of the box of a complete scene, a sentence each."""
     inflow = scene.inflow()
     if inflow is None:
-        search = settings.velocity.method == "default" and settings.velocity.sources
+        search = settings.method == "default" and settings.velocity.sources is not None
         entry = f"No inlet marked: {'where smoke enters is found from the densities' if search else 'none is assumed'}."
     else:
         places, voxels = (

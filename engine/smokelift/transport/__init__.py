@@ -1,29 +1,32 @@
 """Staggered grids and what is carried on them: advection and pressure projection."""
 
+from smokelift.transport.advection import advect, advect_cells
 from smokelift.transport.grid import (
     Array,
     Faces,
+    ResidualMeans,
+    StaggeredGrid,
     Velocity,
-    advect,
     at_centres,
-    closed_flags,
-    divergence,
     face_shapes,
-    project,
     require_positive,
     require_same_shape,
 )
+from smokelift.transport.projection import divergence, project, without_divergence
 
 __all__ = [
     "Array",
     "Faces",
+    "ResidualMeans",
+    "StaggeredGrid",
     "Velocity",
     "advect",
+    "advect_cells",
     "at_centres",
-    "closed_flags",
     "divergence",
     "face_shapes",
     "project",
     "require_positive",
     "require_same_shape",
+    "without_divergence",
 ]

@@ -12,19 +12,93 @@ subject to div u = 0, over velocities u on voxel faces, in voxels per frame, wit
     s = root mean square of |grad| inside the smoke
     W = 0 where smoke enters (`sources`), else 1
     u_p = t prediction + P(momentum)              both fitted with a few numbers (`momentum`)
-    R(v) = k (smoothness * sum |grad curl v|^2 + kinetic * sum |v|^2)    (|grad v|^2 in method "paper")
+    R(v) = k (smoothness * sum |grad curl v|^2 + kinetic * sum |v|^2)
 
-from coarse to fine grids (`pyramid`), linearised anew after every solve (`linear`, `estimate`). Before and after are
-the densities that `noise` and `contrast` make of the given ones. Dividing by s makes every weight independent of the
+from coarse to fine grids (`pyramid`), linearised anew after every solve (`linearisation`, `coarse_to_fine`). Before and
+after are the densities that `preparation` makes of the given ones. Dividing by s makes every weight independent of the
 scales of density, space and time. k grows as u_p proves right: it is the given share of the change over the one that
 u_p leaves unexplained.
 
-Sources: Cen, Zhang, Liang (2023), Entropy 25, 1348, section 3.3 and algorithm 5 (method "paper"); Chambolle
-and Pock (2011), J. Math. Imaging Vis. 40, 120; Eckert et al. (2019), ACM TOG 38(6), 239 (ScalarFlow).
+Sources: Cen, Zhang, Liang (2023), Entropy 25, 1348, section 3.3; Eckert et al. (2019), ACM TOG 38(6), 239 (ScalarFlow).
 """
 
-from smokelift.transport import Velocity
-from smokelift.velocity.estimate import estimate_velocity, predict_velocity
-from smokelift.velocity.settings import VelocitySettings
+from typing import Any
 
-__all__ = ["Velocity", "VelocitySettings", "estimate_velocity", "predict_velocity"]
+import numpy as np
+import numpy.typing as npt
+
+from smokelift.scene import Side
+from smokelift.transport import Velocity
+from smokelift.velocity.coarse_to_fine import CoarseToFine
+from smokelift.velocity.estimator import VelocityEstimator, predict_velocity
+from smokelift.velocity.settings import VelocitySettings
+from smokelift.velocity.solver import PrimalDual, ProjectedCG, Solver
+from smokelift.velocity.sources import SourceDetection
+
+
+def estimate_velocity(
+    before: npt.NDArray[np.floating[Any]],
+    after: npt.NDArray[np.floating[Any]],
+    dt: float,
+    voxel_size: float,
+    settings: VelocitySettings | None = None,
+    *,
+    closed: tuple[Side, ...] = (),
+    inflow: npt.NDArray[np.bool_] | None = None,
+    prediction: Velocity | None = None,
+) -> Velocity:
+    """Estimate the velocity that carries one density into the next.
+
+    Parameters
+    ----------
+    before, after
+        Densities >= 0, shape (nx, ny, nz).
+    dt
+        Time between them in seconds.
+    voxel_size
+        Edge of a voxel in metres.
+    settings
+        See `VelocitySettings`.
+    closed
+        Sides of the box that are walls. None by default: the box of a video is cut out of the air around the
+        smoke, which goes in and out through it freely. A floor, say, is ``("z-",)``.
+    inflow
+        True in voxels where smoke enters, shape (nx, ny, nz): changes there are not taken for motion, and others
+        are not looked for, so it has to hold all of them. Without it, sources are looked for.
+    prediction
+        What the velocity should be near, such as `predict_velocity` of the frame before. How near is decided by how
+        much of the change it explains; one that explains less than half is not used.
+
+    Returns
+    -------
+    Velocity
+        In m/s, without divergence, such that after(x) = before(x - u(x) dt), with the `confidence` and the `source`
+        of every voxel. `figures` has ``iterations``, ``products`` and ``projections`` of the whole estimate, the last
+        ``residual`` of the solver, the ``divergence`` (max |div u| voxel size / max |u|), the ``unexplained`` share of
+        the change that the centre of the regulariser leaves, the ``trust`` in the prediction and the ``dissipation``,
+        the share of the smoke that dissolves in `dt`, below zero where all of it gets denser. Zero if there is no
+        smoke, or none in one of the two, or no motion.
+
+    Raises
+    ------
+    ValueError
+        If shapes differ, a density is negative or not finite, `dt` or `voxel_size` is not positive, a side is unknown
+        or the steps of the primal-dual splitting do not converge.
+    """
+    return CoarseToFine(settings or VelocitySettings()).estimate(
+        before, after, dt, voxel_size, closed=closed, inflow=inflow, prediction=prediction
+    )
+
+
+__all__ = [
+    "CoarseToFine",
+    "PrimalDual",
+    "ProjectedCG",
+    "Solver",
+    "SourceDetection",
+    "Velocity",
+    "VelocityEstimator",
+    "VelocitySettings",
+    "estimate_velocity",
+    "predict_velocity",
+]

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from smokelift import _core
-from smokelift.transport import Array, Faces
-from smokelift.velocity.sources import Unexplained
+from smokelift.transport import Array, ResidualMeans, StaggeredGrid
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Level:
     """One grid of the pyramid.
 
@@ -31,7 +31,7 @@ class Level:
     after: Array
     weight: Array
     coarseness: float = 1.0
-    past: Unexplained | None = None
+    past: ResidualMeans | None = None
 
 
 def pyramid(finest: Level, levels: int) -> list[Level]:
@@ -39,28 +39,28 @@ def pyramid(finest: Level, levels: int) -> list[Level]:
     result = [finest]
     while len(result) < levels and min(result[0].before.shape) >= 16:
         last = result[0]
-        before, after, weight = (halve(a) for a in (last.before, last.after, last.weight))
+        before, after, weight = (coarsen(a) for a in (last.before, last.after, last.weight))
         result.insert(0, Level(before, after, weight, 2 * last.coarseness))
     return result
 
 
-def refine(u: Faces, shape: tuple[int, ...], closed: list[bool], threads: int) -> Faces:
-    """A velocity on the next finer grid, in its voxels, without divergence."""
-    x, y, z = _core.refine(u, shape, closed, threads)
-    return x, y, z
+def refine(u: StaggeredGrid, shape: Sequence[int]) -> StaggeredGrid:
+    """A velocity in voxels a frame on the next finer grid, in its voxels, without divergence."""
+    x, y, z = _core.refine(u.faces, tuple(shape), u.walls)
+    return StaggeredGrid((x, y, z), u.voxel_size, u.closed)
 
 
-def halve(a: Array) -> Array:
+def coarsen(a: Array) -> Array:
     """Means of two along every axis; an odd last one counts twice."""
     for axis in range(3):
         a = _means_of_two(a, axis)
     return a
 
 
-def halve_faces(faces: Faces) -> Faces:
-    """A velocity on the next coarser grid, in the same unit: what goes in and out of eight voxels together."""
-    x, y, z = (_every_second(component, along) for along, component in enumerate(faces))
-    return x, y, z
+def coarsen_faces(field: StaggeredGrid) -> StaggeredGrid:
+    """A field on the next coarser grid, in the same unit: what goes in and out of eight voxels together."""
+    x, y, z = (_every_second(component, along) for along, component in enumerate(field.faces))
+    return StaggeredGrid((x, y, z), 2 * field.voxel_size, field.closed)
 
 
 def _every_second(component: Array, along: int) -> Array:

@@ -1,8 +1,14 @@
-"""Noise in densities: how much there is, and how much blur takes it off.
+"""What is done to densities before their motion is looked for: noise is blurred, contrast reduced.
 
-White noise is as strong in the finest scale, where neighbours alternate along all axes at once, as in any other; smoke
-has next to nothing there. So the median of that scale's magnitude inside the smoke measures the noise and not the smoke
-(Donoho and Johnstone 1994), and blur is chosen by it: gradients have to stand out from what noise makes of them.
+Noise: white noise is as strong in the finest scale, where neighbours alternate along all axes at once, as in any other;
+smoke has next to nothing there. So the median of that scale's magnitude inside the smoke measures the noise and not the
+smoke (Donoho and Johnstone 1994). Blur is chosen by it, because gradients have to stand out from what noise makes of
+them.
+
+Contrast: any function of a density is carried along just like the density, so the one to follow is free to choose.
+With the density itself the thick smoke at the base of a plume decides everything. With its power of 3/4 thin smoke
+counts as well (docs/experiments/velocity-contrast.md). Noise would count as well, so noisy densities are followed as
+they are, and so are smooth ones.
 """
 
 from __future__ import annotations
@@ -15,68 +21,70 @@ from scipy import ndimage
 
 from smokelift import _core
 from smokelift.transport import Array
-from smokelift.velocity.contrast import compressed
+from smokelift.velocity.settings import VelocitySettings
 
 NOISE_WIDTHS = (1.0, 1.5, 2.0)
-"""Standard deviations in voxels to choose from where the usual blur leaves too much."""
-
-LARGEST_SHARE = 0.35
-"""Noise that is left in the change between two densities, in root mean square gradients (that is, in voxels of motion):
-a third moves an estimate by less than smoke's own finest scales do."""
-
-SMOOTHNESS = 0.045
-"""The same where densities are smooth already and neither blur nor compression helps: from one view reconstructed ones
-(0.015 to 0.025; their thin smoke is the least certain) and blurred ones (0.02 to 0.04). Baked ones have 0.055 to 0.19.
-"""
+"""Standard deviations in voxels to choose from where the usual blur leaves too much noise."""
 
 MAD = 0.6745
 """Median magnitude of a normal variable in standard deviations."""
 
 
 @dataclass(frozen=True, eq=False)
-class Followed:
+class PreparedPair:
     """Two densities as their motion is looked for.
 
     Attributes
     ----------
     before, after : (nx, ny, nz) float32
-        Blurred, and perhaps compressed.
+        Blurred, and perhaps with less contrast.
     noise
         Variance of the noise that is left in their difference.
-    compressed
-        Whether they are.
+    reduced
+        Whether they are the power of 3/4 of the densities.
     """
 
     before: Array
     after: Array
     noise: float
-    compressed: bool
+    reduced: bool
 
 
-def followed(before: Array, after: Array, blur: float, threshold: float, threads: int) -> Followed:
-    """Blur and compress two densities; leave them as they are where smooth, and only blur where noisy.
+def prepare(before: Array, after: Array, settings: VelocitySettings) -> PreparedPair:
+    """Blur two densities and reduce their contrast; leave them as they are where smooth, and only blur where noisy.
 
     Parameters
     ----------
     before, after : (nx, ny, nz) float32
         The densities.
-    blur
-        Standard deviation in voxels of the Gaussian that smooths in any case.
-    threshold
-        Fraction of the largest density from which a voxel counts as smoke.
-    threads
-        Processor cores.
+    settings
+        Their `blur`, `noise`, `smooth` and `smoke_threshold`.
     """
-    smooth, enough = without_noise(before, after, ((0.0, SMOOTHNESS),), threshold, threads)
+    threshold = settings.smoke_threshold
+    smooth, enough = without_noise(before, after, ((0.0, settings.smooth),), threshold)
     if enough:
-        return Followed(*smooth, compressed=False)
-    sharp, enough = without_noise(compressed(before), compressed(after), ((blur, LARGEST_SHARE),), threshold, threads)
+        return PreparedPair(*smooth, reduced=False)
+    usual = ((settings.blur, settings.noise),)
+    sharp, enough = without_noise(reduced_contrast(before), reduced_contrast(after), usual, threshold)
     if enough:
-        return Followed(*sharp, compressed=True)
-    widths = (blur, *(width for width in NOISE_WIDTHS if width > blur))
-    limits = tuple((width, LARGEST_SHARE) for width in widths)
-    noisy, _ = without_noise(before, after, limits, threshold, threads)
-    return Followed(*noisy, compressed=False)
+        return PreparedPair(*sharp, reduced=True)
+    widths = (settings.blur, *(width for width in NOISE_WIDTHS if width > settings.blur))
+    limits = tuple((width, settings.noise) for width in widths)
+    noisy, _ = without_noise(before, after, limits, threshold)
+    return PreparedPair(*noisy, reduced=False)
+
+
+def reduced_contrast(density: Array) -> Array:
+    """density^(3/4)."""
+    root = np.sqrt(density)
+    result: Array = root * np.sqrt(root)
+    return result
+
+
+def full_contrast(values: Array) -> Array:
+    """values^(4/3), the inverse of `reduced_contrast`."""
+    result: Array = values * np.cbrt(values)
+    return result
 
 
 def noise_level(density: Array, smoke: npt.NDArray[np.bool_]) -> float:
@@ -94,7 +102,7 @@ def noise_level(density: Array, smoke: npt.NDArray[np.bool_]) -> float:
 
 
 def without_noise(
-    before: Array, after: Array, widths: tuple[tuple[float, float], ...], threshold: float, threads: int
+    before: Array, after: Array, widths: tuple[tuple[float, float], ...], threshold: float
 ) -> tuple[tuple[Array, Array, float], bool]:
     """Blur two densities as much as their noise asks for.
 
@@ -107,8 +115,6 @@ def without_noise(
         mean square gradients. The last is taken where none is enough.
     threshold
         Fraction of the largest density from which a voxel counts as smoke.
-    threads
-        Processor cores.
 
     Returns
     -------
@@ -120,7 +126,7 @@ def without_noise(
     smoke = after > threshold * after.max()
     raw = float(np.hypot(noise_level(before, smoke), noise_level(after, smoke)))
     for width, share in widths:
-        first, second = (_core.blur(a, width, 4.0, threads) if width > 0 else a for a in (before, after))
+        first, second = (_core.blur(a, width, 4.0) if width > 0 else a for a in (before, after))
         left = raw * _passed(width)
         enough = left <= share * _gradient(second, smoke)
         if enough:

@@ -1,0 +1,76 @@
+"""The paper's velocity (algorithm 5): one grid, one linearisation around rest, first-order smoothness, primal-dual.
+
+It minimises, over velocities u without divergence in voxels per frame,
+
+    sum (after - before + g . u)^2 / s^2 + smoothness * sum |grad u|^2 + kinetic * sum |u|^2
+
+with g and s as in `smokelift.velocity`. Source: Cen, Zhang, Liang (2023), Entropy 25, 1348, section 3.3.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from smokelift.scene import Side
+from smokelift.transport import StaggeredGrid, Velocity
+from smokelift.velocity.estimator import Density, Estimate, Mask, checked, motion_weight, predict_velocity
+from smokelift.velocity.linearisation import Regularisation, least_squares, linearise
+from smokelift.velocity.preparation import without_noise
+from smokelift.velocity.pyramid import Level
+from smokelift.velocity.solver import PrimalDual, Solver
+
+
+@dataclass(frozen=True)
+class PaperVelocity:
+    """The paper's estimator (a `VelocityEstimator`). Weights have no unit.
+
+    Attributes
+    ----------
+    smoothness
+        Weight of the differences of velocity.
+    kinetic
+        Weight of the squared velocity. It only holds what nothing else does.
+    blur
+        Standard deviation in voxels of the Gaussian that smooths the densities.
+    smoke_threshold
+        Fraction of the largest density from which a voxel counts as smoke.
+    solver
+        The paper's splitting.
+    """
+
+    smoothness: float = 0.03
+    kinetic: float = 0.003
+    blur: float = 0.5
+    smoke_threshold: float = 0.01
+    solver: Solver = PrimalDual()
+
+    def estimate(
+        self,
+        before: Density,
+        after: Density,
+        dt: float,
+        voxel_size: float,
+        *,
+        closed: tuple[Side, ...] = (),
+        inflow: Mask | None = None,
+        prediction: Velocity | None = None,
+    ) -> Velocity:
+        """See `smokelift.velocity.estimate_velocity`. The paper's estimate knows of no prediction."""
+        first, second = checked(before, after, dt, voxel_size, inflow, prediction)
+        (first, second, _), _ = without_noise(first, second, ((self.blur, np.inf),), self.smoke_threshold)
+        rest = StaggeredGrid.zero(first.shape, 1.0, closed)
+        level = Level(first, second, motion_weight(first.shape, inflow))
+        linear = linearise(level, rest, self.smoke_threshold, None)
+        if linear is None:
+            return Velocity.zero(first.shape, voxel_size, closed)
+        terms = Regularisation(first_order=self.smoothness, kinetic=self.kinetic)
+        u, figures = self.solver.solve(least_squares(linear, rest, terms), rest)
+        measures = {name: figures[name] for name in ("iterations", "products", "projections", "residual")}
+        nothing = np.zeros_like(second)
+        return Estimate(u, measures, nothing + 1, nothing, None).velocity(dt, voxel_size)
+
+    def predict(self, velocity: Velocity, dt: float) -> Velocity:
+        """The velocity of the next frame if no force acts."""
+        return predict_velocity(velocity, dt)

@@ -1,0 +1,60 @@
+"""Divergence, and the pressure projection that removes it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from smokelift import _core
+from smokelift.scene import Side
+from smokelift.transport.grid import Array, StaggeredGrid, Velocity
+
+
+def project(velocity: Velocity, closed: Iterable[Side] | None = None) -> Velocity:
+    """The nearest velocity without divergence (pressure projection).
+
+    Nearest in the sum of squares over faces, those on open sides counted half, as they belong to half a
+    voxel. Pressure is zero on open sides; closed sides (walls) let nothing through.
+
+    Parameters
+    ----------
+    velocity
+        Any velocity.
+    closed
+        Names of the sides that are walls: "x-", "x+", "y-", "y+", "z-", "z+". None takes those of the velocity.
+
+    Returns
+    -------
+    Velocity
+        Its figure ``"divergence"`` is max |div u| times voxel size over max |u|, around 1e-7.
+
+    Raises
+    ------
+    ValueError
+        If a side is unknown.
+    """
+    if closed is not None:
+        velocity = replace(velocity, closed=tuple(closed))
+    grid, largest = without_divergence(velocity, passes=2)
+    return Velocity(grid.faces, velocity.voxel_size, velocity.closed, figures={"divergence": largest})
+
+
+def without_divergence(field: StaggeredGrid, passes: int = 1) -> tuple[StaggeredGrid, float]:
+    """The nearest field without divergence, and max |div u| times voxel size over max |u| of that.
+
+    Parameters
+    ----------
+    field
+        Any field.
+    passes
+        Projections in a row. A second one removes what rounding leaves of a large divergence.
+    """
+    faces, largest = _core.project(field.faces, field.walls, passes=passes)
+    return StaggeredGrid((faces[0], faces[1], faces[2]), field.voxel_size, field.closed), largest
+
+
+def divergence(field: StaggeredGrid) -> Array:
+    """Net outflow of every voxel per volume, shape (nx, ny, nz); of a velocity in 1/s."""
+    return _core.divergence(field.faces) / np.float32(field.voxel_size)

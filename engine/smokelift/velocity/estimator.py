@@ -1,0 +1,168 @@
+"""What every way to estimate a velocity has in common."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+from scipy import ndimage
+
+from smokelift import _core
+from smokelift.scene import Side
+from smokelift.transport import (
+    Array,
+    ResidualMeans,
+    StaggeredGrid,
+    Velocity,
+    advect,
+    project,
+    require_positive,
+    require_same_shape,
+    without_divergence,
+)
+from smokelift.velocity.pyramid import coarsen_faces, refine
+
+Density = npt.NDArray[np.floating[Any]]
+Mask = npt.NDArray[np.bool_]
+
+
+class VelocityEstimator(Protocol):
+    """A way to find the velocity between two densities, and to predict the next one."""
+
+    def estimate(
+        self,
+        before: Density,
+        after: Density,
+        dt: float,
+        voxel_size: float,
+        *,
+        closed: tuple[Side, ...] = (),
+        inflow: Mask | None = None,
+        prediction: Velocity | None = None,
+    ) -> Velocity:
+        """Estimate the velocity that carries one density into the next: see `estimate_velocity`."""
+        ...
+
+    def predict(self, velocity: Velocity, dt: float) -> Velocity:
+        """The velocity of the next frame if no force acts: see `predict_velocity`."""
+        ...
+
+
+def predict_velocity(velocity: Velocity, dt: float, *, coarsening: int = 0) -> Velocity:
+    """The velocity of the next frame if no force acts: carried along by itself, then projected.
+
+    Parameters
+    ----------
+    velocity
+        Velocity of one frame.
+    dt
+        Time between frames in seconds.
+    coarsening
+        Carry it on a coarser grid: see `VelocitySettings`.
+
+    Returns
+    -------
+    Velocity
+        Without divergence; `residual` stays as it is, because inlets stand still.
+    """
+    if coarsening:
+        return refined(predict_velocity(coarsened(velocity), dt, coarsening=coarsening - 1), velocity.shape)
+    return replace(project(advect(velocity, velocity, dt)), residual=velocity.residual)
+
+
+def coarsened(velocity: Velocity) -> Velocity:
+    """A velocity on a grid half as fine; the residual is on that already."""
+    coarse = coarsen_faces(velocity)
+    return Velocity(coarse.faces, coarse.voxel_size, coarse.closed, residual=velocity.residual)
+
+
+def refined(coarse: Velocity, shape: tuple[int, int, int]) -> Velocity:
+    """A velocity on a grid twice as fine, without divergence there; the residual stays as it is."""
+    faces = refine(coarse, shape).faces
+    for component in faces:
+        component *= np.float32(0.5)  # refined are voxels, of which there are twice as many to the way
+    found = Velocity(faces, coarse.voxel_size / 2, coarse.closed, residual=coarse.residual)
+    figures = dict(coarse.figures)
+    if figures:
+        largest = max(float(np.abs(component).max()) for component in faces)
+        left = float(np.abs(_core.divergence(faces)).max())
+        figures["divergence"] = left / largest if largest > 0 else 0.0
+    confidence, source = (
+        None if values is None else values.repeat(2, 0).repeat(2, 1).repeat(2, 2)[: shape[0], : shape[1], : shape[2]]
+        for values in (coarse.confidence, coarse.source)
+    )
+    return replace(found, figures=figures, confidence=confidence, source=source)
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """A velocity in voxels a frame, and what is known about it.
+
+    Attributes
+    ----------
+    u
+        The velocity.
+    figures
+        How it was found.
+    confidence, source : (nx, ny, nz) float32
+        As in `Velocity`, the source per frame.
+    residual
+        As in `Velocity`.
+    """
+
+    u: StaggeredGrid
+    figures: Mapping[str, float]
+    confidence: Array
+    source: Array
+    residual: ResidualMeans | None
+
+    def velocity(self, dt: float, voxel_size: float) -> Velocity:
+        """The velocity in m/s, projected a last time."""
+        u, largest = without_divergence(self.u)
+        for component in u.faces:
+            component *= np.float32(voxel_size / dt)
+        return Velocity(
+            u.faces,
+            voxel_size,
+            u.closed,
+            figures={**self.figures, "divergence": largest},
+            confidence=self.confidence,
+            source=self.source / np.float32(dt),
+            residual=self.residual,
+        )
+
+
+def checked(
+    before: Density, after: Density, dt: float, voxel_size: float, inflow: Mask | None, prediction: Velocity | None
+) -> tuple[Array, Array]:
+    """The two densities as float32; ValueError for what no estimator takes."""
+    require_positive("dt", dt)
+    require_positive("voxel_size", voxel_size)
+    first, second = _density("before", before), _density("after", after)
+    require_same_shape("after", second.shape, first.shape)
+    if inflow is not None:
+        require_same_shape("inflow", inflow.shape, first.shape)
+    if prediction is not None:
+        require_same_shape("the prediction", prediction.shape, first.shape)
+    return first, second
+
+
+def motion_weight(shape: tuple[int, ...], inflow: Mask | None) -> Array:
+    """1 where changes may be taken for motion, 0 where smoke is known to enter, shape (nx, ny, nz)."""
+    if inflow is None:
+        return np.broadcast_to(np.float32(1), shape)
+    # blur and gradients take the change there one voxel further
+    return (~ndimage.binary_dilation(inflow)).astype(np.float32)
+
+
+def _density(name: str, values: Density) -> Array:
+    if values.ndim != 3 or 0 in values.shape:
+        raise ValueError(f"{name} must be a three-dimensional array, not one of shape {values.shape}.")
+    if not np.isfinite(values).all():
+        raise ValueError(f"{name} holds densities that are not finite.")
+    if values.min() < 0:
+        raise ValueError(f"{name} holds negative densities.")
+    return np.ascontiguousarray(values, np.float32)

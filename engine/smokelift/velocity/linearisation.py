@@ -1,0 +1,113 @@
+"""The change between two densities as a linear function of the velocity, and the quadratic problem that it poses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from smokelift import _core
+from smokelift.transport import Array, Faces, StaggeredGrid
+from smokelift.velocity.pyramid import Level
+from smokelift.velocity.sources import SourceDetection
+
+
+@dataclass(frozen=True, eq=False)
+class Linearisation:
+    """The change between two densities around a velocity u_k: r + g . (u - u_k) = offset + direction . u.
+
+    Attributes
+    ----------
+    direction
+        g at voxel centres, one array (nx, ny, nz) for each component.
+    offset : (nx, ny, nz) float32
+        r - g . u_k.
+    carried : (nx, ny, nz) float32
+        The density before, carried along by u_k, in the unit of `offset`.
+    weight : (nx, ny, nz) float32
+        How far the change is taken for motion, 0 to 1.
+    smoke : (nx, ny, nz) bool
+        Where there is smoke.
+    scale
+        Density gradient by which all of it is divided: its root mean square in the smoke.
+    """
+
+    direction: Faces
+    offset: Array
+    carried: Array
+    weight: Array
+    smoke: npt.NDArray[np.bool_]
+    scale: float
+
+    def with_dissipation(self, share: float) -> Linearisation:
+        """The change that is left where a share of the smoke dissolves."""
+        return replace(self, offset=self.offset + np.float32(share) * self.carried) if share else self
+
+    def unexplained(self, u: StaggeredGrid, noise: float) -> tuple[float, float]:
+        """What a velocity leaves of the squared change: the share beyond noise of a variance, and all of it."""
+        whole, rest, inside = _core.evidence(self.direction, self.offset, self.weight, self.smoke, u.faces)
+        floor = noise / self.scale**2 * inside
+        return (max(rest - floor, 0.0) / (whole - floor) if whole > floor else 1.0), rest
+
+
+@dataclass(frozen=True)
+class Regularisation:
+    """Weights of what a velocity u costs beside the data term, with v = u - centre.
+
+    Attributes
+    ----------
+    first_order
+        Of |grad v|^2.
+    second_order
+        Of |grad curl v|^2.
+    kinetic
+        Of |v|^2.
+    irrotational
+        Of |curl u|^2 outside the smoke.
+    """
+
+    first_order: float = 0.0
+    second_order: float = 0.0
+    kinetic: float = 0.0
+    irrotational: float = 0.0
+
+
+def linearise(level: Level, u: StaggeredGrid, threshold: float, sources: SourceDetection | None) -> Linearisation | None:
+    """The change around `u`; None where there is no structure to follow.
+
+    Parameters
+    ----------
+    level
+        The densities.
+    u
+        In voxels of the level a frame.
+    threshold
+        Fraction of the largest density from which a voxel counts as smoke.
+    sources
+        How smoke that enters is found; None looks for none.
+    """
+    (gx, gy, gz), offset, residual, carried, density, smoke, scale = _core.linearise(
+        level.before, level.after, u.faces, threshold
+    )
+    if scale == 0:
+        return None
+    weight = np.ascontiguousarray(level.weight)
+    if sources is not None:
+        weight = weight * sources.weight(sources.means(residual, density, level.coarseness, level.past), smoke)
+    return Linearisation((gx, gy, gz), offset, carried, weight, smoke, scale)
+
+
+def least_squares(linear: Linearisation, centre: StaggeredGrid, terms: Regularisation) -> _core.LeastSquares:
+    """The quadratic function of a velocity: data term and regularisation around a centre."""
+    return _core.LeastSquares(
+        direction=linear.direction,
+        offset=linear.offset,
+        weight=linear.weight,
+        irrotational=np.where(linear.smoke, np.float32(0), np.float32(terms.irrotational)),
+        centre=centre.faces,
+        first_order=terms.first_order,
+        second_order=terms.second_order,
+        kinetic=terms.kinetic,
+        closed=centre.walls,
+    )

@@ -1,0 +1,95 @@
+"""Two solvers of the quadratic problem: minimise it over velocities without divergence."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+from smokelift import _core
+from smokelift.transport import StaggeredGrid
+
+
+class Solver(Protocol):
+    """A way to minimise a quadratic function over velocities without divergence."""
+
+    def solve(self, problem: _core.LeastSquares, start: StaggeredGrid) -> tuple[StaggeredGrid, _core.Figures]:
+        """Return the minimum, and how it was found.
+
+        Parameters
+        ----------
+        problem
+            The quadratic function, see `smokelift.velocity.linearisation.least_squares`.
+        start
+            Without divergence, in voxels a frame.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class ProjectedCG:
+    """Conjugate gradients on the velocities without divergence, preconditioned with constant coefficients.
+
+    Attributes
+    ----------
+    tolerance
+        Stops at this fraction of the preconditioned gradient at rest.
+    iterations
+        Limit for each solve. Ten are as exact against known velocities as a hundred (velocity-solvers.md).
+    """
+
+    tolerance: float = 0.01
+    iterations: int = 10
+
+    def solve(self, problem: _core.LeastSquares, start: StaggeredGrid) -> tuple[StaggeredGrid, _core.Figures]:
+        """See `Solver`."""
+        faces, figures = problem.projected_cg(start.faces, tolerance=self.tolerance, limit=self.iterations)
+        return start.with_faces(faces), figures
+
+
+@dataclass(frozen=True)
+class PrimalDual:
+    """Chambolle and Pock's splitting, as in algorithm 5 of Cen, Zhang and Liang (2023).
+
+    Attributes
+    ----------
+    sigma, tau, theta
+        Dual step, primal step (the paper's gamma) and over-relaxation; sigma * tau <= 1. The paper gives no values:
+        velocity-solvers.md has the sweep.
+    absolute_tolerance, relative_tolerance
+        Stops when the change is at most sqrt(3) absolute sqrt(voxels) + relative |u|, in voxels a frame.
+    iterations
+        Limit of its steps. A few tens are usual; the paper gives none.
+    inner_tolerance, inner_iterations
+        By how much, and in how many steps at most, the conjugate gradients in each proximal operator reduce their
+        residual.
+
+    Raises
+    ------
+    ValueError
+        By `solve`, for steps that do not converge.
+    """
+
+    sigma: float = 0.1
+    tau: float = 10.0
+    theta: float = 1.0
+    absolute_tolerance: float = 1e-4
+    relative_tolerance: float = 1e-3
+    iterations: int = 100
+    inner_tolerance: float = 0.3
+    inner_iterations: int = 50
+
+    def solve(self, problem: _core.LeastSquares, start: StaggeredGrid) -> tuple[StaggeredGrid, _core.Figures]:
+        """See `Solver`."""
+        faces, figures = problem.primal_dual(
+            start.faces,
+            sigma=self.sigma,
+            tau=self.tau,
+            theta=self.theta,
+            absolute=self.absolute_tolerance * math.sqrt(start.faces[0].size),
+            relative=self.relative_tolerance,
+            limit=self.iterations,
+            inner_tolerance=self.inner_tolerance,
+            inner_limit=self.inner_iterations,
+        )
+        return start.with_faces(faces), figures
