@@ -36,6 +36,7 @@ from smokelift import (
 from smokelift.density import DensitySettings, evidence
 from smokelift.output.images import write_image
 from smokelift.setup.shot import Shot, prepare_shot
+from smokelift.velocity import CoarseToFine
 
 VIEWS = {"0": "front", "20": "nov20", "45": "nov45", "90": "side"}
 """Degrees about the vertical, and the files of picture.py."""
@@ -101,11 +102,11 @@ def leave_out(part: str, settings: Settings) -> Settings:
     if part == "transport":
         return replace(settings, transport=0.0)
     if part == "sources":
-        return replace(settings, velocity=replace(settings.velocity, sources=False))
+        return replace(settings, velocity=replace(settings.velocity, sources=None))
     if part == "hull":
         evidence.common_hull = lambda _masks, projections: np.any([p.visible for p in projections], axis=0)
     elif part == "projection":
-        reconstruct.__globals__["predict_velocity"] = carried_by_itself
+        CoarseToFine.predict = carried_by_itself
     elif part == "depth":
         evidence.DepthProfile.at = lambda _profile, _projection, voxels: np.full(np.count_nonzero(voxels), 0.5)
     else:
@@ -113,9 +114,9 @@ def leave_out(part: str, settings: Settings) -> Settings:
     return settings
 
 
-def carried_by_itself(velocity: Velocity, dt: float, *_: Any, **__: Any) -> Velocity:
+def carried_by_itself(_estimator: CoarseToFine, velocity: Velocity, dt: float) -> Velocity:
     """What is predicted without pressure projection."""
-    return replace(advect(velocity, velocity, dt), unexplained=velocity.unexplained)
+    return replace(advect(velocity, velocity, dt), residual=velocity.residual)
 
 
 def smeared(clip: Clip, shot: Shot) -> Iterator[np.ndarray]:

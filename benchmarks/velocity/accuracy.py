@@ -20,9 +20,11 @@ import numpy.typing as npt
 from scipy import ndimage
 
 from benchmarks.machine import poisson_seconds
+from smokelift.baselines.velocity import PaperVelocity
 from smokelift.evaluation.truth import Truth
+from smokelift.scene import Side
 from smokelift.transport import advect
-from smokelift.velocity import Velocity, VelocitySettings, estimate_velocity, predict_velocity
+from smokelift.velocity import CoarseToFine, Velocity, VelocityEstimator
 
 PAIRS = range(6, 38, 4)
 CHAIN = range(6, 22)
@@ -89,7 +91,7 @@ def score(truth: Truth, frame: int, found: Velocity, solves: float, step: int = 
 
 def pairs(
     truth: Truth,
-    settings: VelocitySettings,
+    estimator: VelocityEstimator,
     unit: float,
     change: Callable[[Array], Array] = lambda density: density,
     told: bool = False,
@@ -100,18 +102,18 @@ def pairs(
         before, after = (change(truth.density(f)) for f in (frame, frame + step))
         start = time.perf_counter()
         inflow = truth.inflow(frame + step) if told else None
-        found = estimate_velocity(before, after, step * truth.dt, truth.voxel_size, settings, inflow=inflow)
+        found = estimator.estimate(before, after, step * truth.dt, truth.voxel_size, inflow=inflow)
         yield score(truth, frame, found, (time.perf_counter() - start) / unit, step)
 
 
-def chain(truth: Truth, settings: VelocitySettings, unit: float) -> Iterator[Score]:
+def chain(truth: Truth, unit: float, closed: tuple[Side, ...] = ()) -> Iterator[Score]:
     """Estimates that each have the one before for a prediction."""
-    prediction = None
+    estimator, prediction = CoarseToFine(), None
     for frame in CHAIN:
         densities = truth.density(frame), truth.density(frame + 1)
         start = time.perf_counter()
-        found = estimate_velocity(*densities, truth.dt, truth.voxel_size, settings, prediction=prediction)
-        prediction = predict_velocity(found, truth.dt, settings.closed)
+        found = estimator.estimate(*densities, truth.dt, truth.voxel_size, closed=closed, prediction=prediction)
+        prediction = estimator.predict(found, truth.dt)
         seconds = time.perf_counter() - start
         if frame >= CHAIN.start + SETTLED:
             yield score(truth, frame, found, seconds / unit)
@@ -137,13 +139,13 @@ def table(path: Path) -> None:
     """Print the rows of one scene."""
     truth = Truth.load(path)
     unit = poisson_seconds(truth.shape)
-    usual = VelocitySettings()
+    usual = CoarseToFine()
     rows: dict[str, Iterator[Score]] = {
         "pairs": pairs(truth, usual, unit),
-        "after 8 frames": chain(truth, usual, unit),
-        "after 8 frames, walls said": chain(truth, VelocitySettings(closed=truth.closed), unit),
+        "after 8 frames": chain(truth, unit),
+        "after 8 frames, walls said": chain(truth, unit, truth.closed),
         "pairs, inlet told": pairs(truth, usual, unit, told=True),
-        "pairs, paper": pairs(truth, VelocitySettings(method="paper"), unit),
+        "pairs, paper": pairs(truth, PaperVelocity(), unit),
         "pairs, blurred": pairs(truth, usual, unit, blurred),
         "pairs, noise 1 %": pairs(truth, usual, unit, noisy(0.01)),
         "pairs, noise 3 %": pairs(truth, usual, unit, noisy(0.03)),
@@ -165,11 +167,11 @@ def draw(paths: list[Path], out: Path) -> None:
     figure, axes = pyplot.subplots(len(paths), 4, figsize=(10, 3.6 * len(paths)), squeeze=False)
     for row, path in zip(axes, paths, strict=True):
         truth = Truth.load(path)
-        prediction, frame = None, CHAIN.start
+        estimator, prediction, frame = CoarseToFine(), None, CHAIN.start
         for frame in CHAIN:
             densities = truth.density(frame), truth.density(frame + 1)
-            found = estimate_velocity(*densities, truth.dt, truth.voxel_size, prediction=prediction)
-            prediction = predict_velocity(found, truth.dt)
+            found = estimator.estimate(*densities, truth.dt, truth.voxel_size, prediction=prediction)
+            prediction = estimator.predict(found, truth.dt)
         smoke = ndimage.binary_dilation(truth.density(frame + 1) > 0.01 * truth.density(frame + 1).max(), iterations=2)
         heaviest = [int(truth.density(frame).sum(axis=tuple(d for d in range(3) if d != a)).argmax()) for a in (0, 1)]
         limit = float(np.abs(truth.velocity(frame).centres()[smoke]).max())

@@ -16,7 +16,7 @@ SOLVERS = {"projected-cg": ("-", "o", "projected CG"), "primal-dual": ("--", "s"
 
 CURVES = {"iterations": ("-", "o", "iterations"), "primal_dual_iterations": ("--", "s", "steps of primal-dual")}
 
-MARKERS = {"warps": "^", "levels": "D", "method": "X"}
+MARKERS = {"linearisations": "^", "levels": "D", "method": "X"}
 
 
 def draw(results: dict[str, Any], path: Path) -> None:

@@ -21,10 +21,11 @@ import numpy as np
 from benchmarks import machine
 from benchmarks.tables import size_text
 from benchmarks.velocity.flow import built_in_pair
-from benchmarks.velocity.linear import LinearProblem, Solver
+from benchmarks.velocity.linear import LinearProblem
 from benchmarks.velocity.pairs import Pair, frames_for_pairs, pair_of_truth, relative_error
+from smokelift.baselines.velocity import PaperVelocity
 from smokelift.evaluation.truth import Truth
-from smokelift.velocity import Velocity, VelocitySettings, estimate_velocity
+from smokelift.velocity import CoarseToFine, PrimalDual, ProjectedCG, Solver, VelocityEstimator, VelocitySettings
 
 Shape = tuple[int, int, int]
 Made = TypeVar("Made")
@@ -60,7 +61,7 @@ class Plan:
     """
 
     pairs: int
-    steps: Mapping[Solver, tuple[int, ...]]
+    steps: Mapping[str, tuple[int, ...]]
     reference: int
     iterations: tuple[int, ...]
     primal_dual_iterations: tuple[int, ...]
@@ -73,7 +74,7 @@ USUAL = Plan(
     reference=300,
     iterations=(2, 3, 5, 10, 20),
     primal_dual_iterations=(2, 5, 20, 100),
-    others=({"warps": 1}, {"warps": 3}, {"levels": 1}, {"levels": 2}, {"method": "paper"}),
+    others=({"linearisations": 1}, {"linearisations": 3}, {"levels": 1}, {"levels": 2}, {"method": "paper"}),
 )
 
 SHORT = Plan(
@@ -82,7 +83,7 @@ SHORT = Plan(
     reference=100,
     iterations=(2, 5, 10),
     primal_dual_iterations=(2,),
-    others=({"warps": 1},),
+    others=({"linearisations": 1},),
 )
 """Where the usual plan would take hours."""
 
@@ -118,7 +119,7 @@ class Estimate:
     Attributes
     ----------
     setting
-        What is varied: ``iterations``, ``primal_dual_iterations``, ``warps``, ``levels`` or ``method``.
+        What is varied: ``iterations``, ``primal_dual_iterations``, ``linearisations``, ``levels`` or ``method``.
     value
         Of it.
     default
@@ -233,37 +234,53 @@ def _steps(pair: Pair, plan: Plan, clock: _Clock, say: Say) -> tuple[float, list
     """How far from the optimum the solvers begin, and where they are after some iterations."""
     problem = LinearProblem.of_pair(pair)
     say("  the linear problem's optimum")
-    optimum = problem.solve("projected-cg", plan.reference)
+    optimum = problem.solve(_endless("projected-cg", plan.reference))
     steps = []
-    for solver, counts in plan.steps.items():
+    for name, counts in plan.steps.items():
         for count in counts:
-            seconds, solves, found = clock.time(partial(problem.solve, solver, count))
-            steps.append(Step(solver, count, problem.distance(found, optimum), seconds, solves))
-            say(f"  {solver}, {count}: {100 * steps[-1].distance:.2g} % from the optimum, {solves:.0f} solves")
-    return problem.distance(Velocity(problem.start, 1.0).centres(), optimum), steps
+            seconds, solves, found = clock.time(partial(problem.solve, _endless(name, count)))
+            steps.append(Step(name, count, problem.distance(found, optimum), seconds, solves))
+            say(f"  {name}, {count}: {100 * steps[-1].distance:.2g} % from the optimum, {solves:.0f} solves")
+    return problem.distance(problem.start.centres(), optimum), steps
+
+
+def _endless(name: str, iterations: int) -> Solver:
+    """The solver of a name that nothing stops but its iterations."""
+    if name == "projected-cg":
+        return ProjectedCG(tolerance=0.0, iterations=iterations)
+    return PrimalDual(absolute_tolerance=0.0, relative_tolerance=0.0, iterations=iterations)
 
 
 def _estimates(pairs: Sequence[Pair], plan: Plan, clock: _Clock, say: Say) -> list[Estimate]:
-    usual = VelocitySettings()
     ways = [{"iterations": count} for count in plan.iterations]
     ways += [{"primal_dual_iterations": count} for count in plan.primal_dual_iterations]
     estimates = []
     for way in (*ways, *plan.others):
         ((setting, value),) = way.items()
-        settings = replace(usual, **way)
-        if setting == "primal_dual_iterations":
-            settings = replace(settings, solver="primal-dual")
-        found = [_against_truth(pair, settings, clock) for pair in pairs]
+        estimator = _estimator(setting, value)
+        found = [_against_truth(pair, estimator, clock) for pair in pairs]
         errors = tuple(error for error, _, _ in found)
         seconds, solves = (float(np.median(column)) for column in list(zip(*found, strict=True))[1:])
-        estimates.append(Estimate(setting, value, settings == usual, float(np.mean(errors)), errors, seconds, solves))
+        default = estimator == CoarseToFine()
+        estimates.append(Estimate(setting, value, default, float(np.mean(errors)), errors, seconds, solves))
         say(f"  {setting} {value}: error {estimates[-1].error:.3f}, {solves:.0f} solves")
     return estimates
 
 
-def _against_truth(pair: Pair, settings: VelocitySettings, clock: _Clock) -> tuple[float, float, float]:
+def _estimator(setting: str, value: Any) -> VelocityEstimator:
+    """The default estimator with one thing changed, or the paper's."""
+    if setting == "method":
+        return PaperVelocity()
+    if setting == "iterations":
+        return CoarseToFine(VelocitySettings(solver=ProjectedCG(iterations=value)))
+    if setting == "primal_dual_iterations":
+        return CoarseToFine(VelocitySettings(solver=PrimalDual(iterations=value)))
+    return CoarseToFine(replace(VelocitySettings(), **{setting: value}))
+
+
+def _against_truth(pair: Pair, estimator: VelocityEstimator, clock: _Clock) -> tuple[float, float, float]:
     """Error, seconds, solves."""
-    seconds, solves, found = clock.time(lambda: estimate_velocity(pair.before, pair.after, 1.0, 1.0, settings))
+    seconds, solves, found = clock.time(lambda: estimator.estimate(pair.before, pair.after, 1.0, 1.0))
     return relative_error(found.centres(), pair.motion, pair.counted), seconds, solves
 
 

@@ -27,7 +27,7 @@ PLAN = run.Plan(
     reference=60,
     iterations=(1, 10),
     primal_dual_iterations=(3,),
-    others=({"warps": 1}, {"method": "paper"}),
+    others=({"linearisations": 1}, {"method": "paper"}),
 )
 
 FEW = run.Plan(pairs=1, steps={}, reference=1, iterations=(1,), primal_dual_iterations=(), others=())
@@ -109,7 +109,7 @@ def test_every_figure_in_json_and_in_the_table(quick, tmp_path, capsys):
             ("iterations", 1),
             ("iterations", 10),
             ("primal_dual_iterations", 3),
-            ("warps", 1),
+            ("linearisations", 1),
             ("method", "paper"),
         ]
         assert [row["default"] for row in estimates.values()] == [False, True, False, False, False]
@@ -121,7 +121,13 @@ def test_every_figure_in_json_and_in_the_table(quick, tmp_path, capsys):
             assert timed["seconds"] > 0
             assert timed["solves"] > 0
     table = capsys.readouterr().out
-    for name in ("16x16x24, built-in", "20x16x24, built-in", "10 iterations *", "3 primal-dual steps", "1 warp "):
+    for name in (
+        "16x16x24, built-in",
+        "20x16x24, built-in",
+        "10 iterations *",
+        "3 primal-dual steps",
+        "1 linearisation ",
+    ):
         assert name in table
 
 
@@ -188,7 +194,11 @@ def test_time_to_a_goal_is_interpolated_between_what_was_measured():
 
 @pytest.mark.parametrize(
     ("setting", "value", "name"),
-    [("warps", 1, "1 warp"), ("levels", 2, "2 levels"), ("primal_dual_iterations", 5, "5 primal-dual steps")],
+    [
+        ("linearisations", 1, "1 linearisation"),
+        ("levels", 2, "2 levels"),
+        ("primal_dual_iterations", 5, "5 primal-dual steps"),
+    ],
 )
 def test_names_of_estimates(setting, value, name):
     assert estimate_name({"setting": setting, "value": value}) == name

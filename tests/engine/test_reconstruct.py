@@ -24,7 +24,7 @@ from smokelift.scene import Background, ClipSource, Inlet, Medium, PointLight, S
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import prepare_shot
 from smokelift.transport import advect
-from smokelift.velocity import estimate_velocity, predict_velocity
+from smokelift.velocity import CoarseToFine
 
 
 def frames_of(scene: Scene, settings: Settings, out: Path | None = None, **options: bool) -> list[Frame]:
@@ -184,11 +184,12 @@ def test_walls_and_inlets_of_the_scene_are_kept(plume, draft, tmp_path, monkeypa
     """Nothing goes through the floor, no motion is taken from the inlet, and both are on record."""
     told = []
 
-    def estimate(*arguments, inflow, **options):
-        told.append(inflow)
-        return estimate_velocity(*arguments, inflow=inflow, **options)
+    class Told(CoarseToFine):
+        def estimate(self, *arguments, inflow, **options):
+            told.append(inflow)
+            return super().estimate(*arguments, inflow=inflow, **options)
 
-    monkeypatch.setitem(reconstruct.__globals__, "estimate_velocity", estimate)
+    monkeypatch.setitem(reconstruct.__globals__, "CoarseToFine", Told)
     scene = replace(plume.scene, closed=("z-",), inlets=(Inlet((0, 0, 0.3), 0.2),))
     frames = frames_of(scene, draft, tmp_path / "out", npz=True)
     for frame in frames:
@@ -199,7 +200,6 @@ def test_walls_and_inlets_of_the_scene_are_kept(plume, draft, tmp_path, monkeypa
         np.testing.assert_array_equal(inflow, scene.inflow())
     sequence = Sequence.open(tmp_path / "out")
     assert (sequence.scene.closed, sequence.scene.inlets) == (scene.closed, scene.inlets)
-    assert sequence.settings["velocity"]["closed"] == ["z-"]
     assert frames_of(scene, draft, tmp_path / "out", npz=True, resume=True) == []
 
 
@@ -482,23 +482,16 @@ def test_the_papers_loop_takes_all(plume, tmp_path, monkeypatch) -> None:
 def test_the_loop_looks_for_motion_as_coarsely_as_was_chosen(plume, draft, tmp_path, monkeypatch, method) -> None:
     """Prediction and estimate have the same grid; the paper's method knows of none."""
     settings = draft if method == "default" else Settings.preset("draft", "paper")
-    halvings = 1 if method == "default" else None
     monkeypatch.setattr("smokelift.setup.motion.FINEST_SIDE", max(plume.scene.domain.resolution) - 1)
-    estimated, predicted = [], []
+    used = []
 
-    def estimate(before, after, dt, voxel_size, settings, **options):
-        estimated.append(settings.halvings)
-        return estimate_velocity(before, after, dt, voxel_size, settings, **options)
+    def estimator(settings):
+        used.append(settings.coarsening)
+        return CoarseToFine(settings)
 
-    def predict(*arguments, **options):
-        predicted.append(options["halvings"])
-        return predict_velocity(*arguments, **options)
-
-    monkeypatch.setitem(reconstruct.__globals__, "estimate_velocity", estimate)
-    monkeypatch.setitem(reconstruct.__globals__, "predict_velocity", predict)
+    monkeypatch.setitem(reconstruct.__globals__, "CoarseToFine", estimator)
     frames_of(plume.write(tmp_path / "clip", plume.densities[:3]), settings)
-    assert predicted == [halvings or 0]
-    assert estimated == [halvings] * 2
+    assert used == ([1] if method == "default" else [])
 
 
 def test_without_transport_every_picture_stands_alone(plume, draft, monkeypatch) -> None:

@@ -324,11 +324,9 @@ def test_frames_without_smoke_cost_nothing(plume, draft, tmp_path, monkeypatch) 
     scene = plume.write(tmp_path, clip)
     predicted, rendered = [], []
     from smokelift.density import Renderer
-    from smokelift.velocity import predict_velocity
 
     def counted(*arguments):
         predicted.append(arguments)
-        return predict_velocity(*arguments)
 
     class Counted(Renderer):
         def image(self, *arguments, **options):
@@ -336,7 +334,7 @@ def test_frames_without_smoke_cost_nothing(plume, draft, tmp_path, monkeypatch) 
             return super().image(*arguments, **options)
 
     shot = shot_of(scene, draft)
-    monkeypatch.setitem(reconstruct.__globals__, "predict_velocity", counted)
+    monkeypatch.setattr("smokelift.velocity.CoarseToFine.predict", counted)
     monkeypatch.setattr("smokelift.density.Renderer", Counted)
     with Clip.open(scene.clip) as opened:
         work = {frame.number: len(rendered) for frame in reconstruct(opened, scene, draft, shot=shot)}

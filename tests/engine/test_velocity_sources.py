@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from smokelift.velocity.sources import left_unexplained, source_weight
+from smokelift.velocity import SourceDetection
+
+DETECTION = SourceDetection()
 
 SHAPE = (24, 24, 32)
 INLET = (slice(8, 14), slice(8, 14), slice(4, 10))
@@ -22,8 +24,8 @@ def residual(inlet=0.0, front=0.0):
 
 
 def weight(left, past=None):
-    unexplained = left_unexplained(left, np.ones(SHAPE, np.float32), 1.0, past, 0)
-    return source_weight(unexplained, np.ones(SHAPE, bool)), unexplained
+    unexplained = DETECTION.means(left, np.ones(SHAPE, np.float32), 1.0, past)
+    return DETECTION.weight(unexplained, np.ones(SHAPE, bool)), unexplained
 
 
 def test_an_inlet_is_found():
@@ -63,6 +65,6 @@ def test_inlets_are_remembered_and_what_passes_is_not():
 @pytest.mark.parametrize("scale", [1e-3, 1e3])
 def test_the_scale_of_density_does_not_matter(scale):
     left, density = residual(inlet=0.5), np.ones(SHAPE, np.float32)
-    plain = source_weight(left_unexplained(left, density, 1.0, None, 0), density > 0)
-    scaled = left_unexplained(np.float32(scale) * left, np.float32(scale) * density, 1.0, None, 0)
-    np.testing.assert_allclose(source_weight(scaled, density > 0), plain, atol=1e-4)
+    plain = DETECTION.weight(DETECTION.means(left, density, 1.0, None), density > 0)
+    scaled = DETECTION.means(np.float32(scale) * left, np.float32(scale) * density, 1.0, None)
+    np.testing.assert_allclose(DETECTION.weight(scaled, density > 0), plain, atol=1e-4)

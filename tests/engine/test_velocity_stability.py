@@ -11,7 +11,7 @@ import pytest
 
 from smokelift.scene import SIDES
 from smokelift.transport import Velocity, advect
-from smokelift.velocity import VelocitySettings, estimate_velocity, predict_velocity
+from smokelift.velocity import estimate_velocity, predict_velocity
 
 DT, VOXEL = 1 / 24, 0.03
 SHAPE = (40, 32, 40)
@@ -129,7 +129,7 @@ def test_a_chain_of_frames_settles():
 def test_a_sealed_box():
     """No pressure is singular, and nothing goes through any wall."""
     before, after = moved((0.5, -0.3, 0.6))
-    found = estimate_velocity(before, after, DT, VOXEL, VelocitySettings(closed=SIDES))
+    found = estimate_velocity(before, after, DT, VOXEL, closed=SIDES)
     assert mean_motion(found, after) == pytest.approx((0.5, -0.3, 0.6), abs=0.2)
     for axis, component in enumerate(found.faces):
         assert not component.take((0, -1), axis).any()
@@ -233,21 +233,21 @@ def test_flicker_leaves_motion_as_it_is(brighter):
 
 
 @pytest.mark.parametrize("left", [0.5, 0.8, 0.95])
-def test_thinning_smoke_at_rest_stays_at_rest(left):
+def test_dissolving_smoke_at_rest_stays_at_rest(left):
     before, _ = moved((0, 0, 0))
     found = estimate_velocity(before, left * before, DT, VOXEL)
     assert np.abs(voxels_a_frame(found)).max() < 0.05
-    assert found.figures["thinning"] == pytest.approx(1 - left, abs=0.01)
+    assert found.figures["dissipation"] == pytest.approx(1 - left, abs=0.01)
 
 
 @pytest.mark.parametrize("left", [0.8, 0.9, 0.95])
-def test_thinning_smoke_moves_at_its_own_speed(left):
+def test_dissolving_smoke_moves_at_its_own_speed(left):
     motion = np.array((0.3, -0.2, 1.0))
     before, after = moved(motion)
     found, steady = (estimate_velocity(before, share * after, DT, VOXEL) for share in (left, 1))
     assert mean_motion(found, after) == pytest.approx(motion, abs=0.25)
     assert error(found, after, motion) < error(steady, after, motion) + 0.15
-    assert 0 < found.figures["thinning"] < 1.2 * (1 - left)
+    assert 0 < found.figures["dissipation"] < 1.2 * (1 - left)
 
 
 # compression

@@ -9,7 +9,7 @@ with g and s as in `smokelift.velocity`. Source: Cen, Zhang, Liang (2023), Entro
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -44,7 +44,7 @@ class PaperVelocity:
     kinetic: float = 0.003
     blur: float = 0.5
     smoke_threshold: float = 0.01
-    solver: Solver = PrimalDual()
+    solver: Solver = field(default_factory=PrimalDual)
 
     def estimate(
         self,

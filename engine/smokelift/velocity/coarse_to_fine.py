@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -36,7 +36,7 @@ CONFIDENCE_WIDTH = 2.0
 class CoarseToFine:
     """The default estimator (a `VelocityEstimator`); see `smokelift.velocity` for the function that it minimises."""
 
-    settings: VelocitySettings = VelocitySettings()
+    settings: VelocitySettings = field(default_factory=VelocitySettings)
 
     def estimate(
         self,

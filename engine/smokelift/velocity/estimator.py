@@ -155,7 +155,8 @@ def motion_weight(shape: tuple[int, ...], inflow: Mask | None) -> Array:
     if inflow is None:
         return np.broadcast_to(np.float32(1), shape)
     # blur and gradients take the change there one voxel further
-    return (~ndimage.binary_dilation(inflow)).astype(np.float32)
+    weight: Array = (~ndimage.binary_dilation(inflow)).astype(np.float32)
+    return weight
 
 
 def _density(name: str, values: Density) -> Array:

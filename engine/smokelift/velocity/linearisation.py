@@ -73,7 +73,9 @@ class Regularisation:
     irrotational: float = 0.0
 
 
-def linearise(level: Level, u: StaggeredGrid, threshold: float, sources: SourceDetection | None) -> Linearisation | None:
+def linearise(
+    level: Level, u: StaggeredGrid, threshold: float, sources: SourceDetection | None
+) -> Linearisation | None:
     """The change around `u`; None where there is no structure to follow.
 
     Parameters

@@ -7,7 +7,7 @@ them.
 
 Contrast: any function of a density is carried along just like the density, so the one to follow is free to choose.
 With the density itself the thick smoke at the base of a plume decides everything. With its power of 3/4 thin smoke
-counts as well (docs/experiments/velocity-contrast.md). Noise would count as well, so noisy densities are followed as
+counts as well (docs/experiments/velocity-weights.md). Noise would count as well, so noisy densities are followed as
 they are, and so are smooth ones.
 """
 

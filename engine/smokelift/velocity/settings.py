@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from smokelift.velocity.solver import ProjectedCG, Solver
 from smokelift.velocity.sources import SourceDetection
@@ -27,14 +27,14 @@ class VelocitySettings:
     levels
         Grids, each half as fine as the one before, for an estimate without a prediction. None takes as many as the
         motion in a clip asks for (see `smokelift.setup`), and three between two densities alone. With a prediction
-        there is one, because fine detail aliases on coarse grids (velocity-levels.md).
+        there is one, because fine detail aliases on coarse grids (velocity-pyramid.md).
     linearisations
-        Linearisations on each grid (velocity-linearisations.md).
+        Linearisations on each grid (velocity-pyramid.md).
     large_grid
-        Voxels. A finest grid of more is linearised once, which costs a third less time (velocity-linearisations.md).
+        Voxels. A finest grid of more is linearised once, which costs a third less time (velocity-pyramid.md).
     small_step
         Voxels a frame, root mean square in the smoke. A solve that changes a prediction by less is not linearised
-        around again (velocity-linearisations.md).
+        around again (velocity-pyramid.md).
     largest_increment
         Voxels of the grid at hand. A linearisation of the density holds no further, so the increment is clamped.
     smoothness
@@ -46,7 +46,7 @@ class VelocitySettings:
     unexplained
         Share of the change between the densities that the prediction leaves unexplained at which `smoothness` and
         `kinetic` hold as they are. They grow in inverse proportion: the more a prediction proves right, the more it is
-        trusted (velocity-trust.md).
+        trusted (velocity-weights.md).
     least_unexplained
         Share at which that growth ends.
     worthless
@@ -70,7 +70,7 @@ class VelocitySettings:
     smooth
         The same limit for densities that are left as they are (velocity-noise.md).
     solver
-        `ProjectedCG`, or `PrimalDual`, which has the same minimum at several times the cost (velocity-solvers.md).
+        `ProjectedCG`, or `PrimalDual`, which has the same minimum at several times the cost (velocity-solver.md).
     """
 
     coarsening: int | None = None
@@ -87,12 +87,12 @@ class VelocitySettings:
     worthless: float = 0.5
     momentum: float = 0.8
     brightening: float = 0.5
-    sources: SourceDetection | None = SourceDetection()
+    sources: SourceDetection | None = field(default_factory=SourceDetection)
     smoke_threshold: float = 0.01
     blur: float = 0.5
     noise: float = 0.35
     smooth: float = 0.045
-    solver: Solver = ProjectedCG()
+    solver: Solver = field(default_factory=ProjectedCG)
 
     @property
     def grids(self) -> int:

@@ -35,7 +35,8 @@ class ProjectedCG:
     tolerance
         Stops at this fraction of the preconditioned gradient at rest.
     iterations
-        Limit for each solve. Ten are as exact against known velocities as a hundred (velocity-solvers.md).
+        Limit for each solve: ten are as exact against known velocities as a hundred
+        (docs/experiments/velocity-solver.md).
     """
 
     tolerance: float = 0.01
@@ -55,7 +56,7 @@ class PrimalDual:
     ----------
     sigma, tau, theta
         Dual step, primal step (the paper's gamma) and over-relaxation; sigma * tau <= 1. The paper gives no values:
-        velocity-solvers.md has the sweep.
+        docs/experiments/velocity-solver.md has the sweep.
     absolute_tolerance, relative_tolerance
         Stops when the change is at most sqrt(3) absolute sqrt(voxels) + relative |u|, in voxels a frame.
     iterations

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import bpy
 import pytest
-from conftest import quietly
 
 from addon import batch, volume
 from addon.take import Take
+from conftest import quietly
 from smokelift.output.sequence import Sequence
 from tests.example_shot import EXAMPLE
 
