@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from benchmarks.velocity.pairs import Pair, relative_error
 from smokelift.transport import Array, StaggeredGrid
-from smokelift.velocity import Solver, VelocitySettings, estimate_velocity
+from smokelift.velocity import PrimalDual, ProjectedCG, Solver, VelocitySettings, estimate_velocity
 from smokelift.velocity.linearisation import Linearisation, Regularisation, least_squares, linearise
 from smokelift.velocity.preparation import prepare
 from smokelift.velocity.pyramid import Level, pyramid, refine
@@ -65,3 +65,10 @@ class LinearProblem:
     def distance(self, found: Array, optimum: Array) -> float:
         """Relative L2 distance in the smoke and around it."""
         return relative_error(found, optimum, self.counted)
+
+
+def endless(name: str, iterations: int) -> Solver:
+    """The solver of a name that nothing stops but its iterations."""
+    if name == "projected-cg":
+        return ProjectedCG(tolerance=0.0, iterations=iterations)
+    return PrimalDual(absolute_tolerance=0.0, relative_tolerance=0.0, iterations=iterations)

@@ -21,11 +21,11 @@ import numpy as np
 from benchmarks import machine
 from benchmarks.tables import size_text
 from benchmarks.velocity.flow import built_in_pair
-from benchmarks.velocity.linear import LinearProblem
+from benchmarks.velocity.linear import LinearProblem, endless
 from benchmarks.velocity.pairs import Pair, frames_for_pairs, pair_of_truth, relative_error
 from smokelift.baselines.velocity import PaperVelocity
 from smokelift.evaluation.truth import Truth
-from smokelift.velocity import CoarseToFine, PrimalDual, ProjectedCG, Solver, VelocityEstimator, VelocitySettings
+from smokelift.velocity import CoarseToFine, PrimalDual, ProjectedCG, VelocityEstimator, VelocitySettings
 
 Shape = tuple[int, int, int]
 Made = TypeVar("Made")
@@ -234,21 +234,14 @@ def _steps(pair: Pair, plan: Plan, clock: _Clock, say: Say) -> tuple[float, list
     """How far from the optimum the solvers begin, and where they are after some iterations."""
     problem = LinearProblem.of_pair(pair)
     say("  the linear problem's optimum")
-    optimum = problem.solve(_endless("projected-cg", plan.reference))
+    optimum = problem.solve(endless("projected-cg", plan.reference))
     steps = []
     for name, counts in plan.steps.items():
         for count in counts:
-            seconds, solves, found = clock.time(partial(problem.solve, _endless(name, count)))
+            seconds, solves, found = clock.time(partial(problem.solve, endless(name, count)))
             steps.append(Step(name, count, problem.distance(found, optimum), seconds, solves))
             say(f"  {name}, {count}: {100 * steps[-1].distance:.2g} % from the optimum, {solves:.0f} solves")
     return problem.distance(problem.start.centres(), optimum), steps
-
-
-def _endless(name: str, iterations: int) -> Solver:
-    """The solver of a name that nothing stops but its iterations."""
-    if name == "projected-cg":
-        return ProjectedCG(tolerance=0.0, iterations=iterations)
-    return PrimalDual(absolute_tolerance=0.0, relative_tolerance=0.0, iterations=iterations)
 
 
 def _estimates(pairs: Sequence[Pair], plan: Plan, clock: _Clock, say: Say) -> list[Estimate]:
