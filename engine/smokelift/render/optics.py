@@ -65,7 +65,7 @@ def scene_optics(scene: CompleteScene) -> Optics:
         if isinstance(light, EnvironmentLight):
             lights += _environment(light, scene.camera.at(0), scene.domain, scene.medium)
         else:
-            lights.append(light)
+            lights += light.samples()
     return Optics(scene.domain, scene.medium, tuple(lights), scene.scattering)
 
 

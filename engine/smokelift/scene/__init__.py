@@ -11,7 +11,9 @@ from smokelift.scene.complete import CompleteScene, completed
 from smokelift.scene.description import Scene
 from smokelift.scene.dictionary import scene_from_dict, scene_to_dict
 from smokelift.scene.domain import SIDES, Domain, Inlet, Side
-from smokelift.scene.lights import DirectionalLight, EnvironmentLight, Light, PointLight
+from smokelift.scene.environment_light import EnvironmentLight
+from smokelift.scene.finite_lights import DirectionalLight, FiniteLight, PointLight, SampledLight
+from smokelift.scene.lights import Light
 from smokelift.scene.medium import SCATTERINGS, Medium, Scattering
 from smokelift.scene.view import View
 
@@ -25,11 +27,13 @@ __all__ = [
     "DirectionalLight",
     "Domain",
     "EnvironmentLight",
+    "FiniteLight",
     "Inlet",
     "Light",
     "Matrix",
     "Medium",
     "PointLight",
+    "SampledLight",
     "Scattering",
     "Scene",
     "SceneError",

@@ -21,7 +21,9 @@ from smokelift.scene.camera import Camera
 from smokelift.scene.checks import SceneError, set_fields, shown
 from smokelift.scene.clip_source import ClipSource
 from smokelift.scene.domain import Domain, Inlet, Side, checked_sides, inflow
-from smokelift.scene.lights import Light, PointLight
+from smokelift.scene.environment_light import EnvironmentLight
+from smokelift.scene.finite_lights import PointLight
+from smokelift.scene.lights import Light
 from smokelift.scene.medium import Medium, Scattering, checked_scattering
 from smokelift.scene.projection import sees
 from smokelift.scene.reading import read_file
@@ -79,12 +81,13 @@ class Scene:
                     table=f"inlet.{index}",
                 )
         for index, light in enumerate(self.lights):
-            if isinstance(light, PointLight) and domain.contains(light.position):
-                raise SceneError(
-                    f"position {shown(list(light.position))} is inside the domain; it must be outside",
-                    key="position",
-                    table=f"lights.{index}",
-                )
+            for sample in () if isinstance(light, EnvironmentLight) else light.samples():
+                if isinstance(sample, PointLight) and domain.contains(sample.position):
+                    raise SceneError(
+                        f"position {shown(list(sample.position))} is inside the domain; it must be outside",
+                        key="position",
+                        table=f"lights.{index}",
+                    )
         cameras = {f"views.{index}.camera": view.camera for index, view in enumerate(self.views)}
         if self.camera is not None:
             cameras = {"camera": self.camera, **cameras}

@@ -14,28 +14,22 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import MISSING, dataclass, fields
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args, get_type_hints
 
 from smokelift.scene.background import Background
 from smokelift.scene.camera import Camera, focal_length, look_at_matrix, picture_size
 from smokelift.scene.checks import SceneError, number, one_of, shown, unexpected
 from smokelift.scene.clip_source import ClipSource
 from smokelift.scene.domain import Domain, Inlet
-from smokelift.scene.lights import DirectionalLight, EnvironmentLight, Light, PointLight
+from smokelift.scene.lights import LIGHT_TYPES, Light
 from smokelift.scene.medium import Medium
 from smokelift.scene.toml_lines import Place, find_lines
 from smokelift.scene.view import View
 
 Table = Mapping[str, Any]
 Described = TypeVar("Described")
-
-_LIGHT_KEYS = {
-    "directional": ("direction", "irradiance"),
-    "point": ("position", "intensity"),
-    "environment": ("image", "rotation_degrees", "strength", "directions"),
-}
 
 
 def read_file(path: Path, build: Callable[..., Described]) -> Described:
@@ -81,21 +75,20 @@ class _Reader:
 
     def scene(self, data: Table, build: Callable[..., Described]) -> Described:
         readers: dict[str, Callable[[Place, Any], Any]] = {
-            "clip": self._table(self._clip),
+            "clip": self._table(self._part(ClipSource)),
             "camera": self._table(self._camera),
-            "domain": self._table(self._domain),
-            "inlet": self._tables(self._inlet),
-            "medium": self._table(self._medium),
+            "domain": self._table(self._part(Domain, "closed")),
+            "inlet": self._tables(self._part(Inlet)),
+            "medium": self._table(self._part(Medium, "scattering")),
             "lights": self._tables(self._light),
-            "background": self._table(self._background),
+            "background": self._table(self._part(Background)),
             "views": self._tables(self._view),
         }
         self._known((), data, tuple(readers))
         parts = {name: readers[name]((name,), value) for name, value in data.items()}
-        if "domain" in parts:
-            parts["domain"], parts["closed"] = parts["domain"]
-        if "medium" in parts:
-            parts["medium"], parts["scattering"] = parts["medium"]
+        for table, key in (("domain", "closed"), ("medium", "scattering")):
+            if key in data.get(table, {}):
+                parts[key] = data[table][key]
         if "inlet" in parts:
             parts["inlets"] = parts.pop("inlet")
         try:
@@ -145,64 +138,43 @@ class _Reader:
 
         return read
 
-    def _with_path(self, data: Table, key: str) -> dict[str, Any]:
-        """Return the table with the path under ``key`` made absolute."""
-        if isinstance(data.get(key), str) and data[key]:
-            return {**data, key: self.base / data[key]}
-        return dict(data)
+    def _part(self, kind: type[Any], *beside: str) -> Callable[[Place, Table], Any]:
+        """Return a reader of a dataclass whose fields are the keys of its table.
 
-    def _clip(self, place: Place, data: Table) -> ClipSource:
-        self._known(place, data, ("path", "fps", "frames", "transfer"))
-        _require(data, "path")
-        return ClipSource(**self._with_path(data, "path"))
+        Parameters
+        ----------
+        kind
+            The dataclass. A field without a default has to be given; a path is relative to the file.
+        beside
+            Further keys, which are no fields of it. A table that holds nothing else leaves the part open.
+        """
 
-    def _domain(self, place: Place, data: Table) -> tuple[Domain | None, Any]:
-        """Read the box and its walls."""
-        keys = ("min", "max", "resolution")
-        self._known(place, data, (*keys, "closed"))
-        box = {key: value for key, value in data.items() if key != "closed"}
-        closed = data.get("closed", ())
-        if not box and "closed" in data:
-            return None, closed
-        _require(data, *keys)
-        return Domain(**box), closed
+        def read(place: Place, data: Table) -> Any:
+            self._known(place, data, (*(each.name for each in fields(kind)), *beside))
+            values = {key: value for key, value in data.items() if key not in beside}
+            if data and not values:
+                return None
+            _require(values, *(each.name for each in fields(kind) if each.default is MISSING))
+            for key, hint in get_type_hints(kind).items():
+                if Path in (hint, *get_args(hint)) and isinstance(values.get(key), str) and values[key]:
+                    values[key] = self.base / values[key]
+            return kind(**values)
 
-    def _inlet(self, place: Place, data: Table) -> Inlet:
-        keys = ("centre", "radius")
-        self._known(place, data, keys)
-        _require(data, *keys)
-        return Inlet(**data)
-
-    def _medium(self, place: Place, data: Table) -> tuple[Medium | None, Any]:
-        """Read the medium and how it scatters light."""
-        self._known(place, data, ("extinction", "albedo", "anisotropy", "scattering"))
-        properties = {key: value for key, value in data.items() if key != "scattering"}
-        if not properties and "scattering" in data:
-            return None, data["scattering"]
-        return Medium(**properties), data.get("scattering")
-
-    def _background(self, place: Place, data: Table) -> Background:
-        self._known(place, data, ("color", "image"))
-        return Background(**self._with_path(data, "image"))
+        return read
 
     def _light(self, place: Place, data: Table) -> Light:
         _require(data, "type")
-        kind = data["type"]
-        if not isinstance(kind, str) or kind not in _LIGHT_KEYS:
-            raise unexpected(kind, "type", f"one of {one_of(_LIGHT_KEYS)}")
-        values = {key: value for key, value in data.items() if key != "type"}
-        self._known(place, values, _LIGHT_KEYS[kind])
-        if kind == "environment":
-            _require(data, "image")
-            return EnvironmentLight(**self._with_path(values, "image"))
-        _require(data, *_LIGHT_KEYS[kind])
-        return DirectionalLight(**values) if kind == "directional" else PointLight(**values)
+        name = data["type"]
+        if not isinstance(name, str) or name not in LIGHT_TYPES:
+            raise unexpected(name, "type", f"one of {one_of(LIGHT_TYPES)}")
+        light: Light = self._part(LIGHT_TYPES[name])(place, {key: data[key] for key in data if key != "type"})
+        return light
 
     def _view(self, place: Place, data: Table) -> View:
         readers: dict[str, Callable[[Place, Table], Any]] = {
             "camera": self._camera,
-            "clip": self._clip,
-            "background": self._background,
+            "clip": self._part(ClipSource),
+            "background": self._part(Background),
         }
         self._known(place, data, tuple(readers))
         _require(data, "camera", "clip")

@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import tomli_w
 
-from smokelift.scene.background import Background
 from smokelift.scene.camera import Camera
-from smokelift.scene.clip_source import ClipSource
-from smokelift.scene.domain import Domain, Inlet, Side
-from smokelift.scene.lights import DirectionalLight, EnvironmentLight, Light, PointLight
-from smokelift.scene.medium import Medium, Scattering
-from smokelift.scene.view import View
+from smokelift.scene.lights import LIGHT_TYPES
 
 Table = dict[str, Any]
-Part = TypeVar("Part")
+_LIGHT_NAMES = {kind: name for name, kind in LIGHT_TYPES.items()}
 
 
 def write_file(parts: Mapping[str, Any], path: Path) -> None:
@@ -50,25 +46,40 @@ def to_tables(parts: Mapping[str, Any], base: Path | None) -> Table:
     base
         Paths below this folder become relative to it, all others absolute.
     """
-    tables = {
-        "clip": _optional(parts["clip"], lambda clip: _clip(clip, base)),
-        "camera": _optional(parts["camera"], _camera),
-        "domain": _domain(parts["domain"], parts["closed"]),
-        "inlet": [_inlet(inlet) for inlet in parts["inlets"]] or None,
-        "medium": _medium(parts["medium"], parts["scattering"]),
-        "lights": [_light(light, base) for light in parts["lights"]] or None,
-        "background": _optional(parts["background"], lambda background: _background(background, base)),
-        "views": [_view(view, base) for view in parts["views"]] or None,
+    tables: Table = {
+        "clip": _table(parts["clip"], base),
+        "camera": _table(parts["camera"], base),
+        "domain": _table(parts["domain"], base, closed=parts["closed"]),
+        "inlet": [_table(inlet, base) for inlet in parts["inlets"]] or None,
+        "medium": _table(parts["medium"], base, scattering=parts["scattering"]),
+        "lights": [_table(light, base) for light in parts["lights"]] or None,
+        "background": _table(parts["background"], base),
+        "views": [_table(view, base) for view in parts["views"]] or None,
     }
-    return _without_none(tables)
+    return {name: table for name, table in tables.items() if table is not None}
 
 
-def _optional(part: Part | None, table: Callable[[Part], Table]) -> Table | None:
-    return None if part is None else table(part)
+def _table(part: Any, base: Path | None, **beside: Any) -> Table | None:
+    """Return the fields of a part that have a value, and what stands beside them in its table.
+
+    The part may be None, and there is no table if nothing stands beside it either.
+    """
+    values = {} if part is None else {each.name: getattr(part, each.name) for each in fields(part)}
+    if type(part) in _LIGHT_NAMES:
+        values = {"type": _LIGHT_NAMES[type(part)], **values}
+    if isinstance(part, Camera) and part.moves:
+        del values["matrix"]  # the first of its matrices
+    table = {key: _plain(value, base) for key, value in {**values, **beside}.items() if value not in (None, ())}
+    return None if part is None and not table else table
 
 
-def _without_none(table: Table) -> Table:
-    return {key: value for key, value in table.items() if value is not None}
+def _plain(value: Any, base: Path | None) -> Any:
+    """Return a value as TOML and JSON know it."""
+    if isinstance(value, tuple):
+        return [_plain(item, base) for item in value]
+    if isinstance(value, Path):
+        return _path(value, base)
+    return _table(value, base) if is_dataclass(value) else value
 
 
 def _path(path: Path, base: Path | None) -> str:
@@ -76,78 +87,3 @@ def _path(path: Path, base: Path | None) -> str:
     if base is not None and whole.is_relative_to(base):
         whole = whole.relative_to(base)
     return whole.as_posix()
-
-
-def _clip(clip: ClipSource, base: Path | None) -> Table:
-    frames = None if clip.frames is None else list(clip.frames)
-    return _without_none({"path": _path(clip.path, base), "fps": clip.fps, "frames": frames, "transfer": clip.transfer})
-
-
-def _camera(camera: Camera) -> Table:
-    matrices = [[list(row) for row in matrix] for matrix in camera.matrices or (camera.matrix,)]
-    return {
-        "type": camera.type,
-        **({"matrices": matrices} if camera.moves else {"matrix": matrices[0]}),
-        "fx": camera.fx,
-        "fy": camera.fy,
-        "cx": camera.cx,
-        "cy": camera.cy,
-        "size": list(camera.size),
-    }
-
-
-def _domain(domain: Domain | None, closed: tuple[Side, ...]) -> Table | None:
-    """Return the box and its walls; walls alone are those of the box that will be found."""
-    table: Table = {}
-    if domain is not None:
-        table = {"min": list(domain.min), "max": list(domain.max), "resolution": list(domain.resolution)}
-    if closed:
-        table["closed"] = list(closed)
-    return table or None
-
-
-def _inlet(inlet: Inlet) -> Table:
-    return {"centre": list(inlet.centre), "radius": inlet.radius}
-
-
-def _medium(medium: Medium | None, scattering: Scattering | None) -> Table | None:
-    """Return the medium and how it scatters light; scattering alone is that of the medium that will be found."""
-    table: Table = {}
-    if medium is not None:
-        table = {"extinction": medium.extinction, "albedo": medium.albedo, "anisotropy": medium.anisotropy}
-    if scattering is not None:
-        table["scattering"] = scattering
-    return table or None
-
-
-def _light(light: Light, base: Path | None) -> Table:
-    match light:
-        case DirectionalLight():
-            return {
-                "type": "directional",
-                "direction": list(light.direction),
-                "irradiance": list(light.irradiance),
-            }
-        case PointLight():
-            return {"type": "point", "position": list(light.position), "intensity": list(light.intensity)}
-        case EnvironmentLight():
-            return _without_none(
-                {
-                    "type": "environment",
-                    "image": _path(light.image, base),
-                    "rotation_degrees": light.rotation_degrees,
-                    "strength": light.strength,
-                    "directions": light.directions,
-                }
-            )
-
-
-def _background(background: Background, base: Path | None) -> Table:
-    color = None if background.color is None else list(background.color)
-    image = None if background.image is None else _path(background.image, base)
-    return _without_none({"color": color, "image": image})
-
-
-def _view(view: View, base: Path | None) -> Table:
-    background = _optional(view.background, lambda background: _background(background, base))
-    return _without_none({"camera": _camera(view.camera), "clip": _clip(view.clip, base), "background": background})

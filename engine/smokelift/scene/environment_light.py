@@ -1,0 +1,32 @@
+"""Light from all around, as a picture gives it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from smokelift.scene.checks import file_path, integer, number, set_fields, unexpected
+
+
+@dataclass(frozen=True)
+class EnvironmentLight:
+    """Light from an equirectangular picture (.exr, .hdr), turned about Z, scaled by ``strength``.
+
+    ``directions`` is the number of parallel lights that stand for it; None takes as many as the smoke needs.
+    """
+
+    image: Path
+    rotation_degrees: float = 0.0
+    strength: float = 1.0
+    directions: int | None = None
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        image = file_path(self.image, "image")
+        if image.suffix.lower() not in (".exr", ".hdr"):
+            raise unexpected(str(image), "image", "an .exr or .hdr file")
+        strength = number(self.strength, "strength", "a number not below 0", lambda v: v >= 0.0)
+        rotation = number(self.rotation_degrees, "rotation_degrees")
+        set_fields(self, image=image, rotation_degrees=rotation, strength=strength)
+        if self.directions is not None:
+            set_fields(self, directions=integer(self.directions, "directions", "a whole number from 1", least=1))

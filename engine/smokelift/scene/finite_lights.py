@@ -1,0 +1,61 @@
+"""The lights that a renderer takes as they are: parallel light, and light from a point."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+from smokelift.scene.checks import SceneError, Vector, colour, set_fields, vector
+
+
+@dataclass(frozen=True)
+class DirectionalLight:
+    """Parallel light; ``direction`` is the direction of travel, ``irradiance`` in W/m^2 per channel."""
+
+    direction: Vector
+    irradiance: Vector
+
+    def __post_init__(self) -> None:
+        """Check the values and make the direction a unit vector."""
+        direction = vector(self.direction, "direction")
+        length = math.hypot(*direction)
+        if length == 0.0:
+            raise SceneError("direction must not be [0, 0, 0]", key="direction")
+        # What is a unit vector already stays as it is: a saved scene must come back the same.
+        if abs(length - 1.0) > 1e-12:
+            x, y, z = direction
+            direction = (x / length, y / length, z / length)
+        set_fields(self, direction=direction, irradiance=colour(self.irradiance, "irradiance"))
+
+    def samples(self) -> tuple[FiniteLight, ...]:
+        """Return the light itself; see `SampledLight`."""
+        return (self,)
+
+
+@dataclass(frozen=True)
+class PointLight:
+    """Light from a point; ``intensity`` in W/sr per channel."""
+
+    position: Vector
+    intensity: Vector
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        set_fields(self, position=vector(self.position, "position"), intensity=colour(self.intensity, "intensity"))
+
+    def samples(self) -> tuple[FiniteLight, ...]:
+        """Return the light itself; see `SampledLight`."""
+        return (self,)
+
+
+FiniteLight = DirectionalLight | PointLight
+"""What one sweep through the voxels can do."""
+
+
+class SampledLight(Protocol):
+    """A light for which finitely many simple ones stand, whatever the camera and the smoke."""
+
+    def samples(self) -> tuple[FiniteLight, ...]:
+        """Return the simple lights."""
+        ...
