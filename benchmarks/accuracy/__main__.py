@@ -36,7 +36,8 @@ from smokelift.evaluation import metrics
 from smokelift.evaluation.scores import PictureScore, VolumeScore, eight_bit_values, finite_mean
 from smokelift.evaluation.truth import Truth
 from smokelift.footage.images import area_average
-from smokelift.output import pictures
+from smokelift.output.images import eight_bit
+from smokelift.output.sheet import write_sheet
 from smokelift.render import Renderer, scene_renderer
 from smokelift.scene import completed
 from smokelift.scene.projection import project, ray_through_pixels
@@ -332,10 +333,10 @@ def contact_sheet(
             for view in subject.cameras
             for image in (subject.seen(view, last[0]), *(pictured[run][view] for run in shown))
         ]
-        rows.append([pictures.eight_bit(area_average(tile, *half)) for tile in tiles])
+        rows.append([eight_bit(area_average(tile, *half)) for tile in tiles])
     titles = [f"{view}: {what}" for view in subjects[0].cameras for what in ("truth", *shown)]
     labels = [f"{subject.name}, frame {subject.scored[-1]}" for subject in subjects]
-    pictures.sheet(rows, titles, labels).save(path)
+    write_sheet(path, rows, titles, labels)
 
 
 def main() -> None:

@@ -28,7 +28,8 @@ from smokelift.evaluation.metrics import psnr
 from smokelift.evaluation.scores import resampled
 from smokelift.evaluation.truth import Truth
 from smokelift.footage.images import area_average
-from smokelift.output import pictures
+from smokelift.output.images import eight_bit
+from smokelift.output.sheet import write_sheet
 from smokelift.render import scene_renderer
 from smokelift.scene import EnvironmentLight, completed
 from smokelift.setup.shot import Shot, prepare_shot
@@ -212,7 +213,7 @@ def main() -> None:
         rows.append(row)
         small = [area_average(tile, 192, round(192 * tile.shape[0] / tile.shape[1])) for tile in tiles]
         gain = max(1.0, SHOWN / float(small[0].max()))  # a haze would be black
-        sheet.append([pictures.eight_bit(gain * np.maximum(tile, 0)) for tile in small])
+        sheet.append([eight_bit(gain * np.maximum(tile, 0)) for tile in small])
         print(line(row), flush=True)
         (options.out / "selection.json").write_text(json.dumps(rows, indent=1) + "\n")
     head = [
@@ -233,7 +234,7 @@ def main() -> None:
     full = [row for row in sheet if len(row) == len(titles)]
     if full:
         labels = [row["clip"] for row, tiles in zip(rows, sheet, strict=True) if len(tiles) == len(titles)]
-        pictures.sheet(full, titles, labels).save(options.out / "selection.png")
+        write_sheet(options.out / "selection.png", full, titles, labels)
 
 
 def line(row: dict[str, Any]) -> str:

@@ -24,9 +24,9 @@ from smokelift.density.hull import project_voxels
 from smokelift.density.initial import first_guess
 from smokelift.density.light import refine_axis
 from smokelift.footage.clip import Clip
-from smokelift.output.sequence import SequenceWriter
+from smokelift.output.writer import SequenceWriter
 from smokelift.render.renderer import Image, Volume
-from smokelift.scene import Domain, Scene
+from smokelift.scene import Domain, Scene, completed
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot, prepare_shot
 from smokelift.transport import Array, ResidualMeans, Velocity, advect
@@ -115,7 +115,7 @@ def reconstruct(
         return
     with SequenceWriter(
         out,
-        shot.scene,
+        completed(replace(shot.scene, scattering=shot.scattering)),
         settings.as_dict(),
         npz=npz,
         resume=resume,

@@ -23,11 +23,12 @@ from smokelift.app import memory
 from smokelift.app.cli import main
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import read_image
-from smokelift.output import pictures
+from smokelift.output.images import eight_bit
 from smokelift.output.sequence import Sequence
 from smokelift.output.vdb import VdbUnavailable, vdb_module
+from smokelift.output.video import write_video
 from smokelift.render import device, render
-from smokelift.scene import Camera, Inlet, Scene, orbit
+from smokelift.scene import Camera, Inlet, Scene, completed, orbit
 
 MODULE = [sys.executable, "-m", "smokelift"]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(Path(smokelift.__file__).parents[1])}
@@ -112,7 +113,7 @@ def test_reconstruct_writes_a_sequence(finished, plume) -> None:
     sequence = Sequence.open(finished)
     assert sequence.complete
     assert sequence.frames == (1, 2, 3, 4, 5)
-    assert sequence.scene == plume.scene
+    assert sequence.scene == completed(plume.scene)
     assert {f"smoke_000{n}.npz" for n in range(1, 6)} <= set(names(finished))
     assert all(sequence.figures(n)["psnr"] >= 35 for n in sequence.frames)
 
@@ -524,8 +525,8 @@ def test_render_another_view_as_png(finished, plume, tmp_path, word, yaw, pitch)
     path = tmp_path / "a.png"
     assert command("render", finished, "--frame", 3, f"--camera={word}", "--out", path) == 0
     camera = orbit(plume.scene.camera, plume.scene.domain, yaw, pitch)
-    wanted = pictures.eight_bit(render(Sequence.open(finished).density(3), plume.scene, camera))
-    found = pictures.eight_bit(read_image(path))
+    wanted = eight_bit(render(Sequence.open(finished).density(3), plume.scene, camera))
+    found = eight_bit(read_image(path))
     assert np.abs(found.astype(int) - wanted).max() <= 1
     assert found.max() > 50
 
@@ -551,7 +552,7 @@ def test_render_a_video(finished, tmp_path) -> None:
 def test_a_video_has_the_rate_of_its_clip(plume, tmp_path) -> None:
     """Also where only the video file itself says it."""
     frames = [render(density, plume.scene) for density in plume.densities[:3]]
-    pictures.write_video(tmp_path / "clip.mp4", frames, 12.0)
+    write_video(tmp_path / "clip.mp4", frames, 12.0)
     out = tmp_path / "out"
     arguments = ("--npz", "--resolution", "16,16,24", *QUICK)
     assert command("reconstruct", tmp_path / "clip.mp4", "--out", out, *arguments) == 0
@@ -634,9 +635,8 @@ def test_preview_writes_sheet_and_video(finished, tmp_path, capsys) -> None:
         assert len(clip) == 5
 
 
-def test_preview_stands_beside_the_sequence(finished) -> None:
-    """By default in the folder that holds the sequence, never among its frames."""
+def test_preview_lies_in_the_sequence(finished) -> None:
+    """By default; the sequence can still be resumed, and two in one folder do not overwrite each other's."""
     before = names(finished)
     assert command("preview", finished) == 0
-    assert names(finished) == before
-    assert {"contact_sheet.png", "preview.mp4"} <= set(names(finished.parent))
+    assert names(finished) == sorted([*before, "contact_sheet.png", "preview.mp4"])

@@ -12,7 +12,7 @@ from PIL import Image
 
 from smokelift.app.cli import main
 from smokelift.output.images import write_image
-from smokelift.output.sequence import SequenceWriter
+from smokelift.output.writer import SequenceWriter
 from smokelift.render import render
 from smokelift.scene import Background, ClipSource, Domain, Scene, orbit
 from smokelift.transport import Velocity

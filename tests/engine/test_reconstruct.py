@@ -16,7 +16,8 @@ from smokelift.density.screen import view_frame
 from smokelift.evaluation.metrics import psnr
 from smokelift.footage.clip import Clip
 from smokelift.output.images import write_image
-from smokelift.output.sequence import Sequence, SequenceError
+from smokelift.output.index import SequenceError
+from smokelift.output.sequence import Sequence
 from smokelift.output.vdb import VdbUnavailable, read_vdb, vdb_module
 from smokelift.pipeline import Frame, reconstruct, smoke_axis
 from smokelift.render import render, scene_renderer

@@ -18,6 +18,9 @@ from pathlib import Path
 from types import FrameType
 from typing import Literal
 
+import numpy as np
+from PIL import Image as Pillow
+
 from smokelift.app.doctor import report
 from smokelift.app.forecast import forecast
 from smokelift.app.memory import require_memory
@@ -25,16 +28,19 @@ from smokelift.app.progress import Reporter, reporter
 from smokelift.evaluation import charts
 from smokelift.evaluation.compare import evaluate
 from smokelift.footage.clip import Clip
-from smokelift.output import pictures
-from smokelift.output.files import atomic_path
-from smokelift.output.images import write_image
+from smokelift.output.atomic import atomic_path
+from smokelift.output.images import eight_bit, write_image
+from smokelift.output.layout import CONTACT_SHEET, PREVIEW
+from smokelift.output.preview import write_contact_sheet, write_preview
 from smokelift.output.sequence import Sequence
 from smokelift.output.vdb import VdbUnavailable
-from smokelift.pipeline import reconstruct
-from smokelift.render import DeviceError, device
-from smokelift.scene import ClipSource, Scene, scene_to_dict
+from smokelift.output.video import VIDEO_KINDS, write_video
+from smokelift.output.viewer import Viewer
+from smokelift.pipeline import Frame, reconstruct
+from smokelift.render import DeviceError, device, scene_renderer
+from smokelift.scene import Camera, ClipSource, CompleteScene, Scene, completed, orbit, scene_to_dict
 from smokelift.setup.settings import METHODS, QUALITIES, Settings
-from smokelift.setup.shot import boundaries, prepare_shot
+from smokelift.setup.shot import Shot, boundaries, prepare_shot
 
 DONE, BAD_INPUT, NO_DEVICE, CANCELLED = 0, 2, 3, 130
 
@@ -91,7 +97,7 @@ def _reconstruct(options: argparse.Namespace, say: Reporter) -> None:
             say.start(len(clip), first.number - 1)
             for frame in itertools.chain([first], frames):
                 if options.thumbnail:
-                    pictures.write_thumbnail(options.thumbnail, clip, shot, frame)
+                    _write_thumbnail(options.thumbnail, clip, shot, frame)
                 say.frame(frame.number, frame.figures)
     sequence = Sequence.open(options.out)
     if not any((sequence.figures(number).get("hull_share") or 0) > 0 for number in sequence.frames):
@@ -104,6 +110,19 @@ def _reconstruct(options: argparse.Namespace, say: Reporter) -> None:
         f"{len(sequence.frames)} frames in {options.out} ({seconds:.0f} s).",
         {"directory": str(options.out), "frames": len(sequence.frames), "seconds": round(seconds, 1)},
     )
+
+
+def _write_thumbnail(path: Path, clip: Clip, shot: Shot, frame: Frame) -> None:
+    """Write the part of a frame that the grid is fitted to, beside its reconstruction (or above, if wide), as a PNG."""
+    now = shot.at(frame.number - 1)
+    if now is None:  # nothing of the domain is in this frame's picture: the picture of the last one stays
+        return
+    seen = now.working.cut(clip.frame(frame.number - 1))
+    scene = completed(replace(now.small_scene, scattering=now.scattering))
+    found = scene_renderer(scene, background=now.plate.image).image(frame.density)
+    both = np.concatenate([seen, found], 0 if seen.shape[1] > seen.shape[0] else 1)
+    with atomic_path(path) as aside:
+        Pillow.fromarray(eight_bit(both)).save(aside, format="PNG")
 
 
 def _inspect(options: argparse.Namespace, say: Reporter) -> None:
@@ -133,18 +152,18 @@ def _inspect(options: argparse.Namespace, say: Reporter) -> None:
 
 def _render(options: argparse.Namespace, say: Reporter) -> None:
     sequence = Sequence.open(options.directory)
-    viewer = _viewer(options.camera, sequence)
+    viewer = Viewer(sequence.scene, _camera(options.camera, sequence.scene))
     suffix = options.out.suffix.lower()
-    if suffix not in (".exr", ".png", *pictures.VIDEO_KINDS):
-        raise ValueError(f"{options.out}: write an image (.exr, .png) or a video ({', '.join(pictures.VIDEO_KINDS)}).")
+    if suffix not in (".exr", ".png", *VIDEO_KINDS):
+        raise ValueError(f"{options.out}: write an image (.exr, .png) or a video ({', '.join(VIDEO_KINDS)}).")
     if not sequence.frames:
         raise ValueError(f"{options.directory}: there are no finished frames to render yet.")
     _require_folder(options.out)
     device.start(options.device)
-    if suffix in pictures.VIDEO_KINDS:
+    if suffix in VIDEO_KINDS:
         numbers = sequence.frames if options.frame is None else (options.frame,)
         fps = sequence.scene.clip.fps if sequence.scene.clip and sequence.scene.clip.fps else 24.0
-        pictures.write_video(options.out, (viewer.image(n, sequence.density(n)) for n in numbers), fps)
+        write_video(options.out, (viewer.image(n, sequence.density(n)) for n in numbers), fps)
     else:
         number = sequence.frames[0] if options.frame is None else options.frame
         write_image(options.out, viewer.image(number, sequence.density(number)))
@@ -156,15 +175,13 @@ def _preview(options: argparse.Namespace, say: Reporter) -> None:
     if sequence.scene.clip is None or not sequence.frames:
         raise ValueError(f"{options.directory}: there are no finished frames of a clip to show yet.")
     device.start(options.device)
-    out = options.out or sequence.directory.parent
+    out = options.out or sequence.directory
     out.mkdir(parents=True, exist_ok=True)
+    sheet, video = out / CONTACT_SHEET, out / PREVIEW
     with Clip.open(sequence.scene.clip) as clip:
-        pictures.write_contact_sheet(out / "contact_sheet.png", sequence, clip)
-        pictures.write_preview(out / "preview.mp4", sequence, clip)
-    say.finish(
-        f"{out / 'contact_sheet.png'} and {out / 'preview.mp4'} written.",
-        {"files": [str(out / "contact_sheet.png"), str(out / "preview.mp4")]},
-    )
+        write_contact_sheet(sheet, sequence, clip)
+        write_preview(video, sequence, clip)
+    say.finish(f"{sheet} and {video} written.", {"files": [str(sheet), str(video)]})
 
 
 def _evaluate(options: argparse.Namespace, say: Reporter) -> None:
@@ -246,17 +263,17 @@ def _scene(path: Path, frames: tuple[int, int] | None) -> Scene:
     return scene if frames is None else scene.with_frames(*frames)
 
 
-def _viewer(name: str, sequence: Sequence) -> pictures.Viewer:
-    """What looks from where a word, two angles or a camera file say."""
+def _camera(name: str, scene: CompleteScene) -> Camera:
+    """The camera that a word, two angles or a camera file say."""
     if name == "front":
-        return pictures.Viewer(sequence)
+        return scene.camera
     if name == "side":
-        return pictures.Viewer(sequence, turn=(SIDE_YAW, 0.0))
+        return orbit(scene.camera, scene.domain, SIDE_YAW)
     if name.endswith(".toml"):
         camera = Scene.load(name).camera
         if camera is None:
             raise ValueError(f"{name}: has no [camera].")
-        return pictures.Viewer(sequence, camera)
+        return camera
     try:
         yaw, pitch = (float(part) for part in name.split(","))
         if not (math.isfinite(yaw) and math.isfinite(pitch)):
@@ -265,7 +282,7 @@ def _viewer(name: str, sequence: Sequence) -> pictures.Viewer:
         raise ValueError(
             f"--camera {name}: expected front, side, two angles YAW,PITCH in degrees, or a camera.toml."
         ) from None
-    return pictures.Viewer(sequence, turn=(yaw, pitch))
+    return orbit(scene.camera, scene.domain, yaw, pitch)
 
 
 def _resolution(text: str) -> tuple[int, int, int] | Literal["auto"]:
@@ -334,7 +351,7 @@ def _parser() -> argparse.ArgumentParser:
 
     look = commands.add_parser("preview", parents=[common], help="a contact sheet and a preview video")
     look.add_argument("directory", type=Path)
-    look.add_argument("--out", type=Path, help="directory for them; by default the one that holds the sequence")
+    look.add_argument("--out", type=Path, help="directory for them; by default the sequence's own")
 
     judge = commands.add_parser("evaluate", parents=[common], help="a sequence beside the truth, or beside other views")
     judge.add_argument("directory", type=Path)

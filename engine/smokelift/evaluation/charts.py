@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from smokelift.output.files import atomic_path
+from smokelift.output.atomic import atomic_path
 
 ERRORS = {
     "input_error": "error of the input view (RMS of sRGB values, white is 1)",

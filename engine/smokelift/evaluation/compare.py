@@ -16,12 +16,12 @@ from smokelift.evaluation.truth import Truth
 from smokelift.footage.background import background_picture, open_plates
 from smokelift.footage.clip import Clip, ClipError
 from smokelift.footage.images import area_average
-from smokelift.output import pictures
-from smokelift.output.files import atomic_path
+from smokelift.output.images import eight_bit
 from smokelift.output.sequence import Sequence
-from smokelift.render import scene_renderer
+from smokelift.output.sheet import write_sheet
+from smokelift.output.viewer import Viewer
 from smokelift.render.renderer import Image, Volume
-from smokelift.scene import Camera, Scene, completed
+from smokelift.scene import Camera, Scene
 
 LONGEST_SIDE = 480
 """Pixels of the pictures that are compared, which are larger ones' means over areas; finer than any usual grid."""
@@ -33,19 +33,19 @@ Tiles = dict[int, list[npt.NDArray[np.uint8]]]
 
 
 @dataclass(frozen=True, eq=False)
-class SeenView:
-    """What a camera saw of the smoke.
+class ReferenceView:
+    """A camera with the clip that its pictures are compared with.
 
     Attributes
     ----------
     name
         To call it by.
     camera
-        With as many pixels as the pictures are compared at.
+        With as many pixels as the pictures are compared at; where it moves, from the sequence's first frame on.
     background : (rows, columns, 3) or (3,)
         Linear radiance behind the smoke.
     clip
-        What it saw.
+        Its footage.
     first
         The clip's frame that the sequence's frame 1 belongs to.
     """
@@ -56,8 +56,8 @@ class SeenView:
     clip: Clip
     first: int
 
-    def seen(self, number: int) -> Image:
-        """The picture of the sequence's frame of a number."""
+    def picture(self, number: int) -> Image:
+        """The clip's picture of the sequence's frame of a number."""
         return area_average(self.clip.frame(self.first + number - 1), *self.camera.size)
 
 
@@ -79,9 +79,7 @@ class Evaluation:
 
     def write_picture(self, path: Path) -> None:
         """Write the tiles as a PNG."""
-        sheet = pictures.sheet(list(self.tiles.values()), self.titles, [f"frame {number}" for number in self.tiles])
-        with atomic_path(path) as aside:
-            sheet.save(aside, format="PNG")
+        write_sheet(path, list(self.tiles.values()), self.titles, [f"frame {number}" for number in self.tiles])
 
 
 def evaluate(
@@ -151,7 +149,6 @@ def _against_truth(sequence: Sequence, path: Path, tiles: Tiles) -> Figures:
 
 def _check_box(sequence: Sequence, truth: Truth, path: Path) -> None:
     domain = sequence.scene.domain
-    assert domain is not None
     box = np.array(domain.max) - np.array(domain.min)
     wanted = np.array(truth.shape) * truth.voxel_size
     if not np.allclose(box, wanted, rtol=0.01):
@@ -172,9 +169,8 @@ def _metres(size: npt.NDArray[np.float64]) -> str:
 
 def _open_views(
     sequence: Sequence, paths: tuple[tuple[Path, Path], ...], stack: ExitStack, notes: list[str]
-) -> list[SeenView]:
+) -> list[ReferenceView]:
     scene = sequence.scene
-    assert scene.camera is not None
     views = []
     if (plates := open_plates(scene)) is not None:
         plates.close()
@@ -182,7 +178,7 @@ def _open_views(
     elif scene.clip is not None:
         try:
             clip = stack.enter_context(Clip.open(scene.clip))
-            views.append(_view("input", scene.camera, scene, clip, 0, sequence))
+            views.append(_view("input", scene.camera, None, clip, 0, sequence))
         except ClipError as error:
             notes.append(f"The input view was left out: {error}")
     for camera_path, clip_path in paths:
@@ -190,11 +186,14 @@ def _open_views(
         if other.camera is None:
             raise ValueError(f"{camera_path}: has no [camera].")
         clip = stack.enter_context(Clip.open(clip_path))
-        views.append(_view(camera_path.stem, other.camera, other, clip, first_frame(sequence), sequence))
+        behind = None if other.background is None else background_picture(other)
+        views.append(_view(camera_path.stem, other.camera, behind, clip, first_frame(sequence), sequence))
     return views
 
 
-def _view(name: str, camera: Camera, own: Scene, clip: Clip, first: int, sequence: Sequence) -> SeenView:
+def _view(
+    name: str, camera: Camera, background: Image | None, clip: Clip, first: int, sequence: Sequence
+) -> ReferenceView:
     if camera.size[0] * clip.size[1] != camera.size[1] * clip.size[0]:
         raise ValueError(
             f"{clip.path}: its pictures are {clip.size[0]} x {clip.size[1]}, the camera's {camera.size[0]} x "
@@ -207,23 +206,23 @@ def _view(name: str, camera: Camera, own: Scene, clip: Clip, first: int, sequenc
         )
     scale = min(1.0, LONGEST_SIDE / max(clip.size))
     camera = camera.resized(*(max(1, round(side * scale)) for side in clip.size))
-    # the sequence's background picture is the input camera's; others stand before its mean
-    behind = background_picture(own) if own.background is not None else background_picture(sequence.scene, camera)
-    return SeenView(name, camera, area_average(behind, *camera.size) if behind.ndim == 3 else behind, clip, first)
+    if camera.moves:
+        camera = replace(camera, matrix=camera.matrices[first], matrices=camera.matrices[first:])
+    if background is None:
+        background = Viewer(sequence.scene, camera).background(1)
+    elif background.ndim == 3:
+        background = area_average(background, *camera.size)
+    return ReferenceView(name, camera, background, clip, first)
 
 
-def _against_view(sequence: Sequence, view: SeenView, tiles: Tiles) -> Figures:
-    scene = completed(replace(sequence.scene, scattering=sequence.settings["density"]["scattering"]))
-    renderer = None
+def _against_view(sequence: Sequence, view: ReferenceView, tiles: Tiles) -> Figures:
+    viewer = Viewer(sequence.scene, view.camera, view.background)
     score = PictureScore(view.background)
     for number in sequence.frames:
-        if renderer is None or view.camera.moves:
-            camera = view.camera.at(view.first + number - 1)
-            renderer = scene_renderer(scene, camera, view.background)
-        seen, image = view.seen(number), renderer.image(sequence.density(number))
-        score.add(image, seen)
+        pictures = view.picture(number), viewer.image(number, sequence.density(number))
+        score.add(pictures[1], pictures[0])
         if number in tiles:
-            tiles[number] += [_fitted(pictures.eight_bit(picture)) for picture in (seen, image)]
+            tiles[number] += [_fitted(eight_bit(picture)) for picture in pictures]
     return {"name": view.name, "clip": str(view.clip.path), "size": list(view.camera.size), **score.figures()}
 
 

@@ -10,7 +10,12 @@ import OpenEXR
 from PIL import Image
 
 from smokelift.footage.images import ImageError, linear_to_srgb
-from smokelift.output.files import atomic_path
+from smokelift.output.atomic import atomic_path
+
+
+def eight_bit(image: npt.ArrayLike) -> npt.NDArray[np.uint8]:
+    """Return linear radiance as 8 bit sRGB codes, clipped to 0..1."""
+    return np.asarray(np.rint(255 * linear_to_srgb(np.clip(image, 0, 1))), np.uint8)
 
 
 def write_image(path: str | Path, image: npt.ArrayLike, *, half: bool = True) -> None:
@@ -40,9 +45,8 @@ def write_image(path: str | Path, image: npt.ArrayLike, *, half: bool = True) ->
         raise ImageError(f"{path}: the picture holds values that are not finite")
     suffix = path.suffix.lower()
     if suffix == ".png":
-        codes = np.rint(np.clip(linear_to_srgb(values), 0.0, 1.0) * 255.0).astype(np.uint8)
         with atomic_path(path) as aside:
-            Image.fromarray(codes).save(aside, format="PNG")
+            Image.fromarray(eight_bit(values)).save(aside, format="PNG")
     elif suffix == ".exr":
         limit = float(np.finfo(np.float16).max)
         pixels = np.clip(values, -limit, limit).astype(np.float16) if half else values

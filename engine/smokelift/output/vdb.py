@@ -24,7 +24,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
-from smokelift.output.files import atomic_path
+from smokelift.output.atomic import atomic_path
 from smokelift.scene import Domain
 
 Array = npt.NDArray[np.float32]

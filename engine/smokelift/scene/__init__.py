@@ -4,7 +4,7 @@
 """
 
 from smokelift.scene.background import Background
-from smokelift.scene.camera import Camera, Matrix, as_matrix, look_at_matrix, orbit
+from smokelift.scene.camera import Camera, Matrix, as_matrix, look_at_matrix, orbit, shared_part
 from smokelift.scene.checks import SceneError, Vector
 from smokelift.scene.clip_source import ClipSource
 from smokelift.scene.complete import CompleteScene, completed
@@ -46,4 +46,5 @@ __all__ = [
     "orbit",
     "scene_from_dict",
     "scene_to_dict",
+    "shared_part",
 ]

@@ -196,6 +196,8 @@ def as_matrix(values: NDArray[np.float64]) -> Matrix:
 def orbit(camera: Camera, domain: Domain, yaw_degrees: float, pitch_degrees: float = 0.0) -> Camera:
     """The camera carried around the domain's centre, still looking at it from the same distance.
 
+    One that moves is carried around in every frame.
+
     Parameters
     ----------
     yaw_degrees
@@ -203,14 +205,42 @@ def orbit(camera: Camera, domain: Domain, yaw_degrees: float, pitch_degrees: flo
     pitch_degrees
         Then raise the camera by so much; negative lowers it.
     """
+    matrices = [_carried(np.array(matrix), domain, yaw_degrees, pitch_degrees) for matrix in camera.matrices]
+    first = _carried(np.array(camera.matrix), domain, yaw_degrees, pitch_degrees)
+    return replace(camera, matrix=first, matrices=tuple(matrices))
+
+
+def shared_part(whole: Camera, camera: Camera) -> tuple[slice, slice] | None:
+    """Return which part of a camera's picture another camera shows.
+
+    Parameters
+    ----------
+    whole, camera
+        Neither moves.
+
+    Returns
+    -------
+    Rows and columns of the first camera's picture, to the nearest pixel. None if the second stands elsewhere, looks
+    elsewhere or shows more than that picture.
+    """
+    if camera.type != whole.type or not np.allclose(camera.matrix, whole.matrix, rtol=0, atol=1e-9):
+        return None
+    across, down = whole.fx / camera.fx, whole.fy / camera.fy
+    left, top = round(whole.cx - camera.cx * across), round(whole.cy - camera.cy * down)
+    right, bottom = left + round(camera.size[0] * across), top + round(camera.size[1] * down)
+    inside = left >= 0 and top >= 0 and right <= whole.size[0] and bottom <= whole.size[1]
+    return np.s_[top:bottom, left:right] if inside and right > left and bottom > top else None
+
+
+def _carried(matrix: NDArray[np.float64], domain: Domain, yaw_degrees: float, pitch_degrees: float) -> Matrix:
+    """A camera's matrix after `orbit`."""
     centre = np.array(domain.centre)
-    matrix = np.array(camera.matrix, np.float64)
     right = matrix[:3, 0]
     turn = _rotation(np.array([0.0, 0.0, 1.0]), yaw_degrees) @ _rotation(right, -pitch_degrees)
     moved = matrix.copy()
     moved[:3, :3] = turn @ matrix[:3, :3]
     moved[:3, 3] = centre + turn @ (matrix[:3, 3] - centre)
-    return replace(camera, matrix=as_matrix(moved))
+    return as_matrix(moved)
 
 
 def _rotation(axis: NDArray[np.float64], degrees: float) -> NDArray[np.float64]:

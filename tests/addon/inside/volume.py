@@ -18,8 +18,8 @@ from addon.scene import box_corners
 from addon.take import Take
 from conftest import quietly, rendered
 from smokelift.output.images import write_image
-from smokelift.output.pictures import write_video
 from smokelift.output.vdb import write_vdb
+from smokelift.output.video import write_video
 from smokelift.scene import Domain, Medium, Scene, scene_to_dict
 from tests.example_shot import EXAMPLE
 

@@ -1,4 +1,4 @@
-"""Sequences: what was written opens; nothing is overwritten; a run that was cut off goes on exactly."""
+"""Writing sequences: nothing is overwritten; a run that was cut off goes on exactly."""
 
 from __future__ import annotations
 
@@ -9,38 +9,19 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from small_sequence import SCENE, SETTINGS, frame, names, write
 
-from smokelift.output import sequence, vdb
-from smokelift.output.sequence import ResumeState, Sequence, SequenceError, SequenceWriter
-from smokelift.scene import Camera, ClipSource, DirectionalLight, Domain, Scene
-from smokelift.transport import Velocity
-
-SCENE = Scene(
-    clip=ClipSource(Path("/footage/smoke.mp4"), 24.0),
-    camera=Camera.look_at((0, -7, 1.5), (0, 0, 1.5), fov_y_degrees=30, size=(32, 48)),
-    domain=Domain((-1, -1, 0), (1, 1, 3), (8, 8, 12)),
-    lights=(DirectionalLight((0, 0, -1), (1, 1, 1)),),
-)
-SETTINGS = {"quality": "draft", "density": {"iterations": 12}}
-
-
-def frame(number: int) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    random = np.random.default_rng(number)
-    rho = random.random((8, 8, 12)).astype(np.float32)
-    shapes = ((9, 8, 12), (8, 9, 12), (8, 8, 13))
-    x, y, z = (random.normal(size=shape).astype(np.float32) for shape in shapes)
-    return rho, (x, y, z)
-
-
-def write(directory: Path, numbers: Iterable[int], *, npz: bool = True, **options: Any) -> None:
-    with SequenceWriter(directory, SCENE, SETTINGS, npz=npz, **options) as writer:
-        for number in numbers:
-            writer.write(number, *frame(number), {"loss": 1.0 / number})
+from smokelift.output import vdb
+from smokelift.output.index import SequenceError
+from smokelift.output.resume import ResumeState
+from smokelift.output.sequence import Sequence
+from smokelift.output.writer import SequenceWriter
 
 
 class CutOffError(Exception):
@@ -57,14 +38,6 @@ def cut_off(directory: Path, numbers: Iterable[int], *, npz: bool = True, **opti
         raise CutOffError
 
 
-@pytest.fixture
-def no_vdb(monkeypatch: pytest.MonkeyPatch) -> None:
-    def missing() -> None:
-        raise vdb.VdbUnavailable("no OpenVDB module was found")
-
-    monkeypatch.setattr(sequence, "vdb_module", missing)
-
-
 def has_module() -> bool:
     try:
         vdb.vdb_module()
@@ -74,34 +47,6 @@ def has_module() -> bool:
 
 
 needs_vdb = pytest.mark.skipif(not has_module(), reason="needs an OpenVDB module")
-
-
-def names(directory: Path) -> list[str]:
-    return sorted(file.name for file in directory.iterdir())
-
-
-@needs_vdb
-def test_a_sequence_opens_as_it_was_written(tmp_path: Path) -> None:
-    write(tmp_path / "out", [1, 2, 3])
-    assert names(tmp_path / "out") == [
-        "sequence.json",
-        *(f"smoke_000{n}.{kind}" for n in (1, 2, 3) for kind in ("npz", "vdb")),
-    ]
-    opened = Sequence.open(tmp_path / "out")
-    assert opened.scene == SCENE
-    assert opened.settings == SETTINGS
-    assert opened.frames == (1, 2, 3)
-    assert opened.complete
-    assert opened.versions["numpy"] == np.__version__
-    rho, faces = frame(2)
-    np.testing.assert_array_equal(opened.density(2), rho)
-    np.testing.assert_allclose(opened.velocity(2), Velocity(faces, 1.0).centres())
-    assert opened.figures(2) == {"loss": 0.5}
-    assert vdb.read_settings(tmp_path / "out" / "smoke_0002.vdb") == SETTINGS
-    for n in (1, 2, 3):
-        (tmp_path / "out" / f"smoke_000{n}.npz").unlink()
-    np.testing.assert_allclose(opened.density(2), rho, rtol=1e-3)
-    np.testing.assert_allclose(opened.velocity(2), Velocity(faces, 1.0).centres(), rtol=1e-3, atol=1e-6)
 
 
 def test_choices_are_kept_and_not_compared(tmp_path: Path, no_vdb: None) -> None:
@@ -146,6 +91,19 @@ def test_a_directory_of_other_files_is_refused(tmp_path: Path, no_vdb: None) -> 
     (tmp_path / "smoke_0001.vdb").unlink()
     (tmp_path / ".DS_Store").write_bytes(b"the file manager's")
     write(tmp_path, [1])
+
+
+def test_a_preview_in_the_directory_is_our_own(tmp_path: Path, no_vdb: None) -> None:
+    """It does not keep a run from going on, but is no sequence by itself."""
+    (tmp_path / "preview.mp4").write_bytes(b"of another sequence")
+    with pytest.raises(SequenceError, match=r"other files \(preview\.mp4\)"):
+        write(tmp_path, [1])
+    (tmp_path / "preview.mp4").unlink()
+    cut_off(tmp_path, [1])
+    for name in ("preview.mp4", "contact_sheet.png"):
+        (tmp_path / name).write_bytes(b"of frame 1")
+    write(tmp_path, [2], resume=True)
+    assert Sequence.open(tmp_path).frames == (1, 2)
 
 
 def test_a_file_in_the_place_of_the_directory_is_refused(tmp_path: Path, no_vdb: None) -> None:
@@ -218,7 +176,7 @@ def test_another_run_is_not_resumed(tmp_path: Path, no_vdb: None) -> None:
     message = r"density\.iterations was 12 and is now 13; choose another directory"
     with pytest.raises(SequenceError, match=r"begun differently .*settings\." + message):
         SequenceWriter(tmp_path, SCENE, other, npz=True, resume=True).__enter__()
-    scene = Scene(clip=SCENE.clip, camera=SCENE.camera, domain=SCENE.domain)
+    scene = replace(SCENE, lights=())
     with pytest.raises(SequenceError, match=r"scene\.lights was .* and is now null"):
         SequenceWriter(tmp_path, scene, SETTINGS, npz=True, resume=True).__enter__()
     with SequenceWriter(tmp_path, SCENE, SETTINGS, npz=True, resume=True) as writer:
@@ -229,7 +187,7 @@ def test_lost_files_and_damaged_states_are_not_resumed(tmp_path: Path, no_vdb: N
     cut_off(tmp_path, [1, 2])
     state = (tmp_path / "resume.npz").read_bytes()
     (tmp_path / "resume.npz").write_bytes(state[:100])
-    with pytest.raises(SequenceError, match=r"resume\.npz: is damaged"):
+    with pytest.raises(SequenceError, match=r"resume\.npz: cannot be read: .*; this run cannot be resumed"):
         write(tmp_path, [3], resume=True)
     (tmp_path / "resume.npz").write_bytes(state)
     (tmp_path / "smoke_0001.npz").unlink()
@@ -251,7 +209,7 @@ def test_a_killed_run_leaves_frames_and_no_lock(tmp_path: Path) -> None:
     code = f"""
 import sys, time
 sys.path.insert(0, {str(Path(__file__).parent)!r})
-from test_sequence import SCENE, SETTINGS, SequenceWriter, frame
+from small_sequence import SCENE, SETTINGS, SequenceWriter, frame
 with SequenceWriter({str(tmp_path / "out")!r}, SCENE, SETTINGS, npz=True) as writer:
     writer.write(1, *frame(1))
     print("written", flush=True)
@@ -277,7 +235,7 @@ def test_a_full_disk_is_one_sentence(tmp_path: Path, no_vdb: None, monkeypatch: 
         SequenceWriter(tmp_path, SCENE, SETTINGS, npz=True) as writer,
     ):
         writer.write(1, *frame(1))
-        monkeypatch.setattr(sequence, "_save_arrays", full)
+        monkeypatch.setattr("smokelift.output.writer.write_arrays", full)
         writer.write(2, *frame(2))
     monkeypatch.undo()
     assert Sequence.open(tmp_path).frames == (1,)
@@ -299,38 +257,3 @@ def test_frames_must_fit_and_follow(tmp_path: Path, no_vdb: None) -> None:
             with pytest.raises(ValueError, match=r"follow|negative|finite|shapes"):
                 writer.write(*bad)
     assert Sequence.open(tmp_path).frames == (5,)
-    with pytest.raises(SequenceError, match="domain"):
-        SequenceWriter(tmp_path, Scene(), SETTINGS)
-
-
-def test_figures_are_json(tmp_path: Path, no_vdb: None) -> None:
-    with SequenceWriter(tmp_path, SCENE, SETTINGS, npz=True) as writer:
-        figures = {"loss": np.float32(0.5), "psnr": math.inf, "each": np.array([1, 2]), "note": "thin"}
-        writer.write(1, *frame(1), figures)
-    assert Sequence.open(tmp_path).figures(1) == {
-        "loss": 0.5, "psnr": None, "each": [1, 2], "note": "thin",
-    }  # fmt: skip
-
-
-def test_what_is_no_sequence_is_named(tmp_path: Path, no_vdb: None) -> None:
-    with pytest.raises(SequenceError, match=r"holds no sequence \(sequence\.json is missing\)"):
-        Sequence.open(tmp_path)
-    write(tmp_path, [1])
-    with pytest.raises(SequenceError, match="there is no frame 2; it has 1 to 1"):
-        Sequence.open(tmp_path).density(2)
-    (tmp_path / "smoke_0001.npz").write_bytes(b"half")
-    with pytest.raises(SequenceError, match=r"smoke_0001\.npz: cannot be read"):
-        Sequence.open(tmp_path).density(1)
-    (tmp_path / "smoke_0001.npz").unlink()
-    with pytest.raises(SequenceError, match="is missing"):
-        Sequence.open(tmp_path).velocity(1)
-    index = json.loads((tmp_path / "sequence.json").read_text())
-    for text, message in (
-        ("{", "cannot be read"),
-        ("{}", "is not a sequence of format 1"),
-        (json.dumps({**index, "frames": 3}), "is damaged: frames"),
-        (json.dumps({**index, "scene": {"medium": {"albedo": 3}}}), "albedo must be"),
-    ):
-        (tmp_path / "sequence.json").write_text(text)
-        with pytest.raises(SequenceError, match=message):
-            Sequence.open(tmp_path)

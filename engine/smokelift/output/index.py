@@ -1,0 +1,126 @@
+"""`sequence.json`: what a sequence was made from, and which of its frames are finished."""
+
+from __future__ import annotations
+
+import json
+import math
+import platform
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from smokelift.output.atomic import atomic_path
+from smokelift.output.layout import INDEX
+
+FORMAT = 1
+"""Version of the file's structure; any other is refused."""
+
+
+class SequenceError(ValueError):
+    """A directory that cannot be written to or opened, and why."""
+
+
+def software_versions() -> dict[str, str]:
+    """Return the versions of what a result depends on."""
+    versions = {"python": platform.python_version()}
+    for name in ("smokelift", "numpy", "scipy", "taichi", "av"):
+        with suppress(PackageNotFoundError):
+            versions[name] = version(name)
+    return versions
+
+
+@dataclass(frozen=True)
+class Index:
+    """The content of the file, as plain values.
+
+    Attributes
+    ----------
+    scene
+        The tables of a scene file.
+    settings
+        All settings that decide the result.
+    choices
+        What was chosen for the clip and why.
+    frames
+        The figures of every finished frame, by its number as text.
+    complete
+        Whether the run came to its end.
+    versions
+        Of the software.
+    """
+
+    scene: dict[str, Any]
+    settings: dict[str, Any]
+    choices: list[Any] = field(default_factory=list)
+    frames: dict[str, Any] = field(default_factory=dict)
+    complete: bool = False
+    versions: dict[str, Any] = field(default_factory=software_versions)
+
+    @property
+    def numbers(self) -> tuple[int, ...]:
+        """The finished frames' numbers, in order."""
+        return tuple(sorted(map(int, self.frames)))
+
+    def write(self, directory: Path) -> None:
+        """Write the file; OSError if that fails."""
+        text = json.dumps({"format": FORMAT, **vars(self)}, indent=1, allow_nan=False)
+        with atomic_path(directory / INDEX) as aside:
+            aside.write_text(text + "\n", encoding="utf-8")
+
+    @staticmethod
+    def read(directory: Path) -> Index:
+        """Read the file of a directory.
+
+        Raises
+        ------
+        SequenceError
+            If it is missing or damaged, or of another format.
+        """
+        path = directory / INDEX
+        try:
+            data = json.loads(path.read_text(encoding="utf-8"))
+        except FileNotFoundError:
+            raise SequenceError(f"{directory}: holds no sequence ({INDEX} is missing)") from None
+        except (OSError, ValueError) as error:
+            raise SequenceError(f"{path}: cannot be read: {error}") from error
+        if not isinstance(data, dict) or data.get("format") != FORMAT:
+            raise SequenceError(f"{path}: is not a sequence of format {FORMAT}, which this version reads")
+        data.setdefault("choices", [])  # early versions made none
+        kinds = {"scene": dict, "settings": dict, "choices": list, "frames": dict, "complete": bool, "versions": dict}
+        for key, kind in kinds.items():
+            if not isinstance(data.get(key), kind):
+                raise SequenceError(f"{path}: is damaged: {key} is missing or of another type")
+        return Index(**{key: data[key] for key in kinds})
+
+
+def plain(value: Any) -> Any:
+    """Return a value as JSON holds it: arrays become lists, and numbers that are not finite become None."""
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def difference(place: str, there: Any, now: Any) -> str:
+    """Return the first difference between two plain values as words, or an empty string."""
+    if isinstance(there, dict) and isinstance(now, dict):
+        for key in there | now:
+            found = difference(f"{place}.{key}", there.get(key), now.get(key))
+            if found:
+                return found
+        return ""
+    if isinstance(there, list) and isinstance(now, list) and len(there) == len(now):
+        parts = (difference(f"{place}[{n}]", *pair) for n, pair in enumerate(zip(there, now, strict=True)))
+        return next(filter(None, parts), "")
+    if there == now:
+        return ""
+    before, after = (text if len(text) <= 60 else f"{text[:57]}..." for text in map(json.dumps, (there, now)))
+    return f"{place} was {before} and is now {after}"

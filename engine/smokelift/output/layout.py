@@ -1,0 +1,29 @@
+"""Which files lie in the directory of a sequence."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+INDEX = "sequence.json"
+RESUME = "resume.npz"
+LOCK = "run.lock"
+BACKGROUND = "background.exr"
+CONTACT_SHEET = "contact_sheet.png"
+PREVIEW = "preview.mp4"
+
+_FRAME = re.compile(r"smoke_\d{4,}\.(vdb|npz)")
+
+
+def frame_path(directory: Path, number: int, kind: str) -> Path:
+    """Return the file of a frame; the kind is ``"vdb"`` or ``"npz"``."""
+    return directory / f"smoke_{number:04d}.{kind}"
+
+
+def is_foreign(name: str) -> bool:
+    """Return whether no run writes a file of this name.
+
+    What begins with a dot is left over from a killed run, or the file manager's.
+    """
+    known = name in (INDEX, RESUME, LOCK, BACKGROUND, CONTACT_SHEET, PREVIEW)
+    return not (known or name.startswith(".") or _FRAME.fullmatch(name))

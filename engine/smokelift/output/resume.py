@@ -1,0 +1,64 @@
+"""What an unfinished run needs to go on: its last frame at full precision, which OpenVDB's 16 bits do not hold."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from smokelift.output.archive import read_arrays, write_arrays
+from smokelift.transport import Array, Faces
+
+_EXTRA = "extra_"
+
+
+@dataclass(frozen=True)
+class ResumeState:
+    """What a reconstruction carries from one frame to the next.
+
+    Attributes
+    ----------
+    number
+        The last finished frame.
+    density : (nx, ny, nz)
+    velocity
+        On faces, m/s.
+    extra
+        Further arrays by name, as they were given to `SequenceWriter.write`.
+    """
+
+    number: int
+    density: Array
+    velocity: Faces
+    extra: Mapping[str, npt.NDArray[Any]]
+
+    def write(self, path: Path) -> None:
+        """Write the state; OSError if that fails."""
+        velocity = {f"velocity_{axis}": face for axis, face in zip("xyz", self.velocity, strict=True)}
+        extra = {f"{_EXTRA}{name}": value for name, value in self.extra.items()}
+        arrays = {"number": np.array(self.number), "density": self.density, **velocity, **extra}
+        write_arrays(path, arrays, compressed=False)
+
+    @staticmethod
+    def read(path: Path) -> ResumeState | None:
+        """Read the state, or return None if no frame was finished.
+
+        Raises
+        ------
+        OSError
+            If the file is damaged.
+        """
+        if not path.is_file():
+            return None
+        arrays = read_arrays(path)
+        try:
+            number, density = int(arrays["number"]), arrays["density"]
+            velocity = arrays["velocity_x"], arrays["velocity_y"], arrays["velocity_z"]
+        except (KeyError, TypeError) as error:
+            raise OSError(f"{path}: lacks {error}") from error
+        extra = {name.removeprefix(_EXTRA): value for name, value in arrays.items() if name.startswith(_EXTRA)}
+        return ResumeState(number, density, velocity, extra)

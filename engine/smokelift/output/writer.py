@@ -1,0 +1,264 @@
+"""Writes a sequence: one OpenVDB file a frame and one `sequence.json`.
+
+A frame counts once `sequence.json` lists it, which is written after the frame's files. Every file appears whole or not
+at all. So a killed run leaves a directory that opens, and the same run can go on from it.
+"""
+
+from __future__ import annotations
+
+import errno
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from smokelift.output.archive import write_arrays
+from smokelift.output.images import write_image
+from smokelift.output.index import Index, SequenceError, difference, plain
+from smokelift.output.layout import BACKGROUND, INDEX, LOCK, RESUME, frame_path, is_foreign
+from smokelift.output.lock import Lock
+from smokelift.output.resume import ResumeState
+from smokelift.output.vdb import VdbUnavailable, vdb_module, write_vdb
+from smokelift.scene import Background, CompleteScene, scene_to_dict
+from smokelift.transport import Array, Faces, Velocity, face_shapes
+
+
+class SequenceWriter:
+    """Writes a sequence frame by frame; a context manager that holds the directory's lock.
+
+    Leaving the block without an exception completes the sequence. After an exception the finished frames stay
+    and ``resume=True`` goes on from them.
+
+    Parameters
+    ----------
+    directory
+        Made if missing. It must be empty, or hold the same run unfinished with ``resume``.
+    scene
+        Kept in `sequence.json`.
+    settings
+        All settings that decide the result, as JSON can hold them.
+    npz
+        Whether to write a NumPy twin of every frame, with velocity on faces.
+    resume
+        Whether to go on from the finished frames in the directory. An empty directory starts a new run.
+    background : (rows, columns, 3), optional
+        An estimated background of the scene's picture, kept as `background.exr`.
+    choices
+        What was chosen for the clip and why, as JSON can hold it. Kept, and not compared when a run goes on: what they
+        decided is in the scene and the settings.
+
+    Attributes
+    ----------
+    state
+        Where to go on from; None before the first frame, and after the last.
+
+    Raises
+    ------
+    SequenceError
+        On entering: another run is at work, the directory holds other files or finished frames or another
+        run, or nothing could be written because there is no OpenVDB module.
+    """
+
+    def __init__(
+        self,
+        directory: str | Path,
+        scene: CompleteScene,
+        settings: Mapping[str, Any],
+        *,
+        npz: bool = False,
+        resume: bool = False,
+        background: Array | None = None,
+        choices: Iterable[Mapping[str, Any]] = (),
+    ) -> None:
+        self.directory = Path(directory)
+        self.state: ResumeState | None = None
+        self._domain = scene.domain
+        self._background = background
+        if background is not None:
+            scene = replace(scene, background=Background(image=self.directory / BACKGROUND))
+        # Through JSON, so that it compares equal to what is read back.
+        run = {"scene": scene_to_dict(scene, self.directory.resolve()), "settings": dict(settings)}
+        self._index = Index(**json.loads(json.dumps(run, allow_nan=False)), choices=plain(list(choices)))
+        self._kinds = ("vdb", "npz") if npz else ("vdb",)
+        self._resume = resume
+        self._lock = Lock(self.directory / LOCK)
+
+    @property
+    def finished(self) -> tuple[int, ...]:
+        """Numbers of the frames that need not be computed again, in order."""
+        return self._index.numbers
+
+    def __enter__(self) -> SequenceWriter:
+        try:
+            vdb_module()
+        except VdbUnavailable as error:
+            if "npz" not in self._kinds:
+                raise SequenceError(str(error)) from error
+            self._kinds = ("npz",)
+        try:
+            self.directory.mkdir(parents=True, exist_ok=True)
+            if not self._lock.acquire():
+                raise SequenceError(f"{self.directory}: another run is writing into this directory")
+        except OSError as error:
+            raise SequenceError(f"{self.directory}: cannot be written to: {error.strerror}") from error
+        try:
+            self._take_over()
+            if self._background is not None:
+                write_image(self.directory / BACKGROUND, self._background)
+            self._index.write(self.directory)
+        except OSError as error:
+            self._lock.release()
+            raise self._failed(INDEX, error) from error
+        except BaseException:
+            self._lock.release()
+            raise
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        try:
+            if kind is None:
+                self._index = replace(self._index, complete=True)
+                self._index.write(self.directory)
+                (self.directory / RESUME).unlink(missing_ok=True)
+        except OSError as failure:
+            raise self._failed(INDEX, failure) from failure
+        finally:
+            self._lock.release()
+
+    def write(
+        self,
+        number: int,
+        density: npt.ArrayLike,
+        velocity_faces: tuple[npt.ArrayLike, npt.ArrayLike, npt.ArrayLike],
+        figures: Mapping[str, Any] | None = None,
+        extra: Mapping[str, npt.ArrayLike] | None = None,
+    ) -> None:
+        """Write one frame and make it count.
+
+        Parameters
+        ----------
+        number
+            The frame's number in its file name, the one after the last finished.
+        density : (nx, ny, nz)
+            Not negative.
+        velocity_faces
+            m/s, shapes (nx+1, ny, nz), (nx, ny+1, nz), (nx, ny, nz+1).
+        figures
+            Numbers and text about the frame by name. Numbers that are not finite become null.
+        extra
+            Further arrays that the next frame depends on, for :attr:`state`.
+
+        Raises
+        ------
+        ValueError
+            If a shape does not fit the domain, a value is not finite, a density negative, or the number out
+            of order.
+        SequenceError
+            If the frame cannot be written; the finished ones stay.
+        """
+        if self.finished and number != self.finished[-1] + 1:
+            raise ValueError(f"frame {number} cannot follow frame {self.finished[-1]}: a sequence has no gaps")
+        if number < 0:
+            raise ValueError(f"a frame's number must not be negative, as {number} is")
+        rho, faces = _checked(density, velocity_faces, self._domain.shape)
+        # The caller may use its arrays again; what is kept here must not change with them.
+        kept = {name: np.asarray(value) for name, value in (extra or {}).items()}
+        state = ResumeState(number, rho.copy(), faces, kept)
+        try:
+            for kind in self._kinds:
+                self._write_arrays(frame_path(self.directory, number, kind), rho, faces)
+            figures = plain(figures or {})
+            self._index = replace(self._index, frames={**self._index.frames, str(number): figures})
+            self._index.write(self.directory)
+            # Last: a state without its frame could not be told from a frame that was lost.
+            state.write(self.directory / RESUME)
+        except OSError as error:
+            raise self._failed(f"frame {number}", error) from error
+        self.state = state
+
+    def _write_arrays(self, path: Path, density: Array, faces: Faces) -> None:
+        if path.suffix == ".npz":
+            velocity = {f"velocity_{axis}": face for axis, face in zip("xyz", faces, strict=True)}
+            write_arrays(path, {"density": density, **velocity})
+        else:
+            centres = Velocity(faces, self._domain.voxel_size).centres()
+            write_vdb(path, density, centres, self._domain, self._index.settings)
+
+    def _take_over(self) -> None:
+        """Judge what is in the directory, and read what can be gone on from."""
+        names = sorted(file.name for file in self.directory.iterdir() if not file.name.startswith("."))
+        has_index = INDEX in names
+        # Without an index nothing here was written by a run, whatever it is called.
+        foreign = [name for name in names if is_foreign(name) or not (has_index or name == LOCK)]
+        if foreign:
+            raise SequenceError(
+                f"{self.directory}: holds other files ({foreign[0]}); nothing was overwritten, "
+                "choose an empty directory"
+            )
+        if not has_index:
+            return
+        there = Index.read(self.directory)
+        if not self._resume:
+            if there.frames:
+                raise SequenceError(
+                    f"{self.directory}: holds {len(there.frames)} finished frames; go on with --resume, "
+                    "or choose another directory"
+                )
+            return
+        changed = difference("scene", there.scene, self._index.scene) or difference(
+            "settings", there.settings, self._index.settings
+        )
+        if changed:
+            raise SequenceError(
+                f"{self.directory}: was begun differently and cannot be resumed: {changed}; choose another directory"
+            )
+        for leftover in self.directory.glob(".*.tmp"):
+            leftover.unlink(missing_ok=True)
+        frames = there.frames
+        if not there.complete:
+            self.state = self._last_state()
+            last = self.state.number if self.state is not None else -1
+            frames = {number: figures for number, figures in frames.items() if int(number) <= last}
+        self._index = replace(self._index, frames=frames, complete=there.complete)
+        self._check_files()
+
+    def _last_state(self) -> ResumeState | None:
+        try:
+            return ResumeState.read(self.directory / RESUME)
+        except OSError as error:
+            raise SequenceError(f"{error}; this run cannot be resumed, choose another directory") from error
+
+    def _check_files(self) -> None:
+        """Refuse to go on if files of finished frames were taken away."""
+        for path in (frame_path(self.directory, number, kind) for number in self.finished for kind in self._kinds):
+            if not path.is_file():
+                raise SequenceError(
+                    f"{path}: is missing, so this run cannot be resumed with this output; choose another directory"
+                )
+
+    def _failed(self, what: str, error: OSError) -> SequenceError:
+        reason = "the disk is full" if error.errno in (errno.ENOSPC, errno.EDQUOT) else str(error)
+        return SequenceError(
+            f"{self.directory}: {what} could not be written: {reason}; "
+            f"{len(self.finished)} finished frames stay and --resume goes on from them"
+        )
+
+
+def _checked(density: npt.ArrayLike, faces: Any, shape: tuple[int, int, int]) -> tuple[Array, Faces]:
+    rho, x, y, z = arrays = [np.ascontiguousarray(values, np.float32) for values in (density, *faces)]
+    wanted = [shape, *face_shapes(shape)]
+    if [array.shape for array in arrays] != wanted:
+        found = ", ".join(str(array.shape) for array in arrays)
+        raise ValueError(f"density and velocity on faces must have shapes {wanted}, not {found}")
+    if not all(np.isfinite(array).all() for array in arrays):
+        raise ValueError("density and velocity must be finite")
+    if rho.min() < 0.0:
+        raise ValueError("density must not be negative")
+    return rho, (x, y, z)

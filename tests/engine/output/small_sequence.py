@@ -1,0 +1,44 @@
+"""A sequence of a few voxels, made up of noise."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from smokelift.output.writer import SequenceWriter
+from smokelift.scene import Camera, ClipSource, DirectionalLight, Domain, Scene, completed
+
+SCENE = completed(
+    Scene(
+        clip=ClipSource(Path("/footage/smoke.mp4"), 24.0),
+        camera=Camera.look_at((0, -7, 1.5), (0, 0, 1.5), fov_y_degrees=30, size=(32, 48)),
+        domain=Domain((-1, -1, 0), (1, 1, 3), (8, 8, 12)),
+        lights=(DirectionalLight((0, 0, -1), (1, 1, 1)),),
+        scattering="unshadowed",
+    )
+)
+SETTINGS = {"quality": "draft", "density": {"iterations": 12}}
+
+
+def frame(number: int) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Density and velocity of a frame."""
+    random = np.random.default_rng(number)
+    rho = random.random((8, 8, 12)).astype(np.float32)
+    shapes = ((9, 8, 12), (8, 9, 12), (8, 8, 13))
+    x, y, z = (random.normal(size=shape).astype(np.float32) for shape in shapes)
+    return rho, (x, y, z)
+
+
+def write(directory: Path, numbers: Iterable[int], *, npz: bool = True, **options: Any) -> None:
+    """Write frames and complete the sequence."""
+    with SequenceWriter(directory, SCENE, SETTINGS, npz=npz, **options) as writer:
+        for number in numbers:
+            writer.write(number, *frame(number), {"loss": 1.0 / number})
+
+
+def names(directory: Path) -> list[str]:
+    """What is in a directory."""
+    return sorted(file.name for file in directory.iterdir())

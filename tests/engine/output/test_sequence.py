@@ -1,0 +1,97 @@
+"""Reading sequences: what was written opens, and renders as it was fitted."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from small_sequence import SCENE, SETTINGS, frame, names, write
+
+from smokelift.output import vdb
+from smokelift.output.index import SequenceError
+from smokelift.output.sequence import Sequence
+from smokelift.output.writer import SequenceWriter
+from smokelift.transport import Velocity
+
+
+def has_module() -> bool:
+    try:
+        vdb.vdb_module()
+    except vdb.VdbUnavailable:
+        return False
+    return True
+
+
+needs_vdb = pytest.mark.skipif(not has_module(), reason="needs an OpenVDB module")
+
+
+@needs_vdb
+def test_a_sequence_opens_as_it_was_written(tmp_path: Path) -> None:
+    write(tmp_path / "out", [1, 2, 3])
+    assert names(tmp_path / "out") == [
+        "sequence.json",
+        *(f"smoke_000{n}.{kind}" for n in (1, 2, 3) for kind in ("npz", "vdb")),
+    ]
+    opened = Sequence.open(tmp_path / "out")
+    assert opened.scene == SCENE
+    assert opened.settings == SETTINGS
+    assert opened.frames == (1, 2, 3)
+    assert opened.complete
+    assert opened.versions["numpy"] == np.__version__
+    rho, faces = frame(2)
+    np.testing.assert_array_equal(opened.density(2), rho)
+    np.testing.assert_allclose(opened.velocity(2), Velocity(faces, 1.0).centres())
+    assert opened.figures(2) == {"loss": 0.5}
+    assert vdb.read_settings(tmp_path / "out" / "smoke_0002.vdb") == SETTINGS
+    for n in (1, 2, 3):
+        (tmp_path / "out" / f"smoke_000{n}.npz").unlink()
+    np.testing.assert_allclose(opened.density(2), rho, rtol=1e-3)
+    np.testing.assert_allclose(opened.velocity(2), Velocity(faces, 1.0).centres(), rtol=1e-3, atol=1e-6)
+
+
+def test_a_sequence_of_version_1_0_tells_its_scattering_in_the_settings(tmp_path: Path, no_vdb: None) -> None:
+    settings = {"density": {"scattering": "absorption"}}
+    with SequenceWriter(tmp_path, SCENE, settings, npz=True) as writer:
+        writer.write(1, *frame(1))
+    assert Sequence.open(tmp_path).scene.scattering == "unshadowed"
+    index = json.loads((tmp_path / "sequence.json").read_text())
+    del index["scene"]["medium"]["scattering"]
+    (tmp_path / "sequence.json").write_text(json.dumps(index))
+    assert Sequence.open(tmp_path).scene == replace(SCENE, scattering="absorption")
+
+
+def test_figures_are_json(tmp_path: Path, no_vdb: None) -> None:
+    with SequenceWriter(tmp_path, SCENE, SETTINGS, npz=True) as writer:
+        figures = {"loss": np.float32(0.5), "psnr": math.inf, "each": np.array([1, 2]), "note": "thin"}
+        writer.write(1, *frame(1), figures)
+    assert Sequence.open(tmp_path).figures(1) == {
+        "loss": 0.5, "psnr": None, "each": [1, 2], "note": "thin",
+    }  # fmt: skip
+
+
+def test_what_is_no_sequence_is_named(tmp_path: Path, no_vdb: None) -> None:
+    with pytest.raises(SequenceError, match=r"holds no sequence \(sequence\.json is missing\)"):
+        Sequence.open(tmp_path)
+    write(tmp_path, [1])
+    with pytest.raises(SequenceError, match="there is no frame 2; it has 1 to 1"):
+        Sequence.open(tmp_path).density(2)
+    (tmp_path / "smoke_0001.npz").write_bytes(b"half")
+    with pytest.raises(SequenceError, match=r"smoke_0001\.npz: cannot be read"):
+        Sequence.open(tmp_path).density(1)
+    (tmp_path / "smoke_0001.npz").unlink()
+    with pytest.raises(SequenceError, match="is missing"):
+        Sequence.open(tmp_path).velocity(1)
+    index = json.loads((tmp_path / "sequence.json").read_text())
+    for text, message in (
+        ("{", "cannot be read"),
+        ("{}", "is not a sequence of format 1"),
+        (json.dumps({**index, "frames": 3}), "is damaged: frames"),
+        (json.dumps({**index, "scene": {"medium": {"albedo": 3}}}), "albedo must be"),
+    ):
+        (tmp_path / "sequence.json").write_text(text)
+        with pytest.raises(SequenceError, match=message):
+            Sequence.open(tmp_path)
