@@ -210,7 +210,7 @@ def test_what_is_written_is_what_was_yielded(run, plume) -> None:
     sequence = Sequence.open(out)
     assert sequence.complete
     assert sequence.frames == (1, 2, 3, 4, 5)
-    assert sequence.scene == plume.scene
+    assert sequence.scene == completed(plume.scene)
     assert sequence.settings["quality"] == "draft"
     for frame in frames:
         assert (out / f"smoke_{frame.number:04d}.npz").is_file()
@@ -279,7 +279,7 @@ def test_further_views_put_the_smoke_in_its_place(plume, two_views, draft, tmp_p
         off = [np.linalg.norm(centroid(f.density, two_views) - t) / voxel for f, t in zip(frames, truth, strict=True)]
         assert max(off) < 0.7 if near else min(off) > 3
     sequence = Sequence.open(tmp_path / "out")
-    assert sequence.scene == two_views
+    assert sequence.scene == completed(two_views)
     for number in sequence.frames:
         assert min(sequence.figures(number)["psnr"], sequence.figures(number)["psnr_view_1"]) > 35
     cut_off(two_views, draft, tmp_path / "again", 3)
@@ -333,7 +333,7 @@ def test_a_moving_camera_resumes_on_its_own_path_only(tracked, draft, tmp_path) 
         frames_of(replace(tracked, camera=other), draft, out, npz=True, resume=True)
     frames_of(tracked, draft, out, npz=True, resume=True)
     sequence = Sequence.open(out)
-    assert sequence.scene == tracked
+    assert sequence.scene == completed(tracked)
     for frame in whole:
         np.testing.assert_array_equal(sequence.density(frame.number), frame.density)
 
@@ -363,7 +363,7 @@ def test_a_clean_plate_for_every_frame(plume, tracked, draft, tmp_path) -> None:
     frames = frames_of(scene, draft, tmp_path / "out", npz=True)
     assert all(frame.figures["psnr"] >= 35 for frame in frames)
     assert all(frame.figures["hull_share"] < 0.5 for frame in frames)
-    assert Sequence.open(tmp_path / "out").scene == scene
+    assert Sequence.open(tmp_path / "out").scene == completed(scene)
 
 
 def test_an_exception_of_the_caller_leaves_what_can_be_resumed(plume, draft, tmp_path) -> None:
