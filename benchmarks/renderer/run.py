@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks import machine
+from benchmarks.errors import relative_error
 from benchmarks.renderer import reference
 from benchmarks.renderer.peers import OURS, PEERS
 from benchmarks.renderer.scene import PLUME, bench_scene, plume
@@ -198,8 +199,8 @@ class _Stage:
     def _judged(self, row: Row) -> Row:
         image, gradient = self._answer(PEERS[row.peer].before_black)
         smoke = self._scene.density > 0
-        of_image = _distance(np.load(self._folder / "image.npy"), image)
-        of_gradient = _distance(np.load(self._folder / "gradient.npy")[smoke], gradient[smoke])
+        of_image = relative_error(np.load(self._folder / "image.npy"), image)
+        of_gradient = relative_error(np.load(self._folder / "gradient.npy")[smoke], gradient[smoke])
         exact = of_image <= EXACT and of_gradient <= EXACT
         return replace(row, image_error=of_image, gradient_error=of_gradient, exact=exact)
 
@@ -219,7 +220,3 @@ def _figures(row: Row, result: Result) -> Row:
         peak_mib=None if peak is None else peak / 2**20,
         peak_volumes=None if peak is None else peak / (4 * row.size**3),
     )
-
-
-def _distance(values: Array, truth: Array) -> float:
-    return float(np.linalg.norm(values - truth) / np.linalg.norm(truth))

@@ -1,19 +1,23 @@
-"""What happens to image and gradient as smoke gets thinner and thicker: a table for docs/renderer.md.
+"""Errors of image and gradient as smoke gets thinner and thicker: a Markdown table.
 
     python -m benchmarks.renderer.stability
 
-A plume of 40^3 voxels, albedo 1, the sun at 45 degrees, a camera at an oblique angle; the sums in float64 with their
-exact derivative are the truth. The last column is the brightest pixel of the same smoke in a white room (radiance 1
-from everywhere, before a white wall): above 1 light would have been created.
+A plume of 40^3 voxels, albedo 1, the sun at 45 degrees, a camera at an oblique angle. The truth is the same sums and
+their exact derivative in float64. The last column is the brightest pixel of the same smoke in a white room (radiance 1
+from everywhere, before a white wall): above 1 the renderer would create light.
 """
+
+from __future__ import annotations
 
 from dataclasses import replace
 
 import numpy as np
 
+from benchmarks.errors import relative_error
 from benchmarks.renderer.reference import image_and_gradient
-from benchmarks.renderer.scene import BenchScene, bench_scene, plume
-from smokelift.render import Renderer
+from benchmarks.renderer.scene import PLUME, BenchScene, bench_scene, plume
+from benchmarks.tables import markdown
+from smokelift.render import Renderer, Volume
 from smokelift.scene import DirectionalLight, Medium
 
 SIZE = 40
@@ -24,24 +28,24 @@ ROOM_LIGHTS = 64
 
 def main() -> None:
     """Print the table."""
-    print(
-        "| optical depth | anisotropy | image error | gradient error | worst of the ten steepest voxels | white room |"
-    )
-    print("|---|---|---|---|---|---|")
-    density = plume(SIZE, 0.18)
-    for depth in DEPTHS:
-        for anisotropy in ANISOTROPIES:
-            print(row(at_depth(density, depth, anisotropy), depth, anisotropy))
+    density = plume(SIZE, PLUME)
+    rows = [
+        [f"{depth:g}", f"{anisotropy:g}", *row(at_depth(density, depth, anisotropy))]
+        for depth in DEPTHS
+        for anisotropy in ANISOTROPIES
+    ]
+    worst = "worst of the ten steepest voxels"
+    print(markdown(["optical depth", "anisotropy", "image error", "gradient error", worst, "white room"], rows), end="")
 
 
-def at_depth(density: np.ndarray, depth: float, anisotropy: float) -> BenchScene:
+def at_depth(density: Volume, depth: float, anisotropy: float) -> BenchScene:
     """Return the benchmark's scene with this optical depth."""
     scene = bench_scene(density, np.full((SIZE, SIZE, 3), 0.1, np.float32))
     extinction = depth / float(density.sum(1).max() * scene.domain.voxel_size)
     return replace(scene, medium=Medium(extinction, 1.0, anisotropy))
 
 
-def row(scene: BenchScene, depth: float, anisotropy: float) -> str:
+def row(scene: BenchScene) -> list[str]:
     """Measure one scene."""
     background = np.array(scene.background, np.float32)
     renderer = Renderer(
@@ -53,19 +57,12 @@ def row(scene: BenchScene, depth: float, anisotropy: float) -> str:
     exact_gradient = np.where(scene.density > 0, exact_gradient, 0)
     steepest = np.argsort(np.abs(exact_gradient), axis=None)[-10:]
     worst = np.abs(gradient.flat[steepest] / exact_gradient.flat[steepest] - 1).max()
-    return (
-        f"| {depth:g} | {anisotropy:g} | {error(image, exact_image):.1e} | {error(gradient, exact_gradient):.1e} "
-        f"| {worst:.1e} | {white_room(scene):.4f} |"
-    )
-
-
-def error(values: np.ndarray, exact: np.ndarray) -> float:
-    """Relative L2 distance."""
-    return float(np.linalg.norm(values - exact) / np.linalg.norm(exact))
+    errors = (relative_error(image, exact_image), relative_error(gradient, exact_gradient), worst)
+    return [*(f"{error:.1e}" for error in errors), f"{white_room(scene):.4f}"]
 
 
 def white_room(scene: BenchScene) -> float:
-    """Brightest pixel where radiance 1 arrives from every side, in isotropic smoke."""
+    """Return the brightest pixel where radiance 1 arrives from every side, in isotropic smoke."""
     spiral = (np.arange(ROOM_LIGHTS) + 0.5) / ROOM_LIGHTS
     height, turn = 1 - 2 * spiral, np.pi * (1 + 5**0.5) * np.arange(ROOM_LIGHTS)
     level = np.sqrt(1 - height**2)

@@ -2,9 +2,9 @@
 
     python -m benchmarks.velocity.accuracy [--picture SLICES.png] plume-1/truth.npz jet-1/truth.npz ...
 
-benchmarks/truth bakes such files and says what is in them. No estimate is told where smoke enters, except where the
-row says so. Means over at least eight frames, inside the smoke and the two voxels around it, without the inlet's cells,
-which have a column of their own. Time is in scipy's cosine-transform Poisson solves of the same grid in the same run.
+`benchmarks.truth` bakes such files. Estimates do not know where smoke enters, except in the row "inlet known". Figures
+are means over at least eight frames, inside the smoke and the two voxels around it, without the cells of the inlet,
+which have a column of their own. Time is in Poisson solves of the same grid (`benchmarks.machine.poisson_seconds`).
 """
 
 from __future__ import annotations
@@ -19,7 +19,10 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
+from benchmarks.errors import relative_error
 from benchmarks.machine import poisson_seconds
+from benchmarks.tables import markdown
+from benchmarks.velocity.pairs import away_from, near_smoke
 from smokelift.baselines.velocity import PaperVelocity
 from smokelift.evaluation.truth import Truth
 from smokelift.scene import Side
@@ -29,7 +32,7 @@ from smokelift.velocity import CoarseToFine, Velocity, VelocityEstimator
 PAIRS = range(6, 38, 4)
 CHAIN = range(6, 22)
 SETTLED = 8
-"""Frames after which a chain of predictions counts."""
+"""Frames of a chain that are not scored: its first estimates have no prediction yet."""
 
 Array = npt.NDArray[np.float32]
 
@@ -41,16 +44,16 @@ class Score:
     Attributes
     ----------
     error
-        Relative L2 error.
+        Relative L2 error of the velocity.
     cosine
-        Of the two velocity fields as one vector each.
+        Cosine of the angle between the two velocity fields, each taken as one vector.
     mean, largest
-        Mean and largest speed over the truth's.
+        Mean and largest speed, relative to the truth's.
     inlet
-        Error in the cells where smoke enters.
+        Relative L2 error in the cells where smoke enters.
     warp
-        Error of the density carried by the estimate over that of the density carried by the truth. Below one is no
-        success: it fits what the truth does not do.
+        Error of the density that the estimate carries, relative to that of the density that the true velocity
+        carries. Below one the estimate fits changes that are not motion.
     solves
         Time in Poisson solves.
     """
@@ -65,25 +68,20 @@ class Score:
 
 
 def score(truth: Truth, frame: int, found: Velocity, solves: float, step: int = 1) -> Score:
-    """Compare an estimate from a frame to the one `step` later; with more than one, by the mean of the true ones."""
+    """Compare an estimate over `step` frames with the mean of their true velocities."""
     after, inlet = truth.density(frame + step), truth.inflow(frame + step)
-    wanted = np.mean([truth.velocity(frame + k).centres() for k in range(step)], axis=0)
-    around = ndimage.binary_dilation(after > 0.01 * after.max(), iterations=2)
-    moving = around & ~ndimage.binary_dilation(inlet, iterations=1)
-    u, v = found.centres(), wanted
-
-    def error(where: npt.NDArray[np.bool_]) -> float:
-        return float(np.linalg.norm((u - v)[where]) / np.linalg.norm(v[where])) if where.any() else np.nan
-
+    near = near_smoke(after)
+    moving, entering = near & away_from(inlet), near & inlet
+    u, v = found.centres(), np.mean([truth.velocity(frame + k).centres() for k in range(step)], axis=0)
     speed, true_speed = np.linalg.norm(u[moving], axis=-1), np.linalg.norm(v[moving], axis=-1)
     carried = [advect(truth.density(frame), velocity, step * truth.dt) for velocity in (found, truth.velocity(frame))]
     ours, best = (float(np.linalg.norm((c - after)[moving])) for c in carried)
     return Score(
-        error(moving),
+        relative_error(u, v, moving),
         float(np.sum(u[moving] * v[moving]) / np.linalg.norm(u[moving]) / np.linalg.norm(v[moving])),
         float(speed.mean() / true_speed.mean()),
         float(speed.max() / true_speed.max()),
-        error(around & inlet),
+        relative_error(u, v, entering) if entering.any() else np.nan,
         ours / best if step == 1 else np.nan,
         solves,
     )
@@ -94,20 +92,20 @@ def pairs(
     estimator: VelocityEstimator,
     unit: float,
     change: Callable[[Array], Array] = lambda density: density,
-    told: bool = False,
+    known_inlet: bool = False,
     step: int = 1,
 ) -> Iterator[Score]:
-    """Estimates from two densities each, without a past."""
+    """Score estimates from two densities each, without a prediction."""
     for frame in PAIRS:
         before, after = (change(truth.density(f)) for f in (frame, frame + step))
         start = time.perf_counter()
-        inflow = truth.inflow(frame + step) if told else None
+        inflow = truth.inflow(frame + step) if known_inlet else None
         found = estimator.estimate(before, after, step * truth.dt, truth.voxel_size, inflow=inflow)
         yield score(truth, frame, found, (time.perf_counter() - start) / unit, step)
 
 
 def chain(truth: Truth, unit: float, closed: tuple[Side, ...] = ()) -> Iterator[Score]:
-    """Estimates that each have the one before for a prediction."""
+    """Score estimates whose prediction is the estimate of the frame before."""
     estimator, prediction = CoarseToFine(), None
     for frame in CHAIN:
         densities = truth.density(frame), truth.density(frame + 1)
@@ -120,31 +118,31 @@ def chain(truth: Truth, unit: float, closed: tuple[Side, ...] = ()) -> Iterator[
 
 
 def blurred(density: Array) -> Array:
-    """As reconstructed densities are."""
+    """Blur by one voxel: reconstructed densities are as smooth."""
     return np.asarray(ndimage.gaussian_filter(density, 1.0), np.float32)
 
 
 def noisy(share: float) -> Callable[[Array], Array]:
-    """White noise in the smoke, of a standard deviation relative to the largest density."""
+    """Return what adds white noise to smoke, of a standard deviation relative to the largest density."""
     rng = np.random.default_rng(0)
 
     def change(density: Array) -> Array:
         noise = share * density.max() * rng.standard_normal(density.shape).astype(np.float32)
-        return np.maximum(density + noise * (density > 0), 0)
+        return np.asarray(np.maximum(density + noise * (density > 0), 0))
 
     return change
 
 
-def table(path: Path) -> None:
-    """Print the rows of one scene."""
+def table(path: Path) -> list[list[str]]:
+    """Return the rows of one scene."""
     truth = Truth.load(path)
     unit = poisson_seconds(truth.shape)
     usual = CoarseToFine()
     rows: dict[str, Iterator[Score]] = {
         "pairs": pairs(truth, usual, unit),
         "after 8 frames": chain(truth, unit),
-        "after 8 frames, walls said": chain(truth, unit, truth.closed),
-        "pairs, inlet told": pairs(truth, usual, unit, told=True),
+        "after 8 frames, walls known": chain(truth, unit, truth.closed),
+        "pairs, inlet known": pairs(truth, usual, unit, known_inlet=True),
         "pairs, paper": pairs(truth, PaperVelocity(), unit),
         "pairs, blurred": pairs(truth, usual, unit, blurred),
         "pairs, noise 1 %": pairs(truth, usual, unit, noisy(0.01)),
@@ -152,16 +150,17 @@ def table(path: Path) -> None:
         "pairs, noise 10 %": pairs(truth, usual, unit, noisy(0.10)),
         "pairs, every second frame": pairs(truth, usual, unit, step=2),
     }
+    cells = []
     for name, scores in rows.items():
         found = list(scores)
-        cells = [f"{np.nanmean([getattr(s, f.name) for s in found]):.2f}" for f in fields(Score)[:-1]]
-        worst = max(s.error for s in found)
-        solves = np.median([s.solves for s in found])
-        print(f"| {path.parent.name} | {name} | {' | '.join(cells)} | {worst:.2f} | {solves:.0f} |", flush=True)
+        means = [f"{np.nanmean([getattr(s, f.name) for s in found]):.2f}" for f in fields(Score)[:-1]]
+        worst, solves = max(s.error for s in found), np.median([s.solves for s in found])
+        cells.append([path.parent.name, name, *means, f"{worst:.2f}", f"{solves:.0f}"])
+    return cells
 
 
 def draw(paths: list[Path], out: Path) -> None:
-    """Centre slices of the velocity after a chain, beside the truth's, from the front and from the side."""
+    """Draw slices of the upward velocity after a chain, beside the truth's, from the front and from the side."""
     from matplotlib import pyplot
 
     figure, axes = pyplot.subplots(len(paths), 4, figsize=(10, 3.6 * len(paths)), squeeze=False)
@@ -172,7 +171,7 @@ def draw(paths: list[Path], out: Path) -> None:
             densities = truth.density(frame), truth.density(frame + 1)
             found = estimator.estimate(*densities, truth.dt, truth.voxel_size, prediction=prediction)
             prediction = estimator.predict(found, truth.dt)
-        smoke = ndimage.binary_dilation(truth.density(frame + 1) > 0.01 * truth.density(frame + 1).max(), iterations=2)
+        smoke = near_smoke(truth.density(frame + 1))
         heaviest = [int(truth.density(frame).sum(axis=tuple(d for d in range(3) if d != a)).argmax()) for a in (0, 1)]
         limit = float(np.abs(truth.velocity(frame).centres()[smoke]).max())
         for column, (axis, name) in enumerate([(1, "front"), (0, "side")]):
@@ -194,10 +193,9 @@ def main() -> None:
     parser.add_argument("truths", nargs="+", type=Path, metavar="TRUTH.npz")
     parser.add_argument("--picture", type=Path, metavar="PNG")
     options = parser.parse_args()
-    print("| scene | | error | cosine | mean | largest | inlet | warp | worst | solves |")
-    print("|---|---|---|---|---|---|---|---|---|---|")
-    for path in options.truths:
-        table(path)
+    names = [field.name for field in fields(Score)]
+    rows = [row for path in options.truths for row in table(path)]
+    print(markdown(["scene", "", *names[:-1], "worst", names[-1]], rows), end="")
     if options.picture:
         draw(options.truths, options.picture)
 

@@ -10,9 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
-from benchmarks.velocity.pairs import Pair, relative_error
+from benchmarks.errors import relative_error
+from benchmarks.velocity.pairs import Mask, Pair
 from smokelift.transport import Array, StaggeredGrid
 from smokelift.velocity import PrimalDual, ProjectedCG, Solver, VelocitySettings, estimate_velocity
 from smokelift.velocity.linearisation import Linearisation, Regularisation, least_squares, linearise
@@ -27,7 +27,7 @@ class LinearProblem:
     settings: VelocitySettings
     linear: Linearisation
     start: StaggeredGrid
-    counted: npt.NDArray[np.bool_]
+    counted: Mask
 
     @staticmethod
     def of_pair(pair: Pair) -> LinearProblem:

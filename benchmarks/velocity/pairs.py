@@ -12,37 +12,48 @@ from smokelift.evaluation.truth import Truth
 from smokelift.transport import Array
 
 SMOKE = 0.01
-"""Fraction of the largest density from which a voxel counts as smoke."""
+"""Share of the largest density from which a voxel counts as smoke."""
+
+Mask = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """What an estimate gets, and what it should find.
+    """Two densities, and the motion that an estimate should find between them.
 
     Attributes
     ----------
     before, after : (nx, ny, nz) float32
-        The densities.
+        Densities of two frames.
     motion : (nx, ny, nz, 3) float32
-        What carries the one into the other, in voxels a frame, at voxel centres and at the points of arrival.
+        What carries the first into the second, in voxels a frame, at voxel centres and at the points of arrival.
     inlet : (nx, ny, nz) bool
-        Where smoke enters; no estimate is told.
+        Where smoke enters. Estimates do not know it.
     """
 
     before: Array
     after: Array
     motion: Array
-    inlet: npt.NDArray[np.bool_]
+    inlet: Mask
 
     @property
-    def counted(self) -> npt.NDArray[np.bool_]:
-        """The voxels that are compared: smoke and the two around it, without the inlet and the one around that."""
-        around = ndimage.binary_dilation(self.after > SMOKE * self.after.max(), iterations=2)
-        return np.asarray(around & ~ndimage.binary_dilation(self.inlet))
+    def counted(self) -> Mask:
+        """The voxels that are compared: near smoke and away from the inlet."""
+        return near_smoke(self.after) & away_from(self.inlet)
+
+
+def near_smoke(density: Array) -> Mask:
+    """Return the voxels with smoke and the two around them, where a velocity still matters."""
+    return np.asarray(ndimage.binary_dilation(density > SMOKE * density.max(), iterations=2))
+
+
+def away_from(inlet: Mask) -> Mask:
+    """Return the voxels that neither are in an inlet nor touch one: smoke enters there without being carried."""
+    return np.asarray(~ndimage.binary_dilation(inlet))
 
 
 def frames_for_pairs(name: str, truth: Truth, count: int) -> list[int]:
-    """The first frames of so many pairs, spread evenly over a known scene.
+    """Return the first frames of some pairs, spread evenly over a known scene.
 
     Raises
     ------
@@ -61,15 +72,10 @@ def frames_for_pairs(name: str, truth: Truth, count: int) -> list[int]:
 
 
 def pair_of_truth(truth: Truth, frame: int) -> Pair:
-    """A frame of a known scene and the next one."""
+    """Return a frame of a known scene and the next one."""
     return Pair(
         truth.density(frame),
         truth.density(frame + 1),
         truth.velocity(frame).centres() * np.float32(truth.dt / truth.voxel_size),
         truth.inflow(frame + 1),
     )
-
-
-def relative_error(found: Array, wanted: Array, where: npt.NDArray[np.bool_]) -> float:
-    """Relative L2 distance of two vector fields (nx, ny, nz, 3) in some of the voxels."""
-    return float(np.linalg.norm((found - wanted)[where]) / np.linalg.norm(wanted[where]))

@@ -19,10 +19,11 @@ from typing import Any, TypeVar
 import numpy as np
 
 from benchmarks import machine
+from benchmarks.errors import relative_error
 from benchmarks.tables import size_text
 from benchmarks.velocity.flow import built_in_pair
 from benchmarks.velocity.linear import LinearProblem, endless
-from benchmarks.velocity.pairs import Pair, frames_for_pairs, pair_of_truth, relative_error
+from benchmarks.velocity.pairs import Pair, frames_for_pairs, pair_of_truth
 from smokelift.baselines.velocity import PaperVelocity
 from smokelift.evaluation.truth import Truth
 from smokelift.velocity import CoarseToFine, PrimalDual, ProjectedCG, VelocityEstimator, VelocitySettings

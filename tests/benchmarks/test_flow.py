@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
+from benchmarks.errors import relative_error
 from benchmarks.velocity import flow
 from benchmarks.velocity.flow import Flow, built_in_pair
-from benchmarks.velocity.pairs import relative_error
 
 SHAPE = (32, 32, 48)
 
