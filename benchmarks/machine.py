@@ -105,6 +105,12 @@ def peak_bytes() -> int | None:
     return next(1024 * int(line.split()[1]) for line in status.splitlines() if line.startswith("VmHWM"))
 
 
+def peak_mib() -> float | None:
+    """Return `peak_bytes` in MiB."""
+    peak = peak_bytes()
+    return None if peak is None else peak / 2**20
+
+
 def _processor() -> str:
     try:
         lines = Path("/proc/cpuinfo").read_text().splitlines()

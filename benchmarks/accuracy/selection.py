@@ -1,12 +1,12 @@
-"""What the choices save, and what they cost: each clip once as chosen and once with the richest model, side by side.
+"""What the choice of a model saves and costs: each clip once as chosen and once with the richest model, side by side.
 
     python -m benchmarks.accuracy.selection OUT CLIP[=SCENE:FIRST:STEP] ... [--frames 10] [--quality balanced]
 
-A CLIP is a scene file. SCENE is a folder of truth/picture.py with the same smoke in the light of a sun: its frame FIRST
-+ STEP n is the clip's frame n, and what is measured against it is the volume: its density, and what it shows in that
-light from 20, 45 and 90 degrees. The two sides take turns, frame by frame, so that both have the same machine; time is
-the processor's, of all cores. What is chosen is compared with the most that can be said by hand: the scene's own voxels
-(of a box that is found the most of the quality), 64 directions, three grids, shadows where the light is known.
+A CLIP is a scene file. SCENE is a folder of `benchmarks.truth.picture` with the same smoke in sunlight: its frame FIRST
++ STEP n is the clip's frame n. It gives the true density, and pictures from 20, 45 and 90 degrees in that light. The
+two sides take turns, frame by frame, so that both have the same machine; time is the processor's, over all cores. The
+richest model has the scene's own voxels (or the most of the quality, if the box is found), 64 directions of light,
+three grids of velocity, and shadows where the light is known.
 
 OUT gets selection.md, selection.json and selection.png.
 """
@@ -23,6 +23,10 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.accuracy.scenes import VIEWS, BakedViews
+from benchmarks.errors import relative_error
+from benchmarks.tables import markdown
+from benchmarks.timing import UNTIMED
 from smokelift import Clip, Frame, Scene, Settings, reconstruct
 from smokelift.evaluation.metrics import psnr
 from smokelift.evaluation.scores import resampled
@@ -30,62 +34,54 @@ from smokelift.evaluation.truth import Truth
 from smokelift.footage.images import area_average
 from smokelift.output.images import eight_bit
 from smokelift.output.sheet import write_sheet
-from smokelift.render import scene_renderer
+from smokelift.render import Image, Volume, scene_renderer
 from smokelift.scene import EnvironmentLight, completed
 from smokelift.setup.shot import Shot, prepare_shot
 from smokelift.velocity.settings import LEVELS
 
-VIEWS = {"0": "front", "20": "nov20", "45": "nov45", "90": "side"}
 BLACK = np.zeros(3, np.float32)
-STARTED = 2
-"""Frames that are not clocked: the first two come together."""
 
 DIRECTIONS = 64
-"""The richest environment that is compared with."""
+"""Lights of an environment in the richest model."""
 
 SHOWN = 0.3
-"""Brightness (linear) of the brightest in a row of pictures at least."""
+"""Least radiance of the brightest pixel in a row of pictures; darker rows are brightened to it."""
 
+HEAD = ("clip", "scattering", "voxels", "directions", "grids", "time", "choosing", "front", "density", "new views, dB")
 RUN = 24
-"""Frames of the run that choosing is compared with."""
+"""Frames of the run whose time the time of choosing is divided by."""
 
 
 @dataclass(frozen=True, eq=False)
 class Known:
-    """The same smoke in the light of a sun, from a folder of truth/picture.py."""
+    """The same smoke in sunlight; frame n of the clip is its frame ``first + step n``."""
 
     scene: Scene
     truth: Truth
+    views: BakedViews
     first: int
     step: int
-    stored: dict[str, np.ndarray]
-    cameras: dict[str, Any]
 
     @staticmethod
     def load(text: str) -> Known:
-        """From FOLDER:FIRST:STEP."""
+        """Read FOLDER:FIRST:STEP."""
         name, first, step = text.split(":")
         folder = Path(name)
-        stored, cameras = {}, {}
-        for view, file in VIEWS.items():
-            with np.load(folder / f"{file}.npz") as data:
-                stored[view] = data["image"]
-            cameras[view] = Scene.load(folder / f"{file}.toml").camera
-        scene = Scene.load(folder / "scene.toml")
-        return Known(scene, Truth.load(folder / "truth.npz"), int(first), int(step), stored, cameras)
+        truth, views = Truth.load(folder / "truth.npz"), BakedViews.load(folder)
+        return Known(Scene.load(folder / "scene.toml"), truth, views, int(first), int(step))
 
-    def seen(self, view: str, frame: int) -> np.ndarray:
-        """The picture of the smoke alone (rows, columns)."""
-        return self.stored[view][self.first + self.step * frame].astype(np.float32)
+    def seen(self, view: str, frame: int) -> Image:
+        """Return the picture of the smoke alone, (rows, columns, 3)."""
+        return self.views.seen(view, self.first + self.step * frame)
 
-    def shown(self, density: np.ndarray, view: str) -> np.ndarray:
-        """What a volume shows in the same light."""
+    def shown(self, density: Volume, view: str) -> Image:
+        """Return what a volume shows in the same light."""
         scene = completed(replace(self.scene, domain=replace(self.scene.domain, resolution=density.shape)))
-        return scene_renderer(scene, self.cameras[view], BLACK).image(density)[..., 0]
+        return scene_renderer(scene, self.views.cameras[view], BLACK).image(density)
 
 
 def sides(clip: Clip, scene: Scene, quality: str) -> dict[str, tuple[Scene, Settings]]:
-    """What is compared: everything left open, and the richest of everything."""
+    """Return what is compared: everything left open, and the richest of everything."""
     chosen = Settings.preset(quality, resolution="auto")
     rich = Settings.preset(quality)
     if scene.domain is None:  # the paper's method takes the most
@@ -114,7 +110,7 @@ class Side:
 
     @staticmethod
     def begin(clip: Clip, scene: Scene, settings: Settings) -> Side:
-        """Prepare it, and clock what that takes beyond the paper's method, which chooses nothing."""
+        """Prepare it, and time what that takes beyond the paper's method, which chooses nothing."""
         clocks = []
         for each in (Settings.preset(settings.quality, "paper"), settings):
             began = time.process_time()
@@ -130,12 +126,12 @@ class Side:
 
     @property
     def seconds(self) -> float:
-        """Of a frame, the median."""
-        return float(np.median(self.spent[STARTED:]))
+        """A frame (s), the median."""
+        return float(np.median(self.spent[UNTIMED:]))
 
 
 def residual(side: Side, clip: Clip) -> float:
-    """Error of the front picture over all frames, in shares of what the smoke changes there."""
+    """Return the L2 error of the front picture over all frames, relative to what the smoke changes there."""
     wrong = change = 0.0
     for frame in side.found:
         shot = side.shot
@@ -149,19 +145,18 @@ def residual(side: Side, clip: Clip) -> float:
 
 
 def against(side: Side, known: Known) -> dict[str, float]:
-    """Error of the density, and PSNR of new views, means over the frames."""
+    """Return the relative error of the density and the PSNR of new views (dB), means over the frames."""
     errors, decibels = [], []
     for frame in side.found:
         at = frame.number - 1
         true = known.truth.density(known.first + known.step * at)
-        found = resampled(frame.density, true.shape)
-        errors.append(float(np.linalg.norm(found - true) / np.linalg.norm(true)))
+        errors.append(relative_error(resampled(frame.density, known.truth.shape), true))
         decibels += [psnr(known.shown(frame.density, view), known.seen(view, at)) for view in list(VIEWS)[1:]]
     return {"density_error": float(np.mean(errors)), "psnr_new": float(np.mean(decibels))}
 
 
-def compare(path: Path, known: Known | None, frames: int, quality: str) -> tuple[dict[str, Any], list[np.ndarray]]:
-    """Both sides of a clip: figures, and pictures of the last frame."""
+def compare(path: Path, known: Known | None, frames: int, quality: str) -> tuple[dict[str, Any], list[Image]]:
+    """Return both sides of a clip: figures, and pictures of the last frame."""
     scene = Scene.load(path)
     first = scene.clip.first
     source = replace(scene.clip, frames=(first, first + frames - 1))
@@ -191,14 +186,14 @@ def compare(path: Path, known: Known | None, frames: int, quality: str) -> tuple
             scene = completed(replace(side.shot.scene, scattering=side.shot.scattering))
             tiles.append(scene_renderer(scene, background=plate).image(side.found[-1].density))
         if known is not None:
-            tiles.append(np.repeat(known.seen("90", frames - 1)[..., None], 3, -1))
-            tiles += [np.repeat(known.shown(side.found[-1].density, "90")[..., None], 3, -1) for side in both.values()]
+            tiles.append(known.seen("90", frames - 1))
+            tiles += [known.shown(side.found[-1].density, "90") for side in both.values()]
     return row, tiles
 
 
 def main() -> None:
     """Compare, and write table, figures and pictures."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description="Compare the chosen model with the richest one.")
     parser.add_argument("out", type=Path)
     parser.add_argument("clips", nargs="+", help="scene.toml, or scene.toml=FOLDER:FIRST:STEP")
     parser.add_argument("--frames", type=int, default=10)
@@ -214,22 +209,9 @@ def main() -> None:
         small = [area_average(tile, 192, round(192 * tile.shape[0] / tile.shape[1])) for tile in tiles]
         gain = max(1.0, SHOWN / float(small[0].max()))  # a haze would be black
         sheet.append([eight_bit(gain * np.maximum(tile, 0)) for tile in small])
-        print(line(row), flush=True)
+        print(markdown(HEAD, [cells(row)]).splitlines()[-1], flush=True)
         (options.out / "selection.json").write_text(json.dumps(rows, indent=1) + "\n")
-    head = [
-        "clip",
-        "scattering",
-        "voxels",
-        "directions",
-        "grids",
-        "time",
-        "choosing",
-        "front",
-        "density",
-        "new views, dB",
-    ]
-    table = [f"| {' | '.join(head)} |", "|" + " --- |" * len(head), *map(line, rows)]
-    (options.out / "selection.md").write_text("\n".join(table) + "\n")
+    (options.out / "selection.md").write_text(markdown(HEAD, map(cells, rows)))
     titles = ["clip", "chosen", "richest", "truth, 90", "chosen, 90", "richest, 90"]
     full = [row for row in sheet if len(row) == len(titles)]
     if full:
@@ -237,14 +219,14 @@ def main() -> None:
         write_sheet(options.out / "selection.png", full, titles, labels)
 
 
-def line(row: dict[str, Any]) -> str:
-    """A row of the table: as chosen, and in brackets the richest."""
+def cells(row: dict[str, Any]) -> list[str]:
+    """Return a row of the table: as chosen, and in brackets the richest."""
     chosen, richest = row["chosen"], row["richest"]
 
     def pair(key: str, form: str) -> str:
         return f"{chosen[key]:{form}} ({richest[key]:{form}})" if key in chosen else "-"
 
-    cells = [
+    return [
         row["clip"],
         f"{chosen['scattering']} ({richest['scattering']})",
         " x ".join(map(str, chosen["resolution"])) + f" ({' x '.join(map(str, richest['resolution']))})",
@@ -256,7 +238,6 @@ def line(row: dict[str, Any]) -> str:
         pair("density_error", ".2f"),
         pair("psnr_new", ".1f"),
     ]
-    return f"| {' | '.join(cells)} |"
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """Seconds a frame of whole runs, from decoding a clip to OpenVDB files on disk, and their peak of memory.
 
-Every run has a process of its own. The machine may be anything and noisy, so times are also given in cosine-transform
-Poisson solves of the same grid, which run between the frames.
+Every run has a process of its own. Machines differ and are shared, so times are also given in Poisson solves of the
+same grid, which are timed between the frames.
 """
 
 from __future__ import annotations
@@ -14,8 +14,9 @@ from typing import Any
 
 from benchmarks import machine
 from benchmarks.pipeline.clip import with_grid, write_clip
-from benchmarks.pipeline.worker import STARTED, run_apart
+from benchmarks.pipeline.worker import run_apart
 from benchmarks.tables import size_text
+from benchmarks.timing import UNTIMED
 from smokelift.scene import Scene
 from smokelift.setup.settings import Method, Quality
 
@@ -44,9 +45,9 @@ def run(
     methods, quality
         As in `Settings`.
     frames
-        To be clocked. Two more come before them, while compilers work.
+        How many are timed. Two more come before them, while compilers work.
     say
-        Is told what happens.
+        Takes a sentence about each run.
     save
         Gets the results so far after each run.
 
@@ -63,7 +64,7 @@ def run(
     }
     with tempfile.TemporaryDirectory() as made:
         folder = Path(made)
-        known = Scene.load(scene_path) if scene_path is not None else write_clip(folder, STARTED + frames)
+        known = Scene.load(scene_path) if scene_path is not None else write_clip(folder, UNTIMED + frames)
         for shape in sizes:
             path = folder / "scene.toml"
             (known if scene_path is not None else with_grid(known, shape)).save(path)

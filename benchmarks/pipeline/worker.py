@@ -10,23 +10,20 @@ from __future__ import annotations
 import json
 import sys
 import tempfile
-import time
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import cast
 
 import numpy as np
 
-from benchmarks.machine import peak_bytes, poisson_seconds
+from benchmarks.machine import peak_mib
 from benchmarks.process import run_module, why_it_ended
 from benchmarks.tables import size_text
+from benchmarks.timing import UNTIMED, FrameTimes, median
 from smokelift.footage.clip import Clip
 from smokelift.pipeline import reconstruct
 from smokelift.scene import Scene
 from smokelift.setup.settings import Method, Quality, Settings
-
-STARTED = 2
-"""Frames that are not clocked: the first two come together, and compilers work before them."""
 
 
 @dataclass(frozen=True)
@@ -40,15 +37,15 @@ class Run:
     method
         As in `Settings`.
     seconds, seconds_density, seconds_velocity
-        A frame: all of it, from its picture (the paper's rendering), and its velocity.
+        A whole frame, its density (the paper's rendering) and its velocity.
     solves
-        The whole frame in Poisson solves.
+        The whole frame in Poisson solves of the same grid.
     memory_mib
-        Peak of the process; None where the system does not say.
+        Peak of the process's memory; None where the system does not say.
     psnr
         Of the working picture, linear, mean over the frames (dB).
     failure
-        One sentence if there is nothing else.
+        Why there are no figures, one sentence; else empty.
     """
 
     size: tuple[int, ...]
@@ -88,34 +85,25 @@ def measure(scene_path: Path, shape: tuple[int, int, int], method: Method, quali
     if scene.clip is None:
         raise ValueError(f"{scene_path}: has no [clip]; give the path of the video there.")
     first = scene.clip.frames[0] if scene.clip.frames is not None else 0
-    source = replace(scene.clip, frames=(first, first + STARTED + frames - 1))
+    source = replace(scene.clip, frames=(first, first + UNTIMED + frames - 1))
     settings = Settings.preset(quality, method, shape)
-    seconds, units, density, velocity, psnr = [], [], [], [], []
+    times = FrameTimes(shape)
     with tempfile.TemporaryDirectory() as out, Clip.open(source) as clip:
-        began = time.perf_counter()
-        for frame in reconstruct(clip, scene, settings, Path(out) / "smoke"):
-            seconds.append(time.perf_counter() - began)
-            units.append(poisson_seconds(shape))
-            density.append(frame.figures["seconds_density"])
-            velocity.append(frame.figures["seconds_velocity"])
-            psnr.append(frame.figures["psnr"])
-            began = time.perf_counter()
-    whole, rendering, motion = (float(np.median(values[STARTED:])) for values in (seconds, density, velocity))
-    peak = peak_bytes()
+        figures = [frame.figures for frame in times.over(reconstruct(clip, scene, settings, Path(out) / "smoke"))]
     return Run(
         size=shape,
         method=method,
-        seconds=whole,
-        seconds_density=rendering,
-        seconds_velocity=motion,
-        solves=whole / float(np.median(units[STARTED:])),
-        memory_mib=None if peak is None else peak / 2**20,
-        psnr=float(np.mean(psnr[STARTED:])),
+        seconds=times.seconds,
+        seconds_density=median([found["seconds_density"] for found in figures]),
+        seconds_velocity=median([found["seconds_velocity"] for found in figures]),
+        solves=times.solves,
+        memory_mib=peak_mib(),
+        psnr=float(np.mean([found["psnr"] for found in figures[UNTIMED:]])),
     )
 
 
 def main() -> None:
-    """Do what the command line says."""
+    """Do the run that the command line names."""
     scene_path, size, method, quality, frames, folder = sys.argv[1:]
     x, y, z = (int(count) for count in size.split("x"))
     try:

@@ -1,0 +1,105 @@
+"""The figures of all runs as a Markdown table, as CSV and as a sheet of pictures."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks import tables
+from benchmarks.accuracy.scenes import KnownScene
+from benchmarks.accuracy.score import images
+from smokelift.footage.images import area_average
+from smokelift.output.images import eight_bit
+from smokelift.output.sheet import write_sheet
+
+Row = dict[str, Any]
+
+
+def columns(views: list[str]) -> list[tuple[str, list[str], str]]:
+    """Return the table's columns: heading, the figures that share the column, and their format."""
+    return [
+        (f"PSNR {' / '.join(views)}", [f"psnr_{view}" for view in views], ".1f"),
+        ("SSIM input, new", [f"ssim_{views[0]}", "ssim_new"], ".3f"),
+        ("shifted, new", ["psnr_shifted_new"], ".1f"),
+        ("spectrum, new", ["spectrum_distance_new"], ".1f"),
+        ("flicker (true), new", ["flicker_new", "flicker_truth_new"], ".4f"),
+        ("depth anisotropy (true)", ["depth_anisotropy", "depth_anisotropy_truth"], ".2f"),
+        ("row-constant detail (true)", ["row_constant_detail", "row_constant_detail_truth"], ".2f"),
+        ("front in side (true)", ["detail_correlation", "detail_correlation_truth"], ".2f"),
+        ("density", ["density_error"], ".2f"),
+        ("height mass", ["height_mass_error"], ".2f"),
+        ("mass", ["mass_ratio"], ".2f"),
+        ("velocity, cosine", ["velocity_error", "velocity_cosine"], ".2f"),
+        ("around", ["velocity_error_around", "velocity_cosine_around"], ".2f"),
+        ("div (true)", ["divergence", "divergence_truth"], ".0e"),
+        ("warp (true)", ["warp_error", "warp_error_truth"], ".2f"),
+        ("s a frame", ["seconds"], ".2f"),
+        ("solves", ["solves"], ".0f"),
+        ("MiB", ["memory_mib"], ".0f"),
+    ]
+
+
+def markdown(rows: list[Row], views: list[str]) -> str:
+    """Return the table of some runs."""
+    shown = columns(views)
+    cells = [[row["scene"], row["run"], *(_cell(row, names, form) for _, names, form in shown)] for row in rows]
+    return tables.markdown(["scene", "run", *(heading for heading, _, _ in shown)], cells)
+
+
+def write(out: Path, name: str, rows: list[Row], scenes: list[KnownScene]) -> None:
+    """Write the table, on one page with the pictures, and every figure as CSV."""
+    names = dict.fromkeys(column for row in rows for column in row)
+    with (out / f"{name}.csv").open("w", newline="") as file:
+        writer = csv.DictWriter(file, names)
+        writer.writeheader()
+        writer.writerows(rows)
+    table = markdown(rows + _means(rows), list(scenes[0].cameras))
+    page = f"{rows[0]['machine']}, {rows[0]['date']}\n\n{table}\n![Pictures]({name}.png)\n"
+    (out / f"{name}.md").write_text(page)
+
+
+def contact_sheet(
+    scenes: list[KnownScene], shown: list[str], folder: Callable[[KnownScene, str], Path], path: Path
+) -> None:
+    """Write a picture of the last scored frames: a row a scene; for every view the truth and some runs."""
+    rows = []
+    for known in scenes:
+        last = known.scored[-1:]
+        pictured = {run: next(images(known, run, folder(known, run), last))[1] for run in shown}
+        width, height = next(iter(known.cameras.values())).size
+        tiles = [
+            image
+            for view in known.cameras
+            for image in (known.seen(view, last[0]), *(pictured[run][view] for run in shown))
+        ]
+        rows.append([eight_bit(area_average(tile, width // 2, height // 2)) for tile in tiles])
+    titles = [f"{view}: {what}" for view in scenes[0].cameras for what in ("truth", *shown)]
+    labels = [f"{known.name}, frame {known.scored[-1]}" for known in scenes]
+    write_sheet(path, rows, titles, labels)
+
+
+def _means(rows: list[Row]) -> list[Row]:
+    """Return the mean of every run over the scenes, if there are several."""
+    if len({row["scene"] for row in rows}) < 2:
+        return []
+    found = []
+    for run in dict.fromkeys(row["run"] for row in rows):
+        of_run = [row for row in rows if row["run"] == run]
+        mean: Row = {"scene": "**mean**", "run": run}
+        for name in of_run[0]:
+            values = [value for row in of_run if isinstance(value := row.get(name), int | float)]
+            if len(values) == len(of_run):
+                mean[name] = float(np.mean(values))
+        found.append(mean)
+    return found
+
+
+def _cell(row: Row, names: list[str], form: str) -> str:
+    values = [row.get(name) for name in names]
+    if all(value is None for value in values):
+        return ""
+    return " / ".join("-" if value is None else f"{value:{form}}" for value in values)

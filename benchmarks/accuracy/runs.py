@@ -1,0 +1,138 @@
+"""Runs by their names: which settings a reconstruction has, and which cameras it may see.
+
+A name is a quality or "paper", then further views, then changes:
+
+- ``balanced``, ``paper``
+- ``balanced+90``, ``balanced+90+45``: the views 90 and 45 are input too; of a capture ``balanced+camera00``
+- ``balanced:transport=0``, ``fine:velocity.levels=2``, ``draft:resolution=32x32x48``: settings that differ
+- ``balanced:without=depth``: a part of the method is left out, see `leave_out`
+- ``smear``: the front picture alone is fitted, with a density that is constant along the rays
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, get_args
+
+import numpy as np
+
+from benchmarks.accuracy.scenes import VIEWS, BakedViews, camera_of
+from smokelift import Clip, ClipSource, Scene, Settings, Velocity, View, advect, reconstruct_density
+from smokelift.density import DensitySettings, evidence
+from smokelift.output.images import write_image
+from smokelift.setup.settings import Quality
+from smokelift.setup.shot import Shot
+from smokelift.velocity import CoarseToFine
+
+SMEAR = "smear"
+SMEAR_SETTINGS = DensitySettings(fit_iterations=24, descent_iterations=0, tolerance=1e-3)
+"""Only whole rays are scaled, so that a density which is constant along them stays so."""
+
+
+def run_views(run: str) -> list[str]:
+    """Return the names of the further views of a run: "90" and "45" of "balanced+90+45:transport=0"."""
+    return run.partition(":")[0].split("+")[1:]
+
+
+def further_view(name: str, scene_path: Path, last: int, folder: Path) -> View:
+    """Return a further view of a scene.
+
+    Parameters
+    ----------
+    name
+        Key of `VIEWS`, or the name of a scene file beside the scene's.
+    scene_path
+        The scene's file.
+    last
+        The last frame that is needed, from 0.
+    folder
+        Gets 8-bit pictures of what the camera saw, if there is no clip of it.
+    """
+    path = scene_path.with_name(f"{VIEWS.get(name, name)}.toml")
+    source = Scene.load(path).clip
+    if source is None:
+        seen = BakedViews.load(scene_path.parent)
+        for number in range(last + 1):
+            write_image(folder / f"{name}_{number:04d}.png", seen.seen(name, number))
+        source = ClipSource(folder / f"{name}_####.png")
+    return View(camera_of(path), source)
+
+
+def run_settings(run: str) -> Settings:
+    """Return the settings of a run's name.
+
+    Raises
+    ------
+    ValueError
+        If there is no such quality or part of the method.
+    """
+    name, _, changes = run.partition(":")
+    name = name.split("+")[0]
+    qualities: dict[str, Quality] = {quality: quality for quality in get_args(Quality)}
+    if name != "paper" and name not in qualities:
+        raise ValueError(f"{run}: expected paper or one of {', '.join(qualities)} before a colon.")
+    settings = Settings.preset(method="paper") if name == "paper" else Settings.preset(qualities[name])
+    for change in filter(None, changes.split(",")):
+        key, _, text = change.partition("=")
+        if key == "without":
+            settings = leave_out(text, settings)
+        elif key == "resolution":
+            x, y, z = (int(count) for count in text.split("x"))
+            settings = replace(settings, resolution=(x, y, z))
+        else:
+            settings = _changed(settings, key, text)
+    return settings
+
+
+def _changed(settings: Settings, key: str, text: str) -> Settings:
+    """Return settings with a field, or with a field of a group ("velocity.levels"), read from text."""
+    try:
+        value: Any = json.loads(text)
+    except json.JSONDecodeError:
+        value = text
+    group, _, field = key.rpartition(".")
+    if group:
+        field, value = group, replace(getattr(settings, group), **{field: value})
+    return replace(settings, **{field: value})
+
+
+def leave_out(part: str, settings: Settings) -> Settings:
+    """Do without a part of the method: the settings for that, and what settings do not say, for the whole process.
+
+    - transport: every frame begins with its own picture
+    - hull: smoke may be wherever the camera looks
+    - sources: smoke that enters is read as motion
+    - projection: the prediction is the velocity carried along by itself, divergence and all
+    - depth: the first guess is constant along the rays
+    """
+    if part == "transport":
+        return replace(settings, transport=0.0)
+    if part == "sources":
+        return replace(settings, velocity=replace(settings.velocity, sources=None))
+    if part == "hull":
+        evidence.common_hull = lambda _masks, projections: np.any([p.visible for p in projections], axis=0)
+    elif part == "projection":
+        CoarseToFine.predict = carried_by_itself
+    elif part == "depth":
+        evidence.DepthProfile.at = lambda _profile, _projection, voxels: np.full(np.count_nonzero(voxels), 0.5)
+    else:
+        raise ValueError(f"without={part}: expected transport, hull, sources, projection or depth.")
+    return settings
+
+
+def carried_by_itself(_estimator: CoarseToFine, velocity: Velocity, dt: float) -> Velocity:
+    """What is predicted without pressure projection."""
+    return replace(advect(velocity, velocity, dt), residual=velocity.residual)
+
+
+def smeared(clip: Clip, shot: Shot) -> Iterator[np.ndarray]:
+    """The front fit with a density that is constant along the rays inside the domain."""
+    domain, medium = shot.scene.domain, shot.scene.medium
+    fog = np.full(domain.resolution, 0.5 / (medium.extinction * (domain.max[1] - domain.min[1])), np.float32)
+    settings = replace(SMEAR_SETTINGS, scattering=shot.scattering)
+    for index in range(len(clip)):
+        image = shot.working.cut(clip.frame(index))
+        yield reconstruct_density(image, shot.small_scene, fog, settings, plate=shot.plate).values

@@ -1,0 +1,55 @@
+"""The time that frames take, in seconds and in Poisson solves of the same grid."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Iterator
+from typing import TypeVar
+
+import numpy as np
+
+from benchmarks.machine import poisson_seconds
+
+Frame = TypeVar("Frame")
+
+UNTIMED = 2
+"""Frames that do not count: the first two come together, and compilers work before them."""
+
+
+class FrameTimes:
+    """Times of a run's frames. Between them a Poisson solve is timed, because the machine may be busy.
+
+    Parameters
+    ----------
+    shape
+        Voxels along x, y and z.
+    """
+
+    def __init__(self, shape: tuple[int, int, int]) -> None:
+        self._shape = shape
+        self._seconds: list[float] = []
+        self._units: list[float] = []
+
+    def over(self, frames: Iterable[Frame]) -> Iterator[Frame]:
+        """Yield frames and time the making of each; what is done with a frame is not timed."""
+        began = time.perf_counter()
+        for frame in frames:
+            self._seconds.append(time.perf_counter() - began)
+            self._units.append(poisson_seconds(self._shape))
+            yield frame
+            began = time.perf_counter()
+
+    @property
+    def seconds(self) -> float:
+        """A frame (s), the median."""
+        return median(self._seconds)
+
+    @property
+    def solves(self) -> float:
+        """A frame in Poisson solves."""
+        return self.seconds / median(self._units)
+
+
+def median(values: list[float]) -> float:
+    """Return the median over the frames that count; over all, if there are no others."""
+    return float(np.median(values[UNTIMED:] or values))
