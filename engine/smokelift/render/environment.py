@@ -207,7 +207,8 @@ class _Cells:
     def _split(self, stratum: Indices) -> list[Indices]:
         weight, direction = self.importance[stratum], self.direction[stratum]
         spread = weight @ np.square(direction) - np.square(weight @ direction) / weight.sum()
-        order = np.argsort(direction[:, _first_largest(spread)], kind="stable")
+        # parts of one row or of mirrored halves lie equally far along an axis but for rounding, which differs by machine
+        order = np.argsort(direction[:, _first_largest(spread)].round(9), kind="stable")
         weight, moment = weight[order], (weight[:, None] * direction)[order]
         kept = _concentration(weight, moment)[:-1] + _concentration(weight[::-1], moment[::-1])[-2::-1]
         cut = _first_largest(kept) + 1
