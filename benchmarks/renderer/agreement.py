@@ -24,7 +24,8 @@ from scipy import ndimage
 
 from smokelift.output.images import write_image
 from smokelift.render import Renderer
-from smokelift.render.environment import environment_count, environment_lights
+from smokelift.render.environment import environment_lights
+from smokelift.render.environment_count import environment_count
 from smokelift.scene import Camera, DirectionalLight, Domain, EnvironmentLight, Light, Medium, PointLight
 
 VOXELS = 32

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.renderer.scene import BenchScene
-from smokelift.render.rays import LATERAL, camera_rays
+from smokelift.render.camera_rays import LATERAL, camera_rays
 
 Floats = NDArray[np.float32]
 Ints = NDArray[np.int32]

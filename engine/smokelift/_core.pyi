@@ -131,7 +131,7 @@ class PointLight:
 Lights = list[ParallelLight | PointLight]
 
 class Rays:
-    """One ray a pixel; see `smokelift.render.rays.Rays` for the arrays."""
+    """One ray a pixel; see `smokelift.render.camera_rays.Rays` for the arrays."""
 
     def __init__(self, lines: Array, length: Array, planes: npt.NDArray[np.int32]) -> None: ...
     def clip(self, support: Support, medium: Volume, threads: int = 0) -> None: ...

@@ -18,7 +18,7 @@ from drjit.llvm import Array2f, Float, Int32, UInt32
 from benchmarks.renderer.peers import Iteration
 from benchmarks.renderer.sampling import LightTable, light_table, phase_volume, ray_table
 from benchmarks.renderer.scene import BenchScene
-from smokelift.render.rays import LATERAL
+from smokelift.render.camera_rays import LATERAL
 
 
 def without_atomics() -> Any:

@@ -18,7 +18,7 @@ from benchmarks.renderer.peers import Iteration
 from benchmarks.renderer.peers.drjit_loops import without_atomics
 from benchmarks.renderer.sampling import light_table, phase_volume, ray_table
 from benchmarks.renderer.scene import BenchScene
-from smokelift.render.rays import LATERAL
+from smokelift.render.camera_rays import LATERAL
 
 
 def prepare(scene: BenchScene) -> Iteration:

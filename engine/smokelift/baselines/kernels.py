@@ -10,11 +10,17 @@ weights of a sample always add up to one.
 
 import taichi as ti
 
-from smokelift.render.gpu_light import _at_voxel as parallel_at_voxel
-from smokelift.render.gpu_light import _faces_voxel as faces_voxel
-from smokelift.render.gpu_light import _from_columns as point_at_voxel
-from smokelift.render.gpu_light import _phase as phase
-from smokelift.render.gpu_light import affine, ndarray3, ndarray4, vec2, vec3
+from smokelift.render.gpu.light_kernels import (
+    affine,
+    faces_voxel,
+    ndarray3,
+    ndarray4,
+    parallel_at_voxel,
+    phase,
+    point_at_voxel,
+    vec2,
+    vec3,
+)
 
 ndarray2 = ti.types.ndarray(dtype=ti.f32, ndim=2)
 samples_type = ti.types.ndarray(dtype=ti.i32, ndim=3)

@@ -39,15 +39,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.render import device
-from smokelift.render import taichi_runtime as taichi
+from smokelift.render.gpu import taichi_runtime as taichi
 
 # isort: split
 # only now what imports Taichi too: the runtime holds its greeting back
 from smokelift.baselines import kernels as kernels
-from smokelift.render import gpu_light as light_kernels
-from smokelift.render.lights import FiniteLight, Parallel
+from smokelift.render.gpu import light_kernels as light_kernels
+from smokelift.render.light_sweeps import FiniteLight, ParallelSweep
+from smokelift.render.plan import plan_render
 from smokelift.render.renderer import Image, Volume
-from smokelift.render.setup import make_setup
 from smokelift.scene import Camera, Domain, Medium, Scattering
 from smokelift.scene.projection import ray_through_pixels
 
@@ -84,7 +84,7 @@ class PaperRenderer:
         taichi.start(device.start())
         self.camera, self.domain, self.medium = camera, domain, medium
         self._background = np.asarray(background, np.float64)
-        setup = make_setup(camera, domain, medium, lights, scattering, None)
+        setup = plan_render(camera, domain, medium, lights, scattering, None)
         self._shadows = setup.shadows
         self._lights = setup.lighting.lights
         # black light where there is none: kernels want a channel
@@ -143,7 +143,7 @@ class PaperRenderer:
         for number, light in enumerate(self._lights):
             energy = taichi.vector(np.resize(light.energy, 3))
             scatters = (energy, self._to_eye, medium.anisotropy, medium.albedo, h, self._channels, number)
-            if isinstance(light, Parallel):
+            if isinstance(light, ParallelSweep):
                 slopes = (*light.slope, light.first)
                 x, y, z = (n + (axis != light.axis) for axis, n in enumerate(self.domain.resolution))
                 columns = self._buffer((x, y, z))

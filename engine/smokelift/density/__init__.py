@@ -25,7 +25,7 @@ from smokelift.footage.matte import matte
 from smokelift.footage.noise import EIGHT_BIT_STEP
 from smokelift.footage.plate import Plate, noise_at
 from smokelift.render import Renderer, scene_background, scene_lights
-from smokelift.render.lights import unshadowed_source
+from smokelift.render.light_sweeps import unshadowed_source
 from smokelift.render.renderer import Image, Volume
 from smokelift.scene import Camera, Domain, Medium, Scattering, Scene, orbit
 

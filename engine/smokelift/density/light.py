@@ -27,7 +27,7 @@ from smokelift.footage.images import area_average
 from smokelift.footage.matte import matte
 from smokelift.footage.plate import Plate, noise_at
 from smokelift.render import Renderer, scene_lights
-from smokelift.render.lights import lighting
+from smokelift.render.light_sweeps import lighting
 from smokelift.render.renderer import Image
 from smokelift.scene import Domain, Medium, PointLight, Scene
 

@@ -1,18 +1,24 @@
 """The differentiable renderer: a density and a scene in, an image out, and the exact derivative back.
 
-``optics`` turns a scene into what light meets on its way: the domain, the medium and finitely many lights.
-``setup`` puts camera rays (``rays``) and lights (``lights``) into the grid, ``device`` chooses between ``cpu`` and
-``gpu``, which find how much light reaches every voxel and sum it up along the rays, ``renderer`` makes colours of it.
+    Scene -> Optics     domain, medium, lights, scattering           optics
+      lights            all as directional and point lights          finite_lights, environment, environment_count
+    Optics -> Renderer  one camera before one background             renderer
+      RenderPlan        rays and light sweeps in voxel coordinates   plan, camera_rays, light_sweeps
+      Backend           light to every voxel, then along the rays    device: cpu_backend (cpp/) or gpu/ (Taichi)
+
+`render` and `render_gradient` go all the way from a density and a scene (``image``).
 """
 
 from smokelift.footage.background import background_picture as scene_background
 from smokelift.render.device import DeviceError, start
 from smokelift.render.image import render, render_gradient
+from smokelift.render.light_sweeps import FiniteLight
 from smokelift.render.optics import Optics, scene_lights, scene_optics, scene_renderer
 from smokelift.render.renderer import Image, Renderer, Volume
 
 __all__ = [
     "DeviceError",
+    "FiniteLight",
     "Image",
     "Optics",
     "Renderer",

@@ -8,15 +8,13 @@ from __future__ import annotations
 import ctypes
 import sys
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.render.cpu import CpuPipeline
-
-if TYPE_CHECKING:
-    from smokelift.render.setup import Setup
+from smokelift.render.cpu_backend import CpuBackend
+from smokelift.render.plan import RenderPlan
 
 DeviceName = Literal["auto", "cpu", "gpu"]
 
@@ -36,8 +34,8 @@ class DeviceError(RuntimeError):
     """The device that was asked for is not there."""
 
 
-class Pipeline(Protocol):
-    """Picture and derivative of one setup, in channels."""
+class Backend(Protocol):
+    """Picture and derivative of one `RenderPlan`, in channels; `Renderer` makes colours of them."""
 
     def image(self, density: NDArray[np.float32], keep_record: bool) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Scattered radiance (rows, columns, channels) and optical depth (rows, columns)."""
@@ -94,16 +92,16 @@ def start(device: DeviceName = "auto") -> str:
     return _running
 
 
-def pipeline(setup: Setup) -> Pipeline:
-    """What renders a setup on the device of this process."""
+def backend(plan: RenderPlan) -> Backend:
+    """What renders a plan on the device of this process."""
     if start() == "cpu":
-        return CpuPipeline(setup)
-    gpu_pipeline: Pipeline = import_module("smokelift.render.gpu").GpuPipeline(setup)
-    return gpu_pipeline
+        return CpuBackend(plan)
+    on_gpu: Backend = import_module("smokelift.render.gpu.backend").GpuBackend(plan)
+    return on_gpu
 
 
 def _taichi() -> Any:
-    return import_module("smokelift.render.taichi_runtime")
+    return import_module("smokelift.render.gpu.taichi_runtime")
 
 
 def _driver_installed() -> bool:

@@ -8,43 +8,31 @@ a stratum cancels; what is left grows with its scatter
     sum_i w_i |d_i - centroid|^2   (w_i importance, d_i unit vectors to its parts),
 
 so the stratum with the most scatter is split next, across the axis of its largest spread, where the two halves keep
-the least scatter. A median cut (Debevec 2005: split the stratum with the most importance into equal halves) needs up
-to twice as many lights for the same picture, and cuts a sun again and again.
+the least scatter. A median cut (Debevec 2005, "A Median Cut Algorithm for Light Probe Sampling") needs up to twice as
+many lights for the same picture (docs/experiments/environment-directions.md).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.footage.images import ImageError, read_image
-from smokelift.render.renderer import Image, Renderer, Volume
-from smokelift.scene import Camera, DirectionalLight, Domain, EnvironmentLight, Medium
-from smokelift.scene.projection import project
+from smokelift.scene import DirectionalLight, EnvironmentLight
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-"""Rec. 709."""
+"""Weights of linear red, green and blue (ITU-R BT.709)."""
 
 CELLS = (256, 512)
 """Rows and columns of the cells that strata are made of, 0.7 degrees: a sun is one to four of them."""
 
-FEWEST, MOST = 4, 256
-"""Lights that `environment_count` chooses between."""
-
-TOLERANCE = 0.01
-"""Change of the picture: an image by single scattering is itself good to a few tenths of a percent at a voxel a step,
-and one code value of an 8-bit picture is half a percent of middle grey."""
-
-REFERENCE_VOXELS = 28
-REFERENCE_PIXELS = 96
-REFERENCE_DEPTH = 3.0
+ROUNDING = 1e-9
+"""Relative difference below which two sums are equal. Processors and their libraries add in different orders."""
 
 
 def environment_lights(light: EnvironmentLight, count: int) -> tuple[DirectionalLight, ...]:
@@ -67,7 +55,7 @@ def environment_lights(light: EnvironmentLight, count: int) -> tuple[Directional
     -------
     tuple of DirectionalLight
         Empty for a black picture. Directions are directions of travel, irradiance in W/m^2 (perpendicular to the
-        direction) a channel; their sum is the integral of the radiance over the sphere.
+        direction) a channel; their sum is the integral of the radiance over the sphere. Every machine finds the same.
 
     Raises
     ------
@@ -76,76 +64,11 @@ def environment_lights(light: EnvironmentLight, count: int) -> tuple[Directional
     ValueError
         If ``count`` is below 1.
     """
-    return _Cells(light).lights(count)
+    return EnvironmentCells(light).lights(count)
 
 
-def environment_count(light: EnvironmentLight, camera: Camera, domain: Domain, medium: Medium) -> int:
-    """Choose the number of lights for an environment by convergence.
-
-    A ball of lumps and hollows that fills the domain, of optical depth 3, 28 voxels along the longest edge, is
-    rendered in the medium before black with 4, 8, 16, ... lights, until doubling their number changes the picture by
-    at most 1 % (relative L2 norm), or the number is 256. With the number so found, a simulated plume under six kinds
-    of surroundings, anisotropy 0 and 0.6, came within 0.2 to 1.3 % of its picture with 512 lights (2.5 % under a few
-    small lamps at 0.6).
-
-    Returns
-    -------
-    int
-        The number of lights that doubling did not change any more.
-
-    Raises
-    ------
-    smokelift.footage.images.ImageError
-        As `environment_lights`.
-    """
-    small = _coarse(domain)
-    view = _coarse_camera(camera, small)
-    ball = _reference_density(small, medium)
-
-    def picture(lights: tuple[DirectionalLight, ...]) -> Image:
-        return Renderer(view, small, medium, lights, np.zeros(3, np.float32)).image(ball)
-
-    return lights_needed(light, picture)[0]
-
-
-def lights_needed(
-    light: EnvironmentLight, picture: Callable[[tuple[DirectionalLight, ...]], Image]
-) -> tuple[int, float]:
-    """Double the number of lights until that changes a picture by at most the tolerance, or there are 256.
-
-    Parameters
-    ----------
-    light
-        The environment.
-    picture
-        Shows something in some lights.
-
-    Returns
-    -------
-    count
-        The number of lights that doubling did not change any more.
-    change
-        By how much doubling still changes the picture (relative L2 norm).
-
-    Raises
-    ------
-    smokelift.footage.images.ImageError
-        As `environment_lights`.
-    """
-    cells = _Cells(light)
-    count, image = FEWEST, picture(cells.lights(FEWEST))
-    while True:
-        finer = picture(cells.lights(2 * count))
-        bright = float(np.linalg.norm(finer))
-        change = float(np.linalg.norm(finer - image)) / bright if bright > 0 else 0.0
-        if change <= TOLERANCE or 2 * count >= MOST:
-            break
-        count, image = 2 * count, finer
-    return (count if change <= TOLERANCE else MOST), change
-
-
-class _Cells:
-    """The picture's parts that are not black.
+class EnvironmentCells:
+    """The parts of an environment's picture that are not black, read once for any number of lights.
 
     Attributes
     ----------
@@ -172,7 +95,7 @@ class _Cells:
         self.direction = direction[lit]
 
     def lights(self, count: int) -> tuple[DirectionalLight, ...]:
-        """At most so many lights."""
+        """At most so many lights, as `environment_lights`."""
         if count < 1:
             raise ValueError(f"An environment needs at least 1 light, not {count}.")
         return tuple(self._light(stratum) for stratum in self._strata(count))
@@ -207,8 +130,9 @@ class _Cells:
     def _split(self, stratum: Indices) -> list[Indices]:
         weight, direction = self.importance[stratum], self.direction[stratum]
         spread = weight @ np.square(direction) - np.square(weight @ direction) / weight.sum()
-        # parts of one row or of mirrored halves lie equally far along an axis but for rounding, which differs by machine
-        order = np.argsort(direction[:, _first_largest(spread)].round(9), kind="stable")
+        along = direction[:, _first_largest(spread)]
+        # cells of one row, or of mirrored halves, lie equally far along the axis but for rounding
+        order = np.argsort(np.rint(along / ROUNDING), kind="stable")
         weight, moment = weight[order], (weight[:, None] * direction)[order]
         kept = _concentration(weight, moment)[:-1] + _concentration(weight[::-1], moment[::-1])[-2::-1]
         cut = _first_largest(kept) + 1
@@ -222,11 +146,11 @@ def _concentration(weight: Array, moment: Array) -> Array:
 
 
 def _first_largest(values: Array) -> int:
-    """The first of the values that are the largest but for rounding, so that every machine takes the same."""
-    return int(np.argmax(values >= values.max() * (1 - 1e-9)))
+    """The first of the values that are the largest but for rounding."""
+    return int(np.argmax(values >= values.max() * (1 - ROUNDING)))
 
 
-def _gather(picture: Image) -> tuple[Array, Array]:
+def _gather(picture: NDArray[np.float32]) -> tuple[Array, Array]:
     """Sum a picture up over `CELLS`.
 
     Returns
@@ -254,35 +178,3 @@ def _gather(picture: Image) -> tuple[Array, Array]:
         moment[cell_row] = np.add.reduceat(((part @ LUMINANCE)[..., None] * towards).sum(0), first_column)
     moment /= np.maximum(np.linalg.norm(moment, axis=-1, keepdims=True), np.finfo(float).tiny)
     return irradiance.reshape(-1, 3), moment.reshape(-1, 3)
-
-
-def _coarse(domain: Domain) -> Domain:
-    """The domain in few cubic voxels; where they do not fit its edges, to the nearest."""
-    edges = np.array(domain.max) - np.array(domain.min)
-    voxel = edges.max() / REFERENCE_VOXELS
-    counts = np.maximum(np.rint(edges / voxel), 1).astype(int)
-    low, high = (np.array(domain.centre) + side * counts * voxel / 2 for side in (-1, 1))
-    return Domain(_triple(low), _triple(high), (int(counts[0]), int(counts[1]), int(counts[2])))
-
-
-def _coarse_camera(camera: Camera, domain: Domain) -> Camera:
-    """The camera with pixels about as wide as voxels at the domain's centre."""
-    _, depth = project(camera, np.array(domain.centre))
-    nearest = domain.voxel_size if camera.type == "perspective" else 1.0
-    pixels_a_voxel = max(camera.fx, camera.fy) * domain.voxel_size / max(float(depth), nearest)
-    width, height = camera.size
-    shrink = max(1.0, pixels_a_voxel, max(width, height) / REFERENCE_PIXELS)
-    return camera.resized(max(1, round(width / shrink)), max(1, round(height / shrink)))
-
-
-def _reference_density(domain: Domain, medium: Medium) -> Volume:
-    """A ball of lumps and hollows that fills the domain, of optical depth 3 through its thickest part."""
-    x, y, z = np.meshgrid(*((2 * np.arange(n) + 1) / n - 1 for n in domain.resolution), indexing="ij")
-    lumps = np.maximum(1 + 4 * np.sin(9 * x) * np.sin(8 * y + 1) * np.sin(7 * z + 2), 0)
-    ball = np.maximum(1 - (x * x + y * y + z * z), 0) * lumps
-    thickest = domain.voxel_size * min(ball.sum(axis).max() for axis in range(3))
-    return np.asarray(ball * REFERENCE_DEPTH / (medium.extinction * thickest), np.float32)
-
-
-def _triple(values: NDArray[Any]) -> tuple[float, float, float]:
-    return float(values[0]), float(values[1]), float(values[2])

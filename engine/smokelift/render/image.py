@@ -14,7 +14,7 @@ from smokelift.scene import Camera, CompleteScene, Domain, Scene, completed
 
 
 def render(density: Volume, scene: Scene | CompleteScene, camera: Camera | None = None) -> Image:
-    """Render a density as a camera sees it, by the scene's scattering model (method section 1).
+    """Render a density as a camera sees it, by the scene's scattering model.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def render_gradient(
     target: Image | Sequence[Image],
     camera: Camera | Sequence[Camera] | None = None,
 ) -> tuple[float, Volume, Image | list[Image]]:
-    """Squared difference between the rendered and a target image, with its derivative (method section 2).
+    """Squared difference between the rendered and a target image, with its exact derivative.
 
     Parameters
     ----------

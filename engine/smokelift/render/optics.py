@@ -3,26 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.footage.background import background_picture
-from smokelift.render.environment import environment_count, environment_lights
-from smokelift.render.lights import FiniteLight
+from smokelift.render.finite_lights import finite_lights
+from smokelift.render.light_sweeps import FiniteLight
 from smokelift.render.renderer import Image, Renderer
-from smokelift.scene import (
-    Camera,
-    CompleteScene,
-    DirectionalLight,
-    Domain,
-    EnvironmentLight,
-    Medium,
-    Scattering,
-    Scene,
-    completed,
-)
+from smokelift.scene import Camera, CompleteScene, Domain, Medium, Scattering, Scene, completed
 
 
 @dataclass(frozen=True)
@@ -50,23 +39,8 @@ class Optics:
 
 
 def scene_optics(scene: CompleteScene) -> Optics:
-    """The optics of a scene, in which an environment has become as many parallel lights as it needs.
-
-    That number is found with the scene's own camera, where it is in the first frame. It is the same for every other
-    camera and frame, so that a sequence is lit alike from all sides.
-
-    Raises
-    ------
-    smokelift.footage.images.ImageError
-        If an environment's picture cannot be read.
-    """
-    lights: list[FiniteLight] = []
-    for light in scene.lights:
-        if isinstance(light, EnvironmentLight):
-            lights += _environment(light, scene.camera.at(0), scene.domain, scene.medium)
-        else:
-            lights += light.samples()
-    return Optics(scene.domain, scene.medium, tuple(lights), scene.scattering)
+    """The optics of a scene; see `finite_lights` for its lights."""
+    return Optics(scene.domain, scene.medium, finite_lights(scene), scene.scattering)
 
 
 def scene_lights(scene: Scene | CompleteScene) -> tuple[FiniteLight, ...]:
@@ -87,10 +61,3 @@ def scene_renderer(scene: CompleteScene, camera: Camera | None = None, backgroun
         raise ValueError("The camera moves; give the one of a frame, camera.at(frame).")
     behind = background_picture(scene, view) if background is None else background
     return scene_optics(scene).renderer(view, behind)
-
-
-@lru_cache(maxsize=4)
-def _environment(
-    light: EnvironmentLight, camera: Camera, domain: Domain, medium: Medium
-) -> tuple[DirectionalLight, ...]:
-    return environment_lights(light, light.directions or environment_count(light, camera, domain, medium))

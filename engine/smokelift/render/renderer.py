@@ -1,4 +1,4 @@
-"""One scene, one camera, one grid: a density in, an image out, and the derivative back.
+"""One camera before one grid: a density in, an image out, and the derivative back.
 
 The smoke is grey, so a picture is scattered radiance S, in one channel where all lights have the same colour and in
 three otherwise, and transmittance T = exp(-optical depth). Colours are a matter of the last line:
@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.render import device
-from smokelift.render.lights import FiniteLight
-from smokelift.render.setup import make_setup
+from smokelift.render.light_sweeps import FiniteLight
+from smokelift.render.plan import plan_render
 from smokelift.scene import Camera, Domain, Medium, Scattering
 
 Image = NDArray[np.float32]
@@ -57,15 +57,15 @@ class Renderer:
         support: NDArray[np.bool_] | None = None,
     ) -> None:
         self.camera, self.domain, self.medium = camera, domain, medium
-        setup = make_setup(camera, domain, medium, lights, scattering, support)
-        self._colour = np.asarray(setup.lighting.colour, np.float32)
+        plan = plan_render(camera, domain, medium, lights, scattering, support)
+        self._colour = np.asarray(plan.lighting.colour, np.float32)
         self._background = np.asarray(background, np.float32)
-        self._pipeline = device.pipeline(setup)
+        self._backend = device.backend(plan)
         self._depth: Image = np.zeros(camera.size[::-1], np.float32)
 
     def image(self, density: Volume, *, keep_record: bool = False) -> Image:
         """Render a density (nx, ny, nz); linear radiance (rows, columns, 3)."""
-        scattered, self._depth = self._pipeline.image(density, keep_record)
+        scattered, self._depth = self._backend.image(density, keep_record)
         return np.asarray(scattered @ self._colour + self.transmittance[..., None] * self._background)
 
     @property
@@ -80,4 +80,4 @@ class Renderer:
         """
         of_image = np.asarray(image_gradient, np.float32)
         of_transmittance = np.einsum("...c,...c", of_image, np.broadcast_to(self._background, of_image.shape))
-        return self._pipeline.gradient(np.ascontiguousarray(of_image @ self._colour.T), of_transmittance)
+        return self._backend.gradient(np.ascontiguousarray(of_image @ self._colour.T), of_transmittance)

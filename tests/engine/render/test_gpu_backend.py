@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from smokelift.render import taichi_runtime
-from smokelift.render.cpu import CpuPipeline
-from smokelift.render.gpu import GpuPipeline
-from smokelift.render.setup import make_setup
+from smokelift.render.cpu_backend import CpuBackend
+from smokelift.render.gpu import taichi_runtime
+from smokelift.render.gpu.backend import GpuBackend
+from smokelift.render.plan import plan_render
 from smokelift.scene import Camera, DirectionalLight, Domain, Medium, PointLight
 
 SHAPE = (9, 10, 12)
@@ -31,7 +31,7 @@ def taichi_on_the_processor():
 @pytest.mark.parametrize("lights", LIGHTS.values(), ids=LIGHTS.keys())
 @pytest.mark.parametrize("scattering", ["single", "unshadowed"])
 @pytest.mark.parametrize("hull", [False, True])
-def test_both_pipelines_agree(lights, scattering, hull):
+def test_both_backends_agree(lights, scattering, hull):
     """The same picture and the same derivative, twice in a row, with and without a hull."""
     rng = np.random.default_rng(1)
     density = (rng.random(SHAPE) * (rng.random(SHAPE) > 0.3)).astype(np.float32)
@@ -41,13 +41,13 @@ def test_both_pipelines_agree(lights, scattering, hull):
         support[:2], support[:, -3:] = False, False
         density = np.where(support, density, 0).astype(np.float32)
     camera = Camera.look_at((2.5, -1.2, 2.4), (0.45, 0.5, 0.6), fov_y_degrees=40, size=(14, 16))
-    setup = make_setup(camera, DOMAIN, Medium(4.0, 0.9, 0.3), lights, scattering, support)
-    pipelines = CpuPipeline(setup), GpuPipeline(setup)
+    plan = plan_render(camera, DOMAIN, Medium(4.0, 0.9, 0.3), lights, scattering, support)
+    backends = CpuBackend(plan), GpuBackend(plan)
     for values in (density / 2, density):
         results = []
-        for pipeline in pipelines:
-            scattered, depth = (part.copy() for part in pipeline.image(values, True))
-            slope = pipeline.gradient(np.full(scattered.shape, 0.7, np.float32), np.full(depth.shape, 0.3, np.float32))
+        for backend in backends:
+            scattered, depth = (part.copy() for part in backend.image(values, True))
+            slope = backend.gradient(np.full(scattered.shape, 0.7, np.float32), np.full(depth.shape, 0.3, np.float32))
             results.append((scattered, depth, slope))
         for ours, theirs in zip(*results, strict=True):
             np.testing.assert_allclose(ours, theirs, rtol=1e-4, atol=1e-6 * float(np.abs(theirs).max(initial=0)))

@@ -1,4 +1,4 @@
-"""The renderer on a GPU: Taichi kernels (``gpu_light``, ``gpu_camera``) over the box around the smoke."""
+"""The renderer on a GPU: Taichi kernels (``light_kernels``, ``camera_kernels``) over the box around the smoke."""
 
 from __future__ import annotations
 
@@ -8,52 +8,52 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from smokelift.render import gpu_camera as camera
-from smokelift.render import gpu_light as light
-from smokelift.render import taichi_runtime as taichi
-from smokelift.render.lights import Face, Parallel, Point
-from smokelift.render.setup import Setup
+from smokelift.render.gpu import camera_kernels as camera
+from smokelift.render.gpu import light_kernels as light
+from smokelift.render.gpu import taichi_runtime as taichi
+from smokelift.render.light_sweeps import Face, ParallelSweep, PointSweep
+from smokelift.render.plan import RenderPlan
 
 Floats = NDArray[np.float32]
 
 
-class GpuPipeline:
-    """Picture and derivative of one `Setup` in channels; `Renderer` makes colours of them."""
+class GpuBackend:
+    """Picture and derivative of one `RenderPlan` in channels; `Renderer` makes colours of them."""
 
-    def __init__(self, setup: Setup) -> None:
-        self._setup = setup
-        self._channels = setup.lighting.channels
-        x, y, z = setup.shape
-        self._box = tuple(slice(c, c + n) for c, n in zip(setup.corner, setup.shape, strict=True))
-        near = ndimage.binary_dilation(setup.marked, np.ones((3, 3, 3)))
-        self._marked = taichi.upload(setup.marked.astype(np.int32))
+    def __init__(self, plan: RenderPlan) -> None:
+        self._plan = plan
+        self._channels = plan.lighting.channels
+        x, y, z = plan.shape
+        self._box = tuple(slice(c, c + n) for c, n in zip(plan.corner, plan.shape, strict=True))
+        near = ndimage.binary_dilation(plan.marked, np.ones((3, 3, 3)))
+        self._marked = taichi.upload(plan.marked.astype(np.int32))
         self._near = taichi.upload(near.astype(np.int32))
         self._padded = (x + 2, y + 2, z + 2)
         self._medium = taichi.zeros((*self._padded, self._channels + 1))
-        pixels = setup.rays.length.shape
-        self._lines = taichi.upload(setup.rays.lines)
-        self._length = taichi.upload(setup.rays.length)
-        self._planes = taichi.upload(setup.rays.planes)
+        pixels = plan.rays.length.shape
+        self._lines = taichi.upload(plan.rays.lines)
+        self._length = taichi.upload(plan.rays.length)
+        self._planes = taichi.upload(plan.rays.planes)
         self._scattered = taichi.zeros((*pixels, max(self._channels, 1)))
         self._depth = taichi.zeros(pixels)
         self._record: Any = None
         self._gradient: Any = None
         self._scratch: Any = None
-        self._to_eye = taichi.matrix(setup.to_eye)
+        self._to_eye = taichi.matrix(plan.to_eye)
         self._columns: dict[tuple[int, int, int], Any] = {}
-        if self._channels and not setup.shadows:
+        if self._channels and not plan.shadows:
             self._shade()
 
     def image(self, density: Floats, keep_record: bool) -> tuple[Floats, Floats]:
         """Scattered radiance (rows, columns, channels) and optical depth (rows, columns)."""
-        setup = self._setup
-        camera.pack(taichi.upload(density[self._box]), self._marked, self._medium, setup.medium.extinction)
-        if setup.shadows:
+        plan = self._plan
+        camera.pack(taichi.upload(density[self._box]), self._marked, self._medium, plan.medium.extinction)
+        if plan.shadows:
             self._shade()
         if keep_record and self._record is None:
-            self._record = taichi.zeros((max(setup.shape), *setup.rays.length.shape, self._channels + 1))
+            self._record = taichi.zeros((max(plan.shape), *plan.rays.length.shape, self._channels + 1))
         record = self._record if keep_record else self._medium
-        for axis in setup.rays.axes:
+        for axis in plan.rays.axes:
             camera.march(
                 self._medium, self._lines, self._length, self._planes,
                 self._scattered, self._depth, record, axis, self._channels, keep_record,
@@ -62,7 +62,7 @@ class GpuPipeline:
 
     def gradient(self, of_scattered: Floats, of_transmittance: Floats) -> Floats:
         """Pull derivatives by the last recorded picture back to the density (nx, ny, nz); uses the record up."""
-        setup = self._setup
+        plan = self._plan
         if self._gradient is None:
             self._gradient = taichi.zeros((*self._padded, self._channels + 1))
         of_scattered = of_scattered if self._channels else np.zeros((*of_transmittance.shape, 1), np.float32)
@@ -70,25 +70,25 @@ class GpuPipeline:
             self._record, self._length, self._planes, self._depth,
             taichi.upload(of_scattered), taichi.upload(of_transmittance), self._channels,
         )  # fmt: skip
-        to_pixel = taichi.matrix(setup.rays.to_pixel)
-        for number, axis in enumerate(setup.rays.axes or (0,)):
+        to_pixel = taichi.matrix(plan.rays.to_pixel)
+        for number, axis in enumerate(plan.rays.axes or (0,)):
             camera.gather_gradient(
                 self._record, self._lines, self._planes, to_pixel, self._near, self._gradient,
                 axis, self._channels, number,
             )  # fmt: skip
-        if setup.shadows:
+        if plan.shadows:
             self._shade_adjoint()
-        in_box = taichi.zeros(setup.shape)
-        camera.unpack(self._gradient, self._marked, in_box, setup.medium.extinction)
-        result = np.zeros(setup.domain.resolution, np.float32)
+        in_box = taichi.zeros(plan.shape)
+        camera.unpack(self._gradient, self._marked, in_box, plan.medium.extinction)
+        result = np.zeros(plan.domain.resolution, np.float32)
         result[self._box] = taichi.download(in_box)
         return result
 
     def _shade(self) -> None:
         add = 0
-        for of_light in self._setup.lighting.lights:
+        for of_light in self._plan.lighting.lights:
             scatters = (self._energy(of_light), self._to_eye, *self._phase, add)
-            if isinstance(of_light, Parallel):
+            if isinstance(of_light, ParallelSweep):
                 columns = self._sweep(self._medium, of_light, of_light.travel)
                 light.shade_parallel(
                     columns, self._near, self._medium, *_slopes(of_light), of_light.step,
@@ -105,9 +105,9 @@ class GpuPipeline:
     def _shade_adjoint(self) -> None:
         if self._scratch is None:
             self._scratch = taichi.zeros((*self._padded, 1))
-        for of_light in self._setup.lighting.lights:
+        for of_light in self._plan.lighting.lights:
             scatters = (self._energy(of_light), self._to_eye, *self._phase)
-            if isinstance(of_light, Parallel):
+            if isinstance(of_light, ParallelSweep):
                 columns = self._sweep(self._medium, of_light, of_light.travel)
                 light.parallel_depth_gradient(
                     columns, self._near, self._gradient, self._scratch, *_slopes(of_light), of_light.step,
@@ -124,13 +124,13 @@ class GpuPipeline:
                 light.gather_rays(self._scratch, columns, *rays, of_light.voxel_size)
                 light.add_point_shadow(columns, self._near, self._gradient, *rays)
 
-    def _sweep(self, voxels: Any, of_light: Parallel, travel: int) -> Any:
-        x, y, z = (n + (axis != of_light.axis) for axis, n in enumerate(self._setup.shape))
+    def _sweep(self, voxels: Any, of_light: ParallelSweep, travel: int) -> Any:
+        x, y, z = (n + (axis != of_light.axis) for axis, n in enumerate(self._plan.shape))
         columns = self._buffer((x, y, z))
         light.accumulate_columns(voxels, columns, of_light.axis, travel, *of_light.slope, of_light.first)
         return columns
 
-    def _cast(self, of_light: Point, face: Face) -> Any:
+    def _cast(self, of_light: PointSweep, face: Face) -> Any:
         columns = self._buffer((face.planes, face.columns_b[1], face.columns_c[1]))
         light.accumulate_rays(self._medium, columns, *_rays(of_light, face), of_light.voxel_size)
         return columns
@@ -140,18 +140,18 @@ class GpuPipeline:
             self._columns[shape] = taichi.zeros(shape)
         return self._columns[shape]
 
-    def _energy(self, of_light: Parallel | Point) -> Any:
+    def _energy(self, of_light: ParallelSweep | PointSweep) -> Any:
         return taichi.vector(np.resize(of_light.energy, 3))
 
     @property
     def _phase(self) -> tuple[float, float]:
-        return self._setup.medium.anisotropy, self._setup.medium.albedo
+        return self._plan.medium.anisotropy, self._plan.medium.albedo
 
 
-def _slopes(of_light: Parallel) -> tuple[int, float, float, int]:
+def _slopes(of_light: ParallelSweep) -> tuple[int, float, float, int]:
     return of_light.axis, *of_light.slope, of_light.first
 
 
-def _rays(of_light: Point, face: Face) -> tuple[Any, ...]:
+def _rays(of_light: PointSweep, face: Face) -> tuple[Any, ...]:
     begin = np.array([face.columns_b[0], face.columns_c[0]])
     return face.axis, face.travel, face.first, face.far, taichi.vector(begin), taichi.vector(of_light.position)

@@ -1,4 +1,4 @@
-"""A scene's lights in the terms of a grid, each as the cheapest exact sweep takes it (method section 1)."""
+"""A scene's lights in the coordinates of a grid, each as one sweep over its planes (docs/renderer.md)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.render.rays import LATERAL
+from smokelift.render.camera_rays import LATERAL
 from smokelift.scene import DirectionalLight, Domain, Medium, PointLight
 
 Array = NDArray[np.float64]
@@ -23,7 +23,7 @@ _CLOSEST = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Parallel:
+class ParallelSweep:
     """Parallel light, swept from plane to plane across the dominant axis of its direction.
 
     Attributes
@@ -80,7 +80,7 @@ class Face:
 
 
 @dataclass(frozen=True, eq=False)
-class Point:
+class PointSweep:
     """Light from a point.
 
     Attributes
@@ -114,7 +114,7 @@ class Lighting:
         Turns the channels into colours. Smoke is grey, so lights of one colour need one channel, others three.
     """
 
-    lights: tuple[Parallel | Point, ...]
+    lights: tuple[ParallelSweep | PointSweep, ...]
     colour: Array
 
     @property
@@ -172,13 +172,13 @@ def _channels(colours: Array) -> tuple[Array, Array]:
     return np.eye(3), colours
 
 
-def _parallel(light: DirectionalLight, energy: Array, domain: Domain, corner: Box) -> Parallel:
+def _parallel(light: DirectionalLight, energy: Array, domain: Domain, corner: Box) -> ParallelSweep:
     direction = np.array(light.direction, np.float64)
     direction /= np.linalg.norm(direction)
     axis = int(np.argmax(np.abs(direction)))
     along = float(direction[axis])
     b, c = LATERAL[axis]
-    return Parallel(
+    return ParallelSweep(
         direction=direction,
         energy=energy,
         axis=axis,
@@ -189,7 +189,7 @@ def _parallel(light: DirectionalLight, energy: Array, domain: Domain, corner: Bo
     )
 
 
-def _point(light: PointLight, energy: Array, domain: Domain, corner: Box, shape: Box) -> Point:
+def _point(light: PointLight, energy: Array, domain: Domain, corner: Box, shape: Box) -> PointSweep:
     if domain.contains(light.position):
         raise ValueError(f"The point light at {list(light.position)} is inside the domain; it must be outside.")
     h = domain.voxel_size
@@ -201,7 +201,7 @@ def _point(light: PointLight, energy: Array, domain: Domain, corner: Box, shape:
             face = _face(position, shape, axis, travel, travel * (farthest - float(position[axis])))
             if face:
                 faces.append(face)
-    return Point(position, energy / h**2, h, tuple(faces))
+    return PointSweep(position, energy / h**2, h, tuple(faces))
 
 
 def _face(light: Array, shape: Box, axis: int, travel: int, far: float) -> Face | None:

@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-# Taichi compiles what stands here; its annotations are no Python types.
+# Taichi compiles this file: its annotations are no Python types, so there is nothing for mypy to check.
 """Light sweeps for a GPU: the same sums as in ``cpp/parallel_light.cpp`` and ``cpp/point_light.cpp``.
 
 Voxels are [x + 1, y + 1, z + 1, channel] with a border of one; the channels are extinction and in-scattered radiance J,
@@ -61,7 +61,7 @@ def _first_channel(voxels: ti.template(), axis: ti.template(), k, i, j):
 
 
 @ti.func
-def _phase(index, to_eye, travel, anisotropy, albedo):
+def phase(index, to_eye, travel, anisotropy, albedo):
     """Albedo x Henyey-Greenstein, 1/sr, towards the camera; ``travel`` need not be normalised."""
     out = ti.Vector([0.0, 0.0, 0.0])
     for row in ti.static(range(3)):
@@ -129,7 +129,7 @@ def accumulate_columns(
 
 
 @ti.func
-def _at_voxel(columns: ti.template(), axis: ti.template(), slope_b, slope_c, first, index):
+def parallel_at_voxel(columns: ti.template(), axis: ti.template(), slope_b, slope_c, first, index):
     """(S' columns) at one voxel."""
     kij = planar(axis, index)
     k, i, j = kij[0], kij[1], kij[2]
@@ -160,8 +160,8 @@ def shade_parallel(
     """J = E p V, or J += E p V, in and next to voxels that may hold smoke."""
     for index in ti.grouped(ti.ndrange(*near.shape)):
         if near[index] != 0:
-            lit = _phase(index, to_eye, direction, anisotropy, albedo)
-            lit *= ti.exp(-step * _at_voxel(columns, axis, slope_b, slope_c, first, index))
+            lit = phase(index, to_eye, direction, anisotropy, albedo)
+            lit *= ti.exp(-step * parallel_at_voxel(columns, axis, slope_b, slope_c, first, index))
             _write_inscatter(medium, index, energy, lit, add)
 
 
@@ -185,8 +185,8 @@ def parallel_depth_gradient(
     """Scratch = derivative by the optical depth to the light."""
     for index in ti.grouped(ti.ndrange(*near.shape)):
         if near[index] != 0:
-            lit = _phase(index, to_eye, direction, anisotropy, albedo)
-            lit *= ti.exp(-step * _at_voxel(columns, axis, slope_b, slope_c, first, index))
+            lit = phase(index, to_eye, direction, anisotropy, albedo)
+            lit *= ti.exp(-step * parallel_at_voxel(columns, axis, slope_b, slope_c, first, index))
             scratch[index[0] + 1, index[1] + 1, index[2] + 1, 0] = _depth_gradient(gradient, index, energy, lit)
 
 
@@ -204,7 +204,7 @@ def add_parallel_shadow(
     """Extinction's gradient += step S' columns, with the columns of the reversed sweep of `scratch`."""
     for index in ti.grouped(ti.ndrange(*near.shape)):
         if near[index] != 0:
-            gradient[index[0] + 1, index[1] + 1, index[2] + 1, 0] += step * _at_voxel(
+            gradient[index[0] + 1, index[1] + 1, index[2] + 1, 0] += step * parallel_at_voxel(
                 columns, axis, slope_b, slope_c, first, index
             )
 
@@ -229,13 +229,13 @@ def _owned(axis: ti.template(), away):
 
 
 @ti.func
-def _faces_voxel(axis: ti.template(), travel, position, index):
+def faces_voxel(axis: ti.template(), travel, position, index):
     away = index - position
     return travel * away[axis] >= 1e-3 and _owned(axis, away)
 
 
 @ti.func
-def _from_columns(columns: ti.template(), axis: ti.template(), travel, first, far, begin, position, index):
+def point_at_voxel(columns: ti.template(), axis: ti.template(), travel, first, far, begin, position, index):
     """Optical depth of a voxel, bilinear between the columns around it."""
     kij, light = planar(axis, index), planar(axis, position)
     number = travel * (kij[0] - first)
@@ -306,10 +306,10 @@ def shade_point(
 ):
     """J = E p V, or J += E p V, for the voxels seen through one face."""
     for index in ti.grouped(ti.ndrange(*near.shape)):
-        if near[index] != 0 and _faces_voxel(axis, travel, position, index):
+        if near[index] != 0 and faces_voxel(axis, travel, position, index):
             away = index - position
-            lit = _phase(index, to_eye, away, anisotropy, albedo) / away.norm_sqr()
-            lit *= ti.exp(-_from_columns(columns, axis, travel, first, far, begin, position, index))
+            lit = phase(index, to_eye, away, anisotropy, albedo) / away.norm_sqr()
+            lit *= ti.exp(-point_at_voxel(columns, axis, travel, first, far, begin, position, index))
             _write_inscatter(medium, index, energy, lit, add)
 
 
@@ -334,10 +334,10 @@ def point_depth_gradient(
     for index in ti.grouped(ti.ndrange(*near.shape)):
         if near[index] != 0:
             value = 0.0
-            if _faces_voxel(axis, travel, position, index):
+            if faces_voxel(axis, travel, position, index):
                 away = index - position
-                lit = _phase(index, to_eye, away, anisotropy, albedo) / away.norm_sqr()
-                lit *= ti.exp(-_from_columns(columns, axis, travel, first, far, begin, position, index))
+                lit = phase(index, to_eye, away, anisotropy, albedo) / away.norm_sqr()
+                lit *= ti.exp(-point_at_voxel(columns, axis, travel, first, far, begin, position, index))
                 value = _depth_gradient(gradient, index, energy, lit)
             scratch[index[0] + 1, index[1] + 1, index[2] + 1, 0] = value
 

@@ -1,14 +1,14 @@
 # mypy: ignore-errors
-# Taichi compiles what stands here; its annotations are no Python types.
+# Taichi compiles this file: its annotations are no Python types, so there is nothing for mypy to check.
 """The camera pass and its adjoint for a GPU: the same sums as in ``cpp/camera.cpp``, one thread a ray.
 
-Voxels are laid out as in ``gpu_light``. On the way back every voxel gathers from the rays that pass it, so that
+Voxels are laid out as in ``light_kernels``. On the way back every voxel gathers from the rays that pass it, so that
 nothing is atomic.
 """
 
 import taichi as ti
 
-from smokelift.render.gpu_light import affine, cell, hat, mask3, ndarray3, ndarray4, planar
+from smokelift.render.gpu.light_kernels import affine, cell, hat, mask3, ndarray3, ndarray4, planar
 
 ndarray2 = ti.types.ndarray(dtype=ti.f32, ndim=2)
 planes_type = ti.types.ndarray(dtype=ti.i32, ndim=3)

@@ -1,7 +1,8 @@
-"""What does not change from picture to picture: a camera, lights and the part of a grid that may hold smoke."""
+"""What stays the same from picture to picture: a camera and lights, in coordinates of the voxels that are rendered."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import get_args
@@ -9,15 +10,15 @@ from typing import get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.render.lights import Box, FiniteLight, Lighting, lighting
-from smokelift.render.rays import Rays, camera_rays
+from smokelift.render.camera_rays import Rays, camera_rays
+from smokelift.render.light_sweeps import Box, FiniteLight, Lighting, lighting
 from smokelift.scene import Camera, Domain, Medium, Scattering
 
 Slices = tuple[slice, slice, slice]
 
 
 @dataclass(frozen=True, eq=False)
-class Setup:
+class RenderPlan:
     """One camera before one grid: the box around the voxels that may hold smoke.
 
     Attributes
@@ -28,8 +29,6 @@ class Setup:
         First voxel of the box.
     marked : (x, y, z) uint8
         The voxels of the box that may hold smoke.
-    everywhere
-        Whether that is all voxels.
     medium
         Extinction, albedo, anisotropy.
     rays
@@ -45,7 +44,6 @@ class Setup:
     domain: Domain
     corner: Box
     marked: NDArray[np.uint8]
-    everywhere: bool
     medium: Medium
     rays: Rays
     to_eye: NDArray[np.float64]
@@ -58,16 +56,21 @@ class Setup:
         x, y, z = self.marked.shape
         return x, y, z
 
+    @property
+    def everywhere(self) -> bool:
+        """Whether all voxels of the domain may hold smoke."""
+        return int(np.count_nonzero(self.marked)) == math.prod(self.domain.resolution)
 
-def make_setup(
+
+def plan_render(
     camera: Camera,
     domain: Domain,
     medium: Medium,
     lights: Sequence[FiniteLight],
     scattering: Scattering,
     support: NDArray[np.bool_] | None,
-) -> Setup:
-    """Set up a renderer; see `smokelift.render.renderer.Renderer` for the parameters."""
+) -> RenderPlan:
+    """Plan the rendering for a camera; `smokelift.render.Renderer` says what the parameters are."""
     if scattering not in get_args(Scattering):
         raise ValueError(f"scattering must be one of {', '.join(get_args(Scattering))}, not {scattering!r}.")
     if support is None:
@@ -75,11 +78,10 @@ def make_setup(
     corner, part = _box_around(support)
     box = _part_of(domain, part)
     found = lighting(() if scattering == "absorption" else lights, domain, corner, box.resolution)
-    return Setup(
+    return RenderPlan(
         domain=domain,
         corner=corner,
         marked=support[part].astype(np.uint8),
-        everywhere=bool(support.all()),
         medium=medium,
         rays=camera_rays(camera, box),
         to_eye=_to_eye(camera, box),

@@ -1,0 +1,115 @@
+"""The renderer on the processor: compiled sweeps over the voxels that may hold smoke (``cpp/``).
+
+Sweeps of light are fastest along rows of memory, and slow where the light travels along them. So where most of the
+light comes from above or below, y and z change places: the voxels are copied into the sweeps' own grid anyway.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smokelift import _core
+from smokelift.render.light_sweeps import ParallelSweep, PointSweep
+from smokelift.render.plan import RenderPlan
+
+Floats = NDArray[np.float32]
+
+
+class CpuBackend:
+    """Picture and derivative of one `RenderPlan` in channels; `Renderer` makes colours of them."""
+
+    def __init__(self, plan: RenderPlan) -> None:
+        self._axes = (0, 1, 2)
+        lights = plan.lighting.lights
+        parallel = [light for light in lights if isinstance(light, ParallelSweep)]
+        # a point light's voxels belong to the first of its faces, an order that a swap would change
+        if len(parallel) == len(lights) and 2 * sum(light.axis == 2 for light in parallel) > len(lights):
+            self._axes = (0, 2, 1)
+            plan = _with_y_and_z_swapped(plan, parallel)
+        self._plan = plan
+        channels = plan.lighting.channels
+        x, y, z = plan.shape
+        self._support = _core.Support(plan.marked)
+        # what no sweep touches is never given memory
+        self._medium = _core.zeros((x + 2, y + 2, z + 2, channels + 1))
+        self._gradient: Floats | None = None
+        self._scratch: Floats | None = None
+        self._record: Floats | None = None
+        self._rays = _core.Rays(plan.rays.lines, plan.rays.length, plan.rays.planes)
+        pixels = plan.rays.length.shape
+        self._scattered = np.zeros((*pixels, channels), np.float32)
+        self._depth = np.zeros(pixels, np.float32)
+        self._phase = _core.Phase(to_eye=plan.to_eye, albedo=plan.medium.albedo, anisotropy=plan.medium.anisotropy)
+        self._lights = [_compiled(light) for light in plan.lighting.lights]
+        if not plan.everywhere:
+            mask = np.zeros((x + 2, y + 2, z + 2, 1), np.float32)
+            mask[1:-1, 1:-1, 1:-1, 0] = plan.marked
+            self._rays.clip(self._support, mask)
+        if channels and not plan.shadows:
+            _core.shade(self._medium, self._support, self._phase, self._lights)
+
+    def image(self, density: Floats, keep_record: bool) -> tuple[Floats, Floats]:
+        """Scattered radiance (rows, columns, channels) and optical depth (rows, columns)."""
+        plan = self._plan
+        density = np.asarray(density, np.float32).transpose(self._axes)
+        _core.pack(density, plan.corner, self._support, plan.medium.extinction, self._medium)
+        if plan.shadows:
+            _core.shade(self._medium, self._support, self._phase, self._lights)
+        if keep_record and self._record is None:
+            self._record = _core.zeros((plan.lighting.channels + 1, max(plan.shape), *self._depth.shape))
+        record = self._record if keep_record else None
+        _core.march(self._medium, self._support, self._rays, self._scattered, self._depth, record)
+        return self._scattered, self._depth
+
+    def gradient(self, of_scattered: Floats, of_transmittance: Floats) -> Floats:
+        """Pull derivatives by the last recorded picture back to the density (nx, ny, nz); uses the record up."""
+        plan = self._plan
+        if self._gradient is None:
+            self._gradient = _core.zeros(self._medium.shape)
+        _core.march_adjoint(
+            self._rays, self._depth, of_scattered, of_transmittance, self._record, self._gradient, self._support
+        )
+        if plan.shadows:
+            if self._scratch is None:
+                self._scratch = _core.zeros((*self._medium.shape[:3], 1))
+            _core.shade_adjoint(self._medium, self._gradient, self._scratch, self._support, self._phase, self._lights)
+        result = _core.zeros(plan.domain.resolution)
+        swapped = result.transpose(self._axes)
+        _core.unpack(self._gradient, self._support, plan.medium.extinction, swapped, plan.corner)
+        return result
+
+
+def _compiled(light: ParallelSweep | PointSweep) -> _core.ParallelLight | _core.PointLight:
+    energy = np.zeros(3)
+    energy[: light.energy.size] = light.energy
+    if isinstance(light, PointSweep):
+        faces = [_core.Face(**vars(face)) for face in light.faces]
+        return _core.PointLight(position=light.position, energy=energy, voxel_size=light.voxel_size, faces=faces)
+    return _core.ParallelLight(**{**vars(light), "energy": energy})
+
+
+def _with_y_and_z_swapped(plan: RenderPlan, lights: Sequence[ParallelSweep]) -> RenderPlan:
+    """The same plan for arrays of voxels [x, z, y]; only its domain stays as it is."""
+    x, y, z = plan.corner
+    rays = plan.rays
+    lines, planes = rays.lines.copy(), rays.planes.copy()
+    # across x the two other axes change places; the others keep x first
+    across_x = planes[..., 0] == 0
+    lines[across_x] = lines[across_x][:, [2, 3, 0, 1]]
+    planes[..., 0] = np.array([0, 2, 1])[planes[..., 0]]
+    swapped = tuple(
+        replace(light, axis=(0, 2, 1)[light.axis], slope=light.slope if light.axis else light.slope[::-1])
+        for light in lights
+    )
+    return replace(
+        plan,
+        corner=(x, z, y),
+        marked=np.ascontiguousarray(plan.marked.transpose(0, 2, 1)),
+        rays=replace(rays, lines=lines, planes=planes),
+        to_eye=plan.to_eye[:, [0, 2, 1, 3]],
+        lighting=replace(plan.lighting, lights=swapped),
+    )

@@ -1,0 +1,117 @@
+"""The public functions: exact, by the model that the scene says, with examples that run, strict about input."""
+
+import doctest
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import renderer_reference as reference
+
+from smokelift import render, render_gradient
+from smokelift.output.images import write_image
+from smokelift.render import image as image_module
+from smokelift.scene import Background, Camera, DirectionalLight, Domain, Medium, Scene, completed
+
+SHAPE = (14, 12, 16)
+SUN = DirectionalLight((0.57, 0.45, -0.68), (3.0, 2.0, 1.0))
+SCENE = Scene(
+    camera=Camera.look_at((0.3, -2.0, 0.9), (0.7, 0.6, 0.8), fov_y_degrees=50, size=(20, 22)),
+    domain=Domain((0.0, 0.0, 0.0), (1.4, 1.2, 1.6), SHAPE),
+    medium=Medium(4.0, 0.8, -0.4),
+    lights=(SUN,),
+)
+ASIDE = Camera.look_at((3.0, 0.2, 1.1), (0.7, 0.6, 0.8), fov_y_degrees=40, size=(18, 14))
+
+
+@pytest.fixture(scope="module")
+def density():
+    rng = np.random.default_rng(3)
+    return (rng.random(SHAPE) * (rng.random(SHAPE) > 0.4)).astype(np.float32)
+
+
+@pytest.fixture(scope="module")
+def target():
+    return np.random.default_rng(4).random((22, 20, 3)).astype(np.float32)
+
+
+def test_examples_of_the_documentation_run():
+    assert doctest.testmod(image_module).failed == 0
+
+
+@pytest.mark.parametrize("scattering", ["single", "unshadowed", "absorption"])
+def test_render_gradient_of_every_model(density, target, scattering):
+    """loss, gradient and image agree with each other and with finite differences."""
+    scene = replace(SCENE, scattering=scattering)
+    loss, gradient, image = render_gradient(density, scene, target)
+    assert loss == pytest.approx(np.sum((image.astype(np.float64) - target) ** 2), rel=1e-6)
+    np.testing.assert_array_equal(image, render(density, scene))
+    direction = np.random.default_rng(7).random(SHAPE) * (density > 0)
+
+    def at(step):
+        moved = reference.render(
+            density + step * direction, scene.camera, scene.domain, scene.medium, (SUN,), np.zeros(3), scattering
+        )
+        return float(np.sum((moved - target) ** 2))
+
+    slope = (at(1e-5) - at(-1e-5)) / 2e-5
+    assert np.vdot(gradient, direction) == pytest.approx(slope, rel=1e-4)
+
+
+def test_losses_of_several_views_add_up(density, target):
+    other = np.zeros((14, 18, 3), np.float32)
+    loss, gradient, images = render_gradient(density, SCENE, [target, other], [SCENE.camera, ASIDE])
+    one = render_gradient(density, SCENE, target)
+    two = render_gradient(density, SCENE, other, ASIDE)
+    assert loss == one[0] + two[0]
+    np.testing.assert_array_equal(gradient, one[1] + two[1])
+    for found, expected in zip(images, (one[2], two[2]), strict=True):
+        np.testing.assert_array_equal(found, expected)
+    with pytest.raises(ValueError, match="one target a camera, not 1 for 2"):
+        render_gradient(density, SCENE, [target], [SCENE.camera, ASIDE])
+
+
+def test_a_complete_scene_shows_the_same_as_its_description(density):
+    np.testing.assert_array_equal(render(density, completed(SCENE)), render(density, SCENE))
+    np.testing.assert_array_equal(render(density, completed(SCENE), ASIDE), render(density, SCENE, ASIDE))
+    without = replace(SCENE, camera=None)
+    np.testing.assert_array_equal(render(density, without, ASIDE), render(density, SCENE, ASIDE))
+
+
+def test_background_colour_is_attenuated(density):
+    """Absorption only: what is left of the background is the transmittance."""
+    medium = Medium(3.0 / (density.sum(1).max() * SCENE.domain.voxel_size))
+    scene = replace(SCENE, medium=medium, background=Background(color=(1.0, 0.5, 0.25)), scattering="absorption")
+    image = render(density, scene)
+    np.testing.assert_allclose(image[..., 1], image[..., 0] / 2, rtol=1e-5)
+    assert image[..., 0].min() == pytest.approx(np.exp(-3), rel=0.5)
+
+
+def test_a_background_picture_belongs_to_the_scenes_own_camera(target, tmp_path):
+    """Before another camera its mean colour takes its place."""
+    write_image(tmp_path / "wall.exr", target, half=False)
+    scene = replace(SCENE, background=Background(image=tmp_path / "wall.exr"))
+    clear = np.zeros(SHAPE, np.float32)
+    np.testing.assert_allclose(render(clear, scene), target, rtol=1e-6)
+    mean = np.broadcast_to(target.reshape(-1, 3).mean(0), (14, 18, 3))
+    np.testing.assert_allclose(render(clear, scene, ASIDE), mean, rtol=1e-6)
+
+
+@pytest.mark.parametrize(("value", "words"), [(np.nan, "not finite"), (np.inf, "not finite"), (-1e-6, "negative")])
+def test_density_that_is_no_density_is_refused(density, value, words):
+    bad = density.copy()
+    bad[1, 2, 3] = value
+    with pytest.raises(ValueError, match=words):
+        render(bad, SCENE)
+
+
+def test_incomplete_scenes_and_other_shapes_are_refused(density, target):
+    with pytest.raises(ValueError, match="no camera"):
+        render(density, replace(SCENE, camera=None))
+    with pytest.raises(ValueError, match="no domain"):
+        render(density, replace(SCENE, domain=None))
+    with pytest.raises(ValueError, match="must agree"):
+        render(density[1:], SCENE)
+    with pytest.raises(ValueError, match="target image must have the shape"):
+        render_gradient(density, SCENE, target[1:])
+    with pytest.raises(ValueError, match="target image holds values that are not finite"):
+        render_gradient(density, SCENE, np.full_like(target, np.nan))
