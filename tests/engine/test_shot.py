@@ -11,7 +11,7 @@ import pytest
 
 from smokelift.footage.clip import Clip
 from smokelift.output.images import write_image
-from smokelift.render import finite_lights
+from smokelift.render import light_sampling
 from smokelift.scene import (
     Background,
     Camera,
@@ -215,7 +215,7 @@ def test_each_frame_has_its_own_small_picture(tracked, draft) -> None:
 def test_surroundings_do_not_flicker_while_the_camera_moves(tracked, draft, tmp_path, monkeypatch) -> None:
     """An environment is as many lights in one frame as in another, though another camera would need more."""
     wanted = {pose[0][3]: 4 + n for n, pose in enumerate(tracked.camera.matrices)}
-    monkeypatch.setattr(finite_lights, "environment_count", lambda _light, camera, *_: wanted[camera.position[0]])
+    monkeypatch.setattr(light_sampling, "environment_count", lambda _light, camera, *_: wanted[camera.position[0]])
     sky = np.random.default_rng(0).uniform(0.1, 2.0, (8, 16, 3)).astype(np.float32)
     write_image(tmp_path / "sky.exr", sky)
     shot = shot_of(replace(tracked, lights=(EnvironmentLight(tmp_path / "sky.exr"),)), draft)

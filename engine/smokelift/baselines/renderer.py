@@ -44,11 +44,11 @@ from smokelift.render.gpu import taichi_runtime as taichi
 # isort: split
 # only now what imports Taichi too: the runtime holds its greeting back
 from smokelift.baselines import kernels as kernels
-from smokelift.render.gpu import light_kernels as light_kernels
-from smokelift.render.light_sweeps import FiniteLight, ParallelSweep
+from smokelift.render.gpu import light_kernels
+from smokelift.render.light_sweeps import ParallelSweep
 from smokelift.render.plan import plan_render
 from smokelift.render.renderer import Image, Volume
-from smokelift.scene import Camera, Domain, Medium, Scattering
+from smokelift.scene import Camera, Domain, FiniteLight, Medium, Scattering
 from smokelift.scene.projection import ray_through_pixels
 
 

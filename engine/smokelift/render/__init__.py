@@ -1,7 +1,7 @@
 """The differentiable renderer: a density and a scene in, an image out, and the exact derivative back.
 
     Scene -> Optics     domain, medium, lights, scattering           optics
-      lights            all as directional and point lights          finite_lights, environment, environment_count
+      lights            all as directional and point lights          light_sampling, environment, environment_count
     Optics -> Renderer  one camera before one background             renderer
       RenderPlan        rays and light sweeps in voxel coordinates   plan, camera_rays, light_sweeps
       Backend           light to every voxel, then along the rays    device: cpu_backend (cpp/) or gpu/ (Taichi)
@@ -12,13 +12,11 @@
 from smokelift.footage.background import background_picture as scene_background
 from smokelift.render.device import DeviceError, start
 from smokelift.render.image import render, render_gradient
-from smokelift.render.light_sweeps import FiniteLight
 from smokelift.render.optics import Optics, scene_lights, scene_optics, scene_renderer
 from smokelift.render.renderer import Image, Renderer, Volume
 
 __all__ = [
     "DeviceError",
-    "FiniteLight",
     "Image",
     "Optics",
     "Renderer",

@@ -10,12 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.render.camera_rays import LATERAL
-from smokelift.scene import DirectionalLight, Domain, Medium, PointLight
+from smokelift.scene import DirectionalLight, Domain, FiniteLight, Medium, PointLight
 
 Array = NDArray[np.float64]
-FiniteLight = DirectionalLight | PointLight
-"""A light that one sweep can do; an environment becomes many of them."""
-
 Box = tuple[int, int, int]
 
 _CLOSEST = 1e-3

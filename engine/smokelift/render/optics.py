@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.footage.background import background_picture
-from smokelift.render.finite_lights import finite_lights
-from smokelift.render.light_sweeps import FiniteLight
+from smokelift.render.light_sampling import sampled_lights
 from smokelift.render.renderer import Image, Renderer
-from smokelift.scene import Camera, CompleteScene, Domain, Medium, Scattering, Scene, completed
+from smokelift.scene import Camera, CompleteScene, Domain, FiniteLight, Medium, Scattering, Scene, completed
 
 
 @dataclass(frozen=True)
@@ -39,8 +38,8 @@ class Optics:
 
 
 def scene_optics(scene: CompleteScene) -> Optics:
-    """The optics of a scene; see `finite_lights` for its lights."""
-    return Optics(scene.domain, scene.medium, finite_lights(scene), scene.scattering)
+    """The optics of a scene; see `sampled_lights` for its lights."""
+    return Optics(scene.domain, scene.medium, sampled_lights(scene), scene.scattering)
 
 
 def scene_lights(scene: Scene | CompleteScene) -> tuple[FiniteLight, ...]:

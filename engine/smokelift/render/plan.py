@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.render.camera_rays import Rays, camera_rays
-from smokelift.render.light_sweeps import Box, FiniteLight, Lighting, lighting
-from smokelift.scene import Camera, Domain, Medium, Scattering
+from smokelift.render.light_sweeps import Box, Lighting, lighting
+from smokelift.scene import Camera, Domain, FiniteLight, Medium, Scattering
 
 Slices = tuple[slice, slice, slice]
 

@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.render import device
-from smokelift.render.light_sweeps import FiniteLight
 from smokelift.render.plan import plan_render
-from smokelift.scene import Camera, Domain, Medium, Scattering
+from smokelift.scene import Camera, Domain, FiniteLight, Medium, Scattering
 
 Image = NDArray[np.float32]
 Volume = NDArray[np.float32]

@@ -10,9 +10,8 @@ import numpy as np
 from smokelift.density import Density, DensitySettings, reconstruct_density
 from smokelift.render import Renderer
 from smokelift.render.environment_count import FEWEST, TOLERANCE, lights_needed
-from smokelift.render.light_sweeps import FiniteLight
 from smokelift.render.renderer import Image
-from smokelift.scene import EnvironmentLight, Medium, Scattering, Scene
+from smokelift.scene import EnvironmentLight, FiniteLight, Medium, Scattering, Scene
 from smokelift.setup.choice import Choice
 from smokelift.setup.coarse import CoarseFrame
 

@@ -1,6 +1,6 @@
 """A scene's lights as finitely many directional and point lights, each of which one sweep can do.
 
-A new kind of light needs nothing here if it says itself which simple lights stand for it.
+Lights give their own samples. Only an environment does not: how many it needs depends on what it lights.
 """
 
 from __future__ import annotations
@@ -9,11 +9,10 @@ from functools import lru_cache
 
 from smokelift.render.environment import environment_lights
 from smokelift.render.environment_count import environment_count
-from smokelift.render.light_sweeps import FiniteLight
-from smokelift.scene import Camera, CompleteScene, DirectionalLight, Domain, EnvironmentLight, Medium
+from smokelift.scene import Camera, CompleteScene, DirectionalLight, Domain, EnvironmentLight, FiniteLight, Medium
 
 
-def finite_lights(scene: CompleteScene) -> tuple[FiniteLight, ...]:
+def sampled_lights(scene: CompleteScene) -> tuple[FiniteLight, ...]:
     """The lights of a scene, in which an environment has become as many parallel lights as it needs.
 
     That number is found with the scene's own camera, where it is in the first frame. It is the same for every other
@@ -29,7 +28,7 @@ def finite_lights(scene: CompleteScene) -> tuple[FiniteLight, ...]:
         if isinstance(light, EnvironmentLight):
             lights += _environment(light, scene.camera.at(0), scene.domain, scene.medium)
         else:
-            lights.append(light)
+            lights += light.samples()
     return tuple(lights)
 
 

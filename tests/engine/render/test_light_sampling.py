@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from smokelift.render.finite_lights import finite_lights
+from smokelift.render.light_sampling import sampled_lights
 from smokelift.scene import Camera, DirectionalLight, Domain, PointLight, Scene, completed
 from tests.engine.render.environments import sky
 
@@ -13,11 +13,11 @@ SCENE = completed(Scene(camera=CAMERA, domain=Domain((-0.5, -0.5, 0.0), (0.5, 0.
 
 
 def test_simple_lights_stay_in_their_order() -> None:
-    assert finite_lights(replace(SCENE, lights=(SUN, LAMP))) == (SUN, LAMP)
+    assert sampled_lights(replace(SCENE, lights=(SUN, LAMP))) == (SUN, LAMP)
 
 
 def test_an_environment_becomes_parallel_lights_in_its_place(light_of) -> None:
-    first, *between, last = finite_lights(replace(SCENE, lights=(LAMP, light_of(sky(), directions=9), SUN)))
+    first, *between, last = sampled_lights(replace(SCENE, lights=(LAMP, light_of(sky(), directions=9), SUN)))
     assert (first, last, len(between)) == (LAMP, SUN, 9)
     assert all(isinstance(light, DirectionalLight) for light in between)
 
@@ -27,4 +27,4 @@ def test_lights_do_not_change_while_the_camera_moves(light_of) -> None:
     away = Camera.look_at((0.0, -30.0, 1.0), (0.0, 0.0, 0.7), fov_y_degrees=35, size=(64, 48))
     scene = replace(SCENE, lights=(light_of(sky()),))
     moving = replace(scene, camera=replace(CAMERA, matrices=(CAMERA.matrix, away.matrix)))
-    assert finite_lights(moving) == finite_lights(scene)
+    assert sampled_lights(moving) == sampled_lights(scene)
