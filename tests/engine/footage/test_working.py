@@ -1,4 +1,4 @@
-"""Cameras made from cameras: an orbit keeps looking at the domain, a working picture fits its grid."""
+"""The working picture: the part of a picture that the domain covers, as fine as the grid."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from smokelift.footage.working import CameraError, working_picture
-from smokelift.scene import Camera, Domain, orbit
+from smokelift.scene import Camera, Domain
 from smokelift.scene.projection import project
 
 DOMAIN = Domain((-0.6, -0.6, 0), (0.6, 0.6, 1.6), (24, 24, 32))
@@ -26,44 +26,6 @@ all_three = pytest.mark.parametrize(
 def points(count: int = 50) -> np.ndarray:
     """World points inside the domain."""
     return np.random.default_rng(1).uniform(DOMAIN.min, DOMAIN.max, (count, 3))
-
-
-@all_three
-@pytest.mark.parametrize(("yaw", "pitch"), [(33, 0), (0, 25), (-120, -10)])
-def test_an_orbit_keeps_distance_and_aim(camera: Camera, yaw: float, pitch: float) -> None:
-    """The camera stays as far away, and the domain's centre at the same pixel and depth."""
-    moved = orbit(camera, DOMAIN, yaw, pitch)
-    distance = [np.linalg.norm(np.array(c.position) - CENTRE) for c in (camera, moved)]
-    assert distance[1] == pytest.approx(distance[0])
-    for before, after in zip(project(camera, CENTRE), project(moved, CENTRE), strict=True):
-        np.testing.assert_allclose(after, before, atol=1e-9)
-    assert (moved.size, moved.fx, moved.fy, moved.type) == (camera.size, camera.fx, camera.fy, camera.type)
-
-
-@all_three
-def test_once_around_is_where_it_began(camera: Camera) -> None:
-    """360 degrees is no turn at all."""
-    np.testing.assert_allclose(orbit(camera, DOMAIN, 360).matrix, camera.matrix, atol=1e-12)
-
-
-@both
-def test_ninety_degrees_look_from_the_right_side(camera: Camera) -> None:
-    """What was at the picture's right is now near: the camera stands at +X and looks along -X, upright."""
-    side = orbit(camera, DOMAIN, 90)
-    np.testing.assert_allclose(side.position, (4, 0, 0.8), atol=1e-12)
-    matrix = np.array(side.matrix)
-    np.testing.assert_allclose(-matrix[:3, 2], (-1, 0, 0), atol=1e-12)
-    np.testing.assert_allclose(matrix[:3, 1], (0, 0, 1), atol=1e-12)
-
-
-@all_three
-def test_pitch_raises_the_camera(camera: Camera) -> None:
-    """Positive pitch goes up by so many degrees, negative down."""
-    x, y, z = np.array(camera.position) - CENTRE
-    elevation = np.degrees(np.arctan2(z, np.hypot(x, y)))
-    for pitch in (20.0, -20.0):
-        x, y, z = np.array(orbit(camera, DOMAIN, 70, pitch).position) - CENTRE
-        assert np.degrees(np.arctan2(z, np.hypot(x, y))) == pytest.approx(elevation + pitch)
 
 
 @both

@@ -76,7 +76,7 @@ def ramp(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_frames_are_linear_and_in_order(ramp: Path) -> None:
     with Clip.open(ramp) as clip:
-        assert (clip.fps, clip.frame_count, len(clip), clip.size) == (24.0, 30, 30, (32, 16))
+        assert (clip.fps, len(clip), clip.size) == (24.0, 30, (32, 16))
         assert (clip.path, clip.warning, clip.first) == (ramp, None, 0)
         assert near(codes(clip), LEVELS)
         image = clip.frame(12)

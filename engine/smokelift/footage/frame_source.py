@@ -1,0 +1,40 @@
+"""What a clip format has to offer; `Clip` counts, caches and checks for all of them."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from smokelift.footage.images import Picture
+
+DEFAULT_FPS = 24.0
+"""Frames a second where neither the file nor the user gives any: the rate of film."""
+
+
+class ClipError(ValueError):
+    """A clip, or a frame of it, that cannot be read."""
+
+
+class FrameSource(Protocol):
+    """The frames of one file or sequence, counted from 0 over the whole of it.
+
+    Attributes
+    ----------
+    count
+        Frames that can be read.
+    fps
+        Frames a second.
+    warning
+        A sentence about what is amiss, else None.
+    """
+
+    count: int
+    fps: float
+    warning: str | None
+
+    def read(self, n: int) -> Picture:
+        """Return a frame, linear; raise ClipError if it is damaged."""
+        ...
+
+    def close(self) -> None:
+        """Close the file."""
+        ...

@@ -1,0 +1,89 @@
+"""Clips that are numbered pictures."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from smokelift.footage.frame_source import DEFAULT_FPS, ClipError
+from smokelift.footage.images import READABLE, ImageError, Picture, Transfer, read_image
+
+
+class ImageSequence:
+    """Numbered pictures on disk, or a single one.
+
+    Parameters
+    ----------
+    path
+        A pattern ``frame_####.png`` (each # a digit at least), the first picture of a sequence, or one picture without
+        a number.
+    transfer
+        As in `Clip.open`.
+    fps
+        What the user gives; without it there is a warning.
+
+    Raises
+    ------
+    ClipError
+        If there is no such picture, or one is missing.
+    """
+
+    def __init__(self, path: Path, transfer: Transfer | None, fps: float | None) -> None:
+        self._paths = _numbered(path)
+        self._transfer = transfer
+        self.count = len(self._paths)
+        self.fps = DEFAULT_FPS
+        self.warning = None
+        if fps is None and self.count > 1:
+            self.warning = f"{path}: pictures carry no frame rate; {DEFAULT_FPS:g} frames a second are taken"
+        self._shape: tuple[int, ...] | None = None
+
+    @staticmethod
+    def reads(path: Path) -> bool:
+        """Return whether a path, to judge by its name, is that of one or more pictures."""
+        return "#" in path.name or path.suffix.lower() in READABLE
+
+    def read(self, n: int) -> Picture:
+        """Return a picture, or raise ClipError if it is damaged or of another size than the first."""
+        try:
+            image = read_image(self._paths[n], self._transfer)
+        except ImageError as error:
+            raise ClipError(str(error)) from error
+        self._shape = self._shape or image.shape
+        if image.shape != self._shape:
+            raise ClipError(
+                f"{self._paths[n]}: is {image.shape[1]} x {image.shape[0]} pixels, "
+                f"the first picture {self._shape[1]} x {self._shape[0]}"
+            )
+        return image
+
+    def close(self) -> None:
+        """Nothing is held open."""
+
+
+def _numbered(path: Path) -> list[Path]:
+    """Return the pictures of a sequence in order, or raise ClipError naming the first that is missing."""
+    hashes = re.fullmatch(r"([^#]*)(#+)([^#]*)", path.name)
+    digits = re.fullmatch(r"(.*?)(\d+)(\.[^.]+)", path.name)
+    if "#" in path.name and hashes is None:
+        raise ClipError(f"{path}: a pattern has one row of # for the number, as in frame_####.png")
+    named = hashes or digits
+    if named is None or (hashes is None and not path.is_file()):
+        if not path.is_file():
+            raise ClipError(f"{path}: no such file")
+        return [path]
+    prefix, number, suffix = named.groups()
+    found: dict[int, Path] = {}
+    if path.parent.is_dir():
+        pattern = re.compile(re.escape(prefix) + rf"(\d{{{len(number)},}})" + re.escape(suffix))
+        matches = ((pattern.fullmatch(file.name), file) for file in path.parent.iterdir())
+        found = {int(match[1]): file for match, file in matches if match}
+    start = min(found, default=0) if hashes else int(number)
+    if start not in found:
+        raise ClipError(f"{path}: no such pictures")
+    last = max(found)
+    for n in range(start, last + 1):
+        if n not in found:
+            missing = path.with_name(f"{prefix}{n:0{len(number)}d}{suffix}")
+            raise ClipError(f"{missing}: this picture is missing; the sequence goes on to {found[last].name}")
+    return [found[n] for n in range(start, last + 1)]

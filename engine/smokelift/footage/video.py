@@ -1,0 +1,231 @@
+"""Clips that are videos.
+
+The container is read once at the start, without decoding, for the times of all frames; after that any frame can be
+had, and frames in a row cost one decode each.
+
+What a file says about its colours is honoured: matrix and range through FFmpeg's converter (an untagged video is read
+as BT.601, as FFmpeg writes one), rotation and mirroring flags, alpha (over black). The converter is asked to round
+exactly: by default FFmpeg's is half an 8 bit step too dark.
+
+A video whose rate varies by more than 1 % is read at its mean rate: frame n is the picture on show at n / fps.
+"""
+
+from __future__ import annotations
+
+import bisect
+from collections.abc import Iterator
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+import numpy.typing as npt
+from av.sidedata.sidedata import Type as SideData
+from av.video.reformatter import Interpolation
+
+from smokelift.footage.frame_source import DEFAULT_FPS, ClipError
+from smokelift.footage.images import Picture, Transfer, decode_integers
+
+_EXACT_CONVERSION = int(
+    Interpolation.BICUBIC | Interpolation.ACCURATE_RND | Interpolation.FULL_CHR_H_INT | Interpolation.FULL_CHR_H_INP
+)
+
+
+class Video:
+    """One video stream with an index of the times of its frames.
+
+    ``_times`` are the frames' presentation times in the stream's time base, in order; ``_keys`` those where
+    decoding can start; ``_shown`` maps a frame of the clip to one of them. Containers without presentation
+    times (raw streams, some AVI) have no index: they are decoded once to count and then only forward.
+    """
+
+    def __init__(self, path: Path, transfer: Transfer | None) -> None:
+        self._path = path
+        self._transfer = transfer
+        self.warning: str | None = None
+        if not path.exists():
+            raise ClipError(f"{path}: no such file")
+        if path.is_dir():
+            raise ClipError(f"{path}: is a folder; for pictures give a pattern such as {path}/frame_####.png")
+        self._start()
+        self._times, self._keys, broken = self._index()
+        if not self._times:
+            self.close()
+            raise ClipError(f"{path}: holds no frame that can be decoded")
+        if broken:
+            self._drop_undecodable_end()
+            self.warning = f"{path}: is truncated; its first {len(self._times)} frames can be used"
+        self.fps, self._shown = self._steady()
+        self.count = len(self._shown)
+
+    def _start(self) -> None:
+        """Open the file at its beginning."""
+        try:
+            self._container = av.open(str(self._path))
+        except (av.FFmpegError, ValueError) as error:
+            raise ClipError(f"{self._path}: is not a video, or is damaged: {_reason(error)}") from error
+        if not self._container.streams.video:
+            self._container.close()
+            raise ClipError(f"{self._path}: holds no video stream")
+        self._stream = self._container.streams.video[0]
+        self._stream.thread_type = "AUTO"
+        self._decoded: Iterator[av.VideoFrame] = self._container.decode(self._stream)
+        self._next = 0  # index into _times of the frame that decoding on will give
+
+    def _index(self) -> tuple[list[int], list[int], bool]:
+        """Return the times of all frames and of the key frames, and whether the file broke off."""
+        times, keys, seen, broken = [], [], 0, False
+        try:
+            for packet in self._container.demux(self._stream):
+                if packet.is_corrupt:
+                    broken = True
+                    break
+                seen += 1
+                if packet.size == 0 or packet.is_discard:  # a dropped frame, or one that an edit cuts away
+                    continue
+                if packet.pts is None:
+                    return self._count(), [], False
+                times.append(packet.pts)
+                if packet.is_keyframe:
+                    keys.append(packet.pts)
+        except av.FFmpegError:
+            broken = True
+        broken = broken or seen < self._promised()
+        self._rewind()
+        return sorted(set(times)), sorted(keys), broken
+
+    def _promised(self) -> int:
+        """Return how many frames the file says it holds; 0 if it does not say."""
+        stream, length = self._stream, self._container.duration
+        if stream.frames or stream.duration is not None or length is None or stream.average_rate is None:
+            return stream.frames
+        # Matroska counts no frames, but knows how long the whole is, give or take one. Sound may last longer.
+        alone = len(self._container.streams) == 1
+        return int(length * stream.average_rate / av.time_base) - 1 if alone else 0
+
+    def _count(self) -> list[int]:
+        """Return made-up times, by decoding everything, for a container that has none."""
+        self._rewind()
+        count = 0
+        try:
+            for _ in self._decoded:
+                count += 1
+        except av.FFmpegError:
+            self.warning = f"{self._path}: is damaged; its first {count} frames can be used"
+        self._rewind()
+        return list(range(count))
+
+    def _rewind(self) -> None:
+        self._container.close()
+        self._start()
+
+    def _drop_undecodable_end(self) -> None:
+        """Cut the index after the last frame that decodes, looking at the end only."""
+        while self._times:
+            try:
+                self._decode(len(self._times) - 1)
+                return
+            except ClipError:
+                self._times.pop()
+        raise ClipError(f"{self._path}: holds no frame that can be decoded")
+
+    def _steady(self) -> tuple[float, list[int]]:
+        """Return the frame rate and, for each frame of the clip, the decoded frame that it shows."""
+        count = len(self._times)
+        base = self._stream.time_base
+        rate = self._stream.average_rate or self._stream.guessed_rate
+        if not self._keys or count < 3 or base is None:
+            return float(rate or DEFAULT_FPS), list(range(count))
+        gaps = np.diff(np.array(self._times, np.float64))
+        mean = (self._times[-1] - self._times[0]) / (count - 1)
+        # Times are whole ticks: a gap may be off by one without the rate being another (Matroska: 1 ms).
+        if np.abs(gaps - mean).max() <= max(0.01 * mean, 1.0):
+            steady = 1.0 / (mean * float(base))
+            near = rate is not None and abs(float(rate) - steady) < 0.01 * steady
+            return float(rate if near and rate is not None else steady), list(range(count))
+        shown = [bisect.bisect_right(self._times, self._times[0] + mean * n + 0.5) - 1 for n in range(count)]
+        return float(Fraction(1) / (Fraction(mean) * base)), shown
+
+    def close(self) -> None:
+        """Close the file."""
+        self._container.close()
+
+    def read(self, n: int) -> Picture:
+        """Return a frame, or raise ClipError if it is damaged."""
+        return self._picture(self._decode(self._shown[n]))
+
+    def _decode(self, index: int) -> av.VideoFrame:
+        """Return the decoded frame at an index into ``_times``."""
+        if not self._keys:
+            return self._decode_by_count(index)
+        wanted = self._times[index]
+        reached = self._times[self._next] if self._next < len(self._times) else None
+        key_between = reached is not None and any(reached < key <= wanted for key in self._keys)
+        if reached is None or wanted < reached or key_between:
+            self._container.seek(wanted, stream=self._stream)
+            self._decoded = self._container.decode(self._stream)
+        frame = self._forward_to(wanted)
+        if frame is None:
+            # A seek may land late (open groups of pictures); from the start nothing can be missed.
+            self._rewind()
+            frame = self._forward_to(wanted)
+        if frame is None:
+            self._rewind()
+            raise ClipError(f"{self._path}: frame {index} is damaged and cannot be decoded")
+        self._next = index + 1
+        return frame
+
+    def _forward_to(self, wanted: int) -> av.VideoFrame | None:
+        try:
+            for frame in self._decoded:
+                if frame.pts is not None and frame.pts >= wanted:
+                    return frame if frame.pts == wanted and not frame.is_corrupt else None
+        except av.FFmpegError:
+            pass
+        return None
+
+    def _decode_by_count(self, index: int) -> av.VideoFrame:
+        if index < self._next:
+            self._rewind()
+        try:
+            while True:
+                frame = next(self._decoded)
+                self._next += 1
+                if self._next == index + 1:
+                    return frame
+        except (StopIteration, av.FFmpegError) as error:
+            self._rewind()
+            raise ClipError(f"{self._path}: frame {index} is damaged and cannot be decoded") from error
+
+    def _picture(self, frame: av.VideoFrame) -> Picture:
+        components = frame.format.components
+        wide = max(component.bits for component in components) > 8
+        alpha = any(component.is_alpha for component in components)
+        layout = {False: ("rgb24", "rgba"), True: ("rgb48le", "rgba64le")}[wide][alpha]
+        size = (self._stream.width, self._stream.height)
+        if (frame.width, frame.height) != size:
+            raise ClipError(
+                f"{self._path}: changes its picture size from {size[0]} x {size[1]} to {frame.width} x {frame.height}"
+            )
+        codes = frame.reformat(format=layout, interpolation=_EXACT_CONVERSION).to_ndarray()
+        return decode_integers(_upright(codes, frame), self._transfer)
+
+
+def _upright(pixels: npt.NDArray[Any], frame: av.VideoFrame) -> npt.NDArray[Any]:
+    """Turn and mirror a picture as its display matrix says; angles other than quarter turns are ignored.
+
+    The matrix sends the stored column p and row q to the shown column a p + c q and row b p + d q.
+    """
+    sides: Any = frame.side_data  # PyAV's stub of it knows motion vectors only
+    side = sides.get(SideData.DISPLAYMATRIX)
+    if side is None:
+        return pixels
+    a, b, _, c, d = (int(v) for v in np.frombuffer(bytes(side), np.int32)[:5])
+    if abs(a) < abs(c):
+        pixels, a, d = np.swapaxes(pixels, 0, 1), c, b
+    return pixels[:: -1 if d < 0 else 1, :: -1 if a < 0 else 1]
+
+
+def _reason(error: Exception) -> str:
+    return str(error.strerror) if isinstance(error, av.FFmpegError) else str(error)

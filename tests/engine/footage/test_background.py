@@ -1,0 +1,86 @@
+"""The background that a scene gives, and what a camera sees of it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from films import COUNT, HEIGHT, WIDTH, codes_apart, pan, passing_wall
+
+from smokelift.footage.background import background_picture, given_plates, open_plates
+from smokelift.footage.plate import ChangingPlate, Plate
+from smokelift.output.images import write_image
+from smokelift.scene import Background, Camera, ClipSource, Scene
+
+CAMERA = Camera.look_at((0, -4, 0), (0, 0, 0), fov_y_degrees=30, size=(WIDTH, HEIGHT))
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A clip of smoke before a passing wall, and the wall alone, frame by frame."""
+    for name, smoke in (("clip", 1.0), ("plate", 0.0)):
+        (tmp_path / name).mkdir()
+        pan(tmp_path / name, passing_wall(), smoke).close()
+    return tmp_path
+
+
+def test_a_background_that_is_not_given_has_no_plates(folder: Path) -> None:
+    clip = pan(folder / "clip", passing_wall(), 1.0)
+    assert given_plates(Scene(), clip) is None
+    assert given_plates(Scene(background=Background()), clip) is None
+
+
+def test_a_colour_or_a_picture_is_one_plate_for_all_frames(folder: Path) -> None:
+    clip = pan(folder / "clip", passing_wall(), 1.0)
+    plates = given_plates(Scene(background=Background(color=(0.1, 0.2, 0.3))), clip)
+    assert isinstance(plates, Plate)
+    assert plates.at(0) is plates.at(COUNT - 1)
+    np.testing.assert_allclose(plates.image[5, 7], (0.1, 0.2, 0.3), atol=1e-4)
+    scene = Scene(background=Background(image=folder / "plate" / "frame_003.png"))
+    plates = given_plates(scene, clip)
+    assert isinstance(plates, Plate)
+    assert codes_apart(plates.image, passing_wall()[:, 6 : 6 + WIDTH]).max() < 6
+    assert open_plates(scene) is None
+
+
+def test_pictures_are_a_plate_a_frame_and_are_cut_like_one(folder: Path) -> None:
+    clip = pan(folder / "clip", passing_wall(), 1.0)
+    plates = given_plates(Scene(background=Background(image=folder / "plate" / "frame_###.png")), clip)
+    assert isinstance(plates, ChangingPlate)
+    part = plates.through(lambda picture: picture[8:40]).through(lambda picture: picture[:, 4:])
+    for n in (0, 9):
+        np.testing.assert_array_equal(part.at(n).image, plates.at(n).image[8:40, 4:])
+        np.testing.assert_array_equal(part.at(n).noise, plates.at(n).noise)
+
+
+def test_a_numbered_picture_begins_a_sequence_before_a_moving_camera(folder: Path) -> None:
+    moving = replace(CAMERA, matrices=(CAMERA.matrix,) * COUNT)
+    scene = Scene(camera=moving, background=Background(image=folder / "plate" / "frame_000.png"))
+    plates = open_plates(scene)
+    assert plates is not None
+    assert len(plates) == COUNT
+
+
+def test_a_camera_sees_its_own_plate_and_others_its_mean(folder: Path) -> None:
+    first = folder / "plate" / "frame_002.png"
+    clip = ClipSource(folder / "clip" / "frame_###.png", frames=(2, 9))
+    for image in (first, folder / "plate" / "frame_###.png"):
+        scene = Scene(camera=CAMERA, clip=clip, background=Background(image=image))
+        own = background_picture(scene)
+        assert codes_apart(own, passing_wall()[:, 4 : 4 + WIDTH]).max() < 6
+        other = background_picture(scene, CAMERA.resized(20, 30))
+        np.testing.assert_allclose(other, own.reshape(-1, 3).mean(0), rtol=1e-5)
+
+
+def test_a_colour_is_seen_by_every_camera_and_nothing_is_black() -> None:
+    scene = Scene(background=Background(color=(0.1, 0.2, 0.3)))
+    np.testing.assert_array_equal(background_picture(scene, CAMERA), np.float32([0.1, 0.2, 0.3]))
+    np.testing.assert_array_equal(background_picture(Scene(camera=CAMERA)), np.zeros(3))
+
+
+def test_the_size_of_a_plate_is_that_of_the_camera(tmp_path: Path) -> None:
+    write_image(tmp_path / "wall.png", np.full((HEIGHT, WIDTH, 3), 0.5))
+    scene = Scene(camera=CAMERA.resized(14, 18), background=Background(image=tmp_path / "wall.png"))
+    assert background_picture(scene).shape == (18, 14, 3)

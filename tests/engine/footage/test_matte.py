@@ -1,0 +1,38 @@
+"""Where a frame shows smoke."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from films import HEIGHT, WIDTH, film, overlap, wall
+
+from smokelift.footage.images import linear_to_srgb
+from smokelift.footage.matte import matte
+from smokelift.footage.plate import known_plate
+from smokelift.footage.plate_estimation import estimate_plate
+
+
+def test_an_empty_clip_has_no_smoke(tmp_path: Path) -> None:
+    truth = wall(0.2, 0.8)
+    clip = film(tmp_path, truth, lambda n: np.zeros((HEIGHT, WIDTH)), 1.0, 2.0)
+    plate = estimate_plate(clip)
+    assert plate.confidence.min() == 1.0
+    assert not any(matte(frame, plate).mask.any() for frame in clip)
+
+
+def test_smoke_over_most_of_the_picture_is_not_noise(tmp_path: Path) -> None:
+    def billows(n: int) -> np.ndarray:
+        rows, columns = np.mgrid[:HEIGHT, :WIDTH]
+        return np.where(columns < 0.65 * WIDTH, 0.3 + 0.25 * np.sin(rows / 4 + 0.8 * n), 0.0)
+
+    for name, behind in (("black", np.zeros((HEIGHT, WIDTH, 3))), ("wall", wall(0.2, 0.5))):
+        (tmp_path / name).mkdir()
+        clip = film(tmp_path / name, behind, billows, 0.9)
+        plate = known_plate(behind, clip)
+        noise = linear_to_srgb(np.median(behind, axis=(0, 1)) + plate.noise) - linear_to_srgb(
+            np.median(behind, axis=(0, 1))
+        )
+        assert 0.5 < noise.mean() * 255 < 2.0
+        for n in (4, 12, 20):
+            assert overlap(matte(clip.frame(n), plate).mask, billows(n) > 0.002) > 0.9

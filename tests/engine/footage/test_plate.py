@@ -1,0 +1,75 @@
+"""The plate of a background that is known, once or frame by frame."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from films import HEIGHT, WIDTH, codes_apart, film, overlap, pan, passing_wall, puff, wall
+
+from smokelift.footage.clip import Clip
+from smokelift.footage.images import linear_to_srgb, srgb_to_linear
+from smokelift.footage.matte import matte
+from smokelift.footage.plate import changing_plate, known_plate
+from smokelift.footage.plate_estimation import estimate_plate
+from smokelift.output.images import write_image
+
+
+def test_a_known_black_background(tmp_path: Path) -> None:
+    black = np.zeros((HEIGHT, WIDTH, 3), np.float32)
+    clip = film(tmp_path, black, puff, 0.5, 0.0)
+    plate = known_plate((0.0, 0.0, 0.0), clip)
+    assert plate.confidence.min() == 1.0
+    np.testing.assert_allclose(plate.noise, 1 / 255 / 12.92, rtol=1e-3)
+    for n in (4, 12, 20):
+        assert overlap(matte(clip.frame(n), plate).mask, puff(n) > 0.002) > 0.75
+    estimated = estimate_plate(clip)
+    assert codes_apart(estimated.image, black).max() < 1.0
+    picture = known_plate(wall(0.2, 0.5)[::2, ::2], clip)
+    assert picture.image.shape == (HEIGHT, WIDTH, 3)
+
+
+def test_what_does_not_fit_is_refused(tmp_path: Path) -> None:
+    write_image(tmp_path / "still.png", wall(0.2, 0.8))
+    clip = Clip.open(tmp_path / "still.png")
+    plate = estimate_plate(clip)
+    with pytest.raises(ValueError, match="one shape"):
+        matte(clip.frame(0)[1:], plate)
+    with pytest.raises(ValueError, match="finite"):
+        matte(clip.frame(0) * np.nan, plate)
+    for background in ((1.0, 2.0), np.full((4, 4, 3), np.nan), np.ones((4, 4))):
+        with pytest.raises(ValueError, match="finite colour or RGB picture"):
+            known_plate(background, clip)
+
+
+def test_a_plate_for_every_frame(tmp_path: Path) -> None:
+    """Each frame has its own, the noise is that of the difference, and the smoke is found before it."""
+    (tmp_path / "clip").mkdir()
+    (tmp_path / "plate").mkdir()
+    wide = passing_wall()
+    clip = pan(tmp_path / "clip", wide, 1.0)
+    plates = pan(tmp_path / "plate", wide, 0.0)
+    changing = changing_plate(plates, clip)
+    slope = (srgb_to_linear(linear_to_srgb(0.1) + 0.01) - 0.1) / 0.01
+    for n in (4, 12, 20):
+        plate = changing.at(n)
+        assert codes_apart(plate.image, wide[:, 2 * n : 2 * n + WIDTH]).max() < 6
+        assert plate.noise.mean() < 2.5 / 255 * slope
+        mask = matte(clip.frame(n), plate).mask
+        assert mask[puff(n) > 0.3].mean() > 0.95
+        assert mask[puff(n) == 0.0].mean() < 0.08
+
+
+def test_plates_are_counted_as_the_clips_file(tmp_path: Path) -> None:
+    """A part of the clip has that part of the plates; too few are refused."""
+    for name in ("clip", "plate"):
+        (tmp_path / name).mkdir()
+    wide = passing_wall()
+    pan(tmp_path / "clip", wide, 1.0)
+    plates = pan(tmp_path / "plate", wide, 0.0)
+    late = Clip.open(tmp_path / "clip" / "frame_###.png", fps=24, frames=(10, 15))
+    assert codes_apart(changing_plate(plates, late).at(2).image, wide[:, 24 : 24 + WIDTH]).max() < 6
+    few = Clip.open(tmp_path / "plate" / "frame_###.png", fps=24, frames=(0, 12))
+    with pytest.raises(ValueError, match="has 13 of the frames 0 to 15 that are needed"):
+        changing_plate(few, late)

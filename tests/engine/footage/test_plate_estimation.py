@@ -1,0 +1,108 @@
+"""The clean plate that is found from the clip alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from films import COUNT, HEIGHT, WIDTH, codes_apart, film, pan, passing_wall, puff, wall
+
+from smokelift.footage.clip import Clip
+from smokelift.footage.images import linear_to_srgb, srgb_to_linear
+from smokelift.footage.matte import matte
+from smokelift.footage.plate_estimation import estimate_plate, one_colour
+from smokelift.output.images import write_image
+
+DATA = Path(__file__).parents[4] / "shared" / "data"
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "colour"),
+    [(0.2, 0.5, 0.6), (0.6, 0.9, 0.02), (0.2, 0.9, 0.25)],
+    ids=["brightening", "darkening", "both"],
+)
+def test_plate_and_matte(tmp_path: Path, low: float, high: float, colour: float) -> None:
+    truth = wall(low, high)
+    clip = film(tmp_path, truth, puff, colour)
+    plate = estimate_plate(clip)
+    assert plate.image.shape == truth.shape
+    assert plate.confidence.shape == truth.shape[:2]
+    assert plate.confidence.min() > 0.9
+    apart = codes_apart(plate.image, truth)
+    assert np.median(apart) < 0.7
+    assert np.percentile(apart, 95) < 5.0
+    for n in (4, 12, 20):
+        result = matte(clip.frame(n), plate)
+        contrast = puff(n) * np.abs(linear_to_srgb(truth) - linear_to_srgb(colour)).mean(axis=2) * 255
+        assert result.deviation.dtype == np.float32
+        assert result.mask[contrast > 12].mean() > 0.95
+        assert result.mask[puff(n) == 0.0].mean() < 0.08
+        assert np.median(result.deviation[puff(n) == 0.0]) < 1.5
+
+
+def test_noise_is_measured(tmp_path: Path) -> None:
+    for name, codes in (("quiet", 0.0), ("noisy", 4.0)):
+        (tmp_path / name).mkdir()
+        flat = np.full((HEIGHT, WIDTH, 3), 0.2, np.float32)
+        plate = estimate_plate(film(tmp_path / name, flat, puff, 0.8, codes))
+        slope = (srgb_to_linear(linear_to_srgb(0.2) + 0.01) - 0.2) / 0.01
+        assert plate.noise.shape == (3,)
+        np.testing.assert_allclose(plate.noise, max(codes, 1.0) / 255 * slope, rtol=0.25)
+
+
+def test_pixels_that_are_never_clear_are_filled_and_marked(tmp_path: Path) -> None:
+    truth = np.linspace(0.1, 0.3, WIDTH, dtype=np.float32)[None, :, None].repeat(HEIGHT, 0).repeat(3, 2)
+    rows, columns = np.mgrid[:HEIGHT, :WIDTH]
+    jet = (np.abs(columns - WIDTH / 2) < 5) & (rows > 30)
+
+    def opacity(n: int) -> np.ndarray:
+        flicker = np.random.default_rng(n).uniform(0.3, 0.9)
+        return np.where(jet, flicker, 0.0)
+
+    clip = film(tmp_path, truth, opacity, 0.9, 0.5)
+    plate = estimate_plate(clip)
+    inner = (np.abs(columns - WIDTH / 2) < 3) & (rows > 34)
+    assert plate.confidence[inner].max() < 0.5
+    assert plate.confidence[np.abs(columns - WIDTH / 2) > 8].min() == 1.0
+    assert codes_apart(plate.image, truth)[inner].max() < 12
+    assert all(matte(clip.frame(n), plate).mask[inner].all() for n in (0, 11, 23))
+
+
+def test_one_frame_is_its_own_plate(tmp_path: Path) -> None:
+    write_image(tmp_path / "still.png", wall(0.2, 0.8))
+    clip = Clip.open(tmp_path / "still.png")
+    plate = estimate_plate(clip)
+    assert codes_apart(plate.image, clip.frame(0)).max() < 0.1
+    assert not matte(clip.frame(0), plate).mask.any()
+
+
+@pytest.mark.parametrize("colour", [(0.0, 0.0, 0.0), (0.1, 0.3, 0.05)], ids=["black", "green"])
+def test_one_colour_behind_a_moving_camera_is_found(tmp_path: Path, colour: tuple[float, float, float]) -> None:
+    wide = np.broadcast_to(colour, (HEIGHT, WIDTH + 2 * COUNT, 3))
+    found = one_colour(estimate_plate(pan(tmp_path, wide, 1.0)))
+    assert found == pytest.approx(colour, abs=0.003)
+
+
+@pytest.mark.parametrize("smoke", [0.0, 1.0])
+def test_more_than_one_colour_behind_a_moving_camera_is_noticed(tmp_path: Path, smoke: float) -> None:
+    assert one_colour(estimate_plate(pan(tmp_path, passing_wall(), smoke))) is None
+
+
+def test_a_slope_behind_a_moving_camera_is_not_one_colour(tmp_path: Path) -> None:
+    """It passes up and down, so no pixel changes, and yet there are many colours."""
+    wide = np.broadcast_to(np.linspace(0.1, 0.3, HEIGHT)[:, None, None], (HEIGHT, WIDTH + 2 * COUNT, 3))
+    assert one_colour(estimate_plate(pan(tmp_path, wide, 1.0))) is None
+
+
+@pytest.mark.skipif(not DATA.is_dir(), reason="needs the development data")
+def test_the_wall_behind_the_synthetic_puff() -> None:
+    folder = DATA / "synthetic" / "puff"
+    plate = estimate_plate(Clip.open(folder / "front.mp4"))
+    with np.load(folder / "background_plate.npz") as data:
+        truth = data[data.files[0]]
+    truth = truth if truth.ndim == 3 else truth[..., None].repeat(3, 2)
+    apart = np.abs(linear_to_srgb(plate.image) - linear_to_srgb(truth)).mean(axis=2) * 255
+    assert np.median(apart) < 1.5
+    assert np.percentile(apart, 95) < 4.0
+    assert (plate.confidence < 0.5).mean() < 0.01

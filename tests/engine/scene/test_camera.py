@@ -1,0 +1,117 @@
+"""Cameras: what is one, and one made of another."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scene_examples import FRONT, moving_camera
+
+from smokelift.scene import Camera, Domain, SceneError, orbit
+from smokelift.scene.projection import project
+
+DOMAIN = Domain((-0.6, -0.6, 0), (0.6, 0.6, 1.6), (24, 24, 32))
+CENTRE = np.array([0, 0, 0.8])
+PERSPECTIVE = Camera.look_at((0, -4, 0.8), (0, 0, 0.8), fov_y_degrees=30, size=(160, 224))
+ORTHOGRAPHIC = Camera("orthographic", PERSPECTIVE.matrix, (160, 224), 103.0, 103.0, 80.0, 112.0)
+TILTED = Camera.look_at((1, -4, 2.0), (0, 0, 0.8), fov_y_degrees=30, size=(160, 224))
+both = pytest.mark.parametrize("camera", [PERSPECTIVE, ORTHOGRAPHIC], ids=["perspective", "orthographic"])
+all_three = pytest.mark.parametrize(
+    "camera", [PERSPECTIVE, ORTHOGRAPHIC, TILTED], ids=["perspective", "orthographic", "tilted"]
+)
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        np.diag([2.0, 1.0, 1.0, 1.0]),
+        np.diag([-1.0, 1.0, 1.0, 1.0]),
+        np.eye(4) + np.eye(4)[::-1],
+        np.eye(3),
+        np.full((4, 4), np.nan),
+    ],
+)
+def test_only_rigid_matrices_are_cameras(rows: np.ndarray) -> None:
+    with pytest.raises(SceneError, match="matrix"):
+        Camera("perspective", rows, (4, 4), 1.0, 1.0, 2.0, 2.0)  # type: ignore[arg-type]
+
+
+def test_look_at_turns_the_camera_to_the_target() -> None:
+    camera = Camera.look_at((0, -7, 1.5), (0, 0, 1.5), fov_y_degrees=30, size=(256, 384))
+    np.testing.assert_allclose(camera.matrix, FRONT, atol=1e-12)
+    oblique = np.array(Camera.look_at((1, 2, 3), (-4, 0, 1), fov_y_degrees=30, size=(4, 4)).matrix)
+    forward = -oblique[:3, 2]
+    np.testing.assert_allclose(forward, np.array([-5, -2, -2]) / math.sqrt(33))
+    assert oblique[2, 0] == pytest.approx(0.0)  # the horizon is level
+    assert oblique[2, 1] > 0.0
+
+
+def test_resizing_and_cropping_keep_the_rays() -> None:
+    camera = Camera("perspective", FRONT, (256, 384), 700.0, 710.0, 120.0, 200.0)
+
+    def ray(camera: Camera, x: float, y: float) -> tuple[float, float]:
+        return (x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy
+
+    small = camera.resized(64, 192)
+    assert small.size == (64, 192)
+    assert ray(small, 10, 30) == pytest.approx(ray(camera, 40, 60))
+    part = camera.cropped(20, 30, 100, 50)
+    assert part.size == (100, 50)
+    assert ray(part, 5, 6) == pytest.approx(ray(camera, 25, 36))
+    assert small.position == camera.position == (0.0, -7.0, 1.5)
+
+
+def test_a_moving_camera_stands_still_in_every_frame() -> None:
+    """Each frame has its own matrix; size and lens are shared, also by resized ones."""
+    camera = moving_camera((0, -7, 1.5), (1, -7, 1.5), (2, -7, 1.5))
+    for frame in range(3):
+        still = camera.at(frame)
+        assert not still.moves
+        assert still.position == (frame, -7.0, 1.5)
+        assert still.at(9) == still
+        assert camera.resized(64, 96).at(frame) == still.resized(64, 96)
+    assert camera.matrix == camera.matrices[0]
+    with pytest.raises(SceneError, match="frames 0 to 2, not for 3"):
+        camera.at(3)
+    with pytest.raises(SceneError, match="first of matrices"):
+        replace(camera, matrix=camera.matrices[1])
+
+
+@all_three
+@pytest.mark.parametrize(("yaw", "pitch"), [(33, 0), (0, 25), (-120, -10)])
+def test_an_orbit_keeps_distance_and_aim(camera: Camera, yaw: float, pitch: float) -> None:
+    """The camera stays as far away, and the domain's centre at the same pixel and depth."""
+    moved = orbit(camera, DOMAIN, yaw, pitch)
+    distance = [np.linalg.norm(np.array(c.position) - CENTRE) for c in (camera, moved)]
+    assert distance[1] == pytest.approx(distance[0])
+    for before, after in zip(project(camera, CENTRE), project(moved, CENTRE), strict=True):
+        np.testing.assert_allclose(after, before, atol=1e-9)
+    assert (moved.size, moved.fx, moved.fy, moved.type) == (camera.size, camera.fx, camera.fy, camera.type)
+
+
+@all_three
+def test_once_around_is_where_it_began(camera: Camera) -> None:
+    """360 degrees is no turn at all."""
+    np.testing.assert_allclose(orbit(camera, DOMAIN, 360).matrix, camera.matrix, atol=1e-12)
+
+
+@both
+def test_ninety_degrees_look_from_the_right_side(camera: Camera) -> None:
+    """What was at the picture's right is now near: the camera stands at +X and looks along -X, upright."""
+    side = orbit(camera, DOMAIN, 90)
+    np.testing.assert_allclose(side.position, (4, 0, 0.8), atol=1e-12)
+    matrix = np.array(side.matrix)
+    np.testing.assert_allclose(-matrix[:3, 2], (-1, 0, 0), atol=1e-12)
+    np.testing.assert_allclose(matrix[:3, 1], (0, 0, 1), atol=1e-12)
+
+
+@all_three
+def test_pitch_raises_the_camera(camera: Camera) -> None:
+    """Positive pitch goes up by so many degrees, negative down."""
+    x, y, z = np.array(camera.position) - CENTRE
+    elevation = np.degrees(np.arctan2(z, np.hypot(x, y)))
+    for pitch in (20.0, -20.0):
+        x, y, z = np.array(orbit(camera, DOMAIN, 70, pitch).position) - CENTRE
+        assert np.degrees(np.arctan2(z, np.hypot(x, y))) == pytest.approx(elevation + pitch)

@@ -1,0 +1,241 @@
+"""Scene files: what is read, what is refused and with which words."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scene_examples import FRONT, GOOD, load
+
+from smokelift.scene import (
+    Background,
+    ClipSource,
+    DirectionalLight,
+    Domain,
+    Inlet,
+    Medium,
+    PointLight,
+    Scene,
+    SceneError,
+)
+
+AIMED = "position = [0, -7, 1.5]\ntarget = [0, 0, 1.5]"
+
+
+def test_every_table_is_read(tmp_path: Path) -> None:
+    scene = load(tmp_path, GOOD)
+    assert scene.clip == ClipSource(tmp_path / "smoke.mp4", 24.0, (0, 10))
+    assert scene.camera is not None
+    np.testing.assert_allclose(scene.camera.matrix, FRONT, atol=1e-12)
+    assert scene.camera.fx == scene.camera.fy == pytest.approx(192 / math.tan(math.radians(15)))
+    assert (scene.camera.cx, scene.camera.cy) == (128, 192)
+    assert scene.domain == Domain((-1, -1, 0), (1, 1, 3), (64, 64, 96))
+    assert scene.medium == Medium(albedo=0.5)
+    sun, lamp = scene.lights
+    assert isinstance(sun, DirectionalLight)
+    assert sun.direction == pytest.approx((0, 0.6, -0.8))
+    assert lamp == PointLight((0, -5, 5), (9, 9, 9))
+    assert scene.background == Background(color=(0.1, 0.2, 0.3))
+    (view,) = scene.views
+    assert view.camera.fx == view.camera.fy == 100.0
+    assert view.camera.position == (7.0, 0.0, 1.5)
+    assert view.clip.path == tmp_path / "side" / "frame_####.exr"
+    assert view.background is None
+    (view,) = load(tmp_path, f'{GOOD}[views.background]\nimage = "wall.png"\n').views
+    assert view.background == Background(image=tmp_path / "wall.png")
+
+
+def test_walls_and_inlets_are_read(tmp_path: Path) -> None:
+    """In the order of the sides, whatever the file's."""
+    inlets = "[[inlet]]\ncentre = [0, 0, 0]\nradius = 0.5\n[[inlet]]\ncentre = [1, 0, 1]\nradius = 0.25\n"
+    text = GOOD.replace("[domain]", '[domain]\nclosed = ["z-", "x+"]').replace("[medium]", f"{inlets}[medium]")
+    scene = load(tmp_path, text)
+    assert scene.closed == ("x+", "z-")
+    assert scene.inlets == (Inlet((0, 0, 0), 0.5), Inlet((1, 0, 1), 0.25))
+    assert scene.domain == load(tmp_path, GOOD).domain
+
+
+def test_walls_of_a_box_that_is_not_given(tmp_path: Path) -> None:
+    """They wait for the one that will be found."""
+    scene = load(tmp_path, '[domain]\nclosed = ["z-"]\n')
+    assert scene == Scene(closed=("z-",))
+    assert scene.inflow() is None
+    with pytest.raises(SceneError, match="lacks min"):
+        load(tmp_path, "[domain]\n")
+
+
+def test_the_scattering_stands_with_the_medium(tmp_path: Path) -> None:
+    scene = load(tmp_path, GOOD.replace("[medium]", '[medium]\nscattering = "unshadowed"'))
+    assert scene == replace(load(tmp_path, GOOD), scattering="unshadowed")
+    assert load(tmp_path, GOOD).scattering is None
+
+
+def test_scattering_alone_leaves_the_medium_open(tmp_path: Path) -> None:
+    scene = load(tmp_path, '[medium]\nscattering = "absorption"\n')
+    assert scene == Scene(scattering="absorption")
+
+
+def test_a_file_may_hold_any_one_table(tmp_path: Path) -> None:
+    assert load(tmp_path, "") == Scene()
+    assert load(tmp_path, "[medium]\n") == Scene(medium=Medium())
+    assert load(tmp_path, "[background]\nimage = 'plate.png'\n").background == Background(image=tmp_path / "plate.png")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (
+            "albedo = 0.5",
+            "albedo = 1.4",
+            "scene.toml, line 22: [medium] albedo must be a number from 0 to 1, not 1.4",
+        ),
+        ("albedo = 0.5", 'albedo = "x"', 'line 22: [medium] albedo must be a number from 0 to 1, not "x"'),
+        ("albedo = 0.5", "albedo = true", "line 22: [medium] albedo must be a number from 0 to 1, not true"),
+        ("albedo = 0.5", "albedo = nan", "line 22: [medium] albedo must be"),
+        (
+            "albedo = 0.5",
+            "anisotropy = 1",
+            "line 22: [medium] anisotropy must be a number between -1 and 1, not 1",
+        ),
+        (
+            "albedo = 0.5",
+            'scattering = "double"',
+            'line 22: [medium] scattering must be one of "single", "unshadowed", "absorption", not "double"',
+        ),
+        ("albedo = 0.5", "scattering = [1]", "line 22: [medium] scattering must be one of"),
+        ("albedo = 0.5", "extinction = 0", "line 22: [medium] extinction must be a number above 0"),
+        (
+            "albedo = 0.5",
+            "albeda = 0.5",
+            'line 22: [medium] there is no key "albeda" here; known are extinction',
+        ),
+        ("[medium]", "[medim]", 'line 21: there is no table "medim" here; known are clip, camera'),
+        ("fps = 24", "fps = 0", "line 4: [clip] fps must be a number above 0, not 0"),
+        ("[0, 10]", "[3, 2]", "line 5: [clip] frames must be [first, last]"),
+        ("[0, 10]", "[0, 1.5]", "line 5: [clip] frames must be"),
+        ("fps = 24", 'transfer = "log"', 'line 4: [clip] transfer must be "srgb" or "linear", not "log"'),
+        ('path = "smoke.mp4"', "", "line 2: [clip] lacks path"),
+        ('"smoke.mp4"', "3", "line 3: [clip] path must be the path of a file, not 3"),
+        (
+            "fov_y_degrees = 30",
+            "fov_y_degrees = 180",
+            "line 10: [camera] fov_y_degrees must be a number between",
+        ),
+        ("fov_y_degrees = 30", "", "line 7: [camera] needs fov_y_degrees or fx"),
+        ("fov_y_degrees = 30", "fov_y_degrees = 30\nfx = 2", "line 11: [camera] takes fov_y_degrees or fx"),
+        ("fov_y_degrees = 30", "height = 3", 'line 10: [camera] there is no key "height" here'),
+        ("fov_y_degrees = 30", "fx = -3", "line 10: [camera] fx must be a number above 0"),
+        ("target = [0, 0, 1.5]\nfov", "target = [0, -7, 1.5]\nfov", "line 9: [camera] target must differ"),
+        ("target = [0, 0, 1.5]\nfov", "fov", "line 7: [camera] needs matrix, or position and target"),
+        ("target = [0, 0, 1.5]\nfov", "target = [0, -7, 9]\nfov", "line 7: [camera] up must not be"),
+        ("size = [256, 384]", "size = [256, 0]", "line 11: [camera] size must be [width, height]"),
+        ("size = [256, 384]", "", "line 7: [camera] lacks size"),
+        (
+            "max = [1, 1, 3]",
+            "max = [1, 1, 0]",
+            "line 15: [domain] max must be above min on every axis; along z",
+        ),
+        ("max = [1, 1, 3]", "max = [1, 1, 3.1]", "line 16: [domain] resolution must make cubic voxels"),
+        ("max = [1, 1, 3]", "max = [1, 1]", "line 15: [domain] max must be three numbers"),
+        ("  96,", "  0,", "line 16: [domain] resolution must be three whole numbers"),
+        ("min = [-1, -1, 0]", "", "line 13: [domain] lacks min"),
+        ("[0, 3, -4]", "[0, 0, 0]", "line 26: [[lights]] direction must not be [0, 0, 0]"),
+        (
+            "[1, 2, 3]",
+            "[1, -2, 3]",
+            "line 27: [[lights]] irradiance must be three numbers [r, g, b], none below 0",
+        ),
+        ("irradiance = [1, 2, 3]", "", "line 24: [[lights]] lacks irradiance"),
+        ('type = "point"', 'type = "area"', 'line 30: [[lights]] type must be one of "directional", "point"'),
+        ("intensity =", "irradiance =", 'line 32: [[lights]] there is no key "irradiance" here'),
+        ("[0, -5, 5]", "[0, 0.5, 1]", "line 31: [[lights]] position [0.0, 0.5, 1.0] is inside the domain"),
+        (
+            "color = [0.1, 0.2, 0.3]",
+            "color = [0.1, 0.2]",
+            "line 35: [background] color must be three numbers",
+        ),
+        (
+            "color = [0.1, 0.2, 0.3]",
+            'color = [0.1, 0.2, 0.3]\nimage = "a.png"',
+            "line 36: [background] takes color or image, not both",
+        ),
+        (
+            "target = [0, 0, 1.5]\nfov",
+            f"target = [0, 0, 1.5]\nmatrices = {[[list(row) for row in FRONT]]}\nfov",
+            "line 8: [camera] takes matrices or position, not both",
+        ),
+        (AIMED, "matrices = []", "line 8: [camera] matrices must be a list of 4x4 matrices"),
+        (AIMED, "matrices = [[1, 2], [3, 4]]", "line 8: [camera] matrices must be four rows of four numbers"),
+        (
+            AIMED,
+            f"matrices = [{[list(row) for row in FRONT]}, {np.diag([2, 1, 1, 1]).tolist()}]",
+            "line 8: [camera] every one of matrices must be rigid",
+        ),
+        ("height = 3", "height = -3", "line 42: [views.camera] height must be a number of metres above 0"),
+        ("side/frame", "", None),
+        ("[views.clip]\npath", "[views.clap]\npath", 'line 44: [[views]] there is no key "clap" here'),
+        ("[-1, -1, 0]\nmax = [1, 1, 3]", "[9, -1, 0]\nmax = [11, 1, 3]", "[camera] does not see the domain"),
+        ("[domain]", "domain = 3\n[dom]", "domain"),
+        (
+            "min = [-1, -1, 0]",
+            'closed = ["z-", "floor"]\nmin = [-1, -1, 0]',
+            'line 14: [domain] closed must be a list of sides of the box, of "x-", "x+", "y-", "y+", "z-", "z+", '
+            "not ['z-', 'floor']",
+        ),
+        ("min = [-1, -1, 0]", 'closed = "z-"', "line 13: [domain] lacks min"),
+        (
+            "min = [-1, -1, 0]",
+            'closed = "z-"\nmin = [-1, -1, 0]',
+            "line 14: [domain] closed must be a list of sides of the box",
+        ),
+        (
+            "[medium]",
+            "[[inlet]]\ncentre = [0, 0, 1]\nradius = 0\n[medium]",
+            "line 23: [[inlet]] radius must be a number of metres above 0, not 0",
+        ),
+        ("[medium]", "[[inlet]]\ncentre = [0, 0, 1]\n[medium]", "line 21: [[inlet]] lacks radius"),
+        (
+            "[medium]",
+            "[[inlet]]\ncentre = [0, 0]\nradius = 1\n[medium]",
+            "line 22: [[inlet]] centre must be three numbers",
+        ),
+        (
+            "[medium]",
+            "[[inlet]]\ncentre = [0, 0, 1]\nradius = 1\n[[inlet]]\ncentre = [0, 0, -2]\nradius = 1\n[medium]",
+            "line 25: [[inlet]] is outside the domain: nothing within 1 m of centre [0.0, 0.0, -2.0] is in the box",
+        ),
+        ("albedo = 0.5", "albedo = ", "scene.toml: is not valid TOML: "),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_named_with_its_line(tmp_path: Path, old: str, new: str, message: str | None) -> None:
+    assert old in GOOD
+    text = GOOD.replace(old, new, 1)
+    if message is None:
+        load(tmp_path, text)
+        return
+    with pytest.raises(SceneError) as caught:
+        load(tmp_path, text)
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_inline_tables_are_named_by_their_own_line(tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match=r"line 2: \[medium\] albedo"):
+        load(tmp_path, "# one\nmedium = { albedo = 3 }\n")
+    with pytest.raises(SceneError, match=r"line 1: \[medium\] albedo"):
+        load(tmp_path, "medium.albedo = 3\n")
+    with pytest.raises(SceneError, match=r"line 1: \[lights\] must be a list of tables"):
+        load(tmp_path, "[lights]\n")
+    with pytest.raises(SceneError, match=r"line 1: \[medium\] must be a table, not 3"):
+        load(tmp_path, "medium = 3\n")
+
+
+def test_files_that_cannot_be_read_are_named(tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match=r"nothing\.toml: cannot be read"):
+        Scene.load(tmp_path / "nothing.toml")
+    (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(SceneError, match="not a text file"):
+        Scene.load(tmp_path / "binary.toml")
