@@ -16,9 +16,10 @@ from benchmarks.accuracy.scenes import KnownScene
 from benchmarks.process import run_module
 from smokelift import Scene
 from smokelift.evaluation import metrics
-from smokelift.evaluation.scores import Array, PictureScore, VolumeScore, eight_bit_values, finite_mean
+from smokelift.evaluation.frame_means import PictureMeans, VolumeMeans, eight_bit_values, finite_mean
 from smokelift.render import Image, Renderer, scene_renderer
 from smokelift.scene import completed
+from smokelift.transport import Array
 
 FRONT, SIDE = "0", "90"
 """The input's view, and the one in which a wrong distribution along the rays shows most."""
@@ -82,7 +83,7 @@ def score(known: KnownScene, run: str, folder: Path) -> dict[str, Any]:
         about = reconstructed(known, run, folder)
         row |= {name: about[name] for name in (*RUN_FIGURES, "method")}
         row["resolution"] = "x".join(map(str, about["resolution"]))
-    scores = {view: PictureScore(BLACK) for view in known.cameras}
+    scores = {view: PictureMeans(BLACK) for view in known.cameras}
     depth: list[dict[str, float]] = []
     for frame, shown in images(known, run, folder, known.scored):
         for view, image in shown.items():
@@ -98,7 +99,7 @@ def score(known: KnownScene, run: str, folder: Path) -> dict[str, Any]:
         new = [figures[name] for view, figures in found.items() if view not in used and figures[name] is not None]
         row[f"{name}_new"] = float(np.mean(new)) if new else None
     if known.truth is not None and run not in BASELINES:
-        volumes = VolumeScore(known.truth)
+        volumes = VolumeMeans(known.truth)
         for number, frame in enumerate(known.scored):
             arrays = _volume(folder, known, frame)
             volumes.add(frame, arrays["density"], arrays.get("velocity"))

@@ -29,7 +29,7 @@ from benchmarks.tables import markdown
 from benchmarks.timing import UNTIMED
 from smokelift import Clip, Frame, Scene, Settings, reconstruct
 from smokelift.evaluation.metrics import psnr
-from smokelift.evaluation.scores import resampled
+from smokelift.evaluation.resampling import resampled
 from smokelift.evaluation.truth import Truth
 from smokelift.footage.images import area_average
 from smokelift.output.images import eight_bit

@@ -25,8 +25,8 @@ from smokelift.app.doctor import report
 from smokelift.app.forecast import forecast
 from smokelift.app.memory import require_memory
 from smokelift.app.progress import Reporter, reporter
-from smokelift.evaluation import charts
-from smokelift.evaluation.compare import evaluate
+from smokelift.evaluation.evaluate import evaluate
+from smokelift.evaluation.speed_accuracy_chart import draw, read_runs
 from smokelift.footage.clip import Clip
 from smokelift.output.atomic import atomic_path
 from smokelift.output.images import eight_bit, write_image
@@ -206,7 +206,7 @@ def _evaluate(options: argparse.Namespace, say: Reporter) -> None:
 
 def _chart(options: argparse.Namespace, say: Reporter) -> None:
     _require_folder(options.out)
-    charts.draw(charts.read_runs(options.csv), options.out)
+    draw(read_runs(options.csv), options.out)
     say.finish(f"{options.out} written.", {"file": str(options.out)})
 
 

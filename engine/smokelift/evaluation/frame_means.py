@@ -1,4 +1,4 @@
-"""Figures gathered frame by frame: pictures beside the true ones, volumes beside the true ones."""
+"""Metrics of every frame, and their means over the frames: pictures and volumes beside the true ones."""
 
 from __future__ import annotations
 
@@ -10,24 +10,25 @@ import numpy.typing as npt
 from scipy import ndimage
 
 from smokelift.evaluation import metrics
+from smokelift.evaluation.resampling import resampled
 from smokelift.evaluation.truth import Truth
 from smokelift.footage.images import area_average, linear_to_srgb
-from smokelift.render.renderer import Image, Volume
+from smokelift.render import Image, Volume
+from smokelift.transport import Array
 
-Array = npt.NDArray[np.float32]
 Figures = dict[str, Any]
 
 SMOKE = 0.01
-"""Share of the largest true density from which a voxel counts as smoke."""
+"""Share of a frame's largest true density above which a voxel counts as smoke."""
 
 AROUND = 2
-"""Voxels around the smoke in which a velocity still matters: what is advected or blurred by motion goes there."""
+"""Voxels around the smoke in which a velocity still matters: advection and motion blur reach there."""
 
 BLOCKS = 16
 """Blocks along a picture's longer side for its flicker: coarser than any motion from frame to frame."""
 
 
-class PictureScore:
+class PictureMeans:
     """Pictures from one camera beside the true ones, in 8-bit sRGB values over the whole picture.
 
     Parameters
@@ -39,13 +40,13 @@ class PictureScore:
     def __init__(self, background: Image) -> None:
         self._background = eight_bit_values(background)
         self._frames: list[Figures] = []
-        self._power: list[metrics.Array] = []
-        self._power_truth: list[metrics.Array] = []
+        self._power: list[npt.NDArray[np.float64]] = []
+        self._power_truth: list[npt.NDArray[np.float64]] = []
         self._blocks: list[Array] = []
         self._blocks_truth: list[Array] = []
 
     def add(self, image: Image, truth: Image) -> Figures:
-        """Score one more frame, linear radiance (rows, columns, 3); what is said of it alone.
+        """Add a frame, linear radiance (rows, columns, 3), and return its own metrics.
 
         Raises
         ------
@@ -84,7 +85,7 @@ class PictureScore:
         }
 
 
-class VolumeScore:
+class VolumeMeans:
     """Densities and velocities beside the true ones, on the truth's grid.
 
     Parameters
@@ -101,7 +102,7 @@ class VolumeScore:
         self._before: tuple[int, Volume] | None = None
 
     def add(self, frame: int, density: Volume, velocity: Array | None = None) -> Figures:
-        """Score one more frame.
+        """Add a frame and return its own metrics.
 
         Parameters
         ----------
@@ -110,8 +111,8 @@ class VolumeScore:
         density
             Shape (nx, ny, nz), of any resolution over the truth's box.
         velocity
-            In m/s at the voxels' centres, shape (nx, ny, nz, 3), of the smoke that arrives in this frame. Scored, with
-            its warp, from the second frame on.
+            In m/s at the voxels' centres, shape (nx, ny, nz, 3), of the smoke that arrives in this frame. Compared from
+            the second frame on.
 
         Raises
         ------
@@ -126,26 +127,28 @@ class VolumeScore:
             "mass_ratio": float(found.sum(dtype=float) / max(true.sum(dtype=float), 1e-30)),
         }
         smoke = true > SMOKE * true.max()
-        if velocity is not None and self._before is not None and self._before[0] == frame - 1 and smoke.any():
-            figures |= self._motion(frame, found, resampled(velocity, truth.shape), smoke)
+        before, self._before = self._before, (frame, found)
+        if velocity is not None and before is not None and before[0] == frame - 1 and smoke.any():
+            figures |= self._motion(frame, before[1], found, resampled(velocity, truth.shape), smoke)
         self._layers.append(found.sum(axis=(0, 1)))
         self._layers_truth.append(true.sum(axis=(0, 1)))
-        self._before = frame, found
         self._frames.append(figures)
         return figures
 
-    def _motion(self, frame: int, found: Volume, velocity: Array, smoke: npt.NDArray[np.bool_]) -> Figures:
+    def _motion(
+        self, frame: int, before: Volume, after: Volume, velocity: Array, smoke: npt.NDArray[np.bool_]
+    ) -> Figures:
+        """Metrics of what moves the density of the frame before into this one's, at the points of arrival."""
         truth = self._truth
-        assert self._before is not None
         true_velocity = truth.velocity(frame - 1).centres()
         free = ~(truth.inflow(frame - 1) | truth.inflow(frame))
         inside, around = smoke & free, ndimage.binary_dilation(smoke, iterations=AROUND) & free
         if not ndimage.binary_erosion(inside, np.ones((2, 2, 2))).any():
             return {}  # too little smoke for a divergence
-        voxels = truth.dt / truth.voxel_size
         error, cosine = metrics.velocity_error(velocity, true_velocity, inside)
         error_around, cosine_around = metrics.velocity_error(velocity, true_velocity, around)
-        before, after = truth.density(frame - 1), truth.density(frame)
+        densities = truth.density(frame - 1), truth.density(frame)
+        voxels = truth.dt / truth.voxel_size
         return {
             "velocity_error": error,
             "velocity_cosine": cosine,
@@ -153,8 +156,8 @@ class VolumeScore:
             "velocity_cosine_around": cosine_around,
             "divergence": truth.dt * metrics.mean_divergence(velocity, truth.voxel_size, inside),
             "divergence_truth": truth.dt * metrics.mean_divergence(true_velocity, truth.voxel_size, inside),
-            "warp_error": metrics.warp_error(self._before[1], found, velocity * voxels, free),
-            "warp_error_truth": metrics.warp_error(before, after, true_velocity * voxels, free),
+            "warp_error": metrics.warp_error(before, after, velocity * voxels, free),
+            "warp_error_truth": metrics.warp_error(*densities, true_velocity * voxels, free),
         }
 
     def figures(self) -> Figures:
@@ -165,18 +168,6 @@ class VolumeScore:
             "flicker": _flicker(self._layers),
             "flicker_truth": _flicker(self._layers_truth),
         }
-
-
-def resampled(values: Array, shape: tuple[int, int, int]) -> Array:
-    """A volume (nx, ny, nz, ...) on another grid over the same box: means where it is coarser, else interpolated."""
-    if values.shape[:3] == tuple(shape):
-        return values
-    x, y, z = shape
-    rest = values.shape[3:]
-    flat = area_average(values.reshape(*values.shape[:2], -1), y, x)  # two axes, then the third
-    upright = np.moveaxis(flat.reshape(x, y, values.shape[2], *rest), 2, 0)
-    layers = area_average(upright.reshape(values.shape[2], -1, 1), x * y * int(np.prod(rest, dtype=int)), z)
-    return np.ascontiguousarray(np.moveaxis(layers.reshape(z, x, y, *rest), 0, 2))
 
 
 def eight_bit_values(image: npt.ArrayLike) -> Array:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from smokelift.evaluation.scores import PictureScore, VolumeScore, eight_bit_values, finite_mean, resampled
+from smokelift.evaluation.frame_means import PictureMeans, VolumeMeans, eight_bit_values, finite_mean
 from smokelift.evaluation.truth import Truth
 from smokelift.transport import Velocity
 
@@ -51,7 +51,7 @@ def picture(shift: int = 0, size: tuple[int, int] = (96, 64)) -> np.ndarray:
 
 
 def test_equal_pictures_are_perfect() -> None:
-    score = PictureScore(BLACK)
+    score = PictureMeans(BLACK)
     for brightness in (0.8, 1.0, 0.9, 0.7):
         alone = score.add(brightness * picture(), brightness * picture())
         assert alone["psnr"] == np.inf
@@ -63,7 +63,7 @@ def test_equal_pictures_are_perfect() -> None:
 
 
 def test_a_shifted_picture_is_forgiven_by_its_own_figures_only() -> None:
-    score = PictureScore(BLACK)
+    score = PictureMeans(BLACK)
     assert score.add(0.97 * picture(9), picture())["shift"] == [0, -9]
     figures = score.figures()
     assert figures["psnr"] < 30
@@ -75,7 +75,7 @@ def test_a_shifted_picture_is_forgiven_by_its_own_figures_only() -> None:
 def test_a_blurred_picture_lacks_its_fine_octaves() -> None:
     plain = picture(size=(96, 64))
     blurred = sum(np.roll(plain, step, axis) for step in (-3, -1, 1, 3) for axis in (0, 1)) / 8
-    score = PictureScore(BLACK)
+    score = PictureMeans(BLACK)
     score.add(blurred, plain)
     figures = score.figures()
     assert figures["spectrum_octaves"][-1] < -3
@@ -86,13 +86,13 @@ def test_a_blurred_picture_lacks_its_fine_octaves() -> None:
 def test_the_background_is_no_smoke() -> None:
     """What both pictures share does not count as detail, and moving the smoke leaves it in place."""
     wall = np.random.default_rng(0).random((96, 64, 3)).astype(np.float32) * 0.2
-    score = PictureScore(wall)
+    score = PictureMeans(wall)
     score.add(wall, wall)
     assert score.figures()["spectrum_distance"] is None
 
 
 def test_unsteady_light_shows_as_flicker() -> None:
-    score = PictureScore(BLACK)
+    score = PictureMeans(BLACK)
     for factor in (1.0, 0.8, 1.0, 0.8):
         score.add(factor * picture(), picture())
     figures = score.figures()
@@ -101,7 +101,7 @@ def test_unsteady_light_shows_as_flicker() -> None:
 
 
 def test_the_truth_itself_is_perfect(truth) -> None:
-    score = VolumeScore(truth)
+    score = VolumeMeans(truth)
     for frame in range(4):
         score.add(frame, truth.density(frame), truth.velocity(max(frame - 1, 0)).centres())
     figures = score.figures()
@@ -116,7 +116,7 @@ def test_the_truth_itself_is_perfect(truth) -> None:
 
 def test_each_mistake_shows_where_it_belongs(truth) -> None:
     """Half the mass; smoke a voxel too deep; a velocity that is half as fast; a step that does not fit."""
-    half, deep, slow = VolumeScore(truth), VolumeScore(truth), VolumeScore(truth)
+    half, deep, slow = VolumeMeans(truth), VolumeMeans(truth), VolumeMeans(truth)
     still = np.zeros((*SHAPE, 3), np.float32)
     for frame in range(4):
         density, velocity = truth.density(frame), truth.velocity(max(frame - 1, 0)).centres()
@@ -139,7 +139,7 @@ def test_where_smoke_is_put_in_motion_is_not_scored(truth) -> None:
     inlet = np.zeros(SHAPE, bool)
     inlet[6:10, 6:10, 6:9] = True
     fed = replace(truth, inflow_packed=np.stack([np.packbits(inlet)] * 4))
-    right, wrong = VolumeScore(fed), VolumeScore(fed)
+    right, wrong = VolumeMeans(fed), VolumeMeans(fed)
     for frame in range(3):
         density, velocity = truth.density(frame), truth.velocity(max(frame - 1, 0)).centres()
         right.add(frame, density, velocity)
@@ -150,26 +150,10 @@ def test_where_smoke_is_put_in_motion_is_not_scored(truth) -> None:
 
 def test_a_velocity_after_a_gap_is_not_scored(truth) -> None:
     """A velocity belongs to the step from the frame before."""
-    score = VolumeScore(truth)
+    score = VolumeMeans(truth)
     score.add(0, truth.density(0), np.zeros((*SHAPE, 3), np.float32))
     score.add(2, truth.density(2), np.zeros((*SHAPE, 3), np.float32))
     assert "velocity_error" not in score.figures()
-
-
-def test_other_resolutions_over_the_same_box(truth) -> None:
-    """Means on a coarser grid, interpolation on a finer one; each axis its own."""
-    density = truth.density(0)
-    fine = density.repeat(2, 0).repeat(2, 1).repeat(2, 2)
-    np.testing.assert_allclose(resampled(fine, SHAPE), density, atol=1e-6)
-    ramp = np.broadcast_to(np.arange(8, dtype=np.float32)[:, None, None, None] + 0.5, (8, 4, 6, 3))
-    found = resampled(np.ascontiguousarray(ramp), (16, 8, 12))
-    assert found.shape == (16, 8, 12, 3)
-    np.testing.assert_allclose(
-        found[1:-1], np.broadcast_to(((np.arange(16) + 0.5) / 2)[1:-1, None, None, None], found[1:-1].shape)
-    )
-    score = VolumeScore(truth)
-    score.add(0, fine)
-    assert score.figures()["density_error"] < 1e-3
 
 
 def test_values_are_those_of_an_8_bit_picture() -> None:

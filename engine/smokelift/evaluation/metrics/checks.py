@@ -1,0 +1,46 @@
+"""What every metric demands of its arguments: arrays of one shape, whose values are finite."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
+
+
+def finite(values: npt.ArrayLike) -> Array:
+    """Return an array of float64; ValueError if a value is not finite."""
+    array = np.asarray(values, np.float64)
+    if not np.isfinite(array).all():
+        raise ValueError("values must be finite")
+    return array
+
+
+def pair(a: npt.ArrayLike, b: npt.ArrayLike) -> tuple[Array, Array]:
+    """Return two arrays of float64; ValueError if a value is not finite, or they are empty or differ in shape."""
+    first, second = finite(a), finite(b)
+    if first.shape != second.shape:
+        raise ValueError(f"shapes must be equal, not {first.shape} and {second.shape}")
+    if first.size == 0:
+        raise ValueError("arrays must not be empty")
+    return first, second
+
+
+def counted(mask: npt.ArrayLike | None, shape: tuple[int, ...]) -> Mask:
+    """Return which values count, all without a mask; ValueError if it does not fit the shape or counts none."""
+    if mask is None:
+        return np.ones(shape, np.bool_)
+    counts = np.asarray(mask, np.bool_)
+    if counts.shape != shape[: counts.ndim] or not counts.any():
+        raise ValueError(f"the mask {counts.shape} must fit {shape} and count at least one value")
+    return counts
+
+
+def relative(error: float, norm: float) -> float:
+    """Return an error beside a norm: 0 where both are, infinity where only the norm is."""
+    if norm == 0.0:
+        return 0.0 if error == 0.0 else math.inf
+    return error / norm

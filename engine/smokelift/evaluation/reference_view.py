@@ -1,0 +1,119 @@
+"""Cameras whose clips a sequence is compared with."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from smokelift.footage.background import background_picture, open_plates
+from smokelift.footage.clip import Clip, ClipError
+from smokelift.footage.images import area_average
+from smokelift.output.sequence import Sequence
+from smokelift.output.viewer import Viewer
+from smokelift.render import Image
+from smokelift.scene import Camera, Scene
+
+LONGEST_SIDE = 480
+"""Pixels of a compared picture at most: larger ones are averaged over areas. Finer than any usual grid."""
+
+
+@dataclass(frozen=True, eq=False)
+class ReferenceView:
+    """A camera with the clip that its pictures are compared with.
+
+    Attributes
+    ----------
+    name
+        To call it by.
+    camera
+        With as many pixels as the pictures are compared at; where it moves, from the sequence's first frame on.
+    background : (rows, columns, 3) or (3,)
+        Linear radiance behind the smoke.
+    clip
+        Its footage.
+    first
+        The clip's frame that the sequence's frame 1 belongs to.
+    """
+
+    name: str
+    camera: Camera
+    background: Image
+    clip: Clip
+    first: int
+
+    def picture(self, number: int) -> Image:
+        """The clip's picture of a frame of the sequence; linear radiance (rows, columns, 3)."""
+        return area_average(self.clip.frame(self.first + number - 1), *self.camera.size)
+
+
+def first_frame(sequence: Sequence) -> int:
+    """Return the frame of the input clip's file, from 0, that the sequence's frame 1 belongs to."""
+    clip = sequence.scene.clip
+    return 0 if clip is None else clip.first
+
+
+def open_views(
+    sequence: Sequence, paths: tuple[tuple[Path, Path], ...], stack: ExitStack, notes: list[str]
+) -> list[ReferenceView]:
+    """Open the sequence's own input, and other cameras with their clips.
+
+    Parameters
+    ----------
+    sequence
+        With at least one frame.
+    paths
+        Camera files and clips.
+    stack
+        Closes the clips.
+    notes
+        Takes a sentence if the input cannot be compared with.
+
+    Raises
+    ------
+    ValueError
+        If a file cannot be read, or a camera does not fit its clip.
+    """
+    scene = sequence.scene
+    views = []
+    if (plates := open_plates(scene)) is not None:
+        plates.close()
+        notes.append("The input view was left out: what stands behind the smoke there changes.")
+    elif scene.clip is not None:
+        try:
+            clip = stack.enter_context(Clip.open(scene.clip))
+            views.append(_view("input", scene.camera, None, clip, 0, sequence))
+        except ClipError as error:
+            notes.append(f"The input view was left out: {error}")
+    for camera_path, clip_path in paths:
+        other = Scene.load(camera_path)
+        if other.camera is None:
+            raise ValueError(f"{camera_path}: has no [camera].")
+        clip = stack.enter_context(Clip.open(clip_path))
+        behind = None if other.background is None else background_picture(other)
+        views.append(_view(camera_path.stem, other.camera, behind, clip, first_frame(sequence), sequence))
+    return views
+
+
+def _view(
+    name: str, camera: Camera, background: Image | None, clip: Clip, first: int, sequence: Sequence
+) -> ReferenceView:
+    if camera.size[0] * clip.size[1] != camera.size[1] * clip.size[0]:
+        raise ValueError(
+            f"{clip.path}: its pictures are {clip.size[0]} x {clip.size[1]}, the camera's {camera.size[0]} x "
+            f"{camera.size[1]}; [camera] size must have the clip's shape."
+        )
+    if (last := first + sequence.frames[-1] - 1) >= len(clip):
+        raise ValueError(
+            f"{clip.path}: has {len(clip)} frames, but the sequence goes on to frame {last} of its clip (from 0); "
+            "give the whole clip of that camera."
+        )
+    scale = min(1.0, LONGEST_SIDE / max(clip.size))
+    camera = camera.resized(*(max(1, round(side * scale)) for side in clip.size))
+    if camera.moves:
+        camera = replace(camera, matrix=camera.matrices[first], matrices=camera.matrices[first:])
+    if background is None:
+        background = Viewer(sequence.scene, camera).background(1)
+    elif background.ndim == 3:
+        background = area_average(background, *camera.size)
+    return ReferenceView(name, camera, background, clip, first)

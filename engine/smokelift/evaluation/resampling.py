@@ -1,0 +1,27 @@
+"""Volumes on other grids over the same box."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from smokelift.footage.images import area_average
+from smokelift.transport import Array
+
+
+def resampled(values: Array, shape: tuple[int, int, int]) -> Array:
+    """Return a volume on another grid over the same box.
+
+    Parameters
+    ----------
+    values : (nx, ny, nz, ...)
+    shape
+        Of the new grid. Along an axis where it is coarser its values are means, otherwise they are interpolated.
+    """
+    if values.shape[:3] == tuple(shape):
+        return values
+    x, y, z = shape
+    rest = values.shape[3:]
+    flat = area_average(values.reshape(*values.shape[:2], -1), y, x)  # two axes, then the third
+    upright = np.moveaxis(flat.reshape(x, y, values.shape[2], *rest), 2, 0)
+    layers = area_average(upright.reshape(values.shape[2], -1, 1), x * y * int(np.prod(rest, dtype=int)), z)
+    return np.ascontiguousarray(np.moveaxis(layers.reshape(z, x, y, *rest), 0, 2))
