@@ -37,7 +37,7 @@ class Clip:
     first
         Number in the file of the clip's frame 0 (not 0 if a range was asked for).
     warning
-        A sentence about what is amiss (a truncated file, say), else None.
+        A sentence about a defect (a truncated file, say), else None.
     """
 
     def __init__(self, path: Path, source: FrameSource, fps: float | None, frames: tuple[int, int] | None) -> None:
@@ -132,7 +132,7 @@ class Clip:
         return (self.frame(n) for n in range(self._count))
 
     def spread(self, count: int) -> list[int]:
-        """So many numbers of frames (or all, if there are fewer), spread evenly over the clip."""
+        """Return the numbers of ``count`` frames (of all, if there are fewer), spread evenly over the clip."""
         numbers = np.unique(np.linspace(0, len(self) - 1, min(count, len(self))).round())
         return [int(number) for number in numbers]
 

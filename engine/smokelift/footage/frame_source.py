@@ -1,4 +1,4 @@
-"""What a clip format has to offer; `Clip` counts, caches and checks for all of them."""
+"""What a clip format implements; `Clip` counts, caches and checks the frames of all of them."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class FrameSource(Protocol):
     fps
         Frames a second.
     warning
-        A sentence about what is amiss, else None.
+        A sentence about a defect, else None.
     """
 
     count: int

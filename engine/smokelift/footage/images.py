@@ -106,7 +106,7 @@ def _read_with_ffmpeg(path: Path, pixels: str) -> npt.NDArray[Any]:
 
 
 def _read_radiance(path: Path) -> npt.NDArray[Any]:
-    """A Radiance .hdr of the ordinary kind; FFmpeg takes the rare others for that, upside down or in wrong colours."""
+    """Read a Radiance .hdr of the usual kind; FFmpeg would read the others upside down or in wrong colours."""
     with path.open("rb") as file:
         head = file.read(4096)
     if b"FORMAT=32-bit_rle_xyze" in head or re.search(rb"\n(\+Y|[+-]X) \d+ [+-][XY] \d+\n|\n-Y \d+ -X \d+\n", head):

@@ -31,11 +31,11 @@ class WorkingPicture:
     height: int
 
     def part(self, picture: NDArray[np.float32]) -> NDArray[np.float32]:
-        """The part of a full picture (rows, columns, ...), at its own resolution."""
+        """Return the part of a full picture (rows, columns, ...), at its own resolution."""
         return picture[self.top : self.top + self.height, self.left : self.left + self.width]
 
     def cut(self, picture: NDArray[np.float32]) -> NDArray[np.float32]:
-        """The small picture, area-averaged from a full one (rows, columns, ...)."""
+        """Return the small picture, averaged over areas of a full one (rows, columns, ...)."""
         columns, rows = self.camera.size
         return area_average(self.part(picture), columns, rows)
 
@@ -45,17 +45,17 @@ class CameraError(ValueError):
 
 
 def voxel_width(camera: Camera, domain: Domain) -> float:
-    """Width in pixels of a voxel at the domain's centre."""
+    """Return the width in pixels of a voxel at the domain's centre."""
     _, depth = project(camera, np.array(domain.centre))
     near = domain.voxel_size if camera.type == "perspective" else 1.0
     return max(camera.fx, camera.fy) * domain.voxel_size / max(float(depth), near)
 
 
 def working_picture(camera: Camera, domain: Domain) -> WorkingPicture:
-    """Choose the picture that a grid is fitted to.
+    """Return the picture that a grid is fitted to.
 
-    Finer pixels than voxels hold detail that the grid cannot show, coarser ones lose some that it can, so a pixel
-    is as wide as a voxel at the domain's centre (unless the footage is coarser than that).
+    A pixel is as wide as a voxel at the domain's centre, unless the footage is coarser: finer pixels hold detail that
+    the grid cannot show, and coarser ones lose detail that it can.
 
     Raises
     ------

@@ -4,15 +4,15 @@
 """
 
 from smokelift.scene.background import Background
-from smokelift.scene.camera import Camera, Matrix, as_matrix, look_at_matrix, orbit, shared_part
-from smokelift.scene.checks import SceneError, Vector
+from smokelift.scene.camera import Camera, as_matrix, look_at_matrix, orbit, shared_part
+from smokelift.scene.checks import SceneError
 from smokelift.scene.clip_source import ClipSource
 from smokelift.scene.complete import CompleteScene, completed
 from smokelift.scene.description import Scene
 from smokelift.scene.dictionary import scene_from_dict, scene_to_dict
 from smokelift.scene.domain import SIDES, Domain, Inlet, Side
 from smokelift.scene.environment_light import EnvironmentLight
-from smokelift.scene.finite_lights import DirectionalLight, FiniteLight, PointLight, SampledLight
+from smokelift.scene.finite_lights import DirectionalLight, FiniteLight, PointLight
 from smokelift.scene.lights import Light
 from smokelift.scene.medium import SCATTERINGS, Medium, Scattering
 from smokelift.scene.view import View
@@ -30,15 +30,12 @@ __all__ = [
     "FiniteLight",
     "Inlet",
     "Light",
-    "Matrix",
     "Medium",
     "PointLight",
-    "SampledLight",
     "Scattering",
     "Scene",
     "SceneError",
     "Side",
-    "Vector",
     "View",
     "as_matrix",
     "completed",

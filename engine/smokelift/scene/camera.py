@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any, Literal, cast
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,8 +33,8 @@ class Camera:
     cx, cy
         Where the optical axis meets the picture, in pixels.
     matrices
-        Of a camera that moves: its matrix in every frame of the clip that is used, ``matrix`` the first of them.
-        Empty for one that stands still.
+        Matrices of a camera that moves, one for every frame of the clip that is used; ``matrix`` is the first of them.
+        Empty for a camera that stands still.
 
     Raises
     ------
@@ -167,11 +167,11 @@ def look_at_matrix(position: Any, target: Any, up: Any) -> Matrix:
         raise SceneError(f"up must not be zero or along the line of sight, not {shown(up)}", key="up")
     right /= sine
     rows = np.column_stack([right, np.cross(back, right), back, eye])
-    return cast(Matrix, tuple(tuple(row) for row in [*rows.tolist(), [0.0, 0.0, 0.0, 1.0]]))
+    return as_matrix(np.vstack([rows, [0.0, 0.0, 0.0, 1.0]]))
 
 
 def _rigid(value: Any, key: str = "matrix") -> Matrix:
-    """Check a camera to world matrix. A few rounded digits in a file (1e-3) are forgiven."""
+    """Check a camera to world matrix. The rounding of a few digits in a file (1e-3) is allowed."""
     name = key if key == "matrix" else f"every one of {key}"
     expected = "four rows of four numbers, camera to world"
     rows = [[number(v, key, expected) for v in items(row, 4, key, expected)] for row in items(value, 4, key, expected)]
@@ -184,29 +184,29 @@ def _rigid(value: Any, key: str = "matrix") -> Matrix:
         )
     if np.linalg.det(rotation) < 0.0:
         raise SceneError(f"{name} must be rigid: its upper left 3x3 part mirrors", key=key)
-    return cast(Matrix, tuple(tuple(row) for row in rows))
+    return as_matrix(np.array(rows))
 
 
 def as_matrix(values: NDArray[np.float64]) -> Matrix:
-    """A 4x4 array as the nested tuples that a frozen camera holds."""
+    """Return a 4x4 array as the nested tuples that a frozen camera holds."""
     rows = [tuple(float(v) for v in row) for row in values]
     return tuple((r[0], r[1], r[2], r[3]) for r in rows)
 
 
 def orbit(camera: Camera, domain: Domain, yaw_degrees: float, pitch_degrees: float = 0.0) -> Camera:
-    """The camera carried around the domain's centre, still looking at it from the same distance.
+    """Return the camera turned about the domain's centre, which stays at the same distance and place of the picture.
 
-    One that moves is carried around in every frame.
+    A camera that moves is turned in every frame.
 
     Parameters
     ----------
     yaw_degrees
         Turn about the world's Z, counter-clockwise seen from above: 90 looks from the right side.
     pitch_degrees
-        Then raise the camera by so much; negative lowers it.
+        Then the rise of the camera about its own horizontal axis; negative lowers it.
     """
-    matrices = [_carried(np.array(matrix), domain, yaw_degrees, pitch_degrees) for matrix in camera.matrices]
-    first = _carried(np.array(camera.matrix), domain, yaw_degrees, pitch_degrees)
+    matrices = [_turned(np.array(matrix), domain, yaw_degrees, pitch_degrees) for matrix in camera.matrices]
+    first = _turned(np.array(camera.matrix), domain, yaw_degrees, pitch_degrees)
     return replace(camera, matrix=first, matrices=tuple(matrices))
 
 
@@ -232,7 +232,7 @@ def shared_part(whole: Camera, camera: Camera) -> tuple[slice, slice] | None:
     return np.s_[top:bottom, left:right] if inside and right > left and bottom > top else None
 
 
-def _carried(matrix: NDArray[np.float64], domain: Domain, yaw_degrees: float, pitch_degrees: float) -> Matrix:
+def _turned(matrix: NDArray[np.float64], domain: Domain, yaw_degrees: float, pitch_degrees: float) -> Matrix:
     """A camera's matrix after `orbit`."""
     centre = np.array(domain.centre)
     right = matrix[:3, 0]

@@ -33,15 +33,20 @@ from smokelift.scene.writing import write_file
 
 @dataclass(frozen=True)
 class Scene:
-    """One shot. Whatever is None (or, for lights, empty) is estimated or defaulted before a run, and said.
+    """One shot. What is None (for lights: empty) is estimated or defaulted before a run, and the run notes how.
 
     Attributes
     ----------
+    clip
+        The footage.
+    camera, domain, medium, lights, background
+        What is in front of the lens.
+    views
+        Further cameras and their clips.
     closed
-        Sides of the domain that are walls, given or estimated: smoke and air go freely through the others. A floor is
-        ``("z-",)``.
+        Sides of the domain that are walls: smoke and air pass freely through the others. A floor is ``("z-",)``.
     inlets
-        All the places where smoke enters. Where none is marked they are looked for.
+        All the places where smoke enters. If there is none, they are estimated.
     scattering
         How light is scattered: ``"single"`` with self-shadowing, ``"unshadowed"`` or ``"absorption"``.
 
@@ -71,7 +76,7 @@ class Scene:
             self._check_places(self.domain)
 
     def _check_places(self, domain: Domain) -> None:
-        """Refuse what stands where it cannot be of use."""
+        """Refuse an inlet outside the domain, a light inside it, and a camera that does not see it."""
         for index, inlet in enumerate(self.inlets):
             if not inlet.reaches(domain):
                 raise SceneError(
@@ -96,7 +101,7 @@ class Scene:
                 raise SceneError("does not see the domain: no part of the box is in its picture", table=table)
 
     def with_frames(self, first: int, last: int) -> Scene:
-        """Return the scene with another range of its clip's frames; the further views keep step with it.
+        """Return the scene with another range of its clip's frames; the ranges of further views move with it.
 
         Raises
         ------

@@ -108,12 +108,12 @@ class Inlet:
         set_fields(self, centre=vector(self.centre, "centre"), radius=radius)
 
     def reaches(self, domain: Domain) -> bool:
-        """Return whether any of it lies in a box."""
+        """Return whether a part of it lies in a box."""
         nearest = np.clip(self.centre, domain.min, domain.max)
         return math.dist(self.centre, nearest) <= self.radius
 
     def voxels(self, domain: Domain) -> NDArray[np.bool_]:
-        """Return where it is, shape (nx, ny, nz): voxels whose centres lie in it, or the nearest if none does."""
+        """Return the voxels whose centres lie in it, or the nearest ones if none does, shape (nx, ny, nz) bool."""
         places = zip(domain.min, self.centre, domain.resolution, strict=True)
         x, y, z = np.ix_(*(low + (np.arange(n) + 0.5) * domain.voxel_size - centre for low, centre, n in places))
         squares = x**2 + y**2 + z**2

@@ -12,7 +12,7 @@ from smokelift.scene.checks import file_path, integer, number, set_fields, unexp
 class EnvironmentLight:
     """Light from an equirectangular picture (.exr, .hdr), turned about Z, scaled by ``strength``.
 
-    ``directions`` is the number of parallel lights that stand for it; None takes as many as the smoke needs.
+    ``directions`` is the number of parallel lights that approximate it; None takes as many as the smoke needs.
     """
 
     image: Path

@@ -1,4 +1,4 @@
-"""What the smoke does to light."""
+"""What the smoke does to light: how much of it is removed, and how it is scattered."""
 
 from __future__ import annotations
 

@@ -16,11 +16,11 @@ class View:
     Attributes
     ----------
     camera
-        One that stands still.
+        Stands still.
     clip
-        Its ``frames`` are those at the moments of the scene's; None takes the same numbers.
+        Its ``frames`` show the same moments as those of the scene's clip; None takes the same numbers.
     background
-        What it sees behind the smoke; None takes the scene's if that is one colour, and else estimates it.
+        Behind the smoke; None takes the scene's if that is one colour, and else estimates it.
     """
 
     camera: Camera
