@@ -1,14 +1,15 @@
-"""Smokelift's Blender add-on: a clip of smoke in, a volume that sits in the shot out.
+"""Smokelift's Blender add-on: a clip of smoke becomes a volume in the shot.
 
-The sidebar is `panel`, what its buttons do `operators`, what is saved with the .blend `properties`. `scene` turns
-the Blender scene into a scene file, `job` runs the engine on it in a process of its own and `run` looks after that,
-`take` knows the files of a run, `volume` shows them, `look` makes a render of them look like the clip. `batch` is the
-same without a window.
+The library knows nothing of Blender: `take` is the files of a run, `job` the engine's process, `toml` the text of a
+scene file, `contract` what the add-on repeats of the engine. `scene_file` (Blender scene to scene file), `volume`
+(sequence to Volume object) and `shot_setup` (camera, world and light that match the clip) translate to Blender's data
+and back. The interface is thin: `properties`, `panel` and `operators`; `run` keeps the queue; `batch` is the command
+line.
 """
 
 
 def register() -> None:
-    """Make everything known to Blender."""
+    """Register all classes, properties and handlers."""
     from . import batch, operators, panel, properties, run, volume
 
     for module in (properties, volume, run, operators, panel, batch):
@@ -16,7 +17,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Take everything back."""
+    """Unregister them."""
     from . import batch, operators, panel, properties, run, volume
 
     for module in (batch, panel, operators, run, volume, properties):

@@ -1,4 +1,4 @@
-"""The same job without a window:
+"""The command line: the same run without a window.
 
     blender -b shot.blend --command smokelift reconstruct [options]     where the extension is enabled
     blender -b shot.blend -P addon/batch.py -- [options]                anywhere
@@ -19,15 +19,15 @@ from typing import Any
 
 import bpy
 
-DONE, BAD_INPUT, CANCELLED = 0, 2, 130
 POLL_SECONDS = 0.05
 
 
 def main(words: Sequence[str]) -> int:
-    """Make the smoke of the scene and return the exit status."""
+    """Make the scene's smoke; returns the exit status."""
     from . import run
+    from .contract import BAD_INPUT, CANCELLED, DONE
     from .job import EngineMissingError, Job, engine_command
-    from .scene import ShotError
+    from .scene_file import ShotError
     from .take import TakeError
 
     try:
@@ -58,18 +58,18 @@ def main(words: Sequence[str]) -> int:
 
 
 def _wait(job: Any) -> None:
-    """Run a job to its end and print what it says; SIGTERM and Ctrl-C cancel it."""
+    """Run a job to its end and print its messages; SIGTERM and Ctrl-C cancel it."""
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
-    said = done = 0
+    printed = done = 0
     job.start()
     try:
         while not job.ended:
             try:
                 time.sleep(POLL_SECONDS)
                 if job.poll():
-                    for note in job.notes[said:]:
+                    for note in job.notes[printed:]:
                         print(note, flush=True)
-                    said = len(job.notes)
+                    printed = len(job.notes)
                     if job.done > done:
                         done = job.done
                         print(f"frame {done} of {job.total}", flush=True)
@@ -81,8 +81,8 @@ def _wait(job: Any) -> None:
 
 
 def _scene(choices: argparse.Namespace) -> bpy.types.Scene:
-    """The scene with what the options override."""
-    from .scene import ShotError, use_frames
+    """The scene, with its settings overridden by the options."""
+    from .scene_file import ShotError, use_frames
 
     scene = bpy.context.scene
     settings = scene.smokelift
@@ -105,7 +105,7 @@ def _scene(choices: argparse.Namespace) -> bpy.types.Scene:
 
 
 def _render(scene: bpy.types.Scene, path: Path) -> None:
-    """Render all frames of the smoke where the name has #### for their numbers, else the scene's current frame."""
+    """Render all frames of the smoke if the name has #### for their numbers, else the current frame."""
     scene.render.filepath = str(path.absolute())
     if "#" not in path.name:
         bpy.ops.render.render(write_still=True)
@@ -116,22 +116,23 @@ def _render(scene: bpy.types.Scene, path: Path) -> None:
 
 
 def _parser() -> argparse.ArgumentParser:
+    qualities = bpy.context.scene.smokelift.bl_rna.properties["quality"].enum_items.keys()
     parser = argparse.ArgumentParser(prog="smokelift", description="Turn the scene's clip into a volume of smoke.")
-    parser.add_argument("--clip", type=Path, help="another clip than the scene's")
+    parser.add_argument("--clip", type=Path, help="clip in place of the scene's")
     parser.add_argument("--frames", type=_frames, metavar="A:B", help="first and last frame of the clip, from 0")
-    parser.add_argument("--quality", choices=("draft", "balanced", "fine"))
+    parser.add_argument("--quality", choices=qualities)
     parser.add_argument(
         "--axis-depth",
         type=float,
         metavar="METRES",
-        help="how far behind the middle of the box the smoke stands",
+        help="distance of the smoke behind the middle of the box",
     )
     parser.add_argument("--output", type=Path, help="folder for the results")
-    parser.add_argument("--resume", action="store_true", help="go on with the last unfinished run")
-    parser.add_argument("--set-up", action="store_true", help="make renders look like the clip, as Set Up Shot does")
+    parser.add_argument("--resume", action="store_true", help="resume the last unfinished run")
+    parser.add_argument("--set-up", action="store_true", help="make renders match the clip, as Set Up Shot does")
     parser.add_argument("--save", action="store_true", help="save the .blend with the result")
     parser.add_argument(
-        "--render", type=Path, metavar="PICTURE", help="render the current frame, or all where the name has ####"
+        "--render", type=Path, metavar="PICTURE", help="render the current frame, or all if the name has ####"
     )
     return parser
 
@@ -147,29 +148,31 @@ def _frames(text: str) -> tuple[int, int]:
 def command(words: list[str]) -> int:
     """``blender --command smokelift reconstruct ...``"""
     if not words or words[0] != "reconstruct":
+        from .contract import BAD_INPUT
+
         print("usage: blender -b shot.blend --command smokelift reconstruct [options]", file=sys.stderr)
         return BAD_INPUT
     return main(words[1:])
 
 
 def register() -> None:
-    """Add the command to Blender's own."""
+    """Add Blender's command ``smokelift``."""
     register.handles = [bpy.utils.register_cli_command("smokelift", command)]
 
 
 def unregister() -> None:
-    """Take the command away. Its handle must not live on: at the end of Blender that would crash."""
+    """Remove the command and its handle, which would crash Blender at its end."""
     bpy.utils.unregister_cli_command(register.handles.pop())
 
 
 def _run_as_script() -> int:
-    """Run the add-on that is enabled, or else the one that this script lies in."""
+    """Run the enabled add-on, else the one that holds this script."""
     words = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
     if hasattr(bpy.types.Scene, "smokelift"):
         package = type(bpy.context.scene.smokelift).__module__.rpartition(".")[0]
         return importlib.import_module(f"{package}.batch").main(words)
     init = Path(__file__).resolve().parent / "__init__.py"
-    name = "smokelift_addon"  # not the folder's name: an extension's is the engine's
+    name = "smokelift_addon"  # not the folder's name, which an extension shares with the engine
     spec = importlib.util.spec_from_file_location(name, init, submodule_search_locations=[str(init.parent)])
     package = sys.modules[name] = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(package)

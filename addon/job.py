@@ -1,8 +1,8 @@
 """Runs of the engine in child processes, one after the other. Knows nothing of Blender.
 
-The engine says what it does in lines of JSON on its standard output; a thread reads them, so that looking never
-waits. It ends when its standard input is closed: that is how it is cancelled, on every system, and what happens by
-itself when Blender quits or crashes.
+The engine writes its progress to its standard output, one JSON object a line. A thread reads them, so polling never
+waits. The engine ends when its standard input closes: so a job is cancelled on every system, and ends by itself when
+Blender quits or crashes.
 """
 
 from __future__ import annotations
@@ -19,19 +19,24 @@ from contextlib import suppress
 from pathlib import Path
 from typing import IO, Any, Literal
 
+from .contract import CANCELLED
+
 Outcome = Literal["waiting", "running", "done", "failed", "cancelled"]
+ENDED: tuple[Outcome, ...] = ("done", "failed", "cancelled")
 
 LINES_A_POLL = 500
-"""A flood of lines must not hold the caller up."""
+"""Lines read in one poll, at most, so that many lines do not delay the caller."""
 
 LONGEST_LINE = 2**20
+"""Bytes."""
+
 GRACE_SECONDS = 8.0
-"""How long the engine may take to end by itself; it writes files whole, so a hard end does no harm."""
+"""Time for a cancelled engine to end by itself. It writes files whole, so killing it does no harm."""
 
-LAST_WORDS_SECONDS = 1.0
-CANCELLED_STATUS = 130
+DRAIN_SECONDS = 1.0
+"""Time for the last lines to arrive after the engine has ended; a child of its own may hold the pipe open."""
 
-# os.read, because a thread that waits in a buffered reader would hold its lock at the interpreter's end.
+# os.read, because a thread in a buffered reader holds its lock at the interpreter's end.
 _START = """
 import _thread, os, runpy, signal, sys, threading
 
@@ -54,12 +59,12 @@ class EngineMissingError(RuntimeError):
 
 
 def engine_command(arguments: Sequence[str]) -> list[str]:
-    """The command that runs the engine with this Python, undisturbed by the user's own settings of Python.
+    """The command that runs the engine with this Python, isolated from the user's Python environment.
 
     Raises
     ------
     EngineMissingError
-        If there is no engine.
+        If the engine is not installed.
     """
     found = importlib.util.find_spec("smokelift")
     if found is None or found.origin is None:
@@ -76,26 +81,26 @@ class Job:
     command
         What to start.
     log
-        File that keeps everything that it says; appended to.
+        File to which all messages are appended.
 
     Attributes
     ----------
     outcome
-        How it stands.
+        Its state.
     done, total
-        Frames finished, and in all; 0 of 0 until the engine knows.
+        Finished frames and all frames; 0 of 0 while unknown.
     seconds_left
         The engine's estimate; None while unknown.
     notes
-        What was assumed or noticed, a sentence each.
+        The engine's assumptions and warnings, a sentence each.
     warnings
-        Those of the notes that came with the frames: what is wrong with the result, not what was assumed before.
+        The notes since the first finished frame: faults of the result.
     sentence
-        How it ended, or why it failed.
+        The result, or the reason of a failure.
     details
-        The fields of the engine's last word.
+        The fields of the engine's last message.
     status
-        The engine's exit status, once it has ended: 0 done, 2 bad input, 3 device or memory, 130 cancelled.
+        The engine's exit status; None before it ends.
     """
 
     def __init__(self, command: Sequence[str], log: Path) -> None:
@@ -112,23 +117,23 @@ class Job:
         self._log: IO[bytes] | None = None
         self._process: subprocess.Popen[bytes] | None = None
         self._lines: queue.Queue[bytes | None] = queue.Queue(4 * LINES_A_POLL)
-        self._stop_at: float | None = None
-        self._silent = False
-        self._dead_since: float | None = None
+        self._kill_at: float | None = None
+        self._output_ended = False
+        self._exited_at: float | None = None
         self._error = ""
 
     @property
     def ended(self) -> bool:
-        """Whether nothing more will happen."""
-        return self.outcome in ("done", "failed", "cancelled")
+        """Whether its state is final."""
+        return self.outcome in ENDED
 
     @property
     def cancelling(self) -> bool:
-        """Whether it was asked to end and has not yet."""
-        return self._stop_at is not None and not self.ended
+        """Whether it was cancelled and still runs."""
+        return self._kill_at is not None and not self.ended
 
     def start(self) -> None:
-        """Start the process; a failure to start is an outcome like others."""
+        """Start the process; a failure to start is an outcome too."""
         try:
             self._log_path.parent.mkdir(parents=True, exist_ok=True)
             self._log = self._log_path.open("ab", buffering=0)
@@ -148,7 +153,7 @@ class Job:
         threading.Thread(target=_read, args=(self._process.stdout, self._lines), daemon=True).start()
 
     def poll(self) -> bool:
-        """Take in what the engine has said since; never waits. Returns whether anything changed."""
+        """Read the engine's new messages, without waiting; returns whether anything changed."""
         if self.outcome != "running":
             return False
         assert self._process is not None
@@ -159,15 +164,14 @@ class Job:
             except queue.Empty:
                 break
             if line is None:
-                self._silent = True
+                self._output_ended = True
                 break
-            changed = self._take(line) or changed
-        if self._stop_at is not None and time.monotonic() > self._stop_at:
+            changed = self._read_line(line) or changed
+        if self._kill_at is not None and time.monotonic() > self._kill_at:
             self._process.kill()
         if self._process.poll() is not None:
-            self._dead_since = self._dead_since or time.monotonic()
-            # what it said last may be on its way still; a child of its own may hold the pipe open for ever
-            if self._silent or (self._lines.empty() and time.monotonic() - self._dead_since > LAST_WORDS_SECONDS):
+            self._exited_at = self._exited_at or time.monotonic()
+            if self._output_ended or (self._lines.empty() and time.monotonic() - self._exited_at > DRAIN_SECONDS):
                 self._end(self._process.returncode)
                 return True
         return changed
@@ -176,57 +180,57 @@ class Job:
         """Ask the engine to end; finished frames stay."""
         if self.outcome == "waiting":
             self.outcome, self.sentence = "cancelled", "Cancelled before it began."
-        elif self.outcome == "running" and self._stop_at is None:
-            self._stop_at = time.monotonic() + GRACE_SECONDS
+        elif self.outcome == "running" and self._kill_at is None:
+            self._kill_at = time.monotonic() + GRACE_SECONDS
             self._close_input()
 
     def kill(self) -> None:
-        """End the engine now, for when there is no time left; finished frames stay."""
+        """End the engine at once; finished frames stay."""
         self.cancel()
         if self._process is not None and self.outcome == "running":
             self._process.kill()
             self._process.wait()
-            with suppress(queue.Empty):  # the reader may wait for room
+            with suppress(queue.Empty):  # the reader may wait for room in the queue
                 while self._lines.get(timeout=0.2) is not None:
                     pass
             self._end(self._process.returncode)
 
-    def _take(self, line: bytes) -> bool:
-        """Understand one line; whatever is not a message is kept in the log."""
+    def _read_line(self, line: bytes) -> bool:
+        """Handle one line; what is no message goes to the log."""
         text = line.decode("utf-8", "replace").rstrip()
         try:
             message = json.loads(text)
             event = message.pop("event")
         except (ValueError, AttributeError, LookupError, TypeError):
-            self._note_down(text)
+            self._write_log(text)
             return False
         try:
-            return self._understand(event, message)
+            return self._handle(event, message)
         except (LookupError, TypeError, ValueError):
-            self._note_down(text)
+            self._write_log(text)
             return False
 
-    def _understand(self, event: str, message: dict[str, Any]) -> bool:
+    def _handle(self, event: str, message: dict[str, Any]) -> bool:
         match event:
             case "note":
                 self.notes.append(str(message["text"]))
                 if self.done:
                     self.warnings.append(self.notes[-1])
-                self._note_down(self.notes[-1])
+                self._write_log(self.notes[-1])
             case "start":
                 self.done, self.total = int(message["done"]), int(message["total"])
             case "frame":
                 self.done, self.total = int(message["done"]), int(message["total"])
                 self.seconds_left = float(message["seconds_left"])
-                self._note_down(f"frame {message['frame']}: {self.done} of {self.total}")
+                self._write_log(f"frame {message['frame']}: {self.done} of {self.total}")
             case "done":
                 self.sentence, self.details = str(message["text"]), message
-                self._note_down(self.sentence)
+                self._write_log(self.sentence)
             case "error":
                 self._error = str(message["text"])
-                self._note_down(self._error)
+                self._write_log(self._error)
             case _:
-                self._note_down(json.dumps({"event": event, **message}))
+                self._write_log(json.dumps({"event": event, **message}))
                 return False
         return True
 
@@ -234,15 +238,15 @@ class Job:
         self.status = status
         if status == 0:
             self.outcome = "done"
-        elif self._stop_at is not None or status == CANCELLED_STATUS:
+        elif self._kill_at is not None or status == CANCELLED:
             self.outcome, self.sentence = "cancelled", f"Cancelled; {self.done} finished frames stay."
         else:
             self.outcome = "failed"
-            self.sentence = self._error or self._last_words(status)
-        self._note_down(f"[{self.outcome}, status {status}]")
+            self.sentence = self._error or self._failure_reason(status)
+        self._write_log(f"[{self.outcome}, status {status}]")
         self._close()
 
-    def _last_words(self, status: int) -> str:
+    def _failure_reason(self, status: int) -> str:
         if status < 0 or status == 137:
             return f"The engine was ended from outside (signal {abs(status) % 128}), perhaps for lack of memory."
         try:
@@ -252,9 +256,9 @@ class Job:
         last = next((line.strip() for line in reversed(lines) if line.strip()), "")
         return f"The engine stopped with an error of its own: {last or f'status {status}'}"
 
-    def _note_down(self, text: str) -> None:
+    def _write_log(self, text: str) -> None:
         if self._log is not None and text:
-            with suppress(OSError):  # a full disk: the engine will say so itself
+            with suppress(OSError):  # the engine itself reports a full disk
                 self._log.write((text + "\n").encode("utf-8", "replace"))
 
     def _close_input(self) -> None:
@@ -286,11 +290,11 @@ class Queue:
         return all(job.ended for job in self.jobs)
 
     def add(self, job: Job) -> None:
-        """Put a job at the end."""
+        """Append a job."""
         self.jobs.append(job)
 
     def poll(self) -> list[Job]:
-        """Let time pass without waiting; returns the jobs that changed."""
+        """Poll the running job and start the next, without waiting; returns the jobs that changed."""
         changed = [job for job in self.jobs if job.poll()]
         if self.current is None:
             waiting = next((job for job in self.jobs if job.outcome == "waiting"), None)
@@ -300,7 +304,7 @@ class Queue:
         return changed
 
     def kill(self) -> None:
-        """End everything now."""
+        """End all jobs at once."""
         for job in reversed(self.jobs):
             job.kill()
 
@@ -313,7 +317,7 @@ def _read(stream: IO[bytes], lines: queue.Queue[bytes | None]) -> None:
 
 
 def _quiet_flags() -> int:
-    """Without a console window on Windows, and behind what the user does."""
+    """On Windows: no console window, and a low priority."""
     if sys.platform == "win32":
         return subprocess.CREATE_NO_WINDOW | subprocess.BELOW_NORMAL_PRIORITY_CLASS
     return 0

@@ -1,4 +1,4 @@
-"""What the sidebar's buttons do."""
+"""The buttons of the tab."""
 
 from pathlib import Path
 
@@ -6,28 +6,33 @@ import bpy
 from bpy.props import StringProperty
 from mathutils import Vector
 
-from . import look, run, volume
-from .scene import ShotError, box_of
+from . import run, shot_setup, volume
+from .scene_file import ShotError, box_of
 from .take import Take, TakeError, takes
 
 LOG_TEXT = "Smokelift Log"
 BOX_SHARE = 0.9
-"""Share of the picture that a new box fills."""
+"""Width and height of a new box over those of the picture."""
 
 
-class SMOKELIFT_OT_run(bpy.types.Operator):
+class _NeedsClip:
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Whether the scene has a clip."""
+        if context.scene.smokelift.clip is None:
+            cls.poll_message_set("Choose a clip first")
+            return False
+        return True
+
+
+class SMOKELIFT_OT_run(_NeedsClip, bpy.types.Operator):
     """Turn the clip into a volume of smoke. Blender stays usable meanwhile"""
 
     bl_idname = "smokelift.run"
     bl_label = "Make Smoke"
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Needs a clip."""
-        return _has_clip(cls, context)
-
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Write the shot's files and put it into the queue."""
+        """Write a new take and append it to the queue."""
         try:
             take = run.begin(context.scene)
         except (ShotError, TakeError) as error:
@@ -37,29 +42,24 @@ class SMOKELIFT_OT_run(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SMOKELIFT_OT_resume(bpy.types.Operator):
-    """Go on with the run that was stopped, from its last finished frame, with the settings that it had"""
+class SMOKELIFT_OT_resume(_NeedsClip, bpy.types.Operator):
+    """Resume the stopped run after its last finished frame, with its own settings"""
 
     bl_idname = "smokelift.resume"
     bl_label = "Resume"
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Needs a clip."""
-        return _has_clip(cls, context)
-
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Put the unfinished take into the queue again."""
+        """Append the unfinished take to the queue."""
         take = run.unfinished(context.scene)
         if take is None or run.busy(context.window_manager, take):
-            self.report({"ERROR"}, "There is nothing to go on with: press Make Smoke.")
+            self.report({"ERROR"}, "No stopped run to resume: press Make Smoke.")
             return {"CANCELLED"}
         run.enqueue(context, context.scene, take)
         return {"FINISHED"}
 
 
 class SMOKELIFT_OT_cancel(bpy.types.Operator):
-    """Stop. Finished frames stay, and Resume goes on from them"""
+    """Stop the run. Finished frames stay, and Resume continues after them"""
 
     bl_idname = "smokelift.cancel"
     bl_label = "Stop Making Smoke?"
@@ -68,13 +68,13 @@ class SMOKELIFT_OT_cancel(bpy.types.Operator):
     take: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Ask first, where no button was pressed."""
+        """Ask first, unless a button was pressed."""
         if self.take:
             return self.execute(context)
         return context.window_manager.invoke_confirm(self, event)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Stop one job, or the one that runs."""
+        """Stop one job, else the running one."""
         for row in context.window_manager.smokelift.jobs:
             if row.take == self.take or (not self.take and row.outcome == "running"):
                 row.cancel = True
@@ -83,20 +83,15 @@ class SMOKELIFT_OT_cancel(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SMOKELIFT_OT_check(bpy.types.Operator):
-    """Look at the clip, and say what will be assumed and how much time, memory and disk it will take"""
+class SMOKELIFT_OT_check(_NeedsClip, bpy.types.Operator):
+    """Estimate time, memory and disk space of the run, and list its assumptions"""
 
     bl_idname = "smokelift.check"
     bl_label = "Check Shot"
     bl_options = {"INTERNAL"}
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Needs a clip."""
-        return _has_clip(cls, context)
-
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Have the worker look, as soon as the settings rest."""
+        """Let the worker check the shot once its settings rest."""
         state = context.window_manager.smokelift
         state.check_scene = context.scene.session_uid
         state.check_ticks = run.CHECK_TICKS
@@ -105,7 +100,7 @@ class SMOKELIFT_OT_check(bpy.types.Operator):
 
 
 class SMOKELIFT_OT_make_box(bpy.types.Operator):
-    """Fit the box to the camera's picture, at the distance of the 3D cursor; make it if there is none"""
+    """Fit the box to the camera's picture at the distance of the 3D cursor; make one if there is none"""
 
     bl_idname = "smokelift.make_box"
     bl_label = "Frame Box"
@@ -113,7 +108,7 @@ class SMOKELIFT_OT_make_box(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Needs a camera."""
+        """Whether the scene has a camera."""
         if context.scene.camera is None:
             cls.poll_message_set("The scene has no camera: add one where the clip was filmed from")
             return False
@@ -136,14 +131,14 @@ class SMOKELIFT_OT_make_box(bpy.types.Operator):
 
 
 def framed_box(scene: bpy.types.Scene) -> tuple[Vector, Vector]:
-    """An upright box that nearly fills the camera's picture, at the 3D cursor's depth: lowest and highest corner."""
+    """Lowest and highest corner of an upright box that nearly fills the picture at the 3D cursor's depth."""
     camera = scene.camera
     frame = [camera.matrix_world @ corner for corner in camera.data.view_frame(scene=scene)]
     eye = camera.matrix_world.translation
     ahead = -camera.matrix_world.to_3x3().col[2].normalized()
     near = (frame[0] - eye).dot(ahead)
     depth = (scene.cursor.location - eye).dot(ahead)
-    if depth < 2 * near:  # the cursor is behind the camera, or in its lens
+    if depth < 2 * near:  # the cursor is behind the camera or close to it
         depth = 10 * near
     if camera.data.type == "ORTHO":
         corners = [corner + ahead * (depth - near) for corner in frame]
@@ -167,60 +162,55 @@ def _new_box() -> bpy.types.Object:
     return box
 
 
-class SMOKELIFT_OT_match_clip(bpy.types.Operator):
-    """Give the scene the clip's picture size, frame rate and length"""
+class SMOKELIFT_OT_match_clip(_NeedsClip, bpy.types.Operator):
+    """Set the scene's resolution, frame rate and length to the clip's"""
 
     bl_idname = "smokelift.match_clip"
     bl_label = "Match Scene to Clip"
     bl_options = {"REGISTER", "UNDO"}
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Needs a clip."""
-        return _has_clip(cls, context)
-
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Set size, rate and length."""
-        look.match_clip(context.scene)
+        """Set resolution, frame rate and length."""
+        shot_setup.match_clip(context.scene)
         return {"FINISHED"}
 
 
-class SMOKELIFT_OT_set_up(bpy.types.Operator):
-    """Make a render from the camera look like the clip."""
+class SMOKELIFT_OT_set_up(_NeedsClip, bpy.types.Operator):
+    """Make a render from the camera match the clip."""
 
     bl_idname = "smokelift.set_up"
     bl_description = (
-        "Make a render from the camera look like the clip: its size and speed, the background behind the smoke, the "
-        "light that was found, Cycles, and colours as they are. The old world stays in the file"
+        "Make a Cycles render from the camera match the clip: resolution, frame rate, background, estimated light "
+        "and colours. The old world stays in the file"
     )
     bl_label = "Set Up Shot"
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Needs a result."""
+        """Whether the scene has a result and a clip."""
         if volume.shown_take(context.scene) is None:
             cls.poll_message_set("Make smoke first")
             return False
-        return _has_clip(cls, context)
+        return super().poll(context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Set everything up."""
+        """Set up the scene."""
         take = volume.shown_take(context.scene)
         index = take.index()
         if index is None:
-            self.report({"ERROR"}, f"The files of the smoke in {take.directory} are gone: make it again.")
+            self.report({"ERROR"}, f"The files of the smoke in {take.directory} are missing: make it again.")
             return {"CANCELLED"}
         if context.scene.smokelift.camera_mode == "SCENE" and context.scene.camera is None:
-            self.report({"ERROR"}, "The scene has no camera any more: choose the one that the smoke was made for.")
+            self.report({"ERROR"}, "The scene has no camera: choose the one that the smoke was made for.")
             return {"CANCELLED"}
-        look.set_up(context.scene, take, index)
+        shot_setup.set_up(context.scene, take, index)
         volume.show(context.scene, take)  # the frame rate may have changed
         return {"FINISHED"}
 
 
 class SMOKELIFT_OT_open_log(bpy.types.Operator):
-    """Show what was said during the run, in a text editor"""
+    """Show the log of the run in a text editor"""
 
     bl_idname = "smokelift.open_log"
     bl_label = "Open Log"
@@ -228,7 +218,7 @@ class SMOKELIFT_OT_open_log(bpy.types.Operator):
     take: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Load the log as a text, and show it where a text editor is, or in a window of its own."""
+        """Load the log as a text and show it in a text editor, in a new window if there is none."""
         log = Take(Path(self.take)).log_file
         if not log.is_file():
             self.report({"ERROR"}, f"There is no log at {log}: the engine never started.")
@@ -251,36 +241,24 @@ def _text_editor(context: bpy.types.Context) -> bpy.types.Space:
     return found.spaces.active
 
 
-class SMOKELIFT_OT_remove_takes(bpy.types.Operator):
-    """Delete the files of all results in the output folder but the one on show"""
+class SMOKELIFT_OT_remove_takes(_NeedsClip, bpy.types.Operator):
+    """Delete the files of all results in the output folder except the one on show"""
 
     bl_idname = "smokelift.remove_takes"
     bl_label = "Delete Earlier Results?"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Needs a clip."""
-        return _has_clip(cls, context)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Ask first."""
         return context.window_manager.invoke_confirm(self, event)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Delete what no scene shows and nothing works on."""
+        """Delete every take that no scene shows and no job uses."""
         kept = {str(take.directory) for scene in bpy.data.scenes if (take := volume.shown_take(scene))}
         kept |= {row.take for row in context.window_manager.smokelift.jobs}
         for take in takes(run.output_folder(context.scene)):
             if str(take.directory) not in kept:
                 take.remove()
         return {"FINISHED"}
-
-
-def _has_clip(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
-    if context.scene.smokelift.clip is None:
-        cls.poll_message_set("Choose a clip first")
-        return False
-    return True
 
 
 _CLASSES = (
@@ -295,14 +273,4 @@ _CLASSES = (
     SMOKELIFT_OT_remove_takes,
 )
 
-
-def register() -> None:
-    """Make the operators known."""
-    for cls in _CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister() -> None:
-    """Take them back."""
-    for cls in reversed(_CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = bpy.utils.register_classes_factory(_CLASSES)

@@ -1,15 +1,15 @@
-"""The sidebar's tab Smokelift, in the 3D View and in the Movie Clip Editor."""
+"""The tab Smokelift in the sidebar of the 3D View and of the Movie Clip Editor."""
 
 import textwrap
 
 import bpy
 
 from . import run, volume
-from .scene import box_of, clip_path, frame_rate
+from .scene_file import box_of, clip_path, frame_rate
 from .take import takes
 
 POINTS_A_LETTER = 6.5
-"""Mean width of a letter of Blender's interface font at scale 1; labels do not wrap by themselves."""
+"""Mean width of a letter in Blender's interface font at scale 1; Blender does not wrap labels."""
 
 
 class _Main:
@@ -18,14 +18,14 @@ class _Main:
     bl_region_type = "UI"
 
     def draw(self, context: bpy.types.Context) -> None:
-        """From the clip to the button, top to bottom."""
+        """Draw the clip, the shot, the cost and the runs."""
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
         settings = context.scene.smokelift
         layout.template_ID(settings, "clip", open="clip.open")
         if settings.clip is None:
-            _say(
+            _label(
                 layout,
                 context,
                 "Choose a video or a picture sequence of smoke. If its camera moves, track it first.",
@@ -44,7 +44,7 @@ def _draw_clip(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     scene = context.scene
     settings, clip = scene.smokelift, scene.smokelift.clip
     if not clip_path(clip).is_file():
-        _say(layout, context, f"{clip_path(clip)} is not there: choose the clip again.", "ERROR")
+        _label(layout, context, f"{clip_path(clip)} is not there: choose the clip again.", "ERROR")
     row = layout.row(align=True)
     row.prop(settings, "first", text="Frames")
     row.prop(settings, "last", text="")
@@ -52,7 +52,7 @@ def _draw_clip(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     other_rate = clip.source == "MOVIE" and abs(clip.fps - frame_rate(scene)) > 0.01
     if size != tuple(clip.size) or other_rate:
         column = layout.column(align=True)
-        _say(
+        _label(
             column,
             context,
             f"The clip has {clip.size[0]} x {clip.size[1]} pixels at {clip.fps:g} frames a second, "
@@ -78,22 +78,22 @@ def _draw_shot(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
 
 
 def _draw_cost(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """What the run will take, if the engine has looked at this scene; it does so when the tab is seen first."""
+    """The estimated cost; the first drawing of the tab starts the estimate."""
     state = context.window_manager.smokelift
     if state.check_scene != context.scene.session_uid:
         layout.operator("smokelift.check", icon="VIEWZOOM")
         run.check_soon(context)
         return
     if state.check_error:
-        _say(layout, context, state.check_error, "ERROR")
+        _label(layout, context, state.check_error, "ERROR")
     elif state.check_done:
         column = layout.column(align=True)
         column.label(text=f"About {duration(state.seconds)}", icon="TIME")
         column.label(text=f"{state.memory:.1f} GB of memory, up to {size(state.disk)} on disk", icon="BLANK1")
         if state.memory > state.memory_free:
-            _say(column, context, f"Only {state.memory_free:.1f} GB are free: choose a lower quality.", "ERROR")
+            _label(column, context, f"Only {state.memory_free:.1f} GB are free: choose a lower quality.", "ERROR")
     else:
-        layout.label(text="Looking at the clip", icon="TIME")
+        layout.label(text="Reading the clip", icon="TIME")
 
 
 def _draw_run(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
@@ -106,7 +106,7 @@ def _draw_run(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         begun = run.unfinished(scene)
         if begun is not None and begun.frames():
             column.operator("smokelift.resume", text=f"Resume after Frame {begun.frames()}", icon="FILE_REFRESH")
-            column.operator("smokelift.run", text="Make Smoke Anew", icon="PLAY")
+            column.operator("smokelift.run", text="Start Again", icon="PLAY")
         else:
             column.operator("smokelift.run", text="Make Smoke", icon="PLAY")
     else:
@@ -123,16 +123,16 @@ def _draw_job(layout: bpy.types.UILayout, context: bpy.types.Context, row: bpy.t
     if scene is not None and scene != context.scene:
         box.label(text=scene.name, icon="SCENE_DATA")
     if row.outcome == "waiting":
-        box.label(text="Waits for the one before", icon="SORTTIME")
+        box.label(text="Waits for the run before it", icon="SORTTIME")
     elif row.outcome == "running":
         box.progress(factor=row.done / row.total if row.total else 0.0, text=_progress(row))
     else:
-        _say(box, context, row.sentence, "ERROR" if row.outcome == "failed" else "INFO")
+        _label(box, context, row.sentence, "ERROR" if row.outcome == "failed" else "INFO")
     if row.icon:
         box.template_icon(icon_value=row.icon, scale=8.0)
     if row.outcome in run.ENDED:
         for warning in filter(None, row.warnings.split("\n")):
-            _say(box, context, warning, "ERROR")
+            _label(box, context, warning, "ERROR")
         box.operator("smokelift.open_log", icon="TEXT").take = row.take
     else:
         box.operator("smokelift.cancel", text="Cancel", icon="CANCEL").take = row.take
@@ -142,13 +142,13 @@ def _progress(row: bpy.types.PropertyGroup) -> str:
     if row.cancel:
         return "Stopping"
     if not row.total:
-        return "Looking at the clip"
+        return "Reading the clip"
     left = f", {duration(row.seconds_left)} left" if row.seconds_left >= 0.0 else ""
     return f"Frame {row.done} of {row.total}{left}"
 
 
 def duration(seconds: float) -> str:
-    """A time in words, no finer than is honest."""
+    """A time in words, to the second below a minute and to the minute above."""
     if seconds < 60.0:
         return f"{max(1, round(seconds))} s"
     minutes = round(seconds / 60.0)
@@ -160,8 +160,8 @@ def size(megabytes: float) -> str:
     return f"{megabytes:.0f} MB" if megabytes < 1000.0 else f"{megabytes / 1000.0:.1f} GB"
 
 
-def _say(layout: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str = "NONE") -> None:
-    """A sentence over as many lines as the sidebar's width asks for."""
+def _label(layout: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str = "NONE") -> None:
+    """A label, wrapped to the sidebar's width."""
     points = context.region.width / context.preferences.system.ui_scale - (50.0 if icon == "NONE" else 70.0)
     lines = textwrap.wrap(text, max(16, int(points / POINTS_A_LETTER)))
     column = layout.column(align=True)
@@ -190,11 +190,11 @@ class _Advanced:
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """There is nothing to set before there is a clip."""
+        """Whether the scene has a clip."""
         return context.scene.smokelift.clip is not None
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Whatever most shots do not need."""
+        """Draw the settings that few shots need, and the assumptions."""
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
@@ -215,9 +215,9 @@ class _Advanced:
             column.prop(settings, name)
         state = context.window_manager.smokelift
         if state.check_scene == context.scene.session_uid and state.notes:
-            layout.label(text="{} x {} x {} voxels. Assumed and chosen:".format(*state.resolution))
+            layout.label(text="{} x {} x {} voxels. Assumptions and choices:".format(*state.resolution))
             for note in state.notes.split("\n"):
-                _say(layout, context, note)
+                _label(layout, context, note)
         layout.operator("smokelift.check", icon="VIEWZOOM")
         earlier = len(takes(run.output_folder(context.scene)))
         row = layout.row()
@@ -241,14 +241,4 @@ class SMOKELIFT_PT_clip_advanced(_Advanced, bpy.types.Panel):
 
 _CLASSES = (SMOKELIFT_PT_view, SMOKELIFT_PT_clip, SMOKELIFT_PT_view_advanced, SMOKELIFT_PT_clip_advanced)
 
-
-def register() -> None:
-    """Make the panels known."""
-    for cls in _CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister() -> None:
-    """Take them back."""
-    for cls in reversed(_CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = bpy.utils.register_classes_factory(_CLASSES)

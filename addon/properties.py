@@ -1,4 +1,4 @@
-"""What the user chooses, saved with the .blend on the scene, and what runs now, on the window manager."""
+"""Settings of a shot, saved with its scene, and the state of this session, on the window manager."""
 
 import bpy
 from bpy.props import (
@@ -12,43 +12,43 @@ from bpy.props import (
     StringProperty,
 )
 
-# Blender 4.5 and later want to be told that // is meant as the .blend's folder; older ones take it for granted.
+# Blender 4.5 and later need this option for // as the .blend's folder; older ones do not know it.
 _PATH_OPTIONS = {"ANIMATABLE"} | ({"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) else set())
 
 
 def _changed(_settings: "SmokeliftSettings", context: bpy.types.Context) -> None:
-    """What the shot will take has changed: look again, where there is somebody to see it."""
+    """Check the shot again, if there is a window."""
     if not bpy.app.background and context.window is not None:
         bpy.ops.smokelift.check()
 
 
 def _clip_chosen(settings: "SmokeliftSettings", context: bpy.types.Context) -> None:
-    """A new clip is used from its first frame to its last."""
+    """Use all frames of a new clip."""
     if settings.clip is not None:
         settings.first, settings.last = 1, max(1, settings.clip.frame_duration)
 
 
 def _box_chosen(settings: "SmokeliftSettings", context: bpy.types.Context) -> None:
-    """Who says where the smoke is in the scene means the scene's camera."""
+    """A box belongs to the scene's camera."""
     if settings.box is not None:
         settings.camera_mode = "SCENE"
     _changed(settings, context)
 
 
-def _is_mesh(_settings: "SmokeliftSettings", thing: bpy.types.Object) -> bool:
-    return thing.type == "MESH"
+def _is_mesh(_settings: "SmokeliftSettings", obj: bpy.types.Object) -> bool:
+    return obj.type == "MESH"
 
 
-def _is_empty(_settings: "SmokeliftSettings", thing: bpy.types.Object) -> bool:
-    return thing.type == "EMPTY"
+def _is_empty(_settings: "SmokeliftSettings", obj: bpy.types.Object) -> bool:
+    return obj.type == "EMPTY"
 
 
 class SmokeliftSettings(bpy.types.PropertyGroup):
-    """The shot of one scene."""
+    """Settings of one scene's shot."""
 
     clip: PointerProperty(
         name="Clip",
-        description="Footage of smoke: a video or a sequence of pictures",
+        description="Footage of smoke: a video or an image sequence",
         type=bpy.types.MovieClip,
         update=_clip_chosen,
     )
@@ -68,18 +68,22 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
     )
     plate_mode: EnumProperty(
         name="Background",
-        description="What the picture shows where there is no smoke",
+        description="The picture without smoke",
         items=[
-            ("ESTIMATE", "From the Clip", "Find the background in the frames where the smoke does not cover it"),
-            ("FILE", "Clean Plate", "A picture of the same view without smoke; of a moving camera, one for each frame"),
+            ("ESTIMATE", "From the Clip", "Estimate the background from frames where no smoke covers it"),
+            (
+                "FILE",
+                "Clean Plate",
+                "Picture of the same view without smoke; for a moving camera, one for each frame",
+            ),
         ],
         update=_changed,
     )
     plate: StringProperty(
         name="Clean Plate",
         description=(
-            "Picture of the same view without smoke. If the camera moves: a video without smoke, or the first picture "
-            "of a sequence, with a picture for every frame of the clip"
+            "Picture of the same view without smoke. For a moving camera: a video, or the first image of a sequence, "
+            "with one image for each frame of the clip"
         ),
         subtype="FILE_PATH",
         options=_PATH_OPTIONS,
@@ -89,66 +93,59 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
         name="Camera",
         description="Where the clip was filmed from",
         items=[
-            (
-                "GUESS",
-                "Guess",
-                "A level camera with an ordinary lens, and a box around the smoke; it is made",
-            ),
-            ("SCENE", "Scene Camera", "The scene's camera with its lens, sensor, shift and place, tracked or still"),
+            ("GUESS", "Guess", "Assume a level camera with an ordinary lens and a box around the smoke, and add it"),
+            ("SCENE", "Scene Camera", "The scene's camera with its lens, sensor and shift, tracked or still"),
         ],
         update=_changed,
     )
     box: PointerProperty(
         name="Box",
-        description="Box that holds all of the smoke; the smaller, the finer the result",
+        description="Box that holds all of the smoke. A smaller box gives a finer result",
         type=bpy.types.Object,
         poll=_is_mesh,
         update=_box_chosen,
     )
     inlet: PointerProperty(
         name="Inlet",
-        description=(
-            "Empty where the smoke comes from, as large as the place where it enters. Without one such places are "
-            "looked for; with one they are not"
-        ),
+        description=("Empty at the smoke's source, as large as the opening. Without one, sources are estimated"),
         type=bpy.types.Object,
         poll=_is_empty,
         update=_changed,
     )
     floor: BoolProperty(
         name="Floor",
-        description="The bottom of the box is solid: no air goes through it",
+        description="The bottom of the box is solid: no air flows through it",
         update=_changed,
     )
     light_mode: EnumProperty(
         name="Light",
         description="What lights the smoke in the clip",
         items=[
-            ("ESTIMATE", "From the Clip", "Even light from everywhere, as bright as the smoke in the clip"),
-            ("SCENE", "Scene Lights", "The scene's suns and point lights, and the picture that lights its world"),
+            ("ESTIMATE", "From the Clip", "Estimate even light from the smoke's brightness"),
+            ("SCENE", "Scene Lights", "The scene's suns and point lights, and its world's panorama"),
         ],
     )
     quality: EnumProperty(
         name="Quality",
-        description="More detail takes more time, memory and disk",
+        description="More detail takes more time, memory and disk space",
         items=[
             ("draft", "Draft", "A quick look"),
             ("balanced", "Balanced", "Good for most shots"),
-            ("fine", "Fine", "All the detail that the clip holds, several times slower"),
+            ("fine", "Fine", "The clip's full detail, several times slower"),
         ],
         default="balanced",
         update=_changed,
     )
     output: StringProperty(
         name="Output",
-        description="Folder for the results; empty is a folder beside the .blend file",
+        description="Folder for the results; by default beside the .blend file",
         subtype="DIR_PATH",
         options=_PATH_OPTIONS,
     )
 
     longest_side: IntProperty(
         name="Resolution",
-        description="Voxels along the box's longest side; 0 is what the clip's detail asks for, at most the quality's",
+        description="Voxels along the box's longest side; 0 measures the clip's detail",
         default=0,
         min=0,
         max=1024,
@@ -156,19 +153,19 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
     )
     use_axis_depth: BoolProperty(
         name="Known Depth",
-        description="Say how far behind the middle of the box the smoke stands; else it is estimated",
+        description="Set the smoke's distance behind the middle of the box; else it is estimated",
         update=_changed,
     )
     axis_depth: FloatProperty(
         name="Depth",
-        description="From the middle of the box to the middle of the smoke, away from the camera; below 0 is nearer",
+        description="Distance of the smoke behind the middle of the box, away from the camera; negative is nearer",
         subtype="DISTANCE",
         default=0.0,
         update=_changed,
     )
     fps: FloatProperty(
         name="Captured At",
-        description="Frames a second at which the camera ran, if the clip is in slow motion; 0 is the clip's own rate",
+        description="The camera's frame rate, for slow motion; 0 is the clip's frame rate",
         default=0.0,
         min=0.0,
         soft_max=1000.0,
@@ -176,54 +173,58 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
     )
     transfer: EnumProperty(
         name="Pixels",
-        description="How the pixels of the clip encode light",
+        description="Transfer function of the clip's pixels",
         items=[
-            ("AUTO", "Automatic", "As usual for the kind of file"),
+            ("AUTO", "Automatic", "sRGB, or linear for EXR"),
             ("srgb", "sRGB", "Ordinary video and pictures"),
-            ("linear", "Linear", "Already proportional to light"),
+            ("linear", "Linear", "Proportional to light"),
         ],
         update=_changed,
     )
-    use_medium: BoolProperty(name="Smoke Material", description="Say how the smoke takes and scatters light")
+    use_medium: BoolProperty(name="Smoke Material", description="Set the smoke's optical properties")
     extinction: FloatProperty(
         name="Extinction",
-        description="Light taken per metre of smoke of density 1",
+        description="Extinction coefficient per metre of smoke of density 1",
         default=5.0,
         min=0.001,
         soft_max=50.0,
     )
     albedo: FloatProperty(
         name="Albedo",
-        description="Share of that light which is scattered: 1 is white steam, 0 black soot",
+        description="Scattered share of the extinction: 1 is white steam, 0 is black soot",
         default=0.9,
         min=0.0,
         max=1.0,
     )
     anisotropy: FloatProperty(
-        name="Anisotropy", description="Light goes on forwards (above 0) or back", default=0.0, min=-0.95, max=0.95
+        name="Anisotropy",
+        description="Forward scattering above 0, backward scattering below",
+        default=0.0,
+        min=-0.95,
+        max=0.95,
     )
     speed: EnumProperty(
         name="Speed",
-        description="How fast the smoke moves where the clip and the scene have other frame rates",
+        description="Speed of the smoke if clip and scene differ in frame rate",
         items=[
-            ("REAL", "Real Time", "As fast as it was filmed"),
-            ("FRAMES", "Frame by Frame", "One frame of the clip in every frame of the scene, as Blender plays clips"),
+            ("REAL", "Real Time", "As fast as in reality"),
+            ("FRAMES", "Frame by Frame", "One frame of the clip in each frame of the scene, as Blender plays clips"),
         ],
     )
     device: EnumProperty(
         name="Device",
-        description="What computes",
+        description="Device that renders",
         items=[
-            ("auto", "Automatic", "The graphics card if there is a usable one"),
+            ("auto", "Automatic", "The graphics card if it is usable"),
             ("cpu", "Processor", "The processor only"),
             ("gpu", "Graphics Card", "The graphics card, or fail"),
         ],
     )
-    volume: PointerProperty(name="Result", description="The smoke that was made", type=bpy.types.Object)
+    volume: PointerProperty(name="Result", description="Volume object that shows the smoke", type=bpy.types.Object)
 
 
 class SmokeliftJob(bpy.types.PropertyGroup):
-    """One run, as the panel shows it."""
+    """One run in the panel."""
 
     scene_uid: IntProperty()
     take: StringProperty()
@@ -238,7 +239,7 @@ class SmokeliftJob(bpy.types.PropertyGroup):
 
 
 class SmokeliftState(bpy.types.PropertyGroup):
-    """What runs, waits and has ended in this session, and what the next run would take; never saved."""
+    """This session's runs, and the estimate of the next one; never saved."""
 
     jobs: CollectionProperty(type=SmokeliftJob)
     check_scene: IntProperty()
@@ -257,7 +258,7 @@ _CLASSES = (SmokeliftSettings, SmokeliftJob, SmokeliftState)
 
 
 def register() -> None:
-    """Add the properties to scenes and to the window manager."""
+    """Add the properties to Scene and WindowManager."""
     for cls in _CLASSES:
         bpy.utils.register_class(cls)
     bpy.types.Scene.smokelift = PointerProperty(type=SmokeliftSettings)
@@ -265,7 +266,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Take the properties away."""
+    """Remove the properties."""
     del bpy.types.WindowManager.smokelift
     del bpy.types.Scene.smokelift
     for cls in reversed(_CLASSES):

@@ -1,4 +1,4 @@
-"""Running the engine beside Blender: the queue of takes, the look ahead, and what of them is shown."""
+"""The engine beside Blender: the queue of takes, the check before a run, and the progress on show."""
 
 import functools
 import time
@@ -7,45 +7,42 @@ from pathlib import Path
 import bpy
 import bpy.utils.previews
 
-from . import look, volume
-from . import scene as shot
-from .job import EngineMissingError, Job, Queue, engine_command
+from . import scene_file, shot_setup, volume
+from .job import ENDED, EngineMissingError, Job, Queue, engine_command
 from .take import Take, TakeError, new_take, takes
 
 TICK_SECONDS = 0.1
 CHECK_TICKS = 4
-"""How long settings have to rest before the engine looks at them again."""
-
-ENDED = ("done", "failed", "cancelled")
+"""Ticks without a change of settings before the engine checks the shot."""
 
 
 def output_folder(scene: bpy.types.Scene) -> Path:
-    """The folder for the results of a scene: the chosen one, or one beside the .blend, or beside the clip."""
+    """The folder of a scene's takes: the chosen one, else beside the .blend, else beside the clip."""
     settings = scene.smokelift
     if settings.output:
         return Path(bpy.path.abspath(settings.output))
     name = bpy.path.clean_name(Path(settings.clip.filepath).stem)
     if bpy.data.filepath:
         return Path(bpy.data.filepath).parent / "smokelift" / name
-    return shot.clip_path(settings.clip).parent / f"{name}_smokelift"
+    return scene_file.clip_path(settings.clip).parent / f"{name}_smokelift"
 
 
 def begin(scene: bpy.types.Scene) -> Take:
-    """Write a new take of a scene, ready to run.
+    """Write the files of a new take.
 
     Raises
     ------
     ShotError, TakeError
-        If something is missing, or nothing can be written.
+        If the shot is unusable, or the folder cannot be written to.
     """
-    tables = shot.shot_tables(scene)
+    tables = scene_file.shot_tables(scene)
     take = new_take(output_folder(scene))
-    take.begin(tables, shot.options(scene))
+    take.begin(tables, scene_file.options(scene))
     return take
 
 
 def unfinished(scene: bpy.types.Scene) -> Take | None:
-    """The take that can be gone on with: the one on show, or else the newest, if it was not completed."""
+    """The take that can be resumed: the one on show, else the newest."""
     if scene.smokelift.clip is None:
         return None
     newest = takes(output_folder(scene))[-1:]
@@ -54,7 +51,7 @@ def unfinished(scene: bpy.types.Scene) -> Take | None:
 
 
 def enqueue(context: bpy.types.Context, scene: bpy.types.Scene, take: Take) -> None:
-    """Run a take after those that run and wait; without a window, wait for its end."""
+    """Append a take to the queue; without a window, wait for its end."""
     jobs = context.window_manager.smokelift.jobs
     for place in reversed(range(len(jobs))):
         if jobs[place].outcome in ENDED and jobs[place].scene_uid == scene.session_uid:
@@ -65,11 +62,11 @@ def enqueue(context: bpy.types.Context, scene: bpy.types.Scene, take: Take) -> N
 
 
 def present(scene: bpy.types.Scene, take: Take) -> bpy.types.Object | None:
-    """Show a take's finished frames, with the camera that the engine took for granted if it was left to it."""
-    thing, index = volume.show(scene, take), take.index()
-    if thing is not None and index is not None:
-        look.guessed_camera(scene, index)
-    return thing
+    """Show a take's finished frames, and the camera that the engine assumed if it did."""
+    obj, index = volume.show(scene, take), take.index()
+    if obj is not None and index is not None:
+        shot_setup.assumed_camera(scene, index)
+    return obj
 
 
 def busy(manager: bpy.types.WindowManager, take: Take) -> bool:
@@ -78,28 +75,28 @@ def busy(manager: bpy.types.WindowManager, take: Take) -> bool:
 
 
 def work(context: bpy.types.Context) -> None:
-    """See to it that somebody looks after the queue."""
+    """Start the worker unless it runs."""
     if bpy.app.background:
         bpy.ops.smokelift.work("EXEC_DEFAULT")
         return
     if not workers(context.window_manager):
-        # in the first window, which is there as long as Blender is
+        # the first window exists as long as Blender does
         with context.temp_override(window=context.window_manager.windows[0]):
             bpy.ops.smokelift.work("INVOKE_DEFAULT")
 
 
 def workers(manager: bpy.types.WindowManager) -> list[bpy.types.Operator]:
-    """Whoever looks after the queue: one, or nobody."""
+    """The running worker, if any."""
     running = [operator for window in manager.windows for operator in window.modal_operators]
     return [operator for operator in running if operator.bl_idname == SMOKELIFT_OT_work.__name__]
 
 
 def check_soon(context: bpy.types.Context) -> None:
-    """Have the engine look at the shot, unless it has looked at one of this file. Drawing code may call it."""
+    """Check the shot unless a shot of this file was checked. Drawing code may call this."""
     state, first = context.window_manager.smokelift, context.window_manager.windows[0]
-    looked = any(scene.session_uid == state.check_scene for scene in bpy.data.scenes)
-    if not looked and context.window == first and not bpy.app.timers.is_registered(_check):
-        bpy.app.timers.register(_check)  # while it draws, Blender lets nothing be changed
+    checked = any(scene.session_uid == state.check_scene for scene in bpy.data.scenes)
+    if not checked and context.window == first and not bpy.app.timers.is_registered(_check):
+        bpy.app.timers.register(_check)  # drawing code may not change data
 
 
 def _check() -> None:
@@ -114,21 +111,21 @@ def _open_log(take: str) -> None:
 
 
 class SMOKELIFT_OT_work(bpy.types.Operator):
-    """Look ten times a second at what the engine says, until the queue is empty"""
+    """Poll the engine ten times a second until the queue is empty"""
 
     bl_idname = "smokelift.work"
     bl_label = "Smokelift"
     bl_options = {"INTERNAL"}
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
-        """Begin to look."""
+        """Start the timer."""
         self._begin()
         self._timer = context.window_manager.event_timer_add(TICK_SECONDS, window=context.window)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Look, and let everything else through; Esc asks whether to stop."""
+        """Poll on the timer, pass other events on; Esc asks whether to stop."""
         if event.type == "ESC" and event.value == "PRESS" and self._queue.current and not _playing(context):
             bpy.ops.smokelift.cancel("INVOKE_DEFAULT")
             return {"RUNNING_MODAL"}
@@ -138,7 +135,7 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
         return {"PASS_THROUGH"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Wait for the end, where there is no window."""
+        """Without a window: poll to the end."""
         self._begin()
         self._timer = None
         try:
@@ -149,15 +146,15 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
         return {"FINISHED"}
 
     def cancel(self, context: bpy.types.Context) -> None:
-        """Blender quits or loads another file: the engine ends, finished frames stay."""
+        """Blender quits or loads another file: end the engine; finished frames stay."""
         self._end(context)
 
     def _begin(self) -> None:
         self._queue = Queue()
         self._jobs: dict[str, Job] = {}
-        self._unseen: dict[str, Job] = {}  # those whose newest frames are not in the viewport yet
+        self._not_shown: dict[str, Job] = {}  # jobs whose newest frames the viewport does not show yet
         self._check: Job | None = None
-        self._pictures = bpy.utils.previews.new()
+        self._thumbnails = bpy.utils.previews.new()
         self._playhead: dict[str, int] = {}
 
     def _end(self, context: bpy.types.Context) -> None:
@@ -168,12 +165,12 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
             row.icon = 0
             if row.outcome not in ENDED:
                 row.outcome, row.sentence = "cancelled", f"Stopped; {row.done} finished frames stay."
-        bpy.utils.previews.remove(self._pictures)
+        bpy.utils.previews.remove(self._thumbnails)
         if self._timer is not None:
             context.window_manager.event_timer_remove(self._timer)
 
     def _tick(self, context: bpy.types.Context) -> bool:
-        """One look. Returns whether there is more to come."""
+        """Poll once; returns whether work remains."""
         manager = context.window_manager
         rows = {row.take: row for row in manager.smokelift.jobs}
         for name, row in rows.items():
@@ -184,17 +181,17 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
         changed = self._queue.poll()
         for name, job in list(self._jobs.items()):
             if job in changed and name in rows:
-                self._tell(rows[name], job)
+                self._update_row(rows[name], job)
             if job.ended:
-                del self._jobs[name]  # a resumed take comes back under the same name
-        while self._unseen and not bpy.app.is_job_running("RENDER"):  # which must not lose its data
-            name, job = self._unseen.popitem()
+                del self._jobs[name]  # a resumed take has the same name
+        while self._not_shown and not bpy.app.is_job_running("RENDER"):  # its data must stay
+            name, job = self._not_shown.popitem()
             if name in rows:
                 self._show(rows[name], job)
-        looked = self._look_ahead(manager.smokelift)
-        if changed or looked:
+        checked = self._poll_check(manager.smokelift)
+        if changed or checked:
             redraw(manager)
-        return bool(self._jobs or self._unseen) or self._check is not None or manager.smokelift.check_ticks > 0
+        return bool(self._jobs or self._not_shown) or self._check is not None or manager.smokelift.check_ticks > 0
 
     def _start(self, name: str, row: bpy.types.PropertyGroup) -> None:
         take = Take(Path(name))
@@ -206,67 +203,67 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
         self._jobs[name] = job
         self._queue.add(job)
 
-    def _tell(self, row: bpy.types.PropertyGroup, job: Job) -> None:
-        """Show in the panel how a job stands."""
-        grown = job.done != row.done
+    def _update_row(self, row: bpy.types.PropertyGroup, job: Job) -> None:
+        """Show a job's progress in the panel."""
+        new_frames = job.done != row.done
         row.outcome, row.sentence, row.warnings = job.outcome, job.sentence, "\n".join(job.warnings)
         row.done, row.total = job.done, job.total
         row.seconds_left = -1.0 if job.seconds_left is None else job.seconds_left
-        if grown or job.ended:
-            self._unseen[row.take] = job
+        if new_frames or job.ended:
+            self._not_shown[row.take] = job
 
     def _show(self, row: bpy.types.PropertyGroup, job: Job) -> None:
-        """Show a job's frames in the viewport, and how it ended."""
+        """Show a job's frames in the viewport, and its end."""
         take = Take(Path(row.take))
         scene = find_scene(row)
-        made = 0
+        created = 0
         if scene is not None:
-            before = _things()
-            thing = present(scene, take)
-            made = _things() - before
-            if thing is not None and not bpy.app.background:
-                self._follow(scene, thing, row)
+            before = _datablocks()
+            obj = present(scene, take)
+            created = _datablocks() - before
+            if obj is not None and not bpy.app.background:
+                self._follow(scene, obj, row)
         if not bpy.app.background:
-            row.icon = self._picture(take)
-            if made or job.ended:
-                # undoing steps that do not know of new objects would leave Blender with pointers into nowhere
+            row.icon = self._thumbnail(take)
+            if created or job.ended:
+                # an undo to a step before new objects leaves Blender with dangling pointers
                 bpy.ops.ed.undo_push(message="Make Smoke")
             if job.ended:
                 self.report({"ERROR" if job.outcome == "failed" else "INFO"}, job.sentence)
             if job.outcome == "failed":
-                # not from here: a modal operator that opens a window is never taken off the one it was in
+                # later: Blender never removes a modal operator that opens a window from its first one
                 bpy.app.timers.register(functools.partial(_open_log, row.take))
 
-    def _follow(self, scene: bpy.types.Scene, thing: bpy.types.Object, row: bpy.types.PropertyGroup) -> None:
-        """Move the playhead to the newest frame, until somebody else moves it."""
+    def _follow(self, scene: bpy.types.Scene, obj: bpy.types.Object, row: bpy.types.PropertyGroup) -> None:
+        """Move the playhead to the newest frame until the user moves it."""
         before = self._playhead.get(row.take)
         if before is not None and scene.frame_current != before:
             return
-        newest = thing.data.frame_start + thing.data.frame_duration - 1
+        newest = obj.data.frame_start + obj.data.frame_duration - 1
         scene.frame_set(newest)
         self._playhead[row.take] = newest
 
-    def _picture(self, take: Take) -> int:
-        """Read the take's small picture and return its icon; 0 if there is none."""
-        if not take.picture_file.is_file():
+    def _thumbnail(self, take: Take) -> int:
+        """The icon of the take's thumbnail; 0 if there is none."""
+        if not take.thumbnail_file.is_file():
             return 0
-        image = bpy.data.images.load(str(take.picture_file))
+        image = bpy.data.images.load(str(take.thumbnail_file))
         try:
             name = str(take.directory)
-            preview = self._pictures.get(name) or self._pictures.new(name)
+            preview = self._thumbnails.get(name) or self._thumbnails.new(name)
             preview.image_size = image.size
             preview.image_pixels_float = image.pixels[:]
         finally:
             bpy.data.images.remove(image)
         return preview.icon_id
 
-    def _look_ahead(self, state: bpy.types.PropertyGroup) -> bool:
-        """Ask the engine what the shot will take, once the settings rest. Returns whether anything changed."""
+    def _poll_check(self, state: bpy.types.PropertyGroup) -> bool:
+        """Check the shot once its settings rest; returns whether anything changed."""
         if state.check_ticks > 0:
             state.check_ticks -= 1
             if state.check_ticks > 0:
                 return False
-            self._ask(state)
+            self._start_check(state)
             return True
         if self._check is None:
             return False
@@ -285,7 +282,7 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
             state.disk = details["disk"] / 1e6
         return True
 
-    def _ask(self, state: bpy.types.PropertyGroup) -> None:
+    def _start_check(self, state: bpy.types.PropertyGroup) -> None:
         if self._check is not None:
             self._check.kill()
             self._check = None
@@ -296,26 +293,26 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
         folder = Path(bpy.app.tempdir)
         try:
             take = Take(folder / "smokelift_check")
-            take.begin(shot.shot_tables(scene, quick=True), shot.options(scene))
-            words = ["inspect", str(take.scene_file), "--progress", "json", *shot.options(scene)]
+            take.begin(scene_file.shot_tables(scene, quick=True), scene_file.options(scene))
+            words = ["inspect", str(take.scene_file), "--progress", "json", *scene_file.options(scene)]
             self._check = Job(engine_command(words), take.log_file)
-        except (shot.ShotError, TakeError, EngineMissingError) as error:
+        except (scene_file.ShotError, TakeError, EngineMissingError) as error:
             state.check_error = str(error)
             return
         self._check.start()
 
 
 def find_scene(row: bpy.types.PropertyGroup) -> bpy.types.Scene | None:
-    """The scene of a job; it may have been renamed, or be gone."""
+    """The scene of a job, also after a new name; None if it was deleted."""
     return next((scene for scene in bpy.data.scenes if scene.session_uid == row.scene_uid), None)
 
 
-def _things() -> int:
+def _datablocks() -> int:
     return sum(map(len, (bpy.data.objects, bpy.data.volumes, bpy.data.cameras, bpy.data.materials)))
 
 
 def redraw(manager: bpy.types.WindowManager) -> None:
-    """Draw again whatever shows the panel."""
+    """Redraw every area that shows the panel."""
     for window in manager.windows:
         for area in window.screen.areas:
             if area.type in ("VIEW_3D", "CLIP_EDITOR"):
@@ -327,12 +324,12 @@ def _playing(context: bpy.types.Context) -> bool:
 
 
 def register() -> None:
-    """Make the worker known."""
+    """Register the worker."""
     bpy.utils.register_class(SMOKELIFT_OT_work)
 
 
 def unregister() -> None:
-    """Take it back, and end what it runs."""
+    """Unregister the worker and end its jobs."""
     if bpy.app.timers.is_registered(_check):
         bpy.app.timers.unregister(_check)
     for worker in workers(bpy.context.window_manager):

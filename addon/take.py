@@ -1,12 +1,12 @@
-"""The files of one run. Knows nothing of Blender.
+"""A take: the files of one run. Knows nothing of Blender.
 
-Every run has a number and writes beside the others, so that nothing that is finished is ever overwritten:
+Every take has the next free number, so no run overwrites another:
 
     take_0003/        the sequence, written by the engine
-    take_0003.toml    the scene file that it was made from
-    take_0003.json    the request: how the engine was called
-    take_0003.log     what the engine said
-    take_0003.png     a small picture of the last frame, input beside reconstruction
+    take_0003.toml    its scene file
+    take_0003.json    the engine's further options
+    take_0003.log     the engine's messages
+    take_0003.png     a thumbnail of the last frame, input beside reconstruction
 """
 
 from __future__ import annotations
@@ -20,23 +20,18 @@ from pathlib import Path
 from typing import Any
 
 from . import toml
+from .contract import INDEX_FILE
 
 _NAME = re.compile(r"take_(\d{4,})")
 
 
 class TakeError(ValueError):
-    """Files of a run that cannot be written or read, and why."""
+    """A take whose files cannot be written or read; says why in one sentence."""
 
 
 @dataclass(frozen=True)
 class Take:
-    """One run's files.
-
-    Attributes
-    ----------
-    directory
-        Where its sequence lies.
-    """
+    """One run's files; ``directory`` holds its sequence."""
 
     directory: Path
 
@@ -47,28 +42,21 @@ class Take:
 
     @property
     def request_file(self) -> Path:
-        """How the engine was called."""
+        """The engine's further options."""
         return self.directory.with_suffix(".json")
 
     @property
     def log_file(self) -> Path:
-        """What the engine said."""
+        """The engine's messages."""
         return self.directory.with_suffix(".log")
 
     @property
-    def picture_file(self) -> Path:
-        """Small picture of the last frame."""
+    def thumbnail_file(self) -> Path:
+        """The thumbnail of the last frame."""
         return self.directory.with_suffix(".png")
 
     def begin(self, tables: Mapping[str, Any], options: Sequence[str]) -> None:
-        """Write the scene file and the request.
-
-        Parameters
-        ----------
-        tables
-            What the scene file holds.
-        options
-            The engine's further options.
+        """Write the scene file from its tables, and the engine's further options.
 
         Raises
         ------
@@ -85,25 +73,25 @@ class Take:
             ) from error
 
     def arguments(self) -> list[str]:
-        """Arguments that make the engine begin this take, or go on with it.
+        """The engine's arguments, which start this take or resume it.
 
         Raises
         ------
         TakeError
-            If the take was never begun, or its files were taken away.
+            If its files are missing or damaged.
         """
         try:
             request = json.loads(self.request_file.read_text(encoding="utf-8"))
             options = [str(word) for word in request["options"]]
         except (OSError, ValueError, LookupError, TypeError) as error:
             raise TakeError(f"{self.request_file} is missing or damaged: run the shot anew.") from error
-        files = ["--out", str(self.directory), "--thumbnail", str(self.picture_file)]
+        files = ["--out", str(self.directory), "--thumbnail", str(self.thumbnail_file)]
         return ["reconstruct", str(self.scene_file), *files, "--resume", "--progress", "json", *options]
 
     def index(self) -> dict[str, Any] | None:
-        """What `sequence.json` holds, or None before the engine has written it."""
+        """The content of `sequence.json`; None before the engine writes it."""
         try:
-            index = json.loads((self.directory / "sequence.json").read_text(encoding="utf-8"))
+            index = json.loads((self.directory / INDEX_FILE).read_text(encoding="utf-8"))
         except (OSError, ValueError):
             return None
         return index if isinstance(index, dict) else None
@@ -114,31 +102,36 @@ class Take:
         return len(index["frames"]) if index else 0
 
     def complete(self) -> bool:
-        """Whether its run came to its end."""
+        """Whether all its frames are finished."""
         index = self.index()
         return bool(index and index["complete"])
 
     def resumable(self) -> bool:
-        """Whether it was begun and not completed."""
+        """Whether its run can go on: it started and is not complete."""
         return self.scene_file.is_file() and self.request_file.is_file() and not self.complete()
 
     def remove(self) -> None:
         """Delete all its files."""
         shutil.rmtree(self.directory, ignore_errors=True)
-        for file in (self.scene_file, self.request_file, self.log_file, self.picture_file):
+        for file in (self.scene_file, self.request_file, self.log_file, self.thumbnail_file):
             file.unlink(missing_ok=True)
 
 
 def takes(folder: Path) -> list[Take]:
     """The takes in a folder, oldest first."""
-    if not folder.is_dir():
-        return []
-    numbers = {int(match[1]) for path in folder.iterdir() if (match := _NAME.fullmatch(path.stem))}
-    return [Take(folder / f"take_{number:04d}") for number in sorted(numbers)]
+    return [_take(folder, number) for number in sorted(_numbers(folder))]
 
 
 def new_take(folder: Path) -> Take:
-    """A take with the next number that is free in a folder."""
-    there = takes(folder)
-    last = _NAME.fullmatch(there[-1].directory.name) if there else None
-    return Take(folder / f"take_{int(last[1]) + 1 if last else 1:04d}")
+    """The take with the next free number in a folder."""
+    return _take(folder, max(_numbers(folder), default=0) + 1)
+
+
+def _take(folder: Path, number: int) -> Take:
+    return Take(folder / f"take_{number:04d}")
+
+
+def _numbers(folder: Path) -> set[int]:
+    if not folder.is_dir():
+        return set()
+    return {int(match[1]) for path in folder.iterdir() if (match := _NAME.fullmatch(path.stem))}

@@ -1,4 +1,4 @@
-"""Writing scene files: tables of numbers, texts and lists, and lists of tables. Knows nothing of Blender."""
+"""The text of scene files. Knows nothing of Blender."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ def dumps(tables: Mapping[str, Any]) -> str:
     Parameters
     ----------
     tables
-        A dictionary or a list of dictionaries by name; their values are numbers, texts, or (nested) lists of those.
+        Tables and lists of tables by name; their values are numbers, texts, or nested lists of those.
     """
     parts = []
     for name, content in tables.items():

@@ -1,4 +1,4 @@
-"""The result: a Volume object that plays the sequence, with a material that has the smoke's own optics."""
+"""The result: a Volume object that plays the sequence, with a material of the smoke's optical properties."""
 
 import math
 from pathlib import Path
@@ -8,15 +8,16 @@ import bpy
 from bpy.app.handlers import persistent
 from mathutils import Vector
 
-from .scene import frame_rate, turned_world
+from .contract import FRAME_FILE
+from .scene_file import engine_to_world, frame_rate
 from .take import Take
 
 SHADER = "Smokelift"
-"""Name of the node that holds the fitted values; another material, or another node, is the user's own."""
+"""Name of the shader node that holds the fitted values; a material without it is the user's own."""
 
 
 def show(scene: bpy.types.Scene, take: Take) -> bpy.types.Object | None:
-    """Show a take's finished frames, in the object that shows this scene's smoke if there is one already.
+    """Show a take's finished frames in the scene's Volume object, which is made if there is none.
 
     Returns
     -------
@@ -25,22 +26,22 @@ def show(scene: bpy.types.Scene, take: Take) -> bpy.types.Object | None:
     index = take.index()
     if not index or not index["frames"]:
         return None
-    thing = _object(scene)
+    obj = _object(scene)
     if shown_take(scene) != take:
-        thing.delta_location = (0.0, 0.0, 0.0)
-        thing.matrix_world = turned_world(scene)
-    _settle(thing, index["scene"]["domain"])
-    _play(thing.data, scene, take, index)
-    _shade(thing.data, index["scene"]["medium"])
-    return thing
+        obj.delta_location = (0.0, 0.0, 0.0)
+        obj.matrix_world = engine_to_world(scene)
+    _correct_position(obj, index["scene"]["domain"])
+    _set_sequence(obj.data, scene, take, index)
+    _set_material(obj.data, index["scene"]["medium"])
+    return obj
 
 
 def shown_take(scene: bpy.types.Scene) -> Take | None:
-    """The take that the scene's smoke is made of."""
-    thing = scene.smokelift.volume
-    if thing is None or thing.type != "VOLUME" or not thing.data.filepath:
+    """The take on show in the scene."""
+    obj = scene.smokelift.volume
+    if obj is None or obj.type != "VOLUME" or not obj.data.filepath:
         return None
-    return Take(_absolute(thing.data).parent)
+    return Take(_absolute(obj.data).parent)
 
 
 def _absolute(volume: bpy.types.Volume) -> Path:
@@ -48,35 +49,35 @@ def _absolute(volume: bpy.types.Volume) -> Path:
 
 
 def _object(scene: bpy.types.Scene) -> bpy.types.Object:
-    thing = scene.smokelift.volume
-    if thing is None or thing.type != "VOLUME" or thing.name not in scene.objects:
+    obj = scene.smokelift.volume
+    if obj is None or obj.type != "VOLUME" or obj.name not in scene.objects:
         name = f"Smoke {scene.smokelift.clip.name}" if scene.smokelift.clip else "Smoke"
-        thing = bpy.data.objects.new(name, bpy.data.volumes.new(name))
-        scene.collection.objects.link(thing)
-        scene.smokelift.volume = thing
-    return thing
+        obj = bpy.data.objects.new(name, bpy.data.volumes.new(name))
+        scene.collection.objects.link(obj)
+        scene.smokelift.volume = obj
+    return obj
 
 
 @persistent
-def settle_all(_file: str = "") -> None:
-    """Put the smoke of every scene to where this Blender needs it, after another one saved the file."""
+def correct_positions(_file: str = "") -> None:
+    """Correct the smoke of every scene, since another version of Blender may have saved the file."""
     for scene in bpy.data.scenes:
         take = shown_take(scene)
         index = take.index() if take is not None else None
         if index is not None:
-            _settle(scene.smokelift.volume, index["scene"]["domain"])
+            _correct_position(scene.smokelift.volume, index["scene"]["domain"])
 
 
-def _settle(thing: bpy.types.Object, domain: dict[str, Any]) -> None:
-    """Make up for Cycles, which before 5.0 renders every grid half a voxel too far along all its axes."""
+def _correct_position(obj: bpy.types.Object, domain: dict[str, Any]) -> None:
+    """Compensate for Cycles, which before 5.0 renders every grid half a voxel too far along all its axes."""
     voxel = (domain["max"][0] - domain["min"][0]) / domain["resolution"][0]
     shift = Vector([-voxel / 2] * 3) if bpy.app.version < (5, 0, 0) else Vector()
-    thing.delta_location = thing.matrix_basis.to_quaternion() @ shift
+    obj.delta_location = obj.matrix_basis.to_quaternion() @ shift
 
 
-def _play(volume: bpy.types.Volume, scene: bpy.types.Scene, take: Take, index: dict[str, Any]) -> None:
+def _set_sequence(volume: bpy.types.Volume, scene: bpy.types.Scene, take: Take, index: dict[str, Any]) -> None:
     numbers = sorted(int(number) for number in index["frames"])
-    path = str(take.directory / f"smoke_{numbers[0]:04d}.vdb")
+    path = str(take.directory / FRAME_FILE.format(numbers[0]))
     if bpy.data.filepath:
         path = _relative(path)
     if volume.filepath != path:
@@ -85,7 +86,7 @@ def _play(volume: bpy.types.Volume, scene: bpy.types.Scene, take: Take, index: d
     volume.sequence_mode = "CLIP"
     clip_rate, scene_rate = index["scene"]["clip"]["fps"], frame_rate(scene)
     ratio = scene_rate / clip_rate
-    # a camera that moves was read frame by frame, as Blender plays clips, and the smoke has to stay in step with it
+    # the smoke keeps step with a moving camera, which has one matrix for each frame of the clip
     tracked = "matrices" in index["scene"].get("camera", {})
     real = scene.smokelift.speed == "REAL" and not tracked and not math.isclose(ratio, 1.0, rel_tol=1e-3)
     clip = scene.smokelift.clip
@@ -96,16 +97,16 @@ def _play(volume: bpy.types.Volume, scene: bpy.types.Scene, take: Take, index: d
     volume.frame_duration = math.ceil(len(numbers) * ratio) if real else len(numbers)
     volume.driver_remove("frame_offset")
     if real:
-        # Blender shows one file a frame; the offset says which it is instead
+        # Blender shows one file in each frame of the scene; the driven offset selects another
         driver = volume.driver_add("frame_offset").driver
         driver.type = "SCRIPTED"
         driver.expression = f"floor((frame - {start} + 0.001) / {ratio:.9g}) - (frame - {start}) + {numbers[0] - 1}"
-    if volume.velocity_grid != "velocity":  # Blender's default, and setting it again makes it complain
+    if volume.velocity_grid != "velocity":  # Blender complains if the default is set again
         volume.velocity_grid = "velocity"
     volume.velocity_unit = "SECOND"
     volume.velocity_scale = 1.0 if real else ratio
     volume.render.clipping = 0.0
-    volume.display.density = index["scene"]["medium"]["extinction"]  # as thick in the viewport as in a render
+    volume.display.density = index["scene"]["medium"]["extinction"]  # the viewport shows the render's optical depth
 
 
 def _relative(path: str) -> str:
@@ -115,7 +116,7 @@ def _relative(path: str) -> str:
         return path
 
 
-def _shade(volume: bpy.types.Volume, medium: dict[str, float]) -> None:
+def _set_material(volume: bpy.types.Volume, medium: dict[str, float]) -> None:
     material = volume.materials[0] if volume.materials else None
     if material is None:
         material = _material(volume.name)
@@ -130,7 +131,7 @@ def _shade(volume: bpy.types.Volume, medium: dict[str, float]) -> None:
 
 
 def _material(name: str) -> bpy.types.Material:
-    """Scattering is density x extinction x albedo; what is left of the extinction is absorbed."""
+    """A material that scatters density x extinction x albedo and absorbs the rest of the extinction."""
     material = bpy.data.materials.new(name)
     if material.node_tree is None:  # since 5.0 there always is one
         material.use_nodes = True
@@ -147,10 +148,10 @@ def _material(name: str) -> bpy.types.Material:
 
 
 def register() -> None:
-    """Look after files that are loaded."""
-    bpy.app.handlers.load_post.append(settle_all)
+    """Correct every file that Blender loads."""
+    bpy.app.handlers.load_post.append(correct_positions)
 
 
 def unregister() -> None:
-    """Leave them alone."""
-    bpy.app.handlers.load_post.remove(settle_all)
+    """Stop doing so."""
+    bpy.app.handlers.load_post.remove(correct_positions)

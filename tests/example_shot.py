@@ -44,9 +44,9 @@ def set_up_example(scene: bpy.types.Scene, folder: Path = EXAMPLE) -> bpy.types.
 
 def add(scene: bpy.types.Scene, name: str, data: Any) -> bpy.types.Object:
     """A new object in a scene."""
-    thing = bpy.data.objects.new(name, data)
-    scene.collection.objects.link(thing)
-    return thing
+    obj = bpy.data.objects.new(name, data)
+    scene.collection.objects.link(obj)
+    return obj
 
 
 def add_camera(scene: bpy.types.Scene, location: Any, rotation: Any = (0.0, 0.0, 0.0)) -> bpy.types.Object:

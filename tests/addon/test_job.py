@@ -285,7 +285,7 @@ def test_an_engine_that_is_killed_from_outside(engine) -> None:
 @pytest.mark.skipif(sys.platform == "win32", reason="the grandchild is POSIX's")
 def test_a_grandchild_that_keeps_the_pipe_open(engine, monkeypatch) -> None:
     """The job ends with its own process."""
-    monkeypatch.setattr(module, "LAST_WORDS_SECONDS", 0.1)
+    monkeypatch.setattr(module, "DRAIN_SECONDS", 0.1)
     job = finished(engine(f"import subprocess, sys; subprocess.Popen(['sleep', '1.5'])\n{FRAMES}"))
     assert (job.outcome, job.done) == ("done", 3)
 

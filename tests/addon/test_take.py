@@ -92,7 +92,7 @@ def test_removing_takes_all_files_of_one_take(tmp_path) -> None:
     for take in (first, second):
         with_sequence(take, 1, complete=True)
         take.log_file.write_text("log")
-        take.picture_file.write_text("picture")
+        take.thumbnail_file.write_text("picture")
     first.remove()
     assert {path.name[:9] for path in tmp_path.iterdir()} == {"take_0002"}
     assert second.frames() == 1

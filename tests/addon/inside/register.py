@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+from typing import get_args
+
 import bpy
+import pytest
 
 import addon
+from smokelift.footage.images import Transfer
+from smokelift.render.device import DeviceName
+from smokelift.scene import Medium
+from smokelift.setup.settings import QUALITIES
 
 
 def ours() -> set[str]:
@@ -41,3 +48,21 @@ def test_names_follow_blenders_rules() -> None:
         if setting.identifier not in ("rna_type", "name"):
             assert setting.name and setting.description, setting.identifier
             assert not setting.description.endswith("."), setting.identifier  # Blender adds it
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [("quality", QUALITIES), ("device", get_args(DeviceName)), ("transfer", ("AUTO", *get_args(Transfer)))],
+)
+def test_choices_are_the_engines(scene, name, expected) -> None:
+    """In the engine's order."""
+    assert tuple(scene.smokelift.bl_rna.properties[name].enum_items.keys()) == expected
+
+
+def test_default_medium_is_the_engines(scene) -> None:
+    """And its limits are within the engine's."""
+    names = ("extinction", "albedo", "anisotropy")
+    properties = scene.smokelift.bl_rna.properties
+    assert [properties[name].default for name in names] == pytest.approx([getattr(Medium(), name) for name in names])
+    for name in names:
+        Medium(**{name: properties[name].hard_min}), Medium(**{name: properties[name].hard_max})

@@ -14,7 +14,7 @@ import pytest
 from mathutils import Vector
 
 from addon import look, run, volume
-from addon.scene import box_corners
+from addon.scene_file import box_corners
 from addon.take import Take
 from conftest import quietly, rendered
 from smokelift.output.images import write_image
@@ -47,9 +47,9 @@ def made(folder: Path, frames: int = FRAMES, fps: float = 24.0, medium: Medium |
 def evaluated(scene: bpy.types.Scene, frame: int) -> bpy.types.Object:
     """The smoke as it is seen in a frame, its grids loaded."""
     scene.frame_set(frame)
-    thing = scene.smokelift.volume.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    thing.data.grids.load()
-    return thing
+    obj = scene.smokelift.volume.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    obj.data.grids.load()
+    return obj
 
 
 def plays(scene: bpy.types.Scene, frame: int) -> int | None:
@@ -135,7 +135,7 @@ def test_the_plate_of_a_moving_camera_plays_beside_the_clip(shot, tmp_path, kind
             write_image(tmp_path / f"plate_{number:04d}.png", plate)
     take = made(tmp_path)
     index = tracked(take, background={"image": str(path)})
-    thing = volume.show(shot, take)
+    obj = volume.show(shot, take)
     places = []
     for _ in range(2):
         look.set_up(shot, take, index)
@@ -144,7 +144,7 @@ def test_the_plate_of_a_moving_camera_plays_beside_the_clip(shot, tmp_path, kind
         shot.frame_set(frame)
         behind = np.median(rendered(shot, tmp_path / "out.exr"), axis=(0, 1))
         assert behind == pytest.approx([levels[frame - 1]] * 3, abs=0.02)
-        places.append(thing.matrix_world.copy())
+        places.append(obj.matrix_world.copy())
     assert places[0] == places[1]
 
 
@@ -166,8 +166,8 @@ def test_it_grows(shot, tmp_path) -> None:
     for count in (0, 2, 5):
         some = {**whole, "complete": False, "frames": {str(n): {} for n in range(1, count + 1)}}
         (take.directory / "sequence.json").write_text(json.dumps(some))
-        thing = volume.show(shot, take)
-        seen.append(thing and (thing.name, thing.data.frame_duration))
+        obj = volume.show(shot, take)
+        seen.append(obj and (obj.name, obj.data.frame_duration))
     assert seen == [None, ("Smoke clip.mp4", 2), ("Smoke clip.mp4", 5)]
 
 
@@ -178,8 +178,8 @@ def test_grids_and_their_place(shot, tmp_path) -> None:
     """Density and velocity, in the engine's voxels: the smoke is where the engine has it."""
     take = made(tmp_path)
     volume.show(shot, take)
-    thing = evaluated(shot, 3)
-    grids = {grid.name: grid for grid in thing.data.grids}
+    obj = evaluated(shot, 3)
+    grids = {grid.name: grid for grid in obj.data.grids}
     assert {name: grid.data_type for name, grid in grids.items()} == {"density": "FLOAT", "velocity": "VECTOR_FLOAT"}
     voxel = 0.125
     shift = -voxel / 2 if HALF_VOXEL_TOO_FAR else 0.0
@@ -189,7 +189,7 @@ def test_grids_and_their_place(shot, tmp_path) -> None:
     blocks = [((first - 2) // 8 * 8, (last + 2) // 8 * 8 + 7) for first, last in ((10, 12), (3, 4), (12, 13))]
     low = np.array([-1.0, -1.0, 0.0]) + (np.array([first for first, _ in blocks]) + 0.5) * voxel
     high = np.array([-1.0, -1.0, 0.0]) + (np.array([last for _, last in blocks]) + 0.5) * voxel
-    corners = np.array([thing.matrix_world @ Vector(corner) for corner in thing.bound_box])
+    corners = np.array([obj.matrix_world @ Vector(corner) for corner in obj.bound_box])
     np.testing.assert_allclose(corners.min(0), low - around + shift, atol=1e-5)
     np.testing.assert_allclose(corners.max(0), high + around + shift, atol=1e-5)
 
@@ -198,24 +198,24 @@ def test_a_turned_box_turns_the_smoke(shot, tmp_path) -> None:
     """With the box's rotation, about the world's origin, as its scene was given."""
     shot.smokelift.box.rotation_euler = (0.1, 0.2, 0.7)
     bpy.context.view_layer.update()
-    thing = volume.show(shot, made(tmp_path))
+    obj = volume.show(shot, made(tmp_path))
     bpy.context.view_layer.update()
-    turn = thing.matrix_world.to_quaternion().rotation_difference(shot.smokelift.box.matrix_world.to_quaternion())
+    turn = obj.matrix_world.to_quaternion().rotation_difference(shot.smokelift.box.matrix_world.to_quaternion())
     assert turn.angle == pytest.approx(0.0, abs=1e-5)
     assert len(box_corners(shot.smokelift.box)) == 8
-    shift = thing.matrix_world.to_3x3().inverted() @ thing.matrix_world.translation
+    shift = obj.matrix_world.to_3x3().inverted() @ obj.matrix_world.translation
     assert list(shift) == pytest.approx([-0.0625] * 3 if HALF_VOXEL_TOO_FAR else [0.0] * 3, abs=1e-6)
 
 
 def test_smoke_that_was_moved_stays_where_it_was_put_while_it_grows(shot, tmp_path) -> None:
     """Another take puts it into the shot again."""
     first = made(tmp_path)
-    thing = volume.show(shot, first)
-    thing.location.x += 5.0
+    obj = volume.show(shot, first)
+    obj.location.x += 5.0
     volume.show(shot, first)
-    assert thing.location.x == pytest.approx(5.0)
+    assert obj.location.x == pytest.approx(5.0)
     volume.show(shot, made(tmp_path, number=2))
-    assert thing.location.x == pytest.approx(0.0)
+    assert obj.location.x == pytest.approx(0.0)
 
 
 # what it is made of
@@ -223,15 +223,15 @@ def test_smoke_that_was_moved_stays_where_it_was_put_while_it_grows(shot, tmp_pa
 
 def test_the_material_is_the_mediums(shot, tmp_path) -> None:
     """Extinction, albedo and anisotropy that were fitted; clipping and velocity as the files need them."""
-    thing = volume.show(shot, made(tmp_path))
-    (material,) = thing.data.materials
+    obj = volume.show(shot, made(tmp_path))
+    (material,) = obj.data.materials
     output = next(node for node in material.node_tree.nodes if node.type == "OUTPUT_MATERIAL")
     shader = output.inputs["Volume"].links[0].from_node
     values = {name: shader.inputs[name].default_value for name in ("Density", "Anisotropy", "Density Attribute")}
     assert values == {"Density": 4.0, "Anisotropy": pytest.approx(0.3), "Density Attribute": "density"}
     assert list(shader.inputs["Color"].default_value) == pytest.approx([0.8, 0.8, 0.8, 1.0])
     assert shader.inputs["Emission Strength"].default_value == 0.0
-    data = thing.data
+    data = obj.data
     assert (data.velocity_grid, data.velocity_unit, data.render.clipping) == ("velocity", "SECOND", 0.0)
     assert data.display.density == 4.0
 
@@ -240,35 +240,35 @@ def test_running_again_replaces(shot, tmp_path) -> None:
     """One object, one volume, one material, with the new values."""
     volume.show(shot, made(tmp_path))
     before = [len(kind) for kind in (bpy.data.objects, bpy.data.volumes, bpy.data.materials)]
-    thing = volume.show(shot, made(tmp_path, frames=3, medium=Medium(9.0, 0.5), number=2))
+    obj = volume.show(shot, made(tmp_path, frames=3, medium=Medium(9.0, 0.5), number=2))
     assert [len(kind) for kind in (bpy.data.objects, bpy.data.volumes, bpy.data.materials)] == before
-    assert "take_0002" in thing.data.filepath
-    assert thing.data.frame_duration == 3
-    shader = thing.data.materials[0].node_tree.nodes[volume.SHADER]
+    assert "take_0002" in obj.data.filepath
+    assert obj.data.frame_duration == 3
+    shader = obj.data.materials[0].node_tree.nodes[volume.SHADER]
     assert shader.inputs["Density"].default_value == 9.0
 
 
 def test_a_material_of_the_users_own_is_left_alone(shot, tmp_path) -> None:
     """And so is what was added to ours."""
-    thing = volume.show(shot, made(tmp_path))
+    obj = volume.show(shot, made(tmp_path))
     own = bpy.data.materials.new("Own")
-    thing.data.materials[0] = own
+    obj.data.materials[0] = own
     volume.show(shot, made(tmp_path, number=2))
-    assert thing.data.materials[0] == own
+    assert obj.data.materials[0] == own
 
 
 def test_smoke_that_was_deleted_is_made_again(shot, tmp_path) -> None:
     """Nothing refers to what is gone."""
-    thing = volume.show(shot, made(tmp_path))
-    bpy.data.objects.remove(thing)
+    obj = volume.show(shot, made(tmp_path))
+    bpy.data.objects.remove(obj)
     assert shot.smokelift.volume is None
     assert volume.show(shot, made(tmp_path, number=2)).name in shot.objects
 
 
 def test_smoke_that_was_unlinked_is_made_again(shot, tmp_path) -> None:
     """As the Delete key does it."""
-    thing = volume.show(shot, made(tmp_path))
-    shot.collection.objects.unlink(thing)
+    obj = volume.show(shot, made(tmp_path))
+    shot.collection.objects.unlink(obj)
     again = volume.show(shot, made(tmp_path, number=2))
     assert again.name in shot.objects
 
@@ -330,14 +330,14 @@ def test_a_guessed_camera_is_made(shot, tmp_path, size) -> None:
     for _ in range(2):
         run.present(shot, take)
     assert shot.camera == own
-    (thing,) = (thing for thing in shot.objects if thing.type == "CAMERA" and thing != own)
+    (obj,) = (obj for obj in shot.objects if obj.type == "CAMERA" and obj != own)
     bpy.context.view_layer.update()
-    place = world_to_camera_view(shot, thing, Vector((0.3, 0.5, 1.4)))
+    place = world_to_camera_view(shot, obj, Vector((0.3, 0.5, 1.4)))
     column = camera.cx + camera.fx * 0.3 / 5.5
     row = camera.cy - camera.fy * 0.4 / 5.5
     assert (place.x * size[0], (1 - place.y) * size[1]) == pytest.approx((column, row), abs=1e-3)
-    assert math.isclose(thing.data.lens, camera.fx * 36 / max(size), rel_tol=1e-5)
+    assert math.isclose(obj.data.lens, camera.fx * 36 / max(size), rel_tol=1e-5)
     shot.camera = None
     run.present(shot, take)
-    assert shot.camera == thing
+    assert shot.camera == obj
     assert replace(camera, size=size) == camera

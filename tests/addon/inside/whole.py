@@ -11,7 +11,7 @@ import pytest
 
 import smokelift
 from addon import run, volume
-from addon.scene import point_intensity, shot_tables, sun_irradiance
+from addon.scene_file import point_intensity, shot_tables, sun_irradiance
 from addon.take import Take
 from conftest import rendered
 from smokelift.density.hull import voxel_centres
@@ -162,7 +162,7 @@ def test_running_twice_makes_a_second_take_and_one_smoke(shot, tmp_path) -> None
     row = make(shot, tmp_path / "out")
     assert row.take.endswith("take_0002")
     assert shot.smokelift.volume == first
-    assert [thing for thing in shot.objects if thing.type == "VOLUME"] == [first]
+    assert [obj for obj in shot.objects if obj.type == "VOLUME"] == [first]
     assert volume.shown_take(shot) == Take(tmp_path / "out" / "take_0002")
     assert Take(tmp_path / "out" / "take_0001").complete()
     assert bpy.ops.smokelift.remove_takes() == {"FINISHED"}
@@ -219,7 +219,7 @@ def test_going_on_with_what_was_stopped(shot, tmp_path) -> None:
     assert take.complete()
     assert settings.volume.data.frame_duration == 4
     assert run.unfinished(shot) is None
-    with pytest.raises(RuntimeError, match="nothing to go on with"):
+    with pytest.raises(RuntimeError, match="No stopped run to resume"):
         bpy.ops.smokelift.resume()
 
 

@@ -75,12 +75,12 @@ def corners(take: Path) -> dict[int, Any]:
 
 def shown(scene: bpy.types.Scene) -> bpy.types.Object:
     """The one object that shows smoke."""
-    (thing,) = [thing for thing in scene.objects if thing.type == "VOLUME"]
-    return thing
+    (obj,) = [obj for obj in scene.objects if obj.type == "VOLUME"]
+    return obj
 
 
-def take_of(thing: bpy.types.Object) -> Path:
-    return Path(bpy.path.abspath(thing.data.filepath)).parent
+def take_of(obj: bpy.types.Object) -> Path:
+    return Path(bpy.path.abspath(obj.data.filepath)).parent
 
 
 def batch(blend: Path, *words: str) -> list[str]:
@@ -131,15 +131,15 @@ def test_makes_smoke(folder) -> None:
     scene.smokelift.first, scene.smokelift.last = FIRST, LAST
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "shot.blend"))
     assert bpy.ops.smokelift.run() == {"FINISHED"}
-    thing = shown(scene)
-    volume = thing.data
-    index = json.loads((take_of(thing) / "sequence.json").read_text())
+    obj = shown(scene)
+    volume = obj.data
+    index = json.loads((take_of(obj) / "sequence.json").read_text())
     assert index["complete"] and len(index["frames"]) == FRAMES
     assert volume.is_sequence and volume.frame_duration == FRAMES
     assert volume.frame_start == scene.smokelift.clip.frame_start + FIRST - 1
     assert volume.velocity_unit == "SECOND" and volume.velocity_grid == "velocity"
     assert volume.render.clipping == 0.0
-    node = next(node for node in thing.active_material.node_tree.nodes if node.type == "PRINCIPLED_VOLUME")
+    node = next(node for node in obj.active_material.node_tree.nodes if node.type == "PRINCIPLED_VOLUME")
     medium = index["scene"]["medium"]
     assert node.inputs["Density"].default_value == pytest.approx(medium["extinction"])
     assert node.inputs["Color"].default_value[:3] == pytest.approx([medium["albedo"]] * 3)
@@ -150,25 +150,25 @@ def test_makes_smoke(folder) -> None:
 def test_smoke_is_where_the_engine_put_it() -> None:
     """In every frame Blender's voxels lie in the world where the engine's do, and its bounds hold the smoke."""
     scene = bpy.context.scene
-    thing = shown(scene)
-    take = take_of(thing)
+    obj = shown(scene)
+    take = take_of(obj)
     domain = json.loads((take / "sequence.json").read_text())["scene"]["domain"]
     voxel = (domain["max"][2] - domain["min"][2]) / domain["resolution"][2]
     expected = corners(take)
     assert sorted(expected) == list(range(1, FRAMES + 1))
     for number, (low, high, mass) in expected.items():
         assert mass > 0.0
-        scene.frame_set(thing.data.frame_start + number - 1)
-        thing.data.grids.load()
-        assert {grid.name for grid in thing.data.grids} == {"density", "velocity"}
-        assert Path(bpy.path.abspath(thing.data.grids.frame_filepath)).name == f"smoke_{number:04d}.vdb"
-        assert not thing.data.grids.error_message
-        (density,) = [grid for grid in thing.data.grids if grid.name == "density"]
-        first = thing.matrix_world @ density.matrix_object @ Vector((0.0, 0.0, 0.0))
+        scene.frame_set(obj.data.frame_start + number - 1)
+        obj.data.grids.load()
+        assert {grid.name for grid in obj.data.grids} == {"density", "velocity"}
+        assert Path(bpy.path.abspath(obj.data.grids.frame_filepath)).name == f"smoke_{number:04d}.vdb"
+        assert not obj.data.grids.error_message
+        (density,) = [grid for grid in obj.data.grids if grid.name == "density"]
+        first = obj.matrix_world @ density.matrix_object @ Vector((0.0, 0.0, 0.0))
         # before 5.0 Cycles takes a voxel's corner for its centre, and the add-on makes up for it
         centre = 0.0 if bpy.app.version < (5, 0, 0) else voxel / 2
         assert list(first) == pytest.approx([edge + centre for edge in domain["min"]], abs=1e-4)
-        places = [thing.matrix_world @ Vector(corner) for corner in thing.evaluated_get(depsgraph()).bound_box]
+        places = [obj.matrix_world @ Vector(corner) for corner in obj.evaluated_get(depsgraph()).bound_box]
         # Blender's bounds go round all voxels that are stored, which are more than those with smoke
         for axis in range(3):
             least, most = min(p[axis] for p in places), max(p[axis] for p in places)

@@ -59,7 +59,7 @@ def story() -> Iterator[float]:
     area.spaces.active.shading.type = "RENDERED"
     yield 8.0
     yield from picture("rendered")
-    report["volumes"] = sum(thing.type == "VOLUME" for thing in window.scene.objects)
+    report["volumes"] = sum(obj.type == "VOLUME" for obj in window.scene.objects)
 
 
 def make_smoke(window: bpy.types.Window, area: bpy.types.Area, name: str) -> Iterator[float]:
@@ -120,7 +120,7 @@ def drawing_alone(window: bpy.types.Window) -> float:
 
 def note_smoke(scene: bpy.types.Scene, drawn: list[float]) -> None:
     """Called after an area was drawn: the time of the first that has a Volume to show."""
-    if not drawn and any(thing.type == "VOLUME" and thing.data.filepath for thing in scene.objects):
+    if not drawn and any(obj.type == "VOLUME" and obj.data.filepath for obj in scene.objects):
         drawn.append(time.monotonic())
 
 

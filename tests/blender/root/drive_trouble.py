@@ -33,7 +33,7 @@ def scene() -> bpy.types.Scene:
 
 
 def volumes() -> list[bpy.types.Object]:
-    return [thing for thing in scene().objects if thing.type == "VOLUME"]
+    return [obj for obj in scene().objects if obj.type == "VOLUME"]
 
 
 def press(operator: str, *arguments: object, **settings: object) -> None:
@@ -54,13 +54,13 @@ def end() -> Iterator[float]:
     """Wait until everything has ended; returns how."""
     yield from until(lambda: all(job.outcome in ENDED for job in jobs()))
     yield 0.5
-    (thing,) = volumes() or [None]
+    (obj,) = volumes() or [None]
     return {
         "outcomes": [job.outcome for job in jobs()],
         "sentence": jobs()[-1].sentence,
         "volumes": len(volumes()),
-        "frames": thing and thing.data.frame_duration,
-        "file": thing and Path(bpy.path.abspath(thing.data.filepath)).is_file(),
+        "frames": obj and obj.data.frame_duration,
+        "file": obj and Path(bpy.path.abspath(obj.data.filepath)).is_file(),
     }
 
 

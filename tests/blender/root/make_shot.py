@@ -12,8 +12,8 @@ from tests.example_shot import EXAMPLE, set_up_example
 file, first, last, longest_side = sys.argv[sys.argv.index("--") + 1 :]
 folder = Path(file).parent
 shutil.copytree(EXAMPLE, folder)
-for thing in list(bpy.data.objects):
-    bpy.data.objects.remove(thing)
+for obj in list(bpy.data.objects):
+    bpy.data.objects.remove(obj)
 scene = set_up_example(bpy.context.scene, folder)
 scene.smokelift.first, scene.smokelift.last = int(first), int(last)
 scene.smokelift.longest_side = int(longest_side)

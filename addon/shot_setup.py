@@ -1,6 +1,6 @@
-"""Making the scene look like the clip: its size and speed, its background, its light, its colours.
+"""Set Up Shot: size, speed, background, light and colours of the clip for the Blender scene.
 
-Everything that is made here has a name of its own and is found again by it, so that doing it twice changes nothing.
+Everything made here is found again by its name, so a second set-up changes nothing.
 """
 
 import math
@@ -14,7 +14,8 @@ from mathutils import Matrix, Vector
 from .take import Take
 
 NAME = "Smokelift"
-SENSOR = 36.0
+SENSOR_WIDTH = 36.0
+"""Millimetres; Blender's default."""
 
 
 def match_clip(scene: bpy.types.Scene) -> None:
@@ -30,29 +31,29 @@ def match_clip(scene: bpy.types.Scene) -> None:
 
 
 def set_up(scene: bpy.types.Scene, take: Take, index: dict[str, Any]) -> None:
-    """Make a Cycles render from the camera look like the clip.
+    """Make a Cycles render from the camera match the clip.
 
     Parameters
     ----------
     scene
-        It has the smoke already.
+        Shows the smoke already.
     take, index
-        What the smoke was made from.
+        The take on show, and its `sequence.json`.
     """
     match_clip(scene)
-    scene.camera = guessed_camera(scene, index) or scene.camera
-    _show_clip_behind(scene.camera.data, scene.smokelift.clip)
+    scene.camera = assumed_camera(scene, index) or scene.camera
+    _add_background_clip(scene.camera.data, scene.smokelift.clip)
     if scene.smokelift.light_mode == "ESTIMATE":
         _estimated_sun(scene, index)
-    _plate_world(scene, take, index["scene"])
+    _set_world(scene, take, index["scene"])
     scene.render.engine = "CYCLES"
     scene.view_settings.view_transform = "Standard"
     scene.view_settings.look = "None"
     scene.view_settings.exposure, scene.view_settings.gamma = 0.0, 1.0
 
 
-def guessed_camera(scene: bpy.types.Scene, index: dict[str, Any]) -> bpy.types.Object | None:
-    """The camera that the engine took for granted, made or moved; None if the scene's own was used."""
+def assumed_camera(scene: bpy.types.Scene, index: dict[str, Any]) -> bpy.types.Object | None:
+    """The camera that the engine assumed, made or moved; None if the engine used the scene's own."""
     if scene.smokelift.camera_mode != "GUESS":
         return None
     table = index["scene"]["camera"]
@@ -63,26 +64,26 @@ def guessed_camera(scene: bpy.types.Scene, index: dict[str, Any]) -> bpy.types.O
         scene.collection.objects.link(camera)
     camera.matrix_world = Matrix(table["matrix"])
     camera.data.sensor_fit = "AUTO"
-    camera.data.sensor_width = SENSOR
-    camera.data.lens = table["fx"] * SENSOR / max(table["size"])
+    camera.data.sensor_width = SENSOR_WIDTH
+    camera.data.lens = table["fx"] * SENSOR_WIDTH / max(table["size"])
     if scene.camera is None:
         scene.camera = camera
     return camera
 
 
-def _show_clip_behind(camera: bpy.types.Camera, clip: bpy.types.MovieClip) -> None:
+def _add_background_clip(camera: bpy.types.Camera, clip: bpy.types.MovieClip) -> None:
     camera.show_background_images = True
-    if any(behind.source == "MOVIE_CLIP" and behind.clip == clip for behind in camera.background_images):
+    if any(image.source == "MOVIE_CLIP" and image.clip == clip for image in camera.background_images):
         return
-    behind = camera.background_images.new()
-    behind.source = "MOVIE_CLIP"
-    behind.clip = clip
-    behind.alpha = 1.0
-    behind.display_depth = "BACK"
+    image = camera.background_images.new()
+    image.source = "MOVIE_CLIP"
+    image.clip = clip
+    image.alpha = 1.0
+    image.display_depth = "BACK"
 
 
 def _estimated_sun(scene: bpy.types.Scene, index: dict[str, Any]) -> None:
-    """The light that the engine assumed: it reaches all of the smoke, so it throws no shadows."""
+    """The sun that the engine estimated; it casts shadows where the smoke was fitted with them."""
     table = index["scene"]["lights"][0]
     name = f"{NAME} Light"
     sun = scene.objects.get(name)
@@ -96,8 +97,8 @@ def _estimated_sun(scene: bpy.types.Scene, index: dict[str, Any]) -> None:
     sun.rotation_euler = Vector(table["direction"]).to_track_quat("-Z", "Y").to_euler()
 
 
-def _plate_world(scene: bpy.types.Scene, take: Take, tables: dict[str, Any]) -> None:
-    """A world that shows the camera what is behind the smoke, and lights the smoke as the old one did."""
+def _set_world(scene: bpy.types.Scene, take: Take, tables: dict[str, Any]) -> None:
+    """A world that shows the camera the clean plate, and lights the smoke as the scene's own world does."""
     world = scene.world
     if world is None or not world.name.startswith(NAME):
         if world is None:
@@ -122,34 +123,34 @@ def _plate_world(scene: bpy.types.Scene, take: Take, tables: dict[str, Any]) -> 
         links.new(mix.outputs[0], output.inputs["Surface"])
         rays = nodes.new("ShaderNodeLightPath")
         links.new(rays.outputs["Is Camera Ray"], mix.inputs[0])
-        seen = nodes.new("ShaderNodeBackground")
-        links.new(seen.outputs[0], mix.inputs[2])
-        for node, left in ((rays, 400.0), (seen, 200.0)):
+        background = nodes.new("ShaderNodeBackground")
+        links.new(background.outputs[0], mix.inputs[2])
+        for node, left in ((rays, 400.0), (background, 200.0)):
             node.location = mix.location - Vector((left, 200.0))
-    seen = mix.inputs[2].links[0].from_node
-    picture = _wire_plate(world.node_tree, seen, take, tables.get("background") or {})
-    if picture is not None:
-        _play_plate(picture, scene.smokelift.clip, "matrices" in tables["camera"])
+    background = mix.inputs[2].links[0].from_node
+    plate = _set_plate(world.node_tree, background, take, tables.get("background") or {})
+    if plate is not None:
+        _set_plate_frames(plate, scene.smokelift.clip, "matrices" in tables["camera"])
 
 
-def _wire_plate(
-    tree: bpy.types.NodeTree, seen: bpy.types.ShaderNode, take: Take, background: dict[str, Any]
+def _set_plate(
+    tree: bpy.types.NodeTree, shader: bpy.types.ShaderNode, take: Take, background: dict[str, Any]
 ) -> bpy.types.ShaderNode | None:
-    """Show a clean plate or a colour; returns the plate's node."""
-    colour = seen.inputs["Color"]
+    """Connect the background shader with the clean plate, whose node it returns, or give it a colour."""
+    colour = shader.inputs["Color"]
     if "image" not in background:
         for link in list(colour.links):
             tree.links.remove(link)
         colour.default_value = (*background.get("color", (0.0, 0.0, 0.0)), 1.0)
         return None
     if not colour.links:
-        place = tree.nodes.new("ShaderNodeTexCoord")
-        picture = tree.nodes.new("ShaderNodeTexImage")
-        picture.extension = "EXTEND"
-        tree.links.new(place.outputs["Window"], picture.inputs["Vector"])
-        tree.links.new(picture.outputs["Color"], colour)
-        for node, left in ((picture, 300.0), (place, 500.0)):
-            node.location = seen.location - Vector((left, 0.0))
+        coordinates = tree.nodes.new("ShaderNodeTexCoord")
+        texture = tree.nodes.new("ShaderNodeTexImage")
+        texture.extension = "EXTEND"
+        tree.links.new(coordinates.outputs["Window"], texture.inputs["Vector"])
+        tree.links.new(texture.outputs["Color"], colour)
+        for node, left in ((texture, 300.0), (coordinates, 500.0)):
+            node.location = shader.location - Vector((left, 0.0))
     path = Path(background["image"])
     path = path if path.is_absolute() else take.directory / path
     node = colour.links[0].from_node
@@ -157,15 +158,15 @@ def _wire_plate(
     return node
 
 
-def _play_plate(node: bpy.types.ShaderNode, clip: bpy.types.MovieClip, tracked: bool) -> None:
-    """Let a plate with a picture for every frame play beside the clip."""
+def _set_plate_frames(node: bpy.types.ShaderNode, clip: bpy.types.MovieClip, tracked: bool) -> None:
+    """Keep a plate of many pictures in step with the clip."""
     image, user = node.image, node.image_user
     number = re.search(r"(\d+)\.\w+$", image.filepath)
     if tracked and image.source == "FILE" and number:
         image.source = "SEQUENCE"
     if image.source == "FILE":
         return
-    # Blender counts a sequence's pictures by the numbers in their names, and a video's frames from 1
+    # Blender counts the images of a sequence by the numbers in their names, and the frames of a video from 1
     before = int(number[1]) - 1 if number and image.source == "SEQUENCE" else 0
     user.frame_start, user.frame_duration = clip.frame_start, clip.frame_duration
     user.frame_offset = before + clip.frame_offset

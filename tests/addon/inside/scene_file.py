@@ -11,8 +11,8 @@ import pytest
 from bpy_extras.object_utils import world_to_camera_view
 from mathutils import Euler, Matrix, Vector
 
-from addon import scene as module
-from addon.scene import ShotError, shot_tables, use_frames
+from addon import scene_file as module
+from addon.scene_file import ShotError, shot_tables, use_frames
 from addon.take import Take
 from smokelift.scene import Scene
 from smokelift.scene.projection import project
@@ -185,7 +185,7 @@ def test_a_camera_that_moves_has_a_matrix_for_every_frame(tracked, tmp_path, ang
     for index, frame in enumerate(range(11, 31)):
         tracked.frame_set(frame)
         depsgraph = bpy.context.evaluated_depsgraph_get()
-        wanted = module.turned_world(tracked).inverted() @ tracked.camera.evaluated_get(depsgraph).matrix_world
+        wanted = module.engine_to_world(tracked).inverted() @ tracked.camera.evaluated_get(depsgraph).matrix_world
         np.testing.assert_allclose(camera.matrices[index], wanted, atol=1e-5)
 
 
@@ -368,7 +368,7 @@ def test_a_turned_box_turns_everything_else(shot, tmp_path) -> None:
     box.rotation_euler = (0.2, -0.1, 0.5)
     bpy.context.view_layer.update()
     found = engines(shot, tmp_path)
-    world = module.turned_world(shot)
+    world = module.engine_to_world(shot)
     corners = np.array([world.inverted() @ corner for corner in module.box_corners(box)])
     low, high = corners.min(0), corners.max(0)
     assert (np.array(found.domain.min) <= low + 1e-5).all()
@@ -408,7 +408,7 @@ def test_an_inlet(shot, tmp_path) -> None:
     bpy.context.view_layer.update()
     (found,) = engines(shot, tmp_path).inlets
     assert found.radius == pytest.approx(0.3)
-    assert list(module.turned_world(shot) @ Vector(found.centre)) == pytest.approx([0.1, -0.2, 0.3], abs=1e-6)
+    assert list(module.engine_to_world(shot) @ Vector(found.centre)) == pytest.approx([0.1, -0.2, 0.3], abs=1e-6)
     bpy.data.objects.remove(inlet)
     assert engines(shot, tmp_path).inlets == ()
 

@@ -1,8 +1,8 @@
-"""From the Blender scene to the engine's scene file.
+"""The engine's scene file, from the Blender scene.
 
-Everything is said in the axes of the box that holds the smoke: the engine's voxels are not turned against its
-world, so a box that is turned in Blender turns everything else the other way. Where a box stands upright, as most
-do, both worlds are the same. One Blender unit is a metre.
+The engine's axes are those of the box that holds the smoke, because its voxels lie along its world's axes. A rotated
+box rotates the camera and the lights the other way. Without rotation both worlds are the same. One Blender unit is a
+metre.
 """
 
 import math
@@ -15,79 +15,74 @@ import bpy
 from bpy_extras.object_utils import world_to_camera_view
 from mathutils import Matrix, Vector
 
-LONGEST_SIDE = {"draft": 64, "balanced": 96, "fine": 144}
-"""Voxels along the box's longest side, as the engine has them where it chooses the box itself."""
+from .contract import FEWEST_VOXELS, IMAGE_SUFFIXES, LONGEST_SIDE, PANORAMA_SUFFIXES
 
-FEWEST_VOXELS = 8
 LENS = ("fx", "fy", "cx", "cy")
-POSES = 9
-"""Frames at which the camera is looked at to see whether it moves."""
-
-PICTURES = (".png", ".jpg", ".jpeg", ".exr", ".hdr")
-"""Pictures that the engine reads; it takes any other file for a video."""
+CAMERA_SAMPLES = 9
+"""Frames that decide whether the camera moves."""
 
 
 class ShotError(ValueError):
-    """A shot that cannot be run, and what to do about it, in one sentence."""
+    """A shot that the engine cannot run; says in one sentence what to do."""
 
 
 def shot_tables(scene: bpy.types.Scene, quick: bool = False) -> dict[str, Any]:
-    """Return the tables of a scene file.
+    """The tables of a scene file.
 
     Parameters
     ----------
     scene
-        Its Smokelift settings say what is used of it.
+        Its Smokelift settings decide what is used.
     quick
-        Take things as they are in the current frame, without a look at the others.
+        Read the camera in the current frame only.
 
     Raises
     ------
     ShotError
-        If something is missing or cannot be used.
+        If something is missing or unusable.
     """
     settings = scene.smokelift
     tables: dict[str, Any] = {"clip": clip_table(scene)}
     with _at_frame(scene, scene.frame_current if quick else start_frame(scene)) as depsgraph:
-        turn = Matrix.Identity(3)
+        rotation = Matrix.Identity(3)
         if settings.camera_mode == "SCENE":
             box = box_of(scene)
             if box is None:
-                raise ShotError("Say where the smoke is: press Make Box, and move it so that it holds the smoke.")
-            turn = box.matrix_world.to_quaternion().to_matrix()
-            tables["domain"] = domain_table(box, turn, settings)
-            tables["camera"] = _filmed_by(scene, turn, box_corners(box), quick)
-            inlet = _of(scene, settings.inlet)
+                raise ShotError("The scene has no box: press Make Box, and move it so that it holds the smoke.")
+            rotation = box.matrix_world.to_quaternion().to_matrix()
+            tables["domain"] = domain_table(box, rotation, settings)
+            tables["camera"] = _camera_over_frames(scene, rotation, box_corners(box), quick)
+            inlet = _in_scene(scene, settings.inlet)
             if inlet is not None:
-                tables["inlet"] = [inlet_table(inlet.evaluated_get(depsgraph), turn, tables["domain"])]
+                tables["inlet"] = [inlet_table(inlet.evaluated_get(depsgraph), rotation, tables["domain"])]
         if settings.use_medium:
             tables["medium"] = {key: getattr(settings, key) for key in ("extinction", "albedo", "anisotropy")}
         if settings.light_mode == "SCENE":
-            tables["lights"] = light_tables(scene, depsgraph, turn)
-            _check_outside(tables)
+            tables["lights"] = light_tables(scene, depsgraph, rotation)
+            _require_lights_outside(tables)
         if settings.floor:
             tables.setdefault("domain", {})["closed"] = ["z-"]
     if settings.plate_mode == "FILE":
         plate = _existing(settings.plate, "clean plate")
         if "matrices" in tables.get("camera", {}):
-            _check_changes(Path(plate))
+            _require_moving_plate(Path(plate))
         tables["background"] = {"image": plate}
     return tables
 
 
 def options(scene: bpy.types.Scene) -> list[str]:
-    """The engine's options that are no part of the scene file."""
+    """The engine's options that the scene file does not hold."""
     settings = scene.smokelift
     words = ["--quality", settings.quality, "--device", settings.device]
     if settings.camera_mode == "SCENE" and not settings.longest_side:
-        words += ["--resolution", "auto"]  # in the box, as fine as the clip's detail
+        words += ["--resolution", "auto"]  # the engine measures the clip's detail
     if settings.use_axis_depth:
         words.append(f"--axis-depth={settings.axis_depth:g}")  # one word, for "-1e-05" alone is an option
     return words
 
 
-def turned_world(scene: bpy.types.Scene) -> Matrix:
-    """The engine's axes in Blender's world (4x4): how the result is placed."""
+def engine_to_world(scene: bpy.types.Scene) -> Matrix:
+    """The matrix (4x4) from the engine's world to Blender's."""
     settings = scene.smokelift
     box = box_of(scene) if settings.camera_mode == "SCENE" else None
     return Matrix.Identity(4) if box is None else box.matrix_world.to_quaternion().to_matrix().to_4x4()
@@ -97,12 +92,12 @@ def turned_world(scene: bpy.types.Scene) -> Matrix:
 
 
 def clip_path(clip: bpy.types.MovieClip) -> Path:
-    """Where a clip lies."""
+    """The absolute path of a clip."""
     return Path(bpy.path.abspath(clip.filepath, library=clip.library))
 
 
 def clip_table(scene: bpy.types.Scene) -> dict[str, Any]:
-    """The clip and the frames of it that are used, counted from 0."""
+    """The clip and its used frames, counted from 0."""
     settings = scene.smokelift
     clip = settings.clip
     if clip is None:
@@ -152,14 +147,14 @@ def frame_rate(scene: bpy.types.Scene) -> float:
 
 
 def start_frame(scene: bpy.types.Scene) -> int:
-    """The scene's frame in which the first used frame of the clip is seen."""
+    """The scene's frame that shows the first used frame of the clip."""
     settings = scene.smokelift
     return settings.clip.frame_start + settings.first - 1
 
 
 def _existing(path: str, what: str) -> str:
     if not path:
-        raise ShotError(f"Choose the {what}, or let it be found from the clip.")
+        raise ShotError(f"Choose the {what}, or choose From the Clip.")
     absolute = Path(bpy.path.abspath(path))
     if not absolute.is_file():
         raise ShotError(f"The {what} {absolute} is not there: choose it again.")
@@ -170,18 +165,18 @@ def _existing(path: str, what: str) -> str:
 
 
 def camera_table(
-    scene: bpy.types.Scene, camera: bpy.types.Object, depsgraph: bpy.types.Depsgraph, turn: Matrix
+    scene: bpy.types.Scene, camera: bpy.types.Object, depsgraph: bpy.types.Depsgraph, rotation: Matrix
 ) -> dict[str, Any]:
     """The camera as a pinhole (or orthographic) camera of the clip's size.
 
     Parameters
     ----------
     scene
-        For the clip, and for the pixels' shape.
+        Gives the clip and the pixel aspect.
     camera, depsgraph
-        Evaluated at the frame that counts.
-    turn
-        The engine's axes (3x3).
+        Evaluated in the frame that counts.
+    rotation
+        From the engine's axes to Blender's (3x3).
     """
     width, height = scene.smokelift.clip.size
     render = scene.render
@@ -196,8 +191,8 @@ def camera_table(
     skew = max(abs(axes.col[i].dot(axes.col[j])) for i, j in ((0, 1), (0, 2), (1, 2)))
     if skew > 1e-4 or axes.determinant() < 0.0:
         raise ShotError("The camera is skewed or mirrored by the scale of its parents: apply their scale.")
-    pose = turn.to_4x4().inverted() @ Matrix.Translation(camera.matrix_world.translation) @ axes.to_4x4()
-    # Blender's own matrix knows every fit, shift and aspect; it sends the picture's edges to -1 and 1.
+    pose = rotation.to_4x4().inverted() @ Matrix.Translation(camera.matrix_world.translation) @ axes.to_4x4()
+    # Blender's projection matrix holds sensor fit, shift and pixel aspect; it maps the image's edges to -1 and 1.
     lens = camera.calc_matrix_camera(
         depsgraph,
         x=width,
@@ -224,82 +219,82 @@ def _camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> bpy.types
     return scene.camera.evaluated_get(depsgraph)
 
 
-def _filmed_by(scene: bpy.types.Scene, turn: Matrix, corners: list[Vector], quick: bool) -> dict[str, Any]:
-    """The camera's table: its matrix, or that of every used frame if it moves.
+def _camera_over_frames(scene: bpy.types.Scene, rotation: Matrix, corners: list[Vector], quick: bool) -> dict[str, Any]:
+    """The camera's table: one matrix, or one for every used frame if the camera moves.
 
-    To look at a frame costs an evaluation of the whole scene, so a few have to do for a camera that stands still.
+    Each frame costs an evaluation of the whole scene, so a few frames decide whether the camera moves.
 
     Parameters
     ----------
-    scene, turn
-        As `camera_table` has them.
+    scene, rotation
+        As in `camera_table`.
     corners
         Of the box, in the world.
     quick
-        The current frame has to do.
+        Read the current frame only.
     """
     start, length = start_frame(scene), scene.smokelift.last - scene.smokelift.first
-    frames = [start + round(step * length / (POSES - 1)) for step in range(POSES)]
-    looks = _looks(scene, [scene.frame_current] if quick else sorted(set(frames)), turn, corners)
-    first = looks[0][0]
+    frames = [start + round(step * length / (CAMERA_SAMPLES - 1)) for step in range(CAMERA_SAMPLES)]
+    samples = _sample_camera(scene, [scene.frame_current] if quick else sorted(set(frames)), rotation, corners)
+    first = samples[0][0]
     size = max((a - b).length for a in corners for b in corners)
-    moves = any(_moved(table["matrix"], first["matrix"], size) for table, _ in looks)
+    moves = any(_moved(table["matrix"], first["matrix"], size) for table, _ in samples)
     if moves:
-        looks = _looks(scene, list(range(start, start + length + 1)), turn, corners)
-    if any(abs(table[key] - first[key]) > 1e-4 * max(table["size"]) for table, _ in looks for key in LENS):
+        samples = _sample_camera(scene, list(range(start, start + length + 1)), rotation, corners)
+    if any(abs(table[key] - first[key]) > 1e-4 * max(table["size"]) for table, _ in samples for key in LENS):
         raise ShotError(
             "The camera zooms during the clip, and only footage with one focal length can be used: choose frames in "
             "which its lens does not change."
         )
-    if not any(seen for _, seen in looks):
+    if not any(visible for _, visible in samples):
         raise ShotError("The box is not in the camera's picture: move it there, or press Frame Box.")
     if not moves:
         return first
-    matrices = [table["matrix"] for table, _ in looks]
+    matrices = [table["matrix"] for table, _ in samples]
     return {**{key: value for key, value in first.items() if key != "matrix"}, "matrices": matrices}
 
 
-def _looks(
-    scene: bpy.types.Scene, frames: list[int], turn: Matrix, corners: list[Vector]
+def _sample_camera(
+    scene: bpy.types.Scene, frames: list[int], rotation: Matrix, corners: list[Vector]
 ) -> list[tuple[dict[str, Any], bool]]:
-    """The still camera of each of some frames, and whether the box is in its picture."""
-    looks = []
+    """The camera's table in each frame, and whether the box is in its picture."""
+    samples = []
     with _at_frame(scene, frames[0]) as depsgraph:
         for frame in frames:
             if frame != scene.frame_current:
                 scene.frame_set(frame)
             camera = _camera(scene, depsgraph)
-            looks.append((camera_table(scene, camera, depsgraph, turn), _sees(scene, camera, corners)))
-    return looks
+            samples.append((camera_table(scene, camera, depsgraph, rotation), _in_picture(scene, camera, corners)))
+    return samples
 
 
 def _moved(pose: list[list[float]], before: list[list[float]], size: float) -> bool:
-    """Whether a camera was carried or turned by more than the eye would notice at something of a size."""
+    """Whether the camera moved by 0.1% of the box's size, or rotated by 0.001 rad."""
     matrix, other = Matrix(pose), Matrix(before)
-    carried = (matrix.translation - other.translation).length > 1e-3 * size
-    return carried or matrix.to_quaternion().rotation_difference(other.to_quaternion()).angle > 1e-3
+    shifted = (matrix.translation - other.translation).length > 1e-3 * size
+    return shifted or matrix.to_quaternion().rotation_difference(other.to_quaternion()).angle > 1e-3
 
 
-def _check_changes(plate: Path) -> None:
-    """Refuse a single picture as clean plate of a camera that moves."""
-    if plate.suffix.lower() in PICTURES and not plate.stem[-1].isdigit():
+def _require_moving_plate(plate: Path) -> None:
+    """Refuse a single picture as the clean plate of a moving camera."""
+    if plate.suffix.lower() in IMAGE_SUFFIXES and not plate.stem[-1].isdigit():
         raise ShotError(
             "The camera moves, and one picture cannot show what is behind the smoke all the time: choose a video, or "
             "the first of a sequence of pictures, with a clean plate for every frame of the clip."
         )
 
 
-def _sees(scene: bpy.types.Scene, camera: bpy.types.Object, corners: list[Vector]) -> bool:
-    """False for a box that lies wholly beside the picture or behind the camera."""
-    places = [world_to_camera_view(scene, camera, corner) for corner in corners]
-    beside = (
-        all(p.z <= 0.0 for p in places),
-        all(p.x < 0.0 for p in places),
-        all(p.x > 1.0 for p in places),
-        all(p.y < 0.0 for p in places),
-        all(p.y > 1.0 for p in places),
+def _in_picture(scene: bpy.types.Scene, camera: bpy.types.Object, corners: list[Vector]) -> bool:
+    """False for a box that lies wholly outside the picture or behind the camera."""
+    points = [world_to_camera_view(scene, camera, corner) for corner in corners]
+    outside = (
+        all(p.z <= 0.0 for p in points),
+        all(p.x < 0.0 for p in points),
+        all(p.x > 1.0 for p in points),
+        all(p.y < 0.0 for p in points),
+        all(p.y > 1.0 for p in points),
     )
-    return not (beside[0] or (any(beside) and all(p.z > 0.0 for p in places)))
+    return not (outside[0] or (any(outside) and all(p.z > 0.0 for p in points)))
 
 
 # box
@@ -307,12 +302,12 @@ def _sees(scene: bpy.types.Scene, camera: bpy.types.Object, corners: list[Vector
 
 def box_of(scene: bpy.types.Scene) -> bpy.types.Object | None:
     """The box that holds the smoke."""
-    return _of(scene, scene.smokelift.box)
+    return _in_scene(scene, scene.smokelift.box)
 
 
-def _of(scene: bpy.types.Scene, thing: bpy.types.Object | None) -> bpy.types.Object | None:
-    """An object of the scene; a deleted one, which a setting keeps in the file, does not count."""
-    return thing if thing is not None and thing.name in scene.objects else None
+def _in_scene(scene: bpy.types.Scene, obj: bpy.types.Object | None) -> bpy.types.Object | None:
+    """The object if the scene holds it. A setting still refers to an object that was deleted."""
+    return obj if obj is not None and obj.name in scene.objects else None
 
 
 def box_corners(box: bpy.types.Object) -> list[Vector]:
@@ -320,10 +315,10 @@ def box_corners(box: bpy.types.Object) -> list[Vector]:
     return [box.matrix_world @ Vector(corner) for corner in box.bound_box]
 
 
-def domain_table(box: bpy.types.Object, turn: Matrix, settings: bpy.types.PropertyGroup) -> dict[str, Any]:
-    """The box in cubic voxels, whole blocks of four of them: it grows a little, but keeps its floor."""
-    back = turn.inverted()
-    corners = [back @ corner for corner in box_corners(box)]
+def domain_table(box: bpy.types.Object, rotation: Matrix, settings: bpy.types.PropertyGroup) -> dict[str, Any]:
+    """The domain: the box in cubic voxels, a multiple of four along each side. It grows and keeps its floor."""
+    to_engine = rotation.inverted()
+    corners = [to_engine @ corner for corner in box_corners(box)]
     low = Vector(min(corner[axis] for corner in corners) for axis in range(3))
     high = Vector(max(corner[axis] for corner in corners) for axis in range(3))
     extent = high - low
@@ -341,12 +336,12 @@ def domain_table(box: bpy.types.Object, turn: Matrix, settings: bpy.types.Proper
     }
 
 
-def inlet_table(inlet: bpy.types.Object, turn: Matrix, domain: dict[str, Any]) -> dict[str, Any]:
-    """The ball around an Empty that is as large as the Empty is drawn."""
-    centre = turn.inverted() @ inlet.matrix_world.translation
+def inlet_table(inlet: bpy.types.Object, rotation: Matrix, domain: dict[str, Any]) -> dict[str, Any]:
+    """A ball, as large as the Empty is drawn."""
+    centre = rotation.inverted() @ inlet.matrix_world.translation
     radius = inlet.empty_display_size * max(abs(scale) for scale in inlet.matrix_world.to_scale())
     if radius <= 0.0:
-        raise ShotError("The inlet has no size: scale the Empty up.")
+        raise ShotError("The inlet has no size: scale up its Empty.")
     sides = zip(domain["min"], centre, domain["max"], strict=True)
     if (centre - Vector(min(max(place, low), high) for low, place, high in sides)).length > radius:
         raise ShotError("The inlet is outside the box: move it to where the smoke enters.")
@@ -356,54 +351,54 @@ def inlet_table(inlet: bpy.types.Object, turn: Matrix, domain: dict[str, Any]) -
 # lights
 
 
-def light_tables(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, turn: Matrix) -> list[dict[str, Any]]:
+def light_tables(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, rotation: Matrix) -> list[dict[str, Any]]:
     """The scene's suns and point lights, and the picture that lights its world."""
-    back = turn.inverted()
+    to_engine = rotation.inverted()
     tables = []
-    others = []
-    for thing in scene.objects:
-        if thing.type != "LIGHT" or thing.hide_render:
+    unusable = []
+    for obj in scene.objects:
+        if obj.type != "LIGHT" or obj.hide_render:
             continue
-        light = thing.data
-        matrix = thing.evaluated_get(depsgraph).matrix_world
+        light = obj.data
+        matrix = obj.evaluated_get(depsgraph).matrix_world
         if light.type == "SUN":
-            direction = back @ -matrix.to_3x3().col[2].normalized()
+            direction = to_engine @ -matrix.to_3x3().col[2].normalized()
             tables.append({"type": "directional", "direction": list(direction), "irradiance": sun_irradiance(light)})
         elif light.type == "POINT":
-            position = back @ matrix.translation
+            position = to_engine @ matrix.translation
             tables.append({"type": "point", "position": list(position), "intensity": point_intensity(light)})
         else:
-            others.append(thing.name)
-    tables += _world_tables(scene, turn)
+            unusable.append(obj.name)
+    tables += _world_tables(scene, rotation)
     if not tables:
-        unusable = f" ({', '.join(others)} cannot be used)" if others else ""
+        others = f" ({', '.join(unusable)} cannot be used)" if unusable else ""
         raise ShotError(
-            f"The scene has no sun, point light or world picture{unusable}: add one, or choose light From the Clip."
+            f"The scene has no sun, point light or world picture{others}: add one, or choose light From the Clip."
         )
     return tables
 
 
 def sun_irradiance(light: bpy.types.Light) -> list[float]:
-    """Irradiance (W/m2) of a sun: what Blender calls its strength is just that."""
+    """Irradiance (W/m^2) of a sun, red, green and blue: Blender's strength."""
     return [light.energy * part for part in _emitted(light)]
 
 
 def point_intensity(light: bpy.types.Light) -> list[float]:
-    """Intensity (W/sr) of a point light: its power goes evenly into all directions."""
+    """Intensity (W/sr) of a point light, red, green and blue: its power over the sphere's 4 pi."""
     return [light.energy * part / (4 * math.pi) for part in _emitted(light)]
 
 
 def _emitted(light: bpy.types.Light) -> list[float]:
-    """Colour of a light with everything that multiplies its power; older versions lack some of it."""
+    """Strength in red, green and blue. Older versions of Blender lack exposure and temperature."""
     factor = 2.0 ** getattr(light, "exposure", 0.0)
     warmth = light.temperature_color if getattr(light, "use_temperature", False) else (1.0, 1.0, 1.0)
     return [factor * a * b for a, b in zip(light.color, warmth, strict=True)]
 
 
-def _world_tables(scene: bpy.types.Scene, turn: Matrix) -> list[dict[str, Any]]:
-    """The equirectangular picture that is wired to the world's background, if there is one.
+def _world_tables(scene: bpy.types.Scene, rotation: Matrix) -> list[dict[str, Any]]:
+    """The equirectangular picture of the world's background, if there is one.
 
-    Its rotation is what Blender applies to a direction before it is looked up; a box that is turned adds its own.
+    Blender rotates a direction before it reads the picture; a rotated box adds its own rotation.
     """
     world = scene.world
     if world is None or world.node_tree is None:
@@ -416,13 +411,13 @@ def _world_tables(scene: bpy.types.Scene, turn: Matrix) -> list[dict[str, Any]]:
         if source is None or source.type != "TEX_ENVIRONMENT" or source.image is None or strength == 0.0:
             continue
         path = Path(bpy.path.abspath(source.image.filepath, library=source.image.library))
-        if source.projection != "EQUIRECTANGULAR" or path.suffix.lower() not in (".exr", ".hdr"):
+        if source.projection != "EQUIRECTANGULAR" or path.suffix.lower() not in PANORAMA_SUFFIXES:
             raise ShotError(
                 f"The world's picture {source.image.name} cannot be used: it has to be an .exr or .hdr panorama."
             )
         if not path.is_file():
             raise ShotError(f"The world's picture {path} is not there: choose it again, or unpack it.")
-        yaw, tilt = _yaw(_mapping(source) @ turn)
+        yaw, tilt = _yaw(_mapping(source) @ rotation)
         if tilt > 1e-3:
             raise ShotError("The box is tilted against the world's picture: stand it upright, or choose other lights.")
         return [
@@ -432,22 +427,22 @@ def _world_tables(scene: bpy.types.Scene, turn: Matrix) -> list[dict[str, Any]]:
 
 
 def _mapping(texture: bpy.types.ShaderNode) -> Matrix:
-    """Rotation (3x3) that a Mapping node applies to directions before they are looked up."""
+    """Rotation (3x3) of a texture's Mapping node."""
     links = texture.inputs["Vector"].links
     node = links[0].from_node if links else None
     if node is None or node.type != "MAPPING":
         return Matrix.Identity(3)
-    turn = node.inputs["Rotation"].default_value.to_matrix()
-    return turn.inverted() if node.vector_type == "TEXTURE" else turn
+    rotation = node.inputs["Rotation"].default_value.to_matrix()
+    return rotation.inverted() if node.vector_type == "TEXTURE" else rotation
 
 
-def _yaw(turn: Matrix) -> tuple[float, float]:
-    """Angle of a rotation about Z, and how far it tilts Z (radians)."""
-    up = turn @ Vector((0.0, 0.0, 1.0))
-    return math.atan2(turn[1][0], turn[0][0]), up.angle(Vector((0.0, 0.0, 1.0)))
+def _yaw(rotation: Matrix) -> tuple[float, float]:
+    """Angle of a rotation about Z, and the tilt of Z (radians)."""
+    up = rotation @ Vector((0.0, 0.0, 1.0))
+    return math.atan2(rotation[1][0], rotation[0][0]), up.angle(Vector((0.0, 0.0, 1.0)))
 
 
-def _check_outside(tables: dict[str, Any]) -> None:
+def _require_lights_outside(tables: dict[str, Any]) -> None:
     """Refuse a point light inside the box."""
     domain = tables.get("domain")
     for light in tables["lights"]:
@@ -460,7 +455,7 @@ def _check_outside(tables: dict[str, Any]) -> None:
 
 @contextmanager
 def _at_frame(scene: bpy.types.Scene, frame: int) -> Iterator[bpy.types.Depsgraph]:
-    """The scene as it is in a frame; afterwards it is where it was."""
+    """The scene evaluated in a frame; restores the current frame afterwards."""
     before, fraction = scene.frame_current, scene.frame_subframe
     if frame != before:
         scene.frame_set(frame)

@@ -1,0 +1,26 @@
+"""What the add-on repeats of the engine, which it may not import. Knows nothing of Blender.
+
+`tests/addon/test_contract.py` holds every value to the engine's own. The panel's choices and defaults stand in
+`properties`, because Blender has to know them without a process; `tests/addon/inside/register.py` holds those.
+"""
+
+DONE, BAD_INPUT, CANCELLED = 0, 2, 130
+"""Exit statuses of the command line; 3 is a missing device or too little memory."""
+
+INDEX_FILE = "sequence.json"
+"""In a sequence's directory: scene, settings and finished frames."""
+
+FRAME_FILE = "smoke_{:04d}.vdb"
+"""In a sequence's directory, by frame number from 1."""
+
+LONGEST_SIDE = {"draft": 64, "balanced": 96, "fine": 144}
+"""Voxels along the box's longest side, at most, by quality."""
+
+FEWEST_VOXELS = 8
+"""Voxels along any side, at least."""
+
+IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".exr", ".hdr")
+"""Pictures that the engine reads. It takes any other file for a video."""
+
+PANORAMA_SUFFIXES = (".exr", ".hdr")
+"""Pictures that the engine takes as an environment light."""

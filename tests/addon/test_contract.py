@@ -1,0 +1,38 @@
+"""What the add-on repeats of the engine is the engine's own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from addon import contract
+from smokelift.app import cli
+from smokelift.footage.images import READABLE
+from smokelift.scene import EnvironmentLight, SceneError
+from smokelift.setup.settings import LONGEST_SIDE, Settings
+
+
+def test_exit_statuses() -> None:
+    """Done, bad input, cancelled."""
+    assert (contract.DONE, contract.BAD_INPUT, contract.CANCELLED) == (cli.DONE, cli.BAD_INPUT, cli.CANCELLED)
+
+
+def test_resolutions() -> None:
+    """Of every quality, in the order of the qualities, and the least that is accepted."""
+    assert list(contract.LONGEST_SIDE.items()) == list(LONGEST_SIDE.items())
+    fewest = contract.FEWEST_VOXELS
+    Settings.preset("draft", "default", (fewest,) * 3)
+    with pytest.raises(ValueError, match="resolution"):
+        Settings.preset("draft", "default", (fewest, fewest, fewest - 1))
+
+
+def test_pictures() -> None:
+    """Those that are read, and those that light a scene."""
+    assert contract.IMAGE_SUFFIXES == READABLE
+    for suffix in contract.IMAGE_SUFFIXES:
+        if suffix in contract.PANORAMA_SUFFIXES:
+            EnvironmentLight(Path(f"sky{suffix}"))
+        else:
+            with pytest.raises(SceneError, match="image"):
+                EnvironmentLight(Path(f"sky{suffix}"))
