@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from mathutils import Vector
 
-from addon import look, run, volume
+from addon import run, shot_setup, volume
 from addon.scene_file import box_corners
 from addon.take import Take
 from conftest import quietly, rendered
@@ -138,7 +138,7 @@ def test_the_plate_of_a_moving_camera_plays_beside_the_clip(shot, tmp_path, kind
     obj = volume.show(shot, take)
     places = []
     for _ in range(2):
-        look.set_up(shot, take, index)
+        shot_setup.set_up(shot, take, index)
     shot.render.resolution_x, shot.render.resolution_y, shot.cycles.samples = 16, 24, 1
     for frame in (2, 5):
         shot.frame_set(frame)
