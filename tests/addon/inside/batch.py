@@ -31,7 +31,7 @@ def saved(shot, tmp_path) -> Path:
     """The shot as a file, small and short."""
     settings = shot.smokelift
     settings.first, settings.last, settings.longest_side = 27, 30, 32
-    shot.cycles.samples, shot.render.resolution_percentage = 1, 25
+    shot.render.resolution_percentage, shot.cycles.samples, shot.cycles.use_denoising = 25, 1, False
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
     return tmp_path / "shot.blend"
 

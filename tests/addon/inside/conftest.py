@@ -27,8 +27,11 @@ def blender(tmp_path, monkeypatch) -> Iterator[Any]:
 
 @pytest.fixture
 def scene(blender) -> bpy.types.Scene:
-    """The empty scene."""
-    return bpy.context.scene
+    """The empty scene; Cycles marches through volumes, which is ten times as fast as its default since Blender 5.0."""
+    scene = bpy.context.scene
+    if hasattr(scene.cycles, "volume_biased"):
+        scene.cycles.volume_biased = True
+    return scene
 
 
 @pytest.fixture

@@ -87,6 +87,8 @@ def look_alike(scene: bpy.types.Scene, folder: Path) -> tuple[float, float]:
 
 def test_everything_known(shot, kept, tmp_path) -> None:
     """Camera, box, sun and plate: frames, place and material are the engine's, and a render looks like the clip."""
+    if hasattr(shot.cycles, "volume_biased"):
+        shot.cycles.volume_biased = False  # as an artist has it
     row = make(shot, kept)
     assert (row.outcome, row.done, row.total) == ("done", 4, 4)
     sequence = Sequence.open(kept / "take_0001")
