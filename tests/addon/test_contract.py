@@ -9,6 +9,7 @@ import pytest
 from addon import contract
 from smokelift.app import cli
 from smokelift.footage.images import READABLE
+from smokelift.output.layout import INDEX, frame_path
 from smokelift.scene import EnvironmentLight, SceneError
 from smokelift.setup.settings import LONGEST_SIDE, Settings
 
@@ -16,6 +17,12 @@ from smokelift.setup.settings import LONGEST_SIDE, Settings
 def test_exit_statuses() -> None:
     """Done, bad input, cancelled."""
     assert (contract.DONE, contract.BAD_INPUT, contract.CANCELLED) == (cli.DONE, cli.BAD_INPUT, cli.CANCELLED)
+
+
+def test_files_of_a_sequence() -> None:
+    """The index, and a frame."""
+    assert contract.INDEX_FILE == INDEX
+    assert contract.FRAME_FILE.format(12) == frame_path(Path(), 12, "vdb").name
 
 
 def test_resolutions() -> None:
