@@ -1,4 +1,7 @@
-"""Where a frame shows smoke: its deviation from the background, in units of the clip's noise."""
+"""Where a frame shows smoke: its deviation from the background, in units of the clip's noise.
+
+How much the constants matter: docs/experiments/background-plate.md.
+"""
 
 from __future__ import annotations
 

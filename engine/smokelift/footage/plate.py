@@ -20,7 +20,8 @@ from smokelift.footage.noise import (
 )
 
 SMOKE_TO_NOISE = 3.0
-"""Deviation over time, in units of the clear pixels' noise, above which it is smoke and not noise."""
+"""Deviation over time, in units of the clear pixels' noise, above which it is smoke and not noise
+(docs/experiments/background-plate.md)."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,7 @@ from its neighbours. What never moves, a nozzle or a perfectly steady jet, is ba
 A camera that moves shows another part of the background in every frame, so a pixel has no value of its own: the
 background has to be of one colour, or known frame by frame.
 
-What the constants were chosen on: docs/experiments/background-plate.md.
+How much the constants matter: docs/experiments/background-plate.md.
 """
 
 from __future__ import annotations
