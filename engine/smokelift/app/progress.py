@@ -1,4 +1,4 @@
-"""What a long job says while it runs: a bar for people, one JSON object a line for programs."""
+"""What a command says while it runs: a bar for people, one JSON object a line for programs."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from types import TracebackType
 from typing import Any, Literal, Protocol
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 Style = Literal["text", "json"]
 
@@ -57,7 +57,7 @@ class _Text:
             console=self._console,
             speed_estimate_period=120,
         )
-        self._task: TaskID | None = None
+        self._task = self._bar.add_task("frames", start=False, fit="")
 
     def __enter__(self) -> _Text:
         return self
@@ -68,18 +68,18 @@ class _Text:
         self._stop()
 
     def _stop(self) -> None:
-        if self._task is not None:  # a bar that never started would leave an empty line
+        if self._bar.live.is_started:  # a bar that never started would leave an empty line
             self._bar.stop()
 
     def note(self, text: str) -> None:
         self._console.print(text, markup=False, soft_wrap=True)
 
     def start(self, total: int, done: int) -> None:
+        self._bar.update(self._task, total=total, completed=done)
+        self._bar.start_task(self._task)
         self._bar.start()
-        self._task = self._bar.add_task("frames", total=total, completed=done, fit="")
 
     def frame(self, number: int, figures: Mapping[str, Any]) -> None:
-        assert self._task is not None
         fit = f"fit {figures['psnr']:.1f} dB" if figures["hull_share"] > 0 else "no smoke"
         self._bar.update(self._task, advance=1, fit=fit)
 

@@ -1,22 +1,36 @@
-"""What is installed, what runs here, and what is missing: the answer to most questions before they are asked."""
+"""``smokelift doctor``: versions, devices and what is missing."""
 
 from __future__ import annotations
 
+import argparse
 import os
 import platform
 from importlib import metadata
+from typing import Any
 
 import psutil
 
 from smokelift import __version__, _core
+from smokelift.app.progress import Reporter
 from smokelift.output.vdb import VdbUnavailable, vdb_module
 from smokelift.render import device
 
 LIBRARIES = ("numpy", "scipy", "taichi", "av", "OpenEXR", "pillow")
 
 
-def report() -> list[str]:
-    """Lines about versions, devices and what is missing."""
+def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
+    """Add the command."""
+    parser = commands.add_parser("doctor", parents=[common], help="versions, devices and what is missing")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace, say: Reporter) -> None:
+    """Say line by line what is there."""
+    for line in _report():
+        say.note(line)
+
+
+def _report() -> list[str]:
     lines = [
         f"smokelift {__version__}, Python {platform.python_version()}, {platform.system()} {platform.machine()}",
         "libraries: " + ", ".join(f"{name} {metadata.version(name)}" for name in LIBRARIES),

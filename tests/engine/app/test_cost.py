@@ -1,4 +1,4 @@
-"""Memory: a grid that does not fit is refused before it is made, with one that fits."""
+"""Costs: what a run takes; a grid that does not fit is refused before it is made, with one that fits."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from smokelift.app import memory
-from smokelift.app.memory import NotEnoughMemoryError, needed, require_memory
+from smokelift.app import cost
+from smokelift.app.cost import NotEnoughMemoryError, estimate_cost, memory_needed, require_memory
 from smokelift.scene import Domain
 
 DOMAINS = {
@@ -21,7 +21,7 @@ DOMAINS = {
 
 def free(monkeypatch: pytest.MonkeyPatch, gigabytes: float) -> None:
     there = SimpleNamespace(available=int(gigabytes * 2**30))
-    monkeypatch.setattr(memory.psutil, "virtual_memory", lambda: there)
+    monkeypatch.setattr(cost.psutil, "virtual_memory", lambda: there)
 
 
 def suggestion(domain: Domain) -> tuple[int, int, int]:
@@ -35,8 +35,8 @@ def suggestion(domain: Domain) -> tuple[int, int, int]:
 
 def test_more_voxels_need_more() -> None:
     """Eight times the voxels need up to eight times the memory, and nothing is free."""
-    assert needed((8, 8, 8)) > 0
-    assert 4 * needed((128, 128, 128)) < needed((256, 256, 256)) < 8 * needed((128, 128, 128))
+    assert memory_needed((8, 8, 8)) > 0
+    assert 4 * memory_needed((128, 128, 128)) < memory_needed((256, 256, 256)) < 8 * memory_needed((128, 128, 128))
 
 
 def test_what_fits_is_accepted(monkeypatch) -> None:
@@ -51,7 +51,7 @@ def test_the_suggestion_fits(monkeypatch, domain, gigabytes) -> None:
     """The named resolution is accepted at once, and is smaller than what was refused."""
     free(monkeypatch, gigabytes)
     smaller = suggestion(domain)
-    assert needed(smaller) <= gigabytes * 2**30
+    assert memory_needed(smaller) <= gigabytes * 2**30
     assert all(a < b for a, b in zip(smaller, domain.resolution, strict=True))
 
 
@@ -76,3 +76,13 @@ def test_nothing_fits_is_said_too(monkeypatch) -> None:
     with pytest.raises(NotEnoughMemoryError) as caught:
         require_memory(DOMAINS["cube"])
     assert "the largest that fits" not in str(caught.value)
+
+
+def test_more_frames_views_and_voxels_cost_more() -> None:
+    """Time and disk follow them; memory follows the voxels only."""
+    base = estimate_cost(DOMAINS["cube"], 10, "balanced")
+    longer = estimate_cost(DOMAINS["cube"], 1000, "balanced")
+    assert longer.disk == 100 * base.disk == 1000 * 128**3 * 8
+    assert longer.memory == base.memory < estimate_cost(DOMAINS["paper"], 10, "balanced").memory
+    assert longer.seconds > 10 * base.seconds
+    assert estimate_cost(DOMAINS["cube"], 1000, "balanced", further_views=20).seconds > 2 * longer.seconds

@@ -1,0 +1,10 @@
+"""The commands of the command line, a module each.
+
+A module's `add_parser` adds the command with its options to the parser; the option ``run`` is what runs it.
+"""
+
+from smokelift.app.commands import bench, chart, doctor, evaluate, inspect, preview, reconstruct, render
+
+COMMANDS = tuple(
+    module.add_parser for module in (reconstruct, inspect, render, preview, evaluate, chart, doctor, bench)
+)

@@ -1,0 +1,26 @@
+"""``smokelift chart``: speed against accuracy, from measured runs."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from smokelift.app.options import require_folder
+from smokelift.app.progress import Reporter
+from smokelift.evaluation.speed_accuracy_chart import draw, read_runs
+
+
+def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
+    """Add the command."""
+    parser = commands.add_parser("chart", parents=[common], help="speed against accuracy, from measured runs")
+    parser.add_argument("csv", type=Path, help="written by python -m benchmarks.accuracy")
+    parser.add_argument("--out", type=Path, required=True, metavar="chart.png")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace, say: Reporter) -> None:
+    """Draw the chart."""
+    require_folder(options.out)
+    draw(read_runs(options.csv), options.out)
+    say.finish(f"{options.out} written.", {"file": str(options.out)})

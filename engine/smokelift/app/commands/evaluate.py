@@ -1,0 +1,57 @@
+"""``smokelift evaluate``: a sequence beside the truth, or beside other views."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+from smokelift.app.options import require_folder
+from smokelift.app.progress import Reporter
+from smokelift.evaluation.evaluate import evaluate
+from smokelift.output.atomic import atomic_path
+from smokelift.output.sequence import Sequence
+from smokelift.render import device
+
+
+def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
+    """Add the command."""
+    parser = commands.add_parser(
+        "evaluate", parents=[common], help="a sequence beside the truth, or beside other views"
+    )
+    parser.add_argument("directory", type=Path)
+    parser.add_argument("--truth", type=Path, metavar="truth.npz", help="known densities and velocities")
+    parser.add_argument(
+        "--view",
+        type=Path,
+        nargs=2,
+        action="append",
+        default=[],
+        metavar=("camera.toml", "clip.mp4"),
+        help="another camera and its clip; may be repeated",
+    )
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures there, not on standard output")
+    parser.add_argument("--picture", type=Path, metavar="FILE.png", help="truth and sequence side by side")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace, say: Reporter) -> None:
+    """Compare, and write the figures and a picture."""
+    if options.truth is None and not options.view:
+        raise ValueError("Say what to compare with: --truth truth.npz, or --view camera.toml clip.mp4.")
+    for path in (options.json, options.picture):
+        require_folder(path)
+    if options.picture is not None and options.picture.suffix.lower() != ".png":
+        raise ValueError(f"{options.picture}: the picture is written as .png.")
+    sequence = Sequence.open(options.directory)
+    device.start(options.device)
+    found = evaluate(sequence, options.truth, tuple((camera, clip) for camera, clip in options.view))
+    text = json.dumps(found.figures, indent=1, allow_nan=False)
+    if options.picture is not None:
+        found.write_picture(options.picture)
+    if options.json is not None:
+        with atomic_path(options.json) as aside:
+            aside.write_text(text + "\n", encoding="utf-8")
+        text = f"{options.json} written."
+    say.finish(text, found.figures)

@@ -1,0 +1,83 @@
+"""``smokelift reconstruct``: a clip or scene file to a VDB sequence."""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image
+
+from smokelift.app.cost import require_memory
+from smokelift.app.options import add_run_options, scene_of, settings_of
+from smokelift.app.progress import Reporter
+from smokelift.footage.clip import Clip
+from smokelift.output.atomic import atomic_path
+from smokelift.output.images import eight_bit
+from smokelift.output.sequence import Sequence
+from smokelift.pipeline import Frame, reconstruct
+from smokelift.render import device, scene_renderer
+from smokelift.scene import completed
+from smokelift.setup.shot import Shot, prepare_shot
+
+
+def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
+    """Add the command."""
+    parser = commands.add_parser("reconstruct", parents=[common], help="a clip or scene file to a VDB sequence")
+    add_run_options(parser)
+    parser.add_argument("--out", type=Path, required=True, help="directory for the sequence")
+    parser.add_argument("--npz", action="store_true", help="write NumPy twins as well")
+    parser.add_argument(
+        "--thumbnail", type=Path, metavar="FILE.png", help="keep a small picture of the last frame there"
+    )
+    parser.add_argument("--resume", action="store_true", help="go on from the frames that are there")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace, say: Reporter) -> None:
+    """Reconstruct, and say what was assumed, every frame and whether there was any smoke."""
+    began = time.monotonic()
+    settings = settings_of(options)
+    scene, source = scene_of(options)
+    device.start(options.device)
+    with Clip.open(source) as clip:
+        shot = prepare_shot(clip, scene, settings)
+        assert shot.scene.domain is not None
+        require_memory(shot.scene.domain)
+        for note in (*shot.notes, *(choice.reason for choice in shot.choices)):
+            say.note(note)
+        frames = reconstruct(clip, scene, settings, options.out, npz=options.npz, resume=options.resume, shot=shot)
+        for first in frames:
+            say.start(len(clip), first.number - 1)
+            for frame in itertools.chain([first], frames):
+                if options.thumbnail:
+                    _write_thumbnail(options.thumbnail, clip, shot, frame)
+                say.frame(frame.number, frame.figures)
+    sequence = Sequence.open(options.out)
+    if not any((sequence.figures(number).get("hull_share") or 0) > 0 for number in sequence.frames):
+        say.note(
+            "No smoke found: in no frame does a patch differ from the background by six times the clip's noise. "
+            "Check the clean plate, or give one with [background] in a scene file."
+        )
+    seconds = time.monotonic() - began
+    say.finish(
+        f"{len(sequence.frames)} frames in {options.out} ({seconds:.0f} s).",
+        {"directory": str(options.out), "frames": len(sequence.frames), "seconds": round(seconds, 1)},
+    )
+
+
+def _write_thumbnail(path: Path, clip: Clip, shot: Shot, frame: Frame) -> None:
+    """Write the part of a frame that the grid is fitted to, beside its reconstruction (or above, if wide), as a PNG."""
+    now = shot.at(frame.number - 1)
+    if now is None:  # nothing of the domain is in this frame's picture: the picture of the last one stays
+        return
+    seen = now.working.cut(clip.frame(frame.number - 1))
+    scene = completed(replace(now.small_scene, scattering=now.scattering))
+    found = scene_renderer(scene, background=now.plate.image).image(frame.density)
+    both = np.concatenate([seen, found], 0 if seen.shape[1] > seen.shape[0] else 1)
+    with atomic_path(path) as aside:
+        Image.fromarray(eight_bit(both)).save(aside, format="PNG")

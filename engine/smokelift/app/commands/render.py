@@ -1,0 +1,78 @@
+"""``smokelift render``: an image or video of a sequence."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+from typing import Any
+
+from smokelift.app.options import require_folder
+from smokelift.app.progress import Reporter
+from smokelift.output.images import write_image
+from smokelift.output.sequence import Sequence
+from smokelift.output.video import VIDEO_KINDS, write_video
+from smokelift.output.viewer import Viewer
+from smokelift.render import device
+from smokelift.scene import Camera, CompleteScene, Scene, orbit
+
+SIDE_YAW = 90.0
+"""Degrees about the vertical from the scene's camera to the view from the side."""
+
+USUAL_FPS = 24.0
+"""Frames a second of a video where the clip does not say."""
+
+
+def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
+    """Add the command."""
+    parser = commands.add_parser("render", parents=[common], help="an image or video of a sequence")
+    parser.add_argument("directory", type=Path)
+    parser.add_argument("--frame", type=int, help="one frame; the first for an image, all for a video by default")
+    parser.add_argument("--camera", default="front", help="front, side, YAW,PITCH in degrees, or camera.toml")
+    parser.add_argument("--out", type=Path, required=True, help="image.exr, image.png or video.mp4")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace, say: Reporter) -> None:
+    """Render one frame, or all into a video."""
+    sequence = Sequence.open(options.directory)
+    scene = sequence.scene
+    camera = _camera(options.camera, scene)
+    is_video = options.out.suffix.lower() in VIDEO_KINDS
+    if not is_video and options.out.suffix.lower() not in (".exr", ".png"):
+        raise ValueError(f"{options.out}: write an image (.exr, .png) or a video ({', '.join(VIDEO_KINDS)}).")
+    if not sequence.frames:
+        raise ValueError(f"{options.directory}: there are no finished frames to render yet.")
+    require_folder(options.out)
+    device.start(options.device)
+    if is_video:
+        numbers = sequence.frames if options.frame is None else (options.frame,)
+        viewer = Viewer(scene, camera)
+        fps = (scene.clip.fps if scene.clip else None) or USUAL_FPS
+        write_video(options.out, (viewer.image(number, sequence.density(number)) for number in numbers), fps)
+    else:
+        number = sequence.frames[0] if options.frame is None else options.frame
+        write_image(options.out, sequence.render(number, camera))
+    say.finish(f"{options.out} written.", {"file": str(options.out)})
+
+
+def _camera(name: str, scene: CompleteScene) -> Camera:
+    """The camera that a word, two angles or a camera file say."""
+    if name == "front":
+        return scene.camera
+    if name == "side":
+        return orbit(scene.camera, scene.domain, SIDE_YAW)
+    if name.endswith(".toml"):
+        camera = Scene.load(name).camera
+        if camera is None:
+            raise ValueError(f"{name}: has no [camera].")
+        return camera
+    try:
+        yaw, pitch = (float(part) for part in name.split(","))
+        if not (math.isfinite(yaw) and math.isfinite(pitch)):
+            raise ValueError
+    except ValueError:
+        raise ValueError(
+            f"--camera {name}: expected front, side, two angles YAW,PITCH in degrees, or a camera.toml."
+        ) from None
+    return orbit(scene.camera, scene.domain, yaw, pitch)

@@ -1,0 +1,134 @@
+"""What a run takes, known before it is spent: time, memory and disk.
+
+Time is counted in Poisson solves by cosine transforms. A frame takes about as many whatever the grid, and what a solve
+takes on this machine is measured. All constants: docs/experiments/memory-and-time.md.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import psutil
+import scipy.fft
+
+from smokelift.scene import Domain
+from smokelift.setup.settings import Quality
+
+Resolution = tuple[int, int, int]
+
+SOLVES_A_FRAME: Mapping[Quality, float] = {"draft": 65.0, "balanced": 70.0, "fine": 76.0}
+"""Poisson solves that take as long as a frame."""
+
+SHARE_A_VIEW = 0.5
+"""Part of a frame's time that each further view adds."""
+
+START_SECONDS = 5.0
+"""Seconds to start, to compile and to estimate the background."""
+
+BYTES_A_VOXEL_ON_DISK = 8
+"""Bytes of a density and three velocities at 16 bits, where smoke fills the box. A quarter is usual."""
+
+BYTES_A_VOXEL = 220
+"""Bytes of memory at a run's peak, where smoke fills much of the box."""
+
+BASE_BYTES = 350 * 2**20
+"""Bytes of memory for the interpreter, libraries, compiled kernels and decoded pictures."""
+
+LARGEST_TIMED = 64
+"""Voxels along a side of the grid whose solve is timed. Larger ones take as much longer as they have more voxels."""
+
+LEAST_VOXELS = 8
+"""Voxels along the shortest side of a grid that is suggested."""
+
+
+class NotEnoughMemoryError(MemoryError):
+    """The grid does not fit; says which would."""
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What a run takes.
+
+    Attributes
+    ----------
+    seconds
+        Right to a factor of two.
+    memory, memory_free
+        Bytes at the peak, and bytes that are free now.
+    disk
+        Bytes at most.
+    """
+
+    seconds: float
+    memory: int
+    memory_free: int
+    disk: int
+
+
+def estimate_cost(domain: Domain, frames: int, quality: Quality, further_views: int = 0) -> Cost:
+    """Estimate the cost of a run over so many frames; it takes up to a second."""
+    solves = frames * SOLVES_A_FRAME[quality] * (1 + SHARE_A_VIEW * further_views)
+    return Cost(
+        seconds=START_SECONDS + solves * _solve_seconds(domain.resolution),
+        memory=memory_needed(domain.resolution),
+        memory_free=memory_free(),
+        disk=frames * math.prod(domain.resolution) * BYTES_A_VOXEL_ON_DISK,
+    )
+
+
+def memory_needed(resolution: Resolution) -> int:
+    """Return the bytes that a run takes at its peak."""
+    return BASE_BYTES + BYTES_A_VOXEL * math.prod(resolution)
+
+
+def memory_free() -> int:
+    """Return the bytes that programs may still take."""
+    return int(psutil.virtual_memory().available)
+
+
+def require_memory(domain: Domain) -> None:
+    """Check that a domain's grid fits into the memory that is free.
+
+    Raises
+    ------
+    NotEnoughMemoryError
+        With the largest resolution of the same shape that fits.
+    """
+    free = memory_free()
+    needed = memory_needed(domain.resolution)
+    if needed <= free:
+        return
+    shape = " x ".join(map(str, domain.resolution))
+    fits = _largest(domain.resolution, free)
+    advice = (
+        f"the largest that fits is --resolution {','.join(map(str, fits))}"
+        if fits
+        else "close other programs; no grid of this shape fits"
+    )
+    raise NotEnoughMemoryError(
+        f"{shape} voxels need about {needed / 2**30:.1f} GiB of memory and {free / 2**30:.1f} GiB are free; {advice}."
+    )
+
+
+def _largest(resolution: Resolution, free: int) -> Resolution | None:
+    """Return the largest resolution that fits, of the same proportions so that voxels stay cubes."""
+    common = math.gcd(*resolution)
+    x, y, z = (n // common for n in resolution)
+    candidates = ((x * times, y * times, z * times) for times in range(common - 1, 0, -1))
+    return next((c for c in candidates if memory_needed(c) <= free and min(c) >= LEAST_VOXELS), None)
+
+
+def _solve_seconds(resolution: Resolution) -> float:
+    """Return the seconds that a Poisson solve takes on this machine now."""
+    timed = [min(n, LARGEST_TIMED) for n in resolution]
+    field = np.zeros(timed, np.float32)
+    spent = []
+    for _ in range(5):
+        began = time.perf_counter()
+        scipy.fft.idctn(scipy.fft.dctn(field, workers=2), workers=2)
+        spent.append(time.perf_counter() - began)
+    return float(np.median(spent)) * math.prod(resolution) / math.prod(timed)

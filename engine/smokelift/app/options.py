@@ -1,0 +1,88 @@
+"""Options that several commands share, and what they mean."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+from typing import Literal
+
+from smokelift.scene import SCATTERINGS, ClipSource, Scene
+from smokelift.setup.settings import METHODS, QUALITIES, Settings
+
+
+def add_run_options(parser: argparse.ArgumentParser) -> None:
+    """Add the clip or scene file, and all that decides how it is reconstructed."""
+    parser.add_argument("input", type=Path, help="scene.toml, or a video, or frame_####.png")
+    parser.add_argument("--quality", choices=QUALITIES, default="balanced")
+    parser.add_argument("--method", choices=METHODS, default="default", help="paper: the published loop")
+    parser.add_argument(
+        "--resolution", type=_resolution, metavar="X,Y,Z", help="voxels, if not the scene's; auto measures how many"
+    )
+    parser.add_argument(
+        "--scattering",
+        choices=("auto", *SCATTERINGS),
+        default="auto",
+        help="how light is scattered; auto measures which is needed",
+    )
+    parser.add_argument("--frames", type=_frame_range, metavar="A:B", help="first and last frame, from 0")
+    parser.add_argument(
+        "--axis-depth",
+        type=float,
+        metavar="METRES",
+        help="how far behind the middle of the box the smoke stands (before it: less than 0), if you know",
+    )
+
+
+def settings_of(options: argparse.Namespace) -> Settings:
+    """Return the settings that the options of `add_run_options` say."""
+    preset = Settings.preset(options.quality, options.method, options.resolution)
+    density = replace(preset.density, scattering=options.scattering)
+    return replace(preset, density=density, axis_depth=options.axis_depth)
+
+
+def scene_of(options: argparse.Namespace) -> tuple[Scene, ClipSource]:
+    """Return the scene that the options of `add_run_options` say, and its clip.
+
+    Raises
+    ------
+    ValueError
+        If the scene file cannot be read or has no clip.
+    """
+    path: Path = options.input
+    scene = Scene.load(path) if path.suffix.lower() == ".toml" else Scene(clip=ClipSource(path))
+    if options.frames is not None and scene.clip is not None:
+        scene = scene.with_frames(*options.frames)
+    if scene.clip is None:
+        raise ValueError(f"{path}: has no [clip]; give the path of the video there.")
+    return scene, scene.clip
+
+
+def require_folder(path: Path | None) -> None:
+    """Check, before anything is spent, that a file can be written.
+
+    Raises
+    ------
+    ValueError
+        If its folder does not exist.
+    """
+    if path is not None and not path.absolute().parent.is_dir():
+        raise ValueError(f"{path}: the folder {path.parent} does not exist.")
+
+
+def _resolution(text: str) -> tuple[int, int, int] | Literal["auto"]:
+    if text == "auto":
+        return "auto"
+    try:
+        x, y, z = (int(part) for part in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected three whole numbers X,Y,Z, or auto") from None
+    return x, y, z
+
+
+def _frame_range(text: str) -> tuple[int, int]:
+    try:
+        first, last = (int(part) for part in text.split(":"))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected the first and last frame A:B, from 0") from None
+    return first, last

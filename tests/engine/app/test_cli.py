@@ -1,0 +1,139 @@
+"""The exit status of everything else that ends a command: device, memory, and being cancelled."""
+
+from __future__ import annotations
+
+import gc
+import json
+import re
+import signal
+import subprocess
+import sys
+import zipfile
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from command_line import ENVIRONMENT, MODULE, QUICK, command, events, names, refused
+
+from smokelift.app import cost
+from smokelift.output.sequence import Sequence
+from smokelift.render import device
+
+
+def test_a_gpu_that_is_not_there(shot, tmp_path) -> None:
+    """Status 3, and what can be done."""
+    if device.available_gpu() in ("cuda", "metal"):
+        pytest.skip("there is a GPU here that cannot be hidden")
+    done = subprocess.run(
+        [*MODULE, "reconstruct", str(shot), "--out", str(tmp_path / "out"), "--device", "gpu"],
+        env={**ENVIRONMENT, "VK_DRIVER_FILES": "/none", "VK_ICD_FILENAMES": "/none"},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.returncode == 3
+    assert done.stderr.startswith("No GPU")
+    assert "--device cpu" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_grid_too_large_for_the_memory(plume, tmp_path, capsys) -> None:
+    """Status 3 before anything is written, and the resolution that is named would fit."""
+    clip = str(plume.scene.clip.path)
+    sentence = refused(
+        capsys, "reconstruct", clip, "--out", tmp_path / "out", "--resolution", "4000,4000,4000", *QUICK, status=3
+    )
+    named = re.search(r"--resolution (\d+),(\d+),(\d+)", sentence)
+    assert named
+    x, y, z = (int(count) for count in named.groups())
+    assert cost.memory_needed((x, y, z)) < 1.1 * cost.psutil.virtual_memory().available + 2**30
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_named_resolution_is_accepted(shot, tmp_path, capsys, monkeypatch) -> None:
+    """Whoever follows the advice on a calibrated domain gets a sequence."""
+    little = SimpleNamespace(available=cost.memory_needed((23, 23, 31)))
+    monkeypatch.setattr(cost.psutil, "virtual_memory", lambda: little)
+    sentence = refused(capsys, "reconstruct", shot, "--out", tmp_path / "out", "--npz", *QUICK, status=3)
+    named = re.search(r"--resolution (\S+?)\.?$", sentence)
+    assert named
+    arguments = ("--npz", "--frames", "0:1", "--resolution", named[1], *QUICK)
+    assert command("reconstruct", shot, "--out", tmp_path / "out", *arguments) == 0
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGINT to send")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_cancelled_run_can_be_resumed(plume, tmp_path, monkeypatch, capsys, number) -> None:
+    """Status 130 in the middle; --resume gives the rest, bit for bit as without the break."""
+    heights = np.linspace(0.3, 0.9, 8)
+    filmed = plume.write(tmp_path / "clip", [plume.blob(plume.scene, height) for height in heights])
+    filmed.save(tmp_path / "scene.toml")
+    out = tmp_path / "out"
+    # paths relative to the working directory are what people type
+    monkeypatch.chdir(tmp_path)
+    words = ["reconstruct", "scene.toml", "--npz", "--progress", "json", *QUICK]
+    with subprocess.Popen(
+        [*MODULE, *words, "--out", "out"],
+        env=ENVIRONMENT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        # a test run in the background may ignore SIGINT, which children inherit
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    ) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        told = []
+        for line in process.stdout:
+            told.append(json.loads(line))
+            if told[-1]["event"] == "frame":
+                process.send_signal(number)
+                break
+        told += events(process.stdout.read())
+        errors = process.stderr.read()
+        assert process.wait(60) == 130
+    assert "KeyboardInterrupt" not in errors
+    assert (told[-1]["event"], told[-1]["status"]) == ("error", 130)
+    assert "--resume" in told[-1]["text"]
+    begun = Sequence.open(out)
+    assert 1 <= len(begun.frames) < 8
+    assert not [name for name in names(out) if name.endswith(".tmp") or name == "run.lock"]
+    assert command(*words, "--out", "out", "--resume") == 0
+    told = events(capsys.readouterr().out)
+    start = next(event for event in told if event["event"] == "start")
+    assert (start["done"], start["total"]) == (len(begun.frames), 8)
+    assert Sequence.open(out).frames == tuple(range(1, 9))
+    assert command("reconstruct", tmp_path / "scene.toml", "--out", tmp_path / "whole", "--npz", *QUICK) == 0
+    for path in sorted((tmp_path / "whole").glob("*.npz")):
+        with np.load(path) as whole, np.load(out / path.name) as resumed:
+            for name in whole.files:
+                np.testing.assert_array_equal(resumed[name], whole[name], err_msg=f"{path.name} {name}")
+
+
+def test_an_interrupt_while_writing_is_quiet(shot, tmp_path, capsys, monkeypatch) -> None:
+    """Ctrl-C in the middle of a file: one sentence, no half file, and nothing cries out afterwards."""
+    cries: list[Any] = []
+    opened = []
+    real = zipfile.ZipFile.open
+
+    def interrupted(archive: zipfile.ZipFile, name: Any, mode: Any = "r", *rest: Any, **options: Any) -> Any:
+        if mode == "w":
+            opened.append(name)
+            if len(opened) == 11:  # within the second frame's files
+                raise KeyboardInterrupt
+        return real(archive, name, mode, *rest, **options)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(sys, "unraisablehook", cries.append)
+        patch.setattr(zipfile.ZipFile, "open", interrupted)
+        sentence = refused(capsys, "reconstruct", shot, "--out", tmp_path / "out", "--npz", *QUICK, status=130)
+        gc.collect()
+    assert sentence.startswith("Cancelled")
+    assert "--resume" in sentence
+    assert Sequence.open(tmp_path / "out").frames == (1,)
+    assert not [name for name in names(tmp_path / "out") if name.endswith(".tmp")]
+    assert command("reconstruct", shot, "--out", tmp_path / "out", "--npz", "--resume", *QUICK) == 0
+    assert [cry.exc_value for cry in cries] == []

@@ -1,0 +1,27 @@
+"""``smokelift doctor``: what it says of this machine."""
+
+from __future__ import annotations
+
+import subprocess
+
+from command_line import ENVIRONMENT, MODULE, command, events
+
+import smokelift
+
+
+def test_doctor_in_a_process_of_its_own() -> None:
+    """Versions, devices and what is missing, on standard output; nothing on the other."""
+    done = subprocess.run([*MODULE, "doctor"], env=ENVIRONMENT, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0
+    assert done.stdout.startswith(f"smokelift {smokelift.__version__}, Python 3.")
+    for word in ("libraries: numpy ", "taichi ", "processor cores", "GiB free", "GPU: ", "OpenVDB"):
+        assert word in done.stdout
+    assert done.stderr == ""
+
+
+def test_doctor_as_json(capsys) -> None:
+    """Programs get the same lines as notes."""
+    assert command("doctor", "--progress", "json") == 0
+    told = events(capsys.readouterr().out)
+    assert {event["event"] for event in told} == {"note"}
+    assert any(event["text"].startswith("GPU:") for event in told)

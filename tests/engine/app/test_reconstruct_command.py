@@ -1,0 +1,130 @@
+"""``smokelift reconstruct``: what it writes and says."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from command_line import QUICK, command, events, names, refused
+
+from smokelift.output.sequence import Sequence
+from smokelift.output.vdb import VdbUnavailable, vdb_module
+from smokelift.scene import completed
+
+
+def test_reconstruct_writes_a_sequence(finished, plume) -> None:
+    """All frames, complete, with the scene as it was given; a NumPy twin each."""
+    sequence = Sequence.open(finished)
+    assert sequence.complete
+    assert sequence.frames == (1, 2, 3, 4, 5)
+    assert sequence.scene == completed(plume.scene)
+    assert {f"smoke_000{n}.npz" for n in range(1, 6)} <= set(names(finished))
+    assert all(sequence.figures(n)["psnr"] >= 35 for n in sequence.frames)
+
+
+def test_reconstruct_writes_vdb_files(shot, tmp_path, capsys) -> None:
+    """OpenVDB is what is written by default, and the last line says where."""
+    try:
+        vdb_module()
+    except VdbUnavailable as missing:
+        pytest.skip(str(missing))
+    assert command("reconstruct", shot, "--out", tmp_path / "out", "--frames", "0:1", *QUICK) == 0
+    assert names(tmp_path / "out") == ["sequence.json", "smoke_0001.vdb", "smoke_0002.vdb"]
+    out = "".join(capsys.readouterr().out.splitlines())
+    assert "2 frames in" in out
+    assert Sequence.open(tmp_path / "out").density(2).any()
+
+
+def test_progress_as_json(plume, tmp_path, capsys) -> None:
+    """Each line an object: notes, then start, then every frame, then done."""
+    scene = replace(plume.scene, medium=None)
+    scene.save(tmp_path / "scene.toml")
+    out = tmp_path / "out"
+    assert command("reconstruct", tmp_path / "scene.toml", "--out", out, "--npz", "--progress", "json", *QUICK) == 0
+    captured = capsys.readouterr()
+    told = events(captured.out)
+    assert captured.err == ""
+    notes = [event["text"] for event in told if event["event"] == "note"]
+    assert [event["event"] for event in told] == [*["note"] * len(notes), "start", *["frame"] * 5, "done"]
+    assert notes[0].startswith("Medium not given")
+    start, *frames = told[len(notes) : -1]
+    assert (start["total"], start["done"]) == (5, 0)
+    assert [(event["frame"], event["done"], event["total"]) for event in frames] == [(n, n, 5) for n in range(1, 6)]
+    assert all(event["figures"]["psnr"] > 30 for event in frames)
+    assert told[-2]["seconds_left"] == 0
+    assert (told[-1]["directory"], told[-1]["frames"]) == (str(out), 5)
+
+
+def test_further_views_of_a_scene_file_are_used(two_views, tmp_path, capsys) -> None:
+    """They are named before the run, keep step with a range of frames, and their fit is on record."""
+    two_views.save(tmp_path / "scene.toml")
+    told = "View 1: frame_####.png, 90 degrees from the input, frames 3 to 4."
+    assert command("inspect", tmp_path / "scene.toml", "--frames", "2:3", *QUICK) == 0
+    assert told in " ".join(capsys.readouterr().out.split())
+    arguments = ("--npz", "--frames", "2:3", *QUICK)
+    assert command("reconstruct", tmp_path / "scene.toml", "--out", tmp_path / "out", *arguments) == 0
+    assert told in " ".join(capsys.readouterr().out.split())
+    sequence = Sequence.open(tmp_path / "out")
+    assert all(sequence.figures(number)["psnr_view_1"] > 30 for number in (1, 2))
+
+
+def test_a_clip_alone_is_enough(plume, tmp_path, capsys) -> None:
+    """A pattern of pictures instead of a scene file, with a range of frames and a resolution."""
+    out = tmp_path / "out"
+    clip = str(plume.scene.clip.path)
+    arguments = ("--npz", "--frames", "1:3", "--resolution", "16,16,24", "--progress", "json", *QUICK)
+    assert command("reconstruct", clip, "--out", out, *arguments) == 0
+    assert [event["event"] for event in events(capsys.readouterr().out)].count("note") >= 5
+    sequence = Sequence.open(out)
+    assert sequence.frames == (1, 2, 3)
+    assert sequence.scene.domain.resolution == (16, 16, 24)
+
+
+def test_the_smoke_stands_where_the_command_says(shot, finished, tmp_path) -> None:
+    """The depth of its axis reaches the settings and the smoke; before the middle of the box it is negative."""
+    assert command("reconstruct", shot, "--out", tmp_path / "out", "--npz", "--axis-depth", "-0.2", *QUICK) == 0
+    near, plain = Sequence.open(tmp_path / "out"), Sequence.open(finished)
+    assert (near.settings["axis_depth"], plain.settings["axis_depth"]) == (-0.2, None)
+    y = np.arange(24) * 1.2 / 24
+    moved = [np.average(y, weights=sequence.density(1).sum(axis=(0, 2))) for sequence in (near, plain)]
+    assert moved[0] - moved[1] == pytest.approx(-0.2, abs=0.04)
+
+
+def test_a_depth_outside_the_box(shot, tmp_path, capsys) -> None:
+    """One sentence, also before a run, and nothing is written."""
+    for words in (("reconstruct", shot, "--out", tmp_path / "out"), ("inspect", shot)):
+        sentence = refused(capsys, *words, "--axis-depth", "0.7", *QUICK)
+        assert "outside the box, which reaches 0.6 m" in sentence
+    assert not (tmp_path / "out").exists()
+
+
+def test_scattering_and_resolution_by_option(shot, tmp_path, capsys) -> None:
+    """What is said is used, and said to be by hand; auto measures the resolution of a given box."""
+    out = tmp_path / "out"
+    arguments = ("--npz", "--frames", "0:1", "--scattering", "unshadowed", "--resolution", "auto", *QUICK)
+    assert command("reconstruct", shot, "--out", out, *arguments) == 0
+    sequence = Sequence.open(out)
+    assert sequence.settings["density"]["scattering"] == "unshadowed"
+    by_hand = {choice["what"]: choice["by_hand"] for choice in sequence.choices}
+    assert (by_hand["scattering"], by_hand["resolution"]) == (True, False)
+    assert max(sequence.scene.domain.resolution) > 32
+    assert command("reconstruct", shot, "--out", out, "--resume", *arguments) == 0
+    assert "scattering" in refused(capsys, "reconstruct", shot, "--out", out, "--resume", *arguments[:3], *QUICK)
+
+
+def test_no_smoke_at_all_is_said(plume, tmp_path, capsys) -> None:
+    """Empty frames, exit 0, and a note that names the threshold."""
+    nothing = np.zeros_like(plume.densities[0])
+    plume.write(tmp_path / "clip", [nothing] * 2).save(tmp_path / "scene.toml")
+    out = tmp_path / "out"
+    assert command("reconstruct", tmp_path / "scene.toml", "--out", out, "--npz", *QUICK) == 0
+    assert "No smoke found" in capsys.readouterr().out
+    assert not any(Sequence.open(out).density(n).any() for n in (1, 2))
+
+
+def test_resuming_what_is_complete_changes_nothing(finished, shot) -> None:
+    """Done already is done."""
+    before = {path.name: path.read_bytes() for path in finished.glob("smoke_*")}
+    assert command("reconstruct", shot, "--out", finished, "--npz", "--resume", *QUICK) == 0
+    assert {path.name: path.read_bytes() for path in finished.glob("smoke_*")} == before

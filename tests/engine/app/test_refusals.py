@@ -1,0 +1,120 @@
+"""Bad input: one sentence that names what is wrong, and the exit status for it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from command_line import QUICK, command, events, names, refused
+
+
+def test_a_missing_file(tmp_path, capsys) -> None:
+    """The path is named, for scenes, videos and pictures."""
+    for name in ("shot.toml", "shot.mp4", "frame_####.png"):
+        path = tmp_path / name
+        assert name in refused(capsys, "reconstruct", path, "--out", tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_file_that_is_no_video(tmp_path, capsys) -> None:
+    """Text with a video's name."""
+    (tmp_path / "shot.mp4").write_text("not a video " * 100)
+    assert "shot.mp4" in refused(capsys, "reconstruct", tmp_path / "shot.mp4", "--out", tmp_path / "out")
+
+
+def test_an_unknown_key(shot, tmp_path, capsys) -> None:
+    """The key and its line."""
+    text = shot.read_text().replace("[medium]\n", "[medium]\ncolour = 3\n")
+    (tmp_path / "bad.toml").write_text(text)
+    sentence = refused(capsys, "reconstruct", tmp_path / "bad.toml", "--out", tmp_path / "out")
+    assert "bad.toml" in sentence
+    assert "colour" in sentence
+    assert str(text[: text.index("colour")].count("\n") + 1) in sentence
+
+
+def test_a_scene_without_a_clip(plume, tmp_path, capsys) -> None:
+    """There is nothing to reconstruct from."""
+    replace(plume.scene, clip=None).save(tmp_path / "scene.toml")
+    assert "[clip]" in refused(capsys, "reconstruct", tmp_path / "scene.toml", "--out", tmp_path / "out")
+
+
+@pytest.mark.parametrize("span", ["2:9", "7:8"])
+def test_frames_outside_the_clip(shot, tmp_path, capsys, span) -> None:
+    """The range that was asked for, and the one there is."""
+    sentence = refused(capsys, "reconstruct", shot, "--out", tmp_path / "out", "--frames", span)
+    assert "0 to 4" in sentence
+    assert not (tmp_path / "out").exists()
+
+
+def test_frames_in_the_wrong_order(shot, tmp_path, capsys) -> None:
+    """Last before first."""
+    assert "frames" in refused(capsys, "reconstruct", shot, "--out", tmp_path / "out", "--frames", "3:1")
+
+
+@pytest.mark.parametrize(
+    "option",
+    [
+        ("--frames", "1-2"),
+        ("--resolution", "64,64"),
+        ("--quality", "best"),
+        ("--resolution", "a,b,c"),
+        ("--scattering", "many"),
+        ("--axis-depth", "far"),
+    ],
+)
+def test_options_that_make_no_sense(shot, tmp_path, capsys, option) -> None:
+    """Status 2, and the last line names the option."""
+    assert command("reconstruct", shot, "--out", tmp_path / "out", *option) == 2
+    assert option[0] in capsys.readouterr().err.splitlines()[-1]
+
+
+def test_a_resolution_too_low(shot, tmp_path, capsys) -> None:
+    """The least number of voxels is said."""
+    sentence = refused(capsys, "reconstruct", shot, "--out", tmp_path / "out", "--resolution", "4,4,4")
+    assert "8 voxels" in sentence
+
+
+def test_a_resolution_without_cubes(shot, tmp_path, capsys) -> None:
+    """A calibrated box fixes the shape."""
+    sentence = refused(capsys, "reconstruct", shot, "--out", tmp_path / "out", "--resolution", "16,16,16")
+    assert "cubic voxels" in sentence
+
+
+def test_a_directory_of_other_files(shot, tmp_path, capsys) -> None:
+    """Nothing is overwritten, and the directory is named."""
+    (tmp_path / "photos").mkdir()
+    (tmp_path / "photos" / "holiday.jpg").write_text("precious")
+    sentence = refused(capsys, "reconstruct", shot, "--out", tmp_path / "photos", "--npz", *QUICK)
+    assert "photos" in sentence
+    assert "holiday.jpg" in sentence
+    assert names(tmp_path / "photos") == ["holiday.jpg"]
+
+
+def test_a_file_as_directory(shot, tmp_path, capsys) -> None:
+    """The path is named."""
+    (tmp_path / "taken").write_text("precious")
+    assert "taken" in refused(capsys, "reconstruct", shot, "--out", tmp_path / "taken", "--npz", *QUICK)
+    assert (tmp_path / "taken").read_text() == "precious"
+
+
+def test_again_without_resume(finished, shot, capsys) -> None:
+    """The sentence says how to go on."""
+    sentence = refused(capsys, "reconstruct", shot, "--out", finished, "--npz", *QUICK)
+    assert "--resume" in sentence
+    assert finished.name in sentence
+
+
+def test_resume_with_other_settings(finished, shot, capsys) -> None:
+    """The difference is named."""
+    sentence = refused(capsys, "reconstruct", shot, "--out", finished, "--npz", "--resume", "--quality", "balanced")
+    assert "quality" in sentence
+
+
+def test_errors_as_json(tmp_path, capsys) -> None:
+    """Programs get the sentence and the status as the last event."""
+    assert command("reconstruct", tmp_path / "no.mp4", "--out", tmp_path / "out", "--progress", "json") == 2
+    captured = capsys.readouterr()
+    assert captured.err == ""
+    last = events(captured.out)[-1]
+    assert (last["event"], last["status"]) == ("error", 2)
+    assert "no.mp4" in last["text"]
