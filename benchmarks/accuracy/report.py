@@ -58,7 +58,7 @@ def write(out: Path, name: str, rows: list[Row], scenes: list[KnownScene]) -> No
         writer.writeheader()
         writer.writerows(rows)
     table = markdown(rows + _means(rows), list(scenes[0].cameras))
-    page = f"{rows[0]['machine']}, {rows[0]['date']}\n\n{table}\n![Pictures]({name}.png)\n"
+    page = f"{rows[0]['machine']}, {rows[0]['date']}\n\n{table}\n\n![Pictures]({name}.png)\n"
     (out / f"{name}.md").write_text(page)
 
 

@@ -211,7 +211,7 @@ def main() -> None:
         sheet.append([eight_bit(gain * np.maximum(tile, 0)) for tile in small])
         print(markdown(HEAD, [cells(row)]).splitlines()[-1], flush=True)
         (options.out / "selection.json").write_text(json.dumps(rows, indent=1) + "\n")
-    (options.out / "selection.md").write_text(markdown(HEAD, map(cells, rows)))
+    (options.out / "selection.md").write_text(markdown(HEAD, map(cells, rows)) + "\n")
     titles = ["clip", "chosen", "richest", "truth, 90", "chosen, 90", "richest, 90"]
     full = [row for row in sheet if len(row) == len(titles)]
     if full:

@@ -5,6 +5,6 @@ here=$(cd "$(dirname "$0")" && pwd)
 out=${1:?usage: generate.sh DIR, a folder for the truth and the reference images}
 mkdir -p "$out"
 "${BLENDER:-blender}" -b --factory-startup -P "$here/bake.py" -- "$out/truth.npz"
-"${PYTHON:-python3}" "$here/render.py" "$out/truth.npz" "$here/../../examples/plume/scene.toml" \
+PYTHONPATH="$here/../.." "${PYTHON:-python3}" -m benchmarks.example.render "$out/truth.npz" "$here/../../examples/plume/scene.toml" \
     --views "$out" --check 12 30 46
 cp "$here"/../../examples/plume/* "$out"

@@ -1,6 +1,6 @@
 """Render baked smoke with Mitsuba 3: the example's clip, its clean plate, reference images from four sides.
 
-    python render.py TRUTH.npz SCENE.toml [--views DIR] [--check 12 30 46]
+    python -m benchmarks.example.render TRUTH.npz SCENE.toml [--views DIR] [--check 12 30 46]
 
 The pictures are single scattering, integrated at half-voxel steps instead of sampled, so they carry no noise;
 the camera's rays, the light and the trilinear density are Mitsuba's own. `--check` compares with `volpath`.
@@ -19,7 +19,7 @@ import numpy as np
 from av.video.reformatter import Interpolation
 from scipy import ndimage
 
-mi.set_variant("llvm_ad_rgb")
+from benchmarks.mitsuba_scene import emitter, integral, march, path_traced, pixel_rays, sensor, smoke, volume
 
 YAWS = {"front": 0, "nov20": 20, "nov45": 45, "side": 90}  # degrees about the vertical, towards +x
 CHECK_BLOCK = 16  # pixels; volpath's noise is averaged over such blocks
@@ -143,36 +143,6 @@ size = {camera["size"]}
     return matrix, text
 
 
-def grid(values: np.ndarray, low: np.ndarray, high: np.ndarray) -> dict[str, Any]:
-    """Describe values [x, y, z] at voxel centres of a box as a Mitsuba volume."""
-    data = np.ascontiguousarray(values.transpose(2, 1, 0)[..., None], np.float32)
-    return {
-        "type": "gridvolume",
-        "grid": mi.VolumeGrid(data),
-        "filter_type": "trilinear",
-        "wrap_mode": "clamp",
-        "raw": True,
-        "to_world": mi.ScalarTransform4f().translate(low).scale(high - low),
-    }
-
-
-def film_and_camera(camera: dict[str, Any], matrix: np.ndarray, block: int = 1) -> dict[str, Any]:
-    """Describe the camera for Mitsuba, whose own looks along +Z; `block` makes pixels that much larger."""
-    width, height = camera["size"]
-    return {
-        "type": "perspective",
-        "fov": camera["fov_y_degrees"],
-        "fov_axis": "y",
-        "to_world": mi.ScalarTransform4f(matrix @ np.diag([-1.0, 1.0, -1.0, 1.0])),
-        "film": {
-            "type": "hdrfilm",
-            "width": width // block,
-            "height": height // block,
-            "rfilter": {"type": "box"},
-        },
-    }
-
-
 def crop(density: np.ndarray, low: np.ndarray, voxel: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Cut the smoke out, with a voxel of clear air around it; return it with the corners of its box."""
     filled = np.nonzero(density)
@@ -180,63 +150,6 @@ def crop(density: np.ndarray, low: np.ndarray, voxel: float) -> tuple[np.ndarray
     last = np.array([min(i.max() + 2, n) for i, n in zip(filled, density.shape, strict=True)])
     part = density[tuple(slice(a, b) for a, b in zip(first, last, strict=True))]
     return part, low + first * voxel, low + last * voxel
-
-
-@dr.syntax
-def optical_depth(volume: Any, box: Any, points: Any, direction: Any, step: float) -> Any:
-    """Integrate a volume from points to the edge of its box, in one direction, by the midpoint rule."""
-    ray = mi.Ray3f(points, direction)
-    _, _, far = box.ray_intersect(ray)
-    count = dr.maximum(mi.UInt32(dr.ceil(far / step)), 1)
-    width = far / mi.Float(count)
-    where = dr.zeros(mi.Interaction3f, dr.width(points))
-    total = mi.Float(0.0)
-    i = mi.UInt32(0)
-    while i < count:
-        where.p = ray((mi.Float(i) + 0.5) * width)
-        total += volume.eval_1(where)
-        i += 1
-    return total * width
-
-
-@dr.syntax
-def march(smoke: Any, shade: Any, box: Any, ray: Any, step: float, extinction: float) -> tuple[Any, Any]:
-    """March through the smoke.
-
-    Parameters
-    ----------
-    smoke, shade : mitsuba.Volume
-        The density, and its integral towards the light.
-    box : mitsuba.BoundingBox3f
-        Where there is smoke.
-    ray : mitsuba.Ray3f
-        The camera's rays.
-    step : float
-        Largest step (m).
-    extinction : float
-        1/m per unit density.
-
-    Returns
-    -------
-    scattered : mitsuba.Float
-        What is scattered towards the camera, per unit of light, albedo and phase function.
-    transmittance : mitsuba.Float
-        Of the whole ray.
-    """
-    hit, near, far = box.ray_intersect(ray)
-    length = dr.select(hit, far - near, 0.0)
-    count = mi.UInt32(dr.ceil(length / step))
-    width = length / mi.Float(dr.maximum(count, 1))
-    where = dr.zeros(mi.Interaction3f, dr.width(ray))
-    scattered, transmittance = mi.Float(0.0), mi.Float(1.0)
-    i = mi.UInt32(0)
-    while i < count:
-        where.p = ray(near + (mi.Float(i) + 0.5) * width)
-        passed = dr.exp(-extinction * smoke.eval_1(where) * width)
-        scattered += transmittance * (1.0 - passed) * dr.exp(-extinction * shade.eval_1(where))
-        transmittance *= passed
-        i += 1
-    return scattered, transmittance
 
 
 class Renderer:
@@ -251,47 +164,17 @@ class Renderer:
     def __init__(self, scene: dict[str, Any]) -> None:
         self.camera, self.medium, self.lights = scene["camera"], scene["medium"], scene["lights"]
         self.low, self.high = (np.array(scene["domain"][key], float) for key in ("min", "max"))
-        self.mitsuba = self.scene(np.zeros((2, 2, 2), np.float32), np.eye(4))
+        self.mitsuba = mi.load_dict({"type": "scene", **self.scene(np.zeros((2, 2, 2), np.float32), np.eye(4))})
 
-    def scene(self, density: np.ndarray, matrix: np.ndarray, block: int = 1) -> Any:
-        """Build Mitsuba's own scene."""
-        centre, half = (self.low + self.high) / 2, (self.high - self.low) / 2
-        description: dict[str, Any] = {
-            "type": "scene",
+    def scene(self, density: np.ndarray, matrix: np.ndarray, block: int = 1) -> dict[str, Any]:
+        """Describe Mitsuba's own scene."""
+        phase = {"type": "hg", "g": self.medium["anisotropy"]}
+        return {
             "integrator": {"type": "volpath", "max_depth": 2, "hide_emitters": True},
-            "camera": film_and_camera(self.camera, matrix, block),
-            "domain": {
-                "type": "cube",
-                "to_world": mi.ScalarTransform4f().translate(centre).scale(half),
-                "bsdf": {"type": "null"},
-                "interior": {
-                    "type": "heterogeneous",
-                    "sigma_t": grid(density, self.low, self.high),
-                    "scale": self.medium["extinction"],
-                    "albedo": self.medium["albedo"],
-                    "phase": {"type": "hg", "g": self.medium["anisotropy"]},
-                },
-            },
+            "camera": sensor(self.camera | {"matrix": matrix}, block),
+            "domain": smoke(density, self.low, self.high, self.medium, phase),
+            **{f"light{number}": emitter(light) for number, light in enumerate(self.lights)},
         }
-        for number, light in enumerate(self.lights):
-            description[f"light{number}"] = {
-                "type": "directional",
-                "direction": light["direction"],
-                "irradiance": {"type": "rgb", "value": light["irradiance"]},
-            }
-        return mi.load_dict(description)
-
-    def rays(self, matrix: np.ndarray) -> Any:
-        """Return Mitsuba's rays through the centres of the pixels, row by row."""
-        width, height = self.camera["size"]
-        sensor = mi.load_dict(film_and_camera(self.camera, matrix))
-        index = dr.arange(mi.UInt32, width * height)
-        pixel = mi.Point2f(
-            (mi.Float(index % width) + 0.5) / width,
-            (mi.Float(index // width) + 0.5) / height,
-        )
-        ray, _ = sensor.sample_ray(0.0, 0.5, pixel, mi.Point2f(0.5))
-        return ray
 
     def images(self, density: np.ndarray, matrices: list[np.ndarray]) -> list[tuple[np.ndarray, np.ndarray]]:
         """Render a density from several cameras.
@@ -315,20 +198,26 @@ class Renderer:
         voxel = float((self.high - self.low)[0] / density.shape[0])
         part, low, high = crop(density, self.low, voxel)
         box = mi.BoundingBox3f(mi.ScalarPoint3f(low), mi.ScalarPoint3f(high))
-        smoke = mi.load_dict(grid(part, low, high))
+        texture = mi.load_dict(volume(part, low, high))
         step, extinction, g = voxel / 2, self.medium["extinction"], self.medium["anisotropy"]
 
         axes = [a + (np.arange(2 * n) + 0.5) * voxel / 2 for a, n in zip(low, part.shape, strict=True)]
         nodes = mi.Point3f(*(p.ravel() for p in np.meshgrid(*axes, indexing="ij")))
-        views = [(self.rays(matrix), np.zeros((height, width, 3)), None) for matrix in matrices]
-        for emitter in self.mitsuba.emitters():
-            sample, irradiance = emitter.sample_direction(dr.zeros(mi.Interaction3f), mi.Point2f(0.5))
+        views = [
+            (pixel_rays(self.camera | {"matrix": matrix}), np.zeros((height, width, 3)), None) for matrix in matrices
+        ]
+        for source in self.mitsuba.emitters():
+            sample, irradiance = source.sample_direction(dr.zeros(mi.Interaction3f), mi.Point2f(0.5))
             to_light = mi.Vector3f(sample.d)
-            depth = optical_depth(smoke, box, nodes, to_light, step).numpy()
-            shade = mi.load_dict(grid(depth.reshape([2 * n for n in part.shape]), low, high))
+            depth = integral(texture, box, nodes, to_light, step).numpy()
+            shade = mi.load_dict(volume(depth.reshape([2 * n for n in part.shape]), low, high))
+
+            def arriving(where: Any, shade: Any = shade) -> Any:
+                return dr.exp(-extinction * shade.eval_1(where))
+
             colour = irradiance.numpy().ravel() * self.medium["albedo"]
             for number, (ray, radiance, _) in enumerate(views):
-                scattered, transmittance = march(smoke, shade, box, ray, step, extinction)
+                scattered, transmittance = march(texture, arriving, box, ray, step, extinction)
                 cosine = dr.dot(ray.d, to_light)
                 phase = (1 - g * g) / (4 * math.pi * (1 + g * g - 2 * g * cosine) ** 1.5)
                 picture = (scattered * phase).numpy().reshape(height, width, 1) * colour
@@ -337,9 +226,7 @@ class Renderer:
 
     def path_traced(self, density: np.ndarray, matrix: np.ndarray) -> np.ndarray:
         """Render with Mitsuba's `volpath` at single scattering; pixels are blocks of the camera's."""
-        scene = self.scene(density, matrix, CHECK_BLOCK)
-        passes = [mi.render(scene, spp=CHECK_SAMPLES, seed=seed).numpy() for seed in range(CHECK_PASSES)]
-        return np.mean(passes, axis=0)[..., :3]
+        return np.mean(path_traced(self.scene(density, matrix, CHECK_BLOCK), CHECK_PASSES, CHECK_SAMPLES), axis=0)
 
 
 def blocks(image: np.ndarray) -> np.ndarray:

@@ -3,7 +3,7 @@
     python -m benchmarks.renderer.agreement --mitsuba /path/to/python [--folder KEPT] [--out agreement.md]
 
 One field of density, trilinear between the centres of 32^3 voxels, is the truth. Mitsuba renders it as it is
-(mitsuba_pictures.py, in a process of its own, since Mitsuba need not live in the same environment); we sample it
+(`mitsuba_pictures`, in a process of its own, since Mitsuba need not live in the same environment); we sample it
 onto finer grids, and a step shrinks with the voxel.
 """
 
@@ -11,22 +11,30 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from scipy import ndimage
 
+from benchmarks.errors import relative_error
+from benchmarks.tables import markdown
 from smokelift.output.images import write_image
 from smokelift.render import Renderer
 from smokelift.render.environment import environment_lights
 from smokelift.render.environment_count import environment_count
 from smokelift.scene import Camera, DirectionalLight, Domain, EnvironmentLight, Light, Medium, PointLight
+
+Array = npt.NDArray[np.floating[Any]]
+
+SOURCE = Path(__file__).resolve().parents[2]
+"""The folder that holds the package benchmarks."""
 
 VOXELS = 32
 GRIDS = (32, 64, 128, 192)
@@ -45,10 +53,10 @@ LIGHTS = {
 }
 ROTATION = 40.0
 COUNTS = (4, 8, 16, 32, 64, 128, 256)
-BLOCK = 8  # pixels, as mitsuba_pictures.py has it
+BLOCK = 8  # pixels, as in `mitsuba_pictures`
 
 
-def truth() -> np.ndarray:
+def truth() -> Array:
     """Lumps and hollows in a ball that stays clear of the box's sides, (32, 32, 32), at most 1."""
     rng = np.random.default_rng(7)
     x, y, z = np.meshgrid(*[(np.arange(VOXELS) + 0.5) / VOXELS * 2 - 1] * 3, indexing="ij")
@@ -61,14 +69,14 @@ def truth() -> np.ndarray:
     return np.asarray(field / field.max(), np.float32)
 
 
-def sampled(field: np.ndarray, count: int) -> np.ndarray:
+def sampled(field: Array, count: int) -> Array:
     """The trilinear field at the centres of count^3 voxels."""
     at = (np.arange(count) + 0.5) * VOXELS / count - 0.5
     corners = np.meshgrid(at, at, at, indexing="ij")
     return np.asarray(ndimage.map_coordinates(field, corners, order=1, mode="nearest"), np.float32)
 
 
-def surroundings(rows: int = 512) -> np.ndarray:
+def surroundings(rows: int = 512) -> Array:
     """A sky with a broad cold and a narrower warm light in it, (rows, 2 rows, 3)."""
     elevation = np.pi * (0.5 - (np.arange(rows)[:, None] + 0.5) / rows)
     azimuth = 2 * np.pi * (0.5 - (np.arange(2 * rows) + 0.5) / (2 * rows))
@@ -83,19 +91,19 @@ def surroundings(rows: int = 512) -> np.ndarray:
     return np.asarray(radiance, np.float32)
 
 
-def extinctions(field: np.ndarray) -> list[float]:
+def extinctions(field: Array) -> list[float]:
     """Extinction for each of DEPTHS through the thickest column along an axis."""
     thickest = max(field.sum(axis).max() for axis in range(3)) * (HIGH[0] - LOW[0]) / VOXELS
     return [depth / float(thickest) for depth in DEPTHS]
 
 
 def described(light: Light) -> dict[str, Any]:
-    """A light as JSON takes it."""
+    """Return a light as JSON takes it."""
     kind = {DirectionalLight: "directional", PointLight: "point", EnvironmentLight: "environment"}[type(light)]
     return {"type": kind} | {key: str(v) if isinstance(v, Path) else v for key, v in asdict(light).items()}
 
 
-def prepare(folder: Path, field: np.ndarray) -> EnvironmentLight:
+def prepare(folder: Path, field: Array) -> EnvironmentLight:
     """Write what Mitsuba's side reads, and remove its pictures of another scene; returns the environment."""
     environment = EnvironmentLight(folder / "surroundings.exr", rotation_degrees=ROTATION)
     write_image(environment.image, surroundings(), half=False)
@@ -116,22 +124,15 @@ def prepare(folder: Path, field: np.ndarray) -> EnvironmentLight:
     return environment
 
 
-def difference(picture: np.ndarray, reference: np.ndarray) -> float:
-    """Relative L2 difference in percent."""
-    return 100 * float(np.linalg.norm(picture - reference) / np.linalg.norm(reference))
+def difference(picture: Array, reference: Array) -> float:
+    """Return the relative L2 difference in percent."""
+    return 100 * relative_error(picture, reference)
 
 
-def blocks(picture: np.ndarray) -> np.ndarray:
+def blocks(picture: Array) -> Array:
     """Averages over blocks of pixels."""
     rows, columns = picture.shape[0] // BLOCK, picture.shape[1] // BLOCK
     return picture.reshape(rows, BLOCK, columns, BLOCK, -1).mean(axis=(1, 3))
-
-
-def table(header: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
-    """A Markdown table."""
-    header = list(header)
-    lines = [header, ["---"] * len(header), *rows]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
 class Comparison:
@@ -142,30 +143,32 @@ class Comparison:
     field : (32, 32, 32)
         The truth.
     reference
-        What mitsuba_pictures.py wrote.
+        What `mitsuba_pictures` wrote.
     environment
         The light whose picture Mitsuba saw too.
     """
 
-    def __init__(self, field: np.ndarray, reference: dict[str, np.ndarray], environment: EnvironmentLight) -> None:
+    def __init__(self, field: Array, reference: dict[str, Array], environment: EnvironmentLight) -> None:
         self.reference, self.environment = reference, environment
         self.extinctions = extinctions(field)
         self.densities = {count: sampled(field, count) for count in GRIDS}
         self.cases = [(d, a) for d in range(len(DEPTHS)) for a in range(len(ANISOTROPIES))]
 
-    def pictures(self, kind: str) -> dict[int, np.ndarray]:
+    def pictures(self, kind: str) -> dict[int, Array]:
         """A light's pictures, ever finer."""
         names = [name for name in self.reference if name.rpartition("/")[0] == kind]
         return {int(name.rpartition("/")[2]): self.reference[name] for name in names if "volpath" not in name}
 
-    def finest(self, kind: str) -> np.ndarray:
+    def finest(self, kind: str) -> Array:
         """A light's most exact pictures."""
         return list(self.pictures(kind).values())[-1]
 
     def medium(self, case: tuple[int, int]) -> Medium:
         return Medium(self.extinctions[case[0]], ALBEDO, ANISOTROPIES[case[1]])
 
-    def errors(self, kind: str, case: tuple[int, int], lights: tuple, grid: int) -> tuple[float, float]:
+    def errors(
+        self, kind: str, case: tuple[int, int], lights: tuple[FiniteLight, ...], grid: int
+    ) -> tuple[float, float]:
         """Difference of the scattered light alone, and of the picture before the background where smoke is."""
         renderer = Renderer(CAMERA, Domain(LOW, HIGH, (grid,) * 3), self.medium(case), lights, np.zeros(3, np.float32))
         scattered = renderer.image(self.densities[grid])
@@ -190,7 +193,7 @@ class Comparison:
                 rows.append([name, *self.named(case), *(f"{a:.2f} / {b:.2f}" for a, b in errors.values())])
                 worst = {grid: max(worst[grid], *errors[grid]) for grid in GRIDS}
         rows.append(["largest", "", "", *(f"{value:.2f}" for value in worst.values())])
-        return table(["light", "depth", "g", *(f"{grid}³" for grid in GRIDS)], rows)
+        return markdown(["light", "depth", "g", *(f"{grid}³" for grid in GRIDS)], rows)
 
     def counts(self, grid: int = 128) -> str:
         """The environment by the number of lights."""
@@ -201,7 +204,7 @@ class Comparison:
             cells = [f"{self.errors('environment', case, lights, grid)[0]:.2f}" for lights in sets]
             chosen = environment_count(self.environment, CAMERA, domain, self.medium(case))
             rows.append([*self.named(case), *cells, str(chosen)])
-        return table(["depth", "g", *map(str, COUNTS), "chosen"], rows)
+        return markdown(["depth", "g", *map(str, COUNTS), "chosen"], rows)
 
     def parts(self) -> str:
         """What of the difference is the sampling of the field, and what the rendering of the samples."""
@@ -217,7 +220,7 @@ class Comparison:
                 ours = renderer.image(self.densities[grid])
                 cells.append(f"{difference(same_voxels, true[case]):.2f} + {difference(ours, same_voxels):.2f}")
             rows.append([*self.named(case), *cells])
-        return table(["depth", "g", *(f"{grid}³" for grid in GRIDS)], rows)
+        return markdown(["depth", "g", *(f"{grid}³" for grid in GRIDS)], rows)
 
     def convergence(self) -> str:
         """How far the references are from being exact."""
@@ -228,7 +231,7 @@ class Comparison:
             for number in coarser:
                 cells = [f"{difference(pictures[number][c], pictures[best][c]):.3f}" for c in self.cases]
                 rows.append([kind, str(number), str(best), *cells])
-        return table(
+        return markdown(
             ["light", "steps a voxel or directions", "against", *(", ".join(self.named(case)) for case in self.cases)],
             rows,
         )
@@ -244,7 +247,7 @@ class Comparison:
                 noise = 100 * np.linalg.norm(error) / np.linalg.norm(true)
                 cells.append(f"{difference(mean, true):.2f} ({noise:.2f}), {100 * (mean.sum() / true.sum() - 1):+.2f}")
             rows.append([kind, *cells])
-        return table(["light", *(", ".join(self.named(case)) for case in self.cases)], rows)
+        return markdown(["light", *(", ".join(self.named(case)) for case in self.cases)], rows)
 
     def transmittance(self) -> str:
         """Mitsuba's transmittance as volpath has it, over blocks."""
@@ -325,8 +328,8 @@ def main() -> None:
         folder.mkdir(parents=True, exist_ok=True)
         environment = prepare(folder, field)
         if not (folder / "reference.npz").exists():
-            script = Path(__file__).with_name("mitsuba_pictures.py")
-            subprocess.run([options.mitsuba, str(script), str(folder)], check=True)
+            module = (options.mitsuba, "-m", "benchmarks.renderer.mitsuba_pictures")
+            subprocess.run([*module, str(folder)], env={**os.environ, "PYTHONPATH": str(SOURCE)}, check=True)
         with np.load(folder / "reference.npz") as reference:
             page = Comparison(field, dict(reference), environment).page()
     options.out.write_text(page)

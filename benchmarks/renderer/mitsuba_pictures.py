@@ -1,6 +1,6 @@
-"""Mitsuba 3's pictures of the scenes of `agreement`, which starts this file with the Python that has Mitsuba.
+"""Mitsuba 3's pictures of the scenes of `agreement`, which starts this module with the Python that has Mitsuba.
 
-    python mitsuba_pictures.py FOLDER     (scene.json and fields.npz in it; writes reference.npz)
+    python -m benchmarks.renderer.mitsuba_pictures FOLDER     (with scene.json and fields.npz; writes reference.npz)
 
 Single scattering, integrated by the midpoint rule over Mitsuba's own sensor, emitters, phase function and trilinear
 grid, so the pictures carry no noise; the step is halved until nothing changes. Block averages of `volpath`, which
@@ -18,61 +18,13 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-mi.set_variant("llvm_ad_rgb")
+from benchmarks.mitsuba_scene import emitter, integral, path_traced, pixel_rays, sensor, smoke, volume
 
 STEPS = (4, 8, 16)  # a voxel; the last is the reference
 ENVIRONMENT_STEPS = 4
 DIRECTIONS = ((8, 16), (12, 24), (16, 32))  # Gauss points in z, equal ones in azimuth; the last is the reference
 BLOCK = 8  # pixels; volpath's noise is averaged over such blocks
 PASSES, SAMPLES = 16, 4096  # a block
-# Mitsuba's environment has its pole along +Y and looks up atan2(x, -z).
-ENVIRONMENT_TO_WORLD = mi.ScalarTransform4f(np.array([[0.0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]]))
-
-
-def volume(values: np.ndarray, low: np.ndarray, high: np.ndarray) -> dict[str, Any]:
-    """Describe values [x, y, z] at voxel centres of a box."""
-    return {
-        "type": "gridvolume",
-        "grid": mi.VolumeGrid(np.ascontiguousarray(values.transpose(2, 1, 0)[..., None], np.float32)),
-        "filter_type": "trilinear",
-        "wrap_mode": "clamp",
-        "raw": True,
-        "to_world": mi.ScalarTransform4f().translate(low).scale(high - low),
-    }
-
-
-def sensor(camera: dict[str, Any], block: int = 1) -> dict[str, Any]:
-    """Describe the camera; Mitsuba's look along +Z. `block` makes pixels that much larger."""
-    width, height = camera["size"]
-    return {
-        "type": "perspective",
-        "fov": camera["fov_y_degrees"],
-        "fov_axis": "y",
-        "to_world": mi.ScalarTransform4f(np.array(camera["matrix"]) @ np.diag([-1.0, 1.0, -1.0, 1.0])),
-        "film": {"type": "hdrfilm", "width": width // block, "height": height // block, "rfilter": {"type": "box"}},
-    }
-
-
-def emitter(light: dict[str, Any]) -> dict[str, Any]:
-    """Describe a light."""
-    if light["type"] == "directional":
-        return {
-            "type": "directional",
-            "direction": light["direction"],
-            "irradiance": {"type": "rgb", "value": light["irradiance"]},
-        }
-    if light["type"] == "point":
-        return {
-            "type": "point",
-            "position": light["position"],
-            "intensity": {"type": "rgb", "value": light["intensity"]},
-        }
-    return {
-        "type": "envmap",
-        "filename": light["image"],
-        "scale": light["strength"],
-        "to_world": mi.ScalarTransform4f().rotate([0, 0, 1], -light["rotation_degrees"]) @ ENVIRONMENT_TO_WORLD,
-    }
 
 
 def phase_value(function: Any, towards_eye: Any, towards_light: Any) -> Any:
@@ -85,29 +37,14 @@ def phase_value(function: Any, towards_eye: Any, towards_light: Any) -> Any:
 
 
 @dr.syntax
-def integral(texture: Any, box: Any, points: Any, direction: Any, step: float) -> Any:
-    """Integrate a grid from points to the edge of its box by the midpoint rule."""
-    ray = mi.Ray3f(points, direction)
-    _, _, far = box.ray_intersect(ray)
-    count = dr.maximum(mi.UInt32(dr.ceil(far / step)), 1)
-    width = far / mi.Float(count)
-    where = dr.zeros(mi.Interaction3f, dr.width(points))
-    total = mi.Float(0.0)
-    i = mi.UInt32(0)
-    while i < count:
-        where.p = ray((mi.Float(i) + 0.5) * width)
-        total += texture.eval_1(where)
-        i += 1
-    return total * width
-
-
-@dr.syntax
-def march(smoke: Any, box: Any, ray: Any, step: float, extinctions: list, phases: list, light: Any, shade: Any) -> Any:
+def march(
+    texture: Any, box: Any, ray: Any, step: float, extinctions: list, phases: list, light: Any, shade: Any
+) -> Any:
     """March through the smoke, in several media at once.
 
     Parameters
     ----------
-    smoke
+    texture
         The density.
     box
         Where it is.
@@ -138,7 +75,7 @@ def march(smoke: Any, box: Any, ray: Any, step: float, extinctions: list, phases
     transmittance = [mi.Float(1.0) for _ in extinctions]
 
     def add_sample(where: Any, radiance: list, transmittance: list) -> tuple[list, list]:
-        density = smoke.eval_1(where)
+        density = texture.eval_1(where)
         towards, irradiance = light(where)
         shadow = shade(where, towards)
         scattered = [irradiance * phase_value(function, -ray.d, towards) for function in phases]
@@ -165,24 +102,20 @@ class Reference:
         self.extinctions, self.anisotropies = scene["extinctions"], scene["anisotropies"]
         self.low, self.high = (np.array(scene["domain"][key], float) for key in ("min", "max"))
         self.voxel = float(self.high[0] - self.low[0]) / len(self.field)
-        self.smoke = mi.load_dict(volume(self.field, self.low, self.high))
+        self.texture = mi.load_dict(volume(self.field, self.low, self.high))
         self.box = mi.BoundingBox3f(mi.ScalarPoint3f(self.low), mi.ScalarPoint3f(self.high))
         self.phases = [mi.load_dict({"type": "hg", "g": g}) for g in self.anisotropies]
-        # through the centres of the pixels, row by row
-        width, height = self.camera["size"]
-        index = dr.arange(mi.UInt32, width * height)
-        pixel = mi.Point2f((mi.Float(index % width) + 0.5) / width, (mi.Float(index // width) + 0.5) / height)
-        self.rays, _ = mi.load_dict(sensor(self.camera)).sample_ray(0.0, 0.5, pixel, mi.Point2f(0.5))
+        self.rays = pixel_rays(self.camera)
 
     def single(self, light: Any, steps: int) -> tuple[np.ndarray, np.ndarray]:
         """Render one light; every sample on a camera ray marches to it. Radiance and transmittance."""
         step = self.voxel / steps
 
         def shade(where: Any, towards: Any) -> Any:
-            return integral(self.smoke, self.box, where.p, towards, step)
+            return integral(self.texture, self.box, where.p, towards, step)
 
         radiance, transmittance = march(
-            self.smoke, self.box, self.rays, step, self.extinctions, self.phases, light, shade
+            self.texture, self.box, self.rays, step, self.extinctions, self.phases, light, shade
         )
         width, height = self.camera["size"]
         pictures = np.stack([np.array(picture).T.reshape(height, width, 3) for picture in radiance])
@@ -219,21 +152,10 @@ class Reference:
 
     def cube(self, extinction: float = 1.0, anisotropy: float = 0.0) -> dict[str, Any]:
         """Describe the smoke for Mitsuba's own integrators."""
-        centre, half = (self.low + self.high) / 2, (self.high - self.low) / 2
-        return {
-            "type": "cube",
-            "to_world": mi.ScalarTransform4f().translate(centre).scale(half),
-            "bsdf": {"type": "null"},
-            "interior": {
-                "type": "heterogeneous",
-                "sigma_t": volume(self.field, self.low, self.high),
-                "scale": extinction,
-                "albedo": self.albedo,
-                "phase": {"type": "hg", "g": anisotropy},
-            },
-        }
+        medium = {"extinction": extinction, "albedo": self.albedo}
+        return smoke(self.field, self.low, self.high, medium, {"type": "hg", "g": anisotropy})
 
-    def path_traced(self, light: dict[str, Any], extinction: float, anisotropy: float, depth: int) -> np.ndarray:
+    def traced(self, light: dict[str, Any], extinction: float, anisotropy: float, depth: int) -> np.ndarray:
         """Render with `volpath`; pixels are blocks of the camera's.
 
         Returns
@@ -241,17 +163,14 @@ class Reference:
         numpy.ndarray
             Mean over passes and its standard error, [2, row, column, rgb].
         """
-        scene = mi.load_dict(
-            {
-                "type": "scene",
-                "integrator": {"type": "volpath", "max_depth": depth, "hide_emitters": depth > 1},
-                "camera": sensor(self.camera, BLOCK),
-                "domain": self.cube(extinction, anisotropy),
-                "light": light,
-            }
-        )
-        passes = [mi.render(scene, spp=SAMPLES, seed=seed).numpy()[..., :3] for seed in range(PASSES)]
-        return np.stack([np.mean(passes, axis=0), np.std(passes, axis=0, ddof=1) / math.sqrt(PASSES)])
+        scene = {
+            "integrator": {"type": "volpath", "max_depth": depth, "hide_emitters": depth > 1},
+            "camera": sensor(self.camera, BLOCK),
+            "domain": self.cube(extinction, anisotropy),
+            "light": light,
+        }
+        pictures = path_traced(scene, PASSES, SAMPLES)
+        return np.stack([np.mean(pictures, axis=0), np.std(pictures, axis=0, ddof=1) / math.sqrt(PASSES)])
 
 
 def main() -> None:
@@ -285,12 +204,11 @@ def main() -> None:
     for name, light in reference.lights.items():
         began = time.perf_counter()
         traced = [
-            [reference.path_traced(emitter(light), e, g, 2) for g in reference.anisotropies]
-            for e in reference.extinctions
+            [reference.traced(emitter(light), e, g, 2) for g in reference.anisotropies] for e in reference.extinctions
         ]
         keep(began, **{f"{name}/volpath": np.array(traced)})
     began = time.perf_counter()
-    traced = [reference.path_traced({"type": "constant"}, e, 0.0, 1) for e in reference.extinctions]
+    traced = [reference.traced({"type": "constant"}, e, 0.0, 1) for e in reference.extinctions]
     keep(began, **{"transmittance/volpath": np.array(traced)})
 
 

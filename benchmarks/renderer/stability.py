@@ -35,7 +35,7 @@ def main() -> None:
         for anisotropy in ANISOTROPIES
     ]
     worst = "worst of the ten steepest voxels"
-    print(markdown(["optical depth", "anisotropy", "image error", "gradient error", worst, "white room"], rows), end="")
+    print(markdown(["optical depth", "anisotropy", "image error", "gradient error", worst, "white room"], rows))
 
 
 def at_depth(density: Volume, depth: float, anisotropy: float) -> BenchScene:

@@ -22,7 +22,7 @@ import mitsuba as mi
 import numpy as np
 
 from benchmarks.example.render import YAWS, blocks, crop, srgb_decode, srgb_encode, turned, wall, write_png, write_video
-from benchmarks.renderer.mitsuba_pictures import emitter, integral, sensor, volume
+from benchmarks.mitsuba_scene import emitter, integral, march, path_traced, pixel_rays, sensor, smoke, volume
 
 PIXELS = 4  # a voxel
 FOV = 30.0
@@ -81,44 +81,6 @@ def arriving(light: dict[str, Any], points: Any) -> list[tuple[Any, Any]]:
     return [(mi.Vector3f(sample.d), irradiance[0])]
 
 
-@dr.syntax
-def march(smoke: Any, source: Any, box: Any, ray: Any, step: float, extinction: float) -> tuple[Any, Any]:
-    """March through the smoke.
-
-    Parameters
-    ----------
-    smoke, source
-        Textures: the density, and what is scattered into a direction per optical depth (source function).
-    box
-        Where there is smoke.
-    ray
-        The camera's rays.
-    step
-        Largest step (m).
-    extinction
-        1/m per unit of density.
-
-    Returns
-    -------
-    radiance, transmittance
-        Of the rays.
-    """
-    hit, near, far = box.ray_intersect(ray)
-    length = dr.select(hit, far - near, 0.0)
-    count = mi.UInt32(dr.ceil(length / step))
-    width = length / mi.Float(dr.maximum(count, 1))
-    where = dr.zeros(mi.Interaction3f, dr.width(ray))
-    radiance, transmittance = mi.Float(0.0), mi.Float(1.0)
-    i = mi.UInt32(0)
-    while i < count:
-        where.p = ray(near + (mi.Float(i) + 0.5) * width)
-        passed = dr.exp(-extinction * smoke.eval_1(where) * width)
-        radiance += transmittance * (1.0 - passed) * source.eval_1(where)
-        transmittance *= passed
-        i += 1
-    return radiance, transmittance
-
-
 class Renderer:
     """Pictures of densities in the light and medium of a scene, from several cameras.
 
@@ -127,7 +89,7 @@ class Renderer:
     scene
         Domain, medium and light as in a scene file.
     cameras
-        What `mitsuba_pictures.sensor` takes.
+        What `benchmarks.mitsuba_scene.sensor` takes.
     multiple
         Whether light is scattered more than once.
     """
@@ -135,38 +97,33 @@ class Renderer:
     def __init__(self, scene: dict[str, Any], cameras: list[dict[str, Any]], multiple: bool = False) -> None:
         self.medium, self.light, self.cameras, self.multiple = scene["medium"], scene["light"], cameras, multiple
         self.low, self.high = (np.array(scene["domain"][key], float) for key in ("min", "max"))
-        self.rays = []
-        for camera in cameras:
-            width, height = camera["size"]
-            index = dr.arange(mi.UInt32, width * height)
-            pixel = mi.Point2f((mi.Float(index % width) + 0.5) / width, (mi.Float(index // width) + 0.5) / height)
-            self.rays.append(mi.load_dict(sensor(camera)).sample_ray(0.0, 0.5, pixel, mi.Point2f(0.5))[0])
+        self.rays = [pixel_rays(camera) for camera in cameras]
 
     def images(self, density: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
         """Radiance of the smoke alone and transmittance, each [row, column], a camera."""
         voxel = float((self.high - self.low)[0] / density.shape[0])
         part, low, high = crop(density, self.low, voxel)
         box = mi.BoundingBox3f(mi.ScalarPoint3f(low), mi.ScalarPoint3f(high))
-        smoke = mi.load_dict(volume(part, low, high))
-        source = mi.load_dict(volume(self.scattered(smoke, box, part.shape, low, voxel), low, high))
+        texture = mi.load_dict(volume(part, low, high))
+        source = mi.load_dict(volume(self.scattered(texture, box, part.shape, low, voxel), low, high))
         found = []
         for camera, ray in zip(self.cameras, self.rays, strict=True):
             width, height = camera["size"]
-            views = march(smoke, source, box, ray, voxel / 2, self.medium["extinction"])
+            views = march(texture, source.eval_1, box, ray, voxel / 2, self.medium["extinction"])
             radiance, transmittance = (view.numpy().reshape(height, width) for view in views)
             if self.multiple:
                 radiance = self.path_traced(density, camera, 1, BOUNCES, 1, SAMPLES)
             found.append((radiance, transmittance))
         return found
 
-    def scattered(self, smoke: Any, box: Any, shape: tuple[int, ...], low: np.ndarray, voxel: float) -> np.ndarray:
+    def scattered(self, texture: Any, box: Any, shape: tuple[int, ...], low: np.ndarray, voxel: float) -> np.ndarray:
         """Source function of the smoke, on its grid; on one twice as fine for lights with sharp shadows."""
         fine = 1 if self.light["type"] == "environment" else 2
         axes = [a + (np.arange(fine * n) + 0.5) * voxel / fine for a, n in zip(low, shape, strict=True)]
         points = mi.Point3f(*(p.ravel() for p in np.meshgrid(*axes, indexing="ij")))
         total = mi.Float(0.0)
         for towards, irradiance in arriving(self.light, points):
-            depth = integral(smoke, box, points, towards, voxel / fine)
+            depth = integral(texture, box, points, towards, voxel / fine)
             total += irradiance * dr.exp(-self.medium["extinction"] * depth)
             dr.eval(total)
         return self.medium["albedo"] / (4 * math.pi) * total.numpy().reshape([fine * n for n in shape])
@@ -175,29 +132,13 @@ class Renderer:
         self, density: np.ndarray, camera: dict[str, Any], block: int, depth: int, passes: int, samples: int
     ) -> np.ndarray:
         """A picture by `volpath` with paths of a depth, 2 for single scattering; pixels are blocks of the camera's."""
-        centre, half = (self.low + self.high) / 2, (self.high - self.low) / 2
-        interior = {
-            "type": "heterogeneous",
-            "sigma_t": volume(density, self.low, self.high),
-            "scale": self.medium["extinction"],
-            "albedo": self.medium["albedo"],
-            "phase": {"type": "isotropic"},
+        scene = {
+            "integrator": {"type": "volpath", "max_depth": depth, "hide_emitters": True},
+            "camera": sensor(camera, block),
+            "domain": smoke(density, self.low, self.high, self.medium, {"type": "isotropic"}),
+            "light": emitter(self.light),
         }
-        scene = mi.load_dict(
-            {
-                "type": "scene",
-                "integrator": {"type": "volpath", "max_depth": depth, "hide_emitters": True},
-                "camera": sensor(camera, block),
-                "domain": {
-                    "type": "cube",
-                    "to_world": mi.ScalarTransform4f().translate(centre).scale(half),
-                    "bsdf": {"type": "null"},
-                    "interior": interior,
-                },
-                "light": emitter(self.light),
-            }
-        )
-        return np.mean([mi.render(scene, spp=samples, seed=seed).numpy()[..., 0] for seed in range(passes)], axis=0)
+        return np.mean(path_traced(scene, passes, samples)[..., 0], axis=0)
 
 
 def table(name: str, values: dict[str, Any]) -> str:

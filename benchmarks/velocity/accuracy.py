@@ -195,7 +195,7 @@ def main() -> None:
     options = parser.parse_args()
     names = [field.name for field in fields(Score)]
     rows = [row for path in options.truths for row in table(path)]
-    print(markdown(["scene", "", *names[:-1], "worst", names[-1]], rows), end="")
+    print(markdown(["scene", "", *names[:-1], "worst", names[-1]], rows))
     if options.picture:
         draw(options.truths, options.picture)
 

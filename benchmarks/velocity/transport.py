@@ -95,14 +95,14 @@ def main() -> None:
             one, all_steps, error = carried(truth, options.speed, step)
             shown = f"{error:.4f}" if options.speed == 1 else ""
             rows.append([name, scheme, f"{one:+.2%}", f"{all_steps:+.1%}", shown])
-    print(markdown(["scene", "", "mass, one step", f"mass, {len(FRAMES)} steps", "error"], rows))
+    print(markdown(["scene", "", "mass, one step", f"mass, {len(FRAMES)} steps", "error"], rows), end="\n\n")
     if options.speed == 1:
         rows = []
         for name, truth in truths.items():
             cells = [f"{value:.3f}" for value in predicted(truth)]
             rows.append([name, ", ".join(cells[:3]), ", ".join(cells[3:])])
         header = ["scene", "next velocity: one, midpoint, two half steps", "density carried by it"]
-        print(markdown(header, rows), end="")
+        print(markdown(header, rows))
 
 
 if __name__ == "__main__":

@@ -1,0 +1,1 @@
+"""The example clip: baked by Mantaflow, pictured by Mitsuba. README.md says how."""
