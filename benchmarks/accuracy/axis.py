@@ -63,7 +63,7 @@ def shots(truth: Truth) -> Iterator[Shot]:
     domain = Domain(*BOX, truth.shape)
     for side, height in CAMERAS:
         camera = Camera.look_at((0, -7 * side, height), (0, 0, 1.5), fov_y_degrees=32, size=(128, 192))
-        renderer = Renderer(camera, domain, Medium(extinction=5.0), (), np.ones(3), "absorption")
+        renderer = Renderer(camera, domain, Medium(extinction=5.0), (), np.ones(3, np.float32), "absorption")
         looks = np.unique(np.linspace(0, FRAMES - 1, LOOKS).round().astype(int))
         amounts = [-np.log(np.maximum(renderer.image(densities[frame])[..., 0], 1e-9)) for frame in looks]
         seen = [np.where(amount > 0.01, amount, 0).astype(np.float32) for amount in amounts]

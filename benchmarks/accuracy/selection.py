@@ -35,7 +35,8 @@ from smokelift.footage.images import area_average
 from smokelift.output.images import eight_bit
 from smokelift.output.sheet import write_sheet
 from smokelift.render import Image, Volume, scene_renderer
-from smokelift.scene import EnvironmentLight, completed
+from smokelift.scene import EnvironmentLight, Scattering, completed
+from smokelift.setup.settings import QUALITIES, Quality
 from smokelift.setup.shot import Shot, prepare_shot
 from smokelift.velocity.settings import LEVELS
 
@@ -76,22 +77,24 @@ class Known:
 
     def shown(self, density: Volume, view: str) -> Image:
         """Return what a volume shows in the same light."""
-        scene = completed(replace(self.scene, domain=replace(self.scene.domain, resolution=density.shape)))
+        scene = completed(self.scene)
+        nx, ny, nz = density.shape
+        scene = replace(scene, domain=replace(scene.domain, resolution=(nx, ny, nz)))
         return scene_renderer(scene, self.views.cameras[view], BLACK).image(density)
 
 
-def sides(clip: Clip, scene: Scene, quality: str) -> dict[str, tuple[Scene, Settings]]:
+def sides(clip: Clip, scene: Scene, quality: Quality) -> dict[str, tuple[Scene, Settings]]:
     """Return what is compared: everything left open, and the richest of everything."""
     chosen = Settings.preset(quality, resolution="auto")
     rich = Settings.preset(quality)
     if scene.domain is None:  # the paper's method takes the most
-        most = prepare_shot(clip, scene, Settings.preset(quality, "paper")).scene.domain
-        rich = replace(rich, resolution=most.resolution)
+        most = completed(prepare_shot(clip, scene, Settings.preset(quality, "paper")).scene)
+        rich = replace(rich, resolution=most.domain.resolution)
     lights = tuple(
         replace(light, directions=DIRECTIONS) if isinstance(light, EnvironmentLight) else light
         for light in scene.lights
     )
-    model = "single" if lights else "unshadowed"
+    model: Scattering = "single" if lights else "unshadowed"
     richest = replace(
         rich, density=replace(rich.density, scattering=model), velocity=replace(rich.velocity, levels=LEVELS)
     )
@@ -155,9 +158,11 @@ def against(side: Side, known: Known) -> dict[str, float]:
     return {"density_error": float(np.mean(errors)), "psnr_new": float(np.mean(decibels))}
 
 
-def compare(path: Path, known: Known | None, frames: int, quality: str) -> tuple[dict[str, Any], list[Image]]:
+def compare(path: Path, known: Known | None, frames: int, quality: Quality) -> tuple[dict[str, Any], list[Image]]:
     """Return both sides of a clip: figures, and pictures of the last frame."""
     scene = Scene.load(path)
+    if scene.clip is None:
+        raise ValueError(f"{path}: has no [clip].")
     first = scene.clip.first
     source = replace(scene.clip, frames=(first, first + frames - 1))
     row: dict[str, Any] = {"clip": path.parent.name, "frames": frames}
@@ -171,7 +176,7 @@ def compare(path: Path, known: Known | None, frames: int, quality: str) -> tuple
             shot = side.shot
             row[name] = {
                 "scattering": shot.scattering,
-                "resolution": list(shot.scene.domain.resolution),
+                "resolution": list(completed(shot.scene).domain.resolution),
                 "directions": [light.directions for light in shot.scene.lights if isinstance(light, EnvironmentLight)],
                 "levels": shot.levels,
                 "seconds": side.seconds,
@@ -183,8 +188,8 @@ def compare(path: Path, known: Known | None, frames: int, quality: str) -> tuple
         tiles = [clip.frame(frames - 1)]
         for side in both.values():
             plate = side.shot.estimated_background
-            scene = completed(replace(side.shot.scene, scattering=side.shot.scattering))
-            tiles.append(scene_renderer(scene, background=plate).image(side.found[-1].density))
+            shown = completed(replace(side.shot.scene, scattering=side.shot.scattering))
+            tiles.append(scene_renderer(shown, background=plate).image(side.found[-1].density))
         if known is not None:
             tiles.append(known.seen("90", frames - 1))
             tiles += [known.shown(side.found[-1].density, "90") for side in both.values()]
@@ -197,7 +202,7 @@ def main() -> None:
     parser.add_argument("out", type=Path)
     parser.add_argument("clips", nargs="+", help="scene.toml, or scene.toml=FOLDER:FIRST:STEP")
     parser.add_argument("--frames", type=int, default=10)
-    parser.add_argument("--quality", default="balanced")
+    parser.add_argument("--quality", choices=QUALITIES, default="balanced")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     rows, sheet = [], []

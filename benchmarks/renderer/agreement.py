@@ -29,7 +29,7 @@ from smokelift.output.images import write_image
 from smokelift.render import Renderer
 from smokelift.render.environment import environment_lights
 from smokelift.render.environment_count import environment_count
-from smokelift.scene import Camera, DirectionalLight, Domain, EnvironmentLight, Light, Medium, PointLight
+from smokelift.scene import Camera, DirectionalLight, Domain, EnvironmentLight, FiniteLight, Medium, PointLight
 
 Array = npt.NDArray[np.floating[Any]]
 
@@ -46,7 +46,7 @@ DEPTHS = (1.0, 15.0)
 ANISOTROPIES = (0.0, 0.6)
 BACKGROUND = np.array([0.05, 0.08, 0.12], np.float32)
 SUN = DirectionalLight((0.57, 0.456, -0.684), (6.0, 5.0, 4.0))
-LIGHTS = {
+LIGHTS: dict[str, FiniteLight] = {
     "directional": SUN,
     "point": PointLight((-0.9, -0.6, 1.5), (6.0, 5.0, 4.0)),
     "point, close": PointLight((-0.1, -0.7, 0.7), (0.6, 0.5, 0.4)),
@@ -97,7 +97,7 @@ def extinctions(field: Array) -> list[float]:
     return [depth / float(thickest) for depth in DEPTHS]
 
 
-def described(light: Light) -> dict[str, Any]:
+def described(light: FiniteLight | EnvironmentLight) -> dict[str, Any]:
     """Return a light as JSON takes it."""
     kind = {DirectionalLight: "directional", PointLight: "point", EnvironmentLight: "environment"}[type(light)]
     return {"type": kind} | {key: str(v) if isinstance(v, Path) else v for key, v in asdict(light).items()}
@@ -108,7 +108,7 @@ def prepare(folder: Path, field: Array) -> EnvironmentLight:
     environment = EnvironmentLight(folder / "surroundings.exr", rotation_degrees=ROTATION)
     write_image(environment.image, surroundings(), half=False)
     np.savez_compressed(folder / "fields.npz", **{str(n): sampled(field, n) for n in GRIDS})
-    lights = {name: described(light) for name, light in (*LIGHTS.items(), ("environment", environment))}
+    lights = {name: described(light) for name, light in LIGHTS.items()} | {"environment": described(environment)}
     scene = {
         "domain": {"min": LOW, "max": HIGH},
         "camera": {"matrix": CAMERA.matrix, "fov_y_degrees": FOV, "size": SIZE},
@@ -132,7 +132,7 @@ def difference(picture: Array, reference: Array) -> float:
 def blocks(picture: Array) -> Array:
     """Averages over blocks of pixels."""
     rows, columns = picture.shape[0] // BLOCK, picture.shape[1] // BLOCK
-    return picture.reshape(rows, BLOCK, columns, BLOCK, -1).mean(axis=(1, 3))
+    return np.asarray(picture.reshape(rows, BLOCK, columns, BLOCK, -1).mean(axis=(1, 3)))
 
 
 class Comparison:
@@ -184,7 +184,7 @@ class Comparison:
 
     def grids(self) -> str:
         """Every light at every grid."""
-        sets = {name: (light,) for name, light in LIGHTS.items()}
+        sets: dict[str, tuple[FiniteLight, ...]] = {name: (light,) for name, light in LIGHTS.items()}
         sets["environment"] = environment_lights(self.environment, COUNTS[-1])
         rows, worst = [], dict.fromkeys(GRIDS, 0.0)
         for name, lights in sets.items():

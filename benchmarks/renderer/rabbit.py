@@ -2,17 +2,23 @@
 
     python -m benchmarks.renderer.rabbit docs/figure3.png
 
-The rabbit is made of ellipsoids, the plume of curled noise; nothing is downloaded. Every row is a moment of the
-optimisation: the picture, its derivative by a common scaling of the density (red: more smoke makes the pixel brighter,
-blue: darker), what the exact gradient says along each ray (red: less smoke there, blue: more), and the density from
-the side. The last row is the target. The same start with the paper's derivative and its fixed rate is reported as text.
+The rabbit is made of ellipsoids, the plume of curled noise; nothing is downloaded. Each row of the figure is a moment
+of the optimisation: the picture, its derivative with respect to a common scale of the density (red: more smoke makes
+the pixel brighter, blue: darker), the sum of the exact gradient along each ray (red: less smoke lowers the error, blue:
+more), and the density from the side. The last row is the target. The error that the paper's derivative reaches from
+the same start is printed.
 """
+
+from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from PIL import Image, ImageDraw
+import numpy.typing as npt
+from PIL import Image as Pillow
+from PIL import ImageDraw
 from scipy import ndimage
 
 from smokelift.baselines.descent import fit_paper
@@ -20,7 +26,7 @@ from smokelift.baselines.renderer import PaperRenderer
 from smokelift.density.descent import descend
 from smokelift.density.fit import Target
 from smokelift.footage.images import linear_to_srgb
-from smokelift.render import Renderer
+from smokelift.render import Image, Renderer, Volume
 from smokelift.scene import Camera, DirectionalLight, Domain, Medium, orbit
 
 SIZE, PIXELS = 64, 160
@@ -32,6 +38,8 @@ WALL = np.array([0.02, 0.03, 0.05], np.float32)
 MOMENTS = (0, 10, 40, 120, 320)  # steps of descent
 RESTART = 10  # steps after which voxels are measured anew
 PAPER_STEPS, PAPER_RATE = 320, 0.1
+
+Tile = npt.NDArray[np.uint8]
 
 # centre and half axes (m) of the rabbit's parts
 RABBIT = (
@@ -55,7 +63,8 @@ def main() -> None:
     target_density = plume()
     target = renderer.image(target_density)
     density = rabbit()
-    rows, done = [], 0
+    rows: list[list[Tile | None]] = []
+    done = 0
     for moment in MOMENTS:
         if moment > done:
             density = step(renderer, target, density, moment - done)
@@ -68,10 +77,10 @@ def main() -> None:
     assemble(rows, labels, ("picture", "derivative", "gradient", "from the side")).save(out, optimize=True)
 
 
-def step(renderer: Renderer, target: np.ndarray, density: np.ndarray, count: int) -> np.ndarray:
-    """Descend so many steps on the exact gradient; every voxel may hold smoke.
+def step(renderer: Renderer, target: Image, density: Volume, count: int) -> Volume:
+    """Descend some steps on the exact gradient; every voxel may hold smoke.
 
-    The descent measures each voxel in units of its start, which is far from the answer here: hence the restarts.
+    The descent scales each voxel by its initial density. That is far from the answer here, so the descent is restarted.
     """
     everywhere = np.ones(density.shape, bool)
     aim = Target(renderer, target, np.ones(target.shape[:2], np.float32))
@@ -80,25 +89,25 @@ def step(renderer: Renderer, target: np.ndarray, density: np.ndarray, count: int
     return density
 
 
-def by_the_paper(target: np.ndarray) -> np.ndarray:
+def by_the_paper(target: Image) -> Volume:
     """Descend with the paper's derivative at its fixed rate, from the rabbit."""
     renderer = PaperRenderer(CAMERA, DOMAIN, MEDIUM, (SUN,), WALL)
     fog = np.full(DOMAIN.resolution, 0.1 / MEDIUM.extinction, np.float32)
     return fit_paper([renderer], [target], rabbit(), fog, PAPER_RATE, 1e-6, PAPER_STEPS).density
 
 
-def rabbit() -> np.ndarray:
-    """Density of the rabbit."""
+def rabbit() -> Volume:
+    """Return the density of the rabbit."""
     x, y, z = centres()
     shape = np.zeros(DOMAIN.resolution)
     for centre, axes in RABBIT:
         distance = np.sqrt(sum(((p - c) / a) ** 2 for p, c, a in zip((x, y, z), centre, axes, strict=True)))
         shape = np.maximum(shape, np.clip((1.08 - distance) * 6, 0, 1))
-    return shape.astype(np.float32)
+    return np.asarray(shape, np.float32)
 
 
-def plume() -> np.ndarray:
-    """Density of a plume: a rising column of blobs, stirred by the curl of noise."""
+def plume() -> Volume:
+    """Return the density of a plume: a rising column of blobs, stirred by the curl of noise."""
     rng = np.random.default_rng(7)
     potential = [ndimage.gaussian_filter(rng.standard_normal((SIZE,) * 3), 5, mode="wrap") for _ in range(3)]
     gradient = [np.gradient(p / p.std()) for p in potential]
@@ -111,11 +120,11 @@ def plume() -> np.ndarray:
         strength = 5.0 * np.clip(1.6 * z, 0.1, 1)
         at = [i - strength * c for i, c in zip(index, curl, strict=True)]
         column = ndimage.map_coordinates(column, at, order=1, mode="constant")
-    return np.maximum(0.9 * column - 0.03, 0).astype(np.float32)
+    return np.asarray(np.maximum(0.9 * column - 0.03, 0), np.float32)
 
 
-def centres() -> tuple[np.ndarray, ...]:
-    """Positions of the voxels' centres, m."""
+def centres() -> tuple[npt.NDArray[np.float64], ...]:
+    """Return the positions of the voxels' centres (m)."""
     return tuple(
         np.meshgrid(
             *((low + (np.arange(SIZE) + 0.5) * DOMAIN.voxel_size) for low in DOMAIN.min), indexing="ij", sparse=True
@@ -123,8 +132,8 @@ def centres() -> tuple[np.ndarray, ...]:
     )
 
 
-def draw_row(renderer: Renderer, side: Renderer, target: np.ndarray, density: np.ndarray) -> list[np.ndarray]:
-    """One moment: picture, derivative by a common scaling, gradient along the rays, the other side."""
+def draw_row(renderer: Renderer, side: Renderer, target: Image, density: Volume) -> list[Tile | None]:
+    """Return the tiles of one moment: picture, derivative, gradient along the rays, view from the side."""
     change = 0.02
     more, less = renderer.image(density * (1 + change)), renderer.image(density * (1 - change))
     derivative = (more - less).mean(-1) / (2 * change)
@@ -134,30 +143,30 @@ def draw_row(renderer: Renderer, side: Renderer, target: np.ndarray, density: np
     return [shown(picture), signed(derivative), signed(along), shown(side.image(density))]
 
 
-def shown(picture: np.ndarray) -> np.ndarray:
-    """A linear picture as 8-bit sRGB."""
+def shown(picture: Image) -> Tile:
+    """Return a linear picture as 8-bit sRGB."""
     return np.asarray(255 * linear_to_srgb(np.clip(picture, 0, 1)), np.uint8)
 
 
-def signed(values: np.ndarray) -> np.ndarray:
-    """Positive values red, negative ones blue, on white; by their own largest."""
+def signed(values: npt.NDArray[np.floating[Any]]) -> Tile:
+    """Return positive values in red, negative ones in blue, on white, relative to the largest."""
     scaled = np.clip(values / (np.quantile(np.abs(values), 0.995) or 1), -1, 1)
     red, blue = np.clip(1 + scaled, 0, 1), np.clip(1 - scaled, 0, 1)
     picture = np.stack([red, np.minimum(red, blue), blue], -1)
-    tile = Image.fromarray(np.asarray(255 * picture, np.uint8)).resize((PIXELS, PIXELS))
+    tile = Pillow.fromarray(np.asarray(255 * picture, np.uint8)).resize((PIXELS, PIXELS))
     return np.asarray(tile)
 
 
-def error(picture: np.ndarray, target: np.ndarray) -> float:
-    """Distance from the target in units of the smoke's own brightness in it."""
+def error(picture: Image, target: Image) -> float:
+    """Return the distance from the target, relative to the target's own difference from the wall."""
     return float(np.linalg.norm(picture - target) / np.linalg.norm(target - WALL))
 
 
-def assemble(rows: list[list[np.ndarray | None]], labels: list[str], titles: tuple[str, ...]) -> Image.Image:
-    """Tiles in a table with headings."""
+def assemble(rows: list[list[Tile | None]], labels: list[str], titles: tuple[str, ...]) -> Pillow.Image:
+    """Return the tiles as a table with headings."""
     margin, top, left = 6, 22, 64
     pitch = PIXELS + margin
-    sheet = Image.new("RGB", (left + pitch * len(titles), top + pitch * len(rows)), "white")
+    sheet = Pillow.new("RGB", (left + pitch * len(titles), top + pitch * len(rows)), "white")
     draw = ImageDraw.Draw(sheet)
     for column, title in enumerate(titles):
         draw.text((left + column * pitch + 4, 5), title, fill="black")
@@ -165,7 +174,7 @@ def assemble(rows: list[list[np.ndarray | None]], labels: list[str], titles: tup
         draw.text((4, top + number * pitch + PIXELS // 2), label, fill="black")
         for column, tile in enumerate(row):
             if tile is not None:
-                sheet.paste(Image.fromarray(tile), (left + column * pitch, top + number * pitch))
+                sheet.paste(Pillow.fromarray(tile), (left + column * pitch, top + number * pitch))
     return sheet
 
 

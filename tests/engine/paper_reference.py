@@ -4,9 +4,9 @@ Like ``renderer_reference`` it takes complex densities, for derivatives by a com
 """
 
 import numpy as np
-from renderer_reference import inscatter_of
 
 from smokelift.scene.projection import ray_through_pixels
+from tests.engine.renderer_reference import inscatter_of
 
 
 def _trilinear(volume, position):
