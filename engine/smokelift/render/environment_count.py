@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from smokelift.footage.working import voxel_width
 from smokelift.render.environment import EnvironmentCells
@@ -95,11 +94,10 @@ def lights_needed(
 
 def _coarse(domain: Domain) -> Domain:
     """The domain in few cubic voxels; where they do not fit its edges, to the nearest."""
-    edges = np.array(domain.max) - np.array(domain.min)
-    voxel = edges.max() / REFERENCE_VOXELS
-    counts = np.maximum(np.rint(edges / voxel), 1).astype(int)
-    low, high = (np.array(domain.centre) + side * counts * voxel / 2 for side in (-1, 1))
-    return Domain(_triple(low), _triple(high), (int(counts[0]), int(counts[1]), int(counts[2])))
+    edges = [high - low for low, high in zip(domain.min, domain.max, strict=True)]
+    voxel = max(edges) / REFERENCE_VOXELS
+    x, y, z = (max(round(edge / voxel), 1) for edge in edges)
+    return domain.about_centre((x, y, z), voxel)
 
 
 def _coarse_camera(camera: Camera, domain: Domain) -> Camera:
@@ -116,7 +114,3 @@ def _reference_density(domain: Domain, medium: Medium) -> Volume:
     ball = np.maximum(1 - (x * x + y * y + z * z), 0) * lumps
     thickest = domain.voxel_size * min(ball.sum(axis).max() for axis in range(3))
     return np.asarray(ball * REFERENCE_DEPTH / (medium.extinction * thickest), np.float32)
-
-
-def _triple(values: NDArray[np.float64]) -> tuple[float, float, float]:
-    return float(values[0]), float(values[1]), float(values[2])

@@ -1,4 +1,9 @@
-"""A scene's lights in the coordinates of a grid, each as one sweep over its planes (docs/renderer.md)."""
+"""A scene's lights in the coordinates of a grid, each as sweeps from plane to plane of voxels.
+
+Columns of light run through the planes and keep the optical depth up to each. Parallel light has columns of one slope,
+a voxel apart; those of a point diverge, through the sides of a cube around it. The adjoint of parallel light is the
+sweep of the light that travels the other way.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +20,7 @@ from smokelift.scene import DirectionalLight, Domain, FiniteLight, Medium, Point
 Array = NDArray[np.float64]
 Box = tuple[int, int, int]
 
-_CLOSEST = 1e-3
+CLOSEST = 1e-3
 """Voxels: a plane this close to the light, or closer, is no voxel's farthest axis."""
 
 
@@ -204,9 +209,9 @@ def _point(light: PointLight, energy: Array, domain: Domain, corner: Box, shape:
 def _face(light: Array, shape: Box, axis: int, travel: int, far: float) -> Face | None:
     at = float(light[axis])
     if travel > 0:
-        first, last = max(0, math.ceil(at + _CLOSEST)), shape[axis] - 1
+        first, last = max(0, math.ceil(at + CLOSEST)), shape[axis] - 1
     else:
-        first, last = min(shape[axis] - 1, math.floor(at - _CLOSEST)), 0
+        first, last = min(shape[axis] - 1, math.floor(at - CLOSEST)), 0
     planes = travel * (last - first) + 1
     if planes <= 0:
         return None

@@ -76,6 +76,11 @@ class Domain:
         """Shape of an array of voxels, the same as ``resolution``."""
         return self.resolution
 
+    def about_centre(self, resolution: tuple[int, int, int], voxel_size: float) -> Domain:
+        """Return the domain about the same centre with other voxels, whose size is in metres."""
+        (x, y, z), (a, b, c) = self.centre, (n * voxel_size / 2 for n in resolution)
+        return Domain((x - a, y - b, z - c), (x + a, y + b, z + c), resolution)
+
     def contains(self, point: Vector) -> bool:
         """Return whether a point lies inside the box or on its surface."""
         return all(low <= p <= high for low, p, high in zip(self.min, point, self.max, strict=True))

@@ -40,3 +40,11 @@ def test_inlets_add_up() -> None:
     inlets = Inlet((0, 0, 0), 0.2), Inlet((0.5, 0.5, 1), 0.1)
     np.testing.assert_array_equal(inflow(inlets, domain), inlets[0].voxels(domain) | inlets[1].voxels(domain))
     assert inflow((), domain) is None
+
+
+def test_other_voxels_about_the_same_centre() -> None:
+    domain = Domain((0.0, 0.0, 1.0), (1.0, 2.0, 2.0), (10, 20, 10))
+    coarse = domain.about_centre((2, 5, 2), 0.4)
+    assert coarse.resolution == (2, 5, 2)
+    assert coarse.voxel_size == pytest.approx(0.4)
+    assert coarse.centre == pytest.approx(domain.centre)

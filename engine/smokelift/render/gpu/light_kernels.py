@@ -13,6 +13,8 @@ Nothing is atomic: adjoints gather.
 import numpy as np
 import taichi as ti
 
+from smokelift.render.light_sweeps import CLOSEST
+
 ndarray3 = ti.types.ndarray(dtype=ti.f32, ndim=3)
 ndarray4 = ti.types.ndarray(dtype=ti.f32, ndim=4)
 mask3 = ti.types.ndarray(dtype=ti.i32, ndim=3)
@@ -231,7 +233,7 @@ def _owned(axis: ti.template(), away):
 @ti.func
 def faces_voxel(axis: ti.template(), travel, position, index):
     away = index - position
-    return travel * away[axis] >= 1e-3 and _owned(axis, away)
+    return travel * away[axis] >= CLOSEST and _owned(axis, away)
 
 
 @ti.func
@@ -394,7 +396,7 @@ def add_point_shadow(
     for index in ti.grouped(ti.ndrange(*near.shape)):
         kij = planar(axis, index)
         distance = travel * (kij[0] - light[0])
-        if near[index] != 0 and distance >= 1e-3:
+        if near[index] != 0 and distance >= CLOSEST:
             scale = distance / far
             b, c = (kij[1] - light[1]) / scale, (kij[2] - light[2]) / scale
             first_p = ti.max(0, ti.ceil(b - 1 / scale - begin[0], ti.i32))
