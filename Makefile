@@ -1,4 +1,4 @@
-# make demo   lift the example clip to a VDB sequence, with pictures to look at, in demo/
+# make demo   lift the example clip to a VDB sequence in demo/sequence, with a contact sheet and a preview video
 # make test   formatting, types and tests; nothing that needs a GPU
 # make extension      the Blender extension's zips in dist/; ENGINE_WHEELS=DIR adds platforms built elsewhere
 # make test-blender   that zip in the bpy wheels and in a real Blender
@@ -29,7 +29,7 @@ demo: $(VENV)/engine.stamp
 test: lint pytest
 
 pytest: $(VENV)/engine.stamp
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n 2 --dist worksteal
 
 lint: $(VENV)/engine.stamp
 	$(BIN)/ruff check .

@@ -93,7 +93,9 @@ def _estimated_sun(scene: bpy.types.Scene, index: dict[str, Any]) -> None:
     strongest = max(table["irradiance"]) or 1.0
     sun.data.energy = strongest
     sun.data.color = [part / strongest for part in table["irradiance"]]
-    sun.data.use_shadow = index["settings"]["density"]["scattering"] == "single"
+    # sequences of version 1.0 keep the model of scattering in their settings
+    scattering = index["scene"]["medium"].get("scattering") or index["settings"]["density"]["scattering"]
+    sun.data.use_shadow = scattering == "single"
     sun.rotation_euler = Vector(table["direction"]).to_track_quat("-Z", "Y").to_euler()
 
 
