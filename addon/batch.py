@@ -156,7 +156,6 @@ def command(words: list[str]) -> int:
 
 
 def register() -> None:
-    """Add Blender's command ``smokelift``."""
     register.handles = [bpy.utils.register_cli_command("smokelift", command)]
 
 

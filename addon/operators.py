@@ -18,7 +18,6 @@ BOX_SHARE = 0.9
 class _NeedsClip:
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Whether the scene has a clip."""
         if context.scene.smokelift.clip is None:
             cls.poll_message_set("Choose a clip first")
             return False
@@ -32,7 +31,6 @@ class SMOKELIFT_OT_run(_NeedsClip, bpy.types.Operator):
     bl_label = "Make Smoke"
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Write a new take and append it to the queue."""
         try:
             take = run.begin(context.scene)
         except (ShotError, TakeError) as error:
@@ -49,7 +47,6 @@ class SMOKELIFT_OT_resume(_NeedsClip, bpy.types.Operator):
     bl_label = "Resume"
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Append the unfinished take to the queue."""
         take = run.unfinished(context.scene)
         if take is None or run.busy(context.window_manager, take):
             self.report({"ERROR"}, "No stopped run to resume: press Make Smoke.")
@@ -68,13 +65,11 @@ class SMOKELIFT_OT_cancel(bpy.types.Operator):
     take: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Ask first, unless a button was pressed."""
         if self.take:
             return self.execute(context)
         return context.window_manager.invoke_confirm(self, event)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Stop one job, else the running one."""
         for row in context.window_manager.smokelift.jobs:
             if row.take == self.take or (not self.take and row.outcome == "running"):
                 row.cancel = True
@@ -91,7 +86,6 @@ class SMOKELIFT_OT_check(_NeedsClip, bpy.types.Operator):
     bl_options = {"INTERNAL"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Let the worker check the shot once its settings rest."""
         state = context.window_manager.smokelift
         state.check_scene = context.scene.session_uid
         state.check_ticks = run.CHECK_TICKS
@@ -108,14 +102,12 @@ class SMOKELIFT_OT_make_box(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Whether the scene has a camera."""
         if context.scene.camera is None:
             cls.poll_message_set("The scene has no camera: add one where the clip was filmed from")
             return False
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Make or move the box."""
         scene = context.scene
         low, high = framed_box(scene)
         box = box_of(scene)
@@ -170,7 +162,6 @@ class SMOKELIFT_OT_match_clip(_NeedsClip, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Set resolution, frame rate and length."""
         shot_setup.match_clip(context.scene)
         return {"FINISHED"}
 
@@ -188,14 +179,12 @@ class SMOKELIFT_OT_set_up(_NeedsClip, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Whether the scene has a result and a clip."""
         if volume.shown_take(context.scene) is None:
             cls.poll_message_set("Make smoke first")
             return False
         return super().poll(context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Set up the scene."""
         take = volume.shown_take(context.scene)
         index = take.index()
         if index is None:
@@ -218,7 +207,6 @@ class SMOKELIFT_OT_open_log(bpy.types.Operator):
     take: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Load the log as a text and show it in a text editor, in a new window if there is none."""
         log = Take(Path(self.take)).log_file
         if not log.is_file():
             self.report({"ERROR"}, f"There is no log at {log}: the engine never started.")
@@ -248,11 +236,9 @@ class SMOKELIFT_OT_remove_takes(_NeedsClip, bpy.types.Operator):
     bl_label = "Delete Earlier Results?"
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Ask first."""
         return context.window_manager.invoke_confirm(self, event)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Delete every take that no scene shows and no job uses."""
         kept = {str(take.directory) for scene in bpy.data.scenes if (take := volume.shown_take(scene))}
         kept |= {row.take for row in context.window_manager.smokelift.jobs}
         for take in takes(run.output_folder(context.scene)):

@@ -18,7 +18,6 @@ class _Main:
     bl_region_type = "UI"
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Draw the clip, the shot, the cost and the runs."""
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
@@ -190,11 +189,9 @@ class _Advanced:
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Whether the scene has a clip."""
         return context.scene.smokelift.clip is not None
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Draw the settings that few shots need, and the assumptions."""
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False

@@ -258,7 +258,6 @@ _CLASSES = (SmokeliftSettings, SmokeliftJob, SmokeliftState)
 
 
 def register() -> None:
-    """Add the properties to Scene and WindowManager."""
     for cls in _CLASSES:
         bpy.utils.register_class(cls)
     bpy.types.Scene.smokelift = PointerProperty(type=SmokeliftSettings)
@@ -266,7 +265,6 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Remove the properties."""
     del bpy.types.WindowManager.smokelift
     del bpy.types.Scene.smokelift
     for cls in reversed(_CLASSES):

@@ -324,7 +324,6 @@ def _playing(context: bpy.types.Context) -> bool:
 
 
 def register() -> None:
-    """Register the worker."""
     bpy.utils.register_class(SMOKELIFT_OT_work)
 
 

@@ -222,16 +222,8 @@ def _camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> bpy.types
 def _camera_over_frames(scene: bpy.types.Scene, rotation: Matrix, corners: list[Vector], quick: bool) -> dict[str, Any]:
     """The camera's table: one matrix, or one for every used frame if the camera moves.
 
-    Each frame costs an evaluation of the whole scene, so a few frames decide whether the camera moves.
-
-    Parameters
-    ----------
-    scene, rotation
-        As in `camera_table`.
-    corners
-        Of the box, in the world.
-    quick
-        Read the current frame only.
+    Each frame costs an evaluation of the whole scene, so a few frames decide whether the camera moves; ``quick`` reads
+    the current one only. The corners are those of the box, in Blender's world.
     """
     start, length = start_frame(scene), scene.smokelift.last - scene.smokelift.first
     frames = [start + round(step * length / (CAMERA_SAMPLES - 1)) for step in range(CAMERA_SAMPLES)]

@@ -148,10 +148,8 @@ def _material(name: str) -> bpy.types.Material:
 
 
 def register() -> None:
-    """Correct every file that Blender loads."""
     bpy.app.handlers.load_post.append(correct_positions)
 
 
 def unregister() -> None:
-    """Stop doing so."""
     bpy.app.handlers.load_post.remove(correct_positions)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomllib
 
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from addon.toml import dumps
@@ -16,6 +16,7 @@ NAMES = st.from_regex(r"[a-z_]{1,8}", fullmatch=True)
 TABLES = st.dictionaries(NAMES, VALUES, max_size=4)
 
 
+@settings(max_examples=50, deadline=None, derandomize=True)
 @given(st.dictionaries(NAMES, TABLES | st.lists(TABLES, min_size=1, max_size=3), max_size=4))
 def test_what_is_written_is_read_back(tables) -> None:
     """Any texts (paths with quotes, backslashes, umlauts), numbers and nested lists."""
