@@ -1,7 +1,7 @@
 """Footage: pictures in linear light, and the smoke in them apart from its background.
 
-``clip`` gives the frames of a ``video`` or an ``image_sequence`` (each a ``frame_source``), ``images`` reads and resizes
-single pictures. ``plate`` is what is behind the smoke: ``background`` reads the one that a scene gives,
-``plate_estimation`` finds one in the clip. ``noise`` measures the clip's noise, and ``matte`` finds the smoke, which is
-what differs from the plate by more. ``working`` cuts out the small picture that a grid is fitted to.
+``clip`` gives the frames of a ``video`` or an ``image_sequence`` (each a ``frame_source``), ``images`` reads and
+resizes single pictures. ``plate`` is what is behind the smoke: ``background`` reads the one that a scene gives,
+``plate_estimation`` finds one in the clip. ``noise`` measures the clip's noise, and ``matte`` finds the smoke, which
+differs from the plate by more. ``working`` cuts out the small picture that a grid is fitted to.
 """
