@@ -1,7 +1,7 @@
 """OpenVDB files as Blender expects them: a fog volume `density` and a vector grid `velocity` in m/s.
 
-No package index carries an OpenVDB module for Python. One is taken where it is: already importable, or
-inside an installed `bpy` wheel, whose module folder lies aside from `sys.path`; bpy itself is never imported.
+No package index carries an OpenVDB module for Python. It is imported as it is installed, or from inside an installed
+`bpy` wheel, whose module folder is not on `sys.path`. bpy itself is never imported.
 
 OpenVDB puts the value of voxel (i, j, k) at its integer coordinates, so the transform sends (i, j, k) to the
 voxel's centre, `min + (i + 1/2) h`.
@@ -30,12 +30,13 @@ from smokelift.scene import Domain
 Array = npt.NDArray[np.float32]
 
 VELOCITY_MARGIN = 2
-"""Voxels around the smoke in which velocity is kept: motion blur looks a little beyond the edge."""
+"""Voxels around the smoke in which velocity is kept: motion blur reads it beyond the edge."""
 
 SETTINGS = "smokelift_settings"
 """Name of the grid metadata that holds the settings as JSON."""
 
 _SPARE_BYTES = 65536
+"""Bytes that are written after a file and taken away again, to see whether the disk is full."""
 
 
 class VdbUnavailable(RuntimeError):  # noqa: N818  (it says what is the matter better than ...Error)
@@ -91,8 +92,8 @@ def write_vdb(
 ) -> None:
     """Write one frame; the file appears whole or not at all.
 
-    Values are stored as 16 bit floats (three digits; larger ones than they reach are cut). Density is stored
-    where it is not zero, velocity within two voxels of that.
+    Values are stored as 16 bit floats, which have three digits; larger values are clipped. Density is stored where it
+    is not zero, velocity within `VELOCITY_MARGIN` voxels of that.
 
     Parameters
     ----------
@@ -117,7 +118,7 @@ def write_vdb(
         If the file cannot be written.
     """
     vdb = vdb_module()
-    # OpenVDB scrambles arrays of any other layout or type, without a word.
+    # OpenVDB silently scrambles arrays of any other layout or type.
     rho = np.ascontiguousarray(density, np.float32)
     velocity = np.ascontiguousarray(velocity_centres, np.float32)
     if rho.shape != domain.shape or velocity.shape != (*domain.shape, 3):
@@ -172,7 +173,7 @@ def _around(marked: npt.NDArray[np.bool_], margin: int) -> tuple[slice, ...]:
 
 
 def _ensure_written(path: Path) -> None:
-    """Raise OSError if the disk is full: OpenVDB cuts the file short then, without a word."""
+    """Raise OSError if the disk is full: OpenVDB silently cuts the file short then."""
     size = path.stat().st_size
     with path.open("r+b", buffering=0) as file:
         file.seek(size)

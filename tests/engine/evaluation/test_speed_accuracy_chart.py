@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from smokelift.app.cli import main
-from smokelift.evaluation.speed_accuracy_chart import Run, pareto_front, read_runs
+from smokelift.evaluation.measured_runs import Run, read_runs
+from smokelift.evaluation.speed_accuracy_chart import pareto_front
 
 HEADER = "scene,run,method,frames,seconds,psnr_new,density_error,velocity_error,machine,date\n"
 ROWS = (

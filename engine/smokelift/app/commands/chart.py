@@ -8,7 +8,8 @@ from typing import Any
 
 from smokelift.app.options import require_folder
 from smokelift.app.progress import Reporter
-from smokelift.evaluation.speed_accuracy_chart import draw, read_runs
+from smokelift.evaluation.measured_runs import read_runs
+from smokelift.evaluation.speed_accuracy_chart import draw
 
 
 def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:

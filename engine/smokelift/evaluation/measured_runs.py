@@ -1,0 +1,137 @@
+"""Speed and errors of measured runs, from the figures that benchmarks/accuracy writes."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+ERRORS = {
+    "input_error": "error of the input view (RMS of sRGB values, white is 1)",
+    "view_error": "error of new views (RMS of sRGB values, white is 1)",
+    "density_error": "error of the density (relative L2)",
+    "velocity_error": "error of the velocity in smoke (relative L2)",
+}
+
+_NEEDED = ("scene", "run", "method", "frames", "seconds", "psnr_new", "density_error", "velocity_error")
+_SAID = ("machine", "date")
+
+_REFERENCE = "reference"
+"""Method of what is measured to check the measurement, such as the truth rendered by us; it is not drawn."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """One way to reconstruct, or a baseline: means over the scenes that all runs share.
+
+    Attributes
+    ----------
+    name
+        A quality, "paper" or a baseline, and after a colon what was changed: "fine:resolution=32x32x48".
+    method
+        "default", "paper" or "baseline".
+    resolution
+        "64x64x96"; empty for a baseline that has none.
+    seconds
+        A frame; None for a baseline that nothing was computed for.
+    errors
+        By the names of `ERRORS`; what was not measured is missing.
+    """
+
+    name: str
+    method: str
+    resolution: str
+    seconds: float | None
+    errors: dict[str, float]
+
+    @property
+    def series(self) -> str:
+        """What it is called without the changes; runs of one series share a colour."""
+        return self.name.partition(":")[0]
+
+    @property
+    def changes(self) -> str:
+        """What was changed besides the resolution, "coarsening=0" for "velocity.coarsening=0"."""
+        changes = self.name.partition(":")[2].split(",")
+        return ", ".join(
+            change.rpartition(".")[2] for change in changes if change and not change.startswith("resolution=")
+        )
+
+
+@dataclass(frozen=True)
+class Runs:
+    """What a chart shows.
+
+    Attributes
+    ----------
+    runs
+        In the file's order.
+    caption
+        Scenes, frames, machine and date.
+    """
+
+    runs: tuple[Run, ...]
+    caption: str
+
+
+def read_runs(path: Path) -> Runs:
+    """Read the figures that `python -m benchmarks.accuracy` wrote.
+
+    Raises
+    ------
+    ValueError
+        If the file is missing or damaged, lacks a column, or its runs share no scene.
+    """
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            reader = csv.DictReader(file)
+            rows = list(reader)
+            columns = reader.fieldnames or ()
+            missing = [name for name in (*_NEEDED, *_SAID) if name not in columns]
+    except FileNotFoundError:
+        raise ValueError(f"{path}: no such file.") from None
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise ValueError(f"{path}: cannot be read as CSV: {error}.") from error
+    if missing:
+        raise ValueError(f"{path}: has no column {missing[0]!r}; give the CSV of python -m benchmarks.accuracy.")
+    by_run: dict[str, dict[str, dict[str, str]]] = {}
+    for row in (row for row in rows if row["method"] != _REFERENCE):
+        by_run.setdefault(row["run"], {})[row["scene"]] = row
+    if not by_run:
+        raise ValueError(f"{path}: holds no runs.")
+    shared = sorted(set.intersection(*(set(scenes) for scenes in by_run.values())))
+    if not shared:
+        raise ValueError(f"{path}: there is no scene that all runs share; measure all of them on the same scenes.")
+    decibels = {"view_error": "psnr_new"}
+    if (first := next(name for name in columns if name.startswith("psnr_"))) != "psnr_new":
+        decibels = {"input_error": first, **decibels}
+    runs = tuple(_mean(path, name, [scenes[scene] for scene in shared], decibels) for name, scenes in by_run.items())
+    return Runs(runs, _caption([scenes[scene] for scenes in by_run.values() for scene in shared], shared))
+
+
+def _mean(path: Path, name: str, rows: list[dict[str, str]], decibels: dict[str, str]) -> Run:
+    def mean(column: str) -> float | None:
+        try:
+            values = [float(row[column]) for row in rows if row[column] != ""]
+        except (TypeError, ValueError):
+            raise ValueError(f"{path}: {column} of {name} must be a number.") from None
+        return float(np.mean(values)) if len(values) == len(rows) and np.isfinite(values).all() else None
+
+    errors = {"density_error": mean("density_error"), "velocity_error": mean("velocity_error")}
+    for key, column in decibels.items():
+        if (value := mean(column)) is not None:
+            errors[key] = 10 ** (-value / 20)
+    known = {key: value for key, value in errors.items() if value is not None and value > 0}
+    seconds = mean("seconds")
+    if seconds is not None and seconds <= 0:
+        seconds = None
+    return Run(name, rows[0]["method"], rows[0].get("resolution") or "", seconds, known)
+
+
+def _caption(rows: list[dict[str, str]], scenes: Sequence[str]) -> str:
+    frames = sorted({row["frames"] for row in rows}, key=lambda text: (len(text), text))
+    machines, dates = (", ".join(sorted({row[name] for row in rows if row[name]})) for name in _SAID)
+    return f"{', '.join(scenes)}; {' or '.join(frames)} frames; {machines}; {dates}"
