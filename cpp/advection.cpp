@@ -18,7 +18,8 @@ struct Corners {
     SMOKELIFT_INLINE Corners(const In &a, const Point &x) : base(a.data) {
         const std::size_t stride[3] = {a.slab_size(), std::size_t(a.n[2]), 1};
         for (int c = 0; c < 3; ++c) {
-            const float clamped = std::min(std::max(x[c], 0.0f), float(a.n[c] - 1));
+            // in this order of the arguments NaN becomes 0
+            const float clamped = std::min(std::max(0.0f, x[c]), float(a.n[c] - 1));
             const int i = int(clamped);
             t[c] = clamped - float(i);
             base += i * stride[c];
@@ -62,14 +63,14 @@ SMOKELIFT_INLINE Point plus(int i, int j, int k, const Point &u) {
     return {float(i) + u[0], float(j) + u[1], float(k) + u[2]};
 }
 
-SMOKELIFT_INLINE Point centre_velocity(const In3 &u, int i, int j, int k) {
+SMOKELIFT_INLINE Point centre_velocity(const StaggeredIn &u, int i, int j, int k) {
     const float *z = u[2].row(i, j) + k;
     return {0.5f * (u[0].row(i, j)[k] + u[0].row(i + 1, j)[k]),
             0.5f * (u[1].row(i, j)[k] + u[1].row(i, j + 1)[k]), 0.5f * (z[0] + z[1])};
 }
 
 // The velocity where component c lives; the others are the mean of the four faces around.
-SMOKELIFT_INLINE Point face_velocity(const In3 &u, int c, int i, int j, int k) {
+SMOKELIFT_INLINE Point face_velocity(const StaggeredIn &u, int c, int i, int j, int k) {
     const int at[3] = {i, j, k};
     Point result;
     for (int d = 0; d < 3; ++d) {
@@ -100,7 +101,7 @@ template <class At> void everywhere(const Shape &n, Workers &workers, const At &
     });
 }
 
-// Transport of one array by `velocity(i, j, k)`; `keep_inside` says that values outside the box are zero.
+// Transport of one array by `velocity(i, j, k)`; values outside the box are zero or those of its side.
 template <class Velocity>
 void maccormack(In a, const Velocity &velocity, bool zero_outside, Out result, Workers &workers) {
     Field forward(a.n);
@@ -121,20 +122,20 @@ void maccormack(In a, const Velocity &velocity, bool zero_outside, Out result, W
 
 } // namespace
 
-void advect_cells(In field, const In3 &displacement, bool extend, Out result, Workers &workers) {
+void advect_cells(In field, const StaggeredIn &displacement, bool extend, Out result, Workers &workers) {
     everywhere(field.n, workers, [&](int i, int j, int k, std::size_t index) {
         const Point from = minus(i, j, k, centre_velocity(displacement, i, j, k));
         result.data[index] = !extend && outside(field.n, from) ? 0 : Corners(field, from).value();
     });
 }
 
-void advect_cells_maccormack(In field, const In3 &displacement, Out result, Workers &workers) {
+void advect_cells_maccormack(In field, const StaggeredIn &displacement, Out result, Workers &workers) {
     const auto velocity = [&](int i, int j, int k) { return centre_velocity(displacement, i, j, k); };
     maccormack(field, velocity, true, result, workers);
 }
 
-void advect_faces(const In3 &field, const In3 &displacement, bool limited, const Out3 &result,
-                  Workers &workers) {
+void advect_faces(const StaggeredIn &field, const StaggeredIn &displacement, bool limited,
+                  const StaggeredOut &result, Workers &workers) {
     for (int c = 0; c < 3; ++c) {
         const auto velocity = [&](int i, int j, int k) { return face_velocity(displacement, c, i, j, k); };
         if (limited) {

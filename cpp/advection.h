@@ -8,13 +8,13 @@
 namespace smokelift {
 
 // Values at x - u(x). From outside the box comes zero, or the nearest value inside if `extend`.
-void advect_cells(In field, const In3 &displacement, bool extend, Out result, Workers &workers);
+void advect_cells(In field, const StaggeredIn &displacement, bool extend, Out result, Workers &workers);
 
 // The same with MacCormack's correction of the interpolation error, limited to the values around the origin.
-void advect_cells_maccormack(In field, const In3 &displacement, Out result, Workers &workers);
+void advect_cells_maccormack(In field, const StaggeredIn &displacement, Out result, Workers &workers);
 
 // A velocity on faces, each component at its own positions; values are extended beyond the box.
-void advect_faces(const In3 &field, const In3 &displacement, bool maccormack, const Out3 &result,
-                  Workers &workers);
+void advect_faces(const StaggeredIn &field, const StaggeredIn &displacement, bool maccormack,
+                  const StaggeredOut &result, Workers &workers);
 
 } // namespace smokelift

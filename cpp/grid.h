@@ -1,31 +1,11 @@
-// Arrays of floats over a box, [x, y, z] with z fastest, and velocities on the faces of its cells (MAC grid).
+// Arrays of floats over a box, [x, y, z] with z fastest, and vectors on the faces of its cells (MAC grid).
 #pragma once
+
+#include "compiler.h"
+#include "memory.h"
 
 #include <array>
 #include <cstddef>
-#include <new>
-#include <utility>
-#include <vector>
-
-#if defined(__linux__)
-#include <sys/mman.h>
-#endif
-
-// Hot loops are compiled for several instruction sets; the loader picks one. Elsewhere: the compiler's
-// target.
-#if defined(__GNUC__) && !defined(__clang__) && __GNUC__ >= 12 && defined(__x86_64__) && defined(__linux__)
-#define SMOKELIFT_CLONES __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
-#else
-#define SMOKELIFT_CLONES
-#endif
-
-#if defined(__GNUC__)
-#define SMOKELIFT_INLINE inline __attribute__((always_inline))
-#define SMOKELIFT_INLINE_LAMBDA __attribute__((always_inline))
-#else
-#define SMOKELIFT_INLINE inline
-#define SMOKELIFT_INLINE_LAMBDA
-#endif
 
 namespace smokelift {
 
@@ -45,69 +25,56 @@ template <class T> struct Grid {
 
 using In = Grid<const float>;
 using Out = Grid<float>;
-
-// Three arrays of different shapes that belong together; `shapes` says how they lie on the cells.
-using In3 = std::array<In, 3>;
-using Out3 = std::array<Out, 3>;
+using Mask = Grid<const unsigned char>; // 0 or 1
 
 // The elements with the first index i.
 template <class T> Grid<T> slab(const Grid<T> &a, int i) { return {a.row(i, 0), {1, a.n[1], a.n[2]}}; }
 
+// The three components of a vector field.
+using In3 = std::array<In, 3>;
+using Out3 = std::array<Out, 3>;
+
 inline In3 read(const Out3 &a) { return {In(a[0]), In(a[1]), In(a[2])}; }
 
-// Shapes of the normal velocities on x, y and z faces of a box of `n` cells.
-inline std::array<Shape, 3> face_shapes(const Shape &n) {
-    return {Shape{n[0] + 1, n[1], n[2]}, Shape{n[0], n[1] + 1, n[2]}, Shape{n[0], n[1], n[2] + 1}};
-}
+// Unit cells, and which sides of their box are walls, in the order x-, x+, y-, y+, z-, z+. The other sides
+// are open.
+struct Box {
+    using Closed = std::array<bool, 6>;
 
-// Shapes of quantities on edges along x, y and z (curl of a face velocity).
-inline std::array<Shape, 3> edge_shapes(const Shape &n) {
-    return {Shape{n[0], n[1] + 1, n[2] + 1}, Shape{n[0] + 1, n[1], n[2] + 1},
-            Shape{n[0] + 1, n[1] + 1, n[2]}};
-}
+    Shape cells{};
+    Closed closed{};
 
-// Leaves numbers uninitialised, so that the threads that fill an array are also those that first touch its
-// pages. A large one has pages of its own, large too where the system has them: given back as soon as it is
-// done with.
-template <class T> struct LazyPages {
-    using value_type = T;
-
-    LazyPages() = default;
-    template <class U> LazyPages(const LazyPages<U> &) {}
-
-    T *allocate(std::size_t n) {
-#if defined(__linux__)
-        if (large(n)) {
-            void *memory =
-                mmap(nullptr, n * sizeof(T), PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
-            if (memory == MAP_FAILED)
-                throw std::bad_alloc();
-            madvise(memory, n * sizeof(T), MADV_HUGEPAGE);
-            return static_cast<T *>(memory);
-        }
-#endif
-        return static_cast<T *>(::operator new(n * sizeof(T)));
+    // Shapes of the components of a vector on x, y and z faces.
+    std::array<Shape, 3> faces() const {
+        const auto [x, y, z] = cells;
+        return {Shape{x + 1, y, z}, Shape{x, y + 1, z}, Shape{x, y, z + 1}};
     }
-    void deallocate(T *memory, std::size_t n) {
-#if defined(__linux__)
-        if (large(n)) {
-            munmap(memory, n * sizeof(T));
-            return;
-        }
-#endif
-        (void)n;
-        ::operator delete(memory);
+    // Shapes of the components of a vector on edges along x, y and z (curl of one on faces).
+    std::array<Shape, 3> edges() const {
+        const auto [x, y, z] = cells;
+        return {Shape{x, y + 1, z + 1}, Shape{x + 1, y, z + 1}, Shape{x + 1, y + 1, z}};
     }
-    static bool large(std::size_t n) { return n * sizeof(T) >= std::size_t(1) << 22; }
-    template <class U> void construct(U *) {}
-    template <class U, class... V> void construct(U *at, V &&...values) {
-        ::new (static_cast<void *>(at)) U(std::forward<V>(values)...);
+    bool sealed() const {
+        for (bool side : closed)
+            if (!side)
+                return false;
+        return true;
     }
-    template <class U> bool operator==(const LazyPages<U> &) const { return true; }
-    template <class U> bool operator!=(const LazyPages<U> &) const { return false; }
 };
 
-using Values = std::vector<float, LazyPages<float>>;
+// A view of a vector field on the faces of a box: each component on the faces across it.
+template <class T> struct Staggered {
+    std::array<Grid<T>, 3> faces;
+    Box box;
+
+    const Grid<T> &operator[](int c) const { return faces[c]; }
+    operator const std::array<Grid<T>, 3> &() const { return faces; }
+};
+
+using StaggeredIn = Staggered<const float>;
+using StaggeredOut = Staggered<float>;
+
+inline StaggeredIn read(const StaggeredOut &u) { return {read(u.faces), u.box}; }
 
 // Owns one array; what it holds at first is not defined.
 class Field {
@@ -125,34 +92,35 @@ private:
     Shape n_{};
 };
 
-// Owns three arrays in one block, so that sums and dot products are one loop; not defined at first either.
-class Field3 {
+// Owns a vector field on faces in one block, so that sums and dot products are one loop; not defined at first
+// either.
+class StaggeredField {
 public:
-    Field3() = default;
-    explicit Field3(const std::array<Shape, 3> &shapes)
-        : data_(volume(shapes[0]) + volume(shapes[1]) + volume(shapes[2])), shapes_(shapes) {}
+    StaggeredField() = default;
+    explicit StaggeredField(const Box &box) : box_(box) {
+        std::size_t size = 0;
+        for (const Shape &n : box.faces())
+            size += volume(n);
+        data_ = Values(size);
+    }
 
-    Out3 out() {
+    StaggeredOut out() {
         float *p = data_.data();
-        Out3 views;
+        StaggeredOut views{{}, box_};
         for (int c = 0; c < 3; ++c) {
-            views[c] = {p, shapes_[c]};
-            p += volume(shapes_[c]);
+            views.faces[c] = {p, box_.faces()[c]};
+            p += volume(views[c].n);
         }
         return views;
     }
-    In3 in() const { return read(const_cast<Field3 *>(this)->out()); }
+    StaggeredIn in() const { return read(const_cast<StaggeredField *>(this)->out()); }
     float *data() { return data_.data(); }
     const float *data() const { return data_.data(); }
     std::size_t size() const { return data_.size(); }
-    const std::array<Shape, 3> &shapes() const { return shapes_; }
 
 private:
     Values data_;
-    std::array<Shape, 3> shapes_{};
+    Box box_;
 };
-
-// Which sides of the box are walls, in the order x-, x+, y-, y+, z-, z+. The others are open.
-using Closed = std::array<bool, 6>;
 
 } // namespace smokelift

@@ -1,6 +1,7 @@
 #include "least_squares.h"
 
 #include "operators.h"
+#include "vectors.h"
 
 #include <algorithm>
 #include <vector>
@@ -44,10 +45,10 @@ void add_scaled(const float *__restrict a, float factor, float *__restrict out, 
 // be.
 class Window {
 public:
-    explicit Window(const Shape &n) : shapes_(edge_shapes(n)), cells_{1, n[1], n[2]} {
+    explicit Window(const Box &box) : shapes_(box.edges()), cells_{1, box.cells[1], box.cells[2]} {
         for (int c = 0; c < 3; ++c)
             shapes_[c][0] = 1;
-        plane_ = std::size_t(n[1] + 1) * (n[2] + 1);
+        plane_ = std::size_t(cells_[1] + 1) * (cells_[2] + 1);
         memory_.resize(20 * plane_);
     }
 
@@ -73,8 +74,9 @@ private:
 
 // A u with its scalar product with u; with an offset, R's part of A u less direction^T (weight offset).
 // Everything between u and the result is done slab by slab while it lies in the cache.
-double LeastSquares::sweep(const In3 &u, In offset, const Out3 &result, Workers &workers) const {
-    const int nx = shape_[0], slabs = nx + 1;
+double LeastSquares::sweep(const StaggeredIn &u, In offset, const StaggeredOut &result,
+                           Workers &workers) const {
+    const int nx = box_.cells[0], slabs = nx + 1;
     const int size = std::clamp(nx / 8, 4, 16), blocks = (slabs + size - 1) / size;
     const auto &[first_order, second_order, kinetic] = regularisation_;
 
@@ -92,7 +94,7 @@ double LeastSquares::sweep(const In3 &u, In offset, const Out3 &result, Workers 
                 pointwise = window.irrotational(c);
             }
             smoothness_slab(window.vorticity(std::max(i - 1, low[0]))[c], window.vorticity(i)[c],
-                            window.vorticity(std::min(i + 1, nx - 1))[c], low, shape_, second_order,
+                            window.vorticity(std::min(i + 1, nx - 1))[c], low, box_.cells, second_order,
                             pointwise, out);
         }
     };
@@ -132,7 +134,7 @@ double LeastSquares::sweep(const In3 &u, In offset, const Out3 &result, Workers 
 
     return workers.sum(blocks, [&](int block) {
         const int first = block * size, last = std::min(first + size, slabs);
-        Window window(shape_);
+        Window window(box_);
         double product = 0;
         if (first > 0) {
             curl_slab(u, window.vorticity(first - 1), first - 1);
@@ -152,19 +154,19 @@ double LeastSquares::sweep(const In3 &u, In offset, const Out3 &result, Workers 
     });
 }
 
-double LeastSquares::apply(const In3 &u, const Out3 &result, Workers &workers) const {
+double LeastSquares::apply(const StaggeredIn &u, const StaggeredOut &result, Workers &workers) const {
     return sweep(u, {}, result, workers);
 }
 
-Field3 LeastSquares::right_hand_side(In offset, const In3 &centre, Workers &workers) const {
-    Field3 b(shapes());
+StaggeredField LeastSquares::right_hand_side(In offset, const StaggeredIn &centre, Workers &workers) const {
+    StaggeredField b(box_);
     sweep(centre, offset, b.out(), workers);
     return b;
 }
 
 std::array<double, 3> LeastSquares::symbol(Workers &workers) const {
-    const double cells = double(volume(shape_));
-    const double evidence = workers.sum(shape_[0], [&](int i) {
+    const double cells = double(volume(box_.cells));
+    const double data = workers.sum(box_.cells[0], [&](int i) {
         double sum = 0;
         for (std::size_t k = 0; k < weight_.slab_size(); ++k) {
             double square = 0;
@@ -176,8 +178,8 @@ std::array<double, 3> LeastSquares::symbol(Workers &workers) const {
         }
         return sum;
     });
-    const double irrotational = workers.sum(std::max(shape_[0] - 1, 0), [&](int i) {
-        Field edges(Shape{1, shape_[1] + 1, shape_[2]});
+    const double irrotational = workers.sum(std::max(box_.cells[0] - 1, 0), [&](int i) {
+        Field edges(Shape{1, box_.cells[1] + 1, box_.cells[2]});
         std::fill(edges.data().begin(), edges.data().end(), 0.0f);
         edge_means_slab(irrotational_, 2, edges, i + 1);
         double sum = 0;
@@ -185,19 +187,21 @@ std::array<double, 3> LeastSquares::symbol(Workers &workers) const {
             sum += value;
         return sum;
     });
-    return {regularisation_.kinetic + evidence / cells, regularisation_.first_order + irrotational / cells,
+    return {regularisation_.kinetic + data / cells, regularisation_.first_order + irrotational / cells,
             regularisation_.second_order};
 }
 
-Field3 LeastSquares::diagonal(Workers &workers) const {
-    Field3 diagonal(shapes());
-    const Out3 out = diagonal.out();
+StaggeredField LeastSquares::diagonal(Workers &workers) const {
+    StaggeredField diagonal(box_);
+    const StaggeredOut out = diagonal.out();
     const In3 &g = direction_;
-    Field3 edges(edge_shapes(shape_));
-    std::fill_n(edges.data(), edges.size(), 0.0f);
-    for (int c = 0; c < 3; ++c)
-        for (int i = c != 0; i < shape_[0]; ++i)
-            edge_means_slab(irrotational_, c, slab(edges.out()[c], i), i);
+    std::array<Field, 3> edges;
+    for (int c = 0; c < 3; ++c) {
+        edges[c] = Field(box_.edges()[c]);
+        std::fill(edges[c].data().begin(), edges[c].data().end(), 0.0f);
+        for (int i = c != 0; i < box_.cells[0]; ++i)
+            edge_means_slab(irrotational_, c, slab(edges[c].out(), i), i);
+    }
     for (int c = 0; c < 3; ++c) {
         const Shape n = out[c].n;
         const int step[3] = {c == 0, c == 1, c == 2};
@@ -209,7 +213,8 @@ Field3 LeastSquares::diagonal(Workers &workers) const {
                                 regularisation_.kinetic;
                     for (int side = 0; side < 2; ++side) {
                         const int x = i - side * step[0], y = j - side * step[1], z = k - side * step[2];
-                        if (x < 0 || y < 0 || z < 0 || x >= shape_[0] || y >= shape_[1] || z >= shape_[2])
+                        if (x < 0 || y < 0 || z < 0 || x >= box_.cells[0] || y >= box_.cells[1] ||
+                            z >= box_.cells[2])
                             continue;
                         const float along = 0.5f * g[c].row(x, y)[z];
                         sum += weight_.row(x, y)[z] * along * along;
@@ -222,7 +227,7 @@ Field3 LeastSquares::diagonal(Workers &workers) const {
             if (e == c)
                 continue;
             const int across = 3 - c - e;
-            const In around = edges.in()[e];
+            const In around = edges[e].in();
             workers.run(n[0], [&](int i) {
                 for (int j = 0; j < n[1]; ++j)
                     for (int k = 0; k < n[2]; ++k)

@@ -19,27 +19,25 @@ struct Regularisation {
 class LeastSquares {
 public:
     // What is passed here has to outlive this object.
-    LeastSquares(const In3 &direction, In weight, In irrotational, const Regularisation &regularisation,
-                 const Closed &closed)
-        : shape_(weight.n), closed_(closed), regularisation_(regularisation), direction_(direction),
-          weight_(weight), irrotational_(irrotational) {}
+    LeastSquares(const Box &box, const In3 &direction, In weight, In irrotational,
+                 const Regularisation &regularisation)
+        : box_(box), regularisation_(regularisation), direction_(direction), weight_(weight),
+          irrotational_(irrotational) {}
 
-    double apply(const In3 &u, const Out3 &result, Workers &workers) const;       // A u; returns u.Au
-    Field3 right_hand_side(In offset, const In3 &centre, Workers &workers) const; // b
-    Field3 diagonal(Workers &workers) const; // of A, as it is away from the sides
+    double apply(const StaggeredIn &u, const StaggeredOut &result,
+                 Workers &workers) const; // A u; returns u.Au
+    StaggeredField right_hand_side(In offset, const StaggeredIn &centre, Workers &workers) const; // b
+    StaggeredField diagonal(Workers &workers) const; // of A, as it is away from the sides
 
     // Coefficients of k^0, k^2 and k^4 of a problem with constant coefficients that resembles this one.
     std::array<double, 3> symbol(Workers &workers) const;
 
-    const Shape &shape() const { return shape_; }
-    const Closed &closed() const { return closed_; }
-    std::array<Shape, 3> shapes() const { return face_shapes(shape_); }
+    const Box &box() const { return box_; }
 
 private:
-    double sweep(const In3 &u, In offset, const Out3 &result, Workers &workers) const;
+    double sweep(const StaggeredIn &u, In offset, const StaggeredOut &result, Workers &workers) const;
 
-    Shape shape_;
-    Closed closed_;
+    Box box_;
     Regularisation regularisation_;
     In3 direction_;
     In weight_, irrotational_;

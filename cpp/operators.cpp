@@ -188,84 +188,12 @@ void edge_means_slab(In a, int c, Out edges, int i) {
     }
 }
 
-namespace {
-
-constexpr std::size_t chunk = 1 << 14;
-
-int chunks(std::size_t n) { return int((n + chunk - 1) / chunk); }
-
-} // namespace
-
-SMOKELIFT_CLONES
-double dot(const float *__restrict a, const float *__restrict b, std::size_t n) {
-    // Sixteen running sums keep the vector units busy; a fixed number keeps the result the same everywhere.
-    constexpr int lanes = 16;
-    float sums[lanes] = {};
-    std::size_t i = 0;
-    for (; i + lanes <= n; i += lanes)
-        for (int l = 0; l < lanes; ++l)
-            sums[l] += a[i + l] * b[i + l];
-    double total = 0;
-    for (; i < n; ++i)
-        total += double(a[i]) * b[i];
-    for (float value : sums)
-        total += value;
-    return total;
-}
-
-namespace {
-
-SMOKELIFT_CLONES
-void axpy_chunk(float factor, const float *__restrict x, float *__restrict y, std::size_t n) {
-    for (std::size_t i = 0; i < n; ++i)
-        y[i] += factor * x[i];
-}
-
-SMOKELIFT_CLONES
-void xpay_chunk(const float *__restrict x, float factor, float *__restrict y, std::size_t n) {
-    for (std::size_t i = 0; i < n; ++i)
-        y[i] = x[i] + factor * y[i];
-}
-
-} // namespace
-
 void divergence(const In3 &faces, Out cells, Workers &workers) {
     workers.run(cells.n[0], [&](int i) { divergence_slab(faces, slab(cells, i), i); });
 }
 
 void gradient(In cells, const Out3 &result, Workers &workers) {
     workers.run(cells.n[0], [&](int i) { gradient_slab(cells, result, i); });
-}
-
-double dot(const float *a, const float *b, std::size_t n, Workers &workers) {
-    return workers.sum(chunks(n), [&](int c) {
-        const std::size_t start = c * chunk;
-        return dot(a + start, b + start, std::min(chunk, n - start));
-    });
-}
-
-void axpy(float factor, const float *x, float *y, std::size_t n, Workers &workers) {
-    workers.run(chunks(n), [&](int c) {
-        const std::size_t start = c * chunk;
-        axpy_chunk(factor, x + start, y + start, std::min(chunk, n - start));
-    });
-}
-
-void xpay(const float *x, float factor, float *y, std::size_t n, Workers &workers) {
-    workers.run(chunks(n), [&](int c) {
-        const std::size_t start = c * chunk;
-        xpay_chunk(x + start, factor, y + start, std::min(chunk, n - start));
-    });
-}
-
-void axpy(float factor, const In3 &x, const Out3 &y, Workers &workers) {
-    for (int c = 0; c < 3; ++c)
-        axpy(factor, x[c].data, y[c].data, volume(x[c].n), workers);
-}
-
-void copy(const In3 &x, const Out3 &y, Workers &workers) {
-    for (int c = 0; c < 3; ++c)
-        workers.run(x[c].n[0], [&](int i) { std::copy_n(x[c].row(i, 0), x[c].slab_size(), y[c].row(i, 0)); });
 }
 
 } // namespace smokelift

@@ -42,12 +42,4 @@ void add_directional_transposed_slab(In before, In cells, const In3 &direction, 
 // left.
 void edge_means_slab(In cells, int c, Out edges, int i);
 
-// Long vectors in chunks of a fixed size, so that sums do not depend on the number of threads.
-double dot(const float *a, const float *b, std::size_t n); // of one chunk
-double dot(const float *a, const float *b, std::size_t n, Workers &workers);
-void axpy(float factor, const float *x, float *y, std::size_t n, Workers &workers); // y += factor x
-void xpay(const float *x, float factor, float *y, std::size_t n, Workers &workers); // y = x + factor y
-void axpy(float factor, const In3 &x, const Out3 &y, Workers &workers);
-void copy(const In3 &x, const Out3 &y, Workers &workers); // y = x
-
 } // namespace smokelift

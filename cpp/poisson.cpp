@@ -1,6 +1,6 @@
 #include "poisson.h"
 
-#include "waves.h"
+#include "axis_modes.h"
 
 namespace smokelift {
 namespace {
@@ -38,11 +38,9 @@ void tridiagonal(float *f, const float *pivots, int nx, std::size_t slab, int nz
 
 } // namespace
 
-Poisson::Poisson(const Shape &n, const Closed &closed) : n_(n), closed_(closed) {
-    singular_ = true;
-    for (bool side : closed)
-        singular_ = singular_ && side;
-    const Waves y(n[1], closed[2], closed[3], n[1]), z(n[2], closed[4], closed[5], n[2]);
+Poisson::Poisson(const Box &box) : box_(box) {
+    const auto &[n, closed] = box;
+    const AxisModes y(n[1], closed[2], closed[3], n[1]), z(n[2], closed[4], closed[5], n[2]);
     y_ = y.cells();
     z_ = z.cells();
 
@@ -53,15 +51,16 @@ Poisson::Poisson(const Shape &n, const Closed &closed) : n_(n), closed_(closed) 
 }
 
 void Poisson::solve(Out f, Workers &workers) const {
-    const auto [nx, ny, nz] = n_;
+    const auto [nx, ny, nz] = box_.cells;
+    const bool singular = box_.sealed();
     const std::size_t slab = f.slab_size();
-    if (singular_) {
+    if (singular) {
         const double mean = workers.sum(nx, [&](int i) {
             double sum = 0;
             for (const float *p = f.row(i, 0), *end = p + slab; p != end; ++p)
                 sum += *p;
             return sum;
-        }) / double(volume(n_));
+        }) / double(volume(box_.cells));
         workers.run(nx, [&](int i) {
             for (float *p = f.row(i, 0), *end = p + slab; p != end; ++p)
                 *p -= float(mean);
@@ -79,12 +78,17 @@ void Poisson::solve(Out f, Workers &workers) const {
         last.assign(nz, 0);
         for (int i = 0; i < nx; ++i) {
             // A missing neighbour takes 1 from the diagonal at a wall and adds 1 at an open side.
-            const double end = (i > 0 ? 0 : closed_[0] ? -1 : 1) + (i < nx - 1 ? 0 : closed_[1] ? -1 : 1);
+            const double end = (i > 0            ? 0
+                                : box_.closed[0] ? -1
+                                                 : 1) +
+                               (i < nx - 1       ? 0
+                                : box_.closed[1] ? -1
+                                                 : 1);
             eliminate(pivots.data() + std::size_t(i) * nz, last.data(), z_square_.data(), y_square_[j], end,
                       nz);
         }
         // The constant mode has no equation of its own: pin its last value to zero.
-        if (singular_ && j == 0)
+        if (singular && j == 0)
             pivots[std::size_t(nx - 1) * nz] = 0;
         tridiagonal(f.row(0, j), pivots.data(), nx, slab, nz);
     });

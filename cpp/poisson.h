@@ -2,9 +2,9 @@
 // 1964).
 #pragma once
 
-#include "dense.h"
 #include "grid.h"
 #include "threads.h"
+#include "trigonometric.h"
 
 namespace smokelift {
 
@@ -12,19 +12,14 @@ namespace smokelift {
 // along y and z decouple the equations into one tridiagonal system along x for each pair of them.
 class Poisson {
 public:
-    Poisson(const Shape &n, const Closed &closed);
+    explicit Poisson(const Box &box);
 
     // Overwrites f with p. With all sides closed p is known up to a constant: the mean of f is removed first.
     void solve(Out f, Workers &workers) const;
 
-    const Shape &shape() const { return n_; }
-    const Closed &closed() const { return closed_; }
-
 private:
-    Shape n_;
-    Closed closed_;
-    bool singular_;
-    Basis y_, z_;
+    Box box_;
+    LineTransform y_, z_;
     std::vector<double> y_square_, z_square_; // eigenvalues of -laplace along y and z
 };
 

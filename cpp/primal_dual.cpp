@@ -1,6 +1,6 @@
 #include "primal_dual.h"
 
-#include "operators.h"
+#include "vectors.h"
 
 #include <algorithm>
 #include <cmath>
@@ -40,16 +40,17 @@ void divide(const float *__restrict a, const float *__restrict b, float *__restr
 // product.
 class Proximal {
 public:
-    Proximal(const LeastSquares &problem, const Field3 &b, const PrimalDual &settings, Workers &workers)
+    Proximal(const LeastSquares &problem, const StaggeredField &b, const PrimalDual &settings,
+             Workers &workers)
         : problem_(problem), b_(b), settings_(settings), workers_(workers),
-          diagonal_(problem.diagonal(workers)), residual_(problem.shapes()), scaled_(problem.shapes()),
-          search_(problem.shapes()), product_(problem.shapes()) {
+          diagonal_(problem.diagonal(workers)), residual_(problem.box()), scaled_(problem.box()),
+          search_(problem.box()), product_(problem.box()) {
         for (std::size_t i = 0; i < diagonal_.size(); ++i)
             diagonal_.data()[i] += float(settings.sigma / 2);
     }
 
     // Returns the number of products with A.
-    int solve(const Field3 &xi, Field3 &v) {
+    int solve(const StaggeredField &xi, StaggeredField &v) {
         const std::size_t n = v.size();
         std::copy_n(xi.data(), n, residual_.data());
         weigh(residual_);
@@ -75,10 +76,10 @@ public:
     }
 
 private:
-    void weigh(Field3 &field) const { scale_sides(field.out(), problem_.closed(), 0.5f, 1); }
+    void weigh(StaggeredField &field) const { scale_sides(field.out(), 0.5f, 1); }
 
     // product = (A + sigma/2 w) v
-    void apply(const Field3 &v) {
+    void apply(const StaggeredField &v) {
         problem_.apply(v.in(), product_.out(), workers_);
         std::copy_n(v.data(), v.size(), scaled_.data());
         weigh(scaled_);
@@ -91,24 +92,24 @@ private:
     }
 
     const LeastSquares &problem_;
-    const Field3 &b_;
+    const StaggeredField &b_;
     const PrimalDual &settings_;
     Workers &workers_;
-    Field3 diagonal_, residual_, scaled_, search_, product_;
+    StaggeredField diagonal_, residual_, scaled_, search_, product_;
 };
 
 } // namespace
 
-Figures primal_dual(const LeastSquares &problem, const Field3 &b, Projection &projection, const PrimalDual &s,
-                    const Out3 &result, Workers &workers) {
+Figures primal_dual(const LeastSquares &problem, const StaggeredField &b, Projection &projection,
+                    const PrimalDual &s, const StaggeredOut &result, Workers &workers) {
     require_convergent(s);
     Figures figures;
     Proximal proximal(problem, b, s, workers);
-    Field3 u(problem.shapes()), dual(problem.shapes()), xi(problem.shapes());
+    StaggeredField u(problem.box()), dual(problem.box()), xi(problem.box());
     const std::size_t n = u.size();
     std::fill_n(dual.data(), n, 0.0f);
     copy(read(result), u.out(), workers);
-    Field3 relaxed = u, prox = u, before = u;
+    StaggeredField relaxed = u, prox = u, before = u;
 
     for (bool converged = false; !converged && figures.iterations < s.limit; ++figures.iterations) {
         // X' = X + sigma Y - sigma prox_f(X / sigma + Y)

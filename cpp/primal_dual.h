@@ -16,7 +16,7 @@ struct PrimalDual {
 
 // Minimises the quadratic with the right-hand side b over velocities without divergence, starting from u.
 // Throws std::invalid_argument for steps that violate the condition for convergence.
-Figures primal_dual(const LeastSquares &problem, const Field3 &b, Projection &projection,
-                    const PrimalDual &settings, const Out3 &u, Workers &workers);
+Figures primal_dual(const LeastSquares &problem, const StaggeredField &b, Projection &projection,
+                    const PrimalDual &settings, const StaggeredOut &u, Workers &workers);
 
 } // namespace smokelift

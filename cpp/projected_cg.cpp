@@ -1,21 +1,22 @@
 #include "projected_cg.h"
 
-#include "operators.h"
 #include "spectral.h"
+#include "vectors.h"
 
 #include <algorithm>
 #include <cmath>
 
 namespace smokelift {
 
-Figures projected_cg(const LeastSquares &problem, Field3 &b, double tolerance, int limit, const Out3 &u,
-                     Workers &workers) {
+Figures projected_cg(const LeastSquares &problem, StaggeredField &b, double tolerance, int limit,
+                     const StaggeredOut &u, Workers &workers) {
     Figures figures;
     // Constant coefficients that resemble the problem's.
     const auto symbol = problem.symbol(workers);
-    Spectral spectral(problem.shape(), problem.closed(), symbol[0], symbol[1], symbol[2]);
-    Field3 search(problem.shapes());
-    const Out3 residual = b.out(), product = spectral.room(); // a product is done with when waves are made
+    Spectral spectral(problem.box(), symbol[0], symbol[1], symbol[2]);
+    StaggeredField search(problem.box());
+    const StaggeredOut residual = b.out(),
+                       product = spectral.room(); // a product is done with when waves are made
     std::fill_n(search.data(), search.size(), 0.0f);
     const auto project_residual = [&] {
         ++figures.projections;

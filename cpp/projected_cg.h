@@ -9,7 +9,7 @@ namespace smokelift {
 // gradient has fallen to `tolerance` times that of the fluid at rest, after `limit` iterations, or when
 // rounding keeps it from falling any further. `b`, the right-hand side, gives its room to the residual in the
 // meantime and is the same as before, to rounding, in the end.
-Figures projected_cg(const LeastSquares &problem, Field3 &b, double tolerance, int limit, const Out3 &u,
-                     Workers &workers);
+Figures projected_cg(const LeastSquares &problem, StaggeredField &b, double tolerance, int limit,
+                     const StaggeredOut &u, Workers &workers);
 
 } // namespace smokelift

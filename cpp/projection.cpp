@@ -9,7 +9,8 @@ namespace smokelift {
 namespace {
 
 SMOKELIFT_CLONES
-void subtract_gradient_slab(In p, const Out3 &u, const Closed &closed, int i) {
+void subtract_gradient_slab(In p, const StaggeredOut &u, int i) {
+    const Box::Closed &closed = u.box.closed;
     const auto [nx, ny, nz] = p.n;
     for (int j = 0; j < ny; ++j) {
         float *__restrict x = u[0].row(i, j);
@@ -62,10 +63,10 @@ float largest(const float *p, std::size_t n) {
 
 } // namespace
 
-void scale_sides(const Out3 &u, const Closed &closed, float open, float wall) {
+void scale_sides(const StaggeredOut &u, float open, float wall) {
     for (int axis = 0; axis < 3; ++axis)
         for (int high = 0; high < 2; ++high) {
-            const float factor = closed[2 * axis + high] ? wall : open;
+            const float factor = u.box.closed[2 * axis + high] ? wall : open;
             if (factor == 1)
                 continue;
             Shape first{}, last = u[axis].n;
@@ -78,23 +79,23 @@ void scale_sides(const Out3 &u, const Closed &closed, float open, float wall) {
         }
 }
 
-void Projection::apply(const Out3 &u, Workers &workers) {
-    scale_sides(u, poisson_.closed(), 1, 0);
+void Projection::apply(const StaggeredOut &u, Workers &workers) {
+    scale_sides(u, 1, 0);
     divergence(read(u), pressure_, workers);
     // div u = -laplace p here, so that u - (-grad p) loses its divergence.
     poisson_.solve(pressure_, workers);
-    workers.run(shape()[0] + 1, [&](int i) { subtract_gradient_slab(pressure_, u, poisson_.closed(), i); });
+    workers.run(u.box.cells[0] + 1, [&](int i) { subtract_gradient_slab(pressure_, u, i); });
 }
 
-double relative_divergence(const In3 &u, Workers &workers) {
-    const int nx = u[1].n[0];
+double relative_divergence(const StaggeredIn &u, Workers &workers) {
+    const auto [nx, ny, nz] = u.box.cells;
     std::vector<float> speeds(nx + 1), outflows(nx + 1);
-    workers.run(nx + 1, [&](int i) {
-        for (const In &component : u)
+    workers.run(nx + 1, [&, nx = nx, ny = ny, nz = nz](int i) {
+        for (const In &component : u.faces)
             if (i < component.n[0])
                 speeds[i] = std::max(speeds[i], largest(component.row(i, 0), component.slab_size()));
         if (i < nx) {
-            Field cells(Shape{1, u[0].n[1], u[0].n[2]});
+            Field cells(Shape{1, ny, nz});
             divergence_slab(u, cells, i);
             outflows[i] = largest(cells.data().data(), cells.data().size());
         }

@@ -9,11 +9,9 @@ namespace smokelift {
 // a face belongs to half a cell only. Closed sides have no normal velocity.
 class Projection {
 public:
-    Projection(const Shape &n, const Closed &closed) : poisson_(n, closed), pressure_(n) {}
+    explicit Projection(const Box &box) : poisson_(box), pressure_(box.cells) {}
 
-    void apply(const Out3 &u, Workers &workers);
-
-    const Shape &shape() const { return poisson_.shape(); }
+    void apply(const StaggeredOut &u, Workers &workers);
 
 private:
     Poisson poisson_;
@@ -21,9 +19,9 @@ private:
 };
 
 // Multiplies the normal velocities on the sides of the box, by `open` or by `wall`.
-void scale_sides(const Out3 &u, const Closed &closed, float open, float wall);
+void scale_sides(const StaggeredOut &u, float open, float wall);
 
 // max |div u| / max |u|, both in units of one cell; zero for a fluid at rest.
-double relative_divergence(const In3 &u, Workers &workers);
+double relative_divergence(const StaggeredIn &u, Workers &workers);
 
 } // namespace smokelift

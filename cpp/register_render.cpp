@@ -1,13 +1,9 @@
-#include "arrays.h"
 #include "camera.h"
 #include "lighting.h"
+#include "python.h"
 
-#include <cstdint>
-#include <memory>
-
-#if defined(__linux__)
-#include <sys/mman.h>
-#endif
+#include <optional>
+#include <variant>
 
 namespace smokelift {
 namespace {
@@ -16,18 +12,13 @@ using Floats = py::array_t<float, py::array::c_style>;
 using Marks = py::array_t<unsigned char, py::array::c_style | py::array::forcecast>;
 using Integers = py::array_t<int, py::array::c_style | py::array::forcecast>;
 
-void require(bool fits) {
-    if (!fits)
-        throw std::invalid_argument("the arrays do not have shapes that belong together.");
-}
-
 // Where there can be smoke, and the ranges of rows around that.
 struct Support {
     Marks marked;
     Spans spans;
 
     explicit Support(const Marks &marks) : marked(marks) {
-        require(marks.ndim() == 3);
+        require_fit(marks.ndim() == 3);
         spans = spans_around(marks.data(), shape());
     }
     Shape shape() const { return {int(marked.shape(0)), int(marked.shape(1)), int(marked.shape(2))}; }
@@ -35,9 +26,9 @@ struct Support {
 
 Voxels voxels_of(Floats &a, const Support &support) {
     const Shape n = support.shape();
-    require(a.ndim() == 4 && a.shape(0) == n[0] + 2 && a.shape(1) == n[1] + 2 && a.shape(2) == n[2] + 2);
+    require_fit(a.ndim() == 4 && a.shape(0) == n[0] + 2 && a.shape(1) == n[1] + 2 && a.shape(2) == n[2] + 2);
     const int width = static_cast<int>(a.shape(3));
-    require(width == 1 || width == 2 || width == 4);
+    require_fit(width == 1 || width == 2 || width == 4);
     return {a.mutable_data(), n, width};
 }
 
@@ -48,9 +39,9 @@ struct OwnedRays {
     Rays rays;
 
     OwnedRays(const Floats &l, const Floats &d, const Integers &p) : lines(l), length(d), planes(p.size()) {
-        require(l.ndim() == 3 && l.shape(2) == 4 && p.ndim() == 3 && p.shape(2) == 4 && d.ndim() == 2);
-        require(d.shape(0) == l.shape(0) && d.shape(1) == l.shape(1) && p.shape(0) == l.shape(0) &&
-                p.shape(1) == l.shape(1));
+        require_fit(l.ndim() == 3 && l.shape(2) == 4 && p.ndim() == 3 && p.shape(2) == 4 && d.ndim() == 2);
+        require_fit(d.shape(0) == l.shape(0) && d.shape(1) == l.shape(1) && p.shape(0) == l.shape(0) &&
+                    p.shape(1) == l.shape(1));
         std::copy_n(p.data(), p.size(), planes.mutable_data()); // clip() writes them
         rays.lines = lines.data();
         rays.length = length.data();
@@ -60,13 +51,13 @@ struct OwnedRays {
         rays.find_runs();
     }
     void require_pixels(const Floats &a, int channels) const {
-        require(std::size_t(a.size()) == rays.pixels() * channels);
+        require_fit(std::size_t(a.size()) == rays.pixels() * channels);
     }
     Record record(std::optional<Floats> &a, int width) const {
         if (!a)
             return {};
-        require(a->ndim() == 4 && a->shape(0) == width && a->shape(2) == rays.rows &&
-                a->shape(3) == rays.columns);
+        require_fit(a->ndim() == 4 && a->shape(0) == width && a->shape(2) == rays.rows &&
+                    a->shape(3) == rays.columns);
         return {a->mutable_data(), static_cast<int>(a->shape(1))};
     }
 };
@@ -75,51 +66,25 @@ struct OwnedRays {
 template <class T, class Data>
 Strided<T> box_of(const py::array_t<float> &a, Data data, const Support &support,
                   const std::array<int, 3> &corner) {
-    require(a.ndim() == 3);
+    require_fit(a.ndim() == 3);
     std::array<Stride, 3> stride{};
     for (int axis = 0; axis < 3; ++axis) {
-        require(corner[axis] >= 0 && corner[axis] + support.shape()[axis] <= a.shape(axis));
+        require_fit(corner[axis] >= 0 && corner[axis] + support.shape()[axis] <= a.shape(axis));
         stride[axis] = a.strides(axis) / Stride(sizeof(float));
         data += corner[axis] * stride[axis];
     }
     return {data, stride};
 }
 
-// Zeros that get memory where they are touched, in large pages where the system has them: the rays' look-ups
-// are spread over so many small ones that finding the pages would cost as much as the look-ups.
-Floats large_zeros(const std::vector<py::ssize_t> &shape) {
-    std::size_t bytes = sizeof(float);
+// Zeros that get memory where they are touched.
+Array zeros(const std::vector<py::ssize_t> &shape) {
+    std::size_t size = 1;
     for (const py::ssize_t n : shape)
-        bytes *= n;
-#if defined(__linux__)
-    constexpr std::size_t PAGE = std::size_t(1) << 21;
-    if (bytes >= PAGE) {
-        const std::size_t whole = bytes + PAGE; // room to begin at a large page's boundary
-        void *memory = mmap(nullptr, whole, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
-        if (memory == MAP_FAILED)
-            throw std::bad_alloc();
-        madvise(memory, whole, MADV_HUGEPAGE);
-        struct Mapping {
-            void *memory;
-            std::size_t size;
-        };
-        const py::capsule owner(new Mapping{memory, whole}, [](void *p) {
-            const std::unique_ptr<Mapping> mapping(static_cast<Mapping *>(p));
-            munmap(mapping->memory, mapping->size);
-        });
-        const std::uintptr_t first = (reinterpret_cast<std::uintptr_t>(memory) + PAGE - 1) / PAGE * PAGE;
-        return Floats(shape, reinterpret_cast<const float *>(first), owner);
-    }
-#endif
-    Floats result(shape);
-    std::fill_n(result.mutable_data(), result.size(), 0.0f);
-    return result;
-}
-
-template <class Work> void unlocked(int threads, const Work &work) {
-    py::gil_scoped_release release;
-    Workers workers(threads);
-    work(workers);
+        size *= std::size_t(n);
+    Values values(size);
+    if (!LazyPages<float>::starts_as_zero(size))
+        std::fill(values.begin(), values.end(), 0.0f);
+    return array_of(std::move(values), shape);
 }
 
 } // namespace
@@ -127,7 +92,7 @@ template <class Work> void unlocked(int threads, const Work &work) {
 void register_render(py::module_ &module) {
     using namespace py::literals;
 
-    module.def("zeros", &large_zeros, "shape"_a);
+    module.def("zeros", &zeros, "shape"_a);
 
     py::class_<Support>(module, "Support").def(py::init<const Marks &>(), "marked"_a);
 
@@ -165,11 +130,11 @@ void register_render(py::module_ &module) {
         .def(py::init<const Floats &, const Floats &, const Integers &>(), "lines"_a, "length"_a, "planes"_a)
         .def(
             "clip",
-            [](OwnedRays &self, const Support &support, Floats medium, int threads) {
+            [](OwnedRays &self, const Support &support, Floats medium) {
                 const Voxels voxels = voxels_of(medium, support);
-                unlocked(threads, [&](Workers &workers) { clip(voxels, self.rays, workers); });
+                released([&](Workers &workers) { clip(voxels, self.rays, workers); });
             },
-            "support"_a, "medium"_a.noconvert(), "threads"_a = 0)
+            "support"_a, "medium"_a.noconvert())
         .def_property_readonly("samples", [](const OwnedRays &self) {
             std::size_t count = 0;
             for (std::size_t ray = 0; ray < self.rays.pixels(); ++ray)
@@ -180,36 +145,32 @@ void register_render(py::module_ &module) {
     module.def(
         "pack",
         [](const py::array_t<float> &density, const std::array<int, 3> &corner, const Support &support,
-           float extinction, Floats medium, int threads) {
+           float extinction, Floats medium) {
             const auto box = box_of<const float>(density, density.data(), support, corner);
             const Voxels voxels = voxels_of(medium, support);
-            unlocked(threads, [&](Workers &workers) {
+            released([&](Workers &workers) {
                 pack(box, support.marked.data(), extinction, support.spans, voxels, workers);
             });
         },
-        "density"_a.noconvert(), "corner"_a, "support"_a, "extinction"_a, "medium"_a.noconvert(),
-        "threads"_a = 0);
+        "density"_a.noconvert(), "corner"_a, "support"_a, "extinction"_a, "medium"_a.noconvert());
 
     module.def(
         "unpack",
         [](Floats gradient, const Support &support, float extinction, py::array_t<float> result,
-           const std::array<int, 3> &corner, int threads) {
+           const std::array<int, 3> &corner) {
             const Voxels voxels = voxels_of(gradient, support);
             const auto box = box_of<float>(result, result.mutable_data(), support, corner);
-            unlocked(threads, [&](Workers &workers) {
-                unpack(voxels, support.marked.data(), extinction, box, workers);
-            });
+            released(
+                [&](Workers &workers) { unpack(voxels, support.marked.data(), extinction, box, workers); });
         },
-        "gradient"_a.noconvert(), "support"_a, "extinction"_a, "result"_a.noconvert(), "corner"_a,
-        "threads"_a = 0);
+        "gradient"_a.noconvert(), "support"_a, "extinction"_a, "result"_a.noconvert(), "corner"_a);
 
     using Light = std::variant<ParallelLight, PointLight>;
     module.def(
         "shade",
-        [](Floats medium, const Support &support, const Phase &phase, const std::vector<Light> &lights,
-           int threads) {
+        [](Floats medium, const Support &support, const Phase &phase, const std::vector<Light> &lights) {
             const Voxels voxels = voxels_of(medium, support);
-            unlocked(threads, [&](Workers &workers) {
+            released([&](Workers &workers) {
                 bool add = false;
                 for (const Light &light : lights) {
                     std::visit([&](const auto &l) { shade(voxels, support.spans, phase, l, add, workers); },
@@ -219,16 +180,16 @@ void register_render(py::module_ &module) {
                 extend_into_border(voxels);
             });
         },
-        "medium"_a.noconvert(), "support"_a, "phase"_a, "lights"_a, "threads"_a = 0);
+        "medium"_a.noconvert(), "support"_a, "phase"_a, "lights"_a);
 
     module.def(
         "shade_adjoint",
         [](Floats medium, Floats gradient, Floats scratch, const Support &support, const Phase &phase,
-           const std::vector<Light> &lights, int threads) {
+           const std::vector<Light> &lights) {
             const Voxels voxels = voxels_of(medium, support), slopes = voxels_of(gradient, support);
             const Voxels space = voxels_of(scratch, support);
-            require(space.width == 1 && slopes.width == voxels.width);
-            unlocked(threads, [&](Workers &workers) {
+            require_fit(space.width == 1 && slopes.width == voxels.width);
+            released([&](Workers &workers) {
                 fold_border(slopes);
                 const bool alone = lights.size() == 1;
                 for (const Light &light : lights) {
@@ -241,42 +202,42 @@ void register_render(py::module_ &module) {
             });
         },
         "medium"_a.noconvert(), "gradient"_a.noconvert(), "scratch"_a.noconvert(), "support"_a, "phase"_a,
-        "lights"_a, "threads"_a = 0);
+        "lights"_a);
 
     module.def(
         "march",
         [](Floats medium, const Support &support, const OwnedRays &rays, Floats scattered, Floats depth,
-           std::optional<Floats> record, int threads) {
+           std::optional<Floats> record) {
             const Voxels voxels = voxels_of(medium, support);
             rays.require_pixels(scattered, voxels.width - 1);
             rays.require_pixels(depth, 1);
             const Record samples = rays.record(record, voxels.width);
-            unlocked(threads, [&](Workers &workers) {
+            released([&](Workers &workers) {
                 march(voxels, rays.rays, scattered.mutable_data(), depth.mutable_data(), samples, workers);
             });
         },
         "medium"_a.noconvert(), "support"_a, "rays"_a, "scattered"_a.noconvert(), "depth"_a.noconvert(),
-        "record"_a.noconvert(), "threads"_a = 0);
+        "record"_a.noconvert());
 
     module.def(
         "march_adjoint",
         [](const OwnedRays &rays, const Floats &depth, const Floats &of_scattered,
            const Floats &of_transmittance, std::optional<Floats> record, Floats gradient,
-           const Support &support, int threads) {
+           const Support &support) {
             const Voxels voxels = voxels_of(gradient, support);
             rays.require_pixels(of_scattered, voxels.width - 1);
             rays.require_pixels(of_transmittance, 1);
             rays.require_pixels(depth, 1);
             const Record samples = rays.record(record, voxels.width);
-            require(samples.data);
-            unlocked(threads, [&](Workers &workers) {
+            require_fit(samples.data);
+            released([&](Workers &workers) {
                 clear(voxels, workers);
                 march_adjoint(rays.rays, depth.data(), of_scattered.data(), of_transmittance.data(), samples,
                               voxels, workers);
             });
         },
         "rays"_a, "depth"_a.noconvert(), "of_scattered"_a.noconvert(), "of_transmittance"_a.noconvert(),
-        "record"_a.noconvert(), "gradient"_a.noconvert(), "support"_a, "threads"_a = 0);
+        "record"_a.noconvert(), "gradient"_a.noconvert(), "support"_a);
 }
 
 } // namespace smokelift

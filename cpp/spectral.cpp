@@ -1,6 +1,7 @@
 #include "spectral.h"
 
-#include "waves.h"
+#include "axis_modes.h"
+#include "vectors.h"
 
 namespace smokelift {
 namespace {
@@ -24,44 +25,39 @@ void filter_row(float *__restrict x, float *__restrict y, float *__restrict z, i
     }
 }
 
-SMOKELIFT_CLONES
-void xpay_row(const float *__restrict x, float factor, float *__restrict y, std::size_t n) {
-    for (std::size_t i = 0; i < n; ++i)
-        y[i] = x[i] + factor * y[i];
-}
-
 } // namespace
 
-Spectral::Spectral(const Shape &n, const Closed &closed, double zeroth, double second, double fourth)
-    : n_(n), zeroth_(float(zeroth)), second_(float(second)), fourth_(float(fourth)) {
+Spectral::Spectral(const Box &box, double zeroth, double second, double fourth)
+    : box_(box), zeroth_(float(zeroth)), second_(float(second)), fourth_(float(fourth)) {
     for (int axis = 0; axis < 3; ++axis) {
-        const bool low = closed[2 * axis], high = closed[2 * axis + 1];
-        modes_[axis] = Waves::modes(n[axis], low, high);
-        const Waves waves(n[axis], low, high, modes_[axis]);
-        cells_[axis] = waves.cells();
-        faces_[axis] = waves.faces();
-        difference_[axis].assign(waves.difference.begin(), waves.difference.end());
+        const int n = box.cells[axis];
+        const bool low = box.closed[2 * axis], high = box.closed[2 * axis + 1];
+        modes_[axis] = AxisModes::complete(n, low, high);
+        const AxisModes modes(n, low, high, modes_[axis]);
+        cells_[axis] = modes.cells();
+        faces_[axis] = modes.faces();
+        difference_[axis].assign(modes.difference.begin(), modes.difference.end());
     }
     for (int c = 0; c < 3; ++c) {
-        const Shape faces = face_shapes(n)[c], waves{faces[0], modes_[1], modes_[2]};
-        memory_[c] = Field(volume(faces) > volume(waves) ? faces : waves);
-        waves_[c] = {memory_[c].out().data, waves};
+        const Shape faces = box.faces()[c], modes{faces[0], modes_[1], modes_[2]};
+        memory_[c] = Field(volume(faces) > volume(modes) ? faces : modes);
+        expansion_[c] = {memory_[c].out().data, modes};
     }
 }
 
-Out3 Spectral::room() {
-    Out3 faces = waves_;
+StaggeredOut Spectral::room() {
+    StaggeredOut result{expansion_, box_};
     for (int c = 0; c < 3; ++c)
-        faces[c].n = face_shapes(n_)[c];
-    return faces;
+        result.faces[c].n = box_.faces()[c];
+    return result;
 }
 
-double Spectral::precondition(const In3 &derivative, Workers &workers) {
+double Spectral::precondition(const StaggeredIn &derivative, Workers &workers) {
     const int my = modes_[1], mz = modes_[2], plane = my * mz;
     for (int c = 0; c < 3; ++c) {
         const In from = derivative[c];
-        const Out to = waves_[c];
-        const Basis &y = c == 1 ? faces_[1] : cells_[1], &z = c == 2 ? faces_[2] : cells_[2];
+        const Out to = expansion_[c];
+        const LineTransform &y = c == 1 ? faces_[1] : cells_[1], &z = c == 2 ? faces_[2] : cells_[2];
         workers.run(from.n[0], [&](int i) {
             thread_local std::vector<float> scratch, rows;
             rows.resize(std::size_t(from.n[1]) * mz);
@@ -75,8 +71,8 @@ double Spectral::precondition(const In3 &derivative, Workers &workers) {
         modes.resize(3 * size);
         products.assign(mz, 0);
         for (int c = 0; c < 3; ++c) {
-            const Basis &x = c == 0 ? faces_[0] : cells_[0];
-            x.columns_to_modes(waves_[c].row(0, j), plane, mz, modes.data() + c * size, mz, scratch);
+            const LineTransform &x = c == 0 ? faces_[0] : cells_[0];
+            x.columns_to_modes(expansion_[c].row(0, j), plane, mz, modes.data() + c * size, mz, scratch);
         }
         for (int i = 0; i < modes_[0]; ++i) {
             float *row = modes.data() + std::size_t(i) * mz;
@@ -84,8 +80,8 @@ double Spectral::precondition(const In3 &derivative, Workers &workers) {
                        difference_[2].data(), zeroth_, second_, fourth_, products.data());
         }
         for (int c = 0; c < 3; ++c) {
-            const Basis &x = c == 0 ? faces_[0] : cells_[0];
-            x.columns_from_modes(modes.data() + c * size, mz, mz, waves_[c].row(0, j), plane, scratch);
+            const LineTransform &x = c == 0 ? faces_[0] : cells_[0];
+            x.columns_from_modes(modes.data() + c * size, mz, mz, expansion_[c].row(0, j), plane, scratch);
         }
         double sum = 0;
         for (float product : products)
@@ -94,18 +90,18 @@ double Spectral::precondition(const In3 &derivative, Workers &workers) {
     });
 }
 
-void Spectral::descend(float factor, const Out3 &search, Workers &workers) {
+void Spectral::descend(float factor, const StaggeredOut &search, Workers &workers) {
     const int mz = modes_[2];
     for (int c = 0; c < 3; ++c) {
-        const Out from = waves_[c], to = search[c];
-        const Basis &y = c == 1 ? faces_[1] : cells_[1], &z = c == 2 ? faces_[2] : cells_[2];
+        const Out from = expansion_[c], to = search[c];
+        const LineTransform &y = c == 1 ? faces_[1] : cells_[1], &z = c == 2 ? faces_[2] : cells_[2];
         workers.run(to.n[0], [&](int i) {
             thread_local std::vector<float> scratch, rows, gradient;
             rows.resize(std::size_t(to.n[1]) * mz);
             gradient.resize(to.slab_size());
             y.columns_from_modes(from.row(i, 0), mz, mz, rows.data(), mz, scratch);
             z.rows_from_modes(rows.data(), to.n[1], gradient.data(), scratch);
-            xpay_row(gradient.data(), factor, to.row(i, 0), to.slab_size());
+            xpay(gradient.data(), factor, to.row(i, 0), to.slab_size());
         });
     }
 }

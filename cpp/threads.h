@@ -1,4 +1,4 @@
-// A few worker threads that live as long as one call from Python: nothing global, so fork() stays safe.
+// A few worker threads that live as long as one call from Python, so that fork() stays safe.
 #pragma once
 
 #include <atomic>
@@ -10,10 +10,13 @@
 
 namespace smokelift {
 
+// Number of threads of every call from now on; 0 takes every core that the process may use. Results do not
+// depend on it.
+void set_threads(int count);
+
 class Workers {
 public:
-    // `threads` = 0 takes every core of the machine.
-    explicit Workers(int threads);
+    Workers();
     ~Workers();
     Workers(const Workers &) = delete;
     Workers &operator=(const Workers &) = delete;
@@ -38,74 +41,5 @@ private:
     int count_ = 0;
     const std::function<void(int)> *task_ = nullptr;
 };
-
-inline Workers::Workers(int threads) {
-    if (threads <= 0)
-        threads = static_cast<int>(std::thread::hardware_concurrency());
-    for (int t = 1; t < threads; ++t)
-        threads_.emplace_back([this] { serve(); });
-}
-
-inline Workers::~Workers() {
-    {
-        std::lock_guard<std::mutex> lock(mutex_);
-        ending_ = true;
-    }
-    start_.notify_all();
-    for (auto &thread : threads_)
-        thread.join();
-}
-
-inline void Workers::work() {
-    for (int i; (i = next_.fetch_add(1)) < count_;)
-        (*task_)(i);
-}
-
-inline void Workers::serve() {
-    unsigned seen = 0;
-    for (;;) {
-        // Loops follow each other within microseconds, so look a little while before going to sleep.
-        for (int spin = 0; spin < 2000 && round_ == seen && !ending_; ++spin)
-            std::this_thread::yield();
-        {
-            std::unique_lock<std::mutex> lock(mutex_);
-            start_.wait(lock, [&] { return round_ != seen || ending_; });
-            if (ending_)
-                return;
-            seen = round_;
-        }
-        work();
-        --busy_;
-    }
-}
-
-inline void Workers::run(int count, const std::function<void(int)> &task) {
-    if (threads_.empty() || count < 2) {
-        for (int i = 0; i < count; ++i)
-            task(i);
-        return;
-    }
-    {
-        std::lock_guard<std::mutex> lock(mutex_);
-        task_ = &task;
-        count_ = count;
-        next_ = 0;
-        busy_ = static_cast<int>(threads_.size());
-        ++round_;
-    }
-    start_.notify_all();
-    work();
-    while (busy_ > 0)
-        std::this_thread::yield();
-}
-
-inline double Workers::sum(int count, const std::function<double(int)> &partial) {
-    std::vector<double> partials(count);
-    run(count, [&](int i) { partials[i] = partial(i); });
-    double total = 0;
-    for (double value : partials)
-        total += value;
-    return total;
-}
 
 } // namespace smokelift

@@ -1,8 +1,11 @@
-"""Transport and velocity of smoke on a box of unit cells, compiled from ``cpp/``.
+"""Transport, velocity and rendering of smoke on a box of unit cells, compiled from ``cpp/``.
 
-Arrays are float32, C-contiguous, ``[x, y, z]``; others are converted. Velocities are displacements in cells
-per frame on the faces of the cells. ``closed`` says which sides are walls, in the order x-, x+, y-, y+, z-, z+.
-``threads`` = 0 takes all cores; results do not depend on it.
+Arrays are float32, C-contiguous, ``[x, y, z]``; those of transport and velocity are converted if they are not, those of
+the renderer are refused. ``cells`` have the shape (nx, ny, nz). ``faces`` are the normal components on x, y and z
+faces, arrays of shape (nx+1, ny, nz), (nx, ny+1, nz) and (nx, ny, nz+1). Velocities are displacements in cells per
+frame. ``closed`` says which sides of the box are walls, in the order x-, x+, y-, y+, z-, z+.
+
+Functions raise ValueError for arrays whose shapes do not belong together.
 """
 
 from typing import TypedDict
@@ -11,68 +14,160 @@ import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float32]
-Arrays = tuple[Array, Array, Array] | list[Array]
+Mask = npt.NDArray[np.bool_]
+Faces = tuple[Array, Array, Array] | list[Array]
+Vectors = tuple[Array, Array, Array] | list[Array]
+"""Three components at cell centres, each (nx, ny, nz)."""
 Closed = tuple[bool, bool, bool, bool, bool, bool] | list[bool]
 
+def set_threads(count: int) -> None:
+    """Set the number of threads of every call from now on; 0, as at first, takes all cores of the process.
+
+    Results do not depend on it.
+    """
+
+# Transport
+
+def solve_poisson(f: Array, closed: Closed) -> Array:
+    """Solve -laplace p = f at cell centres, with p = 0 on open sides and no flux through closed ones.
+
+    With all sides closed the mean of f is removed first, and p is known up to a constant.
+    """
+
+def project(faces: Faces, closed: Closed, passes: int = 2) -> tuple[list[Array], float]:
+    """The nearest velocity without divergence, and max |div u| / max |u| of that.
+
+    Nearest in the sum of squares over faces, those on open sides counted half. A second pass removes what rounding
+    leaves.
+    """
+
+def divergence(faces: Faces) -> Array:
+    """Net outflow of every cell."""
+
+def gradient(cells: Array) -> list[Array]:
+    """Central differences at cell centres along x, y and z, one-sided at the sides of the box."""
+
+def advect_cells(field: Array, displacement: Faces, maccormack: bool, extend: bool = False) -> Array:
+    """Values at x - displacement(x), interpolated linearly.
+
+    What comes from outside the box is zero. With ``extend``, and without the correction, it is the nearest value
+    inside. The correction (Selle et al. 2008) is limited to the values around the point of origin.
+    """
+
+def advect_faces(field: Faces, displacement: Faces, maccormack: bool) -> list[Array]:
+    """The same for a velocity, each component at its own faces; beyond the box it continues as on its side."""
+
+# The data term of a velocity
+
+def blur(cells: Array, width: float, truncate: float) -> Array:
+    """A Gaussian of a standard deviation in cells, cut off at ``truncate`` of them; ends are mirrored."""
+
+def linearise(
+    before: Array, after: Array, u: Faces, threshold: float
+) -> tuple[list[Array], Array, Array, Array, Array, Mask, float]:
+    """The change between two densities around a velocity, as a linear function of the velocity.
+
+    Returns
+    -------
+    direction
+        Gradient of the mean of ``after`` and ``carried``, over ``scale``; three arrays (nx, ny, nz).
+    offset
+        (after - carried) / scale - direction . u.
+    residual
+        after - carried.
+    carried
+        ``before``, moved by u, over ``scale``.
+    density
+        The larger of ``after`` and the moved ``before``.
+    smoke
+        Where that exceeds ``threshold`` times its maximum.
+    scale
+        Root mean square of the gradient inside the smoke. Where it is zero, nothing else is defined.
+    """
+
+def residual_sums(
+    direction: Vectors, offset: Array, weight: Array, smoke: Mask, u: Faces
+) -> tuple[float, float, float]:
+    """Sums of weight offset^2, of weight (offset + direction . u)^2, and of weight inside the smoke."""
+
+def directional_derivative(direction: Vectors, u: Faces) -> Array:
+    """direction . u at cell centres, u the mean of opposite faces."""
+
+def weighted_products(columns: list[Array], weight: Array) -> npt.NDArray[np.float64]:
+    """Sums over the cells of weight a b for all pairs of the columns, shape (columns, columns)."""
+
+# Motion
+
+def add_momentum(
+    density: Array, source: npt.ArrayLike, trust: float, prediction: Faces | None, closed: Closed
+) -> list[Array]:
+    """trust prediction + P(density source), with P the projection.
+
+    Parameters
+    ----------
+    source
+        Cells per frame at density 1, shape (1, 3) or (4, 3): constant, and slopes along x, y, z, which run from -1 to 1
+        over the box.
+    prediction
+        May be None where ``trust`` is zero.
+    """
+
+def refine(u: Faces, shape: tuple[int, ...], closed: Closed) -> list[Array]:
+    """A velocity in the cells of a grid that is twice as fine and has ``shape`` cells: linear, then projected."""
+
+def clamp_increment(solution: Faces, u: Faces, largest: float, closed: Closed) -> list[Array]:
+    """u + (solution - u, every component clamped to +- largest), projected; the solution where nothing exceeds that."""
+
 class Figures(TypedDict):
+    """How a minimum was found: steps of the solver, products with the matrix, projections, its last residual."""
+
     iterations: int
     products: int
     projections: int
     residual: float
 
-def solve_poisson(f: Array, closed: Closed, threads: int = 0) -> Array: ...
-def project(faces: Arrays, closed: Closed, passes: int = 2, threads: int = 0) -> tuple[list[Array], float]: ...
-def divergence(faces: Arrays, threads: int = 0) -> Array: ...
-def gradient(cells: Array, threads: int = 0) -> list[Array]: ...
-def advect_cells(
-    field: Array, displacement: Arrays, maccormack: bool, extend: bool = False, threads: int = 0
-) -> Array: ...
-def advect_faces(field: Arrays, displacement: Arrays, maccormack: bool, threads: int = 0) -> list[Array]: ...
-def blur(cells: Array, width: float, truncate: float, threads: int = 0) -> Array:
-    """A Gaussian of a standard deviation in cells, cut off at `truncate` of them; ends mirrored."""
-
-def linearise(
-    before: Array, after: Array, u: Arrays, threshold: float, threads: int = 0
-) -> tuple[list[Array], Array, Array, Array, Array, npt.NDArray[np.bool_], float]:
-    """Direction, offset, residual, carried, density, smoke and scale; a scale of zero leaves the others undefined."""
-
-def evidence(
-    direction: Arrays, offset: Array, weight: Array, smoke: npt.NDArray[np.bool_], u: Arrays, threads: int = 0
-) -> tuple[float, float, float]:
-    """Sums of weight offset^2, of weight (offset + direction . u)^2, and of weight inside the smoke."""
-
-def directional(direction: Arrays, u: Arrays, threads: int = 0) -> Array: ...
-def weighted_products(columns: list[Array], weight: Array, threads: int = 0) -> npt.NDArray[np.float64]: ...
-def pushed(
-    density: Array, push: npt.ArrayLike, trust: float, prediction: Arrays | None, closed: Closed, threads: int = 0
-) -> list[Array]:
-    """trust prediction + P(density push); a row of `push` for the constant, or four with slopes along x, y, z."""
-
-def refine(u: Arrays, shape: tuple[int, ...], closed: Closed, threads: int = 0) -> list[Array]: ...
-def within_reach(solution: Arrays, u: Arrays, reach: float, closed: Closed, threads: int = 0) -> list[Array]: ...
-
 class LeastSquares:
+    """A quadratic function of face velocities, E(u) = u.Au - 2 b.u + constant.
+
+    E sums weight (offset + direction . u)^2 + irrotational |curl u|^2 over the cells, and of v = u - centre the terms
+    first_order |grad v|^2 + second_order |grad curl v|^2 + kinetic |v|^2.
+    """
+
     def __init__(
         self,
         *,
-        direction: Arrays,
+        direction: Vectors,
         offset: Array,
         weight: Array,
         irrotational: Array,
-        centre: Arrays,
+        centre: Faces,
         first_order: float,
         second_order: float,
         kinetic: float,
         closed: Closed,
     ) -> None: ...
-    def apply(self, u: Arrays, threads: int = 0) -> list[Array]: ...
-    def right_hand_side(self, threads: int = 0) -> list[Array]: ...
-    def projected_cg(
-        self, start: Arrays, *, tolerance: float, limit: int, threads: int = 0
-    ) -> tuple[list[Array], Figures]: ...
+    def apply(self, u: Faces) -> list[Array]:
+        """A u."""
+
+    def right_hand_side(self) -> list[Array]:
+        """b."""
+
+    def projected_cg(self, start: Faces, *, tolerance: float, limit: int) -> tuple[list[Array], Figures]:
+        """Minimise over velocities without divergence by preconditioned conjugate gradients among them.
+
+        Parameters
+        ----------
+        start
+            Without divergence.
+        tolerance
+            Stops at this fraction of the preconditioned gradient at rest.
+        limit
+            Iterations at most.
+        """
+
     def primal_dual(
         self,
-        start: Arrays,
+        start: Faces,
         *,
         sigma: float,
         tau: float,
@@ -82,22 +177,64 @@ class LeastSquares:
         limit: int,
         inner_tolerance: float,
         inner_limit: int,
-        threads: int = 0,
-    ) -> tuple[list[Array], Figures]: ...
+    ) -> tuple[list[Array], Figures]:
+        """Minimise over velocities without divergence by Chambolle and Pock's splitting (2011).
+
+        Parameters
+        ----------
+        start
+            Any velocity.
+        sigma, tau, theta
+            Dual step, primal step and over-relaxation. ValueError unless sigma and tau are positive, sigma tau <= 1 and
+            theta is in [0, 1].
+        absolute, relative
+            Stops at |u' - u| <= sqrt(3) absolute + relative |u'|.
+        limit
+            Iterations at most.
+        inner_tolerance, inner_limit
+            Of the conjugate gradients in the proximal operator.
+        """
+
+# Renderer. Its grid has a border of one voxel. A `Volume` is float32, (nx+2, ny+2, nz+2, 1 + channels): by voxel
+# the extinction in 1/m and the in-scattered radiance of each channel, or derivatives by these.
 
 Volume = npt.NDArray[np.float32]
 
-def zeros(shape: tuple[int, ...]) -> Array: ...
+def zeros(shape: tuple[int, ...]) -> Array:
+    """Zeros that get memory where they are touched, in large pages where the system has them."""
 
 class Support:
-    """Where there can be smoke; ``marked`` is (nx, ny, nz)."""
+    """Where there can be smoke; ``marked`` is (nx, ny, nz), not 0 in such voxels."""
 
     def __init__(self, marked: npt.NDArray[np.uint8]) -> None: ...
 
 class Phase:
+    """Henyey-Greenstein phase function times albedo, towards the camera.
+
+    ``to_eye`` is (3, 4): it maps a voxel's index (i, j, k, 1) to the direction to the eye, of any length.
+    """
+
     def __init__(self, *, to_eye: npt.ArrayLike, albedo: float, anisotropy: float) -> None: ...
 
 class ParallelLight:
+    """Parallel light, swept through planes of voxels across its dominant axis.
+
+    Parameters
+    ----------
+    direction : (3,)
+        Of travel, unit length.
+    energy : (3,)
+        Irradiance by channel in W/m^2.
+    axis, travel
+        Dominant axis, and +1 or -1 along it.
+    first
+        Number of the first plane in the grid of which this one is a part.
+    slope
+        Voxels that a ray moves from plane to plane along the two other axes.
+    step
+        Length of a ray between two planes in metres.
+    """
+
     def __init__(
         self,
         *,
@@ -111,6 +248,20 @@ class ParallelLight:
     ) -> None: ...
 
 class Face:
+    """A side of the cube around a point light, and the planes of voxels in front of it, the nearest first.
+
+    Parameters
+    ----------
+    axis, travel
+        Axis across the side, and +1 or -1 along it.
+    first, planes
+        The nearest plane of voxels, and how many there are.
+    far
+        Distance in voxels of the plane where columns are one voxel apart.
+    columns_b, columns_c
+        First column and number of columns that meet the grid along the two other axes.
+    """
+
     def __init__(
         self,
         *,
@@ -124,6 +275,20 @@ class Face:
     ) -> None: ...
 
 class PointLight:
+    """Light from a point outside the grid.
+
+    Parameters
+    ----------
+    position : (3,)
+        In grid coordinates, voxel centres at integers.
+    energy : (3,)
+        Intensity by channel over the squared voxel edge, in W/m^2.
+    voxel_size
+        In metres.
+    faces
+        The sides of the cube around it that see the grid.
+    """
+
     def __init__(
         self, *, position: npt.ArrayLike, energy: npt.ArrayLike, voxel_size: float, faces: list[Face]
     ) -> None: ...
@@ -131,43 +296,60 @@ class PointLight:
 Lights = list[ParallelLight | PointLight]
 
 class Rays:
-    """One ray a pixel; see `smokelift.render.camera_rays.Rays` for the arrays."""
+    """One ray a pixel.
+
+    Parameters
+    ----------
+    lines : (rows, columns, 4)
+        b0, b1, c0, c1: the ray crosses plane k of its dominant axis at (b0 + b1 k, c0 + c1 k) along the two other axes,
+        voxel centres at integers.
+    length : (rows, columns)
+        Between two planes in metres.
+    planes : (rows, columns, 4)
+        Dominant axis, travel along it, first and last plane with a sample; last < first where there is none.
+    """
 
     def __init__(self, lines: Array, length: Array, planes: npt.NDArray[np.int32]) -> None: ...
-    def clip(self, support: Support, medium: Volume, threads: int = 0) -> None: ...
-    @property
-    def samples(self) -> int: ...
+    def clip(self, support: Support, medium: Volume) -> None:
+        """Shorten every ray to where the voxels around it hold anything."""
 
-def pack(
-    density: Array, corner: tuple[int, int, int], support: Support, extinction: float, medium: Volume, threads: int = 0
-) -> None: ...
-def unpack(
-    gradient: Volume,
-    support: Support,
-    extinction: float,
-    result: Array,
-    corner: tuple[int, int, int],
-    threads: int = 0,
-) -> None: ...
-def shade(medium: Volume, support: Support, phase: Phase, lights: Lights, threads: int = 0) -> None: ...
+    @property
+    def samples(self) -> int:
+        """Samples of all rays together."""
+
+def pack(density: Array, corner: tuple[int, int, int], support: Support, extinction: float, medium: Volume) -> None:
+    """Write the extinction of the marked voxels from their density.
+
+    ``corner`` is where the support begins in the array of densities; ``extinction`` is in 1/m at density 1.
+    """
+
+def unpack(gradient: Volume, support: Support, extinction: float, result: Array, corner: tuple[int, int, int]) -> None:
+    """Write the derivative by density of the marked voxels into ``result``; others are left as they are."""
+
+def shade(medium: Volume, support: Support, phase: Phase, lights: Lights) -> None:
+    """Write the radiance that the lights scatter in every voxel towards the camera."""
+
 def shade_adjoint(
-    medium: Volume,
-    gradient: Volume,
-    scratch: Volume,
-    support: Support,
-    phase: Phase,
-    lights: Lights,
-    threads: int = 0,
-) -> None: ...
-def march(
-    medium: Volume,
-    support: Support,
-    rays: Rays,
-    scattered: Array,
-    depth: Array,
-    record: Volume | None,
-    threads: int = 0,
-) -> None: ...
+    medium: Volume, gradient: Volume, scratch: Volume, support: Support, phase: Phase, lights: Lights
+) -> None:
+    """Add to the derivative by extinction what the in-scattered radiance says of it (adjoint sweep of `shade`).
+
+    ``scratch`` is one float a voxel, shape (nx+2, ny+2, nz+2, 1).
+    """
+
+def march(medium: Volume, support: Support, rays: Rays, scattered: Array, depth: Array, record: Volume | None) -> None:
+    """Write the radiance towards the camera and the optical depth of every ray.
+
+    Parameters
+    ----------
+    scattered : (rows, columns, channels)
+        Radiance, written.
+    depth : (rows, columns)
+        Optical depth, written.
+    record : (1 + channels, planes, rows, columns)
+        What the samples held, written for `march_adjoint`; may be None.
+    """
+
 def march_adjoint(
     rays: Rays,
     depth: Array,
@@ -176,5 +358,8 @@ def march_adjoint(
     record: Volume | None,
     gradient: Volume,
     support: Support,
-    threads: int = 0,
-) -> None: ...
+) -> None:
+    """Write the derivatives by the voxels of ``gradient`` from those by radiance and transmittance of every ray.
+
+    ``record`` is that of `march`; it is overwritten.
+    """

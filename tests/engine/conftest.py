@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from smokelift import _core
 from smokelift.output.images import write_image
 from smokelift.render import render
 from smokelift.scene import (
@@ -121,3 +122,10 @@ def two_views(plume: Plume, tmp_path_factory: pytest.TempPathFactory) -> Scene:
 def draft() -> Settings:
     """Settings that are quick."""
     return Settings.preset("draft")
+
+
+@pytest.fixture
+def set_threads() -> Iterator[Callable[[int], None]]:
+    """Compute with a number of threads for the rest of a test."""
+    yield _core.set_threads
+    _core.set_threads(0)

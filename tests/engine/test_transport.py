@@ -139,14 +139,20 @@ def test_divergence_is_per_volume():
 
 
 @pytest.mark.parametrize("threads", [1, 2, 3])
-def test_results_do_not_depend_on_threads(threads):
+def test_results_do_not_depend_on_threads(threads, set_threads):
     rng = np.random.default_rng(8)
-    field, faces = rng.random(SHAPE).astype(np.float32), random_faces(rng)
-    many, one = (_core.advect_cells(field, faces, True, threads=count) for count in (threads, 1))
-    np.testing.assert_array_equal(many, one)
-    many, one = (_core.project(faces, [True] * 6, threads=count)[0] for count in (threads, 1))
-    for a, b in zip(many, one, strict=True):
+    field, velocity = rng.random(SHAPE).astype(np.float32), random_velocity(8)
+    one, free = advect(field, velocity, 1.0), project(velocity, SIDES)
+    set_threads(threads)
+    np.testing.assert_array_equal(advect(field, velocity, 1.0), one)
+    for a, b in zip(project(velocity, SIDES).faces, free.faces, strict=True):
         np.testing.assert_array_equal(a, b)
+
+
+def test_a_displacement_that_is_not_a_number_stays_in_the_array():
+    field, faces = np.ones(SHAPE, np.float32), random_faces(np.random.default_rng(9))
+    faces[0][:] = np.nan
+    np.testing.assert_array_equal(_core.advect_cells(field, faces, False, True), 1)
 
 
 def test_gradient_of_a_plane_is_exact():

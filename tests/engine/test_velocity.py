@@ -1,7 +1,6 @@
 """The velocity estimate: what it recovers, what it does not depend on, what it refuses."""
 
 import dataclasses
-import functools
 import itertools
 import os
 import subprocess
@@ -193,11 +192,10 @@ def test_units_of_space_and_time_do_not_matter(estimator):
 
 
 @pytest.mark.parametrize("estimator", [DEFAULT, PAPER], ids=["default", "paper"])
-def test_number_of_threads_does_not_matter(estimator, monkeypatch):
+def test_number_of_threads_does_not_matter(estimator, set_threads):
     before, after, _ = rotation(0.1)
     all_cores = estimator.estimate(before, after, DT, VOXEL)
-    for name in ("advect_cells", "blur", "directional", "evidence", "linearise", "pushed", "refine", "within_reach"):
-        monkeypatch.setattr(_core, name, functools.partial(getattr(_core, name), threads=1))
+    set_threads(1)
     one = estimator.estimate(before, after, DT, VOXEL)
     for a, b in zip(all_cores.faces, one.faces, strict=True):
         np.testing.assert_array_equal(a, b)

@@ -212,4 +212,4 @@ def _clamped(solution: StaggeredGrid, u: StaggeredGrid, largest: float) -> Stagg
 
     Beyond that the data term says nothing, and thin or noisy smoke would throw single wisps many voxels far.
     """
-    return u.with_faces(_core.within_reach(solution.faces, u.faces, largest, u.walls))
+    return u.with_faces(_core.clamp_increment(solution.faces, u.faces, largest, u.walls))

@@ -46,7 +46,7 @@ class Linearisation:
 
     def unexplained(self, u: StaggeredGrid, noise: float) -> tuple[float, float]:
         """What a velocity leaves of the squared change: the share beyond noise of a variance, and all of it."""
-        whole, rest, inside = _core.evidence(self.direction, self.offset, self.weight, self.smoke, u.faces)
+        whole, rest, inside = _core.residual_sums(self.direction, self.offset, self.weight, self.smoke, u.faces)
         floor = noise / self.scale**2 * inside
         return (max(rest - floor, 0.0) / (whole - floor) if whole > floor else 1.0), rest
 

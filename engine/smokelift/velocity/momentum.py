@@ -68,9 +68,9 @@ class Centre:
     def velocity(self, prediction: Prediction | None, density: Array, grid: StaggeredGrid) -> StaggeredGrid:
         """The motion in voxels a frame, on the grid given."""
         if prediction is None:
-            return grid.with_faces(_core.pushed(density, self.momentum, 0.0, None, grid.walls))
+            return grid.with_faces(_core.add_momentum(density, self.momentum, 0.0, None, grid.walls))
         weight, faces = self.trust * prediction.scale, prediction.velocity.faces
-        return grid.with_faces(_core.pushed(density, self.momentum, weight, faces, grid.walls))
+        return grid.with_faces(_core.add_momentum(density, self.momentum, weight, faces, grid.walls))
 
     def refined(self) -> Centre:
         """The same on a grid that is twice as fine."""
@@ -105,10 +105,10 @@ def fit_centre(
     rows = 4 if prediction is None else 1
     columns = []
     for momentum in np.eye(3 * rows).reshape(-1, rows, 3):
-        moved = _core.pushed(density, momentum, 0.0, None, grid.walls)
-        columns.append(_core.directional(linear.direction, moved))
+        moved = _core.add_momentum(density, momentum, 0.0, None, grid.walls)
+        columns.append(_core.directional_derivative(linear.direction, moved))
     if prediction is not None:
-        columns.append(_core.directional(linear.direction, prediction.velocity.faces))
+        columns.append(_core.directional_derivative(linear.direction, prediction.velocity.faces))
     products = _core.weighted_products([*columns, linear.carried, linear.offset], linear.weight)
     found, rest = _least_squares(products)
     dissipation = float(found[-1])

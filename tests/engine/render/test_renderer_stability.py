@@ -122,14 +122,11 @@ def test_result_does_not_depend_on_the_hull():
     np.testing.assert_allclose(results[0][1][inside], results[1][1][inside], rtol=1e-3, atol=1e-6)
 
 
-def test_same_result_for_any_number_of_threads(monkeypatch):
+def test_same_result_for_any_number_of_threads(set_threads):
     """Sums are made in an order that does not depend on who makes them."""
-    from smokelift import _core
-
     shape = (14, 12, 16)
     domain, density = make_domain(shape), make_density(shape)
     scene = replace(Scene(camera=make_camera(domain), domain=domain, lights=(SUN,)), medium=Medium(5.0, 0.9, 0.3))
     several = render(density, scene)
-    march = _core.march
-    monkeypatch.setattr(_core, "march", lambda *arguments: march(*arguments, 1))
+    set_threads(1)
     np.testing.assert_array_equal(render(density, scene), several)

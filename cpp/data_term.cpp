@@ -1,4 +1,4 @@
-#include "linearisation.h"
+#include "data_term.h"
 
 #include "advection.h"
 #include "operators.h"
@@ -34,11 +34,11 @@ void mark(const float *__restrict density, float least, unsigned char *__restric
 SMOKELIFT_CLONES
 double squares(const float *__restrict x, const float *__restrict y, const float *__restrict z,
                const unsigned char *__restrict smoke, std::size_t n) {
-    constexpr int lanes = 8;
-    double sums[lanes] = {};
+    constexpr int sums_kept = 8;
+    double sums[sums_kept] = {};
     std::size_t i = 0;
-    for (; i + lanes <= n; i += lanes)
-        for (int l = 0; l < lanes; ++l)
+    for (; i + sums_kept <= n; i += sums_kept)
+        for (int l = 0; l < sums_kept; ++l)
             sums[l] += smoke[i + l] ? x[i + l] * x[i + l] + y[i + l] * y[i + l] + z[i + l] * z[i + l] : 0.0f;
     for (; i < n; ++i)
         sums[0] += smoke[i] ? x[i] * x[i] + y[i] * y[i] + z[i] * z[i] : 0.0f;
@@ -67,11 +67,11 @@ void differences(const float *__restrict after, const float *__restrict along, f
 }
 
 SMOKELIFT_CLONES
-std::array<double, 3> evidence_row(const float *__restrict along, const float *__restrict offset,
-                                   const float *__restrict weight, const unsigned char *__restrict smoke,
-                                   std::size_t n) {
-    constexpr int lanes = 8;
-    double whole[lanes] = {}, rest[lanes] = {}, inside[lanes] = {};
+std::array<double, 3> residual_sums_row(const float *__restrict along, const float *__restrict offset,
+                                        const float *__restrict weight, const unsigned char *__restrict smoke,
+                                        std::size_t n) {
+    constexpr int sums_kept = 8;
+    double whole[sums_kept] = {}, rest[sums_kept] = {}, inside[sums_kept] = {};
     const auto add = [&](std::size_t i, int l) SMOKELIFT_INLINE_LAMBDA {
         const float left = offset[i] + along[i];
         whole[l] += weight[i] * offset[i] * offset[i];
@@ -79,13 +79,13 @@ std::array<double, 3> evidence_row(const float *__restrict along, const float *_
         inside[l] += smoke[i] ? weight[i] : 0.0f;
     };
     std::size_t i = 0;
-    for (; i + lanes <= n; i += lanes)
-        for (int l = 0; l < lanes; ++l)
+    for (; i + sums_kept <= n; i += sums_kept)
+        for (int l = 0; l < sums_kept; ++l)
             add(i + l, l);
     for (; i < n; ++i)
         add(i, 0);
     std::array<double, 3> total{};
-    for (int l = 0; l < lanes; ++l) {
+    for (int l = 0; l < sums_kept; ++l) {
         total[0] += whole[l];
         total[1] += rest[l];
         total[2] += inside[l];
@@ -96,11 +96,11 @@ std::array<double, 3> evidence_row(const float *__restrict along, const float *_
 SMOKELIFT_CLONES
 double weighted_dot(const float *__restrict a, const float *__restrict b, const float *__restrict weight,
                     std::size_t n) {
-    constexpr int lanes = 8;
-    double sums[lanes] = {};
+    constexpr int sums_kept = 8;
+    double sums[sums_kept] = {};
     std::size_t i = 0;
-    for (; i + lanes <= n; i += lanes)
-        for (int l = 0; l < lanes; ++l)
+    for (; i + sums_kept <= n; i += sums_kept)
+        for (int l = 0; l < sums_kept; ++l)
             sums[l] += double(weight[i + l] * a[i + l]) * b[i + l];
     for (; i < n; ++i)
         sums[0] += double(weight[i] * a[i]) * b[i];
@@ -122,7 +122,7 @@ std::vector<double> sums(int slabs, std::size_t quantities, Workers &workers, co
 
 } // namespace
 
-double linearise(In before, In after, const In3 &u, float threshold, const Linearisation &result,
+double linearise(In before, In after, const StaggeredIn &u, float threshold, const Linearisation &result,
                  Workers &workers) {
     const int nx = after.n[0];
     const std::size_t size = after.slab_size();
@@ -137,7 +137,7 @@ double linearise(In before, In after, const In3 &u, float threshold, const Linea
     gradient(result.offset, result.direction, workers);
     const Out3 g = result.direction;
     const auto total = sums(nx, 2, workers, [&](int i, double *partial) {
-        unsigned char *smoke = result.smoke + i * size;
+        unsigned char *smoke = result.smoke.row(i, 0);
         mark(density.row(i, 0), least, smoke, size);
         partial[0] = squares(g[0].row(i, 0), g[1].row(i, 0), g[2].row(i, 0), smoke, size);
         partial[1] = double(std::count(smoke, smoke + size, 1));
@@ -158,15 +158,15 @@ double linearise(In before, In after, const In3 &u, float threshold, const Linea
     return scale;
 }
 
-std::array<double, 3> evidence(const In3 &direction, In offset, In weight, const unsigned char *smoke,
-                               const In3 &u, Workers &workers) {
+std::array<double, 3> residual_sums(const In3 &direction, In offset, In weight, Mask smoke,
+                                    const StaggeredIn &u, Workers &workers) {
     const std::size_t size = offset.slab_size();
     const auto total = sums(offset.n[0], 3, workers, [&](int i, double *partial) {
         thread_local std::vector<float> along;
         along.resize(size);
         directional_slab(u, direction, {along.data(), {1, offset.n[1], offset.n[2]}}, i);
         const auto row =
-            evidence_row(along.data(), offset.row(i, 0), weight.row(i, 0), smoke + i * size, size);
+            residual_sums_row(along.data(), offset.row(i, 0), weight.row(i, 0), smoke.row(i, 0), size);
         std::copy(row.begin(), row.end(), partial);
     });
     return {total[0], total[1], total[2]};

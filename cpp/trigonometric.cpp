@@ -1,6 +1,6 @@
-#include "dense.h"
+#include "trigonometric.h"
 
-#include "grid.h"
+#include "compiler.h"
 
 #include <algorithm>
 #include <cmath>
@@ -12,7 +12,7 @@ namespace {
 using Stride = std::ptrdiff_t; // negative: rows from the last backwards
 
 // A vector of the compiler's own: left to itself GCC does not keep the sums in registers (20 times slower).
-template <int W> struct Lanes {
+template <int W> struct VectorOf {
     typedef float type __attribute__((vector_size(4 * W), aligned(4), may_alias));
 };
 
@@ -20,7 +20,7 @@ template <int W> struct Lanes {
 template <int R, int W>
 SMOKELIFT_INLINE void tile(int k, const float *__restrict a, Stride lda, const float *__restrict b,
                            Stride ldb, float *__restrict c, Stride ldc) {
-    using Vector = typename Lanes<W>::type;
+    using Vector = typename VectorOf<W>::type;
     Vector sum[R] = {};
     for (int p = 0; p < k; ++p) {
         const Vector values = *reinterpret_cast<const Vector *>(b + p * ldb);
@@ -45,22 +45,27 @@ SMOKELIFT_INLINE void stripe(int m, int k, const float *a, Stride lda, const flo
         tile<1, W>(k, a + i * lda, lda, b, ldb, c + i * ldc, ldc);
 }
 
-constexpr int lanes = 16; // lines that are transformed at once, side by side
+constexpr int width = 16; // lines that are transformed at once, side by side
 constexpr int dense = 32; // transforms up to this size are not split further
 
-using Lane = Lanes<lanes>::type;
+using Vector = VectorOf<width>::type;
 
-int points_of(Wave wave, int n) { return wave == Wave::cos1 ? n + 1 : wave == Wave::sin1 ? n - 1 : n; }
+int points_of(Transform transform, int n) {
+    return transform == Transform::dct1 ? n + 1 : transform == Transform::dst1 ? n - 1 : n;
+}
 
 // The transforms that leave out a face at the start, where sines are zero.
-int first_point(Wave wave) { return wave == Wave::sin1 || wave == Wave::sin3; }
+int first_point(Transform transform) { return transform == Transform::dst1 || transform == Transform::dst3; }
 
-double value(Wave wave, int n, int mode, int point) {
-    const bool cosine = wave == Wave::cos1 || wave == Wave::cos2 || wave == Wave::cos3 || wave == Wave::cos4;
-    const bool centres = wave == Wave::cos2 || wave == Wave::sin2 || wave == Wave::cos4 || wave == Wave::sin4;
-    const bool halves = wave == Wave::cos3 || wave == Wave::sin3 || wave == Wave::cos4 || wave == Wave::sin4;
-    const double phase =
-        (mode + (halves ? 0.5 : 0)) * std::acos(-1.0) / n * (point + (centres ? 0.5 : first_point(wave)));
+double value(Transform transform, int n, int mode, int point) {
+    const bool cosine = transform == Transform::dct1 || transform == Transform::dct2 ||
+                        transform == Transform::dct3 || transform == Transform::dct4;
+    const bool centres = transform == Transform::dct2 || transform == Transform::dst2 ||
+                         transform == Transform::dct4 || transform == Transform::dst4;
+    const bool halves = transform == Transform::dct3 || transform == Transform::dst3 ||
+                        transform == Transform::dct4 || transform == Transform::dst4;
+    const double phase = (mode + (halves ? 0.5 : 0)) * std::acos(-1.0) / n *
+                         (point + (centres ? 0.5 : first_point(transform)));
     return cosine ? std::cos(phase) : std::sin(phase);
 }
 
@@ -73,14 +78,15 @@ std::vector<int> count_up(int count) {
 
 } // namespace
 
-Basis::Basis(Wave wave, int n, int first, int count) : modes_(count) {
-    const bool faces = wave == Wave::cos1 || wave == Wave::sin1 || wave == Wave::cos3 || wave == Wave::sin3;
+LineTransform::LineTransform(Transform transform, int n, int first, int count) : modes_(count) {
+    const bool faces = transform == Transform::dct1 || transform == Transform::dst1 ||
+                       transform == Transform::dct3 || transform == Transform::dst3;
     length_ = n + faces;
     std::vector<int> modes;
     for (int m = first; m < first + count; ++m)
         modes.push_back(m);
-    const int start = first_point(wave), points = points_of(wave, n);
-    rows_ = split(wave, n, modes, start, 1);
+    const int start = first_point(transform), points = points_of(transform, n);
+    rows_ = split(transform, n, modes, start, 1);
     for (int i = 0; i < length_; ++i)
         if (i < start || i >= start + points)
             idle_.push_back(i);
@@ -88,17 +94,18 @@ Basis::Basis(Wave wave, int n, int first, int count) : modes_(count) {
     for (int m = 0; m < count; ++m) {
         double norm = 0;
         for (int i = 0; i < points; ++i) {
-            const double x = value(wave, n, modes[m], i);
+            const double x = value(transform, n, modes[m], i);
             const bool half = faces && (start + i == 0 || start + i == n);
             norm += (half ? 0.5 : 1) * x * x;
         }
-        // A wave that is zero on these points comes out as rounding error.
+        // A transform that is zero on these points comes out as rounding error.
         norms_[rows_[m]] = norm > 1e-6 ? float(1 / std::sqrt(norm)) : 0;
     }
 }
 
 // Plans a transform of points start, start + stride, ...; says where its modes will be.
-std::vector<int> Basis::split(Wave wave, int n, const std::vector<int> &modes, int start, int stride) {
+std::vector<int> LineTransform::split(Transform transform, int n, const std::vector<int> &modes, int start,
+                                      int stride) {
     const auto row = [&](int i) { return start + i * stride; };
     const int half = n / 2;
     std::vector<int> rows(modes.size());
@@ -106,7 +113,7 @@ std::vector<int> Basis::split(Wave wave, int n, const std::vector<int> &modes, i
         Leaf leaf;
         leaf.start = start;
         leaf.stride = stride;
-        leaf.points = points_of(wave, n);
+        leaf.points = points_of(transform, n);
         leaf.count = int(modes.size());
         leaf.first = leaves_.empty() ? 0 : leaves_.back().first + leaves_.back().count;
         leaf.analysis.resize(std::size_t(leaf.count) * leaf.points);
@@ -114,7 +121,7 @@ std::vector<int> Basis::split(Wave wave, int n, const std::vector<int> &modes, i
         for (int m = 0; m < leaf.count; ++m) {
             rows[m] = leaf.first + m;
             for (int i = 0; i < leaf.points; ++i) {
-                const float x = float(value(wave, n, modes[m], i));
+                const float x = float(value(transform, n, modes[m], i));
                 leaf.analysis[std::size_t(m) * leaf.points + i] = x;
                 leaf.synthesis[std::size_t(i) * leaf.count + m] = x;
             }
@@ -122,28 +129,29 @@ std::vector<int> Basis::split(Wave wave, int n, const std::vector<int> &modes, i
         leaves_.push_back(std::move(leaf));
         return rows;
     }
-    if (wave == Wave::cos1 || wave == Wave::sin1 || wave == Wave::cos2 || wave == Wave::sin2) {
+    if (transform == Transform::dct1 || transform == Transform::dst1 || transform == Transform::dct2 ||
+        transform == Transform::dst2) {
         // Modes of even and odd number are symmetric about the middle or antisymmetric.
         std::vector<int> even, odd;
         for (int mode : modes)
             (mode % 2 ? odd : even).push_back(mode / 2);
-        const int last = points_of(wave, n) - 1;
+        const int last = points_of(transform, n) - 1;
         for (int i = 0; i < last - i; ++i)
             before_.push_back({row(i), row(last - i), 1, 1, 1, -1});
         const int end = row(last); // the differences lie from there backwards
         std::vector<int> of_even, of_odd;
-        if (wave == Wave::cos1) {
-            of_even = split(Wave::cos1, half, even, start, stride);
-            of_odd = split(Wave::cos3, half, odd, end, -stride);
-        } else if (wave == Wave::sin1) {
-            of_even = split(Wave::sin1, half, even, end, -stride);
-            of_odd = split(Wave::sin3, half, odd, start, stride);
-        } else if (wave == Wave::cos2) {
-            of_even = split(Wave::cos2, half, even, start, stride);
-            of_odd = split(Wave::cos4, half, odd, end, -stride);
+        if (transform == Transform::dct1) {
+            of_even = split(Transform::dct1, half, even, start, stride);
+            of_odd = split(Transform::dct3, half, odd, end, -stride);
+        } else if (transform == Transform::dst1) {
+            of_even = split(Transform::dst1, half, even, end, -stride);
+            of_odd = split(Transform::dst3, half, odd, start, stride);
+        } else if (transform == Transform::dct2) {
+            of_even = split(Transform::dct2, half, even, start, stride);
+            of_odd = split(Transform::dct4, half, odd, end, -stride);
         } else {
-            of_even = split(Wave::sin2, half, even, end, -stride);
-            of_odd = split(Wave::sin4, half, odd, start, stride);
+            of_even = split(Transform::dst2, half, even, end, -stride);
+            of_odd = split(Transform::dst4, half, odd, start, stride);
         }
         auto e = of_even.begin(), o = of_odd.begin();
         for (std::size_t m = 0; m < modes.size(); ++m)
@@ -152,17 +160,18 @@ std::vector<int> Basis::split(Wave wave, int n, const std::vector<int> &modes, i
     }
     // Modes m and n - 1 - m are the same on every second point, and opposite on the others (III), or sums and
     // differences of neighbours turned by half the angle of m (IV).
-    const bool cosine = wave == Wave::cos3 || wave == Wave::cos4,
-               whole = wave == Wave::cos3 || wave == Wave::sin3;
+    const bool cosine = transform == Transform::dct3 || transform == Transform::dct4,
+               whole = transform == Transform::dct3 || transform == Transform::dst3;
     std::vector<int> a, b;
     if (whole) {
-        a = split(wave, half, count_up(half), row(cosine ? 0 : 1), 2 * stride);
-        b = split(cosine ? Wave::cos4 : Wave::sin4, half, count_up(half), row(cosine ? 1 : 0), 2 * stride);
+        a = split(transform, half, count_up(half), row(cosine ? 0 : 1), 2 * stride);
+        b = split(cosine ? Transform::dct4 : Transform::dst4, half, count_up(half), row(cosine ? 1 : 0),
+                  2 * stride);
     } else {
         for (int i = 0; i < n; i += 2)
             before_.push_back({row(i), row(i + 1), 1, 1, 1, -1});
-        a = split(wave, half, count_up(half), row(0), 2 * stride);
-        b = split(cosine ? Wave::sin4 : Wave::cos4, half, count_up(half), row(1), 2 * stride);
+        a = split(transform, half, count_up(half), row(0), 2 * stride);
+        b = split(cosine ? Transform::dst4 : Transform::dct4, half, count_up(half), row(1), 2 * stride);
     }
     for (int m = 0; m < half; ++m) {
         const double angle = (m + 0.5) * std::acos(-1.0) / n / 2;
@@ -179,61 +188,62 @@ std::vector<int> Basis::split(Wave wave, int n, const std::vector<int> &modes, i
 
 namespace {
 
-template <class Turn> SMOKELIFT_INLINE void turn(const Turn &t, float *x) {
-    Lane &a = *reinterpret_cast<Lane *>(x + t.a * lanes), &b = *reinterpret_cast<Lane *>(x + t.b * lanes);
-    const Lane first = t.aa * a + t.ab * b, second = t.ba * a + t.bb * b;
+template <class Butterfly> SMOKELIFT_INLINE void apply(const Butterfly &t, float *x) {
+    Vector &a = *reinterpret_cast<Vector *>(x + t.a * width),
+           &b = *reinterpret_cast<Vector *>(x + t.b * width);
+    const Vector first = t.aa * a + t.ab * b, second = t.ba * a + t.bb * b;
     a = first;
     b = second;
 }
 
-template <class Turn> SMOKELIFT_INLINE void turn_back(const Turn &t, float *x) {
-    turn(Turn{t.a, t.b, t.aa, t.ba, t.ab, t.bb}, x);
+template <class Butterfly> SMOKELIFT_INLINE void apply_transposed(const Butterfly &t, float *x) {
+    apply(Butterfly{t.a, t.b, t.aa, t.ba, t.ab, t.bb}, x);
 }
 
 } // namespace
 
 SMOKELIFT_CLONES
-void Basis::analyse(float *points, float *modes) const {
-    for (const Turn &t : before_)
-        turn(t, points);
+void LineTransform::analyse(float *points, float *modes) const {
+    for (const Butterfly &t : before_)
+        apply(t, points);
     for (const Leaf &leaf : leaves_)
-        stripe<lanes>(leaf.count, leaf.points, leaf.analysis.data(), leaf.points, points + leaf.start * lanes,
-                      leaf.stride * lanes, modes + leaf.first * lanes, lanes);
-    for (const Turn &t : after_)
-        turn(t, modes);
+        stripe<width>(leaf.count, leaf.points, leaf.analysis.data(), leaf.points, points + leaf.start * width,
+                      leaf.stride * width, modes + leaf.first * width, width);
+    for (const Butterfly &t : after_)
+        apply(t, modes);
     for (int m = 0; m < modes_; ++m)
-        reinterpret_cast<Lane *>(modes)[m] *= norms_[m];
+        reinterpret_cast<Vector *>(modes)[m] *= norms_[m];
 }
 
 // The transpose.
 SMOKELIFT_CLONES
-void Basis::synthesise(float *modes, float *points) const {
+void LineTransform::synthesise(float *modes, float *points) const {
     for (int m = 0; m < modes_; ++m)
-        reinterpret_cast<Lane *>(modes)[m] *= norms_[m];
+        reinterpret_cast<Vector *>(modes)[m] *= norms_[m];
     for (auto t = after_.rbegin(); t != after_.rend(); ++t)
-        turn_back(*t, modes);
+        apply_transposed(*t, modes);
     for (int i : idle_)
-        std::fill_n(points + i * lanes, lanes, 0.0f);
+        std::fill_n(points + i * width, width, 0.0f);
     for (const Leaf &leaf : leaves_)
-        stripe<lanes>(leaf.points, leaf.count, leaf.synthesis.data(), leaf.count, modes + leaf.first * lanes,
-                      lanes, points + leaf.start * lanes, leaf.stride * lanes);
+        stripe<width>(leaf.points, leaf.count, leaf.synthesis.data(), leaf.count, modes + leaf.first * width,
+                      width, points + leaf.start * width, leaf.stride * width);
     for (auto t = before_.rbegin(); t != before_.rend(); ++t)
-        turn_back(*t, points);
+        apply_transposed(*t, points);
 }
 
 namespace {
 
-// Exchanges the off-diagonal blocks of `step` rows and lanes.
+// Exchanges the off-diagonal blocks of `step` rows and columns.
 #define SMOKELIFT_EXCHANGE(step, low, high)                                                                  \
-    for (int i = 0; i < lanes; ++i)                                                                          \
+    for (int i = 0; i < width; ++i)                                                                          \
         if (!(i & step)) {                                                                                   \
-            const Lane a = x[i], b = x[i + step];                                                            \
+            const Vector a = x[i], b = x[i + step];                                                          \
             x[i] = __builtin_shufflevector(a, b, low);                                                       \
             x[i + step] = __builtin_shufflevector(a, b, high);                                               \
         }
 #define SMOKELIFT_LIST(...) __VA_ARGS__
 
-SMOKELIFT_INLINE void transpose(Lane *x){
+SMOKELIFT_INLINE void transpose(Vector *x){
 #pragma GCC unroll 16
     SMOKELIFT_EXCHANGE(8, SMOKELIFT_LIST(0, 1, 2, 3, 4, 5, 6, 7, 16, 17, 18, 19, 20, 21, 22, 23),
                        SMOKELIFT_LIST(8, 9, 10, 11, 12, 13, 14, 15, 24, 25, 26, 27, 28, 29, 30, 31))
@@ -249,20 +259,20 @@ SMOKELIFT_INLINE void transpose(Lane *x){
                                    SMOKELIFT_LIST(1, 17, 3, 19, 5, 21, 7, 23, 9, 25, 11, 27, 13, 29, 15, 31))}
 
 SMOKELIFT_INLINE int at(const int *order, int i) {
-    return lanes * (order ? order[i] : i);
+    return width * (order ? order[i] : i);
 }
 
 // Lines that are rows, side by side: element i of every line to row order[i] of x, or back.
 SMOKELIFT_CLONES
 void rows_in(const float *rows, int length, int lines, const int *order, float *x) {
     int i = 0;
-    for (; lines == lanes && i + lanes <= length; i += lanes) {
-        Lane block[lanes];
-        for (int l = 0; l < lanes; ++l)
-            block[l] = *reinterpret_cast<const Lane *>(rows + std::size_t(l) * length + i);
+    for (; lines == width && i + width <= length; i += width) {
+        Vector block[width];
+        for (int l = 0; l < width; ++l)
+            block[l] = *reinterpret_cast<const Vector *>(rows + std::size_t(l) * length + i);
         transpose(block);
-        for (int k = 0; k < lanes; ++k)
-            *reinterpret_cast<Lane *>(x + at(order, i + k)) = block[k];
+        for (int k = 0; k < width; ++k)
+            *reinterpret_cast<Vector *>(x + at(order, i + k)) = block[k];
     }
     for (; i < length; ++i)
         for (int l = 0; l < lines; ++l)
@@ -272,13 +282,13 @@ void rows_in(const float *rows, int length, int lines, const int *order, float *
 SMOKELIFT_CLONES
 void rows_out(float *rows, int length, int lines, const int *order, const float *x) {
     int i = 0;
-    for (; lines == lanes && i + lanes <= length; i += lanes) {
-        Lane block[lanes];
-        for (int k = 0; k < lanes; ++k)
-            block[k] = *reinterpret_cast<const Lane *>(x + at(order, i + k));
+    for (; lines == width && i + width <= length; i += width) {
+        Vector block[width];
+        for (int k = 0; k < width; ++k)
+            block[k] = *reinterpret_cast<const Vector *>(x + at(order, i + k));
         transpose(block);
-        for (int l = 0; l < lanes; ++l)
-            *reinterpret_cast<Lane *>(rows + std::size_t(l) * length + i) = block[l];
+        for (int l = 0; l < width; ++l)
+            *reinterpret_cast<Vector *>(rows + std::size_t(l) * length + i) = block[l];
     }
     for (; i < length; ++i)
         for (int l = 0; l < lines; ++l)
@@ -289,8 +299,8 @@ void rows_out(float *rows, int length, int lines, const int *order, const float 
 SMOKELIFT_CLONES
 void columns_in(const float *rows, int stride, int length, int lines, const int *order, float *x) {
     for (int i = 0; i < length; ++i, rows += stride)
-        if (lines == lanes)
-            *reinterpret_cast<Lane *>(x + at(order, i)) = *reinterpret_cast<const Lane *>(rows);
+        if (lines == width)
+            *reinterpret_cast<Vector *>(x + at(order, i)) = *reinterpret_cast<const Vector *>(rows);
         else
             std::copy_n(rows, lines, x + at(order, i));
 }
@@ -298,58 +308,57 @@ void columns_in(const float *rows, int stride, int length, int lines, const int 
 SMOKELIFT_CLONES
 void columns_out(float *rows, int stride, int length, int lines, const int *order, const float *x) {
     for (int i = 0; i < length; ++i, rows += stride)
-        if (lines == lanes)
-            *reinterpret_cast<Lane *>(rows) = *reinterpret_cast<const Lane *>(x + at(order, i));
+        if (lines == width)
+            *reinterpret_cast<Vector *>(rows) = *reinterpret_cast<const Vector *>(x + at(order, i));
         else
             std::copy_n(x + at(order, i), lines, rows);
 }
 
+// Calls group(first, lines, x, y) for as many lines at a time as are transformed at once, with room for their
+// points and modes.
+template <class Group>
+void in_groups(int count, int length, int modes, std::vector<float> &scratch, const Group &group) {
+    scratch.resize(std::size_t(length + modes) * width);
+    for (int first = 0; first < count; first += width)
+        group(first, std::min(width, count - first), scratch.data(), scratch.data() + length * width);
+}
+
 } // namespace
 
-void Basis::rows_to_modes(const float *points, int count, float *modes, std::vector<float> &scratch) const {
-    scratch.resize(std::size_t(length_ + modes_) * lanes);
-    float *x = scratch.data(), *y = x + length_ * lanes;
-    for (int first = 0; first < count; first += lanes) {
-        const int lines = std::min(lanes, count - first);
+void LineTransform::rows_to_modes(const float *points, int count, float *modes,
+                                  std::vector<float> &scratch) const {
+    in_groups(count, length_, modes_, scratch, [&](int first, int lines, float *x, float *y) {
         rows_in(points + std::size_t(first) * length_, length_, lines, nullptr, x);
         analyse(x, y);
         rows_out(modes + std::size_t(first) * modes_, modes_, lines, rows_.data(), y);
-    }
+    });
 }
 
-void Basis::rows_from_modes(const float *modes, int count, float *points, std::vector<float> &scratch) const {
-    scratch.resize(std::size_t(length_ + modes_) * lanes);
-    float *x = scratch.data(), *y = x + length_ * lanes;
-    for (int first = 0; first < count; first += lanes) {
-        const int lines = std::min(lanes, count - first);
+void LineTransform::rows_from_modes(const float *modes, int count, float *points,
+                                    std::vector<float> &scratch) const {
+    in_groups(count, length_, modes_, scratch, [&](int first, int lines, float *x, float *y) {
         rows_in(modes + std::size_t(first) * modes_, modes_, lines, rows_.data(), y);
         synthesise(y, x);
         rows_out(points + std::size_t(first) * length_, length_, lines, nullptr, x);
-    }
+    });
 }
 
-void Basis::columns_to_modes(const float *points, int stride, int count, float *modes, int modes_stride,
-                             std::vector<float> &scratch) const {
-    scratch.resize(std::size_t(length_ + modes_) * lanes);
-    float *x = scratch.data(), *y = x + length_ * lanes;
-    for (int first = 0; first < count; first += lanes) {
-        const int lines = std::min(lanes, count - first);
+void LineTransform::columns_to_modes(const float *points, int stride, int count, float *modes,
+                                     int modes_stride, std::vector<float> &scratch) const {
+    in_groups(count, length_, modes_, scratch, [&](int first, int lines, float *x, float *y) {
         columns_in(points + first, stride, length_, lines, nullptr, x);
         analyse(x, y);
         columns_out(modes + first, modes_stride, modes_, lines, rows_.data(), y);
-    }
+    });
 }
 
-void Basis::columns_from_modes(const float *modes, int modes_stride, int count, float *points, int stride,
-                               std::vector<float> &scratch) const {
-    scratch.resize(std::size_t(length_ + modes_) * lanes);
-    float *x = scratch.data(), *y = x + length_ * lanes;
-    for (int first = 0; first < count; first += lanes) {
-        const int lines = std::min(lanes, count - first);
+void LineTransform::columns_from_modes(const float *modes, int modes_stride, int count, float *points,
+                                       int stride, std::vector<float> &scratch) const {
+    in_groups(count, length_, modes_, scratch, [&](int first, int lines, float *x, float *y) {
         columns_in(modes + first, modes_stride, modes_, lines, rows_.data(), y);
         synthesise(y, x);
         columns_out(points + first, stride, length_, lines, nullptr, x);
-    }
+    });
 }
 
 } // namespace smokelift

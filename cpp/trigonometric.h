@@ -1,24 +1,26 @@
-// Transforms between the cells of a line and the eigenvectors of its Laplacian.
+// Discrete cosine and sine transforms of lines (Strang 1999, SIAM Review 41, 135; Martucci 1994, IEEE Trans.
+// Signal Processing 42, 1038).
 #pragma once
 
 #include <vector>
 
 namespace smokelift {
 
-// The cosine and sine transforms of types I to IV for n intervals: cos or sin of
+// DCT-I ... DST-IV for n intervals: the expansion of the points i in the modes k, cos (DCT) or sin (DST) of
 //     I  k pi i / n            II  k pi (i + 1/2) / n
 //    III (k + 1/2) pi i / n    IV  (k + 1/2) pi (i + 1/2) / n
-enum class Wave { cos1, sin1, cos2, sin2, cos3, sin3, cos4, sin4 };
+enum class Transform { dct1, dst1, dct2, dst2, dct3, dst3, dct4, dst4 };
 
 // Each transform is split into two of half the size, with sums and differences of pairs of points before or
-// rotations of pairs of modes after (as in Wang 1984), until what is left is small or odd; those are dense
-// products.
-class Basis {
+// rotations of pairs of modes after (Wang 1984, IEEE Trans. ASSP 32, 803), until what is left is small or
+// odd. That is a dense product. Modes have unit length; those of types I and III do if points on their ends
+// count half.
+class LineTransform {
 public:
-    Basis() = default;
+    LineTransform() = default;
     // Modes first ... first + count - 1 for n intervals, all that there are but for one that is zero or
     // constant, on lines of n cells (II, IV) or n + 1 faces (I, III).
-    Basis(Wave wave, int n, int first, int count);
+    LineTransform(Transform transform, int n, int first, int count);
 
     // Lines are rows: `count` lines of `length` points one after the other, or as many of `modes`
     // coefficients. Input and output may be the same memory if length = modes.
@@ -34,7 +36,7 @@ public:
 
 private:
     // Rows a and b of a line become aa a + ab b and ba a + bb b.
-    struct Turn {
+    struct Butterfly {
         int a, b;
         float aa, ab, ba, bb;
     };
@@ -44,12 +46,12 @@ private:
         std::vector<float> analysis, synthesis; // count x points, points x count
     };
 
-    std::vector<int> split(Wave wave, int n, const std::vector<int> &modes, int start, int stride);
+    std::vector<int> split(Transform transform, int n, const std::vector<int> &modes, int start, int stride);
     void analyse(float *points, float *modes) const;
     void synthesise(float *modes, float *points) const;
 
     int length_ = 0, modes_ = 0;
-    std::vector<Turn> before_, after_;
+    std::vector<Butterfly> before_, after_;
     std::vector<Leaf> leaves_;
     std::vector<int> rows_, idle_; // where each mode is found; points that are zero in all
     std::vector<float> norms_;     // in the order of rows

@@ -1,0 +1,19 @@
+// The motion that a momentum source in the smoke sets off.
+#pragma once
+
+#include "grid.h"
+#include "threads.h"
+
+#include <vector>
+
+namespace smokelift {
+
+// For each component a constant and, if there are slopes, three along x, y, z from -1 to 1.
+using MomentumSource = std::vector<std::array<float, 3>>;
+
+// trust * prediction + P(density * source), with P the pressure projection; the prediction is not looked at
+// where trust is zero.
+void add_momentum(In density, const MomentumSource &source, float trust, const StaggeredIn &prediction,
+                  const StaggeredOut &result, Workers &workers);
+
+} // namespace smokelift

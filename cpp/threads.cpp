@@ -1,0 +1,93 @@
+#include "threads.h"
+
+#if defined(__linux__)
+#include <sched.h>
+#endif
+
+namespace smokelift {
+namespace {
+
+std::atomic<int> threads_set{0};
+
+int usable_cores() {
+#if defined(__linux__)
+    cpu_set_t set;
+    if (sched_getaffinity(0, sizeof(set), &set) == 0)
+        return CPU_COUNT(&set);
+#endif
+    return static_cast<int>(std::thread::hardware_concurrency());
+}
+
+} // namespace
+
+void set_threads(int count) { threads_set = count; }
+
+Workers::Workers() {
+    const int threads = threads_set > 0 ? threads_set.load() : usable_cores();
+    for (int t = 1; t < threads; ++t)
+        threads_.emplace_back([this] { serve(); });
+}
+
+Workers::~Workers() {
+    {
+        std::lock_guard<std::mutex> lock(mutex_);
+        ending_ = true;
+    }
+    start_.notify_all();
+    for (auto &thread : threads_)
+        thread.join();
+}
+
+void Workers::work() {
+    for (int i; (i = next_.fetch_add(1)) < count_;)
+        (*task_)(i);
+}
+
+void Workers::serve() {
+    unsigned seen = 0;
+    for (;;) {
+        // Loops follow each other within microseconds, so look a little while before going to sleep.
+        for (int spin = 0; spin < 2000 && round_ == seen && !ending_; ++spin)
+            std::this_thread::yield();
+        {
+            std::unique_lock<std::mutex> lock(mutex_);
+            start_.wait(lock, [&] { return round_ != seen || ending_; });
+            if (ending_)
+                return;
+            seen = round_;
+        }
+        work();
+        --busy_;
+    }
+}
+
+void Workers::run(int count, const std::function<void(int)> &task) {
+    if (threads_.empty() || count < 2) {
+        for (int i = 0; i < count; ++i)
+            task(i);
+        return;
+    }
+    {
+        std::lock_guard<std::mutex> lock(mutex_);
+        task_ = &task;
+        count_ = count;
+        next_ = 0;
+        busy_ = static_cast<int>(threads_.size());
+        ++round_;
+    }
+    start_.notify_all();
+    work();
+    while (busy_ > 0)
+        std::this_thread::yield();
+}
+
+double Workers::sum(int count, const std::function<double(int)> &partial) {
+    std::vector<double> partials(count);
+    run(count, [&](int i) { partials[i] = partial(i); });
+    double total = 0;
+    for (double value : partials)
+        total += value;
+    return total;
+}
+
+} // namespace smokelift

@@ -1,0 +1,74 @@
+#include "vectors.h"
+
+#include <algorithm>
+
+namespace smokelift {
+namespace {
+
+constexpr std::size_t chunk = 1 << 14;
+
+int chunks(std::size_t n) { return int((n + chunk - 1) / chunk); }
+
+} // namespace
+
+SMOKELIFT_CLONES
+double dot(const float *__restrict a, const float *__restrict b, std::size_t n) {
+    // Sixteen running sums keep the vector units busy; a fixed number keeps the result the same everywhere.
+    constexpr int sums_kept = 16;
+    float sums[sums_kept] = {};
+    std::size_t i = 0;
+    for (; i + sums_kept <= n; i += sums_kept)
+        for (int l = 0; l < sums_kept; ++l)
+            sums[l] += a[i + l] * b[i + l];
+    double total = 0;
+    for (; i < n; ++i)
+        total += double(a[i]) * b[i];
+    for (float value : sums)
+        total += value;
+    return total;
+}
+
+SMOKELIFT_CLONES
+void axpy(float factor, const float *__restrict x, float *__restrict y, std::size_t n) {
+    for (std::size_t i = 0; i < n; ++i)
+        y[i] += factor * x[i];
+}
+
+SMOKELIFT_CLONES
+void xpay(const float *__restrict x, float factor, float *__restrict y, std::size_t n) {
+    for (std::size_t i = 0; i < n; ++i)
+        y[i] = x[i] + factor * y[i];
+}
+
+double dot(const float *a, const float *b, std::size_t n, Workers &workers) {
+    return workers.sum(chunks(n), [&](int c) {
+        const std::size_t start = c * chunk;
+        return dot(a + start, b + start, std::min(chunk, n - start));
+    });
+}
+
+void axpy(float factor, const float *x, float *y, std::size_t n, Workers &workers) {
+    workers.run(chunks(n), [&](int c) {
+        const std::size_t start = c * chunk;
+        axpy(factor, x + start, y + start, std::min(chunk, n - start));
+    });
+}
+
+void xpay(const float *x, float factor, float *y, std::size_t n, Workers &workers) {
+    workers.run(chunks(n), [&](int c) {
+        const std::size_t start = c * chunk;
+        xpay(x + start, factor, y + start, std::min(chunk, n - start));
+    });
+}
+
+void axpy(float factor, const StaggeredIn &x, const StaggeredOut &y, Workers &workers) {
+    for (int c = 0; c < 3; ++c)
+        axpy(factor, x[c].data, y[c].data, volume(x[c].n), workers);
+}
+
+void copy(const StaggeredIn &x, const StaggeredOut &y, Workers &workers) {
+    for (int c = 0; c < 3; ++c)
+        workers.run(x[c].n[0], [&](int i) { std::copy_n(x[c].row(i, 0), x[c].slab_size(), y[c].row(i, 0)); });
+}
+
+} // namespace smokelift
