@@ -8,15 +8,15 @@ the inlet adds smoke afterwards).
 """
 
 import argparse
-import ctypes
 import sys
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import bpy
 import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "truth"))
+from mantaflow import boot, view
 
 DOMAIN_MIN = np.array([-1.0, -1.0, 0.0])
 DOMAIN_SIZE = np.array([2.0, 2.0, 3.0])
@@ -99,42 +99,6 @@ class Noise:
         """Return values of unit variance at points (..., 3) at a time (s)."""
         angles = points @ self.waves + self.frequencies * time + self.phases
         return np.cos(angles).sum(axis=-1) / 4.0
-
-
-def boot() -> Any:
-    """Return the `manta` module with a complete class table.
-
-    Mantaflow misses inherited methods until its second start under Python 3.11; baking a throw-away domain
-    forces the first one, and that bake may fail.
-    """
-    for obj in list(bpy.data.objects):
-        bpy.data.objects.remove(obj)
-    bpy.ops.mesh.primitive_cube_add(size=2)
-    domain = bpy.context.object
-    modifier = domain.modifiers.new("Fluid", "FLUID")
-    modifier.fluid_type = "DOMAIN"
-    settings = modifier.domain_settings
-    settings.domain_type, settings.resolution_max, settings.cache_type = "GAS", 8, "ALL"
-    bpy.context.view_layer.objects.active = domain
-    with tempfile.TemporaryDirectory() as folder:
-        settings.cache_directory, settings.cache_frame_start, settings.cache_frame_end = folder, 1, 1
-        try:
-            bpy.ops.fluid.bake_all()
-        except RuntimeError as error:
-            print("first bake, which may fail:", error)
-    import manta
-
-    return manta
-
-
-def view(grid: Any, shape: tuple[int, ...], components: int = 1) -> np.ndarray:
-    """Return a writable view [x, y, z(, component)] of a Mantaflow grid, valid until its next advection."""
-    count = int(np.prod(shape)) * components
-    buffer = (ctypes.c_float * count).from_address(int(grid.getDataPointer(), 16))
-    data = np.frombuffer(buffer, np.float32)
-    if components == 1:
-        return data.reshape(shape[::-1]).transpose(2, 1, 0)
-    return data.reshape(*shape[::-1], components).transpose(2, 1, 0, 3)
 
 
 class Simulation:

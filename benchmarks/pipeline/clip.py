@@ -1,6 +1,6 @@
-"""The built-in clip: smoke whose motion is a formula, pictured by our own renderer.
+"""The built-in clip: smoke whose motion is a formula, pictured by Smokelift's renderer.
 
-It is there to be timed. How right a result is has to be judged on pictures that we did not make.
+It serves for timing only: accuracy has to be measured on pictures from another renderer.
 """
 
 from __future__ import annotations
@@ -14,17 +14,17 @@ from smokelift.render import render
 from smokelift.scene import Background, Camera, ClipSource, DirectionalLight, Domain, Medium, Scene
 
 SHAPE = (64, 64, 96)
-"""Voxels of the smoke that is pictured, whatever grid is timed."""
+"""Voxels of the pictured smoke; the grid that is timed may be another."""
 
 PIXELS = (512, 768)
-"""Of the pictures: two and more a voxel of the paper's finest grid."""
+"""Columns and rows of the pictures: at least two pixels a voxel of the paper's finest grid."""
 
 HEIGHT = 3.0
-"""Metres of the longest side of the box."""
+"""Longest side of the box (m)."""
 
 
 def write_clip(folder: Path, frames: int) -> Scene:
-    """Write so many frames into a folder; returns their scene."""
+    """Write some frames into a folder, and return their scene."""
     scene = Scene(
         clip=ClipSource(folder / "frame_####.exr", fps=24.0),
         camera=Camera.look_at((0.0, -7.0, 0.0), (0.0, 0.0, 0.0), fov_y_degrees=30, size=PIXELS),
@@ -39,7 +39,7 @@ def write_clip(folder: Path, frames: int) -> Scene:
 
 
 def with_grid(scene: Scene, shape: tuple[int, int, int]) -> Scene:
-    """The scene with a box of so many voxels about the same middle, as high as before."""
+    """Return the scene with a box of other voxels, with the same middle and height."""
     return replace(scene, domain=_box(shape))
 
 

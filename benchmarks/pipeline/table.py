@@ -1,4 +1,4 @@
-"""The results as a table to read, beside the paper's."""
+"""The pipeline's results as a table for a terminal, beside the paper's times."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from benchmarks.tables import printed, size_text
 WIDTH = 110
 
 PAPER = {(64, 64, 96): (0.08, 6.13), (128, 128, 192): (0.12, 8.75), (256, 256, 288): (0.78, 21.31)}
-"""Seconds a frame in the paper's table 2 by size, of rendering and in all, on an RTX 2080 Ti."""
+"""Seconds a frame in the paper's table 2 by size, rendering and whole frame, on an RTX 2080 Ti."""
 
 
 def text(results: dict[str, Any]) -> str:
@@ -28,8 +28,8 @@ def text(results: dict[str, Any]) -> str:
     ]
     legend = (
         "Medians over the frames, from decoding the clip to OpenVDB files on disk. solves: the frame in Poisson solves "
-        "by cosine transforms (scipy) of the same grid, timed between the frames. MiB: peak of the process. front: the "
-        "working picture, linear. paper's: rendering / all in its table 2, on an RTX 2080 Ti."
+        "(scipy's cosine transforms) of the same grid, timed between the frames. MiB: peak of memory. front: PSNR of "
+        "the working picture, linear. paper's: rendering / whole frame in its table 2, on an RTX 2080 Ti."
     )
     return printed(WIDTH, [provenance_text(results), table, *failures, legend])
 

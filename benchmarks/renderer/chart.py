@@ -1,4 +1,4 @@
-"""The results as two charts: time against size for everybody, and ours against the share of voxels with smoke."""
+"""The renderer's results as charts: time against size, and against the share of voxels with smoke."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from benchmarks.renderer.peers import OURS, PEERS
 
 
 def draw(results: dict[str, Any], path: Path) -> None:
-    """Write a PNG with the charts of `benchmarks.renderer.run.run`'s results."""
+    """Write a PNG with the charts of the results of `benchmarks.renderer.run.run`."""
     figure = charts.new_figure(results, 15, 5.2)
     plume, full, shares = figure.subplots(1, 3, width_ratios=(3, 3, 2))
     full.sharey(plume)

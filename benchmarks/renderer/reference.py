@@ -1,10 +1,10 @@
-"""The right answer: the renderer's discrete sums and their exact adjoint in float64, from method sections 1 and 2.
+"""The exact answer: the renderer's discrete sums and their adjoint in float64.
 
 Rays are sampled where they cross the voxel-centre planes of their own dominant axis, bilinearly in the plane, with
 kappa zero and J that of the nearest voxel outside the grid. The light's optical depth is S^T K S kappa: S from voxels
 to the light's columns (bilinear in each plane), K the midpoint rule along the columns.
 
-All rays are worked on together, plane after plane: plain, and fast enough for 256^3.
+All rays advance together, plane after plane, which is fast enough for 256^3 voxels.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Image and gradient of one iteration: us, every peer, every size and scene, one after another.
+"""Image and gradient of one iteration: Smokelift and every peer at every size and in every scene, one after another.
 
-The machine may be anything and noisy, so nothing stands alone: between any two peers we run again, and a peer's ratio
-is its median over ours just before and just after; times are also given in copies of ten volumes of that size.
+Machines differ and are shared, so times are compared in pairs: Smokelift runs again between any two peers, and a peer's
+ratio is its median over Smokelift's just before and just after. Times are also given relative to a copy of ten volumes.
 """
 
 from __future__ import annotations
@@ -24,15 +24,19 @@ from benchmarks.renderer.worker import Result, run_apart
 from smokelift.render.device import DeviceName
 
 SCENES = {"plume": PLUME, "full": 1.0}
-"""Names of the scenes, and their share of voxels with smoke."""
+"""The scenes, and their share of voxels with smoke."""
 
 EXACT = 1e-3
-"""Relative L2 error against float64 up to which image and gradient count as exact."""
+"""Largest relative L2 error against float64 of an image or gradient that counts as exact."""
 
 SHARES = (0.05, 0.1, 0.18, 0.35, 0.6, 1.0)
+"""Shares of voxels with smoke at which Smokelift alone is timed."""
+
 LIGHTS = (1, 16)
+"""Numbers of directional lights with which Smokelift alone is timed."""
+
 SWEEP_SIZE = 128
-"""The largest grid for the runs over shares and lights."""
+"""Voxels a side of the largest grid for the runs over shares and lights."""
 
 LIBRARIES = ("numpy", "taichi", "drjit", "torch", "jax", "mitsuba")
 
@@ -42,7 +46,7 @@ Array = NDArray[np.floating[Any]]
 
 @dataclass(frozen=True)
 class Row:
-    """A peer at one size, in one scene. What is None was not measured.
+    """A peer at one size, in one scene. None stands for what was not measured.
 
     Attributes
     ----------
@@ -51,23 +55,23 @@ class Row:
     size, scene, share, lights
         Voxels a side, name of the scene, share of its voxels with smoke, number of directional lights.
     milliseconds
-        Of every iteration.
+        Time of every iteration.
     median
-        Of them.
+        Median of these times (ms).
     ratio
-        Median over ours just before and after.
+        The median over Smokelift's just before and after.
     floors
-        Median over the time to copy ten volumes.
+        The median over the time to copy ten volumes.
     compile_seconds, setup_seconds
         As in `Result`.
     peak_mib, peak_volumes
-        Peak of memory (see `Result`), also in volumes of size^3 floats.
+        Peak of memory (see `Result`), in MiB and in volumes of size^3 floats.
     image_error, gradient_error
-        Relative L2 distance from the float64 reference, the gradient's where there is smoke.
+        Relative L2 error against the float64 reference; of the gradient, where there is smoke.
     exact
-        Whether both are at most `EXACT`.
+        Whether both errors are at most `EXACT`.
     failure
-        Why nothing was measured.
+        Why nothing was measured, one sentence; else empty.
     """
 
     peer: str
@@ -103,19 +107,19 @@ def run(
     sizes
         Voxels a side.
     peers
-        Keys of `PEERS`. We always run.
+        Keys of `PEERS`. Smokelift always runs.
     device
-        Where our own renderer runs; the peers run on the processor.
+        Where Smokelift runs; the peers run on the processor.
     say
-        Is told what happens.
+        Takes a sentence about each run.
     save
-        Gets the results so far after each scene, should the rest be cancelled.
+        Gets the results so far after each scene, in case the rest is cancelled.
 
     Returns
     -------
     dict
-        ``date``, ``device``, ``machine``, ``versions``, ``floor_ms`` by size, ``rows``, ``shares`` and ``lights``, the
-        last three lists of `Row`, of us alone in the last two. Ready for JSON.
+        ``date``, ``device``, ``machine``, ``versions``, ``floor_ms`` by size, and ``rows``, ``shares`` and ``lights``,
+        lists of `Row`; the last two are of Smokelift alone. Ready for JSON.
     """
     results: dict[str, Any] = {
         **machine.provenance(LIBRARIES),
@@ -146,7 +150,7 @@ def run(
 
 
 class _Stage:
-    """One scene at one size, in a folder for the processes that run it, with the right answers."""
+    """One scene at one size with its exact answers, in a folder for the processes that run it."""
 
     def __init__(
         self, folder: Path, size: int, name: str, share: float, floor: float, device: DeviceName, say: Say
@@ -161,7 +165,7 @@ class _Stage:
         np.save(folder / "target.npy", self._scene.target)
 
     def compare(self, peers: Sequence[str]) -> list[Row]:
-        """Us, and every peer between two runs of us; our row has all our iterations."""
+        """Return Smokelift's row, with all its iterations, and that of every peer between two runs of Smokelift."""
         ours = [self.row(OURS)]
         others = []
         for key in peers:
@@ -174,7 +178,7 @@ class _Stage:
         return [self._timed(ours[0], [time for row in ours for time in row.milliseconds]), *others]
 
     def row(self, peer: str, lights: int = 1) -> Row:
-        """Run a peer in a process of its own and compare what it made, unless there are several lights."""
+        """Run a peer in a process of its own and score its image and gradient, unless there are several lights."""
         row = replace(self._empty, peer=peer, lights=lights)
         missing = PEERS[peer].missing
         if missing:
@@ -185,7 +189,7 @@ class _Stage:
         else:
             row = self._timed(_figures(row, result), [1e3 * seconds for seconds in result.seconds])
             if lights == 1:
-                row = self._judged(row)
+                row = self._scored(row)
         outcome = row.failure or f"{row.median:.4g} ms"
         self._say(f"{row.size}^3, smoke in {100 * row.share:.0f} %, {PEERS[peer].title}: {outcome}")
         return row
@@ -196,7 +200,7 @@ class _Stage:
         median = float(np.median(milliseconds))
         return replace(row, milliseconds=tuple(milliseconds), median=median, floors=median / self._floor)
 
-    def _judged(self, row: Row) -> Row:
+    def _scored(self, row: Row) -> Row:
         image, gradient = self._answer(PEERS[row.peer].before_black)
         smoke = self._scene.density > 0
         of_image = relative_error(np.load(self._folder / "image.npy"), image)

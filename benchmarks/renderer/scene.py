@@ -1,4 +1,4 @@
-"""The scene of the renderer's benchmark: a structured plume of any share of the voxels, seen at an oblique angle."""
+"""The scene of the renderer's benchmark: a plume with structure in a given share of the voxels, seen obliquely."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from smokelift.scene import Camera, DirectionalLight, Domain, Medium
 
 PLUME = 0.18
-"""Share of the voxels that hold smoke in the first scene."""
+"""Share of the voxels with smoke in the first scene."""
 
 OPTICAL_DEPTH = 3.0
-"""The largest along the grid's y axis."""
+"""Largest optical depth along the grid's y axis."""
 
 _BACKGROUND = (0.2, 0.2, 0.2)
 _LIGHT = DirectionalLight((0.8, 0.6, -1.0), (3.0, 2.9, 2.8))
@@ -22,7 +22,7 @@ _LIGHT = DirectionalLight((0.8, 0.6, -1.0), (3.0, 2.9, 2.8))
 
 @dataclass(frozen=True, eq=False)
 class BenchScene:
-    """What a peer gets.
+    """What a peer renders.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class BenchScene:
 
     @property
     def support(self) -> NDArray[np.bool_] | None:
-        """The voxels that may hold smoke, as a visual hull would tell; None if all may."""
+        """The voxels that may hold smoke, as a visual hull gives them; None if all may."""
         smoke = self.density > 0
         return None if smoke.all() else smoke
 
@@ -57,10 +57,10 @@ class BenchScene:
 
 
 def plume(size: int, share: float) -> NDArray[np.float32]:
-    """Return a structured density (size, size, size) that is above zero in exactly this share of the voxels.
+    """Return a density (size, size, size) with structure that is above zero in exactly this share of the voxels.
 
-    A tilted ellipsoid with billows; its surface is the quantile of the distance from the middle that leaves the share
-    inside. With share 1 there is structure everywhere and no envelope.
+    It is a tilted ellipsoid with billows. Its surface is the quantile of the distance from the middle that leaves the
+    share inside. With share 1 there is structure everywhere and no envelope.
     """
     axis = (2 * np.arange(size, dtype=np.float32) + 1) / size - 1
     x, y, z = np.meshgrid(axis, axis, axis, indexing="ij", sparse=True)
@@ -78,7 +78,7 @@ def plume(size: int, share: float) -> NDArray[np.float32]:
 def bench_scene(density: NDArray[np.float32], target: NDArray[np.float32], lights: int = 1) -> BenchScene:
     """Put a cube of density before the camera, with the extinction that gives it the benchmark's optical depth.
 
-    One light comes from 45 degrees above the horizon; more of them together make a sky.
+    A single light comes from 45 degrees above the horizon; several lights are spread over the sky.
     """
     size = density.shape[0]
     return BenchScene(

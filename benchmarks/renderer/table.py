@@ -1,4 +1,4 @@
-"""The results as a table to read."""
+"""The renderer's results as a table for a terminal."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ WIDTH = 150
 
 
 def text(results: dict[str, Any]) -> str:
-    """Return the table, how to read it, what failed, and what was measured about us alone."""
+    """Return the table, how to read it, the failures, and the times of Smokelift alone."""
     table = Table(title=_title(results), title_justify="left")
     table.add_column("peer")
     for heading in ("ms", "from .. to", "x ours", "x floor", "MiB", "volumes", "set-up s", "image", "gradient"):
@@ -30,10 +30,10 @@ def text(results: dict[str, Any]) -> str:
             table.add_row(f"[bold]{row['size']}^3, smoke in {100 * row['share']:.0f} %", f"({floor:.3g})")
         table.add_row(*_cells(row))
     legend = (
-        "ms: median of an iteration, image and gradient; in brackets the floor, a copy of ten volumes. x ours: paired "
-        "with ours just before and after. MiB, volumes: peak of memory beyond imports, compiler (but JAX compiles anew "
-        "for each size) and density. set-up: compiler, tables and warm-up. image, gradient: relative L2 error against "
-        f"float64; above {EXACT:g} a peer is not exact."
+        "ms: median of an iteration, image and gradient; in brackets the floor, a copy of ten volumes. x ours: "
+        "relative to Smokelift just before and after. MiB, volumes: peak of memory beyond imports, density and "
+        "compiler (but JAX compiles again for each size). set-up: compiler, tables and warm-up. image, gradient: "
+        f"relative L2 error against float64; above {EXACT:g} a peer is not exact."
     )
     return printed(WIDTH, [table, legend, *_failures(results), *_ours_alone(results)])
 
@@ -63,7 +63,7 @@ def _cells(row: dict[str, Any]) -> list[str]:
 
 
 def _failures(results: dict[str, Any]) -> list[str]:
-    """Every peer and reason once, with the sizes."""
+    """Return every peer and its reason once, with the sizes."""
     sizes: dict[tuple[str, str], list[str]] = {}
     for row in results["rows"]:
         if row["failure"]:

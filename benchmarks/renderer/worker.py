@@ -2,8 +2,8 @@
 
     python -m benchmarks.renderer.worker PEER FOLDER LIGHTS DEVICE
 
-reads density.npy and target.npy from the folder and writes image.npy, gradient.npy and result.json there.
-Whatever a framework prints goes nowhere.
+reads density.npy and target.npy from the folder and writes image.npy, gradient.npy and result.json there. What a
+framework prints is not shown.
 """
 
 from __future__ import annotations
@@ -27,32 +27,36 @@ from benchmarks.renderer.scene import BenchScene, bench_scene, plume
 from smokelift.render.device import DeviceName, start
 
 WARM_UPS = 2
+"""Iterations before the timed ones."""
+
 FEWEST, MOST = 5, 25
+"""Numbers of timed iterations; between them, they end after `ENOUGH_SECONDS`."""
+
 ENOUGH_SECONDS = 2.0
 SLOW_SECONDS = 5.0
-"""An iteration that takes longer is run twice only."""
+"""An iteration that takes longer is run only twice."""
 
 TINY = 6
-"""Voxels a side of the grid that is run first, so that compilers have done their work before memory is counted."""
+"""Voxels a side of the grid that runs first, so that compilers are done before memory is counted."""
 
 
 @dataclass(frozen=True)
 class Result:
-    """What a peer did.
+    """Times and memory of a peer.
 
     Attributes
     ----------
     seconds
-        Of each iteration, image and gradient.
+        Time of each iteration: image and gradient.
     compile_seconds
         Import, set-up and first iteration of a tiny grid.
     setup_seconds
-        Set-up and warm-up of the grid itself beyond what an iteration takes.
+        Set-up and warm-up of the grid itself, less the iterations in the warm-up.
     peak_bytes
-        The most memory beyond what stood before the set-up: imports, compiler, density and target do not count. None
-        where the system does not tell.
+        Peak of memory beyond what is in use before the set-up: imports, compiler, density and target do not count.
+        None where the system does not say.
     failure
-        One sentence if there is nothing else.
+        Why there is nothing else, one sentence; else empty.
     """
 
     seconds: tuple[float, ...] = ()
@@ -63,9 +67,9 @@ class Result:
 
 
 def run_apart(peer: str, folder: Path, lights: int = 1, device: DeviceName = "cpu") -> Result:
-    """Run a peer on the scene in a folder, in a process of its own; the arrays it makes are left there.
+    """Run a peer in a process of its own, on the scene in a folder; its image and gradient are written there.
 
-    The device is that of our own renderer: what others use is theirs to say.
+    The device is Smokelift's; the other peers choose their own.
     """
     result = folder / "result.json"
     result.unlink(missing_ok=True)
@@ -77,7 +81,7 @@ def run_apart(peer: str, folder: Path, lights: int = 1, device: DeviceName = "cp
 
 
 def measure(peer: str, scene: BenchScene) -> tuple[Result, Any, Any]:
-    """Run a peer in this process; also its image and gradient."""
+    """Run a peer in this process; returns its image and gradient too."""
     began = time.perf_counter()
     prepare = prepare_function(peer)
     small = bench_scene(plume(TINY, 0.5), np.zeros((TINY, TINY, 3), np.float32), len(scene.lights))
@@ -104,7 +108,7 @@ def measure(peer: str, scene: BenchScene) -> tuple[Result, Any, Any]:
 
 
 def prepare_function(peer: str) -> Callable[[BenchScene], Iteration]:
-    """Import a peer; what is returned sets it up for a scene."""
+    """Import a peer, and return the function that prepares it for a scene."""
     described = PEERS[peer]
     module = importlib.import_module(f"benchmarks.renderer.peers.{described.module}")
 
@@ -129,7 +133,7 @@ def _clocked(iteration: Iteration, density: Any) -> tuple[list[float], Any]:
 
 
 def _reset_peak() -> int | None:
-    """Forget the peak of memory so far; bytes in use now, None where the system does not count."""
+    """Reset the peak of memory; returns the bytes in use now, or None where the system has no such count."""
     try:
         Path("/proc/self/clear_refs").write_text("5")
     except OSError:
@@ -138,7 +142,7 @@ def _reset_peak() -> int | None:
 
 
 def main() -> None:
-    """Do what the command line says."""
+    """Run the peer that the command line names."""
     peer, folder, lights, device = sys.argv[1], Path(sys.argv[2]), int(sys.argv[3]), cast(DeviceName, sys.argv[4])
     try:
         scene = bench_scene(np.load(folder / "density.npy"), np.load(folder / "target.npy"), lights)

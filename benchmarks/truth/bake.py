@@ -43,7 +43,7 @@ def bake(name: str, across: int, frames: int, folder: Path) -> None:
     shutil.rmtree(part, ignore_errors=True)
     part.mkdir(parents=True)
     # the root sees one folder of ours only: what runs in there goes with it
-    scripts = [shutil.copy(HERE / script, part) for script in ("manta_scene.py", "scenes.py")]
+    scripts = [shutil.copy(HERE / script, part) for script in ("manta_scene.py", "mantaflow.py", "scenes.py")]
     blender = ("blender", "-b", "--factory-startup", "--python-exit-code", "1", "-P", scripts[0])
     command = [ENTER, debian_root(), part, *blender, "--", name, str(across), str(frames), part / "truth.npz"]
     log = part / "bake.log"

@@ -4,18 +4,16 @@ ACROSS is the number of voxels along x; OUT is the file to write, in the format 
 frame. A voxel on every side is simulated and cut off, so that the floor and the open sides lie on the box's sides.
 """
 
-import ctypes
 import json
 import sys
-import tempfile
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import bpy
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
+from mantaflow import boot, view
 from scenes import BOX_MIN, BOX_SIZE, FPS, Inlet, Scene, scene
 
 DT = 1 / FPS
@@ -50,42 +48,6 @@ class Noise:
         """Values of unit variance at points (..., 3) at a time (s)."""
         angles = self.frequencies * time + self.phases
         return sum(np.cos(points @ wave + angle) for wave, angle in zip(self.waves.T, angles, strict=True)) / 4
-
-
-def boot() -> Any:
-    """Return the `manta` module with a complete class table.
-
-    Mantaflow misses inherited methods until its second start under Python 3.11; baking a throw-away domain
-    forces the first one, and that bake may fail.
-    """
-    for thing in list(bpy.data.objects):
-        bpy.data.objects.remove(thing)
-    bpy.ops.mesh.primitive_cube_add(size=2)
-    domain = bpy.context.object
-    modifier = domain.modifiers.new("Fluid", "FLUID")
-    modifier.fluid_type = "DOMAIN"
-    settings = modifier.domain_settings
-    settings.domain_type, settings.resolution_max, settings.cache_type = "GAS", 8, "ALL"
-    bpy.context.view_layer.objects.active = domain
-    with tempfile.TemporaryDirectory() as folder:
-        settings.cache_directory, settings.cache_frame_start, settings.cache_frame_end = folder, 1, 1
-        try:
-            bpy.ops.fluid.bake_all()
-        except RuntimeError as error:
-            print("first bake, which may fail:", error)
-    import manta
-
-    return manta
-
-
-def view(grid: Any, shape: tuple[int, ...], components: int = 1) -> np.ndarray:
-    """Return a writable view [x, y, z(, component)] of a Mantaflow grid, valid until its next advection."""
-    count = int(np.prod(shape)) * components
-    buffer = (ctypes.c_float * count).from_address(int(grid.getDataPointer(), 16))
-    data = np.frombuffer(buffer, np.float32)
-    if components == 1:
-        return data.reshape(shape[::-1]).transpose(2, 1, 0)
-    return data.reshape(*shape[::-1], components).transpose(2, 1, 0, 3)
 
 
 class Simulation:
@@ -158,7 +120,7 @@ class Simulation:
         lift = self.scene.buoyancy * DT * self.scale
         velocity[:, :, 1:, 2] += lift * 0.5 * (heat[:, :, 1:] + heat[:, :, :-1])
         heat *= np.exp(-COOLING * DT)
-        smoke *= np.exp(-self.scene.thinning * DT)
+        smoke *= np.exp(-self.scene.dissipation * DT)
         self.blow_wind(velocity)
         cells = np.zeros(self.shape, bool)
         if time < self.scene.blowing:

@@ -65,7 +65,7 @@ class Scene:
         Velocity of the air at the start, and of that which comes in at the sides.
     gust
         Standard deviation of the velocity across an inlet, relative to its mean.
-    thinning
+    dissipation
         Rate at which smoke dissolves (1/s).
     """
 
@@ -77,7 +77,7 @@ class Scene:
     blowing: float = np.inf
     wind: Vector = (0.0, 0.0, 0.0)
     gust: float = 0.2
-    thinning: float = 0.0
+    dissipation: float = 0.0
 
 
 def plume(rng: np.random.Generator, seed: int) -> Scene:
@@ -128,7 +128,7 @@ def puff(rng: np.random.Generator, seed: int) -> Scene:
         warm_up=blowing + 0.1,
         blowing=blowing,
         gust=rng.uniform(0.15, 0.3),
-        thinning=rng.uniform(0.2, 0.6),
+        dissipation=rng.uniform(0.2, 0.6),
     )
 
 

@@ -1,4 +1,4 @@
-"""The results as two charts: distance to a linear problem's optimum, and error against known motion, against time."""
+"""The velocity's results as charts: distance from the optimum and error of the motion, against time."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MARKERS = {"linearisations": "^", "levels": "D", "method": "X"}
 
 
 def draw(results: dict[str, Any], path: Path) -> None:
-    """Write a PNG with the charts of `benchmarks.velocity.run.run`'s results."""
+    """Write a PNG with the charts of the results of `benchmarks.velocity.run.run`."""
     from matplotlib.lines import Line2D
 
     figure = charts.new_figure(results, 13, 6.6)
@@ -77,7 +77,7 @@ def _estimates(axes: Any, row: Mapping[str, Any], colour: str) -> None:
 
 
 def _curve(axes: Any, points: Sequence[Mapping[str, Any]], value: str, style: str, marker: str, colour: str) -> None:
-    """One line over time, each point with its number of iterations."""
+    """Draw a line over time, each point with its number of iterations."""
     axes.plot(
         [point["solves"] for point in points],
         [point[value] for point in points],
@@ -94,7 +94,7 @@ def _curve(axes: Any, points: Sequence[Mapping[str, Any]], value: str, style: st
 
 
 def _plain(axis: Any) -> None:
-    """Numbers instead of powers of ten."""
+    """Write numbers instead of powers of ten."""
     from matplotlib.ticker import FuncFormatter, LogLocator
 
     axis.set_major_locator(LogLocator(subs=(1, 2, 5)))

@@ -7,15 +7,15 @@ where the smoke is, as in smoke that drives its own motion; inside there are a v
     v(x) = curl E(x) (w z x x / 2 + sum_k a_k sin(k . x + p_k)),    E(x) = exp(-|x|^2 / 2 s^2)
 
 Lengths are in longest sides of the box, times in frames; X(x, t) is where the smoke at x was t frames ago, traced with
-fourth-order Runge-Kutta. With f the smoke as it was `STIRRED` frames ago, a ball with structure,
+fourth-order Runge-Kutta. With f the smoke `STIRRED` frames ago, a ball with structure,
 
     before(x) = f(X(x, STIRRED))        after(x) = f(X(X(x, 1), STIRRED))        motion(x) = x - X(x, 1)
 
-so both densities sample one function, and no step of ours took part. What counts is the way of a frame and not v: it
-is what carries the one density into the other.
+so both densities sample one function, and no step of Smokelift takes part. The known answer is the motion and not v,
+because the motion carries the one density into the other.
 
 Velocity and smoke have the spectrum k^(-5/3) (Kolmogorov 1941, Corrsin 1951) down to the same number of voxels at every
-size: on a finer grid there is finer smoke, with finer eddies, that moves more voxels a frame.
+size: a finer grid has finer smoke and finer eddies, and moves by more voxels a frame.
 """
 
 from __future__ import annotations
@@ -39,19 +39,19 @@ RADIUS = 0.13
 """Standard deviation s of the envelope."""
 
 STIRRED = 4.0
-"""Frames that the flow has drawn out the smoke before the first density."""
+"""Frames during which the flow draws out the smoke before the first density."""
 
 STEPS_A_FRAME = 2
-"""Runge-Kutta steps of the frame between the densities. Longer ones do for the way before, which both share."""
+"""Runge-Kutta steps of the frame between the densities; one a frame is enough before, which both share."""
 
 BALL = 0.22
-"""Radius of the smoke before it was stirred."""
+"""Radius of the smoke before the flow draws it out."""
 
 REACH = 0.36
-"""Radius beyond which there is no smoke near; densities and motion are zero there."""
+"""Radius beyond which densities and motion are zero; no smoke comes near it."""
 
 STRUCTURE = 0.8
-"""Root mean square of the structure, relative to the smoke without it."""
+"""Root mean square of the structure, relative to the smooth ball."""
 
 COARSEST, FINEST = 0.25, 10.0
 """Wavelengths: the longest in longest sides, the shortest in voxels."""
@@ -60,7 +60,7 @@ WAVES = 6
 """Plane waves in an octave."""
 
 BATCH = 1 << 14
-"""Points that are traced together: few enough for the cache."""
+"""Points that are traced together, few enough for the cache."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +81,7 @@ class Waves:
 
     @staticmethod
     def random(rng: np.random.Generator, voxels: int) -> Waves:
-        """As fine as so many voxels along the longest side can show."""
+        """Draw one as fine as this many voxels along the longest side can show."""
         octaves = max(1, 1 + int(np.log2(COARSEST * voxels / FINEST)))
         length = np.repeat(COARSEST * 0.5 ** np.arange(octaves), WAVES)
         direction = rng.standard_normal((len(length), 3))
@@ -117,7 +117,7 @@ class Flow:
 
     @staticmethod
     def random(rng: np.random.Generator, voxels: int) -> Flow:
-        """As fine as so many voxels along the longest side can show."""
+        """Draw one as fine as this many voxels along the longest side can show."""
         waves = Waves.random(rng, voxels)
         across = np.cross(waves.vectors, rng.standard_normal(waves.vectors.shape))
         across *= TURBULENCE * (waves.amplitudes / np.linalg.norm(across, axis=1))[:, None]
@@ -148,7 +148,7 @@ class Flow:
 
 
 def built_in_pair(shape: tuple[int, int, int], seed: int) -> Pair:
-    """The densities and the motion of a box of so many voxels."""
+    """Return two densities and the motion between them."""
     stirred = Stirred.random(shape, seed)
     positions = _positions(shape)
     near = _near(positions)
@@ -165,7 +165,7 @@ def built_in_pair(shape: tuple[int, int, int], seed: int) -> Pair:
 
 
 def built_in_densities(shape: tuple[int, int, int], seed: int, frames: int) -> Iterator[Array]:
-    """The densities of a box of so many voxels in frames that follow one another."""
+    """Yield the densities of successive frames."""
     stirred = Stirred.random(shape, seed)
     positions = _positions(shape)
     near = _near(positions)
@@ -186,7 +186,7 @@ class Stirred:
 
     @staticmethod
     def random(shape: tuple[int, int, int], seed: int) -> Stirred:
-        """As fine as a box of so many voxels can show."""
+        """Draw one as fine as a box of these voxels can show."""
         rng = np.random.default_rng(seed)
         return Stirred(Flow.random(rng, max(shape)), Waves.random(rng, max(shape)))
 
@@ -200,7 +200,7 @@ class Stirred:
 
 
 def _near(positions: Array) -> npt.NDArray[np.intp]:
-    """Points that smoke can reach."""
+    """Return the numbers of the points that smoke can reach."""
     return np.flatnonzero(np.sum(positions * positions, 0) < REACH**2)
 
 

@@ -1,8 +1,7 @@
-"""The quadratic problem of one linearisation, as the estimate meets it on its finest grid, and its two solvers.
+"""The quadratic problem of one linearisation on the finest grid of an estimate, and its two solvers.
 
-The densities are linearised around the motion that the next coarser grids found, where the solvers begin too; the
-regulariser's centre is rest. The reference is what projected conjugate gradients reach when nothing stops them but the
-limit of single precision.
+The densities are linearised around the velocity of the next coarser grids, where the solvers begin too; the regulariser
+pulls towards rest. The reference is where projected conjugate gradients end if only single precision stops them.
 """
 
 from __future__ import annotations
@@ -31,12 +30,12 @@ class LinearProblem:
 
     @staticmethod
     def of_pair(pair: Pair) -> LinearProblem:
-        """The problem of two densities; known inlets count for nothing.
+        """Return the problem of two densities; voxels of known inlets have no weight.
 
         Raises
         ------
         ValueError
-            If nothing in the densities could show motion.
+            If the densities have no structure that could show motion.
         """
         settings = VelocitySettings()
         clean = prepare(pair.before, pair.after, settings)
@@ -52,7 +51,7 @@ class LinearProblem:
         return LinearProblem(settings, linear, start, pair.counted)
 
     def solve(self, solver: Solver) -> Array:
-        """The velocity that a solver ends with at voxel centres (nx, ny, nz, 3), in voxels a frame."""
+        """Return a solver's velocity at voxel centres (nx, ny, nz, 3), in voxels a frame."""
         rest = StaggeredGrid.zero(self.counted.shape, 1.0)
         terms = Regularisation(
             second_order=self.settings.smoothness,
@@ -63,12 +62,12 @@ class LinearProblem:
         return found.centres()
 
     def distance(self, found: Array, optimum: Array) -> float:
-        """Relative L2 distance in the smoke and around it."""
+        """Return the relative L2 distance in the smoke and around it."""
         return relative_error(found, optimum, self.counted)
 
 
 def endless(name: str, iterations: int) -> Solver:
-    """The solver of a name that nothing stops but its iterations."""
+    """Return a solver that only its number of iterations stops."""
     if name == "projected-cg":
         return ProjectedCG(tolerance=0.0, iterations=iterations)
     return PrimalDual(absolute_tolerance=0.0, relative_tolerance=0.0, iterations=iterations)

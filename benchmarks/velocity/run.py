@@ -1,10 +1,10 @@
 """The two solvers on one linear problem, and whole estimates against known motion, at several sizes.
 
-A size is measured on the known scenes of that size, or on the built-in one where there is none: averaged to a coarser
-grid a scene would not be what a solver makes there, and interpolated to a finer one it would have nothing fine.
+A size is measured on the known scenes of that size, or on the built-in one where there is none. Scenes are not
+resampled: a finer grid would show no finer detail, and a coarser one not what a solver makes at that size.
 
-The machine may be anything and noisy, so no time stands alone: cosine-transform Poisson solves of the same grid run
-just before and just after everything that is timed, and times are given in them.
+Machines differ and are shared, so a Poisson solve of the same grid is timed just before and just after all that is
+measured, and times are given in these solves.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ LIBRARIES = ("numpy", "scipy")
 
 ENOUGH_SECONDS = 2.0
 MOST = 5
-"""Something is timed again and again until one of the two is reached."""
+"""Work is timed again until it took this long in all, or ran this often."""
 
 BUILT_IN = "built-in"
 
@@ -48,17 +48,17 @@ class Plan:
     Attributes
     ----------
     pairs
-        Of densities; the first one makes the linear problem.
+        Number of pairs of densities; the first one makes the linear problem.
     steps
-        Iterations of each solver on the linear problem.
+        Numbers of iterations of each solver on the linear problem.
     reference
-        Iterations of projected CG at most for its optimum.
+        Most iterations of projected CG for its optimum.
     iterations
-        Of projected CG in each solve of an estimate.
+        Numbers of iterations of projected CG in each solve of an estimate.
     primal_dual_iterations
-        Of the splitting in each.
+        Numbers of iterations of primal-dual in each.
     others
-        Other ways to estimate, by what is changed in the settings.
+        Further estimates, by the setting that differs.
     """
 
     pairs: int
@@ -86,10 +86,10 @@ SHORT = Plan(
     primal_dual_iterations=(2,),
     others=({"linearisations": 1},),
 )
-"""Where the usual plan would take hours."""
+"""The plan for large grids, where the usual one would take hours."""
 
 MANY_VOXELS = 1 << 20
-"""Above it the plan is the short one."""
+"""Most voxels of a grid with the usual plan."""
 
 
 @dataclass(frozen=True)
@@ -99,11 +99,11 @@ class Step:
     Attributes
     ----------
     solver, iterations
-        What ran, from where the next coarser grid ends.
+        The solver, and its iterations from the velocity of the next coarser grid.
     distance
         Relative L2 distance from the optimum, in the smoke.
     seconds, solves
-        It took, also in Poisson solves.
+        Its time, in seconds and in Poisson solves.
     """
 
     solver: str
@@ -115,22 +115,22 @@ class Step:
 
 @dataclass(frozen=True)
 class Estimate:
-    """One way to estimate, without a past.
+    """One way to estimate, without a prediction.
 
     Attributes
     ----------
     setting
         What is varied: ``iterations``, ``primal_dual_iterations``, ``linearisations``, ``levels`` or ``method``.
     value
-        Of it.
+        The setting's value.
     default
         Whether these are the default settings.
     error
         Relative L2 error in the smoke, mean over the pairs.
     errors
-        Of each pair.
+        The error of each pair.
     seconds, solves
-        It took, also in Poisson solves; medians over the pairs.
+        Its time, in seconds and in Poisson solves; medians over the pairs.
     """
 
     setting: str
@@ -157,16 +157,16 @@ def run(
     truths
         Known scenes with their names.
     say
-        Is told what happens.
+        Takes a sentence about each step.
     save
-        Gets the results so far after each size, should the rest be cancelled.
+        Gets the results so far after each size, in case the rest is cancelled.
 
     Returns
     -------
     dict
         ``date``, ``machine``, ``versions`` and ``sizes``: each with ``size``, ``scene`` (names, or "built-in"),
-        ``voxels_a_frame`` (mean motion in the smoke), ``poisson_ms``, ``start`` (distance of the first guess from the
-        linear problem's optimum), ``steps`` (of `Step`) and ``estimates`` (of `Estimate`). Ready for JSON.
+        ``voxels_a_frame`` (mean motion in the smoke), ``poisson_ms``, ``start`` (distance of the initial velocity from
+        the optimum of the linear problem), ``steps`` (of `Step`) and ``estimates`` (of `Estimate`). Ready for JSON.
 
     Raises
     ------
@@ -206,14 +206,14 @@ def _plan(shape: Shape) -> Plan:
 
 
 class _Clock:
-    """Times what is done on one grid, in seconds and in Poisson solves just before and just after."""
+    """Times work on one grid, in seconds and in Poisson solves just before and just after."""
 
     def __init__(self, shape: Shape) -> None:
         self._shape = shape
         self.units: list[float] = []
 
     def time(self, work: Callable[[], Made]) -> tuple[float, float, Made]:
-        """Seconds and solves, medians, and what the work made."""
+        """Return seconds and solves, medians, and the result of the work."""
         seconds: list[float] = []
         solves: list[float] = []
         before = self._unit()
@@ -232,7 +232,7 @@ class _Clock:
 
 
 def _steps(pair: Pair, plan: Plan, clock: _Clock, say: Say) -> tuple[float, list[Step]]:
-    """How far from the optimum the solvers begin, and where they are after some iterations."""
+    """Return the distance from the optimum at which the solvers begin, and those after some iterations."""
     problem = LinearProblem.of_pair(pair)
     say("  the linear problem's optimum")
     optimum = problem.solve(endless("projected-cg", plan.reference))
@@ -273,7 +273,7 @@ def _estimator(setting: str, value: Any) -> VelocityEstimator:
 
 
 def _against_truth(pair: Pair, estimator: VelocityEstimator, clock: _Clock) -> tuple[float, float, float]:
-    """Error, seconds, solves."""
+    """Return error, seconds and solves."""
     seconds, solves, found = clock.time(lambda: estimator.estimate(pair.before, pair.after, 1.0, 1.0))
     return relative_error(found.centres(), pair.motion, pair.counted), seconds, solves
 

@@ -1,4 +1,4 @@
-"""The results as tables to read, two for each size."""
+"""The velocity's results as tables for a terminal, two for each size."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ GOALS = (0.1, 0.05, 0.02)
 
 
 def text(results: dict[str, Any]) -> str:
-    """Return for each size the linear problem and the estimates, and how to read them."""
+    """Return the tables of each size, linear problem and estimates, and how to read them."""
     parts: list[RenderableType] = [provenance_text(results)]
     for row in results["sizes"]:
         parts.append(
@@ -30,16 +30,16 @@ def text(results: dict[str, Any]) -> str:
         )
         parts += [_linear(row), _comparison(row), _estimates(row)]
     parts.append(
-        "\nsolves: time in cosine-transform Poisson solves (scipy) of the same grid just before and after. distance: "
-        "from the linear problem's optimum, relative L2 in the smoke. error: of the motion of a frame, relative L2 in "
-        "the smoke and two voxels around it, without the inlet; no estimate has a past or is told of inlets. "
-        "* default settings."
+        "\nsolves: time in Poisson solves (scipy's cosine transforms) of the same grid just before and after. "
+        "distance: from the linear problem's optimum, relative L2 in the smoke. error: of the motion of a frame, "
+        "relative L2 in the smoke and two voxels around it, without the inlet; estimates have no prediction and do not "
+        "know the inlet. * default settings."
     )
     return printed(WIDTH, parts)
 
 
 def estimate_name(estimate: Mapping[str, Any]) -> str:
-    """What an estimate is called: what makes it differ from the default."""
+    """Return the name of an estimate: how it differs from the default."""
     setting, value = estimate["setting"], estimate["value"]
     plain = {"iterations": "iterations", "primal_dual_iterations": "primal-dual steps"}
     if setting in plain:
@@ -50,7 +50,7 @@ def estimate_name(estimate: Mapping[str, Any]) -> str:
 
 
 def solves_to_reach(row: Mapping[str, Any], solver: str, goal: float) -> float | None:
-    """Poisson solves after which a solver is so near, between the points measured; None if it never was."""
+    """Return the Poisson solves after which a solver reaches a distance, interpolated; None if it does not."""
     before = None
     for step in (step for step in row["steps"] if step["solver"] == solver):
         if step["distance"] <= goal:

@@ -1,4 +1,4 @@
-"""The competitors, one module each, and us.
+"""The competitors, one module each, and Smokelift.
 
 Every module has one function, ``prepare(scene, *arguments) -> Iteration``, and imports its framework at its top: only
 the process that runs it needs it. All but Mitsuba and the paper compute the same discrete sums (see
@@ -24,11 +24,11 @@ class Iteration:
     Attributes
     ----------
     upload
-        From a density (n, n, n) float32 to what ``run`` takes. Not timed: an optimisation keeps it where it is.
+        Converts a density (n, n, n) float32 to what ``run`` takes. Not timed: an optimisation keeps it where it is.
     run
-        From that to the image and the derivative of the loss, both there when it returns. This is what is timed.
+        Returns the image and the derivative of the loss, both complete. This is timed.
     download
-        From the two to arrays (rows, columns, 3) and (n, n, n). Not timed.
+        Converts the two to arrays (rows, columns, 3) and (n, n, n). Not timed.
     """
 
     upload: Callable[[NDArray[np.float32]], Any]
@@ -43,15 +43,15 @@ class Peer:
     Attributes
     ----------
     title
-        As the table names it.
+        Its name in the table.
     module
-        Of this package.
+        Its module in this package.
     packages
-        What pip has to install for it, named as they are imported.
+        What pip has to install for it, by the names of import.
     arguments
-        Of its ``prepare``, after the scene.
+        Arguments of its ``prepare`` after the scene.
     before_black
-        Renders, and is compared, without a background.
+        Whether it renders, and is compared, without a background.
     """
 
     title: str
@@ -62,7 +62,7 @@ class Peer:
 
     @property
     def missing(self) -> tuple[str, ...]:
-        """The packages that are not there."""
+        """The packages that are not installed."""
         return tuple(name for name in self.packages if find_spec(name) is None)
 
 

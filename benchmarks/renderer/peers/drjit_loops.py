@@ -1,14 +1,15 @@
 # mypy: ignore-errors
 # The framework need not be installed where types are checked.
-"""Dr.Jit with the adjoint by hand: the fastest exact way that was found in it.
+"""Dr.Jit with the adjoint by hand, the fastest exact way in it.
 
-A symbolic loop per light column, per ray and back along the ray, one lane each, with no records; (kappa, J) lie side by
-side and are gathered and scattered as packets. ``ReduceMode.Expand`` gives every thread a gradient of its own, so
-there are no atomics. Nothing skips empty space.
+A symbolic loop runs per light column, per ray and back along the ray, one lane each, without records. (kappa, J) lie
+side by side and are gathered and scattered as packets. ``ReduceMode.Expand`` gives every thread a gradient of its own,
+so there are no atomics. Nothing skips empty space.
 """
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import drjit as dr
@@ -16,13 +17,13 @@ import numpy as np
 from drjit.llvm import Array2f, Float, Int32, UInt32
 
 from benchmarks.renderer.peers import Iteration
-from benchmarks.renderer.sampling import LightTable, light_table, phase_volume, ray_table
+from benchmarks.renderer.sampling import LightTable, RayTable, light_table, phase_volume, ray_table
 from benchmarks.renderer.scene import BenchScene
 from smokelift.render.camera_rays import LATERAL
 
 
 def without_atomics() -> Any:
-    """How to add up derivatives: in a copy a thread, unless there are so many that copies cost more than atomics."""
+    """Return how to add up derivatives: in a copy a thread, unless the copies cost more than atomics."""
     return dr.ReduceMode.Expand if dr.thread_count() <= 4 else dr.ReduceMode.Local
 
 
@@ -133,16 +134,19 @@ def prepare(scene: BenchScene) -> Iteration:
         dr.sync_thread()
         return image, gradient
 
-    def download(image: Any, gradient: Any) -> tuple[Any, Any]:
-        picture = np.full((n * n, 3), scene.background, np.float32)
-        picture[rays.pixel] = np.stack([np.array(channel) for channel in image], -1)
-        return picture.reshape(n, n, 3), np.array(gradient).reshape((n,) * 3)
+    return Iteration(lambda density: Float(density.ravel()), run, partial(to_arrays, scene, rays))
 
-    return Iteration(lambda density: Float(density.ravel()), run, download)
+
+def to_arrays(scene: BenchScene, rays: RayTable, image: Any, gradient: Any) -> tuple[Any, Any]:
+    """Return the image (n, n, 3) of the rays' channels, and the gradient (n, n, n)."""
+    n = scene.domain.resolution[0]
+    picture = np.full((n * n, 3), scene.background, np.float32)
+    picture[rays.pixel] = np.stack([np.array(channel) for channel in image], -1)
+    return picture.reshape(n, n, 3), np.array(gradient).reshape((n,) * 3)
 
 
 def _unravel(n: int) -> list[Any]:
-    """x, y, z of every cell of a cube."""
+    """Return x, y, z of every cell of a cube."""
     cell = dr.arange(UInt32, n**3)
     row = cell // n
     x = row // n

@@ -8,6 +8,7 @@ partly outside of it.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import drjit as dr
@@ -15,7 +16,7 @@ import numpy as np
 from drjit.llvm.ad import Array2f, Float, Int32, UInt32
 
 from benchmarks.renderer.peers import Iteration
-from benchmarks.renderer.peers.drjit_loops import without_atomics
+from benchmarks.renderer.peers.drjit_loops import to_arrays, without_atomics
 from benchmarks.renderer.sampling import light_table, phase_volume, ray_table
 from benchmarks.renderer.scene import BenchScene
 from smokelift.render.camera_rays import LATERAL
@@ -109,16 +110,11 @@ def prepare(scene: BenchScene) -> Iteration:
         dr.sync_thread()
         return dr.detach(image), gradient
 
-    def download(image: Any, gradient: Any) -> tuple[Any, Any]:
-        picture = np.full((n * n, 3), scene.background, np.float32)
-        picture[rays.pixel] = np.stack([np.array(channel) for channel in image], -1)
-        return picture.reshape(n, n, 3), np.array(gradient).reshape((n,) * 3)
-
-    return Iteration(lambda density: Float(density.ravel()), run, download)
+    return Iteration(lambda density: Float(density.ravel()), run, partial(to_arrays, scene, rays))
 
 
 def _unravel(n: int) -> list[Any]:
-    """x, y, z of every cell of a cube."""
+    """Return x, y, z of every cell of a cube, in the types of this module."""
     cell = dr.arange(UInt32, n**3)
     row = cell // n
     x = row // n

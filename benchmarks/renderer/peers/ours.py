@@ -13,22 +13,12 @@ Volume = NDArray[np.float32]
 
 
 def prepare(scene: BenchScene) -> Iteration:
-    """Set up the renderer, which is told where smoke can be."""
-    renderer = _renderer(scene)
+    """Set up the renderer, which knows the voxels that may hold smoke."""
+    background = np.array(scene.background, np.float32)
+    renderer = Renderer(scene.camera, scene.domain, scene.medium, scene.lights, background, support=scene.support)
 
     def run(density: Volume) -> tuple[Volume, Volume]:
         image = renderer.image(density, keep_record=True)
         return image, renderer.gradient(2 * (image - scene.target))
 
     return Iteration(upload=np.asarray, run=run, download=lambda image, gradient: (image, gradient))
-
-
-def _renderer(scene: BenchScene) -> Renderer:
-    return Renderer(
-        scene.camera,
-        scene.domain,
-        scene.medium,
-        scene.lights,
-        np.array(scene.background, np.float32),
-        support=scene.support,
-    )

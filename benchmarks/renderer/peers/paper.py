@@ -1,4 +1,4 @@
-"""The paper's own algorithms 2 and 3 (gradRec), in Taichi: its Riemann sum, and a derivative that is none by voxel."""
+"""The paper's algorithms 2 and 3 (gradRec), in Taichi: its Riemann sum, and its derivative, which is not exact."""
 
 from __future__ import annotations
 
