@@ -20,12 +20,11 @@ from typing import Any, get_args
 import numpy as np
 
 from benchmarks.accuracy.scenes import VIEWS, BakedViews, camera_of
-from smokelift import Clip, ClipSource, Scene, Settings, Velocity, View, advect, reconstruct_density
-from smokelift.density import DensitySettings, evidence
+from smokelift import ClipSource, Scene, Settings, View
+from smokelift.density import DensitySettings, GradientFit, RoundDepth, ViewSet
 from smokelift.output.images import write_image
 from smokelift.setup.settings import Quality
 from smokelift.setup.shot import Shot
-from smokelift.velocity import CoarseToFine
 
 SMEAR = "smear"
 SMEAR_SETTINGS = DensitySettings(fit_iterations=24, descent_iterations=0, tolerance=1e-3)
@@ -103,36 +102,19 @@ def leave_out(part: str, settings: Settings) -> Settings:
     """Do without a part of the method: the settings for that, and what settings do not say, for the whole process.
 
     - transport: every frame begins with its own picture
-    - hull: smoke may be wherever the camera looks
     - sources: smoke that enters is read as motion
-    - projection: the prediction is the velocity carried along by itself, divergence and all
-    - depth: the first guess is constant along the rays
     """
     if part == "transport":
         return replace(settings, transport=0.0)
     if part == "sources":
         return replace(settings, velocity=replace(settings.velocity, sources=None))
-    if part == "hull":
-        evidence.common_hull = lambda _masks, projections: np.any([p.visible for p in projections], axis=0)
-    elif part == "projection":
-        CoarseToFine.predict = carried_by_itself
-    elif part == "depth":
-        evidence.DepthProfile.at = lambda _profile, _projection, voxels: np.full(np.count_nonzero(voxels), 0.5)
-    else:
-        raise ValueError(f"without={part}: expected transport, hull, sources, projection or depth.")
-    return settings
+    raise ValueError(f"without={part}: expected transport or sources.")
 
 
-def carried_by_itself(_estimator: CoarseToFine, velocity: Velocity, dt: float) -> Velocity:
-    """What is predicted without pressure projection."""
-    return replace(advect(velocity, velocity, dt), residual=velocity.residual)
-
-
-def smeared(clip: Clip, shot: Shot) -> Iterator[np.ndarray]:
+def smeared(shot: Shot) -> Iterator[np.ndarray]:
     """The front fit with a density that is constant along the rays inside the domain."""
     domain, medium = shot.scene.domain, shot.scene.medium
     fog = np.full(domain.resolution, 0.5 / (medium.extinction * (domain.max[1] - domain.min[1])), np.float32)
-    settings = replace(SMEAR_SETTINGS, scattering=shot.scattering)
-    for index in range(len(clip)):
-        image = shot.working.cut(clip.frame(index))
-        yield reconstruct_density(image, shot.small_scene, fog, settings, plate=shot.plate).values
+    for index in range(len(shot.clip)):
+        views = ViewSet.of(shot.observe(index), shot.optics)
+        yield GradientFit(SMEAR_SETTINGS).fit(views, RoundDepth().estimate(views), fog).values

@@ -36,8 +36,9 @@ from smokelift.output.images import eight_bit
 from smokelift.output.sheet import write_sheet
 from smokelift.render import Image, Volume, scene_renderer
 from smokelift.scene import EnvironmentLight, Scattering, completed
+from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import QUALITIES, Quality
-from smokelift.setup.shot import Shot, prepare_shot
+from smokelift.setup.shot import Shot
 from smokelift.velocity.settings import LEVELS
 
 BLACK = np.zeros(3, np.float32)
@@ -95,9 +96,7 @@ def sides(clip: Clip, scene: Scene, quality: Quality) -> dict[str, tuple[Scene, 
         for light in scene.lights
     )
     model: Scattering = "single" if lights else "unshadowed"
-    richest = replace(
-        rich, density=replace(rich.density, scattering=model), velocity=replace(rich.velocity, levels=LEVELS)
-    )
+    richest = replace(rich, scattering=model, velocity=replace(rich.velocity, levels=LEVELS))
     return {"chosen": (scene, chosen), "richest": (replace(scene, lights=lights), richest)}
 
 
@@ -140,7 +139,7 @@ def residual(side: Side, clip: Clip) -> float:
         shot = side.shot
         picture = clip.frame(frame.number - 1)
         plate = shot.estimated_background
-        renderer = scene_renderer(completed(replace(shot.scene, scattering=shot.scattering)), background=plate)
+        renderer = scene_renderer(shot.scene, background=plate)
         behind = renderer.image(np.zeros_like(frame.density))
         wrong += float(np.sum(np.square(renderer.image(frame.density) - picture, dtype=np.float64)))
         change += float(np.sum(np.square(behind - picture, dtype=np.float64)))
@@ -175,10 +174,10 @@ def compare(path: Path, known: Known | None, frames: int, quality: Quality) -> t
         for name, side in both.items():
             shot = side.shot
             row[name] = {
-                "scattering": shot.scattering,
-                "resolution": list(completed(shot.scene).domain.resolution),
+                "scattering": shot.scene.scattering,
+                "resolution": list(shot.scene.domain.resolution),
                 "directions": [light.directions for light in shot.scene.lights if isinstance(light, EnvironmentLight)],
-                "levels": shot.levels,
+                "levels": shot.settings.velocity.levels,
                 "seconds": side.seconds,
                 "choosing": side.choosing,
                 "residual": residual(side, clip),
@@ -188,8 +187,7 @@ def compare(path: Path, known: Known | None, frames: int, quality: Quality) -> t
         tiles = [clip.frame(frames - 1)]
         for side in both.values():
             plate = side.shot.estimated_background
-            shown = completed(replace(side.shot.scene, scattering=side.shot.scattering))
-            tiles.append(scene_renderer(shown, background=plate).image(side.found[-1].density))
+            tiles.append(scene_renderer(side.shot.scene, background=plate).image(side.found[-1].density))
         if known is not None:
             tiles.append(known.seen("90", frames - 1))
             tiles += [known.shown(side.found[-1].density, "90") for side in both.values()]

@@ -22,8 +22,8 @@ from benchmarks.accuracy.runs import SMEAR, further_view, run_settings, run_view
 from benchmarks.machine import peak_mib
 from benchmarks.timing import FrameTimes
 from smokelift import Clip, Scene, Settings, reconstruct
-from smokelift.scene import completed
-from smokelift.setup.shot import Shot, prepare_shot
+from smokelift.setup.prepare import prepare_shot
+from smokelift.setup.shot import Shot
 from smokelift.transport import Array
 
 
@@ -41,10 +41,10 @@ def main() -> None:
         shot = prepare_shot(clip, scene, settings)
         shot.scene.save(out / "scene.toml")
         if run == SMEAR:
-            found: Iterator[dict[str, Array]] = ({"density": density} for density in smeared(clip, shot))
+            found: Iterator[dict[str, Array]] = ({"density": density} for density in smeared(shot))
         else:
             found = _reconstructed(clip, scene, settings, Path(folder) / "smoke", shot)
-        shape = completed(shot.scene).domain.resolution
+        shape = shot.scene.domain.resolution
         times = FrameTimes(shape)
         for number, arrays in enumerate(times.over(found), 1):
             np.savez(out / f"{number:04d}.npz", **arrays)
@@ -53,7 +53,7 @@ def main() -> None:
         "seconds": times.seconds,
         "solves": times.solves,
         "memory_mib": peak_mib(),
-        "scattering": shot.scattering,
+        "scattering": shot.scene.scattering,
         "resolution": list(shape),
         "method": "baseline" if run == SMEAR else settings.method,
     }

@@ -12,6 +12,7 @@ the same start is printed.
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,18 +22,20 @@ from PIL import Image as Pillow
 from PIL import ImageDraw
 from scipy import ndimage
 
-from smokelift.baselines.descent import fit_paper
-from smokelift.baselines.renderer import PaperRenderer
+from smokelift.baselines.density import FixedRateDescent
+from smokelift.density import DepthEstimate, Observation, View, ViewSet
 from smokelift.density.descent import descend
-from smokelift.density.fit import Target
+from smokelift.density.objective import Term
 from smokelift.footage.images import linear_to_srgb
-from smokelift.render import Image, Renderer, Volume
+from smokelift.footage.plate import Plate
+from smokelift.render import Image, Optics, Renderer, Volume
 from smokelift.scene import Camera, DirectionalLight, Domain, Medium, orbit
 
 SIZE, PIXELS = 64, 160
 DOMAIN = Domain((-0.5, -0.5, 0.0), (0.5, 0.5, 1.0), (SIZE,) * 3)
 MEDIUM = Medium(extinction=6.0, albedo=0.9, anisotropy=0.2)
 SUN = DirectionalLight((0.6, 0.5, -0.8), (9.0, 8.6, 8.0))
+OPTICS = Optics(DOMAIN, MEDIUM, (SUN,), "single")
 CAMERA = Camera.look_at((0.0, -2.6, 0.6), (0.0, 0.0, 0.48), fov_y_degrees=27, size=(PIXELS, PIXELS))
 WALL = np.array([0.02, 0.03, 0.05], np.float32)
 MOMENTS = (0, 10, 40, 120, 320)  # steps of descent
@@ -83,17 +86,24 @@ def step(renderer: Renderer, target: Image, density: Volume, count: int) -> Volu
     The descent scales each voxel by its initial density. That is far from the answer here, so the descent is restarted.
     """
     everywhere = np.ones(density.shape, bool)
-    aim = Target(renderer, target, np.ones(target.shape[:2], np.float32))
+    term = Term(seen(target), renderer, np.ones(target.shape[:2], np.float32))
     for _ in range(count // RESTART):
-        density = descend([aim], density, everywhere, 0.0, RESTART, 0.0).density
+        density = descend([term], density, everywhere, RESTART, 0.0).density
     return density
+
+
+def seen(target: Image) -> View:
+    """Return the target as a view without noise, so that a fit goes on to the end."""
+    clean = Plate(np.broadcast_to(WALL, target.shape), np.ones(target.shape[:2], np.float32), np.zeros(3, np.float32))
+    return replace(View.of(Observation(CAMERA, target), OPTICS), plate=clean)
 
 
 def by_the_paper(target: Image) -> Volume:
     """Descend with the paper's derivative at its fixed rate, from the rabbit."""
-    renderer = PaperRenderer(CAMERA, DOMAIN, MEDIUM, (SUN,), WALL)
+    views = ViewSet((seen(target),), np.ones(DOMAIN.resolution, bool), OPTICS)
     fog = np.full(DOMAIN.resolution, 0.1 / MEDIUM.extinction, np.float32)
-    return fit_paper([renderer], [target], rabbit(), fog, PAPER_RATE, 1e-6, PAPER_STEPS).density
+    depth = DepthEstimate(fog, (np.ones(target.shape[:2], np.float32),))
+    return FixedRateDescent(PAPER_RATE, PAPER_STEPS, 1e-6).fit(views, depth, rabbit()).values
 
 
 def rabbit() -> Volume:

@@ -12,7 +12,7 @@ from smokelift.footage.images import linear_to_srgb
 from smokelift.footage.matte import matte
 from smokelift.output.vdb import VdbUnavailable, read_vdb, vdb_module
 from smokelift.render import Renderer
-from smokelift.setup.shot import prepare_shot
+from smokelift.setup.prepare import prepare_shot
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
 
@@ -61,12 +61,11 @@ def test_real_smoke_before_a_textured_wall():
     settings = smokelift.Settings.preset("balanced")
     with smokelift.Clip.open(scene.clip) as clip:
         shot = prepare_shot(clip, scene, settings)
-        image = shot.working.cut(clip.frame(60))
-    small = shot.small_scene
-    model = replace(settings.density, scattering=shot.scattering)
-    density = smokelift.reconstruct_density(image, small, settings=model, plate=shot.plate)
-    renderer = Renderer(small.camera, small.domain, small.medium, small.lights, shot.plate.image, shot.scattering)
-    rows, columns = np.nonzero(matte(image, shot.plate).mask)
+        (seen,) = shot.observe(60)
+    image, scene = seen.image, replace(shot.scene, camera=seen.camera)
+    density = smokelift.reconstruct_density(image, scene, settings=settings.density, plate=seen.plate)
+    renderer = shot.optics.renderer(seen.camera, seen.plate.image)
+    rows, columns = np.nonzero(matte(image, seen.plate).mask)
     box = np.s_[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
     rendered = linear_to_srgb(np.clip(renderer.image(density.values)[box], 0, 1))
     assert psnr(rendered, linear_to_srgb(image[box])) > 30

@@ -37,8 +37,7 @@ def add_run_options(parser: argparse.ArgumentParser) -> None:
 def settings_of(options: argparse.Namespace) -> Settings:
     """Return the settings that the options of `add_run_options` say."""
     preset = Settings.preset(options.quality, options.method, options.resolution)
-    density = replace(preset.density, scattering=options.scattering)
-    return replace(preset, density=density, axis_depth=options.axis_depth)
+    return replace(preset, scattering=options.scattering, axis_depth=options.axis_depth)
 
 
 def scene_of(options: argparse.Namespace) -> tuple[Scene, ClipSource]:

@@ -1,11 +1,9 @@
 """Projected descent on the exact gradient, preconditioned per voxel, with a step that needs no tuning.
 
-    minimise  sum_views sum_pixels |L(rho) - I|^2   subject to 0 <= rho <= densest, rho = 0 outside the hull
-
-Every voxel is measured in units of its own scale w = rho_start + floor: in these units the steepest descent changes
-a ray's smoke in proportion to what is there, so the depth profile of the start survives what the picture says
-nothing about. The step length is Barzilai and Borwein's (1988), shortened until the loss falls sufficiently (Armijo,
-as in the spectral projected gradient method of Birgin, Martinez and Raydan, 2000), so the loss never rises.
+Every voxel is measured in units of its own scale, start + floor: in these units the steepest descent changes a ray's
+smoke in proportion to what is there, so what the start assumes about depth survives where the pictures say nothing.
+The step length is Barzilai and Borwein's (1988), shortened until the objective falls sufficiently (Armijo, as in the
+spectral projected gradient method of Birgin, Martinez and Raydan, 2000), so the objective never rises.
 """
 
 from __future__ import annotations
@@ -16,45 +14,48 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.density.fit import Fit, Target
-from smokelift.render.renderer import Image, Volume
+from smokelift.density.objective import Fit, Term, noise_floor, objective
+from smokelift.render import Image, Volume
 
 FLOOR = 0.1
 """Scale of an empty voxel of the hull, in mean densities of the start: it may fill, but more slowly than others."""
 
 PATIENCE = 2
-"""Steps in turn without gain that end the descent. Of Barzilai and Borwein's one may gain little and the next one much;
-ended by the first, some frames of a clip kept twice the error of others, and the smoke flickered."""
+"""Steps in a row without gain that end the descent. Of Barzilai and Borwein's steps one may gain little and the next
+much (docs/experiments/density-descent.md)."""
 
 SUFFICIENT = 1e-4
+"""Armijo's constant: share of the linear prediction that a step has to gain."""
+
 SHORTEN = 0.3
+"""Factor of a step that gains too little."""
+
+SHORTENINGS = 40
+"""Times that a step is shortened at most: 0.3^40 is below float32's resolution."""
 
 
 def descend(
-    targets: Sequence[Target],
+    terms: Sequence[Term],
     density: Volume,
     hull: NDArray[np.bool_],
-    enough: float,
     iterations: int,
     tolerance: float,
     densest: float = np.inf,
 ) -> Fit:
-    """Minimise the pictures' error from a start; see the module.
+    """Minimise the objective from a start.
 
     Parameters
     ----------
-    targets
+    terms
         Their renderers made with the hull as support.
     density : (nx, ny, nz)
         Start.
     hull : (nx, ny, nz) bool
         Voxels that may hold smoke.
-    enough
-        Loss at which the targets' noise begins to be fitted; nothing is done below it.
     iterations
         At most so many steps.
     tolerance
-        Stop when `PATIENCE` steps in turn lower the loss by less than this share each.
+        Stop when `PATIENCE` steps in a row lower the objective by less than this share each.
     densest
         What no voxel may exceed; where the start does it is cut.
     """
@@ -62,53 +63,50 @@ def descend(
     volume = np.zeros_like(density)
     current = np.minimum(density.ravel()[where], np.float32(densest))
     scale = current + np.float32(FLOOR * (current.mean() if current.size else 0.0))
+    enough = noise_floor(terms)
 
-    def evaluate(candidate: NDArray[np.float32]) -> tuple[tuple[float, ...], list[Image]]:
+    def residuals_of(candidate: NDArray[np.float32]) -> tuple[Image, ...]:
         volume.ravel()[where] = candidate
-        residuals = [
-            target.weight[..., None] * (target.renderer.image(volume, keep_record=True) - target.image)
-            for target in targets
-        ]
-        return tuple(float(np.sum(np.square(part, dtype=np.float64))) for part in residuals), residuals
+        return tuple(term.renderer.image(volume, keep_record=True) - term.view.image for term in terms)
 
-    def gradient_of(residuals: list[Image]) -> NDArray[np.float32]:
-        """Derivative of the loss in units of the scale, for the last density evaluated."""
+    def gradient_of(residuals: tuple[Image, ...]) -> NDArray[np.float32]:
+        """Derivative of the objective in units of the scale, for the last density evaluated."""
         parts = (
-            target.renderer.gradient(2 * target.weight[..., None] * residual).ravel()[where]
-            for target, residual in zip(targets, residuals, strict=True)
+            term.renderer.gradient(term.image_gradient(residual)).ravel()[where]
+            for term, residual in zip(terms, residuals, strict=True)
         )
         return functools.reduce(np.add, parts) * scale
 
-    losses, residuals = evaluate(current)
-    loss, gradient = sum(losses), gradient_of(residuals)
+    residuals = residuals_of(current)
+    loss, gradient = objective(terms, residuals), gradient_of(residuals)
     step: float | None = None
     done = idle = 0
     while done < iterations and loss > enough:
         slope = _dot(gradient, gradient)
-        if slope <= 0:
+        if not slope > 0:
             break
         trial = step or 0.1 * loss / slope
-        while True:
+        for _ in range(SHORTENINGS):
             candidate = np.clip(current - np.float32(trial) * scale * gradient, 0, densest)
             moved = (candidate - current) / scale
-            new_losses, residuals = evaluate(candidate)
-            new_loss = sum(new_losses)
+            new_residuals = residuals_of(candidate)
+            new_loss = objective(terms, new_residuals)
             if new_loss <= loss + SUFFICIENT * _dot(gradient, moved):
                 break
             trial *= SHORTEN
-            if trial * slope < 1e-9 * loss:
-                volume.ravel()[where] = current
-                return Fit(volume, losses, done)
-        new_gradient = gradient_of(residuals)
+        else:
+            volume.ravel()[where] = current
+            return Fit(volume, loss, residuals, done)
+        new_gradient = gradient_of(new_residuals)
         curvature = _dot(moved, new_gradient - gradient)
         step = _dot(moved, moved) / curvature if curvature > 0 else 4 * trial
         gained = loss - new_loss
-        current, losses, loss, gradient = candidate, new_losses, new_loss, new_gradient
+        current, residuals, loss, gradient = candidate, new_residuals, new_loss, new_gradient
         done += 1
         idle = idle + 1 if gained < tolerance * loss else 0
         if idle == PATIENCE:
             break
-    return Fit(volume, losses, done)
+    return Fit(volume, loss, residuals, done)
 
 
 def _dot(a: NDArray[np.float32], b: NDArray[np.float32]) -> float:

@@ -1,51 +1,231 @@
-"""What every way of fitting a density to pictures is given for each, and what it comes back with."""
+"""Density from pictures (algorithm 3): views and a scene's optics in, a volume that renders to the pictures out.
+
+A depth prior gives the start, `multiplicative` scales it ray by ray until it is nearly right, and `descent` follows the
+exact gradient from there.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.render.renderer import Image, Renderer, Volume
+from smokelift.density.depth_prior import DepthEstimate, DepthPrior, RoundDepth
+from smokelift.density.descent import descend
+from smokelift.density.multiplicative import fit_multiplicative
+from smokelift.density.objective import Term
+from smokelift.density.observation import BLACK, Observation, View, ViewSet, eight_bit_plate
+from smokelift.footage.background import background_picture
+from smokelift.footage.plate import Plate
+from smokelift.render import Image, Volume, scene_optics
+from smokelift.scene import CompleteScene, Domain, Scene, completed
+
+TRACE = 1e-9
+"""Density below which a voxel is empty: no picture can show it. Libraries may switch numbers below float32's normal
+range to 0 for a whole process, so a run that is resumed would otherwise differ in its last bits."""
+
+LEAST_SHARE = 0.3
+"""Share that counts at least of rays whose smoke the prior puts outside the domain. With less, smoke that stands
+elsewhere is missing in the picture; with more, density spikes grow at floor and ceiling
+(docs/experiments/density-bound.md)."""
+
+DENSEST = 3.0
+"""Bound of the density, in multiples of the densest voxel of the prior's estimate (or of a denser start). Where smoke
+hardly changes the picture, in shadow or before what hides it, nothing else bounds it. The estimate is smooth and knows
+no shadows, so it has to be exceeded; from 3 on the pictures are met as without a bound
+(docs/experiments/density-bound.md)."""
 
 
-@dataclass(frozen=True, eq=False)
-class Target:
-    """A picture that the density has to show.
+@dataclass(frozen=True)
+class DensitySettings:
+    """How a density is fitted to its pictures.
 
     Attributes
     ----------
-    renderer
-        Of the picture's camera.
+    fit_iterations
+        Multiplicative iterations at most, for each view; the fit is within a few per cent after six, and each further
+        one gains less than a step of descent costs.
+    descent_iterations
+        Steps of descent at most.
+    tolerance
+        Share of the objective that an iteration has to gain for another to follow.
+    """
+
+    fit_iterations: int = 6
+    descent_iterations: int = 12
+    tolerance: float = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class Density:
+    """A reconstructed density.
+
+    Attributes
+    ----------
+    values : (nx, ny, nz) float32
+    hull : (nx, ny, nz) bool
+        Voxels that the pictures allow to hold smoke.
+    figures
+        ``loss`` (sum of squared differences over all pictures) and ``psnr`` (dB, peak 1) of the input's picture, in
+        linear radiance, over the pixels that its smoke's voxels can change, all counted alike; ``psnr_view_1``, ... of
+        further views; ``iterations``; ``hull_share``, the hull's share of the voxels.
+    """
+
+    values: Volume
+    hull: NDArray[np.bool_]
+    figures: Mapping[str, float] = field(default_factory=dict)
+
+
+class DensityFit(Protocol):
+    """A way to find a density that renders to given pictures."""
+
+    def fit(self, views: ViewSet, depth: DepthEstimate, initial: Volume | None) -> Density:
+        """Find a density.
+
+        Parameters
+        ----------
+        views
+            The pictures.
+        depth
+            What the depth prior says of them.
+        initial : (nx, ny, nz), optional
+            Where to start, if not from the prior's density.
+        """
+
+
+@dataclass(frozen=True)
+class GradientFit:
+    """Multiplicative iterations, then descent on the exact gradient.
+
+    Attributes
+    ----------
+    settings
+        How long.
+    """
+
+    settings: DensitySettings = DensitySettings()
+
+    def fit(self, views: ViewSet, depth: DepthEstimate, initial: Volume | None) -> Density:
+        """Find a density; see `DensityFit`."""
+        hull, settings = views.hull, self.settings
+        if not hull.any():
+            return empty_density(views)
+        terms = _terms(views, depth)
+        start = np.where(hull, depth.density if initial is None else initial, 0).astype(np.float32)
+        # what several pictures have in common takes as many times longer to be found
+        scaled = fit_multiplicative(terms, start, settings.fit_iterations * len(terms), settings.tolerance)
+        densest = float(max(DENSEST * depth.density.max(), start.max()))
+        final = descend(terms, scaled.density, hull, settings.descent_iterations, settings.tolerance, densest)
+        iterations = scaled.iterations + final.iterations
+        return Density(without_traces(final.density), hull, fit_figures(views, final.residuals, iterations))
+
+
+def reconstruct_density(
+    image: Image,
+    scene: Scene | CompleteScene,
+    initial: Volume | None = None,
+    settings: DensitySettings | None = None,
+    *,
+    plate: Plate | None = None,
+    views: Sequence[Observation] = (),
+    depth_prior: DepthPrior | None = None,
+) -> Density:
+    """Find a density that renders to a picture, or to several (algorithm 3).
+
+    Parameters
+    ----------
     image : (rows, columns, 3)
-        Linear radiance.
-    weight : (rows, columns)
-        How much each pixel counts, 0 to 1.
+        Linear radiance, of the size of the scene's camera.
+    scene
+        Needs camera and domain.
+    initial : (nx, ny, nz), optional
+        Where to start; by default the prior's density.
+    settings
+        How to fit.
+    plate
+        Background with its noise; by default the scene's background and the noise of 8 bits.
+    views
+        The same smoke at the same moment as other cameras saw it. What a picture does not show it says nothing about.
+    depth_prior
+        What is assumed of the depth; by default `RoundDepth` about the middle of the domain.
+
+    Returns
+    -------
+    Density
+
+    Raises
+    ------
+    ValueError
+        If a picture is not finite or has another size than its camera, if a camera moves, if the initial density is
+        negative, not finite or of another shape than the domain, or if the scene lacks a camera or a domain.
     """
+    complete = completed(scene)
+    optics = scene_optics(complete)
+    own = Observation(complete.camera, np.asarray(image, np.float32), plate or BLACK)
+    seen = ViewSet.of([_with_plate(each, complete) for each in (own, *views)], optics)
+    if initial is not None:
+        initial = _checked_initial(initial, optics.domain)
+    estimate = (depth_prior or RoundDepth()).estimate(seen)
+    return GradientFit(settings or DensitySettings()).fit(seen, estimate, initial)
 
-    renderer: Renderer
-    image: Image
-    weight: NDArray[np.float32]
+
+def _with_plate(observation: Observation, scene: CompleteScene) -> Observation:
+    """The observation before the scene's background, if it says nothing else; a picture's mean for other cameras."""
+    if observation.plate is not BLACK:
+        return observation
+    camera = observation.camera
+    return replace(observation, plate=eight_bit_plate(background_picture(scene, camera), camera.size))
 
 
-@dataclass(frozen=True, eq=False)
-class Fit:
-    """A density with its pictures.
+def _terms(views: ViewSet, depth: DepthEstimate) -> list[Term]:
+    """The objective: a term for every camera's picture, then those that the prior imposes."""
+    weighted: list[tuple[View, NDArray[np.float32]]] = [
+        # a ray that leaves through floor or ceiling crosses few voxels, which must not hold all that it shows: the
+        # smoke outside is an error of the model in proportion to its share, and residuals count by the share inside
+        (view, view.counted * np.maximum(inside, LEAST_SHARE) ** 2)
+        for view, inside in zip(views.views, depth.inside, strict=True)
+    ]
+    weighted += [(imposed.view, imposed.weight) for imposed in depth.imposed]
+    return [
+        Term(view, views.optics.renderer(view.camera, view.plate.image, views.hull), weight)
+        for view, weight in weighted
+    ]
 
-    Attributes
-    ----------
-    density : (nx, ny, nz)
-    losses
-        Sum of squared differences to each target over the smoke's pixels.
-    iterations
-    """
 
-    density: Volume
-    losses: tuple[float, ...]
-    iterations: int
+def empty_density(views: ViewSet) -> Density:
+    """No smoke: one picture without any, or several that contradict each other."""
+    residuals = [view.plate.image - view.image for view in views.views]
+    return Density(np.zeros(views.hull.shape, np.float32), views.hull, fit_figures(views, residuals, 0))
 
-    @property
-    def loss(self) -> float:
-        """Of all targets together."""
-        return sum(self.losses)
+
+def without_traces(density: Volume) -> Volume:
+    """The density without what no picture can show; see `TRACE`."""
+    return np.where(density < TRACE, np.float32(0), density)
+
+
+def fit_figures(views: ViewSet, residuals: Sequence[Image], iterations: int) -> dict[str, float]:
+    """Figures of a fit that leaves residuals (rows, columns, 3), one a view at least; see `Density`."""
+    losses, decibels = [], []
+    for view, residual in zip(views.views, residuals, strict=False):
+        left = residual[view.counted]
+        losses.append(float(np.sum(np.square(left, dtype=np.float64))))
+        decibels.append(float(-10 * np.log10(max(losses[-1] / max(left.size, 3), 1e-12))))
+    return {
+        "loss": sum(losses),
+        "psnr": decibels[0],
+        **{f"psnr_view_{number}": value for number, value in enumerate(decibels[1:], 1)},
+        "iterations": float(iterations),
+        "hull_share": float(views.hull.mean()),
+    }
+
+
+def _checked_initial(initial: Volume, domain: Domain) -> Volume:
+    initial = np.asarray(initial, np.float32)
+    if initial.shape != domain.resolution:
+        raise ValueError(f"The initial density must have the shape {domain.resolution}, not {initial.shape}.")
+    if not np.isfinite(initial).all() or initial.min() < 0:
+        raise ValueError("The initial density must be finite and not negative.")
+    return initial

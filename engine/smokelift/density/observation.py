@@ -1,17 +1,42 @@
-"""What one camera saw of the smoke at one moment."""
+"""What cameras saw of the smoke at one moment, and what each picture says by itself against the grid."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
 
-from smokelift.footage.plate import Plate
-from smokelift.render.renderer import Image
-from smokelift.scene import Camera
+import numpy as np
+from numpy.typing import NDArray
+
+from smokelift.density.hull import Projection, common_hull, project_voxels, reached
+from smokelift.footage.images import srgb_to_linear
+from smokelift.footage.matte import matte
+from smokelift.footage.noise import EIGHT_BIT_STEP
+from smokelift.footage.plate import Plate, noise_at
+from smokelift.render import Image, Optics
+from smokelift.render.light_sweeps import unshadowed_source
+from smokelift.scene import Camera, Inlet
+
+THINNEST_CLEAR = 0.05
+"""Transmittance at least: optical depth above 3 cannot be told from a brightness."""
+
+
+def eight_bit_plate(background: Image, size: tuple[int, int]) -> Plate:
+    """The plate of a known background, (rows, columns, 3) or (3,), with the noise of 8 bits; size as a camera's."""
+    width, height = size
+    picture = np.broadcast_to(background, (height, width, 3)).astype(np.float32)
+    return Plate(picture, np.ones((height, width), np.float32), srgb_to_linear(np.full(3, EIGHT_BIT_STEP)))
+
+
+BLACK = eight_bit_plate(np.zeros(3, np.float32), (1, 1))
+"""Stands for a black plate of any size."""
 
 
 @dataclass(frozen=True, eq=False)
 class Observation:
-    """A picture of the smoke.
+    """One camera's picture of the smoke at one moment.
 
     Attributes
     ----------
@@ -20,10 +45,138 @@ class Observation:
     image : (rows, columns, 3)
         Linear radiance, of the camera's size.
     plate
-        Background with its noise, of the same size; None stands for the scene's background (before another camera than
-        the scene's own a picture is replaced by its mean colour) and the noise of 8 bits.
+        What the camera sees without smoke, and the noise of its pictures. By default black with the noise of 8 bits;
+        in `reconstruct_density` the scene's background takes the place of that.
     """
 
     camera: Camera
     image: Image
-    plate: Plate | None = None
+    plate: Plate = BLACK
+
+
+class ObservedClip(Protocol):
+    """A clip as its cameras saw it, frame by frame; `smokelift.setup.shot.Shot` is one."""
+
+    @property
+    def optics(self) -> Optics:
+        """How light travels through the domain."""
+
+    @property
+    def inlets(self) -> tuple[Inlet, ...]:
+        """Where smoke is known to enter."""
+
+    @property
+    def moves(self) -> bool:
+        """Whether a camera moves."""
+
+    def spread(self, count: int) -> tuple[int, ...]:
+        """Numbers of so many frames at most, from 0, spread evenly over the clip."""
+
+    def observe(self, frame: int) -> tuple[Observation, ...]:
+        """What the cameras saw in a frame, from 0, the input's first; empty if it shows nothing of the domain."""
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """An observation against the grid.
+
+    Attributes
+    ----------
+    camera, image, plate
+        As in `Observation`.
+    mask : (rows, columns) bool
+        Pixels that show smoke.
+    optical_depth : (rows, columns)
+        Of smoke without shadows that explains the picture, 0 outside the mask.
+    projection
+        Where the voxels lie in the picture.
+    counted : (rows, columns) bool
+        Pixels that the voxels behind the mask can change: those that a fit is judged by.
+    """
+
+    camera: Camera
+    image: Image
+    plate: Plate
+    mask: NDArray[np.bool_]
+    optical_depth: NDArray[np.float32]
+    projection: Projection
+    counted: NDArray[np.bool_]
+
+    @staticmethod
+    def of(observation: Observation, optics: Optics) -> View:
+        """Look at an observation against the grid of `optics.domain`."""
+        camera, image, plate = observation.camera, observation.image, observation.plate
+        if plate is BLACK:
+            plate = eight_bit_plate(np.zeros(3, np.float32), camera.size)
+        mask = matte(image, plate).mask
+        projection = project_voxels(camera, optics.domain)
+        depth = unshadowed_optical_depth(image, plate, mask, optics)
+        return View(camera, image, plate, mask, depth, projection, reached(mask, projection))
+
+    @cached_property
+    def noise(self) -> Image:
+        """Standard deviation (rows, columns, 3) of the picture's noise, linear radiance."""
+        return noise_at(self.image, self.plate)
+
+
+@dataclass(frozen=True, eq=False)
+class ViewSet:
+    """All views of one moment.
+
+    Attributes
+    ----------
+    views
+        At least one, the input's first.
+    hull : (nx, ny, nz) bool
+        Voxels that all of them allow to hold smoke.
+    optics
+        How light travels through the domain.
+    """
+
+    views: tuple[View, ...]
+    hull: NDArray[np.bool_]
+    optics: Optics
+
+    @staticmethod
+    def of(observations: Sequence[Observation], optics: Optics) -> ViewSet:
+        """Look at observations of one moment against the grid.
+
+        Raises
+        ------
+        ValueError
+            If a picture is not finite or has another size than its camera, or if a camera moves.
+        """
+        for observation in observations:
+            _check(observation)
+        views = tuple(View.of(observation, optics) for observation in observations)
+        hull = common_hull([view.mask for view in views], [view.projection for view in views])
+        return ViewSet(views, hull, optics)
+
+
+def unshadowed_optical_depth(
+    image: Image, plate: Plate, mask: NDArray[np.bool_], optics: Optics
+) -> NDArray[np.float32]:
+    """Optical depth (rows, columns) of unshadowed smoke that explains a picture: I = J (1 - T) + T B.
+
+    J is the source radiance of smoke in the middle of the domain, B the plate. Over the three channels T is the least
+    squares solution.
+    """
+    source = np.zeros(3)
+    if optics.scattering != "absorption":
+        source = unshadowed_source(optics.lights, optics.medium, optics.domain)
+    contrast = plate.image - source
+    power = np.sum(contrast**2, -1)
+    clear = np.sum((image - source) * contrast, -1) / np.maximum(power, 1e-12)
+    depth = -np.log(np.clip(clear, THINNEST_CLEAR, 1.0))
+    return np.where(mask, depth, 0).astype(np.float32)
+
+
+def _check(observation: Observation) -> None:
+    camera, image = observation.camera, observation.image
+    if camera.moves:
+        raise ValueError("The camera moves; give the scene the one of the picture's frame, camera.at(frame).")
+    width, height = camera.size
+    if image.shape != (height, width, 3):
+        raise ValueError(f"The picture must have the shape {(height, width, 3)} of the camera, not {image.shape}.")
+    if not np.isfinite(image).all():
+        raise ValueError("The picture holds values that are not finite.")

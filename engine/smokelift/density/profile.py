@@ -13,8 +13,6 @@ round. Over four scenes with their axis known the mean was better in new views t
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
@@ -40,9 +38,6 @@ APART = 0.5
 
 SMOOTHING = 1.5
 """Of the thickness, in pixels."""
-
-GRAIN = 1.5
-"""Standard deviation (voxels) of the blur that makes texture of white noise."""
 
 
 def lateral_spread(
@@ -108,14 +103,6 @@ def _pixel_size(camera: Camera, domain: Domain) -> float:
     return float(max(distance, domain.voxel_size) / camera.fx)
 
 
-@lru_cache(maxsize=2)
-def texture_noise(domain: Domain) -> NDArray[np.float32]:
-    """Noise (nx, ny, nz) as coarse as details of smoke, of mean 0 and standard deviation 1; always the same."""
-    white = np.random.default_rng(0).standard_normal(domain.resolution)
-    noise = ndimage.gaussian_filter(white, GRAIN, mode="wrap")
-    return np.asarray((noise - noise.mean()) / noise.std(), np.float32)
-
-
 class DepthProfile:
     """The profile that a picture suggests.
 
@@ -127,14 +114,9 @@ class DepthProfile:
         What is seen, from where.
     axis
         Where in depth its middle is.
-    texture
-        Standard deviation of the logarithm of the noise (see `texture_noise`) that the profile is multiplied with.
     """
 
-    def __init__(
-        self, amount: NDArray[np.float32], camera: Camera, domain: Domain, axis: SmokeAxis, texture: float = 0.0
-    ) -> None:
-        self._texture = texture
+    def __init__(self, amount: NDArray[np.float32], camera: Camera, domain: Domain, axis: SmokeAxis) -> None:
         self._camera, self._domain, self._axis = camera, domain, axis
         self._centre = np.array(domain.centre)
         self._lateral, self._depth, self._height = view_frame(camera)
@@ -145,12 +127,10 @@ class DepthProfile:
         """The profile g (1/m), of unit integral along the depth, at the marked voxels (n,)."""
         profile, width = self._shape_and_width(projection, voxels)
         profile /= 2 * width * gamma(1 + 1 / FLATNESS)
-        if self._texture > 0:
-            profile *= np.exp(self._texture * texture_noise(self._domain)[voxels])
         return np.asarray(profile)
 
     def shape(self, projection: Projection, voxels: NDArray[np.bool_]) -> NDArray[np.float64]:
-        """The profile without texture at the marked voxels (n,), in units of its height in the middle."""
+        """The profile at the marked voxels (n,), in units of its height in the middle."""
         return self._shape_and_width(projection, voxels)[0]
 
     def share_inside(self) -> NDArray[np.float32]:

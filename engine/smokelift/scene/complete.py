@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from smokelift.scene.domain import Domain, Inlet, Side, inflow
 from smokelift.scene.lights import Light
 from smokelift.scene.medium import Medium, Scattering
 from smokelift.scene.view import View
+from smokelift.scene.writing import write_file
 
 
 @dataclass(frozen=True)
@@ -43,6 +45,10 @@ class CompleteScene:
     views: tuple[View, ...] = ()
     closed: tuple[Side, ...] = ()
     inlets: tuple[Inlet, ...] = ()
+
+    def save(self, path: str | Path) -> None:
+        """Write a scene file that `Scene.load` and `completed` read back as an equal scene."""
+        write_file(vars(self), Path(path))
 
     def inflow(self) -> NDArray[np.bool_] | None:
         """Return the voxels where smoke enters, shape (nx, ny, nz); None if no inlet is marked."""

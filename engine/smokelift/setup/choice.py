@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Generic, TypeVar
+
+Chosen = TypeVar("Chosen", str, int, tuple[int, int, int], covariant=True)
 
 
 @dataclass(frozen=True)
-class Choice:
+class Choice(Generic[Chosen]):
     """One choice.
 
     Attributes
     ----------
     what
         ``"scattering"``, ``"resolution"``, ``"domain"``, ``"environment directions"``, ``"iterations"``,
-        ``"velocity grid coarsening"`` or ``"velocity levels"``.
+        ``"velocity coarsening"`` or ``"velocity levels"``.
     chosen
         What will be used.
     reason
@@ -29,7 +31,7 @@ class Choice:
     """
 
     what: str
-    chosen: str | int | tuple[int, int, int]
+    chosen: Chosen
     reason: str
     measured: Mapping[str, float] = field(default_factory=dict)
     tolerance: float | None = None

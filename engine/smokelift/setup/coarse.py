@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from smokelift.footage.plate import Plate
 from smokelift.footage.working import CameraError, WorkingPicture, voxel_width, working_picture
-from smokelift.render.renderer import Image
-from smokelift.scene import Camera, Domain, Scene
+from smokelift.render import Image
+from smokelift.scene import Camera, CompleteScene, Domain, Scattering
 
 LONGEST = 32
 """Voxels along the longest side at most: a few per cent of the work of 96, with every large shadow in its place."""
@@ -30,7 +30,7 @@ class CoarseFrame:
     Attributes
     ----------
     scene
-        With the camera of the small picture, the coarse domain and the medium.
+        With the camera of the small picture and the coarse domain.
     plate
         Of the small picture.
     picture : (rows, columns, 3)
@@ -39,15 +39,19 @@ class CoarseFrame:
         The same from one half of the clip's pixels each, those of one colour of a chequerboard.
     """
 
-    scene: Scene
+    scene: CompleteScene
     plate: Plate
     picture: Image
     fitted: Image
     held_out: Image
 
-    def in_light_of(self, scene: Scene) -> CoarseFrame:
+    def in_light_of(self, scene: CompleteScene) -> CoarseFrame:
         """The frame with the lights of a scene."""
         return replace(self, scene=replace(self.scene, lights=scene.lights))
+
+    def scattered_by(self, scattering: Scattering) -> CoarseFrame:
+        """The frame with another model of scattering."""
+        return replace(self, scene=replace(self.scene, scattering=scattering))
 
 
 def coarse_domain(domain: Domain, pixels: float) -> Domain:
@@ -79,7 +83,7 @@ def coarse_domain(domain: Domain, pixels: float) -> Domain:
     return Domain((x0, y0, z0), (x1, y1, z1), (counts[0], counts[1], counts[2]))
 
 
-def coarse_frame(frame: Image, camera: Camera, scene: Scene, plate: Plate) -> CoarseFrame | None:
+def coarse_frame(frame: Image, camera: Camera, scene: CompleteScene, plate: Plate) -> CoarseFrame | None:
     """Make a frame coarse; None if its camera does not see the domain.
 
     Parameters
@@ -89,11 +93,10 @@ def coarse_frame(frame: Image, camera: Camera, scene: Scene, plate: Plate) -> Co
     camera
         Of the full picture, where it is in this frame.
     scene
-        With the domain, the medium and the lights.
+        With the fine domain.
     plate
         Of the full picture.
     """
-    assert scene.domain is not None
     try:
         domain = coarse_domain(scene.domain, voxel_width(camera, scene.domain))
         working = working_picture(camera, domain)

@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 
 from smokelift.density import Density, reconstruct_density
 from smokelift.footage.clip import Clip
 from smokelift.footage.matte import matte
-from smokelift.footage.plate import Plate
-from smokelift.scene import Scattering, Scene
+from smokelift.footage.plate import Plates
+from smokelift.scene import CompleteScene
 from smokelift.setup.choice import Choice
 from smokelift.setup.coarse import CoarseFrame, coarse_frame
 from smokelift.setup.directions import choose_directions
-from smokelift.setup.motion import choose_coarsening, choose_levels
 from smokelift.setup.scattering import choose_scattering
 from smokelift.setup.settings import Settings
-
-FRAMES = 2
-"""Frames that models are tried on: the one with the most smoke, and one with a middling amount."""
+from smokelift.setup.velocity_grid import choose_coarsening, choose_levels
+from smokelift.velocity import VelocitySettings
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,29 +30,20 @@ class Model:
     Attributes
     ----------
     scene
-        With a number of directions for each environment.
-    scattering
-        How light is scattered.
-    coarsening, levels
-        Of the grid of the velocity, and grids of one without a past.
+        With its model of scattering and a number of directions for each environment.
+    velocity
+        With the grids that velocities are estimated on.
     choices
         All of them, with their figures.
     """
 
-    scene: Scene
-    scattering: Scattering
-    coarsening: int
-    levels: int
-    choices: tuple[Choice, ...]
+    scene: CompleteScene
+    velocity: VelocitySettings
+    choices: tuple[Choice[Any], ...]
 
 
 def choose_model(
-    clip: Clip,
-    scene: Scene,
-    plate_at: Callable[[int], Plate],
-    smoky: Sequence[int],
-    richest: Scattering,
-    settings: Settings,
+    clip: Clip, scene: CompleteScene, plates: Plates, smoky: Sequence[int], by_hand: bool, settings: Settings
 ) -> Model:
     """Choose all that is chosen on coarse densities.
 
@@ -62,77 +52,78 @@ def choose_model(
     clip
         The footage.
     scene
-        Complete.
-    plate_at
+        Its scattering is the richest that the known light allows, or what the user says.
+    plates
         Background of each frame.
     smoky
         Frames with smoke, those with the most first.
-    richest
-        The richest model of scattering that the known light allows.
+    by_hand
+        Whether the user says how light is scattered.
     settings
-        What is said in them is taken.
+        What they decide is taken.
     """
 
     @cache
     def coarse(number: int) -> CoarseFrame | None:
-        assert scene.camera is not None
-        return coarse_frame(clip.frame(number), scene.camera.at(number), scene, plate_at(number))
+        return coarse_frame(clip.frame(number), scene.camera.at(number), scene, plates.at(number))
 
     def shows_smoke(number: int) -> bool:
         frame = coarse(number)
         return frame is not None and bool(matte(frame.picture, frame.plate).mask.any())
 
-    by_hand = settings.density.scattering
-    wanted: Scattering = richest if by_hand == "auto" else by_hand
     numbers = [number for number in _tried(smoky) if shows_smoke(number)]
     frames = [frame for frame in map(coarse, numbers) if frame is not None]
-    assert scene.domain is not None
-    halved = choose_coarsening(scene.domain, settings.velocity)
-    assert isinstance(halved.chosen, int)
+    coarsened = choose_coarsening(scene.domain, settings.velocity)
+    velocity = replace(settings.velocity, coarsening=coarsened.chosen)
     if not frames:
-        return Model(scene, wanted, halved.chosen, settings.velocity.grids, ())
-    lit, directions = choose_directions(scene, frames, settings.density, wanted)
+        return Model(scene, replace(velocity, levels=velocity.grids), ())
+    lit, directions = choose_directions(scene, frames, settings.density)
     frames = [frame.in_light_of(lit) for frame in frames]
-    if by_hand == "auto":
-        scattering, scattered = choose_scattering(frames, richest, settings.density)
-        if directions and scattering != richest:
-            lit, directions = choose_directions(scene, frames, settings.density, scattering)
+    if by_hand:
+        said = scene.scattering
+        scattered: Choice[str] = Choice("scattering", said, f"Scattering by hand: {said}.", by_hand=True)
     else:
-        scattering, scattered = by_hand, Choice("scattering", by_hand, f"Scattering by hand: {by_hand}.", by_hand=True)
-    fit = replace(settings.density, scattering=scattering)
+        scattering, scattered = choose_scattering(frames, scene.scattering, settings.density)
+        lit = replace(lit, scattering=scattering)
+        if directions and scattering != scene.scattering:
+            lit, directions = choose_directions(replace(scene, scattering=scattering), frames, settings.density)
 
     @cache
     def density(number: int) -> Density | None:
         frame = coarse(number)
         if frame is None:
             return None
-        scene = frame.in_light_of(lit).scene
-        return reconstruct_density(frame.picture, scene, settings=fit, plate=frame.plate)
+        own = frame.in_light_of(lit).scattered_by(lit.scattering)
+        return reconstruct_density(frame.picture, own.scene, settings=settings.density, plate=frame.plate)
 
     densities = [found for found in map(density, numbers) if found is not None]
-    if settings.velocity.levels is None:
+    if velocity.levels is None:
         # before the last frame, since something has to follow
         followed = sorted({min(number, len(clip) - 2) for number in numbers if len(clip) > 1})
         ends = [(density(number), density(number + 1)) for number in followed]
         pairs = [(before.values, after.values) for before, after in ends if before is not None and after is not None]
-        velocity = replace(settings.velocity, coarsening=halved.chosen)
-        moved = choose_levels(pairs, frames[0].scene, lit, velocity)
+        moved = choose_levels(pairs, frames[0].scene.domain, scene.domain, velocity)
     else:
-        said = settings.velocity.levels
-        moved = Choice("velocity levels", said, f"Velocity grids by hand: {said}.", by_hand=True)
-    assert isinstance(moved.chosen, int)
-    choices = (_inside(densities, scene), scattered, *directions, _iterations(densities, settings), halved, moved)
-    return Model(lit, scattering, halved.chosen, moved.chosen, choices)
+        levels = velocity.levels
+        moved = Choice[int]("velocity levels", levels, f"Velocity grids by hand: {levels}.", by_hand=True)
+    choices: tuple[Choice[Any], ...] = (
+        _inside(densities, scene),
+        scattered,
+        *directions,
+        _iterations(densities, settings),
+        coarsened,
+        moved,
+    )
+    return Model(lit, replace(velocity, levels=moved.chosen), choices)
 
 
 def _tried(smoky: Sequence[int]) -> tuple[int, ...]:
-    """Frames to measure on."""
+    """Frames that models are tried on: the one with the most smoke, and one with a middling amount."""
     return tuple(dict.fromkeys((*smoky[:1], *smoky[len(smoky) // 2 : len(smoky) // 2 + 1])))
 
 
-def _inside(densities: Sequence[Density], scene: Scene) -> Choice:
+def _inside(densities: Sequence[Density], scene: CompleteScene) -> Choice[tuple[int, int, int]]:
     """The part of the box that is worked on."""
-    assert scene.domain is not None
     share = float(np.mean([density.hull.mean() for density in densities]))
     reason = (
         f"Domain: only voxels that the picture allows to hold smoke are worked on, {share:.0%} of the box; frames "
@@ -141,15 +132,12 @@ def _inside(densities: Sequence[Density], scene: Scene) -> Choice:
     return Choice("domain", scene.domain.resolution, reason, {"hull_share": share})
 
 
-def _iterations(densities: Sequence[Density], settings: Settings) -> Choice:
+def _iterations(densities: Sequence[Density], settings: Settings) -> Choice[int]:
     """How long a density is fitted."""
     fit = settings.density
     most = fit.fit_iterations + fit.descent_iterations
     used = float(np.mean([density.figures["iterations"] for density in densities]))
-    usual = Settings.preset(settings.quality, settings.method).density
-    by_hand = (fit.fit_iterations, fit.descent_iterations, fit.tolerance) != (
-        usual.fit_iterations, usual.descent_iterations, usual.tolerance,
-    )  # fmt: skip
+    by_hand = fit != Settings.preset(settings.quality, settings.method).density
     reason = (
         f"Iterations: until one lowers the error by less than {fit.tolerance:.0%} or noise is all that is left, "
         f"{used:.0f} on the coarse frames, {most} at most{' (by hand)' if by_hand else ''}."

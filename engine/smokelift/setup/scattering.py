@@ -18,8 +18,8 @@ import numpy as np
 from smokelift.density import DensitySettings, reconstruct_density
 from smokelift.density.hull import project_voxels, reached
 from smokelift.footage.matte import matte
-from smokelift.render import Renderer, scene_lights
-from smokelift.scene import Medium, Scattering
+from smokelift.render import scene_optics
+from smokelift.scene import Scattering
 from smokelift.setup.choice import Choice
 from smokelift.setup.coarse import CoarseFrame
 
@@ -39,7 +39,7 @@ _WORDS: Mapping[str, str] = {
 
 def choose_scattering(
     frames: Sequence[CoarseFrame], richest: Scattering, settings: DensitySettings
-) -> tuple[Scattering, Choice]:
+) -> tuple[Scattering, Choice[str]]:
     """Choose the model of scattering.
 
     Parameters
@@ -64,7 +64,7 @@ def choose_scattering(
     return chosen, _choice(chosen, richest, errors)
 
 
-def _choice(chosen: Scattering, richest: Scattering, errors: Mapping[Scattering, float]) -> Choice:
+def _choice(chosen: Scattering, richest: Scattering, errors: Mapping[Scattering, float]) -> Choice[str]:
     said = f"Scattering: {_WORDS[chosen]}"
     if chosen != richest:
         reason = (
@@ -98,17 +98,13 @@ def _error(frames: Sequence[CoarseFrame], model: Scattering, judge: Scattering, 
 
     Root mean square, in shares of what the smoke changes there.
     """
-    fit = replace(settings, scattering=model)
     wrong = change = 0.0
     for frame in frames:
-        scene, plate = frame.scene, frame.plate
-        assert scene.camera is not None and scene.domain is not None
-        density = reconstruct_density(frame.fitted, scene, settings=fit, plate=plate)
-        renderer = Renderer(
-            scene.camera, scene.domain, scene.medium or Medium(), scene_lights(scene), plate.image, judge, density.hull
-        )
+        scene, plate = frame.scattered_by(model).scene, frame.plate
+        density = reconstruct_density(frame.fitted, scene, settings=settings, plate=plate)
+        optics = replace(scene_optics(scene), scattering=judge)
+        shown = optics.renderer(scene.camera, plate.image, density.hull).image(density.values)
         seen = reached(matte(frame.picture, plate).mask, project_voxels(scene.camera, scene.domain))
-        shown = renderer.image(density.values)
         wrong += float(np.sum(np.square(shown - frame.held_out, dtype=np.float64)[seen]))
         change += float(np.sum(np.square(frame.held_out - plate.image, dtype=np.float64)[seen]))
     return float(np.sqrt(wrong / max(change, 1e-30)))

@@ -37,7 +37,7 @@ def test_choices_are_said_and_kept(shot, finished, capsys) -> None:
     said = [event["text"] for event in notes]
     assert all(choice["reason"] in said for choice in kept)
     (scattering,) = (choice for choice in kept if choice["what"] == "scattering")
-    assert scattering["chosen"] == Sequence.open(finished).settings["density"]["scattering"] == "single"
+    assert scattering["chosen"] == Sequence.open(finished).scene.scattering == "single"
     assert scattering["measured"]["error_unshadowed"] > scattering["tolerance"]
     assert command("inspect", shot, *QUICK) == 0
     assert scattering["reason"] in "".join(capsys.readouterr().out.splitlines())

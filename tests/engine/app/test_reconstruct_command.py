@@ -105,7 +105,7 @@ def test_scattering_and_resolution_by_option(shot, tmp_path, capsys) -> None:
     arguments = ("--npz", "--frames", "0:1", "--scattering", "unshadowed", "--resolution", "auto", *QUICK)
     assert command("reconstruct", shot, "--out", out, *arguments) == 0
     sequence = Sequence.open(out)
-    assert sequence.settings["density"]["scattering"] == "unshadowed"
+    assert sequence.scene.scattering == "unshadowed"
     by_hand = {choice["what"]: choice["by_hand"] for choice in sequence.choices}
     assert (by_hand["scattering"], by_hand["resolution"]) == (True, False)
     assert max(sequence.scene.domain.resolution) > 32

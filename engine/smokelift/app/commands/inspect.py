@@ -11,7 +11,7 @@ from smokelift.app.options import add_run_options, scene_of, settings_of
 from smokelift.app.progress import Reporter
 from smokelift.footage.clip import Clip
 from smokelift.scene import scene_to_dict
-from smokelift.setup.shot import boundaries, prepare_shot
+from smokelift.setup.prepare import boundaries, prepare_shot
 
 
 def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
@@ -31,10 +31,9 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         shot = prepare_shot(clip, scene, settings)
         frames = len(clip)
     domain = shot.scene.domain
-    assert domain is not None
     for note in (*shot.notes, *boundaries(shot.scene, settings), *(choice.reason for choice in shot.choices)):
         say.note(note)
-    cost = estimate_cost(domain, frames, settings.quality, len(shot.views))
+    cost = estimate_cost(domain, frames, settings.quality, len(shot.views) - 1)
     voxels = " x ".join(map(str, domain.resolution))
     say.finish(
         f"{frames} frames of {voxels} voxels: about {cost.seconds:.0f} s, {cost.memory / 2**30:.1f} GiB of memory "

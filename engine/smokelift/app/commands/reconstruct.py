@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import itertools
 import time
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +19,9 @@ from smokelift.output.atomic import atomic_path
 from smokelift.output.images import eight_bit
 from smokelift.output.sequence import Sequence
 from smokelift.pipeline import Frame, reconstruct
-from smokelift.render import device, scene_renderer
-from smokelift.scene import completed
-from smokelift.setup.shot import Shot, prepare_shot
+from smokelift.render import device
+from smokelift.setup.prepare import prepare_shot
+from smokelift.setup.shot import Shot
 
 
 def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
@@ -46,7 +45,6 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     device.start(options.device)
     with Clip.open(source) as clip:
         shot = prepare_shot(clip, scene, settings)
-        assert shot.scene.domain is not None
         require_memory(shot.scene.domain)
         for note in (*shot.notes, *(choice.reason for choice in shot.choices)):
             say.note(note)
@@ -55,7 +53,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
             say.start(len(clip), first.number - 1)
             for frame in itertools.chain([first], frames):
                 if options.thumbnail:
-                    _write_thumbnail(options.thumbnail, clip, shot, frame)
+                    _write_thumbnail(options.thumbnail, shot, frame)
                 say.frame(frame.number, frame.figures)
     sequence = Sequence.open(options.out)
     if not any((sequence.figures(number).get("hull_share") or 0) > 0 for number in sequence.frames):
@@ -70,14 +68,14 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     )
 
 
-def _write_thumbnail(path: Path, clip: Clip, shot: Shot, frame: Frame) -> None:
+def _write_thumbnail(path: Path, shot: Shot, frame: Frame) -> None:
     """Write the part of a frame that the grid is fitted to, beside its reconstruction (or above, if wide), as a PNG."""
-    now = shot.at(frame.number - 1)
-    if now is None:  # nothing of the domain is in this frame's picture: the picture of the last one stays
+    observations = shot.observe(frame.number - 1)
+    if not observations:  # nothing of the domain is in this frame's picture: the picture of the last one stays
         return
-    seen = now.working.cut(clip.frame(frame.number - 1))
-    scene = completed(replace(now.small_scene, scattering=now.scattering))
-    found = scene_renderer(scene, background=now.plate.image).image(frame.density)
-    both = np.concatenate([seen, found], 0 if seen.shape[1] > seen.shape[0] else 1)
+    seen = observations[0]
+    found = shot.optics.renderer(seen.camera, seen.plate.image).image(frame.density)
+    rows, columns = seen.image.shape[:2]
+    both = np.concatenate([seen.image, found], 0 if columns > rows else 1)
     with atomic_path(path) as aside:
         Image.fromarray(eight_bit(both)).save(aside, format="PNG")

@@ -26,13 +26,11 @@ def test_the_default_is_balanced() -> None:
     assert Settings.preset().resolution is None
 
 
-def test_paper_means_all_parts() -> None:
-    """The paper's method is used for density and velocity, with nothing but the transported first guess."""
-    paper = Settings.preset("draft", "paper")
-    assert paper.method == paper.density.method == "paper"
-    assert paper.transport == 1.0
-    usual = Settings.preset("draft")
-    assert usual.method == usual.density.method == "default"
+def test_the_papers_method_measures_nothing() -> None:
+    """It is kept as it is; the default chooses what is left open."""
+    paper, usual = Settings.preset("draft", "paper"), Settings.preset("draft")
+    assert (paper.method, paper.model_selection) == ("paper", False)
+    assert (usual.method, usual.model_selection) == ("default", True)
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -21,15 +21,15 @@ from scipy import ndimage
 
 from smokelift.density.axis import SmokeAxis
 from smokelift.density.hull import project_voxels, visual_hull
+from smokelift.density.observation import View
 from smokelift.density.profile import DepthProfile
 from smokelift.density.screen import upright_rows, view_frame
 from smokelift.footage.images import area_average
 from smokelift.footage.matte import matte
-from smokelift.footage.plate import Plate, noise_at
-from smokelift.render import Renderer, scene_lights
+from smokelift.footage.plate import noise_at
+from smokelift.render import Image, Optics
 from smokelift.render.light_sweeps import lighting
-from smokelift.render.renderer import Image
-from smokelift.scene import Domain, Medium, PointLight, Scene
+from smokelift.scene import Camera, Domain, PointLight
 
 COARSE = 48
 """Voxels along the longest side of the grid that the depth is looked for on."""
@@ -60,32 +60,27 @@ LEAST_GAIN = 0.1
 """Share of the misfit that has to go, or the axis stays."""
 
 
-def refine_axis(
-    axis: SmokeAxis, pictures: Sequence[tuple[Image, NDArray[np.float32]]], scene: Scene, plate: Plate
-) -> SmokeAxis:
+def refine_axis(axis: SmokeAxis, views: Sequence[View], optics: Optics) -> SmokeAxis:
     """Shift and lean the axis as the colours of the light say.
 
     Parameters
     ----------
     axis
         What is known without the light.
-    pictures
-        Of a few frames, each (rows, columns, 3), with the optical depth (rows, columns) that unshadowed smoke has.
-    scene
-        With the camera of the pictures and a domain as fine as them.
-    plate
-        Background of the pictures, with their noise.
+    views
+        Of a few frames, by one camera that stands still.
+    optics
+        With a domain as fine as the pictures.
 
     Returns
     -------
     SmokeAxis
         The same if the light is not that of lamps of different colours alone, or says too little.
     """
-    assert scene.camera is not None and scene.domain is not None
-    domain = _coarse(scene.domain)
-    if axis.columns or not pictures or not _telling(scene, domain):
+    coarse = replace(optics, domain=_coarse(optics.domain))
+    if axis.columns or not views or not _colours_vary_with_depth(views[0].camera, coarse):
         return axis
-    rows = [upright_rows(amount, scene.camera, scene.domain) for _, amount in pictures]
+    rows = [upright_rows(view.optical_depth, view.camera, optics.domain) for view in views]
     heights = rows[0].heights
     total = np.sum([row.total for row in rows], 0)
     if not total.any():
@@ -100,13 +95,13 @@ def refine_axis(
 
     grid = [WIDEST * np.array((shift, lean)) for shift in (-1, 0, 1) for lean in (-1, 0, 1)]
     corners = [moved(place) for place in grid if place.all()]
-    looks = [_Look(picture, amount, scene, domain, plate, corners) for picture, amount in pictures]
-    looks = [look for look in looks if look.counts > FEWEST]
-    if not looks:
+    pictures = [_CoarsePicture(view, optics.domain, coarse, corners) for view in views]
+    pictures = [picture for picture in pictures if picture.counts > FEWEST]
+    if not pictures:
         return axis
 
     def misfit(tried: SmokeAxis) -> float:
-        return float(np.mean([np.log(look.misfit(tried)) for look in looks]))
+        return float(np.mean([np.log(picture.misfit(tried)) for picture in pictures]))
 
     misfit(axis)  # from here on the rays hold about what they should
     start = misfit(axis)
@@ -122,61 +117,53 @@ def refine_axis(
     return moved(place) if start - best > LEAST_GAIN else axis
 
 
-def _telling(scene: Scene, domain: Domain) -> bool:
+def _colours_vary_with_depth(camera: Camera, optics: Optics) -> bool:
     """Whether the light is that of lamps alone whose colours mix differently in the front and in the back."""
-    assert scene.camera is not None
-    lamps = [light for light in scene.lights if isinstance(light, PointLight)]
-    if len(lamps) < len(scene.lights) or any(domain.contains(lamp.position) for lamp in lamps):
+    domain, along = optics.domain, view_frame(camera)[1]
+    lamps = [light for light in optics.lights if isinstance(light, PointLight)]
+    if len(lamps) < len(optics.lights) or any(domain.contains(lamp.position) for lamp in lamps):
         return False
     if lighting(lamps, domain, (0, 0, 0), domain.resolution).channels < 3:
         return False
     offset = np.array([lamp.position for lamp in lamps]) - np.array(domain.centre)
     colour = np.array([lamp.intensity for lamp in lamps]) / np.sum(offset**2, 1, keepdims=True)
     # irradiance falls off as 1 / r^2, so along the depth by 2 depth / r^2, relatively
-    slope = 2 * (offset @ view_frame(scene.camera)[1]) / np.sum(offset**2, 1)
+    slope = 2 * (offset @ along) / np.sum(offset**2, 1)
     change = (slope @ colour) / np.maximum(colour.sum(0), 1e-30)
-    reach = float(np.abs(view_frame(scene.camera)[1]) @ (np.array(domain.max) - np.array(domain.centre)))
+    reach = float(np.abs(along) @ (np.array(domain.max) - np.array(domain.centre)))
     return bool(reach * np.ptp(change) > LEAST_CHANGE)
 
 
-class _Look:
+class _CoarsePicture:
     """One picture, and how badly an axis explains it."""
 
-    def __init__(
-        self,
-        picture: Image,
-        amount: NDArray[np.float32],
-        scene: Scene,
-        domain: Domain,
-        plate: Plate,
-        corners: Sequence[SmokeAxis],
-    ) -> None:
-        assert scene.camera is not None and scene.domain is not None
-        shrink = PIXELS * scene.domain.voxel_size / domain.voxel_size
-        self._size = tuple(max(1, round(shrink / PIXELS * n)) for n in scene.camera.size)
+    def __init__(self, view: View, domain: Domain, optics: Optics, corners: Sequence[SmokeAxis]) -> None:
+        coarse = optics.domain
+        shrink = PIXELS * domain.voxel_size / coarse.voxel_size
+        self._size = tuple(max(1, round(shrink / PIXELS * n)) for n in view.camera.size)
         columns, rows = (PIXELS * n for n in self._size)
-        fine, self._camera = scene.camera.resized(columns, rows), scene.camera.resized(*self._size)
-        self._picture = area_average(picture, columns, rows)
-        self._background = area_average(plate.image, columns, rows)
-        self._amount = area_average(amount, *self._size) + np.float32(1e-3)
-        self._domain, self._medium = domain, scene.medium or Medium()
-        small = replace(plate, image=self._background, confidence=area_average(plate.confidence, columns, rows))
+        fine, self._camera = view.camera.resized(columns, rows), view.camera.resized(*self._size)
+        self._picture = area_average(view.image, columns, rows)
+        small = view.plate.through(lambda whole: area_average(whole, columns, rows))
+        self._background = small.image
+        self._amount = area_average(view.optical_depth, *self._size) + np.float32(1e-3)
+        self._optics = optics
         mask = ndimage.binary_dilation(matte(self._picture, small).mask, iterations=PIXELS)
+        amount = area_average(view.optical_depth, columns, rows)
         for corner in corners:
-            mask &= DepthProfile(area_average(amount, columns, rows), fine, domain, corner).share_inside() > INSIDE
+            mask &= DepthProfile(amount, fine, coarse, corner).share_inside() > INSIDE
         self.counts = int(mask.sum())
         self._weight = mask / np.mean(np.square(noise_at(self._picture, small)), -1)
-        self._projection = project_voxels(self._camera, domain)
+        self._projection = project_voxels(self._camera, coarse)
         self._hull = visual_hull(self._amount > 0.01 * self._amount.max(), self._projection)
-        lights = scene_lights(scene)
-        self._renderer = Renderer(fine, domain, self._medium, lights, self._background, "single", self._hull)
+        self._renderer = replace(optics, scattering="single").renderer(fine, self._background, self._hull)
         self._scale = np.zeros(self._amount.shape, np.float32)
 
     def misfit(self, axis: SmokeAxis) -> float:
         """Mean square of what no amount of smoke on the rays explains, in units of the noise."""
-        profile = DepthProfile(self._amount, self._camera, self._domain, axis).at(self._projection, self._hull)
-        base = self._projection.read(self._amount, self._hull) * profile / self._medium.extinction
-        density = np.zeros(self._domain.resolution, np.float32)
+        profile = DepthProfile(self._amount, self._camera, self._optics.domain, axis).at(self._projection, self._hull)
+        base = self._projection.read(self._amount, self._hull) * profile / self._optics.medium.extinction
+        density = np.zeros(self._optics.domain.resolution, np.float32)
         least = np.inf
         for _ in range(ROUNDS):
             density[self._hull] = base * np.exp(self._projection.read(self._scale, self._hull))

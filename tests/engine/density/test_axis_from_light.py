@@ -1,4 +1,4 @@
-"""Depth from lamps of different colours: found where they tell, left alone where they do not."""
+"""Depth from lamps of different colours: found where they show it, left alone where they do not."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from smokelift.density import DensitySettings, SmokeAxis, optical_depth
+from smokelift.density import Observation, View
+from smokelift.density.axis import SmokeAxis
+from smokelift.density.axis_from_light import refine_axis
 from smokelift.density.hull import voxel_centres
-from smokelift.density.light import refine_axis
 from smokelift.footage.images import linear_to_srgb, srgb_to_linear
 from smokelift.footage.plate import Plate
-from smokelift.render import render
-from smokelift.scene import Background, Camera, DirectionalLight, Domain, Medium, PointLight, Scene
+from smokelift.render import render, scene_optics
+from smokelift.scene import Background, Camera, DirectionalLight, Domain, Medium, PointLight, Scene, completed
 
 RED, BLUE, GREY = (36.0, 18.0, 6.0), (6.0, 18.0, 36.0), (20.0, 20.0, 20.0)
 FRONT, BACK, LEFT = (-1.2, -1.9, 2.3), (1.2, 1.9, 2.3), (-2.2, 0.0, 2.3)
@@ -41,8 +42,9 @@ def found(scene: Scene, depth: float, lean: float = 0.0) -> tuple[SmokeAxis, Smo
     noise = np.full(3, 1e-3, np.float32)
     plate = Plate(np.zeros_like(picture), np.ones(picture.shape[:2], np.float32), noise)
     before = SmokeAxis.upright()
-    looks = [(picture, optical_depth(picture, scene, DensitySettings(), plate))]
-    return before, refine_axis(before, looks, scene, plate)
+    optics = scene_optics(completed(scene))
+    view = View.of(Observation(scene.camera, picture, plate), optics)
+    return before, refine_axis(before, [view], optics)
 
 
 @pytest.mark.parametrize("depth", [-0.25, 0.3])
@@ -79,8 +81,8 @@ def test_other_lights_say_nothing(lights) -> None:
 
 def test_no_pictures_say_nothing() -> None:
     """Nothing to look at, or nothing in it."""
-    plate = Plate(np.zeros((32, 32, 3), np.float32), np.ones((32, 32), np.float32), np.full(3, 1e-3, np.float32))
+    optics = scene_optics(completed(SCENE))
     axis = SmokeAxis.upright(0.1)
-    assert refine_axis(axis, [], SCENE, plate) is axis
-    black = np.zeros((32, 32, 3), np.float32)
-    assert refine_axis(axis, [(black, black[..., 0])], SCENE, plate) is axis
+    assert refine_axis(axis, [], optics) is axis
+    black = View.of(Observation(SCENE.camera, np.zeros((32, 32, 3), np.float32)), optics)
+    assert refine_axis(axis, [black], optics) is axis

@@ -1,4 +1,4 @@
-"""Grids that velocities are looked for on: as fine as pictures can tell, and as coarse as the fastest smoke needs."""
+"""Grids that velocities are estimated on: as fine as pictures can show, and as many as the fastest smoke needs."""
 
 from __future__ import annotations
 
@@ -7,24 +7,24 @@ from dataclasses import replace
 
 import numpy as np
 
-from smokelift.render.renderer import Volume
-from smokelift.scene import Domain, Scene
+from smokelift.render import Volume
+from smokelift.scene import Domain
 from smokelift.setup.choice import Choice
 from smokelift.velocity import VelocitySettings, estimate_velocity
 from smokelift.velocity.settings import LEVELS
 
 FINEST_SIDE = 30
-"""Voxels along the longest side of the grid that the motion of a reconstruction is looked for on, at most: one view
-leaves the depth open, and finer velocities follow its errors. docs/selection.md has what more and fewer do."""
+"""Voxels along the longest side of the velocity's grid, at most: one view leaves the depth undetermined, and finer
+velocities follow its errors (docs/experiments/velocity-grid.md)."""
 
 FASTEST = 99
 """Percentile of the smoke's speed that counts as the largest: single wisps may be wrong."""
 
 MARGIN = 1.25
-"""By how much grids reach further than the motion that is found, since coarse densities show less than there is."""
+"""Factor by which grids reach further than the motion that is found, since coarse densities show less than there is."""
 
 
-def choose_coarsening(domain: Domain, settings: VelocitySettings) -> Choice:
+def choose_coarsening(domain: Domain, settings: VelocitySettings) -> Choice[int]:
     """Choose how much coarser than the densities the grid of the velocity is, and leave at least eight voxels a side.
 
     Parameters
@@ -54,25 +54,22 @@ def levels_for(motion: float) -> int:
 
 
 def choose_levels(
-    pairs: Sequence[tuple[Volume, Volume]], coarse: Scene, scene: Scene, settings: VelocitySettings
-) -> Choice:
+    pairs: Sequence[tuple[Volume, Volume]], coarse: Domain, final: Domain, settings: VelocitySettings
+) -> Choice[int]:
     """Choose the number of grids.
 
     Parameters
     ----------
     pairs
         Coarse densities (nx, ny, nz) of frames that follow one another.
-    coarse
-        Scene with their domain.
-    scene
-        Scene with the final domain.
+    coarse, final
+        Their domain, and that of the run.
     settings
         How velocities are estimated.
     """
-    assert coarse.domain is not None and scene.domain is not None
     if not pairs:
         return Choice("velocity levels", LEVELS, f"Velocity grids: {LEVELS}, since there is no motion to measure.")
-    finer = coarse.domain.voxel_size / scene.domain.voxel_size
+    finer = coarse.voxel_size / final.voxel_size
     motion = finer * max(_motion(before, after, settings) for before, after in pairs)
     levels = levels_for(motion / 2 ** (settings.coarsening or 0))
     reason = f"Velocity grids: {levels}, because the fastest smoke goes {motion:.1f} voxels a frame."

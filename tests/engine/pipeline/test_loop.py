@@ -6,11 +6,14 @@ import inspect
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from smokelift.density import DensitySettings, fit_density, reconstruct_density
+from smokelift.baselines.density import FixedRateDescent
+from smokelift.density import GradientFit, RoundDepth, Start, ViewSet
+from smokelift.density.axis import SmokeAxis
 from smokelift.density.hull import project_voxels, voxel_centres
 from smokelift.density.screen import view_frame
 from smokelift.evaluation.metrics import psnr
@@ -19,16 +22,17 @@ from smokelift.output.images import write_image
 from smokelift.output.index import SequenceError
 from smokelift.output.sequence import Sequence
 from smokelift.output.vdb import VdbUnavailable, read_vdb, vdb_module
-from smokelift.pipeline import Frame, reconstruct, smoke_axis
+from smokelift.pipeline import Frame, Method, compose, reconstruct
 from smokelift.render import render, scene_renderer
 from smokelift.scene import Background, ClipSource, Inlet, Medium, PointLight, Scene, completed, look_at_matrix
+from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import Settings
-from smokelift.setup.shot import prepare_shot
-from smokelift.transport import advect
+from smokelift.setup.shot import Shot
+from smokelift.transport import Velocity
 from smokelift.velocity import CoarseToFine
 
 
-def frames_of(scene: Scene, settings: Settings, out: Path | None = None, **options: bool) -> list[Frame]:
+def frames_of(scene: Scene, settings: Settings, out: Path | None = None, **options: Any) -> list[Frame]:
     assert scene.clip is not None
     with Clip.open(scene.clip) as clip:
         return list(reconstruct(clip, scene, settings, out, **options))
@@ -43,6 +47,12 @@ def cut_off(scene: Scene, settings: Settings, out: Path, count: int) -> None:
             next(frames)
         assert inspect.isgenerator(frames)
         frames.close()
+
+
+def axis_of(shot: Shot) -> SmokeAxis:
+    """Where the default depth prior puts the smoke of a clip."""
+    axis = RoundDepth(axis_depth=shot.settings.axis_depth).of_clip(shot).axis
+    return axis or SmokeAxis.upright()
 
 
 def saved(directory: Path) -> Iterator[tuple[str, np.ndarray]]:
@@ -81,25 +91,22 @@ def test_the_smoke_stands_where_the_settings_say(plume, draft) -> None:
     assert places[1] - places[0] == pytest.approx(shift, rel=0.2)
 
 
-@pytest.mark.parametrize(("method", "expected"), [("default", -0.1), ("paper", 0.0)])
-def test_the_axis_is_estimated_from_the_clip(plume, draft, tmp_path, method, expected) -> None:
-    """By the default method, from the foot of the smoke; the paper's knows nothing of it."""
+def test_the_axis_is_estimated_from_the_clip(plume, draft, tmp_path) -> None:
+    """From the floor contact of the smoke."""
     x, y, z = np.moveaxis(voxel_centres(plume.scene.domain), -1, 0)
     column = (np.hypot(x, y + 0.1) < 0.15) & (z < 1.2)
     scene = plume.write(tmp_path, [column.astype(np.float32)] * 2)
-    settings = replace(draft, method=method)
     with Clip.open(scene.clip) as clip:
-        axis = smoke_axis(clip, prepare_shot(clip, scene, settings), settings)
-    np.testing.assert_allclose(axis.at(np.array([-0.6, 0.0])), expected, atol=0.5 * abs(expected))
+        axis = axis_of(prepare_shot(clip, scene, draft))
+    np.testing.assert_allclose(axis.at(np.array([-0.6, 0.0])), -0.1, atol=0.05)
 
 
 def test_the_example_stands_upright() -> None:
     """Its inlet is 0.1 m behind the middle and 0.14 m above the floor, where its picture could as well be far back."""
-    settings = Settings.preset()
-    scene = Scene.load(Path(__file__).parents[2] / "examples" / "plume" / "scene.toml")
+    scene = Scene.load(Path(__file__).parents[3] / "examples" / "plume" / "scene.toml")
     assert scene.clip is not None
     with Clip.open(scene.clip) as clip:
-        axis = smoke_axis(clip, prepare_shot(clip, scene, settings), settings)
+        axis = axis_of(prepare_shot(clip, scene, Settings.preset()))
     np.testing.assert_allclose(axis.at(np.linspace(-1.4, 1.2, 14)), 0.1, atol=0.2)
 
 
@@ -111,8 +118,7 @@ def test_coloured_lamps_show_the_depth_of_a_clip(plume, draft, tmp_path, scatter
     lamps = PointLight((0.8, -1.2, 1.6), (20, 10, 3)), PointLight((-0.8, 1.2, 1.6), (3, 10, 20))
     scene = plume.write(tmp_path, [ball] * 2, replace(plume.scene, lights=lamps, medium=Medium(2.0, 0.9)))
     with Clip.open(scene.clip) as clip:
-        shot = replace(prepare_shot(clip, scene, draft), scattering=scattering)
-        axis = smoke_axis(clip, shot, draft)
+        axis = axis_of(prepare_shot(clip, scene, replace(draft, scattering=scattering)))
     assert axis.at(np.array([0.0]))[0] == pytest.approx(expected, abs=0.06)
 
 
@@ -181,24 +187,26 @@ def test_rising_smoke_has_upward_velocity(run, plume) -> None:
         assert np.abs(mean[:2]).max() < 0.3 * speed
 
 
-def test_walls_and_inlets_of_the_scene_are_kept(plume, draft, tmp_path, monkeypatch) -> None:
+def test_walls_and_inlets_of_the_scene_are_kept(plume, draft, tmp_path) -> None:
     """Nothing goes through the floor, no motion is taken from the inlet, and both are on record."""
-    told = []
+    inflows = []
 
-    class Told(CoarseToFine):
-        def estimate(self, *arguments, inflow, **options):
-            told.append(inflow)
+    class Watched(CoarseToFine):
+        def estimate(self, *arguments: Any, inflow: Any, **options: Any) -> Velocity:
+            inflows.append(inflow)
             return super().estimate(*arguments, inflow=inflow, **options)
 
-    monkeypatch.setitem(reconstruct.__globals__, "CoarseToFine", Told)
     scene = replace(plume.scene, closed=("z-",), inlets=(Inlet((0, 0, 0.3), 0.2),))
-    frames = frames_of(scene, draft, tmp_path / "out", npz=True)
+    with Clip.open(scene.clip) as clip:
+        shot = prepare_shot(clip, scene, draft)
+        method = replace(compose(shot.settings), velocity_estimator=Watched(shot.settings.velocity))
+        frames = list(reconstruct(clip, scene, out=tmp_path / "out", npz=True, shot=shot, method=method))
     for frame in frames:
         assert not frame.velocity.faces[2][:, :, 0].any()
         assert frame.velocity.faces[2][:, :, -1].any()
-    assert len(told) == len(frames) - 1
-    for inflow in told:
-        np.testing.assert_array_equal(inflow, scene.inflow())
+    assert len(inflows) == len(frames) - 1
+    for inflow in inflows:
+        np.testing.assert_array_equal(inflow, shot.scene.inflow())
     sequence = Sequence.open(tmp_path / "out")
     assert (sequence.scene.closed, sequence.scene.inlets) == (scene.closed, scene.inlets)
     assert frames_of(scene, draft, tmp_path / "out", npz=True, resume=True) == []
@@ -297,10 +305,8 @@ def test_with_nothing_carried_along_a_frame_is_that_of_its_pictures(two_views, d
     frames = frames_of(scene, settings)
     with Clip.open(scene.clip) as clip:
         shot = prepare_shot(clip, scene, settings)
-        views = [view.seen(2) for view in shot.views]
-        alone = reconstruct_density(
-            shot.working.cut(clip.frame(2)), shot.small_scene, None, settings.density, plate=shot.plate, views=views
-        )
+        views = ViewSet.of(shot.observe(2), shot.optics)
+        alone = GradientFit(settings.density).fit(views, RoundDepth().estimate(views), None)
     np.testing.assert_array_equal(frames[2].density, alone.values)
 
 
@@ -438,8 +444,8 @@ def test_the_papers_method_lowers_the_loss(plume, tmp_path) -> None:
     paper = Settings.preset("draft", "paper")
     losses = {}
     for steps in (1, 12):
-        settings = replace(paper, density=DensitySettings(method="paper", descent_iterations=steps))
-        frames = frames_of(scene, settings)
+        method = replace(compose(paper), density_fit=FixedRateDescent(iterations=steps))
+        frames = frames_of(scene, paper, method=method)
         assert [frame.number for frame in frames] == [1, 2, 3]
         losses[steps] = [frame.figures["loss"] for frame in frames]
         assert all(frame.density.min() >= 0 for frame in frames)
@@ -457,47 +463,56 @@ def test_what_is_taken_over_is_on_record(run) -> None:
         assert figures["loss_carried"] < figures["loss_before"]
 
 
-def test_the_papers_loop_takes_all(plume, tmp_path, monkeypatch) -> None:
-    """By the paper's method the density carried along is the first guess, as it is."""
+def test_every_part_of_a_method_can_be_exchanged(plume, draft) -> None:
+    """The loop asks each part for what it is for: here the temporal prior, which puts every frame on the one before."""
+
+    class Stubborn:
+        def start(self, views: Any, depth: Any, carried: np.ndarray, before: np.ndarray) -> Start:
+            return Start(before, {"stubborn": 1.0})
+
+    class Idle:
+        def fit(self, views: ViewSet, depth: Any, initial: np.ndarray | None) -> Any:
+            found = GradientFit(draft.density).fit(views, depth, initial)
+            return found if initial is None else replace(found, values=initial)
+
+    default = compose(draft)
+    method = Method(Idle(), default.depth_prior, default.velocity_estimator, Stubborn())
+    frames = frames_of(plume.scene, draft, method=method)
+    assert frames[1].figures["transport"] == {}
+    for frame in frames[2:]:
+        assert frame.figures["transport"] == {"stubborn": 1.0}
+        np.testing.assert_array_equal(frame.density, frames[1].density)
+
+
+def test_the_papers_loop_takes_all(plume, tmp_path) -> None:
+    """By the paper's method the fit starts from the carried density, as it is."""
     paper = Settings.preset("draft", "paper")
-    paper = replace(paper, density=replace(paper.density, descent_iterations=1))
-    monkeypatch.setitem(reconstruct.__globals__, "first_guess", None)
-    guesses, carried = [], []
+    starts, density_fit = [], FixedRateDescent(iterations=1)
 
-    def fit(seen, scene, initial, settings):
-        guesses.append(initial)
-        return fit_density(seen, scene, initial, settings)
+    class Watched:
+        def fit(self, views: ViewSet, depth: Any, initial: np.ndarray | None) -> Any:
+            starts.append(initial)
+            return density_fit.fit(views, depth, initial)
 
-    def carry(*arguments, **options):
-        carried.append(advect(*arguments, **options))
-        return carried[-1]
-
-    monkeypatch.setitem(reconstruct.__globals__, "fit_density", fit)
-    monkeypatch.setitem(reconstruct.__globals__, "advect", carry)
-    frames_of(plume.write(tmp_path / "clip", plume.densities[:4]), paper)
-    assert [guess is None for guess in guesses] == [True, True, False, False]
-    assert all(guess is moved for guess, moved in zip(guesses[2:], carried, strict=True))
+    scene = plume.write(tmp_path / "clip", plume.densities[:4])
+    frames = frames_of(scene, paper, method=replace(compose(paper), density_fit=Watched()))
+    assert [start is None for start in starts] == [True, True, False, False]
+    assert all(frame.figures["transport"] == {} for frame in frames)
 
 
-@pytest.mark.parametrize("method", ["default", "paper"])
-def test_the_loop_looks_for_motion_as_coarsely_as_was_chosen(plume, draft, tmp_path, monkeypatch, method) -> None:
-    """Prediction and estimate have the same grid; the paper's method knows of none."""
-    settings = draft if method == "default" else Settings.preset("draft", "paper")
-    monkeypatch.setattr("smokelift.setup.motion.FINEST_SIDE", max(plume.scene.domain.resolution) - 1)
-    used = []
-
-    def estimator(settings):
-        used.append(settings.coarsening)
-        return CoarseToFine(settings)
-
-    monkeypatch.setitem(reconstruct.__globals__, "CoarseToFine", estimator)
-    frames_of(plume.write(tmp_path / "clip", plume.densities[:3]), settings)
-    assert used == ([1] if method == "default" else [])
+def test_the_loop_looks_for_motion_as_coarsely_as_was_chosen(plume, draft, monkeypatch) -> None:
+    """What the shot decided is what the estimator is made with, and what is on record."""
+    monkeypatch.setattr("smokelift.setup.velocity_grid.FINEST_SIDE", max(plume.scene.domain.resolution) - 1)
+    with Clip.open(plume.scene.clip) as clip:
+        shot = prepare_shot(clip, plume.scene, draft)
+    estimator = compose(shot.settings).velocity_estimator
+    assert isinstance(estimator, CoarseToFine)
+    assert estimator.settings.coarsening == 1
+    assert shot.settings.as_dict()["velocity"]["coarsening"] == 1
 
 
-def test_without_transport_every_picture_stands_alone(plume, draft, monkeypatch) -> None:
-    """With a share of 0 nothing is carried into a guess, and nothing of it is computed."""
-    monkeypatch.setitem(reconstruct.__globals__, "first_guess", None)
+def test_without_transport_every_picture_stands_alone(plume, draft) -> None:
+    """With a share of 0 nothing is carried into a start."""
     frames = frames_of(plume.scene, replace(draft, transport=0.0))
     assert all(frame.figures["transport"] == {} for frame in frames)
 

@@ -17,8 +17,9 @@ from smokelift.footage.plate import Plate
 from smokelift.output.images import write_image
 from smokelift.scene import Camera, ClipSource, Domain, Scene
 from smokelift.setup.detail import Detail, smoke_detail
+from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import LONGEST_SIDE, Settings
-from smokelift.setup.shot import Shot, prepare_shot
+from smokelift.setup.shot import Shot
 
 SIZE = (192, 256)
 

@@ -18,15 +18,27 @@ from smokelift.footage.matte import matte
 from smokelift.footage.noise import EIGHT_BIT_STEP
 from smokelift.footage.plate import Plate
 from smokelift.output.images import write_image
-from smokelift.pipeline import reconstruct
-from smokelift.render import scene_lights
-from smokelift.scene import Background, Domain, EnvironmentLight, Medium, PointLight, Scene, SceneError, look_at_matrix
+from smokelift.pipeline import compose, reconstruct
+from smokelift.render import scene_optics
+from smokelift.scene import (
+    Background,
+    Domain,
+    EnvironmentLight,
+    Medium,
+    PointLight,
+    Scene,
+    SceneError,
+    completed,
+    look_at_matrix,
+)
 from smokelift.setup.choice import Choice
 from smokelift.setup.coarse import LONGEST, coarse_domain, coarse_frame
-from smokelift.setup.motion import choose_coarsening, choose_levels, levels_for
+from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import Settings
-from smokelift.setup.shot import Shot, prepare_shot
-from smokelift.velocity import VelocitySettings
+from smokelift.setup.shot import Shot
+from smokelift.setup.velocity_grid import choose_coarsening, choose_levels, levels_for
+from smokelift.transport import Velocity
+from smokelift.velocity import CoarseToFine, VelocitySettings
 
 
 def shot_of(scene: Scene, settings: Settings) -> Shot:
@@ -41,7 +53,7 @@ def chosen(shot: Shot, what: str) -> Choice:
 
 
 def with_scattering(settings: Settings, model: str) -> Settings:
-    return replace(settings, density=replace(settings.density, scattering=model))
+    return replace(settings, scattering=model)
 
 
 @pytest.fixture(scope="module")
@@ -66,7 +78,7 @@ def test_a_backlit_silhouette_needs_no_light(silhouette, draft) -> None:
     """Dark smoke before a bright sky only absorbs, and the figures say that more would not be better."""
     shot = shot_of(silhouette, draft)
     choice = chosen(shot, "scattering")
-    assert shot.scattering == choice.chosen == "absorption"
+    assert shot.scene.scattering == choice.chosen == "absorption"
     assert choice.measured["error_absorption"] <= choice.measured["error_unshadowed"] + choice.tolerance
     assert "absorption only" in choice.reason
 
@@ -75,7 +87,7 @@ def test_thick_lit_smoke_needs_shadows(plume, draft) -> None:
     """Without shadows the richest model sees at once that the density is wrong."""
     shot = shot_of(plume.scene, draft)
     choice = chosen(shot, "scattering")
-    assert shot.scattering == choice.chosen == "single"
+    assert shot.scene.scattering == choice.chosen == "single"
     assert choice.measured["error_unshadowed"] > choice.measured["error_single"] + 2 * choice.tolerance
     assert choice.measured["error_absorption"] > 0.9
 
@@ -93,7 +105,7 @@ def test_scattering_by_hand_wins(plume, thin, draft, model) -> None:
     for scene in (plume.scene, thin):
         shot = shot_of(scene, with_scattering(draft, model))
         choice = chosen(shot, "scattering")
-        assert (shot.scattering, choice.by_hand, choice.measured) == (model, True, {})
+        assert (shot.scene.scattering, choice.by_hand, choice.measured) == (model, True, {})
 
 
 def test_shadows_need_a_light(silhouette, draft) -> None:
@@ -111,7 +123,7 @@ def test_unknown_models_are_refused(draft) -> None:
 def test_smoke_that_scatters_nothing_absorbs(plume, draft) -> None:
     """That is no question of measuring."""
     dark = replace(plume.scene, medium=Medium(8.0, 0.0))
-    assert shot_of(dark, draft).scattering == "absorption"
+    assert shot_of(dark, draft).scene.scattering == "absorption"
 
 
 def test_choices_are_the_same_again(plume, thin, draft) -> None:
@@ -123,7 +135,7 @@ def test_choices_are_the_same_again(plume, thin, draft) -> None:
 def test_the_papers_method_chooses_nothing(plume) -> None:
     """It is kept as it is."""
     shot = shot_of(plume.scene, Settings.preset("draft", "paper"))
-    assert shot.scattering == "single"
+    assert shot.scene.scattering == "single"
     assert [choice.what for choice in shot.choices] == ["resolution"]
     assert shot.choices[0].by_hand
 
@@ -131,7 +143,7 @@ def test_the_papers_method_chooses_nothing(plume) -> None:
 def test_without_smoke_nothing_is_measured(plume, draft, tmp_path) -> None:
     """The richest model stands by."""
     shot = shot_of(plume.write(tmp_path, [0 * plume.densities[0]] * 3), draft)
-    assert shot.scattering == "single"
+    assert shot.scene.scattering == "single"
     assert [choice.what for choice in shot.choices] == ["resolution"]
 
 
@@ -142,7 +154,7 @@ def test_where_coarse_pictures_show_no_smoke_the_richest_model_stays(plume, draf
 
     monkeypatch.setattr("smokelift.setup.model.matte", blind)
     shot = shot_of(plume.scene, draft)
-    assert shot.scattering == "single"
+    assert shot.scene.scattering == "single"
     assert not any(choice.what == "scattering" for choice in shot.choices)
 
 
@@ -193,12 +205,12 @@ def test_the_halves_of_a_picture_are_apart(plume) -> None:
         np.zeros_like(picture), np.ones((height, width), np.float32), srgb_to_linear(np.full(3, EIGHT_BIT_STEP))
     )
     scene = replace(plume.scene, camera=plume.scene.camera.resized(width, height))
-    frame = coarse_frame(picture, scene.camera, scene, plate)
+    frame = coarse_frame(picture, scene.camera, completed(scene), plate)
     np.testing.assert_allclose(frame.fitted, 0.2, atol=1e-5)
     np.testing.assert_allclose(frame.held_out, 0.5, atol=1e-5)
     assert 0.3 < frame.picture.mean() < 0.4
     away = plume.scene.camera.look_at((0, -4, 0.8), (0, -9, 0.8), fov_y_degrees=27, size=(width, height))
-    assert coarse_frame(picture, away, scene, plate) is None
+    assert coarse_frame(picture, away, completed(scene), plate) is None
 
 
 # velocity
@@ -215,7 +227,9 @@ def test_faster_smoke_gets_more_grids(plume) -> None:
     scene, finer = plume.scene, replace(plume.scene, domain=replace(plume.scene.domain, resolution=(48, 48, 64)))
     slow, fast = ([plume.blob(scene, 0.6), plume.blob(scene, 0.6 + rise)] for rise in (0.03, 0.25))
     found = [
-        choose_levels([pair], scene, final, VelocitySettings()) for pair in (slow, fast) for final in (scene, finer)
+        choose_levels([pair], scene.domain, final.domain, VelocitySettings())
+        for pair in (slow, fast)
+        for final in (scene, finer)
     ]
     motions = [choice.measured["voxels_a_frame"] for choice in found]
     assert motions[1] == pytest.approx(2 * motions[0])
@@ -274,7 +288,7 @@ def test_directions_are_doubled_until_the_smoke_looks_the_same(plume, draft, tmp
         choice = chosen(shot, "environment directions")
         counts[name] = choice.chosen
         assert shot.scene.lights == (replace(light, directions=choice.chosen),)
-        assert len(scene_lights(shot.scene)) <= choice.chosen
+        assert len(shot.optics.lights) <= choice.chosen
         assert choice.measured["change"] <= choice.tolerance
         assert not choice.by_hand
     assert counts["lamp"] < counts["sky"]
@@ -286,7 +300,7 @@ def test_directions_by_hand_win(plume, draft, tmp_path) -> None:
     scene = replace(plume.scene, lights=(light,))
     scene.save(tmp_path / "scene.toml")
     assert Scene.load(tmp_path / "scene.toml") == scene
-    assert len(scene_lights(scene)) == 6
+    assert len(scene_optics(completed(scene)).lights) == 6
     choice = chosen(shot_of(scene, draft), "environment directions")
     assert (choice.chosen, choice.by_hand) == (6, True)
     with pytest.raises(SceneError, match="directions must be a whole number from 1, not 0"):
@@ -303,11 +317,11 @@ def test_every_choice_has_a_sentence_and_a_figure(plume, draft) -> None:
         "resolution", "domain", "scattering", "iterations", "velocity grid coarsening", "velocity levels",
     ]  # fmt: skip
     for choice in shot.choices:
-        told = choice.as_dict()
-        assert json.loads(json.dumps(told, allow_nan=False)) == told
-        assert set(told) == {"what", "chosen", "reason", "measured", "tolerance", "by_hand"}
-        assert told["reason"].endswith(".")
-        assert told["by_hand"] or told["measured"]
+        record = choice.as_dict()
+        assert json.loads(json.dumps(record, allow_nan=False)) == record
+        assert set(record) == {"what", "chosen", "reason", "measured", "tolerance", "by_hand"}
+        assert record["reason"].endswith(".")
+        assert record["by_hand"] or record["measured"]
 
 
 def test_iterations_by_hand_are_said(plume, draft) -> None:
@@ -317,29 +331,24 @@ def test_iterations_by_hand_are_said(plume, draft) -> None:
     assert [(choice.by_hand, choice.chosen) for choice in found] == [(False, 10), (True, 5)]
 
 
-def test_frames_without_smoke_cost_nothing(plume, draft, tmp_path, monkeypatch) -> None:
-    """Nothing is rendered, predicted or carried where there is no smoke, and the smoke after it is as if alone."""
+def test_frames_without_smoke_cost_nothing(plume, draft, tmp_path) -> None:
+    """Nothing is rendered, predicted or carried where there is no smoke."""
     nothing = np.zeros_like(plume.densities[0])
     clip = [plume.densities[0], nothing, nothing, nothing, plume.densities[1]]
     scene = plume.write(tmp_path, clip)
-    predicted, rendered = [], []
-    from smokelift.density import Renderer
+    predicted: list[Velocity] = []
 
-    def counted(*arguments):
-        predicted.append(arguments)
+    class Counted(CoarseToFine):
+        def predict(self, velocity: Velocity, dt: float) -> Velocity:
+            predicted.append(velocity)
+            return super().predict(velocity, dt)
 
-    class Counted(Renderer):
-        def image(self, *arguments, **options):
-            rendered.append(arguments)
-            return super().image(*arguments, **options)
-
-    shot = shot_of(scene, draft)
-    monkeypatch.setattr("smokelift.velocity.CoarseToFine.predict", counted)
-    monkeypatch.setattr("smokelift.density.Renderer", Counted)
     with Clip.open(scene.clip) as opened:
-        work = {frame.number: len(rendered) for frame in reconstruct(opened, scene, draft, shot=shot)}
+        shot = prepare_shot(opened, scene, draft)
+        method = replace(compose(shot.settings), velocity_estimator=Counted(shot.settings.velocity))
+        frames = list(reconstruct(opened, scene, shot=shot, method=method))
     assert not predicted
-    assert work[2] == work[3] == work[4] < work[5]
+    assert [frame.figures["iterations"] > 0 for frame in frames] == [True, False, False, False, True]
 
 
 def test_a_light_close_to_the_box_is_no_hindrance(plume, draft, tmp_path) -> None:

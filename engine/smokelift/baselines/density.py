@@ -1,0 +1,145 @@
+"""Algorithm 3 as the paper has it: gradient descent with a fixed rate, the video used again as if from 90 degrees.
+
+    rho <- max(0, rho - rate * densityGrad),   densityGrad = sum_views sum_pixels 2 (L - I) gradRec
+
+Picture and record are the paper's own too (`smokelift.baselines.renderer`). Two slips of the listing are mended (the
+sign of the difference, which ascends as printed, and the missing rho >= 0); the fixed rate, the start from thin fog
+and the imposed side view, where no other is given, are the paper's. Its derivative is none voxel by voxel, so in thick
+smoke the loss falls at first and then rises without bound, at any rate; hence one thing that the listing has not: the
+best density seen is kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from smokelift.density import (
+    Density,
+    DepthEstimate,
+    ImposedView,
+    ObservedClip,
+    Start,
+    ViewSet,
+    empty_density,
+)
+from smokelift.density.fit import fit_figures, without_traces
+from smokelift.density.hull import project_voxels
+from smokelift.render import Image, Volume
+from smokelift.scene import orbit
+
+if TYPE_CHECKING:
+    from smokelift.baselines.renderer import PaperRenderer
+
+FOG_DEPTH = 0.1
+"""Optical depth of the fog across the domain that the fit starts from: thin, because dense media have local minima."""
+
+
+@dataclass(frozen=True)
+class OrthogonalCopy:
+    """The paper's depth prior: thin fog to start from, and the only picture imposed again as if from 90 degrees."""
+
+    def of_clip(self, clip: ObservedClip) -> OrthogonalCopy:
+        """Itself: it does not look at the clip."""
+        return self
+
+    def estimate(self, views: ViewSet) -> DepthEstimate:
+        """Fog, and the side view where there is no true one."""
+        domain = views.optics.domain
+        thin = FOG_DEPTH / (views.optics.medium.extinction * (domain.max[0] - domain.min[0]))
+        fog = np.full(domain.resolution, thin, np.float32)
+        inside = tuple(np.ones(view.mask.shape, np.float32) for view in views.views)
+        if len(views.views) > 1:
+            return DepthEstimate(fog, inside)
+        front = views.views[0]
+        camera = orbit(front.camera, domain, 90)
+        side = replace(front, camera=camera, projection=project_voxels(camera, domain))
+        return DepthEstimate(fog, inside, (ImposedView(side, inside[0]),))
+
+
+@dataclass(frozen=True)
+class FixedRateDescent:
+    """The paper's density fit.
+
+    Attributes
+    ----------
+    rate
+        Change of density that one step makes in the steepest voxel of the prior's fog. The paper gives no figure
+        (docs/experiments/paper-baseline.md).
+    iterations
+        At most so many.
+    least_loss
+        Mean squared difference, in units of the pictures' mean square, at which to stop.
+    """
+
+    rate: float = 0.03
+    iterations: int = 60
+    least_loss: float = 1e-4
+
+    def fit(self, views: ViewSet, depth: DepthEstimate, initial: Volume | None) -> Density:
+        """Find a density anywhere in the domain; see `smokelift.density.DensityFit`."""
+        from smokelift.baselines.renderer import PaperRenderer  # here, because Taichi takes long to import
+
+        if not views.hull.any():
+            return empty_density(views)
+        optics = views.optics
+        seen = (*views.views, *(imposed.view for imposed in depth.imposed))
+        everywhere = [np.ones(view.mask.shape, np.bool_) for view in views.views]
+        renderers = [
+            PaperRenderer(view.camera, optics.domain, optics.medium, optics.lights, view.plate.image, optics.scattering)
+            for view in seen
+        ]
+        pictures = [view.image for view in seen]
+        start = depth.density if initial is None else initial
+        density, residuals, done = self._descend(renderers, pictures, start, depth.density)
+        judged = replace(
+            views,
+            views=tuple(replace(view, counted=every) for view, every in zip(views.views, everywhere, strict=True)),
+            hull=np.ones_like(views.hull),
+        )
+        return Density(without_traces(density), judged.hull, fit_figures(judged, residuals, done))
+
+    def _descend(
+        self, renderers: Sequence[PaperRenderer], pictures: Sequence[Image], density: Volume, thin: Volume
+    ) -> tuple[Volume, list[Image], int]:
+        """The best density seen, what is left of the pictures, and the number of steps."""
+        _, slope = _residuals_and_gradient(renderers, pictures, thin)
+        factor = np.float32(self.rate / (float(np.abs(slope).max()) or 1.0))
+        enough = self.least_loss * _squares(pictures)
+        residuals, gradient = _residuals_and_gradient(renderers, pictures, density)
+        loss = _squares(residuals)
+        best, left, least, done = density, residuals, loss, 0
+        while done < self.iterations and loss > enough:
+            density = np.maximum(density - factor * gradient, 0)
+            residuals, gradient = _residuals_and_gradient(renderers, pictures, density)
+            loss = _squares(residuals)
+            done += 1
+            if loss < least:
+                best, left, least = density, residuals, loss
+        return best, left, done
+
+
+@dataclass(frozen=True)
+class AllCarried:
+    """The paper's temporal prior: the fit starts from the carried density as it is."""
+
+    def start(self, views: ViewSet, depth: DepthEstimate, carried: Volume, before: Volume) -> Start:
+        """The carried density; see `smokelift.density.TemporalPrior`."""
+        return Start(carried, {})
+
+
+def _squares(images: Sequence[Image]) -> float:
+    return sum(float(np.sum(np.square(image, dtype=np.float64))) for image in images)
+
+
+def _residuals_and_gradient(
+    renderers: Sequence[PaperRenderer], pictures: Sequence[Image], density: Volume
+) -> tuple[list[Image], Volume]:
+    residuals, gradient = [], np.zeros_like(density)
+    for renderer, picture in zip(renderers, pictures, strict=True):
+        residuals.append(renderer.image(density) - picture)
+        gradient += renderer.gradient(2 * residuals[-1])
+    return residuals, gradient

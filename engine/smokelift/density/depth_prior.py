@@ -1,0 +1,185 @@
+"""What is assumed of the smoke's depth, which one picture leaves undetermined.
+
+`RoundDepth`, the default, takes the smoke to be as deep as it is wide. It spreads the smoke of one picture about an
+axis that comes from the whole clip. Several pictures show each other where their smoke stands. The start then is what
+all their profiles have in common, in every layer as much as the pictures show. It need not look like any picture: the
+multiplicative fit scales ray by ray, and keeps of it only how the smoke of one ray relates to that of another.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smokelift.density.axis import SmokeAxis, estimate_axis
+from smokelift.density.axis_from_light import refine_axis
+from smokelift.density.hull import centres_of
+from smokelift.density.observation import ObservedClip, View, ViewSet
+from smokelift.density.profile import DepthProfile
+from smokelift.density.screen import view_frame
+from smokelift.render import Volume
+
+LEAST_SHAPE = 0.05
+"""Of several profiles each has everywhere in the hull so much of its height, because others may show smoke there
+(docs/experiments/density-profile.md)."""
+
+AXIS_FRAMES = 16
+"""Frames of a clip from which the axis is estimated."""
+
+LIGHT_FRAMES = 4
+"""Those of them whose light is looked at as well: each costs 200 pictures on a coarse grid."""
+
+
+@dataclass(frozen=True, eq=False)
+class ImposedView:
+    """A picture that no camera took: a soft observation that a prior adds to the objective.
+
+    Attributes
+    ----------
+    view
+        The picture against the grid. Smoke that it does not show is not ruled out.
+    weight : (rows, columns)
+        How much each pixel counts beside a camera's, from 0.
+    """
+
+    view: View
+    weight: NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class DepthEstimate:
+    """What a prior says of one moment.
+
+    Attributes
+    ----------
+    density : (nx, ny, nz) float32
+        A plausible density that shows about what the pictures do; where a fit starts.
+    inside : tuple of (rows, columns)
+        Of each view, the share of every ray's smoke that lies inside the domain.
+    imposed
+        Pictures to be met beside the cameras'.
+    """
+
+    density: Volume
+    inside: tuple[NDArray[np.float32], ...]
+    imposed: tuple[ImposedView, ...] = ()
+
+
+class DepthPrior(Protocol):
+    """What is assumed of the smoke's depth."""
+
+    def of_clip(self, clip: ObservedClip) -> DepthPrior:
+        """The prior for a clip, after a look at any of its frames; itself if it needs none."""
+
+    def estimate(self, views: ViewSet) -> DepthEstimate:
+        """What it says of one moment."""
+
+
+@dataclass(frozen=True, eq=False)
+class RoundDepth:
+    """Smoke that is as deep as it is wide; see the module.
+
+    Attributes
+    ----------
+    axis
+        Where the smoke of one view stands in depth; None takes the middle of the domain, or estimates it from a clip.
+    axis_depth
+        The same as one number, in metres behind the domain's centre, if the user says it.
+    """
+
+    axis: SmokeAxis | None = None
+    axis_depth: float | None = None
+
+    def of_clip(self, clip: ObservedClip) -> RoundDepth:
+        """Estimate the axis from some frames, unless it is given, a camera moves or there are several."""
+        if self.axis is not None or (self.axis_depth is None and clip.moves):
+            return self
+        moments = filter(None, map(clip.observe, clip.spread(AXIS_FRAMES)))
+        first = next(moments, None)
+        if first is None:
+            return self
+        domain, camera = clip.optics.domain, first[0].camera
+        if self.axis_depth is not None:
+            return replace(self, axis=SmokeAxis.given(self.axis_depth, camera, domain))
+        if len(first) > 1:
+            return self
+        views = [View.of(observations[0], clip.optics) for observations in (first, *moments)]
+        axis = estimate_axis([view.optical_depth for view in views], camera, domain, clip.inlets)
+        if not clip.inlets and clip.optics.scattering == "single":
+            lit = [view for view in views[:: AXIS_FRAMES // LIGHT_FRAMES] if view.optical_depth.any()]
+            axis = refine_axis(axis, lit, clip.optics)
+        return replace(self, axis=axis)
+
+    def estimate(self, views: ViewSet) -> DepthEstimate:
+        """Spread the pictures' smoke by the profiles."""
+        one = self.axis or SmokeAxis.upright()
+        axes = [one] if len(views.views) == 1 else [_common_axis(view, views) for view in views.views]
+        profiles = [
+            DepthProfile(view.optical_depth, view.camera, views.optics.domain, axis)
+            for view, axis in zip(views.views, axes, strict=True)
+        ]
+        extinction = np.float32(views.optics.medium.extinction)
+        return DepthEstimate(_spread(views, profiles) / extinction, tuple(p.share_inside() for p in profiles))
+
+
+def _spread(views: ViewSet, profiles: Sequence[DepthProfile]) -> Volume:
+    """Optical depth per metre (nx, ny, nz) that has the profiles' shape and the pictures' amounts."""
+    hull = views.hull
+    spread = np.zeros(views.optics.domain.resolution, np.float32)
+    single = [
+        view.projection.read(view.optical_depth, hull) * profile.at(view.projection, hull)
+        for view, profile in zip(views.views, profiles, strict=True)
+    ]
+    spread[hull] = single[0] if len(single) == 1 else _common(views, profiles, single)
+    return spread
+
+
+def _common(
+    views: ViewSet, profiles: Sequence[DepthProfile], single: Sequence[NDArray[np.float64]]
+) -> NDArray[np.float64]:
+    """What several profiles have in common (n,), layer by layer as much as the view that shows most."""
+    hull = views.hull
+    seen = [view.projection.visible[hull] for view in views.views]
+    count = np.sum(seen, axis=0)
+    # a round blob's two profiles make it up, and more of them must not make it smaller
+    power = np.minimum(1, 2 / count)
+    # what only one shows it would fill with all that the others contradict
+    least = np.where(count > 1, LEAST_SHAPE, 0)
+    values = np.ones(count.shape)
+    for view, profile, visible in zip(views.views, profiles, seen, strict=True):
+        shape = np.maximum(profile.shape(view.projection, hull), least)
+        values *= np.where(visible, shape**power, 1)
+    layer = np.nonzero(hull)[2]
+    wanted = np.max([np.bincount(layer, np.where(*pair, 0)) for pair in zip(seen, single, strict=True)], axis=0)
+    there = np.bincount(layer, values)
+    return np.asarray(values * (wanted / np.maximum(there, 1e-30))[layer])
+
+
+def _common_axis(view: View, views: ViewSet) -> SmokeAxis:
+    """How far behind the domain's centre all pictures together put the middle of the smoke, by height in one view."""
+    domain, hull = views.optics.domain, views.hull
+    _, depth, height = view_frame(view.camera)
+    offset = centres_of(hull, domain) - np.array(domain.centre)
+    if not offset.size:
+        return SmokeAxis.upright()
+    level = np.rint(offset @ height / domain.voxel_size).astype(int)
+    lowest = level.min()
+    level -= lowest
+    shown = [other.projection.visible[hull] for other in views.views]
+    count = np.sum(shown, axis=0)
+    most = np.zeros(level.max() + 1, count.dtype)
+    np.maximum.at(most, level, count)
+    weight = (count == most[level]).astype(np.float64)  # those that fewer views show are known worse
+    for other, visible in zip(views.views, shown, strict=True):
+        weight *= np.where(visible, other.projection.read(other.optical_depth, hull), 1)
+    total = np.bincount(level, weight)
+    known = total > 0
+    if not known.any():
+        return SmokeAxis.upright()
+    mean = np.bincount(level, weight * (offset @ depth))[known] / total[known]
+    heights = (np.nonzero(known)[0] + lowest) * domain.voxel_size
+    return SmokeAxis(heights, mean, np.zeros(heights.shape))

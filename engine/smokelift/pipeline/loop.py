@@ -1,0 +1,202 @@
+"""The main job (algorithms 1 and 4): a clip in, one frame of density and velocity after the other out.
+
+rho_1, rho_2 from their pictures alone; then for t = 3, 4, ...
+    u~_t   = Project(advect(u_t-1, u_t-1))          prediction of the velocity
+    rho~_t = advect(rho_t-1, u~_t)                  prediction of the density
+    rho_t  = Reconstruction(picture_t, rho~_t)      correction by the renderer
+    u_t    = VelRecon(rho_t-1, rho_t)               correction of the velocity
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from smokelift.density import Density, Observation, ViewSet
+from smokelift.density.hull import project_voxels
+from smokelift.footage.clip import Clip
+from smokelift.output.resume import ResumeState
+from smokelift.output.writer import SequenceWriter
+from smokelift.pipeline.method import Method, compose
+from smokelift.render import Volume
+from smokelift.scene import Domain, Scene
+from smokelift.setup.prepare import prepare_shot
+from smokelift.setup.settings import Settings
+from smokelift.setup.shot import Shot
+from smokelift.transport import Array, ResidualMeans, Velocity, advect
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """One reconstructed frame.
+
+    Attributes
+    ----------
+    number
+        1 for the clip's first frame.
+    density : (nx, ny, nz) float32
+    velocity
+        In m/s, of the smoke that arrives in this frame (the first frame has the second's).
+    figures
+        Measures of the fit and seconds spent.
+    """
+
+    number: int
+    density: Volume
+    velocity: Velocity
+    figures: Mapping[str, Any]
+
+
+def reconstruct(
+    clip: Clip,
+    scene: Scene,
+    settings: Settings | None = None,
+    out: str | Path | None = None,
+    *,
+    npz: bool = False,
+    resume: bool = False,
+    shot: Shot | None = None,
+    method: Method | None = None,
+) -> Iterator[Frame]:
+    """Reconstruct a clip frame by frame.
+
+    Parameters
+    ----------
+    clip
+        The footage.
+    scene
+        Whatever is known of the shot; the rest is estimated (see `prepare_shot`).
+    settings
+        `Settings.preset` of a quality and a method; balanced by default.
+    out
+        Directory for the sequence; without it frames are only yielded.
+    npz
+        Write NumPy twins as well.
+    resume
+        Go on from the frames in ``out``. The frames that are there are not yielded again.
+    shot
+        The result of `prepare_shot`, if it has been computed already.
+    method
+        Another composition than that of the settings, for an experiment.
+
+    Yields
+    ------
+    Frame
+        In the clip's order, each already written when it is yielded.
+
+    Raises
+    ------
+    ValueError
+        For bad input (`SceneError`, `ClipError`, `SequenceError` are ValueErrors too).
+    """
+    shot = shot or prepare_shot(clip, scene, settings or Settings.preset())
+    method = method or compose(shot.settings)
+    if out is None:
+        yield from _frames(shot, method, None)
+        return
+    with SequenceWriter(
+        out,
+        shot.scene,
+        shot.settings.as_dict(),
+        npz=npz,
+        resume=resume,
+        background=shot.estimated_background,
+        choices=[choice.as_dict() for choice in shot.choices],
+    ) as writer:
+        if writer.state is None and writer.finished:
+            return
+        start = None if writer.state is None else _resumed(writer.state, shot)
+        for frame in _frames(shot, method, start):
+            if frame.number not in writer.finished:
+                memory = frame.velocity.residual
+                extra = {} if memory is None else {"residual_mean": memory.mean, "residual_magnitude": memory.magnitude}
+                writer.write(frame.number, frame.density, frame.velocity.faces, frame.figures, extra)
+                yield frame
+
+
+def _resumed(state: ResumeState, shot: Shot) -> Frame:
+    """The last finished frame of a run that goes on."""
+    mean, magnitude = state.extra.get("residual_mean"), state.extra.get("residual_magnitude")
+    residual = None if mean is None or magnitude is None else ResidualMeans(mean, magnitude)
+    velocity = Velocity(state.velocity, shot.optics.domain.voxel_size, shot.scene.closed, residual=residual)
+    return Frame(state.number, state.density, velocity, {})
+
+
+def _frames(shot: Shot, method: Method, start: Frame | None) -> Iterator[Frame]:
+    """Frames after ``start``; the first is held back until the second gives it a velocity."""
+    count = len(shot.clip)
+    method = replace(method, depth_prior=method.depth_prior.of_clip(shot))
+    before = start
+    for index in range(start.number if start else 0, count):
+        frame = _frame(index, before, shot, method)
+        if index == 1 and before is not None:
+            yield replace(before, velocity=frame.velocity)
+        if index > 0 or count == 1:
+            yield frame
+        before = frame
+
+
+def _frame(index: int, before: Frame | None, shot: Shot, method: Method) -> Frame:
+    """One frame, counted from 0, from its pictures and the frame before."""
+    began = time.perf_counter()
+    domain, dt = shot.optics.domain, 1.0 / shot.clip.fps
+    predicted = carried = None
+    # from where there was no smoke nothing is carried
+    if before is not None and index >= 2 and before.density.any():
+        predicted = method.velocity_estimator.predict(before.velocity, dt)
+        # pictures correct the mass, but not of what a moving camera does not see
+        carried = advect(before.density, predicted, dt, conserve=shot.moves)
+    density, taken_over = _density(shot.observe(index), before, carried, shot, method)
+    fitted = time.perf_counter()
+    velocity = Velocity.zero(domain.resolution, domain.voxel_size, shot.scene.closed)
+    if before is not None:
+        velocity = method.velocity_estimator.estimate(
+            before.density,
+            density.values,
+            dt,
+            domain.voxel_size,
+            closed=shot.scene.closed,
+            inflow=shot.scene.inflow(),
+            prediction=predicted,
+        )
+    done = time.perf_counter()
+    figures = {
+        **density.figures,
+        "mass": float(density.values.sum(dtype=np.float64)) * domain.voxel_size**3,
+        "transport": dict(taken_over),
+        "velocity": dict(velocity.figures),
+        "seconds_density": fitted - began,
+        "seconds_velocity": done - fitted,
+    }
+    return Frame(index + 1, density.values, velocity, figures)
+
+
+def _density(
+    observations: tuple[Observation, ...], before: Frame | None, carried: Volume | None, shot: Shot, method: Method
+) -> tuple[Density, Mapping[str, float]]:
+    """The density of a frame, and what was taken over of the carried one."""
+    if not observations:
+        return _unseen(shot.optics.domain, carried), {}
+    views = ViewSet.of(observations, shot.optics)
+    depth = method.depth_prior.estimate(views)
+    if before is None or carried is None:
+        return method.density_fit.fit(views, depth, None), {}
+    start = method.temporal_prior.start(views, depth, carried, before.density)
+    density = method.density_fit.fit(views, depth, start.density)
+    if shot.moves:
+        # what a moving camera does not see now it may have seen before
+        visible = project_voxels(observations[0].camera, shot.optics.domain).visible
+        density = replace(density, values=np.where(visible, density.values, carried))
+    return density, start.figures
+
+
+def _unseen(domain: Domain, carried: Volume | None) -> Density:
+    """The density of a frame whose picture shows nothing of the domain: what was carried along."""
+    nothing: Array = np.zeros(domain.resolution, np.float32)
+    figures = {"loss": 0.0, "psnr": 0.0, "iterations": 0.0, "hull_share": 0.0}
+    return Density(nothing if carried is None else carried, nothing > 0, figures)

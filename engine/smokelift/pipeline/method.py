@@ -1,0 +1,70 @@
+"""A method of reconstruction: four parts, each of which can be exchanged.
+
+The default and the paper's method are two compositions; an ablation is a third, by `dataclasses.replace`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from smokelift.baselines.density import AllCarried, FixedRateDescent, OrthogonalCopy
+from smokelift.baselines.velocity import PaperVelocity
+from smokelift.density import (
+    BlendCarried,
+    DensityFit,
+    DepthPrior,
+    GradientFit,
+    NothingCarried,
+    RoundDepth,
+    TemporalPrior,
+)
+from smokelift.setup.settings import Settings
+from smokelift.velocity import CoarseToFine, VelocityEstimator
+
+
+@dataclass(frozen=True)
+class Method:
+    """How a clip is reconstructed, part by part.
+
+    Attributes
+    ----------
+    density_fit
+        Finds a density that renders to the pictures.
+    depth_prior
+        What is assumed of the depth, which one picture leaves undetermined.
+    velocity_estimator
+        Finds the velocity between two densities, and predicts the next.
+    temporal_prior
+        What a frame takes over from the one before.
+    """
+
+    density_fit: DensityFit
+    depth_prior: DepthPrior
+    velocity_estimator: VelocityEstimator
+    temporal_prior: TemporalPrior
+
+
+def compose(settings: Settings) -> Method:
+    """The method that settings ask for."""
+    return _METHODS[settings.method](settings)
+
+
+def _default(settings: Settings) -> Method:
+    return Method(
+        density_fit=GradientFit(settings.density),
+        depth_prior=RoundDepth(axis_depth=settings.axis_depth),
+        velocity_estimator=CoarseToFine(settings.velocity),
+        temporal_prior=BlendCarried(settings.transport) if settings.transport > 0 else NothingCarried(),
+    )
+
+
+def _paper(settings: Settings) -> Method:
+    return Method(
+        density_fit=FixedRateDescent(),
+        depth_prior=OrthogonalCopy(),
+        velocity_estimator=PaperVelocity(),
+        temporal_prior=AllCarried(),
+    )
+
+
+_METHODS = {"default": _default, "paper": _paper}

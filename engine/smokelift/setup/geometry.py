@@ -1,0 +1,217 @@
+"""Camera, domain and resolution: as the scene gives them, or guessed from where the smoke is in the picture."""
+
+from __future__ import annotations
+
+import math
+from contextlib import suppress
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from smokelift.footage.clip import Clip
+from smokelift.footage.plate import Plates
+from smokelift.footage.working import CameraError, voxel_width, working_picture
+from smokelift.scene import Camera, Domain, Scene, as_matrix
+from smokelift.setup.choice import Choice
+from smokelift.setup.detail import TOLERANCE as DETAIL_TOLERANCE
+from smokelift.setup.detail import Detail, smoke_detail
+from smokelift.setup.settings import LONGEST_SIDE, Settings
+from smokelift.setup.smoke import SmokeSamples
+
+Shape = tuple[int, int, int]
+
+PICTURE_HEIGHT = 2.0
+"""Metres that an uncalibrated picture is taken to be high where the smoke is: the size of a person."""
+
+LENS = 50 / 36
+"""Focal length over the longer side of the picture of an uncalibrated camera: Blender's default lens."""
+
+MARGIN = 0.06
+"""Free space around the smoke on each side of a guessed box, in its longer side."""
+
+NARROWEST = 0.25
+"""Width over height of a guessed box at least, and the reverse."""
+
+COARSEST = 32
+"""Voxels along the longest side at least: with fewer there is nothing more to save."""
+
+DETAIL_FRAMES = 3
+"""Frames whose detail decides the resolution: those with the most smoke."""
+
+
+@dataclass(frozen=True, eq=False)
+class Geometry:
+    """Where the camera stands and where the smoke is.
+
+    Attributes
+    ----------
+    camera
+        Of the clip's full pictures.
+    domain
+        With its final resolution.
+    resolution
+        Why it has that resolution; None where the scene gives it.
+    notes
+        What was assumed, a sentence each.
+    """
+
+    camera: Camera
+    domain: Domain
+    resolution: Choice[Shape] | None
+    notes: tuple[str, ...] = ()
+
+
+def find_geometry(clip: Clip, scene: Scene, settings: Settings, plates: Plates, samples: SmokeSamples) -> Geometry:
+    """Complete camera and domain.
+
+    Raises
+    ------
+    ValueError
+        If the scene gives one of the two without the other, or an inlet without either.
+    """
+    if scene.camera is not None:
+        camera = fitting(scene.camera, clip)
+        if scene.domain is None:
+            raise ValueError("The scene gives a camera but no box in [domain]; give the one that holds the smoke.")
+        if settings.resolution == "auto":
+            grids = _same_shape(scene.domain, LONGEST_SIDE[settings.quality])
+            return Geometry(camera, *_resolved(clip, camera, grids, plates, samples.smoky))
+        if settings.resolution is None:
+            return Geometry(camera, scene.domain, _resolution_by_hand(scene.domain))
+        domain = replace(scene.domain, resolution=settings.resolution)
+        return Geometry(camera, domain, _resolution_by_hand(domain))
+    if scene.domain is not None:
+        raise ValueError("The scene gives a [domain] but no [camera]; give the camera that filmed it.")
+    if scene.inlets:
+        raise ValueError(
+            "The scene marks an [[inlet]] but gives no [camera] and [domain]; give both to say where it is."
+        )
+    camera, grids = _uncalibrated(clip, samples, settings)
+    if isinstance(settings.resolution, tuple):
+        domain, choice = grids[-1], _resolution_by_hand(grids[-1])
+    elif settings.model_selection:
+        domain, choice = _resolved(clip, camera, grids, plates, samples.smoky)
+    else:
+        domain, choice = grids[-1], None
+    size = " x ".join(f"{high - low:.2f}" for low, high in zip(domain.min, domain.max, strict=True))
+    notes = (
+        "Camera not given: a level 50 mm lens on 36 mm film, the picture taken to be "
+        f"{PICTURE_HEIGHT:g} m high where the smoke is.",
+        f"Domain around the smoke: {size} m, {' x '.join(map(str, domain.resolution))} voxels.",
+    )
+    return Geometry(camera, domain, choice, notes)
+
+
+def fitting(camera: Camera, clip: Clip) -> Camera:
+    """The camera with as many pixels as its clip.
+
+    Raises
+    ------
+    ValueError
+        If its picture has another shape than the clip's.
+    """
+    if camera.size[0] * clip.size[1] != camera.size[1] * clip.size[0]:
+        raise ValueError(
+            f"The camera's picture is {camera.size[0]} x {camera.size[1]}, the clip's {clip.size[0]} x {clip.size[1]} "
+            f"({clip.path.name}); [camera] size must have the clip's shape."
+        )
+    return camera.resized(*clip.size)
+
+
+def _resolution_by_hand(domain: Domain) -> Choice[Shape]:
+    said = " x ".join(map(str, domain.resolution))
+    return Choice("resolution", domain.resolution, f"Resolution by hand: {said} voxels.", by_hand=True)
+
+
+def _uncalibrated(clip: Clip, samples: SmokeSamples, settings: Settings) -> tuple[Camera, tuple[Domain, ...]]:
+    """A level camera that looks along +Y, and the box around the smoke at the picture's distance.
+
+    The box comes with every number of voxels that may be chosen, the fewest first.
+    """
+    width, height = clip.size
+    focal = LENS * max(width, height)
+    metres = PICTURE_HEIGHT / height
+    distance = focal * metres
+    matrix = np.array([[1, 0, 0, 0], [0, 0, -1, -distance], [0, 1, 0, PICTURE_HEIGHT / 2], [0, 0, 0, 1]], np.float64)
+    camera = Camera("perspective", as_matrix(matrix), (width, height), focal, focal, width / 2, height / 2)
+    left, right, top, bottom = _covered(samples, width, height)
+    across = max(right - left, NARROWEST * (bottom - top)) * metres
+    up = max(bottom - top, NARROWEST * (right - left)) * metres
+    # the far side of the box has to fill the picture too
+    across *= 1 + across / (2 * distance)
+    centre_x = ((left + right) / 2 - width / 2) * metres
+    bottom_z = PICTURE_HEIGHT / 2 - (bottom - height / 2) * metres
+
+    def box(voxel: float, resolution: tuple[int, int, int]) -> Domain:
+        size = np.array(resolution) * voxel
+        low = np.array([centre_x - size[0] / 2, -size[1] / 2, bottom_z])
+        high = low + size
+        return Domain(
+            (float(low[0]), float(low[1]), float(low[2])), (float(high[0]), float(high[1]), float(high[2])), resolution
+        )
+
+    if isinstance(settings.resolution, tuple):
+        x, y, z = settings.resolution
+        return camera, (box(max(across / x, across / y, up / z), settings.resolution),)
+    grids = []
+    for longest in range(COARSEST, LONGEST_SIDE[settings.quality] + 1, 4):
+        voxel = max(across, up) / longest
+        grids.append(box(voxel, (_voxels(across, voxel), _voxels(across, voxel), _voxels(up, voxel))))
+    return camera, tuple(grids)
+
+
+def _covered(samples: SmokeSamples, width: int, height: int) -> tuple[float, float, float, float]:
+    """Left, right, top and bottom of the smoke in the full picture, in pixels, with a margin."""
+    rows, columns = np.nonzero(samples.covered)
+    if rows.size == 0:  # no smoke: any box will do
+        rows, columns = np.array([0, samples.covered.shape[0] - 1]), np.array([0, samples.covered.shape[1] - 1])
+    # a hundredth of the smoke's pixels on each side may be noise or the last wisps
+    left, right = np.percentile(columns, [1, 99]) + np.array([0, 1])
+    top, bottom = np.percentile(rows, [1, 99]) + np.array([0, 1])
+    left, right, top, bottom = (float(v) * samples.scale for v in (left, right, top, bottom))
+    margin = MARGIN * max(right - left, bottom - top)
+    left, right = max(left - margin, 0.0), min(right + margin, float(width))
+    return left, right, max(top - margin, 0.0), min(bottom + margin, float(height))
+
+
+def _same_shape(domain: Domain, most: int) -> tuple[Domain, ...]:
+    """The box with every number of cubic voxels that fills it exactly, the fewest first; none finer than allowed."""
+    common = math.gcd(*domain.resolution)
+    x, y, z = (n // common for n in domain.resolution)
+    longest = max(x, y, z)
+    fewest = -(-min(COARSEST, max(domain.resolution)) // longest)
+    return tuple(
+        replace(domain, resolution=(x * times, y * times, z * times))
+        for times in range(fewest, max(most // longest, fewest) + 1)
+    )
+
+
+def _resolved(
+    clip: Clip, camera: Camera, grids: tuple[Domain, ...], plates: Plates, smoky: tuple[int, ...]
+) -> tuple[Domain, Choice[Shape]]:
+    """The coarsest grid of some that loses no more of the smoke's detail than tolerated, and why."""
+    finest = max(grids[-1].resolution)
+    detail = _detail(clip, camera, grids[-1], plates, smoky)
+    domain = next((grid for grid in grids if detail.lost(max(grid.resolution)) <= DETAIL_TOLERANCE), grids[-1])
+    lost = detail.lost(max(domain.resolution))
+    reason = (
+        f"Resolution: {' x '.join(map(str, domain.resolution))} voxels, which lose {lost:.1%} of the smoke's contrast "
+        f"against {finest} along the longest side, the most at this quality."
+    )
+    return domain, Choice("resolution", domain.resolution, reason, {"lost": lost}, DETAIL_TOLERANCE)
+
+
+def _detail(clip: Clip, camera: Camera, finest: Domain, plates: Plates, smoky: tuple[int, ...]) -> Detail:
+    """The detail of the smoke in some frames, up to that of a grid."""
+    frames = []
+    for number in smoky[:DETAIL_FRAMES]:
+        with suppress(CameraError):
+            now, plate = camera.at(number), plates.at(number)
+            working = working_picture(now, finest)
+            frames.append((working.part(clip.frame(number)), plate.through(working.part), voxel_width(now, finest)))
+    return smoke_detail(frames, max(finest.resolution))
+
+
+def _voxels(extent: float, voxel: float) -> int:
+    """Voxels that cover an extent: a multiple of four, so that pyramids halve it evenly."""
+    return max(8, 4 * int(np.ceil(extent / voxel / 4 - 1e-6)))

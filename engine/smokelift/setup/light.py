@@ -1,0 +1,49 @@
+"""Light and scattering where a scene does not give them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from smokelift.scene import DirectionalLight, Light, Medium, Scattering
+from smokelift.setup.smoke import SmokeSamples
+
+BEYOND = 0.1
+"""Share by which the source radiance exceeds the 99th percentile of the smoke's: that smoke then has an optical depth
+of about 2.4, not an infinite one."""
+
+
+def richest_scattering(asked: Scattering | None, lights: tuple[Light, ...], medium: Medium) -> Scattering:
+    """The richest model of scattering that may be used: the one that is asked for, or what the known light allows.
+
+    Raises
+    ------
+    ValueError
+        If shadows are asked for without a light to cast them.
+    """
+    if asked == "single" and not lights:
+        raise ValueError(
+            'Scattering "single" needs a light that casts the shadows; give one in [[lights]], or leave it to "auto".'
+        )
+    if asked is not None:
+        return asked
+    if medium.albedo == 0:
+        return "absorption"
+    return "single" if lights else "unshadowed"
+
+
+def ambient_sun(samples: SmokeSamples, medium: Medium) -> DirectionalLight:
+    """Light such that thick, unshadowed smoke looks like the thickest in the clip.
+
+    Thick smoke shows its source radiance J: the brightest smoke where smoke brightens its background, the darkest
+    where it darkens it.
+    """
+    if samples.colours.shape[0] == 0:
+        source = np.ones(3)
+    else:
+        change = np.sum(samples.colours - samples.behind, -1)
+        if np.sum(np.maximum(change, 0)) >= np.sum(np.maximum(-change, 0)):
+            source = (1 + BEYOND) * np.percentile(samples.colours, 99, axis=0)
+        else:
+            source = (1 - BEYOND) * np.percentile(samples.colours, 1, axis=0)
+    irradiance = source * 4 * np.pi / medium.albedo
+    return DirectionalLight((0.0, 0.0, -1.0), (float(irradiance[0]), float(irradiance[1]), float(irradiance[2])))

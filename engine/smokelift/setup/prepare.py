@@ -1,0 +1,149 @@
+"""From what a user gives (a clip, perhaps a scene file) to a shot in which everything is decided.
+
+What a scene leaves out is estimated from the clip or defaulted, and every such choice is put into words.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import replace
+
+from smokelift.density.axis import SmokeAxis
+from smokelift.footage.clip import Clip
+from smokelift.footage.plate import Plate
+from smokelift.footage.working import CameraError, WorkingPicture, working_picture
+from smokelift.render import scene_optics
+from smokelift.scene import Background, Camera, CompleteScene, Domain, Medium, Scene
+from smokelift.setup.background import find_plates
+from smokelift.setup.further_views import disagreement, open_view
+from smokelift.setup.geometry import find_geometry
+from smokelift.setup.light import ambient_sun, richest_scattering
+from smokelift.setup.model import choose_model
+from smokelift.setup.settings import Settings
+from smokelift.setup.shot import Shot, ShotView
+from smokelift.setup.smoke import sample_smoke
+
+OPTICAL_DEPTH_AT_ONE = 5.0
+"""Optical depth of smoke of density 1 across the domain when the medium is not given: thick, not solid."""
+
+
+def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
+    """Complete a scene from its clip.
+
+    Parameters
+    ----------
+    clip
+        The footage.
+    scene
+        Whatever is known.
+    settings
+        What they leave open is chosen by measurement.
+
+    Raises
+    ------
+    ValueError
+        If the scene contradicts the clip or itself, or lacks what cannot be estimated.
+    """
+    _check(clip, scene)
+    found = find_plates(clip, scene.camera, scene.background)
+    plates = found.plates
+    samples = sample_smoke(clip, plates)
+    geometry = find_geometry(clip, scene, settings, plates, samples)
+    camera, domain = geometry.camera, geometry.domain
+    notes = [clip.warning] if clip.warning else []
+    notes += [*found.notes, *geometry.notes]
+    if settings.axis_depth is not None:
+        SmokeAxis.given(settings.axis_depth, camera, domain)  # before anything is spent on what cannot be
+    medium = scene.medium
+    if medium is None:
+        medium = _usual_medium(domain)
+        notes.append(
+            f"Medium not given: extinction {medium.extinction:.3g} 1/m (density 1 is thick smoke), "
+            f"albedo {medium.albedo:g}, isotropic."
+        )
+    asked = scene.scattering if settings.scattering == "auto" else settings.scattering
+    lights, richest = scene.lights, richest_scattering(asked, scene.lights, medium)
+    if not lights and richest != "absorption":
+        sun = ambient_sun(samples, medium)
+        lights = (sun,)
+        notes.append(
+            "Light not given: as much from everywhere as the thickest smoke shows, "
+            f"irradiance {', '.join(f'{v:.2f}' for v in sun.irradiance)}, without shadows."
+        )
+    complete = CompleteScene(
+        camera=camera,
+        domain=domain,
+        medium=medium,
+        lights=lights,
+        background=found.background or Background(),
+        scattering=richest,
+        clip=None if scene.clip is None else replace(scene.clip, fps=clip.fps),
+        views=scene.views,
+        closed=scene.closed,
+        inlets=scene.inlets,
+    )
+    choices = () if geometry.resolution is None else (geometry.resolution,)
+    if settings.model_selection:
+        model = choose_model(clip, complete, plates, samples.smoky, asked is not None, settings)
+        complete, settings = model.scene, replace(settings, velocity=model.velocity)
+        choices = (*choices, *model.choices)
+    views = [ShotView(clip, camera, plates, _working(camera, domain))]
+    for number in range(len(scene.views)):
+        view, said = open_view(number, clip, complete)
+        views.append(view)
+        notes += said
+    shot = Shot(
+        scene=complete,
+        optics=scene_optics(complete),
+        views=tuple(views),
+        settings=replace(settings, scattering=complete.scattering),
+        estimated_background=plates.image if found.background is None and isinstance(plates, Plate) else None,
+        notes=tuple(notes),
+        choices=choices,
+    )
+    return replace(shot, notes=(*notes, *disagreement(shot))) if scene.views else shot
+
+
+def boundaries(scene: CompleteScene, settings: Settings) -> tuple[str, ...]:
+    """How smoke gets in and out of the box of a complete scene, a sentence each."""
+    inflow = scene.inflow()
+    if inflow is None:
+        search = settings.method == "default" and settings.velocity.sources
+        entry = f"No inlet marked: {'where smoke enters is found from the densities' if search else 'none is assumed'}."
+    else:
+        places, voxels = (
+            f"{n} {what}{'s' * (n > 1)}"
+            for n, what in ((len(scene.inlets), "marked inlet"), (int(inflow.sum()), "voxel"))
+        )
+        entry = f"Smoke enters at {places} ({voxels}); others are not looked for."
+    if not scene.closed:
+        return entry, "All sides of the box are open."
+    walls = ", ".join(scene.closed)
+    return entry, f"Closed sides of the box: {walls}; the others are open."
+
+
+def _check(clip: Clip, scene: Scene) -> None:
+    """Refuse what can be seen to be wrong before anything is looked at."""
+    moves = scene.camera is not None and scene.camera.moves
+    if scene.views and (scene.camera is None or scene.domain is None):
+        raise ValueError("Further [[views]] need the input's [camera] and the [domain], in the same metres as theirs.")
+    if scene.views and (moves or any(view.camera.moves for view in scene.views)):
+        raise ValueError("With further [[views]] no camera may move; give one matrix a camera, or one view only.")
+    if scene.camera is not None and moves and len(scene.camera.matrices) != len(clip):
+        raise ValueError(
+            f"[camera] matrices are given for {len(scene.camera.matrices)} frames, and {len(clip)} frames of the clip "
+            "are used; give one matrix for each."
+        )
+
+
+def _usual_medium(domain: Domain) -> Medium:
+    width = min(high - low for low, high in zip(domain.min, domain.max, strict=True))
+    return Medium(extinction=OPTICAL_DEPTH_AT_ONE / width)
+
+
+def _working(camera: Camera, domain: Domain) -> WorkingPicture:
+    """The small picture of the first frame that shows the domain."""
+    for frame in range(len(camera.matrices)):
+        with suppress(CameraError):
+            return working_picture(camera.at(frame), domain)
+    return working_picture(camera, domain)

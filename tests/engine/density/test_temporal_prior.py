@@ -1,0 +1,117 @@
+"""How much of the carried density a frame starts from: as much as the picture bears out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from smokelift.density import BlendCarried, DepthEstimate, NothingCarried, Observation, RoundDepth, Start, ViewSet
+from smokelift.density.temporal_prior import AMOUNTS
+from smokelift.footage.plate import Plate
+from smokelift.render import Volume, render, scene_optics
+from smokelift.scene import completed
+
+LARGEST = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """A frame of the plume: its picture, what the depth prior says, the true density, and that of the frame before."""
+
+    views: ViewSet
+    depth: DepthEstimate
+    true: Volume
+    before: Volume
+
+    @property
+    def prior(self) -> Volume:
+        """The depth prior's density."""
+        return self.depth.density
+
+    def start(self, carried: Volume, largest: float = LARGEST) -> Start:
+        """Where the fit starts with a carried density."""
+        return BlendCarried(largest).start(self.views, self.depth, carried, self.before)
+
+
+@pytest.fixture(scope="module")
+def moment(plume) -> Moment:
+    """The third frame, before black with the noise of 8 bits."""
+    scene, before, true = plume.scene, *plume.densities[1:3]
+    image = render(true, scene)
+    plate = Plate(np.zeros_like(image), np.ones(image.shape[:2], np.float32), np.full(3, 1e-4))
+    views = ViewSet.of([Observation(scene.camera, image, plate)], scene_optics(completed(scene)))
+    return Moment(views, RoundDepth().estimate(views), true, before)
+
+
+def test_what_proves_right_is_taken_over(moment) -> None:
+    """Carried to where the picture shows it, the density gets nearly all of the share that it may have."""
+    start = moment.start(moment.true)
+    assert 0.9 * LARGEST < start.figures["share"] <= LARGEST
+    assert 0.9 * AMOUNTS < start.figures["amounts"] <= AMOUNTS
+    assert np.linalg.norm(start.density - moment.true) < 0.7 * np.linalg.norm(moment.prior - moment.true)
+
+
+@pytest.mark.parametrize("step", [-3, -1, 8])
+def test_a_wrong_motion_is_rejected(moment, step) -> None:
+    """Carried downward, or far too fast, the density is no better than left in place, and none of it is taken over."""
+    assert moment.start(np.roll(moment.before, step, axis=2)).figures["share"] == 0
+
+
+def test_the_better_the_motion_the_more(moment) -> None:
+    """Half of the way is worth less than all of it."""
+    half = (moment.true + moment.before) / 2
+    assert 0 < moment.start(half).figures["share"] < moment.start(moment.true).figures["share"]
+
+
+def test_amounts_that_are_worse_than_the_pictures_own_are_not_taken_over(moment) -> None:
+    """With hardly any smoke carried along, or far too much, the prior's density stays as it is but for the share."""
+    for wrong in (0.02, 12.0):
+        start = moment.start(np.float32(wrong) * moment.true, largest=0.0)
+        assert start.figures["amounts"] == 0
+        np.testing.assert_array_equal(start.density, moment.prior)
+
+
+def test_amounts_go_towards_carried(moment) -> None:
+    """Without a share in depth the smoke of every height lies between what the picture alone and what carried says."""
+    prior, start, true = (d.sum((0, 1)) for d in (moment.prior, moment.start(moment.true, 0.0).density, moment.true))
+    shadowed = true > 1.1 * prior
+    assert shadowed.sum() > 5
+    assert ((start > prior) & (start < true))[shadowed].all()
+
+
+@pytest.mark.parametrize("crumpled", [False, True])
+def test_what_does_not_look_like_smoke_along_the_rays_is_rejected(moment, crumpled) -> None:
+    """The picture hardly tells, but smoke in sheets across the rays is none."""
+    carried = moment.true.copy()
+    if crumpled:
+        carried[:, ::2] *= 2
+        carried[:, 1::2] = 0
+    figures = moment.start(carried).figures
+    assert (figures["share"] == 0) == crumpled
+    assert figures["loss_carried"] < figures["loss_before"]
+
+
+@pytest.mark.parametrize("empty", ["prior", "carried"])
+def test_without_smoke_the_priors_density_stays(moment, empty) -> None:
+    """Before smoke comes and after it has gone there is nothing to compare."""
+    nothing = np.zeros_like(moment.true)
+    prior, carried = (nothing, moment.true) if empty == "prior" else (moment.prior, nothing)
+    start = replace(moment, depth=replace(moment.depth, density=prior)).start(carried)
+    np.testing.assert_array_equal(start.density, prior)
+    assert start.figures == {"share": 0.0, "amounts": 0.0}
+
+
+def test_even_fog_is_no_failure(moment) -> None:
+    """Smoke that changes along the rays only, beyond all measure relative to across them, has a finite start."""
+    fog = np.broadcast_to(np.linspace(0.1, 0.2, 24, dtype=np.float32)[:, None], moment.true.shape).copy()
+    start = replace(moment, depth=replace(moment.depth, density=fog)).start(fog)
+    assert np.isfinite(start.density).all()
+
+
+def test_nothing_carried_is_the_priors_density(moment) -> None:
+    """Whatever comes along."""
+    start = NothingCarried().start(moment.views, moment.depth, moment.true, moment.before)
+    assert start.density is moment.prior
+    assert start.figures == {}
