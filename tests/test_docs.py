@@ -1,0 +1,98 @@
+"""The documents: every path that they or the code name exists, and pages keep their form."""
+
+import re
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+DOCS = ROOT / "docs"
+ENGINE = ROOT / "engine" / "smokelift"
+PAGES = [*sorted(ROOT.glob("*.md")), *sorted(DOCS.rglob("*.md"))]
+EXPERIMENTS = sorted((DOCS / "experiments").glob("*.md"))
+SOURCES = [
+    path
+    for folder in ("addon", "benchmarks", "cpp", "engine", "tools")
+    for path in sorted((ROOT / folder).rglob("*"))
+    if path.suffix in {".py", ".pyi", ".cpp", ".h", ".md"}
+]
+
+LINK = re.compile(r"\]\(([^)#\s]+)[^)]*\)")
+DOCUMENT = re.compile(r"\bdocs/[\w\-./]*\w")
+MODULE = re.compile(r"python -m (benchmarks[\w.]*)")
+ARROWS = re.compile(r"^ {4}(\w+(?: --> \w+)+)$", re.MULTILINE)
+IMPORT = re.compile(r"^\s*(?:from|import) smokelift\.([a-z]\w*)", re.MULTILINE)
+FUNCTION = re.compile(r"\b([\w/]+\.py):(\w+)")
+
+
+def name(path: Path) -> str:
+    """The path within the checkout."""
+    return str(path.relative_to(ROOT))
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_links_of_a_page_lead_somewhere(page: Path) -> None:
+    links = [link for link in LINK.findall(page.read_text()) if not link.startswith(("http:", "https:", "mailto:"))]
+    assert [link for link in links if not (page.parent / link).exists()] == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_benchmarks_that_a_page_runs_exist(page: Path) -> None:
+    paths = {module: ROOT / module.replace(".", "/") for module in MODULE.findall(page.read_text())}
+    assert [m for m, path in paths.items() if not (path.is_dir() or path.with_suffix(".py").is_file())] == []
+
+
+def test_documents_named_anywhere_exist() -> None:
+    missing = {
+        (name(path), document)
+        for path in (*PAGES, *SOURCES)
+        for document in DOCUMENT.findall(path.read_text())
+        if not (ROOT / document).exists()
+    }
+    assert missing == set()
+
+
+def test_the_architecture_names_what_there_is() -> None:
+    missing = [
+        f"{path}:{function}"
+        for path, function in FUNCTION.findall((ROOT / "ARCHITECTURE.md").read_text())
+        if not re.search(rf"^(def|class) {function}\b", (ENGINE / path).read_text(), re.MULTILINE)
+    ]
+    assert missing == []
+
+
+def test_imports_follow_the_arrows_of_the_architecture() -> None:
+    below: dict[str, set[str]] = {}
+    for chain in ARROWS.findall((ROOT / "ARCHITECTURE.md").read_text()):
+        for upper, lower in pairwise(chain.split(" --> ")):
+            below.setdefault(upper, set()).add(lower)
+
+    def reached(package: str) -> set[str]:
+        return {package}.union(*map(reached, below.get(package, ())))  # endless if the arrows had a circle
+
+    packages = [path for path in ENGINE.iterdir() if (path / "__init__.py").exists()]
+    imported = {
+        (package.name, other)
+        for package in packages
+        for path in package.rglob("*.py")
+        for other in IMPORT.findall(path.read_text())
+    }
+    assert {package.name for package in packages} == set(below) | set().union(*below.values())
+    assert {(package, other) for package, other in imported if other not in reached(package)} == set()
+
+
+def test_pictures_of_the_docs_are_shown() -> None:
+    text = "".join(page.read_text() for page in PAGES)
+    assert [path.name for path in sorted(DOCS.glob("*.*")) if path.suffix != ".md" and path.name not in text] == []
+
+
+@pytest.mark.parametrize("page", EXPERIMENTS, ids=name)
+def test_an_experiment_has_its_four_parts(page: Path) -> None:
+    parts = [line for line in page.read_text().splitlines() if line.startswith("## ")]
+    assert parts == ["## Question", "## Setting", "## Table", "## Answer"]
+
+
+@pytest.mark.parametrize("page", sorted(DOCS.glob("*.md")), ids=name)
+def test_a_result_page_names_no_target(page: Path) -> None:
+    assert not re.search(r"\basked\b", page.read_text())
