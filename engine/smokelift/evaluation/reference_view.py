@@ -76,7 +76,7 @@ def open_views(
     """
     scene = sequence.scene
     views = []
-    if (plates := open_plates(scene)) is not None:
+    if (plates := open_plates(scene.background, scene.camera)) is not None:
         plates.close()
         notes.append("The input view was left out: what stands behind the smoke there changes.")
     elif scene.clip is not None:

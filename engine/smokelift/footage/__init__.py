@@ -3,5 +3,5 @@
 ``clip`` gives the frames of a ``video`` or an ``image_sequence`` (each a ``frame_source``), ``images`` reads and
 resizes single pictures. ``plate`` is what is behind the smoke: ``background`` reads the one that a scene gives,
 ``plate_estimation`` finds one in the clip. ``noise`` measures the clip's noise, and ``matte`` finds the smoke, which
-differs from the plate by more. ``working`` cuts out the small picture that a grid is fitted to.
+differs from the plate by more. ``working_picture`` cuts out the small picture that a grid is fitted to.
 """

@@ -7,36 +7,42 @@ import numpy as np
 from smokelift.footage.clip import Clip, is_video
 from smokelift.footage.images import Picture, area_average, read_image
 from smokelift.footage.plate import Plates, changing_plate, known_plate
-from smokelift.scene import Camera, CompleteScene, Scene
+from smokelift.scene import Background, Camera, CompleteScene, Scene
 
 
-def open_plates(scene: Scene | CompleteScene) -> Clip | None:
-    """Open a scene's clean plate as a clip if it changes from frame to frame, and return None if it does not.
+def open_plates(background: Background | None, camera: Camera | None) -> Clip | None:
+    """Open a clean plate as a clip if it changes from frame to frame, and return None if it does not.
 
-    Its frames are counted as those of the clip's file. A numbered picture stands for itself before a still camera, and
-    for the sequence that it begins before one that moves.
+    Its frames are counted as those of the clip's file.
+
+    Parameters
+    ----------
+    background
+        What the scene gives.
+    camera
+        Before one that moves, a numbered picture stands for the sequence that it begins, else for itself.
 
     Raises
     ------
     ClipError
         If it cannot be read.
     """
-    image = scene.background.image if scene.background is not None else None
-    moves = scene.camera is not None and scene.camera.moves
+    image = None if background is None else background.image
+    moves = camera is not None and camera.moves
     if image is None or not (moves or "#" in image.name or is_video(image)):
         return None
     return Clip.open(image)
 
 
-def given_plates(scene: Scene | CompleteScene, clip: Clip) -> Plates | None:
+def given_plates(background: Background | None, camera: Camera | None, clip: Clip) -> Plates | None:
     """Return the background of every frame of a clip as its scene gives it; None if it has to be estimated.
 
     Parameters
     ----------
-    scene
-        For its background, and for whether its camera moves.
+    background, camera
+        As in `open_plates`.
     clip
-        The footage that its camera took.
+        The footage.
 
     Raises
     ------
@@ -45,10 +51,9 @@ def given_plates(scene: Scene | CompleteScene, clip: Clip) -> Plates | None:
     ValueError
         If there are fewer plates than frames.
     """
-    plates = open_plates(scene)
+    plates = open_plates(background, camera)
     if plates is not None:
         return changing_plate(plates, clip)
-    background = scene.background
     if background is None:
         return None
     if background.image is not None:
@@ -84,7 +89,7 @@ def background_picture(scene: Scene | CompleteScene, camera: Camera | None = Non
         return np.array(background.color, np.float32)
     if background is None or background.image is None:
         return np.zeros(3, np.float32)
-    plates = open_plates(scene)
+    plates = open_plates(background, scene.camera)
     if plates is None:
         picture = read_image(background.image)
     else:

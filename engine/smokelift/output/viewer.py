@@ -29,7 +29,7 @@ class Viewer:
     def __init__(self, scene: CompleteScene, camera: Camera | None = None, background: Image | None = None) -> None:
         self._scene, self._camera = scene, camera or scene.camera
         self._optics = scene_optics(scene)
-        self._plates = open_plates(scene) if background is None else None
+        self._plates = open_plates(scene.background, scene.camera) if background is None else None
         self._first = scene.clip.first if scene.clip is not None else 0
         self._given = background
         self._picture = background_picture(scene) if background is None else background

@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from smokelift.footage.working import voxel_width
 from smokelift.render.environment import EnvironmentCells
 from smokelift.render.renderer import Image, Renderer, Volume
 from smokelift.scene import Camera, DirectionalLight, Domain, EnvironmentLight, Medium
+from smokelift.scene.projection import voxel_width
 
 FEWEST, MOST = 4, 256
 """Lights that `environment_count` chooses between (docs/experiments/environment-directions.md)."""

@@ -12,7 +12,7 @@ from smokelift.scene.background import Background
 from smokelift.scene.camera import Camera
 from smokelift.scene.clip_source import ClipSource
 from smokelift.scene.description import Scene
-from smokelift.scene.domain import Domain, Inlet, Side, inflow
+from smokelift.scene.domain import Domain, Inlet, Side
 from smokelift.scene.lights import Light
 from smokelift.scene.medium import Medium, Scattering
 from smokelift.scene.view import View
@@ -52,7 +52,10 @@ class CompleteScene:
 
     def inflow(self) -> NDArray[np.bool_] | None:
         """Return the voxels where smoke enters, shape (nx, ny, nz); None if no inlet is marked."""
-        return inflow(self.inlets, self.domain)
+        if not self.inlets:
+            return None
+        entries: NDArray[np.bool_] = np.logical_or.reduce([inlet.voxels(self.domain) for inlet in self.inlets])
+        return entries
 
 
 def completed(scene: Scene | CompleteScene, camera: Camera | None = None) -> CompleteScene:

@@ -13,14 +13,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from smokelift.scene.background import Background
 from smokelift.scene.camera import Camera
 from smokelift.scene.checks import SceneError, set_fields, shown
 from smokelift.scene.clip_source import ClipSource
-from smokelift.scene.domain import Domain, Inlet, Side, checked_sides, inflow
+from smokelift.scene.domain import Domain, Inlet, Side, checked_sides
 from smokelift.scene.environment_light import EnvironmentLight
 from smokelift.scene.finite_lights import PointLight
 from smokelift.scene.lights import Light
@@ -124,10 +121,6 @@ class Scene:
                 view = replace(view, clip=replace(view.clip, frames=(start, start + last - first)))
             views.append(view)
         return replace(self, clip=replace(self.clip, frames=(first, last)), views=tuple(views))
-
-    def inflow(self) -> NDArray[np.bool_] | None:
-        """Return the voxels of the domain where smoke enters, shape (nx, ny, nz); None if no inlet is marked."""
-        return None if self.domain is None else inflow(self.inlets, self.domain)
 
     @classmethod
     def load(cls, path: str | Path) -> Scene:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -124,14 +123,6 @@ class Inlet:
         squares = x**2 + y**2 + z**2
         inside: NDArray[np.bool_] = squares <= max(self.radius**2, squares.min())
         return inside
-
-
-def inflow(inlets: Sequence[Inlet], domain: Domain) -> NDArray[np.bool_] | None:
-    """Return the voxels where smoke enters, shape (nx, ny, nz); None if no inlet is marked."""
-    if not inlets:
-        return None
-    entries: NDArray[np.bool_] = np.logical_or.reduce([inlet.voxels(domain) for inlet in inlets])
-    return entries
 
 
 def checked_sides(value: Any) -> tuple[Side, ...]:

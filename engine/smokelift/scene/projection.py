@@ -59,6 +59,13 @@ def ray_through_pixels(camera: Camera) -> tuple[Array, Array]:
     return origin, np.broadcast_to(-rotation[:, 2], origin.shape)
 
 
+def voxel_width(camera: Camera, domain: Domain) -> float:
+    """Return the width in pixels of a voxel at the domain's centre."""
+    _, depth = project(camera, np.array(domain.centre))
+    near = domain.voxel_size if camera.type == "perspective" else 1.0
+    return max(camera.fx, camera.fy) * domain.voxel_size / max(float(depth), near)
+
+
 def sees(camera: Camera, domain: Domain) -> bool:
     """Return False if all of the box lies outside one side of what a still camera sees.
 

@@ -10,7 +10,7 @@ from smokelift.footage.background import given_plates
 from smokelift.footage.clip import Clip
 from smokelift.footage.plate import Plates, known_plate
 from smokelift.footage.plate_estimation import estimate_plate, one_colour
-from smokelift.scene import Background, Camera, Scene
+from smokelift.scene import Background, Camera
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,7 @@ def find_plates(clip: Clip, camera: Camera | None, background: Background | None
         If a camera moves before a background of more than one colour that is not given.
     """
     moves = camera is not None and camera.moves
-    given = given_plates(Scene(camera=camera, background=background), clip)
+    given = given_plates(background, camera, clip)
     if given is not None:
         return FoundPlates(given, background)
     plate = estimate_plate(clip)

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.footage.plate import Plate
-from smokelift.footage.working import CameraError, WorkingPicture, voxel_width, working_picture
+from smokelift.footage.working_picture import CameraError, WorkingPicture, working_picture
 from smokelift.render import Image
 from smokelift.scene import Camera, CompleteScene, Domain, Scattering
+from smokelift.scene.projection import voxel_width
 
 LONGEST = 32
 """Voxels along the longest side at most: a few per cent of the work of 96, with every large shadow in its place."""

@@ -9,7 +9,7 @@ import numpy as np
 from smokelift.density import ViewSet
 from smokelift.density.hull import agreement
 from smokelift.footage.clip import Clip, is_video
-from smokelift.footage.working import CameraError, working_picture
+from smokelift.footage.working_picture import CameraError, working_picture
 from smokelift.scene import ClipSource, CompleteScene
 from smokelift.setup.background import find_plates
 from smokelift.setup.geometry import fitting

@@ -10,8 +10,9 @@ import numpy as np
 
 from smokelift.footage.clip import Clip
 from smokelift.footage.plate import Plates
-from smokelift.footage.working import CameraError, voxel_width, working_picture
+from smokelift.footage.working_picture import CameraError, working_picture
 from smokelift.scene import Camera, Domain, Scene, as_matrix
+from smokelift.scene.projection import voxel_width
 from smokelift.setup.choice import Choice
 from smokelift.setup.detail import TOLERANCE as DETAIL_TOLERANCE
 from smokelift.setup.detail import Detail, smoke_detail

@@ -11,7 +11,7 @@ from dataclasses import replace
 from smokelift.density.axis import SmokeAxis
 from smokelift.footage.clip import Clip
 from smokelift.footage.plate import Plate
-from smokelift.footage.working import CameraError, WorkingPicture, working_picture
+from smokelift.footage.working_picture import CameraError, WorkingPicture, working_picture
 from smokelift.render import scene_optics
 from smokelift.scene import Background, Camera, CompleteScene, Domain, Medium, Scene
 from smokelift.setup.background import find_plates

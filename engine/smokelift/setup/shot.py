@@ -9,7 +9,7 @@ from typing import Any
 from smokelift.density import Observation
 from smokelift.footage.clip import Clip
 from smokelift.footage.plate import Plates
-from smokelift.footage.working import CameraError, WorkingPicture, working_picture
+from smokelift.footage.working_picture import CameraError, WorkingPicture, working_picture
 from smokelift.render import Image, Optics
 from smokelift.scene import Camera, CompleteScene, Domain, Inlet
 from smokelift.setup.choice import Choice

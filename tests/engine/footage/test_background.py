@@ -28,26 +28,26 @@ def folder(tmp_path: Path) -> Path:
 
 def test_a_background_that_is_not_given_has_no_plates(folder: Path) -> None:
     clip = pan(folder / "clip", passing_wall(), 1.0)
-    assert given_plates(Scene(), clip) is None
-    assert given_plates(Scene(background=Background()), clip) is None
+    assert given_plates(None, None, clip) is None
+    assert given_plates(Background(), None, clip) is None
 
 
 def test_a_colour_or_a_picture_is_one_plate_for_all_frames(folder: Path) -> None:
     clip = pan(folder / "clip", passing_wall(), 1.0)
-    plates = given_plates(Scene(background=Background(color=(0.1, 0.2, 0.3))), clip)
+    plates = given_plates(Background(color=(0.1, 0.2, 0.3)), None, clip)
     assert isinstance(plates, Plate)
     assert plates.at(0) is plates.at(COUNT - 1)
     np.testing.assert_allclose(plates.image[5, 7], (0.1, 0.2, 0.3), atol=1e-4)
-    scene = Scene(background=Background(image=folder / "plate" / "frame_003.png"))
-    plates = given_plates(scene, clip)
+    picture = Background(image=folder / "plate" / "frame_003.png")
+    plates = given_plates(picture, None, clip)
     assert isinstance(plates, Plate)
     assert codes_apart(plates.image, passing_wall()[:, 6 : 6 + WIDTH]).max() < 6
-    assert open_plates(scene) is None
+    assert open_plates(picture, None) is None
 
 
 def test_pictures_are_a_plate_a_frame_and_are_cut_like_one(folder: Path) -> None:
     clip = pan(folder / "clip", passing_wall(), 1.0)
-    plates = given_plates(Scene(background=Background(image=folder / "plate" / "frame_###.png")), clip)
+    plates = given_plates(Background(image=folder / "plate" / "frame_###.png"), CAMERA, clip)
     assert isinstance(plates, ChangingPlate)
     part = plates.through(lambda picture: picture[8:40]).through(lambda picture: picture[:, 4:])
     for n in (0, 9):
@@ -57,8 +57,7 @@ def test_pictures_are_a_plate_a_frame_and_are_cut_like_one(folder: Path) -> None
 
 def test_a_numbered_picture_begins_a_sequence_before_a_moving_camera(folder: Path) -> None:
     moving = replace(CAMERA, matrices=(CAMERA.matrix,) * COUNT)
-    scene = Scene(camera=moving, background=Background(image=folder / "plate" / "frame_000.png"))
-    plates = open_plates(scene)
+    plates = open_plates(Background(image=folder / "plate" / "frame_000.png"), moving)
     assert plates is not None
     assert len(plates) == COUNT
 

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from smokelift.scene import Domain, Inlet
-from smokelift.scene.domain import inflow
 
 
 def test_domain_helpers() -> None:
@@ -33,18 +32,3 @@ def test_an_inlet_is_the_voxels_in_its_ball() -> None:
 def test_a_small_inlet_is_the_nearest_voxel(centre, voxel) -> None:
     domain = Domain((-1, -1, 0), (1, 1, 3), (64, 64, 96))
     np.testing.assert_array_equal(np.argwhere(Inlet(centre, 0.006).voxels(domain)), [voxel])
-
-
-def test_inlets_add_up() -> None:
-    domain = Domain((-1, -1, 0), (1, 1, 3), (64, 64, 96))
-    inlets = Inlet((0, 0, 0), 0.2), Inlet((0.5, 0.5, 1), 0.1)
-    np.testing.assert_array_equal(inflow(inlets, domain), inlets[0].voxels(domain) | inlets[1].voxels(domain))
-    assert inflow((), domain) is None
-
-
-def test_other_voxels_about_the_same_centre() -> None:
-    domain = Domain((0.0, 0.0, 1.0), (1.0, 2.0, 2.0), (10, 20, 10))
-    coarse = domain.about_centre((2, 5, 2), 0.4)
-    assert coarse.resolution == (2, 5, 2)
-    assert coarse.voxel_size == pytest.approx(0.4)
-    assert coarse.centre == pytest.approx(domain.centre)

@@ -62,7 +62,6 @@ def test_walls_of_a_box_that_is_not_given(tmp_path: Path) -> None:
     """They wait for the one that will be found."""
     scene = load(tmp_path, '[domain]\nclosed = ["z-"]\n')
     assert scene == Scene(closed=("z-",))
-    assert scene.inflow() is None
     with pytest.raises(SceneError, match="lacks min"):
         load(tmp_path, "[domain]\n")
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from smokelift.footage.images import area_average
 from smokelift.scene import Camera, Domain
-from smokelift.scene.projection import project
+from smokelift.scene.projection import project, voxel_width
 
 
 @dataclass(frozen=True)
@@ -42,13 +42,6 @@ class WorkingPicture:
 
 class CameraError(ValueError):
     """The camera does not see the domain."""
-
-
-def voxel_width(camera: Camera, domain: Domain) -> float:
-    """Return the width in pixels of a voxel at the domain's centre."""
-    _, depth = project(camera, np.array(domain.centre))
-    near = domain.voxel_size if camera.type == "perspective" else 1.0
-    return max(camera.fx, camera.fy) * domain.voxel_size / max(float(depth), near)
 
 
 def working_picture(camera: Camera, domain: Domain) -> WorkingPicture:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from smokelift.footage.working import CameraError, working_picture
+from smokelift.footage.working_picture import CameraError, working_picture
 from smokelift.scene import Camera, Domain
 from smokelift.scene.projection import project
 
