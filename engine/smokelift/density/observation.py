@@ -16,7 +16,6 @@ from smokelift.footage.matte import matte
 from smokelift.footage.noise import EIGHT_BIT_STEP
 from smokelift.footage.plate import Plate, noise_at
 from smokelift.render import Image, Optics
-from smokelift.render.light_sweeps import unshadowed_source
 from smokelift.scene import Camera, Inlet
 
 THINNEST_CLEAR = 0.05
@@ -163,7 +162,7 @@ def unshadowed_optical_depth(
     """
     source = np.zeros(3)
     if optics.scattering != "absorption":
-        source = unshadowed_source(optics.lights, optics.medium, optics.domain)
+        source = optics.unshadowed_source()
     contrast = plate.image - source
     power = np.sum(contrast**2, -1)
     clear = np.sum((image - source) * contrast, -1) / np.maximum(power, 1e-12)

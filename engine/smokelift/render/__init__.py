@@ -9,10 +9,9 @@
 `render` and `render_gradient` go all the way from a density and a scene (``image``).
 """
 
-from smokelift.footage.background import background_picture as scene_background
 from smokelift.render.device import DeviceError, start
 from smokelift.render.image import render, render_gradient
-from smokelift.render.optics import Optics, scene_lights, scene_optics, scene_renderer
+from smokelift.render.optics import Optics, scene_optics, scene_renderer
 from smokelift.render.renderer import Image, Renderer, Volume
 
 __all__ = [
@@ -23,8 +22,6 @@ __all__ = [
     "Volume",
     "render",
     "render_gradient",
-    "scene_background",
-    "scene_lights",
     "scene_optics",
     "scene_renderer",
     "start",

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.render.camera_rays import LATERAL
-from smokelift.scene import DirectionalLight, Domain, FiniteLight, Medium, PointLight
+from smokelift.scene import DirectionalLight, Domain, FiniteLight, PointLight
 
 Array = NDArray[np.float64]
 Box = tuple[int, int, int]
@@ -149,16 +149,6 @@ def lighting(lights: Sequence[FiniteLight], domain: Domain, corner: Box, shape: 
         for light, energy in zip(bright, energies, strict=True)
     ]
     return Lighting(tuple(sweeps), colour)
-
-
-def unshadowed_source(lights: Sequence[FiniteLight], medium: Medium, domain: Domain) -> Array:
-    """Radiance (3,) that isotropic smoke in the middle of the domain scatters per unit extinction, unshadowed."""
-    centre = (np.array(domain.min) + np.array(domain.max)) / 2
-    total = np.zeros(3)
-    for light in lights:
-        colour = np.array(_colour(light))
-        total += colour / np.sum((centre - light.position) ** 2) if isinstance(light, PointLight) else colour
-    return medium.albedo / (4 * np.pi) * total
 
 
 def _colour(light: FiniteLight) -> tuple[float, float, float]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from smokelift.footage.background import background_picture
 from smokelift.render.light_sampling import sampled_lights
 from smokelift.render.renderer import Image, Renderer
-from smokelift.scene import Camera, CompleteScene, Domain, FiniteLight, Medium, Scattering, Scene, completed
+from smokelift.scene import Camera, CompleteScene, Domain, FiniteLight, Medium, PointLight, Scattering
 
 
 @dataclass(frozen=True)
@@ -36,15 +36,20 @@ class Optics:
         """The renderer of a camera before a background; see `Renderer` for the parameters."""
         return Renderer(camera, self.domain, self.medium, self.lights, background, self.scattering, support)
 
+    def unshadowed_source(self) -> NDArray[np.float64]:
+        """Source radiance (3,), W/m^2/sr, of isotropic smoke in the middle of the domain, with nothing before it."""
+        total = np.zeros(3)
+        for light in self.lights:
+            if isinstance(light, PointLight):
+                total += np.array(light.intensity) / np.sum((np.array(self.domain.centre) - light.position) ** 2)
+            else:
+                total += light.irradiance
+        return self.medium.albedo / (4 * np.pi) * total
+
 
 def scene_optics(scene: CompleteScene) -> Optics:
     """The optics of a scene; see `sampled_lights` for its lights."""
     return Optics(scene.domain, scene.medium, sampled_lights(scene), scene.scattering)
-
-
-def scene_lights(scene: Scene | CompleteScene) -> tuple[FiniteLight, ...]:
-    """The lights of `scene_optics`."""
-    return scene_optics(completed(scene)).lights
 
 
 def scene_renderer(scene: CompleteScene, camera: Camera | None = None, background: Image | None = None) -> Renderer:

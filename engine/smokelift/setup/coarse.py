@@ -78,10 +78,8 @@ def coarse_domain(domain: Domain, pixels: float) -> Domain:
     times_finer = min(max(longest / max(most, FEWEST), 1.0), min(domain.resolution))
     voxel = domain.voxel_size * times_finer
     # never beyond the box, where a light may stand
-    counts = [max(1, math.floor(n / times_finer + 1e-6)) for n in domain.resolution]
-    low, high = (np.array(domain.centre) + side * np.array(counts) * voxel / 2 for side in (-1, 1))
-    (x0, y0, z0), (x1, y1, z1) = (tuple(float(v) for v in corner) for corner in (low, high))
-    return Domain((x0, y0, z0), (x1, y1, z1), (counts[0], counts[1], counts[2]))
+    x, y, z = (max(1, math.floor(n / times_finer + 1e-6)) for n in domain.resolution)
+    return domain.about_centre((x, y, z), voxel)
 
 
 def coarse_frame(frame: Image, camera: Camera, scene: CompleteScene, plate: Plate) -> CoarseFrame | None:
