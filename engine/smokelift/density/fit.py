@@ -30,7 +30,7 @@ range to 0 for a whole process, so a run that is resumed would otherwise differ 
 LEAST_SHARE = 0.3
 """Share that counts at least of rays whose smoke the prior puts outside the domain. With less, smoke that stands
 elsewhere is missing in the picture; with more, density spikes grow at floor and ceiling
-(docs/experiments/density-bound.md)."""
+(docs/experiments/density-profile.md)."""
 
 DENSEST = 3.0
 """Bound of the density, in multiples of the densest voxel of the prior's estimate (or of a denser start). Where smoke
