@@ -1,18 +1,19 @@
 """Smokelift: one ordinary video of smoke in, a 3D, moving, relightable volume out.
 
-The data flows clip -> shot -> density (renderer) <-> velocity, transport -> sequence.
+The data flows footage -> setup -> density (render) <-> velocity (transport) -> output; `pipeline` is the loop.
 """
 
 from smokelift.density import Density, DensitySettings, Observation, reconstruct_density
 from smokelift.evaluation import metrics
 from smokelift.footage.clip import Clip
 from smokelift.output.sequence import Sequence
-from smokelift.pipeline import Frame, reconstruct
+from smokelift.pipeline import Frame, Method, compose, reconstruct
 from smokelift.render import render, render_gradient
 from smokelift.scene import (
     Background,
     Camera,
     ClipSource,
+    CompleteScene,
     DirectionalLight,
     Domain,
     EnvironmentLight,
@@ -33,6 +34,7 @@ __all__ = [
     "Camera",
     "Clip",
     "ClipSource",
+    "CompleteScene",
     "Density",
     "DensitySettings",
     "DirectionalLight",
@@ -41,6 +43,7 @@ __all__ = [
     "Frame",
     "Inlet",
     "Medium",
+    "Method",
     "Observation",
     "PointLight",
     "Scene",
@@ -51,6 +54,7 @@ __all__ = [
     "View",
     "__version__",
     "advect",
+    "compose",
     "estimate_velocity",
     "metrics",
     "project",

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift import _core
+import smokelift._core as _core
 from smokelift.render.light_sweeps import ParallelSweep, PointSweep
 from smokelift.render.plan import RenderPlan
 

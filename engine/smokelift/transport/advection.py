@@ -7,7 +7,7 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from smokelift import _core
+import smokelift._core as _core
 from smokelift.transport.grid import (
     Array,
     StaggeredGrid,

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from smokelift import _core
+import smokelift._core as _core
 from smokelift.scene import Side
 from smokelift.transport.grid import Array, StaggeredGrid, Velocity
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
-from smokelift import _core
+import smokelift._core as _core
 from smokelift.scene import Side
 from smokelift.transport import Array, Faces, ResidualMeans, StaggeredGrid, Velocity, advect_cells
 from smokelift.velocity.estimator import (

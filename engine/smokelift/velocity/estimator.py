@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
-from smokelift import _core
+import smokelift._core as _core
 from smokelift.scene import Side
 from smokelift.transport import (
     Array,

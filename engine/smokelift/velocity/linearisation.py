@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from smokelift import _core
+import smokelift._core as _core
 from smokelift.transport import Array, Faces, StaggeredGrid
 from smokelift.velocity.pyramid import Level
 from smokelift.velocity.sources import SourceDetection

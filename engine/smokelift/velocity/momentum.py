@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from smokelift import _core
+import smokelift._core as _core
 from smokelift.transport import Array, StaggeredGrid, Velocity
 from smokelift.velocity.linearisation import Linearisation
 

@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
-from smokelift import _core
+import smokelift._core as _core
 from smokelift.transport import Array
 from smokelift.velocity.settings import VelocitySettings
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from smokelift import _core
+import smokelift._core as _core
 from smokelift.transport import Array, ResidualMeans, StaggeredGrid
 
 

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Protocol
 
-from smokelift import _core
+import smokelift._core as _core
 from smokelift.transport import StaggeredGrid
 
 

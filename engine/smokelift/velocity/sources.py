@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from smokelift import _core
+import smokelift._core as _core
 from smokelift.transport import Array, ResidualMeans
 
 FAINT = np.float32(1e-4)
