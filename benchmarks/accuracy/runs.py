@@ -5,7 +5,7 @@ A name is a quality or "paper", then further views, then changes:
 - ``balanced``, ``paper``
 - ``balanced+90``, ``balanced+90+45``: the views 90 and 45 are input too; of a capture ``balanced+camera00``
 - ``balanced:transport=0``, ``fine:velocity.levels=2``, ``draft:resolution=32x32x48``: settings that differ
-- ``balanced:without=depth``: a part of the method is left out, see `leave_out`
+- ``balanced:without=depth``: a part of the method is left out, see `ablations.leave_out`
 - ``smear``: the front picture alone is fitted, with a density that is constant along the rays
 """
 
@@ -17,17 +17,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, get_args
 
-import numpy as np
-
+from benchmarks.accuracy.ablations import leave_out, smear
 from benchmarks.accuracy.scenes import VIEWS, BakedViews, camera_of
 from smokelift import ClipSource, Scene, Settings, View
-from smokelift.density import DensitySettings, GradientFit, RoundDepth, ViewSet
+from smokelift.density import DensitySettings, GradientFit, ViewSet
 from smokelift.output.images import write_image
+from smokelift.pipeline import Method, compose
+from smokelift.render import Volume
 from smokelift.setup.settings import Quality
 from smokelift.setup.shot import Shot
 
 SMEAR = "smear"
-SMEAR_SETTINGS = DensitySettings(fit_iterations=24, descent_iterations=0, tolerance=1e-3)
+SMEAR_FIT = GradientFit(DensitySettings(fit_iterations=24, descent_iterations=0, tolerance=1e-3))
 """Only whole rays are scaled, so that a density which is constant along them stays so."""
 
 
@@ -66,24 +67,49 @@ def run_settings(run: str) -> Settings:
     Raises
     ------
     ValueError
-        If there is no such quality or part of the method.
+        If there is no such quality.
     """
-    name, _, changes = run.partition(":")
-    name = name.split("+")[0]
+    name = run.partition(":")[0].split("+")[0]
     qualities: dict[str, Quality] = {quality: quality for quality in get_args(Quality)}
     if name != "paper" and name not in qualities:
         raise ValueError(f"{run}: expected paper or one of {', '.join(qualities)} before a colon.")
     settings = Settings.preset(method="paper") if name == "paper" else Settings.preset(qualities[name])
-    for change in filter(None, changes.split(",")):
-        key, _, text = change.partition("=")
+    for key, text in _changes(run):
         if key == "without":
-            settings = leave_out(text, settings)
-        elif key == "resolution":
+            continue
+        if key == "resolution":
             x, y, z = (int(count) for count in text.split("x"))
             settings = replace(settings, resolution=(x, y, z))
         else:
             settings = _changed(settings, key, text)
     return settings
+
+
+def run_method(run: str, settings: Settings) -> Method:
+    """Return the composition of a run's name, for settings with nothing left open.
+
+    Raises
+    ------
+    ValueError
+        If a part that is left out is none of the method's.
+    """
+    method = compose(settings)
+    for key, text in _changes(run):
+        if key == "without":
+            method = leave_out(text, method)
+    return method
+
+
+def smeared(shot: Shot) -> Iterator[Volume]:
+    """Yield densities that are constant along the rays and fit the front picture."""
+    for index in range(len(shot.clip)):
+        yield smear(ViewSet.of(shot.observe(index), shot.optics), SMEAR_FIT)
+
+
+def _changes(run: str) -> list[tuple[str, str]]:
+    """Return the keys and values behind the colon of a run's name."""
+    pairs = [change.partition("=") for change in run.partition(":")[2].split(",") if change]
+    return [(key, text) for key, _, text in pairs]
 
 
 def _changed(settings: Settings, key: str, text: str) -> Settings:
@@ -96,25 +122,3 @@ def _changed(settings: Settings, key: str, text: str) -> Settings:
     if group:
         field, value = group, replace(getattr(settings, group), **{field: value})
     return replace(settings, **{field: value})
-
-
-def leave_out(part: str, settings: Settings) -> Settings:
-    """Do without a part of the method: the settings for that, and what settings do not say, for the whole process.
-
-    - transport: every frame begins with its own picture
-    - sources: smoke that enters is read as motion
-    """
-    if part == "transport":
-        return replace(settings, transport=0.0)
-    if part == "sources":
-        return replace(settings, velocity=replace(settings.velocity, sources=None))
-    raise ValueError(f"without={part}: expected transport or sources.")
-
-
-def smeared(shot: Shot) -> Iterator[np.ndarray]:
-    """The front fit with a density that is constant along the rays inside the domain."""
-    domain, medium = shot.scene.domain, shot.scene.medium
-    fog = np.full(domain.resolution, 0.5 / (medium.extinction * (domain.max[1] - domain.min[1])), np.float32)
-    for index in range(len(shot.clip)):
-        views = ViewSet.of(shot.observe(index), shot.optics)
-        yield GradientFit(SMEAR_SETTINGS).fit(views, RoundDepth().estimate(views), fog).values

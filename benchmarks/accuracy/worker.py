@@ -18,12 +18,11 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.accuracy.runs import SMEAR, further_view, run_settings, run_views, smeared
+from benchmarks.accuracy.runs import SMEAR, further_view, run_method, run_settings, run_views, smeared
 from benchmarks.machine import peak_mib
 from benchmarks.timing import FrameTimes
 from smokelift import Clip, Scene, Settings, reconstruct
 from smokelift.setup.prepare import prepare_shot
-from smokelift.setup.shot import Shot
 from smokelift.transport import Array
 
 
@@ -43,7 +42,10 @@ def main() -> None:
         if run == SMEAR:
             found: Iterator[dict[str, Array]] = ({"density": density} for density in smeared(shot))
         else:
-            found = _reconstructed(clip, scene, settings, Path(folder) / "smoke", shot)
+            frames = reconstruct(
+                clip, scene, out=Path(folder) / "smoke", shot=shot, method=run_method(run, shot.settings)
+            )
+            found = ({"density": frame.density, "velocity": frame.velocity.centres()} for frame in frames)
         shape = shot.scene.domain.resolution
         times = FrameTimes(shape)
         for number, arrays in enumerate(times.over(found), 1):
@@ -58,11 +60,6 @@ def main() -> None:
         "method": "baseline" if run == SMEAR else settings.method,
     }
     (out / "run.json").write_text(json.dumps(result) + "\n")
-
-
-def _reconstructed(clip: Clip, scene: Scene, settings: Settings, out: Path, shot: Shot) -> Iterator[dict[str, Array]]:
-    for frame in reconstruct(clip, scene, settings, out, shot=shot):
-        yield {"density": frame.density, "velocity": frame.velocity.centres()}
 
 
 if __name__ == "__main__":

@@ -1,0 +1,106 @@
+"""The default method without one of its parts: compositions for experiments."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from smokelift.density import (
+    Density,
+    DensityFit,
+    DepthEstimate,
+    GradientFit,
+    NothingCarried,
+    ObservedClip,
+    RoundDepth,
+    View,
+    ViewSet,
+)
+from smokelift.density.screen import view_frame
+from smokelift.pipeline import Method
+from smokelift.render import Volume
+from smokelift.scene import Domain
+from smokelift.transport import Velocity, advect
+from smokelift.velocity import CoarseToFine
+
+
+@dataclass(frozen=True)
+class EvenDepth:
+    """A depth prior: smoke is spread evenly along each ray through the domain."""
+
+    def of_clip(self, clip: ObservedClip) -> EvenDepth:
+        """Return itself: it needs no look at the clip."""
+        return self
+
+    def estimate(self, views: ViewSet) -> DepthEstimate:
+        """Return the mean of the even densities of all views."""
+        domain, hull = views.optics.domain, views.hull
+        density = np.zeros(domain.resolution, np.float32)
+        even = [view.projection.read(view.optical_depth, hull) / thickness(view, domain) for view in views.views]
+        density[hull] = np.mean(even, axis=0) / views.optics.medium.extinction
+        return DepthEstimate(density, tuple(np.ones_like(view.optical_depth) for view in views.views))
+
+
+@dataclass(frozen=True)
+class WithoutHull:
+    """A density fit that may put smoke wherever a camera looks."""
+
+    density_fit: DensityFit
+
+    def fit(self, views: ViewSet, depth: DepthEstimate, initial: Volume | None) -> Density:
+        """Fit within the cameras' frusta."""
+        visible = np.any([view.projection.visible for view in views.views], axis=0)
+        return self.density_fit.fit(replace(views, hull=visible), depth, initial)
+
+
+@dataclass(frozen=True)
+class UnprojectedPrediction(CoarseToFine):
+    """The default velocity estimator, but its prediction keeps its divergence."""
+
+    def predict(self, velocity: Velocity, dt: float) -> Velocity:
+        """Return the velocity carried along by itself."""
+        return replace(advect(velocity, velocity, dt), residual=velocity.residual)
+
+
+def leave_out(part: str, method: Method) -> Method:
+    """Return the default method without a part of it.
+
+    - transport: every frame starts from its own pictures
+    - hull: smoke may be wherever a camera looks
+    - depth: the initial density is even along the rays
+    - sources: smoke that enters is taken for motion
+    - projection: the predicted velocity keeps its divergence
+
+    Raises
+    ------
+    ValueError
+        If there is no such part.
+    """
+    estimator = method.velocity_estimator
+    if part == "transport":
+        return replace(method, temporal_prior=NothingCarried())
+    if part == "hull":
+        return replace(method, density_fit=WithoutHull(method.density_fit))
+    if part == "depth":
+        return replace(method, depth_prior=EvenDepth())
+    if part == "sources" and isinstance(estimator, CoarseToFine):
+        settings = replace(estimator.settings, sources=None)
+        return replace(method, velocity_estimator=replace(estimator, settings=settings))
+    if part == "projection" and isinstance(estimator, CoarseToFine):
+        return replace(method, velocity_estimator=UnprojectedPrediction(estimator.settings))
+    raise ValueError(f"without={part}: expected transport, hull, depth, sources or projection of the default method.")
+
+
+def smear(views: ViewSet, fit: GradientFit) -> Volume:
+    """Return a density that is constant along the rays of one view; the fit must scale whole rays only."""
+    optics = views.optics
+    fog = 0.5 / (optics.medium.extinction * thickness(views.views[0], optics.domain))
+    start = np.full(optics.domain.resolution, fog, np.float32)
+    return fit.fit(views, RoundDepth().estimate(views), start).values
+
+
+def thickness(view: View, domain: Domain) -> float:
+    """Return how deep the domain is along a view (m)."""
+    _, depth, _ = view_frame(view.camera)
+    return float((np.array(domain.max) - domain.min) @ np.abs(depth))
