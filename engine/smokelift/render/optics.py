@@ -1,4 +1,4 @@
-"""All that a picture depends on besides the density, the camera and what stands behind: one value to hand around."""
+"""How light travels through the smoke of a scene: all that a picture needs besides density, camera and background."""
 
 from __future__ import annotations
 

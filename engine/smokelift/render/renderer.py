@@ -27,7 +27,7 @@ class Renderer:
     Parameters
     ----------
     camera, domain, medium
-        What is seen, from where.
+        What is seen, from where; the camera stands still.
     lights
         Directional and point lights; none leave absorption only.
     background : (rows, columns, 3) or (3,)
@@ -42,7 +42,7 @@ class Renderer:
     Raises
     ------
     ValueError
-        If a point light stands inside the smoke's box.
+        If a point light stands inside the domain.
     """
 
     def __init__(
@@ -63,7 +63,20 @@ class Renderer:
         self._depth: Image = np.zeros(camera.size[::-1], np.float32)
 
     def image(self, density: Volume, *, keep_record: bool = False) -> Image:
-        """Render a density (nx, ny, nz); linear radiance (rows, columns, 3)."""
+        """Render a density.
+
+        Parameters
+        ----------
+        density : (nx, ny, nz) float32
+            At voxel centres, finite and >= 0.
+        keep_record
+            Keep what `gradient` needs: channels + 1 numbers a sample of every ray.
+
+        Returns
+        -------
+        (rows, columns, 3) float32
+            Linear radiance, row 0 at the top.
+        """
         scattered, self._depth = self._backend.image(density, keep_record)
         return np.asarray(scattered @ self._colour + self.transmittance[..., None] * self._background)
 
@@ -73,9 +86,17 @@ class Renderer:
         return np.asarray(np.exp(-self._depth))
 
     def gradient(self, image_gradient: Image) -> Volume:
-        """Pull dloss / dimage (rows, columns, 3) back to dloss / ddensity (nx, ny, nz).
+        """Pull the derivative of a loss back through the last `image` made with ``keep_record``; uses its record up.
 
-        Belongs to the last `image` made with ``keep_record``, and uses its record up.
+        Parameters
+        ----------
+        image_gradient : (rows, columns, 3)
+            dloss / dimage.
+
+        Returns
+        -------
+        (nx, ny, nz) float32
+            dloss / ddensity, 0 outside the support.
         """
         of_image = np.asarray(image_gradient, np.float32)
         of_transmittance = np.einsum("...c,...c", of_image, np.broadcast_to(self._background, of_image.shape))
