@@ -88,7 +88,7 @@ def step(renderer: Renderer, target: Image, density: Volume, count: int) -> Volu
     everywhere = np.ones(density.shape, bool)
     term = Term(seen(target), renderer, np.ones(target.shape[:2], np.float32))
     for _ in range(count // RESTART):
-        density = descend([term], density, everywhere, RESTART, 0.0).density
+        density = descend([term], density, everywhere, RESTART, 0.0, RESTART).density
     return density
 
 

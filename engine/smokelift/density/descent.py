@@ -18,11 +18,8 @@ from smokelift.density.objective import Fit, Term, noise_floor, objective
 from smokelift.render import Image, Volume
 
 FLOOR = 0.1
-"""Scale of an empty voxel of the hull, in mean densities of the start: it may fill, but more slowly than others."""
-
-PATIENCE = 2
-"""Steps in a row without gain that end the descent. Of Barzilai and Borwein's steps one may gain little and the next
-much (docs/experiments/density-descent.md)."""
+"""Scale of an empty voxel of the hull, in mean densities of the start: it may fill, but more slowly than others
+(docs/experiments/density-descent.md)."""
 
 SUFFICIENT = 1e-4
 """Armijo's constant: share of the linear prediction that a step has to gain."""
@@ -40,6 +37,8 @@ def descend(
     hull: NDArray[np.bool_],
     iterations: int,
     tolerance: float,
+    patience: int,
+    *,
     densest: float = np.inf,
 ) -> Fit:
     """Minimise the objective from a start.
@@ -55,7 +54,10 @@ def descend(
     iterations
         At most so many steps.
     tolerance
-        Stop when `PATIENCE` steps in a row lower the objective by less than this share each.
+        Share of the objective that a step has to gain.
+    patience
+        Stop after so many steps in a row that do not. Of Barzilai and Borwein's steps one may gain little and the next
+        much.
     densest
         What no voxel may exceed; where the start does it is cut.
     """
@@ -104,7 +106,7 @@ def descend(
         current, residuals, loss, gradient = candidate, new_residuals, new_loss, new_gradient
         done += 1
         idle = idle + 1 if gained < tolerance * loss else 0
-        if idle == PATIENCE:
+        if idle == patience:
             break
     return Fit(volume, loss, residuals, done)
 

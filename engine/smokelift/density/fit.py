@@ -27,17 +27,6 @@ TRACE = 1e-9
 """Density below which a voxel is empty: no picture can show it. Libraries may switch numbers below float32's normal
 range to 0 for a whole process, so a run that is resumed would otherwise differ in its last bits."""
 
-LEAST_SHARE = 0.3
-"""Share that counts at least of rays whose smoke the prior puts outside the domain. With less, smoke that stands
-elsewhere is missing in the picture; with more, density spikes grow at floor and ceiling
-(docs/experiments/density-profile.md)."""
-
-DENSEST = 3.0
-"""Bound of the density, in multiples of the densest voxel of the prior's estimate (or of a denser start). Where smoke
-hardly changes the picture, in shadow or before what hides it, nothing else bounds it. The estimate is smooth and knows
-no shadows, so it has to be exceeded; from 3 on the pictures are met as without a bound
-(docs/experiments/density-bound.md)."""
-
 
 @dataclass(frozen=True)
 class DensitySettings:
@@ -52,11 +41,24 @@ class DensitySettings:
         Steps of descent at most.
     tolerance
         Share of the objective that an iteration has to gain for another to follow.
+    patience
+        Steps of descent in a row without that gain which end it (density-descent.md).
+    least_share
+        Share that counts at least of rays whose smoke the prior puts outside the domain. With less, smoke that stands
+        elsewhere is missing in the picture; with more, density spikes grow at floor and ceiling (density-profile.md).
+    densest
+        Bound of the density, in multiples of the densest voxel of the prior's estimate (or of a denser start). Where
+        smoke hardly changes the picture, in shadow or before what hides it, nothing else bounds it (density-bound.md).
+
+    The files are in docs/experiments.
     """
 
     fit_iterations: int = 6
     descent_iterations: int = 12
     tolerance: float = 0.02
+    patience: int = 2
+    least_share: float = 0.3
+    densest: float = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,12 +115,19 @@ class GradientFit:
         hull, settings = views.hull, self.settings
         if not hull.any():
             return empty_density(views)
-        terms = _terms(views, depth)
+        terms = _terms(views, depth, settings.least_share)
         start = np.where(hull, depth.density if initial is None else initial, 0).astype(np.float32)
         # what several pictures have in common takes as many times longer to be found
         scaled = fit_multiplicative(terms, start, settings.fit_iterations * len(terms), settings.tolerance)
-        densest = float(max(DENSEST * depth.density.max(), start.max()))
-        final = descend(terms, scaled.density, hull, settings.descent_iterations, settings.tolerance, densest)
+        final = descend(
+            terms,
+            scaled.density,
+            hull,
+            settings.descent_iterations,
+            settings.tolerance,
+            settings.patience,
+            densest=float(max(settings.densest * depth.density.max(), start.max())),
+        )
         iterations = scaled.iterations + final.iterations
         return Density(without_traces(final.density), hull, fit_figures(views, final.residuals, iterations))
 
@@ -180,12 +189,12 @@ def _with_plate(observation: Observation, scene: CompleteScene) -> Observation:
     return replace(observation, plate=eight_bit_plate(background_picture(scene, camera), camera.size))
 
 
-def _terms(views: ViewSet, depth: DepthEstimate) -> list[Term]:
+def _terms(views: ViewSet, depth: DepthEstimate, least_share: float) -> list[Term]:
     """The objective: a term for every camera's picture, then those that the prior imposes."""
     weighted: list[tuple[View, NDArray[np.float32]]] = [
         # a ray that leaves through floor or ceiling crosses few voxels, which must not hold all that it shows: the
         # smoke outside is an error of the model in proportion to its share, and residuals count by the share inside
-        (view, view.counted * np.maximum(inside, LEAST_SHARE) ** 2)
+        (view, view.counted * np.maximum(inside, least_share) ** 2)
         for view, inside in zip(views.views, depth.inside, strict=True)
     ]
     weighted += [(imposed.view, imposed.weight) for imposed in depth.imposed]

@@ -279,7 +279,7 @@ def test_descent_never_raises_the_loss(plume, small, thickness) -> None:
     """Each further step leaves the picture as near or nearer, in thick smoke too, where bare steps overshoot."""
     scene = replace(small, medium=replace(small.medium, extinction=thickness * small.medium.extinction))
     term, hull, start = even_start(plume.densities[1], scene)
-    losses = [descend([term], start, hull, steps, 0.0).loss for steps in range(40)]
+    losses = [descend([term], start, hull, steps, 0.0, 2).loss for steps in range(40)]
     assert all(after <= before for before, after in itertools.pairwise(losses))
     assert losses[-1] < 0.2 * losses[0]
 
@@ -287,17 +287,17 @@ def test_descent_never_raises_the_loss(plume, small, thickness) -> None:
 def test_descent_does_not_end_with_one_poor_step(plume, small) -> None:
     """Where no step is good enough it takes two."""
     term, hull, start = even_start(plume.densities[1], small)
-    assert descend([term], start, hull, 20, np.inf).iterations == 2
+    assert descend([term], start, hull, 20, np.inf, 2).iterations == 2
 
 
 def test_descent_makes_nothing_denser_than_it_may_be(plume, small) -> None:
     """The loss falls all the same, by what other voxels can do."""
     term, hull, start = even_start(plume.densities[1], small)
-    free = descend([term], start, hull, 20, 0.0)
+    free = descend([term], start, hull, 20, 0.0, 2)
     most = 0.5 * float(free.density.max())
-    bound = descend([term], start, hull, 20, 0.0, most)
+    bound = descend([term], start, hull, 20, 0.0, 2, densest=most)
     assert bound.density.max() == pytest.approx(most)
-    assert free.loss < bound.loss < 0.5 * descend([term], start, hull, 0, 0.0).loss
+    assert free.loss < bound.loss < 0.5 * descend([term], start, hull, 0, 0.0, 2).loss
 
 
 def test_the_figures_are_those_of_the_density(plume, small) -> None:
@@ -438,7 +438,7 @@ def test_every_picture_is_fitted(plume, small, way) -> None:
         if way == "multiplicative":
             found = fit_multiplicative(terms, smeared, count, 0.0)
         else:
-            found = descend(terms, smeared, np.ones(smeared.shape, np.bool_), count, 0.0)
+            found = descend(terms, smeared, np.ones(smeared.shape, np.bool_), count, 0.0, 2)
         return [term.loss(residual) for term, residual in zip(terms, found.residuals, strict=True)]
 
     losses = [fitted(count) for count in range(6)]
