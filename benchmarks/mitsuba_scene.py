@@ -5,7 +5,8 @@ Cameras, lights and media are tables of a scene file; a camera has a ``matrix`` 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import drjit as dr
@@ -80,6 +81,24 @@ def emitter(light: dict[str, Any]) -> dict[str, Any]:
         "scale": light["strength"],
         "to_world": mi.ScalarTransform4f().rotate([0, 0, 1], -light["rotation_degrees"]) @ ENVIRONMENT_TO_WORLD,
     }
+
+
+def surroundings(light: dict[str, Any], directions: tuple[int, int]) -> Iterator[tuple[Any, Any]]:
+    """Yield directions towards an environment, each with the irradiance from there (rgb).
+
+    They are a product rule over the sphere: Gauss points in z, equal steps in azimuth.
+    """
+    source = mi.load_dict(emitter(light))
+    heights, weights = np.polynomial.legendre.leggauss(directions[0])
+    for z, weight in zip(heights.tolist(), weights.tolist(), strict=True):
+        level = math.sqrt(1 - z * z)
+        for azimuth in 2 * math.pi * (np.arange(directions[1]) + 0.5) / directions[1]:
+            towards = mi.Vector3f(level * math.cos(azimuth), level * math.sin(azimuth), z)
+            looking = dr.zeros(mi.SurfaceInteraction3f)
+            looking.wi = -towards
+            irradiance = source.eval(looking) * (weight * 2 * math.pi / directions[1])
+            dr.make_opaque(towards, irradiance)  # one kernel for all directions
+            yield towards, irradiance
 
 
 def pixel_rays(camera: dict[str, Any]) -> Any:

@@ -1,10 +1,10 @@
-"""Where in depth smoke stands, found from its foot, when its box may go below the smoke. A table in Markdown.
+"""Errors of the depth at which smoke is placed by its floor contact, as the box reaches below it: a Markdown table.
 
     python -m benchmarks.accuracy.axis plume-1/truth.npz two-1/truth.npz crossing-1/truth.npz ...
 
-benchmarks/truth bakes such files. True densities are seen by six cameras, three heights before and behind the box, as
-optical depths without light or noise; the floor of the box lies so many centimetres below the truth's. Errors are root
-mean squares (m) of the axis, over the smoke of 24 frames by height, against the smoke's true mean depth.
+`benchmarks.truth` bakes such files. Six cameras, at three heights before and behind the box, see the true densities as
+optical depths without light or noise. The floor of the box lies some centimetres below the true one. Errors are root
+mean squares (m) of the axis against the smoke's true mean depth, over the smoke of 24 frames by height.
 """
 
 from __future__ import annotations
@@ -18,17 +18,16 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from smokelift.density import axis
+from benchmarks.tables import markdown
 from smokelift.density.axis import SmokeAxis, estimate_axis
 from smokelift.evaluation.truth import Truth
 from smokelift.render import Renderer
 from smokelift.scene import Camera, Domain, Medium
 
-FRAMES, LOOKS = 24, 16
+FRAMES, OBSERVED = 24, 16
 BOX = (-1.0, -1.0, 0.0), (1.0, 1.0, 3.0)
 CAMERAS = [(side, height) for side in (1, -1) for height in (1.0, 1.5, 2.5)]
 LOWERED = (0.0, 0.04, 0.08, 0.12, 0.17, 0.25)
-BEHIND = (1e9, 0.5, 0.4, 0.3, 0.2)
 Array = npt.NDArray[np.float64]
 
 
@@ -40,7 +39,7 @@ class Shot:
     ----------
     camera
     amounts
-        Optical depths of some frames.
+        Optical depths (rows, columns) of some frames.
     heights, mass, depths : (nz,)
         Of the truth: metres above the floor, mass, and mean depth away from the camera (m).
     """
@@ -53,7 +52,7 @@ class Shot:
 
 
 def shots(truth: Truth) -> Iterator[Shot]:
-    """The scene from all cameras."""
+    """Yield the scene from all cameras."""
     h = truth.voxel_size
     across, heights = ((np.arange(n) + 0.5) * h for n in truth.shape[1:])
     densities = [truth.density(frame) for frame in range(FRAMES)]
@@ -64,14 +63,14 @@ def shots(truth: Truth) -> Iterator[Shot]:
     for side, height in CAMERAS:
         camera = Camera.look_at((0, -7 * side, height), (0, 0, 1.5), fov_y_degrees=32, size=(128, 192))
         renderer = Renderer(camera, domain, Medium(extinction=5.0), (), np.ones(3, np.float32), "absorption")
-        looks = np.unique(np.linspace(0, FRAMES - 1, LOOKS).round().astype(int))
-        amounts = [-np.log(np.maximum(renderer.image(densities[frame])[..., 0], 1e-9)) for frame in looks]
+        observed = np.unique(np.linspace(0, FRAMES - 1, OBSERVED).round().astype(int))
+        amounts = [-np.log(np.maximum(renderer.image(densities[frame])[..., 0], 1e-9)) for frame in observed]
         seen = [np.where(amount > 0.01, amount, 0).astype(np.float32) for amount in amounts]
         yield Shot(camera, seen, heights, mass, side * mean)
 
 
 def errors(path: Path) -> Array:
-    """Errors (shots, lowered, ways) of a scene: the domain's axis first, then a way for every `BEHIND`."""
+    """Return the errors (shots, lowered, 2) of a scene: of the domain's own axis and of the estimated one."""
     truth = Truth.load(path)
     h = truth.voxel_size
     table = []
@@ -80,30 +79,26 @@ def errors(path: Path) -> Array:
             below = round(lowered / h)
             low, shape = (*BOX[0][:2], BOX[0][2] - below * h), (*truth.shape[:2], truth.shape[2] + below)
             domain = Domain(low, BOX[1], shape)
-            table.append([error(shot, domain, SmokeAxis.upright())])
-            for behind in BEHIND:
-                axis.BEHIND = behind
-                table[-1].append(error(shot, domain, estimate_axis(shot.amounts, shot.camera, domain)))
-    return np.reshape(table, (-1, len(LOWERED), 1 + len(BEHIND)))
+            estimated = estimate_axis(shot.amounts, shot.camera, domain)
+            table.append([error(shot, domain, axis) for axis in (SmokeAxis.upright(), estimated)])
+    return np.reshape(table, (-1, len(LOWERED), 2))
 
 
 def error(shot: Shot, domain: Domain, found: SmokeAxis) -> float:
-    """Of an axis, over the smoke's mass."""
+    """Return the error of an axis (m), weighted by the smoke's mass."""
     difference = found.at(shot.heights - domain.centre[2]) - shot.depths
     return float(np.sqrt(np.average(difference**2, weights=shot.mass)))
 
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description="Measure the depth at which smoke is placed.")
     parser.add_argument("truth", type=Path, nargs="+", help="truth.npz of a scene")
     with ProcessPoolExecutor() as pool:
         found = np.concatenate(list(pool.map(errors, parser.parse_args().truth)))
-    names = ["the domain's axis", "believed alike before and behind", *(f"`BEHIND` {value}" for value in BEHIND[1:])]
-    print("| floor lowered by (cm) | " + " | ".join(f"{100 * lowered:.0f}" for lowered in LOWERED) + " |")
-    print("| --- |" + " --- |" * len(LOWERED))
-    for name, row in zip(names, found.mean(0).T, strict=True):
-        print(f"| {name} | " + " | ".join(f"{value:.3f}" for value in row) + " |")
+    names = ["the domain's axis", "estimated"]
+    rows = [[name, *(f"{value:.3f}" for value in row)] for name, row in zip(names, found.mean(0).T, strict=True)]
+    print(markdown(["floor lowered by (cm)", *(f"{100 * lowered:.0f}" for lowered in LOWERED)], rows))
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from benchmarks.mitsuba_scene import emitter, integral, path_traced, pixel_rays, sensor, smoke, volume
+from benchmarks.mitsuba_scene import emitter, integral, path_traced, pixel_rays, sensor, smoke, surroundings, volume
 
 STEPS = (4, 8, 16)  # a voxel; the last is the reference
 ENVIRONMENT_STEPS = 4
@@ -135,19 +135,9 @@ class Reference:
 
     def surrounded(self, directions: tuple[int, int], steps: int) -> np.ndarray:
         """Render the environment by a product rule over the sphere."""
-        source = mi.load_dict(emitter(self.lights["environment"]))
         total: Any = 0.0
-        heights, weights = np.polynomial.legendre.leggauss(directions[0])
-        for z, weight in zip(heights.tolist(), weights.tolist(), strict=True):
-            for azimuth in 2 * math.pi * (np.arange(directions[1]) + 0.5) / directions[1]:
-                level = math.sqrt(1 - z * z)
-                towards = mi.Vector3f(level * math.cos(azimuth), level * math.sin(azimuth), z)
-                looking = dr.zeros(mi.SurfaceInteraction3f)
-                looking.wi = -towards
-                irradiance = source.eval(looking) * (weight * 2 * math.pi / directions[1])
-                dr.make_opaque(towards, irradiance)  # one kernel for all directions
-                radiance, _ = self.single(lambda _, d=towards, e=irradiance: (d, e), steps)
-                total = total + radiance
+        for pair in surroundings(self.lights["environment"], directions):
+            total = total + self.single(lambda _, pair=pair: pair, steps)[0]
         return total
 
     def cube(self, extinction: float = 1.0, anisotropy: float = 0.0) -> dict[str, Any]:

@@ -22,7 +22,17 @@ import mitsuba as mi
 import numpy as np
 
 from benchmarks.example.render import YAWS, blocks, crop, srgb_decode, srgb_encode, turned, wall, write_png, write_video
-from benchmarks.mitsuba_scene import emitter, integral, march, path_traced, pixel_rays, sensor, smoke, volume
+from benchmarks.mitsuba_scene import (
+    emitter,
+    integral,
+    march,
+    path_traced,
+    pixel_rays,
+    sensor,
+    smoke,
+    surroundings,
+    volume,
+)
 
 PIXELS = 4  # a voxel
 FOV = 30.0
@@ -59,21 +69,9 @@ def lights(kind: str, rng: np.random.Generator, folder: Path) -> dict[str, Any]:
 
 
 def arriving(light: dict[str, Any], points: Any) -> list[tuple[Any, Any]]:
-    """Directions towards a light from points, each with the irradiance from there without smoke."""
+    """Return directions towards a light from points, each with the irradiance from there without smoke."""
     if light["type"] == "environment":
-        source = mi.load_dict(emitter(light))
-        heights, weights = np.polynomial.legendre.leggauss(DIRECTIONS[0])
-        found = []
-        for z, weight in zip(heights.tolist(), weights.tolist(), strict=True):
-            for azimuth in 2 * math.pi * (np.arange(DIRECTIONS[1]) + 0.5) / DIRECTIONS[1]:
-                level = math.sqrt(1 - z * z)
-                towards = mi.Vector3f(level * math.cos(azimuth), level * math.sin(azimuth), z)
-                looking = dr.zeros(mi.SurfaceInteraction3f)
-                looking.wi = -towards
-                irradiance = source.eval(looking)[0] * (weight * 2 * math.pi / DIRECTIONS[1])
-                dr.make_opaque(towards, irradiance)  # one kernel for all directions
-                found.append((towards, irradiance))
-        return found
+        return [(towards, irradiance[0]) for towards, irradiance in surroundings(light, DIRECTIONS)]
     scene = mi.load_dict({"type": "scene", "shape": {"type": "sphere"}, "light": emitter(light)})
     where = dr.zeros(mi.Interaction3f, dr.width(points))
     where.p = points
