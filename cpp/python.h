@@ -72,14 +72,27 @@ inline Array3 new_arrays(const std::array<Shape, 3> &n) {
 inline Out out(Array &a) { return {a.mutable_data(), shape_of(a)}; }
 inline Out3 out(Array3 &a) { return {out(a[0]), out(a[1]), out(a[2])}; }
 
-// Work for new arrays of face values: result(u) with the views u of them.
-inline StaggeredOut out(Array3 &faces, const Box &box) { return {out(faces), box}; }
-
 // Arrays are made while the lock is held; only the work itself runs without it.
 template <class Work> auto released(const Work &work) {
     py::gil_scoped_release release;
     Workers workers;
     return work(workers);
+}
+
+// A new array that work(values, workers) fills.
+template <class Work> Array filled(const Shape &n, const Work &work) {
+    Array result = new_array(n);
+    const Out values = out(result);
+    released([&](Workers &workers) { work(values, workers); });
+    return result;
+}
+
+// New arrays of face values, the same way.
+template <class Work> Array3 filled(const Box &box, const Work &work) {
+    Array3 result = new_arrays(box.faces());
+    const StaggeredOut values{out(result), box};
+    released([&](Workers &workers) { work(values, workers); });
+    return result;
 }
 
 void register_transport(py::module_ &module);

@@ -12,11 +12,11 @@ void register_transport(py::module_ &module) {
     module.def(
         "solve_poisson",
         [](const Array &f, const Box::Closed &closed) {
-            Array p = new_array(shape_of(f));
-            std::copy_n(f.data(), f.size(), p.mutable_data());
-            const Out solution = out(p);
-            released([&](Workers &workers) { Poisson({solution.n, closed}).solve(solution, workers); });
-            return p;
+            const In right = view(f);
+            return filled(right.n, [&](Out p, Workers &workers) {
+                std::copy_n(right.data, volume(right.n), p.data);
+                Poisson({right.n, closed}).solve(p, workers);
+            });
         },
         "f"_a, "closed"_a);
 
@@ -24,14 +24,13 @@ void register_transport(py::module_ &module) {
         "project",
         [](const Array3 &faces, const Box::Closed &closed, int passes) {
             const StaggeredIn from = view(faces, closed);
-            Array3 result = new_arrays(from.box.faces());
-            const StaggeredOut u = out(result, from.box);
-            const double residual = released([&](Workers &workers) {
+            double residual = 0;
+            Array3 result = filled(from.box, [&](const StaggeredOut &u, Workers &workers) {
                 copy(from, u, workers);
                 Projection projection(u.box);
                 for (int pass = 0; pass < passes; ++pass)
                     projection.apply(u, workers);
-                return relative_divergence(read(u), workers);
+                residual = relative_divergence(read(u), workers);
             });
             return std::pair(result, residual);
         },
@@ -41,10 +40,7 @@ void register_transport(py::module_ &module) {
         "divergence",
         [](const Array3 &faces) {
             const StaggeredIn u = view(faces);
-            Array result = new_array(u.box.cells);
-            const Out cells = out(result);
-            released([&](Workers &workers) { divergence(u, cells, workers); });
-            return result;
+            return filled(u.box.cells, [&](Out cells, Workers &workers) { divergence(u, cells, workers); });
         },
         "faces"_a);
 
@@ -64,15 +60,12 @@ void register_transport(py::module_ &module) {
         [](const Array &field, const Array3 &displacement, bool maccormack, bool extend) {
             const In a = view(field);
             const StaggeredIn u = view(displacement, Box{a.n, {}});
-            Array result = new_array(a.n);
-            const Out moved = out(result);
-            released([&](Workers &workers) {
+            return filled(a.n, [&](Out moved, Workers &workers) {
                 if (maccormack)
                     advect_cells_maccormack(a, u, moved, workers);
                 else
                     advect_cells(a, u, extend, moved, workers);
             });
-            return result;
         },
         "field"_a, "displacement"_a, "maccormack"_a, "extend"_a = false);
 
@@ -80,10 +73,9 @@ void register_transport(py::module_ &module) {
         "advect_faces",
         [](const Array3 &field, const Array3 &displacement, bool maccormack) {
             const StaggeredIn a = view(field), u = view(displacement, a.box);
-            Array3 result = new_arrays(a.box.faces());
-            const StaggeredOut moved = out(result, a.box);
-            released([&](Workers &workers) { advect_faces(a, u, maccormack, moved, workers); });
-            return result;
+            return filled(a.box, [&](const StaggeredOut &moved, Workers &workers) {
+                advect_faces(a, u, maccormack, moved, workers);
+            });
         },
         "field"_a, "displacement"_a, "maccormack"_a);
 }

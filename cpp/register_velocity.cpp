@@ -29,10 +29,8 @@ void register_data_term(py::module_ &module) {
         "blur",
         [](const Array &cells, double width, double truncate) {
             const In a = view(cells);
-            Array result = new_array(a.n);
-            const Out blurred = out(result);
-            released([&](Workers &workers) { blur(a, width, truncate, blurred, workers); });
-            return result;
+            return filled(a.n,
+                          [&](Out result, Workers &workers) { blur(a, width, truncate, result, workers); });
         },
         "cells"_a, "width"_a, "truncate"_a);
 
@@ -74,12 +72,9 @@ void register_data_term(py::module_ &module) {
         [](const Array3 &direction, const Array3 &u) {
             const StaggeredIn motion = view(u);
             const In3 g = view(direction, motion.box.cells);
-            Array result = new_array(motion.box.cells);
-            const Out along = out(result);
-            released([&](Workers &workers) {
+            return filled(g[0].n, [&](Out along, Workers &workers) {
                 workers.run(along.n[0], [&](int i) { directional_slab(motion, g, slab(along, i), i); });
             });
-            return result;
         },
         "direction"_a, "u"_a);
 
@@ -111,10 +106,9 @@ void register_motion(py::module_ &module) {
             const StaggeredIn predicted = prediction ? view(*prediction, box) : StaggeredIn{};
             if (source.empty() || (trust != 0 && !prediction))
                 throw std::invalid_argument("expected a momentum source, and a prediction to trust in.");
-            Array3 result = new_arrays(box.faces());
-            const StaggeredOut u = out(result, box);
-            released([&](Workers &workers) { add_momentum(a, source, trust, predicted, u, workers); });
-            return result;
+            return filled(box, [&](const StaggeredOut &u, Workers &workers) {
+                add_momentum(a, source, trust, predicted, u, workers);
+            });
         },
         "density"_a, "source"_a, "trust"_a, "prediction"_a, "closed"_a);
 
@@ -122,11 +116,8 @@ void register_motion(py::module_ &module) {
         "refine",
         [](const Array3 &u, const Shape &shape, const Box::Closed &closed) {
             const StaggeredIn coarse = view(u, closed);
-            const Box box{shape, closed};
-            Array3 result = new_arrays(box.faces());
-            const StaggeredOut fine = out(result, box);
-            released([&](Workers &workers) { refine(coarse, fine, workers); });
-            return result;
+            return filled(Box{shape, closed},
+                          [&](const StaggeredOut &fine, Workers &workers) { refine(coarse, fine, workers); });
         },
         "u"_a, "shape"_a, "closed"_a);
 
@@ -137,13 +128,10 @@ void register_motion(py::module_ &module) {
             if (released([&](Workers &workers) { return largest_difference(found, from, workers); }) <=
                 largest)
                 return solution;
-            Array3 result = new_arrays(found.box.faces());
-            const StaggeredOut clamped = out(result, found.box);
-            released([&](Workers &workers) {
+            return filled(found.box, [&](const StaggeredOut &clamped, Workers &workers) {
                 copy(found, clamped, workers);
                 clamp_increment(from, largest, clamped, workers);
             });
-            return result;
         },
         "solution"_a, "u"_a, "largest"_a, "closed"_a);
 }
@@ -178,16 +166,14 @@ public:
     template <class Solve> std::pair<Array3, py::dict> solved(const Array3 &start, const Solve &solve) {
         const StaggeredIn from = view(start, linear_.box());
         StaggeredField &b = right_hand_side();
-        Array3 result = new_arrays(linear_.box().faces());
-        const StaggeredOut u = out(result, linear_.box());
-        const Figures f = released([&](Workers &workers) {
+        Figures f;
+        Array3 result = filled(linear_.box(), [&](const StaggeredOut &u, Workers &workers) {
             copy(from, u, workers);
             Projection projection(u.box);
-            Figures figures = solve(b, projection, u, workers);
+            f = solve(b, projection, u, workers);
             // Rounding in the course of the iterations leaves a little divergence.
             projection.apply(u, workers);
-            ++figures.projections;
-            return figures;
+            ++f.projections;
         });
         using namespace py::literals;
         return {result, py::dict("iterations"_a = f.iterations, "products"_a = f.products,
@@ -223,21 +209,17 @@ void register_velocity(py::module_ &module) {
         .def(
             "apply",
             [](const Problem &problem, const Array3 &u) {
-                const LeastSquares &linear = problem.linear();
-                const StaggeredIn in = view(u, linear.box());
-                Array3 result = new_arrays(linear.box().faces());
-                const StaggeredOut product = out(result, linear.box());
-                released([&](Workers &workers) { linear.apply(in, product, workers); });
-                return result;
+                const StaggeredIn in = view(u, problem.linear().box());
+                return filled(in.box, [&](const StaggeredOut &product, Workers &workers) {
+                    problem.linear().apply(in, product, workers);
+                });
             },
             "u"_a)
         .def("right_hand_side",
              [](Problem &problem) {
                  const StaggeredIn b = problem.right_hand_side().in();
-                 Array3 result = new_arrays(b.box.faces());
-                 const StaggeredOut copied = out(result, b.box);
-                 released([&](Workers &workers) { copy(b, copied, workers); });
-                 return result;
+                 return filled(
+                     b.box, [&](const StaggeredOut &result, Workers &workers) { copy(b, result, workers); });
              })
         .def(
             "projected_cg",

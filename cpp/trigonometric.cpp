@@ -54,19 +54,17 @@ int points_of(Transform transform, int n) {
     return transform == Transform::dct1 ? n + 1 : transform == Transform::dst1 ? n - 1 : n;
 }
 
-// The transforms that leave out a face at the start, where sines are zero.
-int first_point(Transform transform) { return transform == Transform::dst1 || transform == Transform::dst3; }
+bool is_cosine(Transform transform) { return int(transform) % 2 == 0; }
+bool on_centres(Transform transform) { return int(transform) / 2 % 2 == 1; }      // II and IV
+bool has_half_modes(Transform transform) { return transform >= Transform::dct3; } // III and IV
+
+// The first point with values: sines on faces are zero at the start.
+int first_point(Transform transform) { return !is_cosine(transform) && !on_centres(transform); }
 
 double value(Transform transform, int n, int mode, int point) {
-    const bool cosine = transform == Transform::dct1 || transform == Transform::dct2 ||
-                        transform == Transform::dct3 || transform == Transform::dct4;
-    const bool centres = transform == Transform::dct2 || transform == Transform::dst2 ||
-                         transform == Transform::dct4 || transform == Transform::dst4;
-    const bool halves = transform == Transform::dct3 || transform == Transform::dst3 ||
-                        transform == Transform::dct4 || transform == Transform::dst4;
-    const double phase = (mode + (halves ? 0.5 : 0)) * std::acos(-1.0) / n *
-                         (point + (centres ? 0.5 : first_point(transform)));
-    return cosine ? std::cos(phase) : std::sin(phase);
+    const double phase = (mode + (has_half_modes(transform) ? 0.5 : 0)) * std::acos(-1.0) / n *
+                         (point + (on_centres(transform) ? 0.5 : first_point(transform)));
+    return is_cosine(transform) ? std::cos(phase) : std::sin(phase);
 }
 
 std::vector<int> count_up(int count) {
@@ -79,8 +77,7 @@ std::vector<int> count_up(int count) {
 } // namespace
 
 LineTransform::LineTransform(Transform transform, int n, int first, int count) : modes_(count) {
-    const bool faces = transform == Transform::dct1 || transform == Transform::dst1 ||
-                       transform == Transform::dct3 || transform == Transform::dst3;
+    const bool faces = !on_centres(transform);
     length_ = n + faces;
     std::vector<int> modes;
     for (int m = first; m < first + count; ++m)
@@ -98,7 +95,7 @@ LineTransform::LineTransform(Transform transform, int n, int first, int count) :
             const bool half = faces && (start + i == 0 || start + i == n);
             norm += (half ? 0.5 : 1) * x * x;
         }
-        // A transform that is zero on these points comes out as rounding error.
+        // A mode that is zero on these points comes out as rounding error.
         norms_[rows_[m]] = norm > 1e-6 ? float(1 / std::sqrt(norm)) : 0;
     }
 }
@@ -107,6 +104,7 @@ LineTransform::LineTransform(Transform transform, int n, int first, int count) :
 std::vector<int> LineTransform::split(Transform transform, int n, const std::vector<int> &modes, int start,
                                       int stride) {
     const auto row = [&](int i) { return start + i * stride; };
+    const bool cosine = is_cosine(transform);
     const int half = n / 2;
     std::vector<int> rows(modes.size());
     if (n <= dense || n % 2) {
@@ -129,8 +127,7 @@ std::vector<int> LineTransform::split(Transform transform, int n, const std::vec
         leaves_.push_back(std::move(leaf));
         return rows;
     }
-    if (transform == Transform::dct1 || transform == Transform::dst1 || transform == Transform::dct2 ||
-        transform == Transform::dst2) {
+    if (!has_half_modes(transform)) {
         // Modes of even and odd number are symmetric about the middle or antisymmetric.
         std::vector<int> even, odd;
         for (int mode : modes)
@@ -138,21 +135,10 @@ std::vector<int> LineTransform::split(Transform transform, int n, const std::vec
         const int last = points_of(transform, n) - 1;
         for (int i = 0; i < last - i; ++i)
             before_.push_back({row(i), row(last - i), 1, 1, 1, -1});
-        const int end = row(last); // the differences lie from there backwards
-        std::vector<int> of_even, of_odd;
-        if (transform == Transform::dct1) {
-            of_even = split(Transform::dct1, half, even, start, stride);
-            of_odd = split(Transform::dct3, half, odd, end, -stride);
-        } else if (transform == Transform::dst1) {
-            of_even = split(Transform::dst1, half, even, end, -stride);
-            of_odd = split(Transform::dst3, half, odd, start, stride);
-        } else if (transform == Transform::dct2) {
-            of_even = split(Transform::dct2, half, even, start, stride);
-            of_odd = split(Transform::dct4, half, odd, end, -stride);
-        } else {
-            of_even = split(Transform::dst2, half, even, end, -stride);
-            of_odd = split(Transform::dst4, half, odd, start, stride);
-        }
+        const int end = row(last);                             // the differences lie from there backwards
+        const auto half_modes = Transform(int(transform) + 4); // of the same kind
+        const auto of_even = split(transform, half, even, cosine ? start : end, cosine ? stride : -stride);
+        const auto of_odd = split(half_modes, half, odd, cosine ? end : start, cosine ? -stride : stride);
         auto e = of_even.begin(), o = of_odd.begin();
         for (std::size_t m = 0; m < modes.size(); ++m)
             rows[m] = modes[m] % 2 ? *o++ : *e++;
@@ -160,8 +146,7 @@ std::vector<int> LineTransform::split(Transform transform, int n, const std::vec
     }
     // Modes m and n - 1 - m are the same on every second point, and opposite on the others (III), or sums and
     // differences of neighbours turned by half the angle of m (IV).
-    const bool cosine = transform == Transform::dct3 || transform == Transform::dct4,
-               whole = transform == Transform::dct3 || transform == Transform::dst3;
+    const bool whole = !on_centres(transform);
     std::vector<int> a, b;
     if (whole) {
         a = split(transform, half, count_up(half), row(cosine ? 0 : 1), 2 * stride);

@@ -5,6 +5,7 @@ A name is a quality or "paper", then further views, then changes:
 - ``balanced``, ``paper``
 - ``balanced+90``, ``balanced+90+45``: the views 90 and 45 are input too; of a capture ``balanced+camera00``
 - ``balanced:transport=0``, ``fine:velocity.levels=2``, ``draft:resolution=32x32x48``: settings that differ
+- ``balanced:velocity.solver=primal-dual``: the other solver
 - ``balanced:without=depth``: a part of the method is left out, see `ablations.leave_out`
 - ``smear``: the front picture alone is fitted, with a density that is constant along the rays
 """
@@ -26,10 +27,14 @@ from smokelift.pipeline import Method, compose
 from smokelift.render import Volume
 from smokelift.setup.settings import Quality
 from smokelift.setup.shot import Shot
+from smokelift.velocity import PrimalDual, ProjectedCG
 
 SMEAR = "smear"
 SMEAR_FIT = GradientFit(DensitySettings(fit_iterations=24, descent_iterations=0, tolerance=1e-3))
 """Only whole rays are scaled, so that a density which is constant along them stays so."""
+
+
+SOLVERS = {"primal-dual": PrimalDual(), "projected-cg": ProjectedCG()}
 
 
 def run_views(run: str) -> list[str]:
@@ -117,7 +122,7 @@ def _changed(settings: Settings, key: str, text: str) -> Settings:
     try:
         value: Any = json.loads(text)
     except json.JSONDecodeError:
-        value = text
+        value = SOLVERS.get(text, text)
     group, _, field = key.rpartition(".")
     if group:
         field, value = group, replace(getattr(settings, group), **{field: value})
