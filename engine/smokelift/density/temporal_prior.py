@@ -4,16 +4,13 @@ The carried density knows amounts that the renderer has corrected for shadows al
 `BlendCarried`, the default, judges it before any correction by E, the squared difference between the input's picture
 and what a density renders to:
 
-    amounts  as far as carried beats the prior's:          AMOUNTS  (1 - E(carried) / (E(prior) + noise))
-    depth    as far as its motion has been understood:     largest  (1 - E(carried) / (E(before) + noise))
+    amounts  as far as carried beats the prior's:       largest  (1 - E(carried) / (E(prior) + noise))
+    depth    as far as its motion has been understood:  largest  (1 - E(carried) / (E(before) + noise))
 
 and never below zero. `before` is the density of the frame before, left where it was: persistence, by which the skill of
-weather forecasts is measured. A wrong velocity is no better than none, and then nothing is taken over. The share of the
-depth falls as well where carried's depth anisotropy is less like smoke's than the prior's, because wrong velocities
-draw smoke out or crumple it.
-
-Amounts are mixed in logarithms and by a third at most: what no picture corrects, in thick smoke or in shadow, would
-grow from frame to frame without bound.
+weather forecasts is measured. A wrong velocity is no better than none, and then nothing is taken over. One bound does
+for both (docs/experiments/temporal-prior.md): what no picture corrects, in thick smoke or in shadow, would else grow
+from frame to frame.
 """
 
 from __future__ import annotations
@@ -26,27 +23,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from smokelift.density.anisotropy import depth_anisotropy
 from smokelift.density.depth_prior import DepthEstimate
 from smokelift.density.observation import View, ViewSet
-from smokelift.density.screen import view_frame
 from smokelift.render import Image, Volume
 
-AMOUNTS = 0.35
-"""Largest share of carried's amounts (docs/experiments/temporal-prior.md)."""
-
-LARGEST_CHANGE = 3.0
-"""Factor by which a ray's amount may change, either way."""
-
-FAINT = 0.02
-"""Optical depth, beside the largest, below which carried says nothing about amounts."""
-
-UNLIKE_SMOKE = 0.3
-"""Departure of the depth anisotropy from 1 that true smoke does not reach (docs/experiments/temporal-prior.md)."""
-
-WORST = 1.5
-"""Departure of carried's depth anisotropy from 1, in the prior's, from which nothing is taken over. Up to 1 all is; a
-threshold instead would make smoke flicker."""
+FAINT = 1e-3
+"""Optical depth, beside the largest, below which the logarithm of an amount means nothing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +89,7 @@ class BlendCarried:
 
         Its figures are ``share`` of the density that was carried along and ``amounts``, the share of its amounts, with
         what decided them: ``loss_prior``, ``loss_carried`` and ``loss_before`` (sums of squares over the input's
-        picture, linear radiance), ``anisotropy_prior`` and ``anisotropy_carried``.
+        picture, linear radiance).
         """
         prior, view = depth.density, views.views[0]
         if not (prior.any() and carried.any()):
@@ -124,12 +106,8 @@ class BlendCarried:
         (loss_prior, depth_prior), (loss_carried, depth_carried) = judged(prior), judged(carried)
         loss_before, _ = judged(before)
         noise = float(np.sum(np.square(view.noise, dtype=np.float64)))
-        along = int(np.argmax(np.abs(view_frame(view.camera)[1])))
-        anisotropy_prior, anisotropy_carried = (depth_anisotropy(each, along) for each in (prior, carried))
-        amounts = AMOUNTS * _better(loss_carried, loss_prior + noise)
-        unlike = _departure(anisotropy_carried) / _departure(anisotropy_prior)
-        like_smoke = float(np.clip((WORST - unlike) / (WORST - 1), 0, 1))
-        share = self.largest * _better(loss_carried, loss_before + noise) * like_smoke
+        amounts = self.largest * _skill(loss_carried, loss_prior + noise)
+        share = self.largest * _skill(loss_carried, loss_before + noise)
         corrected = _with_amounts(prior, view, depth_prior, depth_carried, amounts)
         return Start(
             np.float32(1 - share) * corrected + np.float32(share) * carried,
@@ -139,30 +117,24 @@ class BlendCarried:
                 "loss_prior": loss_prior,
                 "loss_carried": loss_carried,
                 "loss_before": loss_before,
-                "anisotropy_prior": anisotropy_prior,
-                "anisotropy_carried": anisotropy_carried,
             },
         )
 
 
-def _better(loss: float, other: float) -> float:
-    """By what part of another loss this one is lower; 0 where it is not."""
-    return max(0.0, 1 - loss / other) if other > 0 else 0.0
-
-
-def _departure(anisotropy: float) -> float:
-    """From 1, beyond what is usual; what changes along the rays only (a picture full of even fog) has no end."""
-    return float(np.clip(abs(anisotropy - 1), UNLIKE_SMOKE, 100.0))
+def _skill(loss: float, reference: float) -> float:
+    """Share of a reference's loss that is gone; 0 where none is."""
+    return max(0.0, 1 - loss / reference) if reference > 0 else 0.0
 
 
 def _with_amounts(
     density: Volume, view: View, have: NDArray[np.float32], want: NDArray[np.float32], share: float
 ) -> Volume:
-    """A density, its rays changed from the optical depths (rows, columns) that they have towards others."""
+    """A density, its rays changed from the optical depths (rows, columns) that they have towards others.
+
+    Amounts are mixed in logarithms. Where nothing is wanted nothing is known: smoke may have come in.
+    """
     faint = FAINT * want.max()
-    change = np.log(np.clip((want + faint) / (have + faint), 1 / LARGEST_CHANGE, LARGEST_CHANGE))
-    # where carried has nothing it knows of nothing: smoke may have come in
-    step = share * change * want / (want + faint)
+    step = share * np.log((want + faint) / (have + faint)) * want / (want + faint)
     # one pixel's blur keeps neighbouring rays from fighting over the voxels that they share
     step = ndimage.gaussian_filter(step.astype(np.float32), 0.7)
     smoky = density > 0

@@ -4,7 +4,7 @@ Every function refuses arrays of different shapes and values that are not finite
 slips into a mean is worse than no figure.
 """
 
-from smokelift.density.anisotropy import depth_anisotropy
+from smokelift.evaluation.metrics.anisotropy import depth_anisotropy
 from smokelift.evaluation.metrics.detail import (
     OCTAVES,
     detail_correlation,

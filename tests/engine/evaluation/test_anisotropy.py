@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from smokelift.density.anisotropy import depth_anisotropy
+from smokelift.evaluation.metrics.anisotropy import depth_anisotropy
 
 
 def test_depth_anisotropy() -> None:
