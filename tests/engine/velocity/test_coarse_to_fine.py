@@ -1,7 +1,8 @@
 """The velocity estimate: what it recovers, what it does not depend on, what it refuses."""
 
+from __future__ import annotations
+
 import dataclasses
-import itertools
 import os
 import subprocess
 import sys
@@ -10,27 +11,30 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from smokelift import _core
 from smokelift.baselines.velocity import PaperVelocity
-from smokelift.transport import divergence, face_shapes, project
+from smokelift.transport import face_shapes
 from smokelift.velocity import (
     CoarseToFine,
-    PrimalDual,
     ProjectedCG,
     Velocity,
     VelocitySettings,
     estimate_velocity,
-    predict_velocity,
 )
-from smokelift.velocity.pyramid import coarsen_faces
+from tests.engine.velocity.known_motions import (
+    DT,
+    LARGE,
+    SHAPE,
+    VOXEL,
+    error_in_smoke,
+    positions,
+    rotation,
+    structured_density,
+    translation,
+)
 
-OPEN = [False] * 6
-SHAPE = (32, 28, 40)
-DT, VOXEL = 1 / 24, 0.03
 DEFAULT, PAPER = CoarseToFine(), PaperVelocity()
 
-# For what moves as a whole and without noise: the default weights are those of turbulent smoke.
-LARGE = {"shape": (48, 48, 48), "radius": 10.5}
+
 # The data term, the pyramid and the solver, without priors about smoke
 SMOOTH = VelocitySettings(
     smoothness=3.0,
@@ -42,43 +46,6 @@ SMOOTH = VelocitySettings(
     blur=0.0,
     solver=ProjectedCG(tolerance=0.003, iterations=100),
 )
-
-
-def structured_density(x, y, z, radius=6.0):
-    """A smooth blob, structured in all directions (else a turn could not be seen); arguments in voxels."""
-    envelope = np.exp(-(x**2 + y**2 + z**2) / radius**2)
-    waves = (
-        np.sin(0.4 * x + 0.16 * y) * np.cos(0.32 * z)
-        + np.cos(0.32 * y - 0.24 * z + 0.12 * x)
-        + np.sin(0.36 * z + 0.08 * y - 0.12 * x)
-    )
-    return envelope * np.exp(0.6 * waves)
-
-
-def positions(shape):
-    return [i - (n - 1) / 2 for i, n in zip(np.indices(shape, dtype=float), shape, strict=True)]
-
-
-def translation(motion, shape=SHAPE, radius=6.0):
-    """Two densities and the displacement between them, in voxels."""
-    x, y, z = positions(shape)
-    after = structured_density(x - motion[0], y - motion[1], z - motion[2], radius)
-    return structured_density(x, y, z, radius), after, np.broadcast_to(motion, (*shape, 3))
-
-
-def rotation(angle, shape=SHAPE, radius=6.0):
-    """A turn about the middle, displacement at arrival."""
-    x, y, z = positions(shape)
-    c, s = np.cos(angle), np.sin(angle)
-    from_x, from_z = c * x + s * z, c * z - s * x
-    after = structured_density(from_x, y, from_z, radius)
-    return structured_density(x, y, z, radius), after, np.stack([x - from_x, 0 * y, z - from_z], axis=-1)
-
-
-def error_in_smoke(velocity, density, displacement, dt=DT, voxel_size=VOXEL):
-    inside = density > 0.1 * density.max()
-    found = velocity.centres()[inside] * dt / voxel_size
-    return np.linalg.norm(found - displacement[inside]) / np.linalg.norm(displacement[inside])
 
 
 @pytest.mark.parametrize("motion", [(0.7, 0.0, 0.0), (0.3, -0.5, 1.2), (-0.6, 1.0, -0.9), (1.5, -1.0, 3.5)])
@@ -151,25 +118,6 @@ def test_smoke_without_a_history_is_not_thrown_far(seed):
     settings = VelocitySettings()
     reach = settings.linearisations * sum(2**level for level in range(settings.grids))
     assert np.abs(found).max() < 1.5 * reach
-
-
-def test_paper_mode_recovers_small_motion():
-    before, after, truth = translation(np.array([0.1, 0.2, 0.3]))
-    velocity = PAPER.estimate(before, after, DT, VOXEL)
-    assert error_in_smoke(velocity, after, truth) < 0.15
-    assert velocity.figures["divergence"] < 1e-5
-
-
-def test_paper_mode_does_not_know_the_limits_of_the_default():
-    """It stops by its own rule: neither the default's few iterations nor measured noise have a part in it."""
-    before, after, _ = rotation(0.15)
-    noise = np.random.default_rng(2).standard_normal(SHAPE)
-    before = np.maximum(before + 0.1 * noise * (before > 0.01), 0)
-    found = PAPER.estimate(before, after, DT, VOXEL)
-    assert found.figures["iterations"] > VelocitySettings().solver.iterations
-    blurred = [ndimage.gaussian_filter(a.astype(np.float32), PAPER.blur) for a in (before, after)]
-    alone = dataclasses.replace(PAPER, blur=0.0).estimate(*blurred, DT, VOXEL)
-    np.testing.assert_allclose(found.centres(), alone.centres(), atol=1e-5)
 
 
 @pytest.mark.parametrize("estimator", [DEFAULT, PAPER], ids=["default", "paper"])
@@ -341,35 +289,6 @@ def test_bad_input_is_refused(change, message):
         estimate_velocity(**arguments)
 
 
-@pytest.mark.parametrize("steps", [{"sigma": 1.0, "tau": 1.01}, {"sigma": -0.1}, {"theta": 1.5}, {"tau": float("nan")}])
-def test_steps_that_do_not_converge_are_refused(steps):
-    before, after, _ = translation(np.array([0.1, 0.0, 0.0]))
-    estimator = PaperVelocity(solver=PrimalDual(**steps))
-    with pytest.raises(ValueError, match=r"sigma = .*tau = .*theta = .*do not converge"):
-        estimator.estimate(before, after, DT, VOXEL)
-
-
-@pytest.mark.parametrize("shape", [(8, 6, 10), (7, 9, 5)])
-def test_half_as_fine_a_flow_is_as_free_of_divergence(shape):
-    """What goes through a coarse face is what went through its four fine ones."""
-    rng = np.random.default_rng(0)
-    rough = Velocity(tuple(rng.standard_normal(n).astype(np.float32) for n in face_shapes(shape)), 1.0)
-    coarse = coarsen_faces(project(rough))
-    assert coarse.shape == tuple((n + 1) // 2 for n in shape)
-    inner = tuple(slice(0, n // 2) for n in shape)  # an odd last voxel is continued outwards
-    assert np.abs(divergence(coarse)[inner]).max() < 1e-5
-
-
-def test_prediction_is_free_of_divergence_and_keeps_a_uniform_flow():
-    zero = Velocity.zero(SHAPE, VOXEL).faces
-    uniform = Velocity([np.full_like(a, v) for a, v in zip(zero, (0.3, -0.2, 0.5), strict=True)], VOXEL)
-    for a, b in zip(predict_velocity(uniform, DT).faces, uniform.faces, strict=True):
-        np.testing.assert_allclose(a, b, atol=1e-5)
-    turning = estimate_velocity(*rotation(0.2)[:2], DT, VOXEL)
-    predicted = predict_velocity(turning, DT)
-    assert np.abs(divergence(predicted)).max() * VOXEL < 1e-4 * np.abs(predicted.centres()).max()
-
-
 PEAK = """
 import re, sys
 import numpy as np, psutil
@@ -399,158 +318,3 @@ def test_memory_is_a_few_times_the_densities(way):
         [sys.executable, "-c", PEAK, way], capture_output=True, text=True, env=environment, check=True
     )
     assert float(done.stdout) < 25
-
-
-# The linear problem itself, on a grid so small that its matrix can be written out.
-
-TINY = (5, 4, 6)
-
-
-def tiny_faces(rng):
-    nx, ny, nz = TINY
-    shapes = [(nx + 1, ny, nz), (nx, ny + 1, nz), (nx, ny, nz + 1)]
-    return [rng.standard_normal(shape).astype(np.float32) for shape in shapes]
-
-
-def tiny_problem(rng, first_order=0.05, second_order=0.03, closed=OPEN):
-    cells = [rng.standard_normal(TINY).astype(np.float32) for _ in range(4)]
-    return _core.LeastSquares(
-        direction=cells[:3],
-        offset=cells[3],
-        weight=rng.random(TINY).astype(np.float32),
-        irrotational=rng.random(TINY).astype(np.float32),
-        centre=tiny_faces(rng),
-        first_order=first_order,
-        second_order=second_order,
-        kinetic=0.01,
-        closed=closed,
-    )
-
-
-def flat(faces):
-    return np.concatenate([a.ravel() for a in faces]).astype(float)
-
-
-def split(vector):
-    nx, ny, nz = TINY
-    shapes = [(nx + 1, ny, nz), (nx, ny + 1, nz), (nx, ny, nz + 1)]
-    ends = np.cumsum([np.prod(s) for s in shapes])[:-1]
-    return [a.reshape(s).astype(np.float32) for a, s in zip(np.split(vector, ends), shapes, strict=True)]
-
-
-def matrix_of(linear, size):
-    return np.stack([linear(split(row)) for row in np.eye(size)], axis=-1)
-
-
-def constrained_minimum(problem, closed):
-    """By a dense solve of the optimality conditions."""
-    size = sum(a.size for a in tiny_faces(np.random.default_rng(0)))
-    quadratic = matrix_of(lambda u: flat(problem.apply(u)), size)
-    constraint = matrix_of(lambda u: _core.divergence(u).ravel().astype(float), size)
-    walls = []
-    for axis, high in itertools.product(range(3), range(2)):
-        marks = split(np.zeros(size))
-        marks[axis][tuple(-high if d == axis else slice(None) for d in range(3))] = 1
-        if closed[2 * axis + high]:
-            walls.append(np.eye(size)[flat(marks) > 0])
-    constraint = np.concatenate([constraint, *walls])
-    right = np.concatenate([flat(problem.right_hand_side()), np.zeros(len(constraint))])
-    zeros = np.zeros((len(constraint), len(constraint)))
-    system = np.block([[quadratic, constraint.T], [constraint, zeros]])
-    return np.linalg.lstsq(system, right, rcond=None)[0][:size]
-
-
-@pytest.mark.parametrize("orders", [(0.05, 0.0), (0.0, 0.03)])
-@pytest.mark.parametrize("closed", [OPEN, [True, False, False, False, True, True], [True] * 6])
-def test_both_solvers_reach_the_constrained_minimum(orders, closed):
-    problem = tiny_problem(np.random.default_rng(1), *orders, closed)
-    truth = constrained_minimum(problem, closed)
-    start = split(np.zeros(truth.size))
-    cg, _ = problem.projected_cg(start, tolerance=2e-5, limit=500)
-    endless, _ = problem.projected_cg(start, tolerance=0.0, limit=500)
-    pd, figures = problem.primal_dual(
-        start,
-        sigma=0.3,
-        tau=3.0,
-        theta=1.0,
-        absolute=0.0,
-        relative=1e-5,
-        limit=2000,
-        inner_tolerance=0.01,
-        inner_limit=100,
-    )
-    assert np.linalg.norm(flat(cg) - truth) < 3e-3 * np.linalg.norm(truth)
-    assert np.linalg.norm(flat(pd) - truth) < 1e-3 * np.linalg.norm(truth)
-    # A tolerance out of reach of single precision does not lead away from the minimum again.
-    assert np.linalg.norm(flat(endless) - truth) < 0.03 * np.linalg.norm(truth)
-    assert figures["iterations"] < 2000
-
-
-def test_the_quadratic_is_symmetric_and_positive():
-    rng = np.random.default_rng(2)
-    problem = tiny_problem(rng)
-    a, b = tiny_faces(rng), tiny_faces(rng)
-    ab, ba = flat(problem.apply(a)) @ flat(b), flat(problem.apply(b)) @ flat(a)
-    assert ab == pytest.approx(ba, rel=1e-5)
-    assert flat(problem.apply(a)) @ flat(a) > 0
-
-
-@pytest.mark.parametrize("closed", [OPEN, [True] * 6, [True, False, False, True, True, True]])
-def test_the_preconditioner_knows_long_lines(closed):
-    """With kinetic energy alone the minimum is the part of the centre without divergence; the rest is a gradient.
-
-    Sides of the box apart, the preconditioner is then exact: a few steps are enough, on lines of any length.
-    """
-    shape = (72, 66, 100)
-    rng = np.random.default_rng(4)
-    faces = [rng.standard_normal([n + (d == axis) for d, n in enumerate(shape)], np.float32) for axis in range(3)]
-    zero = np.zeros(shape, np.float32)
-    problem = _core.LeastSquares(
-        direction=[zero] * 3,
-        offset=zero,
-        weight=zero,
-        irrotational=zero,
-        centre=faces,
-        first_order=0.0,
-        second_order=0.0,
-        kinetic=0.5,
-        closed=closed,
-    )
-    u, figures = problem.projected_cg([np.zeros_like(a) for a in faces], tolerance=1e-4, limit=20)
-    assert figures["iterations"] < 10
-    assert np.abs(_core.divergence(u)).max() < 1e-4
-    x, y, z = (a - b for a, b in zip(faces, u, strict=True))
-    vorticity = np.diff(z[:, :, 1:-1], axis=1)[1:-1] - np.diff(y[:, 1:-1], axis=2)[1:-1]
-    assert np.abs(vorticity).max() < 0.01
-    vorticity = np.diff(y[:, 1:-1], axis=0)[:, :, 1:-1] - np.diff(x[1:-1], axis=1)[:, :, 1:-1]
-    assert np.abs(vorticity).max() < 0.01
-
-
-@pytest.mark.parametrize(("width", "truncate"), [(0.5, 4.0), (1.0, 3.0), (2.0, 3.0)])
-@pytest.mark.parametrize("shape", [(9, 20, 13), (3, 2, 1)])
-def test_blur_is_a_gaussian(shape, width, truncate):
-    cells = np.random.default_rng(1).random(shape, np.float32)
-    expected = ndimage.gaussian_filter(cells, width, truncate=truncate)
-    np.testing.assert_allclose(_core.blur(cells, width, truncate), expected, rtol=1e-5)
-
-
-def test_a_uniform_flow_and_a_solid_turn_cost_no_second_order_smoothness():
-    zero = np.zeros(TINY, np.float32)
-    problem = _core.LeastSquares(
-        direction=[zero] * 3,
-        offset=zero,
-        weight=zero,
-        irrotational=zero,
-        centre=split(np.zeros(flat(tiny_faces(np.random.default_rng(0))).size)),
-        first_order=0.0,
-        second_order=1.0,
-        kinetic=0.0,
-        closed=OPEN,
-    )
-    nx, ny, nz = TINY
-    turn = [
-        np.broadcast_to(np.arange(ny, dtype=np.float32)[None, :, None], (nx + 1, ny, nz)),
-        np.broadcast_to(-np.arange(nx, dtype=np.float32)[:, None, None], (nx, ny + 1, nz)),
-        np.full((nx, ny, nz + 1), 3, np.float32),
-    ]
-    np.testing.assert_allclose(flat(problem.apply(turn)), 0, atol=1e-5)

@@ -1,0 +1,43 @@
+"""Staggered grids: what they hold, and what is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from smokelift import _core
+from smokelift.transport import Velocity, advect, project
+from tests.engine.transport.random_fields import SHAPE, uniform
+
+
+def test_centres_are_means_of_faces():
+    velocity = uniform((1, 2, 3))
+    np.testing.assert_array_equal(velocity.centres(), np.broadcast_to(np.float32([1, 2, 3]), (*SHAPE, 3)))
+    assert velocity.shape == SHAPE
+
+
+def test_bad_input_is_refused():
+    velocity = Velocity.zero(SHAPE, 1.0)
+    density = np.zeros(SHAPE, np.float32)
+    with pytest.raises(ValueError, match="shape"):
+        advect(density[1:], velocity, 1.0)
+    with pytest.raises(ValueError, match="dt must be positive"):
+        advect(density, velocity, 0.0)
+    with pytest.raises(ValueError, match="unknown scheme"):
+        advect(density, velocity, 1.0, scheme="cubic")
+    with pytest.raises(ValueError, match="not finite"):
+        advect(density + np.nan, velocity, 1.0)
+    with pytest.raises(ValueError, match="not of negative values"):
+        advect(density - 1, velocity, 1.0, conserve=True)
+    with pytest.raises(ValueError, match="not of a velocity"):
+        advect(velocity, velocity, 1.0, conserve=True)
+    with pytest.raises(ValueError, match="unknown side 'up'"):
+        project(velocity, ("up",))
+    with pytest.raises(ValueError, match="voxel_size must be positive"):
+        Velocity.zero(SHAPE, 0.0)
+    with pytest.raises(ValueError, match="do not belong to one box"):
+        Velocity((density, density, density), 1.0)
+    with pytest.raises(ValueError, match="not finite"):
+        Velocity(tuple(a + np.nan for a in velocity.faces), 1.0)
+    with pytest.raises(ValueError, match="not have shapes"):
+        _core.divergence([density, density, density])

@@ -1,0 +1,121 @@
+"""Projection, and the Poisson solver under it."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+from smokelift import _core
+from smokelift.transport import Velocity, divergence, project
+from tests.engine.transport.random_fields import ALL_SIDES, SHAPE, names, random_velocity
+
+
+def inner_product(a, b, closed):
+    """Faces on open sides belong to half a voxel."""
+    total = 0.0
+    for axis, (p, q) in enumerate(zip(a, b, strict=True)):
+        product = np.moveaxis(p.astype(float) * q, axis, 0)
+        total += product[1:-1].sum() + sum(
+            product[-high].sum() * (1.0 if closed[2 * axis + high] else 0.5) for high in (0, 1)
+        )
+    return total
+
+
+def minus_laplacian(p, closed):
+    result = np.zeros_like(p)
+    for axis, high in itertools.product(range(3), (0, 1)):
+        neighbour = np.roll(p, -1 if high else 1, axis)
+        side = tuple(-high if d == axis else slice(None) for d in range(3))
+        neighbour[side] = p[side] if closed[2 * axis + high] else -p[side]
+        result += p - neighbour
+    return result
+
+
+@pytest.mark.parametrize("shape", [SHAPE, (8, 12, 16), (3, 2, 1), (1, 5, 4)])
+def test_poisson_on_every_mix_of_sides(shape):
+    rng = np.random.default_rng(3)
+    for closed in ALL_SIDES:
+        truth = rng.standard_normal(shape)
+        solution = _core.solve_poisson(minus_laplacian(truth, closed), closed)
+        if all(closed):  # known up to a constant
+            truth, solution = truth - truth.mean(), solution - solution.mean()
+        np.testing.assert_allclose(solution, truth, atol=2e-5)
+
+
+@pytest.mark.parametrize("closed", [*ALL_SIDES[::9], ALL_SIDES[-1]])
+def test_poisson_where_transforms_are_split(closed):
+    """Long lines go through all kinds of halves; an odd length is not split at all."""
+    rng = np.random.default_rng(7)
+    for shape in ((2, 72, 100), (3, 65, 160)):
+        truth = rng.standard_normal(shape)
+        solution = _core.solve_poisson(minus_laplacian(truth, closed), closed)
+        if all(closed):
+            truth, solution = truth - truth.mean(), solution - solution.mean()
+        np.testing.assert_allclose(solution, truth, atol=2e-4)
+
+
+def test_poisson_with_closed_sides_removes_the_mean():
+    rng = np.random.default_rng(4)
+    f = rng.standard_normal(SHAPE).astype(np.float32)
+    closed = [True] * 6
+    p, q = (_core.solve_poisson(a, closed) for a in (f, f - f.mean()))
+    np.testing.assert_allclose(p - p.mean(), q - q.mean(), atol=1e-4)
+    assert np.isfinite(p).all()
+
+
+@pytest.mark.parametrize("closed", [*ALL_SIDES[::7], ALL_SIDES[-1]])
+def test_projection(closed):
+    velocity = random_velocity(5)
+    sides = names(closed)
+    once = project(velocity, sides)
+    assert np.abs(divergence(once)).max() < 1e-5 * max(np.abs(a).max() for a in once.faces)
+    for axis, high in itertools.product(range(3), (0, 1)):
+        if closed[2 * axis + high]:
+            assert not np.take(once.faces[axis], -high, axis).any()
+
+    twice = project(once, sides)
+    for a, b in zip(once.faces, twice.faces, strict=True):
+        np.testing.assert_allclose(a, b, atol=1e-5)
+
+    # What is taken away is orthogonal to every velocity without divergence.
+    other = project(random_velocity(6), sides)
+    removed = [a - b for a, b in zip(velocity.faces, once.faces, strict=True)]
+    size = inner_product(velocity.faces, velocity.faces, closed)
+    assert abs(inner_product(removed, other.faces, closed)) < 1e-5 * size
+
+
+@pytest.mark.parametrize("closed", [*ALL_SIDES[::7], ALL_SIDES[-1]])
+def test_linear_operators_pass_the_dot_product_test(closed):
+    """The Poisson solve and the projection are their own adjoints, the projection in its own inner product."""
+    rng = np.random.default_rng(11)
+    a, b = (rng.standard_normal(SHAPE).astype(np.float32) for _ in range(2))
+    a, b = a - a.mean(), b - b.mean()  # between walls a constant has no solution
+    left, right = np.vdot(_core.solve_poisson(a, closed), b), np.vdot(a, _core.solve_poisson(b, closed))
+    assert left == pytest.approx(right, rel=1e-3, abs=1e-3 * float(np.linalg.norm(a)))
+    u, v = random_velocity(12), random_velocity(13)
+    left = inner_product(project(u, names(closed)).faces, v.faces, closed)
+    right = inner_product(u.faces, project(v, names(closed)).faces, closed)
+    assert left == pytest.approx(right, abs=1e-5 * float(inner_product(u.faces, u.faces, closed)))
+
+
+def test_projection_keeps_units():
+    velocity = random_velocity(7)
+    small = Velocity(tuple(1e-3 * a for a in velocity.faces), 0.01)
+    for a, b in zip(project(velocity).faces, project(small).faces, strict=True):
+        np.testing.assert_allclose(1e-3 * a, b, rtol=1e-4, atol=1e-8)
+
+
+def test_divergence_is_per_volume():
+    faces = Velocity.zero(SHAPE, 0.1).faces
+    faces[0][1:] = 2.0
+    result = divergence(Velocity(faces, 0.1))
+    np.testing.assert_allclose(result[0], 20.0)
+    assert not result[1:].any()
+
+
+def test_gradient_of_a_plane_is_exact():
+    x, y, z = np.indices(SHAPE).astype(np.float32)
+    for found, expected in zip(_core.gradient(2 * x - y + 0.5 * z), (2, -1, 0.5), strict=True):
+        np.testing.assert_allclose(found, expected)
