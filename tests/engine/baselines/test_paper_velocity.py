@@ -8,17 +8,8 @@ import numpy as np
 from scipy import ndimage
 
 from smokelift.baselines.velocity import PaperVelocity
-from smokelift.velocity import (
-    VelocitySettings,
-)
-from tests.engine.velocity.known_motions import (
-    DT,
-    SHAPE,
-    VOXEL,
-    error_in_smoke,
-    rotation,
-    translation,
-)
+from smokelift.velocity import VelocitySettings
+from tests.engine.velocity.known_motions import DT, SHAPE, VOXEL, error_in_smoke, rotation, translation
 
 PAPER = PaperVelocity()
 

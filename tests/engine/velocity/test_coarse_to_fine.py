@@ -13,13 +13,7 @@ from scipy import ndimage
 
 from smokelift.baselines.velocity import PaperVelocity
 from smokelift.transport import face_shapes
-from smokelift.velocity import (
-    CoarseToFine,
-    ProjectedCG,
-    Velocity,
-    VelocitySettings,
-    estimate_velocity,
-)
+from smokelift.velocity import CoarseToFine, ProjectedCG, Velocity, VelocitySettings, estimate_velocity
 from tests.engine.velocity.known_motions import (
     DT,
     LARGE,

@@ -5,17 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from smokelift.transport import divergence
-from smokelift.velocity import (
-    Velocity,
-    estimate_velocity,
-    predict_velocity,
-)
-from tests.engine.velocity.known_motions import (
-    DT,
-    SHAPE,
-    VOXEL,
-    rotation,
-)
+from smokelift.velocity import Velocity, estimate_velocity, predict_velocity
+from tests.engine.velocity.known_motions import DT, SHAPE, VOXEL, rotation
 
 
 def test_prediction_is_free_of_divergence_and_keeps_a_uniform_flow():

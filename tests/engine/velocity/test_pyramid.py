@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 from smokelift.transport import divergence, face_shapes, project
-from smokelift.velocity import (
-    Velocity,
-)
+from smokelift.velocity import Velocity
 from smokelift.velocity.pyramid import coarsen_faces
 
 

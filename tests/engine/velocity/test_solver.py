@@ -9,14 +9,8 @@ import pytest
 
 from smokelift import _core
 from smokelift.baselines.velocity import PaperVelocity
-from smokelift.velocity import (
-    PrimalDual,
-)
-from tests.engine.velocity.known_motions import (
-    DT,
-    VOXEL,
-    translation,
-)
+from smokelift.velocity import PrimalDual
+from tests.engine.velocity.known_motions import DT, VOXEL, translation
 
 OPEN = [False] * 6
 
