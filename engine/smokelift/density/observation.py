@@ -130,14 +130,17 @@ class ViewSet:
         Voxels that all of them allow to hold smoke.
     optics
         How light travels through the domain.
+    frame
+        Number of the moment in its clip, from 0; a depth prior that looked at the clip knows the others.
     """
 
     views: tuple[View, ...]
     hull: NDArray[np.bool_]
     optics: Optics
+    frame: int = 0
 
     @staticmethod
-    def of(observations: Sequence[Observation], optics: Optics) -> ViewSet:
+    def of(observations: Sequence[Observation], optics: Optics, frame: int = 0) -> ViewSet:
         """Look at observations of one moment against the grid.
 
         Raises
@@ -149,7 +152,7 @@ class ViewSet:
             _check(observation)
         views = tuple(View.of(observation, optics) for observation in observations)
         hull = common_hull([view.mask for view in views], [view.projection for view in views])
-        return ViewSet(views, hull, optics)
+        return ViewSet(views, hull, optics, frame)
 
 
 def unshadowed_optical_depth(

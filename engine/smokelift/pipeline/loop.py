@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from smokelift.density import Density, Observation, ViewSet
+from smokelift.density import Density, ViewSet
 from smokelift.density.hull import project_voxels
 from smokelift.footage.clip import Clip
 from smokelift.output.resume import ResumeState
@@ -151,7 +151,7 @@ def _frame(index: int, before: Frame | None, shot: Shot, method: Method) -> Fram
         predicted = method.velocity_estimator.predict(before.velocity, dt)
         # pictures correct the mass, but not of what a moving camera does not see
         carried = advect(before.density, predicted, dt, conserve=shot.moves)
-    density, taken_over = _density(shot.observe(index), before, carried, shot, method)
+    density, taken_over = _density(index, before, carried, shot, method)
     fitted = time.perf_counter()
     velocity = Velocity.zero(domain.resolution, domain.voxel_size, shot.scene.closed)
     if before is not None:
@@ -177,12 +177,13 @@ def _frame(index: int, before: Frame | None, shot: Shot, method: Method) -> Fram
 
 
 def _density(
-    observations: tuple[Observation, ...], before: Frame | None, carried: Volume | None, shot: Shot, method: Method
+    index: int, before: Frame | None, carried: Volume | None, shot: Shot, method: Method
 ) -> tuple[Density, Mapping[str, float]]:
     """The density of a frame, and what was taken over of the carried one."""
+    observations = shot.observe(index)
     if not observations:
         return _unseen(shot.optics.domain, carried), {}
-    views = ViewSet.of(observations, shot.optics)
+    views = ViewSet.of(observations, shot.optics, index)
     depth = method.depth_prior.estimate(views)
     if before is None or carried is None:
         return method.density_fit.fit(views, depth, None), {}
