@@ -1,7 +1,7 @@
 """The velocity that carries one density into the next.
 
-Two densities say how fast smoke moves along their gradient; that the flow has no divergence and is smooth
-says the rest. The estimate minimises
+Two densities show how fast smoke moves along their gradient. The rest follows from a flow that is smooth and has no
+divergence. The estimate minimises
 
     sum W (r + g . (u - u_k))^2 + R(u - u_p) + irrotational * sum outside the smoke of |curl u|^2
 
@@ -63,8 +63,8 @@ def estimate_velocity(
         Sides of the box that are walls. None by default: the box of a video is cut out of the air around the
         smoke, which goes in and out through it freely. A floor, say, is ``("z-",)``.
     inflow
-        True in voxels where smoke enters, shape (nx, ny, nz): changes there are not taken for motion, and others
-        are not looked for, so it has to hold all of them. Without it, sources are looked for.
+        True in voxels where smoke enters, shape (nx, ny, nz): changes there are not taken for motion. It has to
+        hold all inlets, because others are not searched for then. Without it, sources are searched for.
     prediction
         What the velocity should be near, such as `predict_velocity` of the frame before. How near is decided by how
         much of the change it explains; one that explains less than half is not used.

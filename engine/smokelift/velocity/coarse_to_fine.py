@@ -23,7 +23,7 @@ from smokelift.velocity.estimator import (
 )
 from smokelift.velocity.linearisation import Linearisation, Regularisation, least_squares, linearise
 from smokelift.velocity.momentum import Centre, Prediction, fit_centre
-from smokelift.velocity.preparation import PreparedPair, full_contrast, prepare
+from smokelift.velocity.preparation import PreparedPair, prepare
 from smokelift.velocity.pyramid import Level, coarsen, pyramid, refine
 from smokelift.velocity.settings import VelocitySettings
 from smokelift.velocity.sources import SourceDetection
@@ -91,9 +91,9 @@ def _estimate(
     closed: tuple[Side, ...],
     settings: VelocitySettings,
 ) -> Estimate | None:
-    """From coarse to fine, or straight on the finest grid where there is a prediction worth its name."""
-    known = _worthwhile(finest, prediction, sources, pair.noise, settings)
-    guided = known is not None
+    """From coarse to fine, or on the finest grid alone where a prediction is good enough to start from."""
+    first = _around_prediction(finest, prediction, sources, pair.noise, settings)
+    guided = first is not None
     if not guided:
         prediction, finest = None, replace(finest, past=None)
     levels = [finest] if guided else pyramid(finest, settings.grids)
@@ -101,60 +101,54 @@ def _estimate(
     effort: Counter[str] = Counter(iterations=0, products=0, projections=0)
     centre: Centre
     u = StaggeredGrid.zero(levels[0].after.shape, 1.0, closed) if prediction is None else prediction.displacement()
-    coarsest = True
+    coarsest = levels[0].coarseness
     on_finest = 1 if finest.after.size > settings.large_grid else settings.linearisations
-    while levels:  # a grid that is done with is not kept
+    while levels:  # a grid is not kept after its turn
         level = levels.pop(0)
-        if not coarsest:
+        if level.coarseness < coarsest:
             u = refine(u, level.after.shape)
         count = on_finest if level is finest else settings.linearisations
         for number in range(count):
-            # before anything is known of the motion all of the change would be a source
-            blind = not guided and number == 0 and coarsest
-            linear, known = known or linearise(level, u, settings.smoke_threshold, None if blind else sources), None
+            # around rest all of the change would be a source
+            from_rest = not guided and number == 0 and level.coarseness == coarsest
+            searched = None if from_rest else sources
+            linear, first = first or linearise(level, u, settings.smoke_threshold, searched), None
             if linear is None:
                 return None
-            if coarsest or level is not finest:
+            if level.coarseness == coarsest or level is not finest:
                 centre = fit_centre(prediction, level.after, linear, u, share, settings.brightening)
             elif number == 0:  # twelve projections are too much for the finest grid
                 centre = centre.refined()
             around = centre.velocity(prediction, level.after, u)
             linear = linear.with_dissipation(centre.dissipation)
             unexplained, _ = linear.unexplained(around, pair.noise / level.coarseness**3)
-            stiffness = settings.unexplained / max(unexplained, settings.least_unexplained)
-            terms = Regularisation(
-                second_order=stiffness * settings.smoothness,
-                kinetic=stiffness * settings.kinetic,
-                irrotational=settings.irrotational,
-            )
-            problem, start = least_squares(linear, around, terms), around if blind else u
+            terms = _regularisation(unexplained, settings)
+            problem, start = least_squares(linear, around, terms), around if from_rest else u
             direction, weight, smoke = linear.direction, linear.weight, linear.smoke
-            # The solver takes most of the memory: what it does not look at goes before, what it leaves after.
+            # The solver takes most of the memory: what it does not need goes before it.
             del linear, around
             solution, figures = settings.solver.solve(problem, start)
             del problem, start
             last = number == count - 1 or (guided and _step(solution, u, smoke) < settings.small_step)
             if level is finest and last:
-                source, residual = _source(level, u, weight, settings, pair.reduced)
+                source, residual = _source(level, u, weight, settings, pair)
                 confidence = _confidence(direction, weight, terms.second_order)
             u = _clamped(solution, u, settings.largest_increment)
             del solution, direction, weight
             effort.update({name: figures[name] for name in ("iterations", "products", "projections")})
             if last:
                 break
-        coarsest = False
-    dissipation = 1 - (1 - centre.dissipation) ** (4 / 3) if pair.reduced else centre.dissipation
     measures = {
         **effort,
         "residual": figures["residual"],
         "unexplained": unexplained,
         "trust": centre.trust,
-        "dissipation": dissipation,
+        "dissipation": pair.density_dissipation(centre.dissipation),
     }
     return Estimate(u, measures, confidence, source, residual)
 
 
-def _worthwhile(
+def _around_prediction(
     finest: Level,
     prediction: Prediction | None,
     sources: SourceDetection | None,
@@ -176,16 +170,24 @@ def _worthwhile(
     return linear if rest < float(np.sum(linear.weight * change**2, dtype=np.float64)) else None
 
 
+def _regularisation(unexplained: float, settings: VelocitySettings) -> Regularisation:
+    """The weights for a centre that leaves a share of the change unexplained: the less, the stiffer."""
+    stiffness = settings.unexplained / max(unexplained, settings.least_unexplained)
+    return Regularisation(
+        second_order=stiffness * settings.smoothness,
+        kinetic=stiffness * settings.kinetic,
+        irrotational=settings.irrotational,
+    )
+
+
 def _source(
-    level: Level, u: StaggeredGrid, weight: Array, settings: VelocitySettings, reduced: bool
+    level: Level, u: StaggeredGrid, weight: Array, settings: VelocitySettings, pair: PreparedPair
 ) -> tuple[Array, ResidualMeans]:
     """Density that enters in a frame, that is what is left unexplained where changes are not motion; and all of it."""
     carried, after = advect_cells(level.before, u), level.after
     detection = settings.sources or SourceDetection()
     residual = detection.means(after - carried, np.maximum(after, carried), 1.0, level.past)
-    if reduced:
-        carried, after = full_contrast(carried), full_contrast(after)
-    source: Array = (1 - weight) * np.maximum(after - carried, 0)
+    source: Array = (1 - weight) * np.maximum(pair.density(after) - pair.density(carried), 0)
     return source, residual
 
 

@@ -1,4 +1,4 @@
-"""What is done to densities before their motion is looked for: noise is blurred, contrast reduced.
+"""What is done to densities before their motion is estimated: noise is blurred, contrast reduced.
 
 Noise: white noise is as strong in the finest scale, where neighbours alternate along all axes at once, as in any other;
 smoke has next to nothing there. So the median of that scale's magnitude inside the smoke measures the noise and not the
@@ -32,7 +32,7 @@ MAD = 0.6745
 
 @dataclass(frozen=True, eq=False)
 class PreparedPair:
-    """Two densities as their motion is looked for.
+    """Two densities as their motion is estimated from.
 
     Attributes
     ----------
@@ -48,6 +48,14 @@ class PreparedPair:
     after: Array
     noise: float
     reduced: bool
+
+    def density(self, values: Array) -> Array:
+        """The density that such values stand for."""
+        return values * np.cbrt(values) if self.reduced else values
+
+    def density_dissipation(self, share: float) -> float:
+        """The share of the density that dissolves where a share of the values does."""
+        return float(1 - (1 - share) ** (4 / 3)) if self.reduced else share
 
 
 def prepare(before: Array, after: Array, settings: VelocitySettings) -> PreparedPair:
@@ -78,12 +86,6 @@ def reduced_contrast(density: Array) -> Array:
     """density^(3/4)."""
     root = np.sqrt(density)
     result: Array = root * np.sqrt(root)
-    return result
-
-
-def full_contrast(values: Array) -> Array:
-    """values^(4/3), the inverse of `reduced_contrast`."""
-    result: Array = values * np.cbrt(values)
     return result
 
 

@@ -8,7 +8,7 @@ from smokelift.velocity.solver import ProjectedCG, Solver
 from smokelift.velocity.sources import SourceDetection
 
 LEVELS = 3
-"""Grids where nobody says how many: they reach several voxels a frame."""
+"""Grids by default. They reach several voxels a frame (docs/experiments/velocity-pyramid.md)."""
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ FAINT = np.float32(1e-4)
 
 @dataclass(frozen=True)
 class SourceDetection:
-    """How smoke that enters is told from motion. docs/experiments/velocity-sources.md has the sweeps.
+    """How smoke that enters is distinguished from motion. docs/experiments/velocity-sources.md has the sweeps.
 
     Attributes
     ----------
