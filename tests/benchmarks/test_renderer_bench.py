@@ -1,4 +1,4 @@
-"""``smokelift bench renderer``: the figures, the table and what becomes of peers that fail or are wrong."""
+"""``smokelift bench renderer``: the figures, the table, and peers that fail or are wrong."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ def on_the_processor():
 
 @pytest.fixture
 def peers(monkeypatch):
-    """No processes: Dr.Jit is us, JAX is us and wrong, PyTorch fails, Taichi is not there.
+    """No processes: Dr.Jit is Smokelift, JAX is Smokelift with an error, PyTorch fails, Taichi is not installed.
 
-    The n-th of our own runs takes n ms an iteration, as on a machine that others begin to use; the peers take 60.
+    The n-th run of Smokelift takes n ms an iteration, as on a machine that gets busier; the peers take 60.
     """
     for key in ("drjit", "jax", "pytorch"):
         monkeypatch.setitem(PEERS, key, replace(PEERS[key], packages=()))
