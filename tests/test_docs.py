@@ -80,6 +80,7 @@ def test_imports_follow_the_arrows_of_the_architecture() -> None:
     }
     assert {package.name for package in packages} == set(below) | set().union(*below.values())
     assert {(package, other) for package, other in imported if other not in reached(package)} == set()
+    assert {(upper, lower) for upper in below for lower in below[upper]} - imported == set()
 
 
 def test_pictures_of_the_docs_are_shown() -> None:
