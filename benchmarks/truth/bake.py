@@ -1,4 +1,4 @@
-"""Bake scenes with a known flow: Mantaflow, inside a Blender of Debian's that is fetched for it.
+"""Bake scenes with a known flow by Mantaflow, in a Blender of Debian that is installed for it.
 
     python -m benchmarks.truth.bake OUT [choose | report | NAME ...] [--resolution 64x64x96]
 
@@ -42,7 +42,7 @@ def bake(name: str, across: int, frames: int, folder: Path) -> None:
     part = folder.with_suffix(".part")
     shutil.rmtree(part, ignore_errors=True)
     part.mkdir(parents=True)
-    # the root sees one folder of ours only: what runs in there goes with it
+    # the root sees one folder only, so the scripts are copied into it
     scripts = [shutil.copy(HERE / script, part) for script in ("manta_scene.py", "mantaflow.py", "scenes.py")]
     blender = ("blender", "-b", "--factory-startup", "--python-exit-code", "1", "-P", scripts[0])
     command = [ENTER, debian_root(), part, *blender, "--", name, str(across), str(frames), part / "truth.npz"]

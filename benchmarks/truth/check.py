@@ -1,4 +1,4 @@
-"""Look at baked scenes: figures of the flow in every frame, and a sheet with pictures of them all.
+"""Check baked scenes: figures of the flow in every frame, and a sheet with pictures of all scenes.
 
     python -m benchmarks.truth.check SHEET.png plume-1/truth.npz ... [--frames]
 
@@ -27,7 +27,7 @@ EXTINCTION = 5.0  # 1/m per unit of density, as in the pictures
 
 @dataclass(frozen=True)
 class Figures:
-    """What can be said of one frame.
+    """Figures of the flow in one frame.
 
     Attributes
     ----------
@@ -36,13 +36,13 @@ class Figures:
     densest
         Largest density.
     mean_speed, fastest
-        In smoke, voxels a frame.
+        Mean and largest speed in smoke (voxels a frame).
     divergence
-        Largest in smoke two voxels from the inlet, per frame.
+        Largest divergence in smoke, two voxels from the inlet (per frame).
     warp_error
-        Of the density carried by the velocity against the next, relative L2, without the inlet.
+        Relative L2 error of the density that the velocity carries, against the next frame's, without the inlet.
     unmoved_error
-        The same with the density left where it is.
+        The same error of the density that stays where it is.
     """
 
     mass: float

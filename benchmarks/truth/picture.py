@@ -1,12 +1,12 @@
-"""Make the clip of a baked scene with Mitsuba 3, and what no reconstruction may see: linear pictures from four sides.
+"""Picture a baked scene with Mitsuba 3: its clip, and linear pictures from four sides that no reconstruction may see.
 
     python -m benchmarks.truth.picture plume-1/truth.npz OUT [--light point] [--background wall] [--check 20]
         [--scattering multiple] [--linear] [--frames 24]
 
-None of the project's own code takes part. The pictures are single scattering, integrated at half-voxel steps over
-Mitsuba's own sensor, emitters and trilinear grid, so they carry no noise; `--check` compares frames with `volpath`.
-Scattering is isotropic, so that what arrives at a point is one number, found once for all cameras. With multiple
-scattering `volpath` makes the pictures itself, at half the size and with some grain.
+Nothing of Smokelift takes part. The pictures are single scattering, integrated at half-voxel steps over Mitsuba's own
+sensor, emitters and trilinear grid, so they carry no noise; `--check` compares frames with `volpath`. Scattering is
+isotropic, so that one source function serves all cameras. With multiple scattering `volpath` makes the pictures itself,
+at half the size and with some noise.
 """
 
 from __future__ import annotations

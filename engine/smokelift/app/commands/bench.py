@@ -27,7 +27,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         if missing.name is None or not missing.name.startswith("benchmarks"):
             raise
         raise ValueError(
-            "The benchmarks come with Smokelift's source, not with its wheel: "
-            "run smokelift bench, or python -m benchmarks, in the folder of the source, which has them in benchmarks/."
+            "The benchmarks are in the folder benchmarks of Smokelift's source and in no wheel: "
+            "run `python -m benchmarks` (or `smokelift bench`) in the source's folder."
         ) from None
     command.run(options.arguments, say)
