@@ -18,7 +18,7 @@ from benchmarks.pipeline.worker import run_apart
 from benchmarks.tables import size_text
 from benchmarks.timing import UNTIMED
 from smokelift.scene import Scene
-from smokelift.setup.settings import Method, Quality
+from smokelift.setup.settings import MethodName, Quality
 
 Shape = tuple[int, int, int]
 
@@ -28,7 +28,7 @@ LIBRARIES = ("numpy", "scipy", "taichi")
 def run(
     scene_path: Path | None,
     sizes: Sequence[Shape],
-    methods: Sequence[Method],
+    methods: Sequence[MethodName],
     quality: Quality,
     frames: int,
     say: Callable[[str], None],

@@ -23,7 +23,7 @@ from benchmarks.timing import UNTIMED, FrameTimes, median
 from smokelift.footage.clip import Clip
 from smokelift.pipeline import reconstruct
 from smokelift.scene import Scene
-from smokelift.setup.settings import Method, Quality, Settings
+from smokelift.setup.settings import MethodName, Quality, Settings
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Run:
 
 
 def run_apart(
-    scene_path: Path, shape: tuple[int, int, int], method: Method, quality: Quality, frames: int, folder: Path
+    scene_path: Path, shape: tuple[int, int, int], method: MethodName, quality: Quality, frames: int, folder: Path
 ) -> Run:
     """Time a run in a process of its own."""
     result = folder / "run.json"
@@ -73,7 +73,7 @@ def run_apart(
     return Run(shape, method, failure=why_it_ended(ended))
 
 
-def measure(scene_path: Path, shape: tuple[int, int, int], method: Method, quality: Quality, frames: int) -> Run:
+def measure(scene_path: Path, shape: tuple[int, int, int], method: MethodName, quality: Quality, frames: int) -> Run:
     """Time a run in this process.
 
     Raises
@@ -107,7 +107,7 @@ def main() -> None:
     scene_path, size, method, quality, frames, folder = sys.argv[1:]
     x, y, z = (int(count) for count in size.split("x"))
     try:
-        found = measure(Path(scene_path), (x, y, z), cast(Method, method), cast(Quality, quality), int(frames))
+        found = measure(Path(scene_path), (x, y, z), cast(MethodName, method), cast(Quality, quality), int(frames))
     except MemoryError as error:
         found = Run((x, y, z), method, failure=str(error) or "Out of memory.")
     except ValueError as error:

@@ -1,8 +1,8 @@
 """What is assumed of the smoke's depth, which one picture leaves undetermined.
 
 `RoundDepth`, the default, takes the smoke to be as deep as it is wide. It spreads the smoke of one picture about an
-axis that comes from the whole clip. Several pictures show each other where their smoke stands. The start then is what
-all their profiles have in common, in every layer as much as the pictures show. It need not look like any picture: the
+axis that comes from the whole clip. With several pictures the density is the product of their depth profiles, scaled in
+each horizontal layer to the optical depth of the view that shows most there. It need not look like any picture: the
 multiplicative fit scales ray by ray, and keeps of it only how the smoke of one ray relates to that of another.
 """
 
@@ -24,7 +24,7 @@ from smokelift.density.screen import view_frame
 from smokelift.render import Volume
 
 LEAST_SHAPE = 0.05
-"""Of several profiles each has everywhere in the hull so much of its height, because others may show smoke there
+"""With several views no profile is below this share of its peak inside the hull, since another view may see smoke there
 (docs/experiments/density-profile.md)."""
 
 AXIS_FRAMES = 16

@@ -39,7 +39,7 @@ def descend(
     tolerance: float,
     patience: int,
     *,
-    densest: float = np.inf,
+    bound: float = np.inf,
 ) -> Fit:
     """Minimise the objective from a start.
 
@@ -58,12 +58,12 @@ def descend(
     patience
         Stop after so many steps in a row that do not. Of Barzilai and Borwein's steps one may gain little and the next
         much.
-    densest
+    bound
         What no voxel may exceed; where the start does it is cut.
     """
     where = np.flatnonzero(hull)
     volume = np.zeros_like(density)
-    current = np.minimum(density.ravel()[where], np.float32(densest))
+    current = np.minimum(density.ravel()[where], np.float32(bound))
     scale = current + np.float32(FLOOR * (current.mean() if current.size else 0.0))
     enough = noise_floor(terms)
 
@@ -89,7 +89,7 @@ def descend(
             break
         trial = step or 0.1 * loss / slope
         for _ in range(SHORTENINGS):
-            candidate = np.clip(current - np.float32(trial) * scale * gradient, 0, densest)
+            candidate = np.clip(current - np.float32(trial) * scale * gradient, 0, bound)
             moved = (candidate - current) / scale
             new_residuals = residuals_of(candidate)
             new_loss = objective(terms, new_residuals)

@@ -44,9 +44,10 @@ class DensitySettings:
     patience
         Steps of descent in a row without that gain which end it (density-descent.md).
     least_share
-        Share that counts at least of rays whose smoke the prior puts outside the domain. With less, smoke that stands
-        elsewhere is missing in the picture; with more, density spikes grow at floor and ceiling (density-profile.md).
-    densest
+        Lower bound of the share of a ray's smoke that is taken to lie inside the domain. With less, smoke that the
+        prior puts outside is missing in the picture; with more, density spikes grow at floor and ceiling
+        (density-profile.md).
+    bound
         Bound of the density, in multiples of the densest voxel of the prior's estimate (or of a denser start). Where
         smoke hardly changes the picture, in shadow or before what hides it, nothing else bounds it (density-bound.md).
 
@@ -58,7 +59,7 @@ class DensitySettings:
     tolerance: float = 0.02
     patience: int = 2
     least_share: float = 0.3
-    densest: float = 3.0
+    bound: float = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +118,7 @@ class GradientFit:
             return empty_density(views)
         terms = _terms(views, depth, settings.least_share)
         start = np.where(hull, depth.density if initial is None else initial, 0).astype(np.float32)
-        # what several pictures have in common takes as many times longer to be found
+        # the terms take turns, so several need as many times more iterations
         scaled = fit_multiplicative(terms, start, settings.fit_iterations * len(terms), settings.tolerance)
         final = descend(
             terms,
@@ -126,7 +127,7 @@ class GradientFit:
             settings.descent_iterations,
             settings.tolerance,
             settings.patience,
-            densest=float(max(settings.densest * depth.density.max(), start.max())),
+            bound=float(max(settings.bound * depth.density.max(), start.max())),
         )
         iterations = scaled.iterations + final.iterations
         return Density(without_traces(final.density), hull, fit_figures(views, final.residuals, iterations))
@@ -192,8 +193,8 @@ def _with_plate(observation: Observation, scene: CompleteScene) -> Observation:
 def _terms(views: ViewSet, depth: DepthEstimate, least_share: float) -> list[Term]:
     """The objective: a term for every camera's picture, then those that the prior imposes."""
     weighted: list[tuple[View, NDArray[np.float32]]] = [
-        # a ray that leaves through floor or ceiling crosses few voxels, which must not hold all that it shows: the
-        # smoke outside is an error of the model in proportion to its share, and residuals count by the share inside
+        # Smoke of a ray that lies outside the domain is not modelled. The residual counts by the share inside, so
+        # that the few voxels which a ray crosses on its way out do not have to hold all that it shows.
         (view, view.counted * np.maximum(inside, least_share) ** 2)
         for view, inside in zip(views.views, depth.inside, strict=True)
     ]
@@ -205,7 +206,7 @@ def _terms(views: ViewSet, depth: DepthEstimate, least_share: float) -> list[Ter
 
 
 def empty_density(views: ViewSet) -> Density:
-    """No smoke: one picture without any, or several that contradict each other."""
+    """The empty result: no smoke is seen, or the views have no voxel in common."""
     residuals = [view.plate.image - view.image for view in views.views]
     return Density(np.zeros(views.hull.shape, np.float32), views.hull, fit_figures(views, residuals, 0))
 

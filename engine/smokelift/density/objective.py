@@ -1,13 +1,13 @@
-"""What a density fit minimises: one objective, the same for every optimiser, for the stop and for the figures.
+"""What a density fit minimises: one objective for both of its optimisers and for where it stops.
 
-    E(rho) = sum over terms, pixels, channels of  w (L(rho) - I)^2,    0 <= rho <= densest,  rho = 0 outside the hull
+    E(rho) = sum over terms, pixels, channels of  w (L(rho) - I)^2,    0 <= rho <= bound,  rho = 0 outside the hull
 
-A term is a picture I with the weight w of its pixels. There is one for each camera; a depth prior may add pictures of
-its own (soft observations), with weights that say how much they count. The prior's other part is the start, which the
-preconditioned descent departs from as little as the pictures ask for.
+A term is a picture I with the weight w of its pixels. There is one term a camera. A depth prior may add pictures of its
+own (soft observations), whose weights say how much they count. It has no penalty term: beyond those pictures it acts
+through the start and the preconditioner of the descent.
 
 Noise of standard deviation s leaves E = sum w s^2 at the true density. Below that a fit reproduces noise, so it stops
-there (discrepancy principle: Morozov 1966).
+there (discrepancy principle: Morozov 1966). The figures that a fit reports are plain: unweighted, of the cameras alone.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Term:
     renderer
         Of the view's camera, before the view's plate.
     weight : (rows, columns)
-        How much each pixel counts, 0 to 1.
+        How much each pixel counts, at least 0; at most 1 for a camera's.
     """
 
     view: View

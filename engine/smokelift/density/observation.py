@@ -44,8 +44,8 @@ class Observation:
     image : (rows, columns, 3)
         Linear radiance, of the camera's size.
     plate
-        What the camera sees without smoke, and the noise of its pictures. By default black with the noise of 8 bits;
-        in `reconstruct_density` the scene's background takes the place of that.
+        The clean plate: what the camera sees without smoke, with the noise of its pictures. By default black with the
+        noise of 8 bits, for which `reconstruct_density` substitutes the scene's background.
     """
 
     camera: Camera

@@ -1,16 +1,16 @@
 """Where the fit of a frame starts, from the depth prior's density and the one carried along from the frame before.
 
-The carried density knows amounts that the renderer has corrected for shadows already, and structures along the rays.
-`BlendCarried`, the default, judges it before any correction by E, the squared difference between the input's picture
-and what a density renders to:
+The carried (advected) density knows optical depths that the renderer has corrected for shadows already, and structures
+along the rays. `BlendCarried`, the default, judges it before any correction by D, the squared difference between the
+input's picture and what a density renders to. It blends in two shares:
 
-    amounts  as far as carried beats the prior's:       largest  (1 - E(carried) / (E(prior) + noise))
-    depth    as far as its motion has been understood:  largest  (1 - E(carried) / (E(before) + noise))
+    of the rays' optical depths, by skill against the prior:      largest (1 - D(carried) / (D(prior) + noise))
+    of the density itself, by skill against persistence:          largest (1 - D(carried) / (D(before) + noise))
 
 and never below zero. `before` is the density of the frame before, left where it was: persistence, by which the skill of
-weather forecasts is measured. A wrong velocity is no better than none, and then nothing is taken over. One bound does
-for both (docs/experiments/temporal-prior.md): what no picture corrects, in thick smoke or in shadow, would else grow
-from frame to frame.
+weather forecasts is measured. A wrong velocity is no better than none, and then nothing is blended in. `largest` limits
+both (docs/experiments/temporal-prior.md), so that errors which no picture corrects, in thick smoke or in shadow, do not
+grow from frame to frame.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from smokelift.density.observation import View, ViewSet
 from smokelift.render import Image, Volume
 
 FAINT = 1e-3
-"""Optical depth, beside the largest, below which the logarithm of an amount means nothing."""
+"""Optical depth, as a fraction of the largest, below which its logarithm means nothing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +87,7 @@ class BlendCarried:
     def start(self, views: ViewSet, depth: DepthEstimate, carried: Volume, before: Volume) -> Start:
         """The prior's density, mixed with the carried one; see `TemporalPrior`.
 
-        Its figures are ``share`` of the density that was carried along and ``amounts``, the share of its amounts, with
+        Its figures are ``share`` of the density and ``amounts``, the share of the rays' optical depths, with
         what decided them: ``loss_prior``, ``loss_carried`` and ``loss_before`` (sums of squares over the input's
         picture, linear radiance).
         """
@@ -103,12 +103,12 @@ class BlendCarried:
             along_rays = -np.log(np.maximum(renderer.transmittance, np.finfo(np.float32).tiny))
             return float(np.sum(np.square(difference, dtype=np.float64))), along_rays
 
-        (loss_prior, depth_prior), (loss_carried, depth_carried) = judged(prior), judged(carried)
+        (loss_prior, optical_depth), (loss_carried, carried_optical_depth) = judged(prior), judged(carried)
         loss_before, _ = judged(before)
         noise = float(np.sum(np.square(view.noise, dtype=np.float64)))
         amounts = self.largest * _skill(loss_carried, loss_prior + noise)
         share = self.largest * _skill(loss_carried, loss_before + noise)
-        corrected = _with_amounts(prior, view, depth_prior, depth_carried, amounts)
+        corrected = _with_optical_depth(prior, view, optical_depth, carried_optical_depth, amounts)
         return Start(
             np.float32(1 - share) * corrected + np.float32(share) * carried,
             {
@@ -126,12 +126,12 @@ def _skill(loss: float, reference: float) -> float:
     return max(0.0, 1 - loss / reference) if reference > 0 else 0.0
 
 
-def _with_amounts(
+def _with_optical_depth(
     density: Volume, view: View, have: NDArray[np.float32], want: NDArray[np.float32], share: float
 ) -> Volume:
     """A density, its rays changed from the optical depths (rows, columns) that they have towards others.
 
-    Amounts are mixed in logarithms. Where nothing is wanted nothing is known: smoke may have come in.
+    They are mixed in logarithms. Where none is wanted nothing is known, because smoke may have come in.
     """
     faint = FAINT * want.max()
     step = share * np.log((want + faint) / (have + faint)) * want / (want + faint)

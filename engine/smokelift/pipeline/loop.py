@@ -41,7 +41,7 @@ class Frame:
         1 for the clip's first frame.
     density : (nx, ny, nz) float32
     velocity
-        In m/s, of the smoke that arrives in this frame (the first frame has the second's).
+        In m/s, from the frame before to this one; the first frame has the second's.
     figures
         Measures of the fit and seconds spent.
     """
@@ -149,7 +149,7 @@ def _frame(index: int, before: Frame | None, shot: Shot, method: Method) -> Fram
     # from where there was no smoke nothing is carried
     if before is not None and index >= 2 and before.density.any():
         predicted = method.velocity_estimator.predict(before.velocity, dt)
-        # pictures correct the mass, but not of what a moving camera does not see
+        # what a moving camera does not see no picture corrects, so that its mass has to be kept
         carried = advect(before.density, predicted, dt, conserve=shot.moves)
     density, taken_over = _density(index, before, carried, shot, method)
     fitted = time.perf_counter()

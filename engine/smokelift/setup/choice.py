@@ -17,7 +17,7 @@ class Choice(Generic[Chosen]):
     ----------
     what
         ``"scattering"``, ``"resolution"``, ``"domain"``, ``"environment directions"``, ``"iterations"``,
-        ``"velocity coarsening"`` or ``"velocity levels"``.
+        ``"velocity grid coarsening"`` or ``"velocity levels"``.
     chosen
         What will be used.
     reason

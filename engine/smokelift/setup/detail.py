@@ -1,7 +1,7 @@
-"""How fine a grid a clip needs: as fine as the detail of its smoke, in so far as that stands out from the noise.
+"""How much of the smoke's detail a grid loses, in so far as that detail stands out from the noise.
 
 The spectrum of what the smoke changes in the picture (cosine transform, in sRGB values, where a clip's noise is even)
-is compared with that of the noise, which is what differs from the background where there never is smoke. A grid shows
+is compared with that of the noise, which is measured in pixels without smoke. A grid shows
 what is coarser than two of its voxels; the share of the smoke's contrast that is finer is what it loses.
 """
 
@@ -21,8 +21,8 @@ from smokelift.footage.plate import Plate, encoded_noise
 from smokelift.render.renderer import Image
 
 TOLERANCE = 0.01
-"""Share of the smoke's contrast that a grid may lose against the finest that quality allows: a quarter of what
-even that one misses of the front of a sharp clip (docs/selection.md)."""
+"""Share of the smoke's contrast that a grid may lose against the finest of the quality: a quarter of the error that
+even the finest leaves in the input view of a sharp clip (docs/experiments/resolution-selection.md)."""
 
 EDGE = 3
 """Voxels around the smoke in which there may be some that is too thin to be found."""

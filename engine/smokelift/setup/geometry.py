@@ -28,7 +28,7 @@ LENS = 50 / 36
 """Focal length over the longer side of the picture of an uncalibrated camera: Blender's default lens."""
 
 MARGIN = 0.06
-"""Free space around the smoke on each side of a guessed box, in its longer side."""
+"""Margin on each side of a guessed box, as a fraction of its longer side."""
 
 NARROWEST = 0.25
 """Width over height of a guessed box at least, and the reverse."""
@@ -51,7 +51,7 @@ class Geometry:
     domain
         With its final resolution.
     resolution
-        Why it has that resolution; None where the scene gives it.
+        Why it has that resolution; None for the finest grid of a quality that nothing was measured for.
     notes
         What was assumed, a sentence each.
     """

@@ -1,4 +1,4 @@
-"""Light and scattering where a scene does not give them."""
+"""A light where a scene gives none, and the richest model of scattering that the known light allows."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from smokelift.scene import DirectionalLight, Light, Medium, Scattering
 from smokelift.setup.smoke import SmokeSamples
 
 BEYOND = 0.1
-"""Share by which the source radiance exceeds the 99th percentile of the smoke's: that smoke then has an optical depth
+"""Share by which the source radiance exceeds the 99th percentile of the smoke's. That smoke then has an optical depth
 of about 2.4, not an infinite one."""
 
 
@@ -32,10 +32,10 @@ def richest_scattering(asked: Scattering | None, lights: tuple[Light, ...], medi
 
 
 def ambient_sun(samples: SmokeSamples, medium: Medium) -> DirectionalLight:
-    """Light such that thick, unshadowed smoke looks like the thickest in the clip.
+    """Uniform light whose source radiance is about the radiance of the clip's thickest smoke.
 
-    Thick smoke shows its source radiance J: the brightest smoke where smoke brightens its background, the darkest
-    where it darkens it.
+    Thick smoke shows its source radiance J. It is the brightest smoke where smoke brightens its background, and the
+    darkest where it darkens it.
     """
     if samples.colours.shape[0] == 0:
         source = np.ones(3)

@@ -37,7 +37,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
     scene
         Whatever is known.
     settings
-        What they leave open is chosen by measurement.
+        Anything unset is measured on the clip.
 
     Raises
     ------
@@ -53,7 +53,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
     notes = [clip.warning] if clip.warning else []
     notes += [*found.notes, *geometry.notes]
     if settings.axis_depth is not None:
-        SmokeAxis.given(settings.axis_depth, camera, domain)  # before anything is spent on what cannot be
+        SmokeAxis.given(settings.axis_depth, camera, domain)  # refuse early what cannot be
     medium = scene.medium
     if medium is None:
         medium = _usual_medium(domain)
@@ -96,7 +96,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
         scene=complete,
         optics=scene_optics(complete),
         views=tuple(views),
-        settings=replace(settings, scattering=complete.scattering),
+        settings=settings,
         estimated_background=plates.image if found.background is None and isinstance(plates, Plate) else None,
         notes=tuple(notes),
         choices=choices,

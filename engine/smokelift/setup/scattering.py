@@ -2,8 +2,8 @@
 
     absorption -> unshadowed -> single (with self-shadowing)
 
-What a wrong model does is not to be seen in its own picture: before black, smoke without shadows explains any picture,
-by thinner smoke where there is shadow. So every model fits a coarse density to one half of the clip's pixels, and the
+A wrong model can still reproduce its own picture: before black, unshadowed smoke fits any picture by being too thin in
+shadow. So every model fits a coarse density to one half of the clip's pixels, and the
 richest one, which holds the others as special cases, shows that density; the error of the other half says how good it
 is. Where smoke is brighter than its background, absorption is not even tried.
 """

@@ -11,14 +11,14 @@ from smokelift.density import DensitySettings
 from smokelift.scene import SCATTERINGS, Scattering
 from smokelift.velocity import VelocitySettings
 
-Method = Literal["default", "paper"]
+MethodName = Literal["default", "paper"]
 Quality = Literal["draft", "balanced", "fine"]
 
-METHODS: tuple[Method, ...] = ("default", "paper")
+METHODS: tuple[MethodName, ...] = ("default", "paper")
 QUALITIES: tuple[Quality, ...] = ("draft", "balanced", "fine")
 
 LONGEST_SIDE: Mapping[Quality, int] = {"draft": 64, "balanced": 96, "fine": 144}
-"""Voxels along the domain's longest side where the scene gives no resolution; 96 is the paper's smallest grid."""
+"""Voxels along the domain's longest side at most, where they are chosen; 96 is the paper's smallest grid."""
 
 ITERATIONS: Mapping[Quality, tuple[int, int]] = {"draft": (4, 6), "balanced": (6, 12), "fine": (8, 30)}
 """Multiplicative iterations and steps of descent at most (docs/experiments/density-descent.md)."""
@@ -35,18 +35,18 @@ class Settings:
     quality
         ``"draft"``, ``"balanced"`` or ``"fine"``: resolution (unless given) and iterations.
     resolution
-        Voxels along x, y, z; None takes the scene's. ``"auto"``, and None where the scene gives none, take as many as
-        the detail of the clip's smoke asks for, at most those of the quality.
+        Voxels along x, y, z. ``"auto"`` takes as few as the detail of the clip's smoke allows, up to the quality's
+        limit. None takes the scene's, or ``"auto"`` if it has none.
     scattering
         How light is scattered: ``"single"`` (self-shadowed), ``"unshadowed"``, ``"absorption"``, or ``"auto"``: what
         the scene says, else the cheapest model that finds as good a density as the richest.
     model_selection
-        Whether to choose by measurement on the clip what is left open; else the richest model and the finest grid of
-        the quality are taken.
+        Measure open choices on the clip. Without it a guessed box gets the finest grid of the quality, and the richest
+        model of scattering that the known light allows is taken.
     transport
-        Largest share (0 to 1) of the density carried along from the frame before in the start of the next; the rest is
-        the pictures' own. Every frame takes over as much as proves right (`smokelift.density.temporal_prior`). Beyond a
-        half the velocity's errors smear the depth (docs/experiments/temporal-prior.md). The paper's method takes all.
+        At most this share (0 to 1) of what a frame's fit starts from is the advected density of the frame before. Every
+        frame takes as much as proves right (`smokelift.density.temporal_prior`). Beyond a half the velocity's errors
+        smear the depth (docs/experiments/temporal-prior.md). The paper's method takes all.
     axis_depth
         How far behind the domain's centre (metres, away from the camera) the middle of the smoke stands; None estimates
         it from where the smoke meets the floor and from the light of coloured lamps, else takes the domain's centre.
@@ -60,7 +60,7 @@ class Settings:
         If a value is out of range.
     """
 
-    method: Method = "default"
+    method: MethodName = "default"
     quality: Quality = "balanced"
     resolution: tuple[int, int, int] | Literal["auto"] | None = None
     scattering: Scattering | Literal["auto"] = "auto"
@@ -90,7 +90,7 @@ class Settings:
     def preset(
         cls,
         quality: Quality = "balanced",
-        method: Method = "default",
+        method: MethodName = "default",
         resolution: tuple[int, int, int] | Literal["auto"] | None = None,
     ) -> Settings:
         """The settings of a quality and a method."""

@@ -295,7 +295,7 @@ def test_descent_makes_nothing_denser_than_it_may_be(plume, small) -> None:
     term, hull, start = even_start(plume.densities[1], small)
     free = descend([term], start, hull, 20, 0.0, 2)
     most = 0.5 * float(free.density.max())
-    bound = descend([term], start, hull, 20, 0.0, 2, densest=most)
+    bound = descend([term], start, hull, 20, 0.0, 2, bound=most)
     assert bound.density.max() == pytest.approx(most)
     assert free.loss < bound.loss < 0.5 * descend([term], start, hull, 0, 0.0, 2).loss
 
