@@ -31,21 +31,28 @@ void mark(const float *__restrict density, float least, unsigned char *__restric
         smoke[i] = density[i] > least;
 }
 
-SMOKELIFT_CLONES
-double squares(const float *__restrict x, const float *__restrict y, const float *__restrict z,
-               const unsigned char *__restrict smoke, std::size_t n) {
-    constexpr int sums_kept = 8;
-    double sums[sums_kept] = {};
+// value(0) + ... + value(n - 1) in eight running sums, which keep the vector units busy.
+template <class Value> SMOKELIFT_INLINE double sum_of(std::size_t n, const Value &value) {
+    constexpr int running = 8;
+    double sums[running] = {};
     std::size_t i = 0;
-    for (; i + sums_kept <= n; i += sums_kept)
-        for (int l = 0; l < sums_kept; ++l)
-            sums[l] += smoke[i + l] ? x[i + l] * x[i + l] + y[i + l] * y[i + l] + z[i + l] * z[i + l] : 0.0f;
+    for (; i + running <= n; i += running)
+        for (int l = 0; l < running; ++l)
+            sums[l] += value(i + l);
     for (; i < n; ++i)
-        sums[0] += smoke[i] ? x[i] * x[i] + y[i] * y[i] + z[i] * z[i] : 0.0f;
+        sums[0] += value(i);
     double total = 0;
     for (double sum : sums)
         total += sum;
     return total;
+}
+
+SMOKELIFT_CLONES
+double squares(const float *__restrict x, const float *__restrict y, const float *__restrict z,
+               const unsigned char *__restrict smoke, std::size_t n) {
+    return sum_of(n, [&](std::size_t i) SMOKELIFT_INLINE_LAMBDA {
+        return smoke[i] ? x[i] * x[i] + y[i] * y[i] + z[i] * z[i] : 0.0f;
+    });
 }
 
 SMOKELIFT_CLONES
@@ -70,8 +77,8 @@ SMOKELIFT_CLONES
 std::array<double, 3> residual_sums_row(const float *__restrict along, const float *__restrict offset,
                                         const float *__restrict weight, const unsigned char *__restrict smoke,
                                         std::size_t n) {
-    constexpr int sums_kept = 8;
-    double whole[sums_kept] = {}, rest[sums_kept] = {}, inside[sums_kept] = {};
+    constexpr int running = 8;
+    double whole[running] = {}, rest[running] = {}, inside[running] = {};
     const auto add = [&](std::size_t i, int l) SMOKELIFT_INLINE_LAMBDA {
         const float left = offset[i] + along[i];
         whole[l] += weight[i] * offset[i] * offset[i];
@@ -79,13 +86,13 @@ std::array<double, 3> residual_sums_row(const float *__restrict along, const flo
         inside[l] += smoke[i] ? weight[i] : 0.0f;
     };
     std::size_t i = 0;
-    for (; i + sums_kept <= n; i += sums_kept)
-        for (int l = 0; l < sums_kept; ++l)
+    for (; i + running <= n; i += running)
+        for (int l = 0; l < running; ++l)
             add(i + l, l);
     for (; i < n; ++i)
         add(i, 0);
     std::array<double, 3> total{};
-    for (int l = 0; l < sums_kept; ++l) {
+    for (int l = 0; l < running; ++l) {
         total[0] += whole[l];
         total[1] += rest[l];
         total[2] += inside[l];
@@ -96,18 +103,7 @@ std::array<double, 3> residual_sums_row(const float *__restrict along, const flo
 SMOKELIFT_CLONES
 double weighted_dot(const float *__restrict a, const float *__restrict b, const float *__restrict weight,
                     std::size_t n) {
-    constexpr int sums_kept = 8;
-    double sums[sums_kept] = {};
-    std::size_t i = 0;
-    for (; i + sums_kept <= n; i += sums_kept)
-        for (int l = 0; l < sums_kept; ++l)
-            sums[l] += double(weight[i + l] * a[i + l]) * b[i + l];
-    for (; i < n; ++i)
-        sums[0] += double(weight[i] * a[i]) * b[i];
-    double total = 0;
-    for (double sum : sums)
-        total += sum;
-    return total;
+    return sum_of(n, [&](std::size_t i) SMOKELIFT_INLINE_LAMBDA { return double(weight[i] * a[i]) * b[i]; });
 }
 
 // Sums of several quantities over slabs, added in order whatever the number of threads.

@@ -16,7 +16,7 @@ Figures projected_cg(const LeastSquares &problem, StaggeredField &b, double tole
     Spectral spectral(problem.box(), symbol[0], symbol[1], symbol[2]);
     StaggeredField search(problem.box());
     const StaggeredOut residual = b.out(),
-                       product = spectral.room(); // a product is done with when waves are made
+                       product = spectral.room(); // a product is not needed when modes are made
     std::fill_n(search.data(), search.size(), 0.0f);
     const auto project_residual = [&] {
         ++figures.projections;

@@ -14,11 +14,11 @@ int chunks(std::size_t n) { return int((n + chunk - 1) / chunk); }
 SMOKELIFT_CLONES
 double dot(const float *__restrict a, const float *__restrict b, std::size_t n) {
     // Sixteen running sums keep the vector units busy; a fixed number keeps the result the same everywhere.
-    constexpr int sums_kept = 16;
-    float sums[sums_kept] = {};
+    constexpr int running = 16;
+    float sums[running] = {};
     std::size_t i = 0;
-    for (; i + sums_kept <= n; i += sums_kept)
-        for (int l = 0; l < sums_kept; ++l)
+    for (; i + running <= n; i += running)
+        for (int l = 0; l < running; ++l)
             sums[l] += a[i + l] * b[i + l];
     double total = 0;
     for (; i < n; ++i)
