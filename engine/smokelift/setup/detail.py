@@ -20,10 +20,6 @@ from smokelift.footage.matte import matte
 from smokelift.footage.plate import Plate, encoded_noise
 from smokelift.render.renderer import Image
 
-TOLERANCE = 0.01
-"""Share of the smoke's contrast that a grid may lose against the finest of the quality: a quarter of the error that
-even the finest leaves in the input view of a sharp clip (docs/experiments/resolution-selection.md)."""
-
 EDGE = 3
 """Voxels around the smoke in which there may be some that is too thin to be found."""
 

@@ -14,7 +14,6 @@ from smokelift.footage.working_picture import CameraError, working_picture
 from smokelift.scene import Camera, Domain, Scene, as_matrix
 from smokelift.scene.projection import voxel_width
 from smokelift.setup.choice import Choice
-from smokelift.setup.detail import TOLERANCE as DETAIL_TOLERANCE
 from smokelift.setup.detail import Detail, smoke_detail
 from smokelift.setup.settings import LONGEST_SIDE, Settings
 from smokelift.setup.smoke import SmokeSamples
@@ -70,13 +69,14 @@ def find_geometry(clip: Clip, scene: Scene, settings: Settings, plates: Plates, 
     ValueError
         If the scene gives one of the two without the other, or an inlet without either.
     """
+    tolerance = settings.selection.lost_detail
     if scene.camera is not None:
         camera = fitting(scene.camera, clip)
         if scene.domain is None:
             raise ValueError("The scene gives a camera but no box in [domain]; give the one that holds the smoke.")
         if settings.resolution == "auto":
             grids = _same_shape(scene.domain, LONGEST_SIDE[settings.quality])
-            return Geometry(camera, *_resolved(clip, camera, grids, plates, samples.smoky))
+            return Geometry(camera, *_resolved(clip, camera, grids, plates, samples.smoky, tolerance))
         if settings.resolution is None:
             return Geometry(camera, scene.domain, _resolution_by_hand(scene.domain))
         domain = replace(scene.domain, resolution=settings.resolution)
@@ -90,8 +90,8 @@ def find_geometry(clip: Clip, scene: Scene, settings: Settings, plates: Plates, 
     camera, grids = _uncalibrated(clip, samples, settings)
     if isinstance(settings.resolution, tuple):
         domain, choice = grids[-1], _resolution_by_hand(grids[-1])
-    elif settings.model_selection:
-        domain, choice = _resolved(clip, camera, grids, plates, samples.smoky)
+    elif settings.selection.measure:
+        domain, choice = _resolved(clip, camera, grids, plates, samples.smoky, tolerance)
     else:
         domain, choice = grids[-1], None
     size = " x ".join(f"{high - low:.2f}" for low, high in zip(domain.min, domain.max, strict=True))
@@ -188,18 +188,18 @@ def _same_shape(domain: Domain, most: int) -> tuple[Domain, ...]:
 
 
 def _resolved(
-    clip: Clip, camera: Camera, grids: tuple[Domain, ...], plates: Plates, smoky: tuple[int, ...]
+    clip: Clip, camera: Camera, grids: tuple[Domain, ...], plates: Plates, smoky: tuple[int, ...], tolerance: float
 ) -> tuple[Domain, Choice[Shape]]:
     """The coarsest grid of some that loses no more of the smoke's detail than tolerated, and why."""
     finest = max(grids[-1].resolution)
     detail = _detail(clip, camera, grids[-1], plates, smoky)
-    domain = next((grid for grid in grids if detail.lost(max(grid.resolution)) <= DETAIL_TOLERANCE), grids[-1])
+    domain = next((grid for grid in grids if detail.lost(max(grid.resolution)) <= tolerance), grids[-1])
     lost = detail.lost(max(domain.resolution))
     reason = (
         f"Resolution: {' x '.join(map(str, domain.resolution))} voxels, which lose {lost:.1%} of the smoke's contrast "
         f"against {finest} along the longest side, the most at this quality."
     )
-    return domain, Choice("resolution", domain.resolution, reason, {"lost": lost}, DETAIL_TOLERANCE)
+    return domain, Choice("resolution", domain.resolution, reason, {"lost": lost}, tolerance)
 
 
 def _detail(clip: Clip, camera: Camera, finest: Domain, plates: Plates, smoky: tuple[int, ...]) -> Detail:

@@ -73,7 +73,7 @@ def choose_model(
 
     numbers = [number for number in _tried(smoky) if shows_smoke(number)]
     frames = [frame for frame in map(coarse, numbers) if frame is not None]
-    coarsened = choose_coarsening(scene.domain, settings.velocity)
+    coarsened = choose_coarsening(scene.domain, settings.velocity, settings.selection.velocity_side)
     velocity = replace(settings.velocity, coarsening=coarsened.chosen)
     if not frames:
         return Model(scene, replace(velocity, levels=velocity.grids), ())
@@ -83,7 +83,9 @@ def choose_model(
         said = scene.scattering
         scattered: Choice[str] = Choice("scattering", said, f"Scattering by hand: {said}.", by_hand=True)
     else:
-        scattering, scattered = choose_scattering(frames, scene.scattering, settings.density)
+        scattering, scattered = choose_scattering(
+            frames, scene.scattering, settings.density, settings.selection.scattering_error
+        )
         lit = replace(lit, scattering=scattering)
         if directions and scattering != scene.scattering:
             lit, directions = choose_directions(replace(scene, scattering=scattering), frames, settings.density)

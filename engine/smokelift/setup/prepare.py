@@ -83,7 +83,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
         inlets=scene.inlets,
     )
     choices = () if geometry.resolution is None else (geometry.resolution,)
-    if settings.model_selection:
+    if settings.selection.measure:
         model = choose_model(clip, complete, plates, samples.smoky, asked is not None, settings)
         complete, settings = model.scene, replace(settings, velocity=model.velocity)
         choices = (*choices, *model.choices)

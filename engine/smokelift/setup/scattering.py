@@ -26,10 +26,6 @@ from smokelift.setup.coarse import CoarseFrame
 MODELS: tuple[Scattering, ...] = ("absorption", "unshadowed", "single")
 """From the cheapest to the richest."""
 
-TOLERANCE = 0.02
-"""Error, in shares of what the smoke changes in the picture, that a cheaper model may add. Without shadows that is
-reached at an optical depth of about 0.15, where the smoke's mass comes out 5 % too small (docs/selection.md)."""
-
 _WORDS: Mapping[str, str] = {
     "absorption": "absorption only",
     "unshadowed": "scattering without shadows",
@@ -38,7 +34,7 @@ _WORDS: Mapping[str, str] = {
 
 
 def choose_scattering(
-    frames: Sequence[CoarseFrame], richest: Scattering, settings: DensitySettings
+    frames: Sequence[CoarseFrame], richest: Scattering, settings: DensitySettings, tolerance: float
 ) -> tuple[Scattering, Choice[str]]:
     """Choose the model of scattering.
 
@@ -50,21 +46,25 @@ def choose_scattering(
         What the light that is known allows: shadows need its direction.
     settings
         How to fit.
+    tolerance
+        Error, as a share of what the smoke changes in the picture, that a cheaper model may add.
     """
     errors = {richest: _error(frames, richest, richest, settings)}
     chosen = richest
     for model in MODELS[: MODELS.index(richest)]:
-        if model == "absorption" and (brightened := _brightened(frames)) > errors[richest] + TOLERANCE:
+        if model == "absorption" and (brightened := _brightened(frames)) > errors[richest] + tolerance:
             errors[model] = brightened
             continue
         errors[model] = _error(frames, model, richest, settings)
-        if errors[model] <= errors[richest] + TOLERANCE:
+        if errors[model] <= errors[richest] + tolerance:
             chosen = model
             break
-    return chosen, _choice(chosen, richest, errors)
+    return chosen, _choice(chosen, richest, errors, tolerance)
 
 
-def _choice(chosen: Scattering, richest: Scattering, errors: Mapping[Scattering, float]) -> Choice[str]:
+def _choice(
+    chosen: Scattering, richest: Scattering, errors: Mapping[Scattering, float], tolerance: float
+) -> Choice[str]:
     said = f"Scattering: {_WORDS[chosen]}"
     if chosen != richest:
         reason = (
@@ -79,7 +79,7 @@ def _choice(chosen: Scattering, richest: Scattering, errors: Mapping[Scattering,
         )
     else:
         reason = f"{said}."
-    return Choice("scattering", chosen, reason, {f"error_{name}": value for name, value in errors.items()}, TOLERANCE)
+    return Choice("scattering", chosen, reason, {f"error_{name}": value for name, value in errors.items()}, tolerance)
 
 
 def _brightened(frames: Sequence[CoarseFrame]) -> float:

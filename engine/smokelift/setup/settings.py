@@ -25,6 +25,33 @@ ITERATIONS: Mapping[Quality, tuple[int, int]] = {"draft": (4, 6), "balanced": (6
 
 
 @dataclass(frozen=True)
+class SelectionSettings:
+    """How much worse than the richest model a cheaper one may be (docs/selection.md).
+
+    Attributes
+    ----------
+    measure
+        Measure open choices on the clip. Without it a guessed box gets the finest grid of the quality, and the richest
+        model of scattering that the known light allows is taken.
+    lost_detail
+        Share of the smoke's contrast that a grid may lose against the finest of the quality: a quarter of the error
+        that even the finest leaves in the input view of a sharp clip (docs/experiments/resolution-selection.md).
+    scattering_error
+        Error, as a share of what the smoke changes in the picture, that a cheaper model of scattering may add. Without
+        shadows that is reached at an optical depth of about 0.15, where the mass comes out 5 % too small
+        (docs/experiments/scattering-selection.md).
+    velocity_side
+        Voxels along the longest side of the velocity's grid, at most: one view leaves the depth undetermined, and finer
+        velocities follow its errors (docs/experiments/velocity-grid.md).
+    """
+
+    measure: bool = True
+    lost_detail: float = 0.01
+    scattering_error: float = 0.02
+    velocity_side: int = 30
+
+
+@dataclass(frozen=True)
 class Settings:
     """How a clip is reconstructed.
 
@@ -40,9 +67,8 @@ class Settings:
     scattering
         How light is scattered: ``"single"`` (self-shadowed), ``"unshadowed"``, ``"absorption"``, or ``"auto"``: what
         the scene says, else the cheapest model that finds as good a density as the richest.
-    model_selection
-        Measure open choices on the clip. Without it a guessed box gets the finest grid of the quality, and the richest
-        model of scattering that the known light allows is taken.
+    selection
+        How open choices are made.
     transport
         At most this share (0 to 1) of what a frame's fit starts from is the advected density of the frame before. Every
         frame takes as much as proves right (`smokelift.density.temporal_prior`). Beyond a half the velocity's errors
@@ -64,7 +90,7 @@ class Settings:
     quality: Quality = "balanced"
     resolution: tuple[int, int, int] | Literal["auto"] | None = None
     scattering: Scattering | Literal["auto"] = "auto"
-    model_selection: bool = True
+    selection: SelectionSettings = SelectionSettings()
     transport: float = 0.25
     axis_depth: float | None = None
     density: DensitySettings = field(default_factory=DensitySettings)
@@ -96,7 +122,7 @@ class Settings:
         """The settings of a quality and a method."""
         settings = cls(method=method, quality=quality, resolution=resolution)
         if method == "paper":
-            return replace(settings, model_selection=False)
+            return replace(settings, selection=SelectionSettings(measure=False))
         fit, descent = ITERATIONS[quality]
         return replace(settings, density=DensitySettings(fit_iterations=fit, descent_iterations=descent))
 

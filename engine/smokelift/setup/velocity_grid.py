@@ -13,10 +13,6 @@ from smokelift.setup.choice import Choice
 from smokelift.velocity import VelocitySettings, estimate_velocity
 from smokelift.velocity.settings import LEVELS
 
-FINEST_SIDE = 30
-"""Voxels along the longest side of the velocity's grid, at most: one view leaves the depth undetermined, and finer
-velocities follow its errors (docs/experiments/velocity-grid.md)."""
-
 FASTEST = 99
 """Percentile of the smoke's speed that counts as the largest: single wisps may be wrong."""
 
@@ -24,7 +20,7 @@ MARGIN = 1.25
 """Factor by which grids reach further than the motion that is found, since coarse densities show less than there is."""
 
 
-def choose_coarsening(domain: Domain, settings: VelocitySettings) -> Choice[int]:
+def choose_coarsening(domain: Domain, settings: VelocitySettings, finest: int) -> Choice[int]:
     """Choose how much coarser than the densities the grid of the velocity is, and leave at least eight voxels a side.
 
     Parameters
@@ -33,16 +29,18 @@ def choose_coarsening(domain: Domain, settings: VelocitySettings) -> Choice[int]
         With its final resolution.
     settings
         How velocities are estimated.
+    finest
+        Voxels along the longest side at most.
     """
     what = "velocity grid coarsening"
     if settings.coarsening is not None:
         reason = f"Velocity grid by hand: coarsened {settings.coarsening} times."
         return Choice(what, settings.coarsening, reason, by_hand=True)
     coarsening, longest, shortest = 0, max(domain.resolution), min(domain.resolution)
-    while longest > FINEST_SIDE and shortest >= 16:
+    while longest > finest and shortest >= 16:
         coarsening, longest, shortest = coarsening + 1, -(-longest // 2), -(-shortest // 2)
     reason = f"Velocity grid: {longest} voxels along the longest side, because the depth of the smoke is a guess."
-    return Choice(what, coarsening, reason, {"voxels": float(longest)}, FINEST_SIDE)
+    return Choice(what, coarsening, reason, {"voxels": float(longest)}, finest)
 
 
 def levels_for(motion: float) -> int:

@@ -500,9 +500,10 @@ def test_the_papers_loop_takes_all(plume, tmp_path) -> None:
     assert all(frame.figures["transport"] == {} for frame in frames)
 
 
-def test_the_loop_looks_for_motion_as_coarsely_as_was_chosen(plume, draft, monkeypatch) -> None:
+def test_the_loop_looks_for_motion_as_coarsely_as_was_chosen(plume, draft) -> None:
     """What the shot decided is what the estimator is made with, and what is on record."""
-    monkeypatch.setattr("smokelift.setup.velocity_grid.FINEST_SIDE", max(plume.scene.domain.resolution) - 1)
+    finest = max(plume.scene.domain.resolution) - 1
+    draft = replace(draft, selection=replace(draft.selection, velocity_side=finest))
     with Clip.open(plume.scene.clip) as clip:
         shot = prepare_shot(clip, plume.scene, draft)
     estimator = compose(shot.settings).velocity_estimator

@@ -251,10 +251,10 @@ def test_the_velocity_grid_is_as_coarse_as_the_depth_is_unknown(plume, draft) ->
     """However fine the densities are; by hand it is what was said, and thin boxes keep eight voxels a side."""
     free = draft.velocity
     shapes = [(20, 20, 30), (32, 32, 48), (64, 64, 96), (128, 128, 192), (256, 256, 288), (31, 20, 150)]
-    choices = [choose_coarsening(Domain((0.0, 0.0, 0.0), shape, shape), free) for shape in shapes]
+    choices = [choose_coarsening(Domain((0.0, 0.0, 0.0), shape, shape), free, 30) for shape in shapes]
     assert [choice.chosen for choice in choices] == [0, 1, 2, 3, 4, 1]
     assert [choice.measured["voxels"] for choice in choices] == [30, 24, 24, 24, 18, 75]
-    by_hand = choose_coarsening(plume.scene.domain, replace(free, coarsening=0))
+    by_hand = choose_coarsening(plume.scene.domain, replace(free, coarsening=0), 30)
     assert (by_hand.chosen, by_hand.by_hand) == (0, True)
 
 

@@ -29,8 +29,8 @@ def test_the_default_is_balanced() -> None:
 def test_the_papers_method_measures_nothing() -> None:
     """It is kept as it is; the default chooses what is left open."""
     paper, usual = Settings.preset("draft", "paper"), Settings.preset("draft")
-    assert (paper.method, paper.model_selection) == ("paper", False)
-    assert (usual.method, usual.model_selection) == ("default", True)
+    assert (paper.method, paper.selection.measure) == ("paper", False)
+    assert (usual.method, usual.selection.measure) == ("default", True)
 
 
 @pytest.mark.parametrize("method", METHODS)
