@@ -7,7 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
+from smokelift.output import vdb
 from smokelift.output.writer import SequenceWriter
 from smokelift.scene import Camera, ClipSource, DirectionalLight, Domain, Scene, completed
 
@@ -42,3 +44,15 @@ def write(directory: Path, numbers: Iterable[int], *, npz: bool = True, **option
 def names(directory: Path) -> list[str]:
     """What is in a directory."""
     return sorted(file.name for file in directory.iterdir())
+
+
+def has_vdb() -> bool:
+    """Whether there is an OpenVDB module."""
+    try:
+        vdb.vdb_module()
+    except vdb.VdbUnavailable:
+        return False
+    return True
+
+
+needs_vdb = pytest.mark.skipif(not has_vdb(), reason="needs an OpenVDB module")

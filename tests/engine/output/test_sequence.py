@@ -9,24 +9,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from small_sequence import SCENE, SETTINGS, frame, names, write
+from small_sequence import SCENE, SETTINGS, frame, names, needs_vdb, write
 
 from smokelift.output import vdb
 from smokelift.output.index import SequenceError
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
+from smokelift.render import render
+from smokelift.scene import orbit
 from smokelift.transport import Velocity
-
-
-def has_module() -> bool:
-    try:
-        vdb.vdb_module()
-    except vdb.VdbUnavailable:
-        return False
-    return True
-
-
-needs_vdb = pytest.mark.skipif(not has_module(), reason="needs an OpenVDB module")
 
 
 @needs_vdb
@@ -62,6 +53,19 @@ def test_a_sequence_of_version_1_0_tells_its_scattering_in_the_settings(tmp_path
     del index["scene"]["medium"]["scattering"]
     (tmp_path / "sequence.json").write_text(json.dumps(index))
     assert Sequence.open(tmp_path).scene == replace(SCENE, scattering="absorption")
+
+
+@pytest.mark.parametrize("npz", [True, pytest.param(False, marks=needs_vdb)])
+def test_a_frame_renders_as_its_scene_says(tmp_path: Path, npz: bool) -> None:
+    """From the scene's camera or another, from either kind of file."""
+    write(tmp_path, [1, 2], npz=npz)
+    opened = Sequence.open(tmp_path)
+    for camera in (None, orbit(SCENE.camera, SCENE.domain, 30)):
+        expected = render(frame(2)[0], SCENE, camera)
+        assert expected.max() > 0.01
+        np.testing.assert_allclose(opened.render(2, camera), expected, atol=2e-3 * expected.max())
+    with pytest.raises(SequenceError, match="there is no frame 3"):
+        opened.render(3)
 
 
 def test_figures_are_json(tmp_path: Path, no_vdb: None) -> None:

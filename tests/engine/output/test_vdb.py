@@ -10,22 +10,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from small_sequence import needs_vdb
 
 from smokelift.output import vdb
 from smokelift.scene import Domain
 
 DOMAIN = Domain((-1.0, 0.5, 2.0), (-0.5, 0.75, 2.75), (20, 10, 30))
-
-
-def has_module() -> bool:
-    try:
-        vdb.vdb_module()
-    except vdb.VdbUnavailable:
-        return False
-    return True
-
-
-needs_vdb = pytest.mark.skipif(not has_module(), reason="needs an OpenVDB module")
 
 
 def frame() -> tuple[np.ndarray, np.ndarray]:

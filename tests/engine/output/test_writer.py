@@ -15,9 +15,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from small_sequence import SCENE, SETTINGS, frame, names, write
+from small_sequence import SCENE, SETTINGS, frame, has_vdb, names, write
 
-from smokelift.output import vdb
 from smokelift.output.index import SequenceError
 from smokelift.output.resume import ResumeState
 from smokelift.output.sequence import Sequence
@@ -36,17 +35,6 @@ def cut_off(directory: Path, numbers: Iterable[int], *, npz: bool = True, **opti
         for number in numbers:
             writer.write(number, *frame(number), extra={"gain": np.float64(number)})
         raise CutOffError
-
-
-def has_module() -> bool:
-    try:
-        vdb.vdb_module()
-    except vdb.VdbUnavailable:
-        return False
-    return True
-
-
-needs_vdb = pytest.mark.skipif(not has_module(), reason="needs an OpenVDB module")
 
 
 def test_choices_are_kept_and_not_compared(tmp_path: Path, no_vdb: None) -> None:
@@ -113,7 +101,7 @@ def test_a_file_in_the_place_of_the_directory_is_refused(tmp_path: Path, no_vdb:
 
 
 def test_a_run_goes_on_where_it_was_cut_off(tmp_path: Path) -> None:
-    npz = not has_module()
+    npz = not has_vdb()
     cut_off(tmp_path, [1, 2, 3], npz=npz)
     assert "resume.npz" in names(tmp_path)
     assert not Sequence.open(tmp_path).complete
