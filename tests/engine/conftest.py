@@ -11,7 +11,7 @@ import pytest
 
 from smokelift import _core
 from smokelift.output.images import write_image
-from smokelift.render import render
+from smokelift.render import device, render
 from smokelift.scene import (
     Background,
     Camera,
@@ -25,6 +25,13 @@ from smokelift.scene import (
     orbit,
 )
 from smokelift.setup.settings import Settings
+
+
+@pytest.fixture(scope="session", autouse=True)
+def on_the_processor() -> None:
+    """One device for all tests of a process, whatever their order and whatever GPU is there."""
+    device.start("cpu")
+
 
 FRAMES = 5
 FIRST_HEIGHT = 0.45

@@ -7,7 +7,7 @@ import numpy as np
 from smokelift.footage.clip import Clip, is_video
 from smokelift.footage.images import Picture, area_average, read_image
 from smokelift.footage.plate import Plates, changing_plate, known_plate
-from smokelift.scene import Background, Camera, CompleteScene, Scene
+from smokelift.scene import Background, Camera, CompleteScene, Scene, shared_part
 
 
 def open_plates(background: Background | None, camera: Camera | None) -> Clip | None:
@@ -64,8 +64,8 @@ def given_plates(background: Background | None, camera: Camera | None, clip: Cli
 def background_picture(scene: Scene | CompleteScene, camera: Camera | None = None) -> Picture:
     """Return the background as a camera sees it.
 
-    A clean plate belongs to the scene's own camera, so before another camera its mean colour takes its place. Of a
-    plate that changes from frame to frame, it is the clip's first frame.
+    Of a plate that changes from frame to frame, it is the clip's first frame. `behind` says what another camera than
+    the scene's own sees of a clean plate.
 
     Parameters
     ----------
@@ -95,7 +95,19 @@ def background_picture(scene: Scene | CompleteScene, camera: Camera | None = Non
     else:
         with plates:
             picture = plates.frame(scene.clip.first if scene.clip is not None else 0)
-    if camera is not None and camera != scene.camera:
-        return np.asarray(picture.reshape(-1, 3).mean(0))
-    width, height = scene.camera.size if scene.camera else picture.shape[1::-1]
-    return area_average(picture, width, height)
+    own = scene.camera
+    if own is None:
+        return picture if camera is None else np.asarray(picture.mean((0, 1)))
+    return behind(picture, own.at(0), camera if camera is not None and not camera.moves else own.at(0))
+
+
+def behind(plate: Picture, own: Camera, camera: Camera) -> Picture:
+    """Return what a camera sees of a clean plate (rows, columns, 3) that belongs to a camera of its own.
+
+    A camera at the same place that shows a part of the plate's picture, at whatever resolution, sees that part,
+    (rows, columns, 3). Any other camera gets the plate's mean colour, (3,).
+    """
+    part = shared_part(own, camera)
+    if part is None:
+        return np.asarray(plate.mean((0, 1)))
+    return area_average(area_average(plate, *own.size)[part], *camera.size)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
+from functools import cached_property
 
-from smokelift.footage.background import background_picture, open_plates
-from smokelift.footage.images import area_average
+from smokelift.footage.background import background_picture, behind, open_plates
 from smokelift.render import Image, Renderer, Volume, scene_optics
 from smokelift.scene import Camera, CompleteScene, shared_part
 
@@ -13,8 +12,7 @@ from smokelift.scene import Camera, CompleteScene, shared_part
 class Viewer:
     """Renders the frames of a sequence for one camera; where nothing moves, one renderer serves all of them.
 
-    A clean plate belongs to the scene's own camera. A camera at the same place that shows a part of that picture, at
-    whatever resolution, has that part of the plate behind the smoke. Any other camera has the plate's mean colour.
+    `smokelift.footage.background.behind` says what another camera than the scene's own sees of a clean plate.
 
     Parameters
     ----------
@@ -32,7 +30,6 @@ class Viewer:
         self._plates = open_plates(scene.background, scene.camera) if background is None else None
         self._first = scene.clip.first if scene.clip is not None else 0
         self._given = background
-        self._picture = background_picture(scene) if background is None else background
         self._moves = self._plates is not None or scene.camera.moves or self._camera.moves
         self._renderers: dict[int, Renderer] = {}
 
@@ -51,13 +48,12 @@ class Viewer:
     def _behind(self, frame: int) -> Image:
         if self._given is not None:
             return self._given
-        own = self._scene.camera
-        part = shared_part(own.at(frame), self._camera.at(frame))
-        picture = self._picture
-        if part is not None and self._plates is not None:
-            picture = area_average(self._plates.frame(self._first + frame), *own.size)
-        if picture.ndim == 1:
-            return picture
-        if part is None:
-            return np.asarray(picture.mean(axis=(0, 1)))
-        return area_average(picture[part], *self._camera.size)
+        own, camera = self._scene.camera.at(frame), self._camera.at(frame)
+        if self._plates is None or shared_part(own, camera) is None:
+            return self._steady
+        return behind(self._plates.frame(self._first + frame), own, camera)
+
+    @cached_property
+    def _steady(self) -> Image:
+        """What is behind the smoke in all frames where the frame's own plate is not seen."""
+        return background_picture(self._scene, self._camera.at(0))

@@ -169,8 +169,9 @@ class SequenceWriter:
             raise ValueError(f"a frame's number must not be negative, as {number} is")
         rho, faces = _checked(density, velocity_faces, self._domain.shape)
         # The caller may use its arrays again; what is kept here must not change with them.
-        kept = {name: np.asarray(value) for name, value in (extra or {}).items()}
-        state = ResumeState(number, rho.copy(), faces, kept)
+        kept = {name: np.array(value) for name, value in (extra or {}).items()}
+        x, y, z = (face.copy() for face in faces)
+        state = ResumeState(number, rho.copy(), (x, y, z), kept)
         try:
             for kind in self._kinds:
                 self._write_arrays(frame_path(self.directory, number, kind), rho, faces)

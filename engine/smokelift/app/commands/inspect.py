@@ -10,6 +10,7 @@ from smokelift.app.cost import estimate_cost
 from smokelift.app.options import add_run_options, scene_of, settings_of
 from smokelift.app.progress import Reporter
 from smokelift.footage.clip import Clip
+from smokelift.render import device
 from smokelift.scene import scene_to_dict
 from smokelift.setup.prepare import boundaries, prepare_shot
 
@@ -27,6 +28,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     """Prepare the shot and say what it takes."""
     settings = settings_of(options)
     scene, source = scene_of(options)
+    device.start(options.device)
     with Clip.open(source) as clip:
         shot = prepare_shot(clip, scene, settings)
         frames = len(clip)
