@@ -7,7 +7,8 @@ light blue, and what is near a lamp gets more of its light. So the smoke's axis
     y0(z) = y_found + shift + lean (z - z_mean)
 
 is chosen that leaves the least of the picture unexplained when every ray holds as much smoke as suits it best. That is
-looked at on a coarse grid, in a few frames. docs/accuracy.md has what was tried with other lights.
+looked at on a coarse grid, in a few frames. docs/experiments/density-axis-light.md has what was tried
+with other lights, and every constant here.
 """
 
 from __future__ import annotations

@@ -25,19 +25,22 @@ from smokelift.scene import Camera, Domain
 from smokelift.scene.projection import ray_through_pixels
 
 FLATNESS = 3.5
-"""q: between a Gaussian (2) and a box; 3 to 4 were equally good over four scenes."""
+"""q: between a Gaussian (2) and a box; 3 to 4 were equally good over four scenes
+(docs/experiments/density-profile.md)."""
 
 SILHOUETTE = 0.05
-"""Share of the smoke's usual amount from which a pixel belongs to the silhouette."""
+"""Share of the smoke's usual amount from which a pixel belongs to the silhouette
+(docs/experiments/density-profile.md)."""
 
 THINNEST = 0.7
-"""Half the thickness of a silhouette's thinnest parts, in pixels."""
+"""Half the thickness of a silhouette's thinnest parts, in pixels (docs/experiments/density-profile.md)."""
 
 APART = 0.5
-"""Share of the distance between columns behind one another that lasts on the way up: they draw together."""
+"""Share of the distance between columns behind one another that lasts on the way up: they draw together
+(docs/experiments/density-columns.md)."""
 
 SMOOTHING = 1.5
-"""Of the thickness, in pixels."""
+"""Standard deviation of the Gaussian that smooths the thickness, in pixels (docs/experiments/density-profile.md)."""
 
 
 def lateral_spread(
