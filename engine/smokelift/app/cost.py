@@ -33,7 +33,8 @@ BYTES_A_VOXEL_ON_DISK = 8
 """Bytes of a density and three velocities at 16 bits, where smoke fills the box. A quarter is usual."""
 
 BYTES_A_VOXEL = 220
-"""Bytes of memory at a run's peak, where smoke fills much of the box."""
+"""Bytes of memory at a run's peak, where smoke fills much of the box: the velocity solver's arrays beside two
+densities, three velocities and a projection a view (docs/experiments/memory-and-time.md)."""
 
 BASE_BYTES = 350 * 2**20
 """Bytes of memory for the interpreter, libraries, compiled kernels and decoded pictures."""

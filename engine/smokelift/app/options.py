@@ -17,7 +17,10 @@ def add_run_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--quality", choices=QUALITIES, default="balanced")
     parser.add_argument("--method", choices=METHODS, default="default", help="paper: the published loop")
     parser.add_argument(
-        "--resolution", type=_resolution, metavar="X,Y,Z", help="voxels, if not the scene's; auto measures how many"
+        "--resolution",
+        type=_resolution,
+        metavar="X,Y,Z",
+        help="voxels along X, Y, Z (default: the scene's); auto: measured on the clip",
     )
     parser.add_argument(
         "--scattering",

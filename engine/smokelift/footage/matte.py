@@ -25,8 +25,8 @@ SMOOTHING = 1.5
 """Standard deviation of the Gaussian that smooths the deviation, in pixels."""
 
 GLOBAL_DEVIATION = 2.0
-"""Most that the median deviation of a frame, in units of noise, is taken for a drift of exposure or of the codec and
-not for smoke that fills the picture."""
+"""Units of noise. A median deviation of a frame up to this is treated as drift of exposure or of the codec, not as
+smoke that fills the picture."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""The small picture that a grid is fitted to."""
+"""The working picture: a frame cropped to the domain and downsampled to about one pixel a voxel."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """OpenVDB files as Blender expects them: a fog volume `density` and a vector grid `velocity` in m/s.
 
-No package index carries an OpenVDB module for Python. It is imported as it is installed, or from inside an installed
-`bpy` wheel, whose module folder is not on `sys.path`. bpy itself is never imported.
+There is no standalone package of OpenVDB for Python. The vdb extra installs bpy, whose wheel contains one in a folder
+that is not on `sys.path`. bpy itself is never imported.
 
 OpenVDB puts the value of voxel (i, j, k) at its integer coordinates, so the transform sends (i, j, k) to the
 voxel's centre, `min + (i + 1/2) h`.

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 Box = tuple[int, int, int]
 
 CLOSEST = 1e-3
-"""Voxels: a plane this close to the light, or closer, is no voxel's farthest axis."""
+"""Voxels. Planes nearer to a point light than this are skipped: no voxel there belongs to their axis."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,7 +22,7 @@ class Optics:
     domain, medium
         Where the smoke is, and what it does to light.
     lights
-        Each of which one sweep can do; an environment has become many of them.
+        Directional and point lights only; an environment is split into many.
     scattering
         ``"single"`` with self-shadowing, ``"unshadowed"`` or ``"absorption"``.
     """

@@ -114,7 +114,7 @@ class Scene:
                 start = view.clip.first + skipped
                 if start < 0:
                     raise SceneError(
-                        f"its clip begins {-start} frames after frame {first} of the input; begin later",
+                        f"has no picture before frame {first - start} of the input; use the input from there on",
                         key="frames",
                         table=f"views.{index}.clip",
                     )

@@ -127,5 +127,7 @@ class Settings:
         return replace(settings, density=DensitySettings(fit_iterations=fit, descent_iterations=descent))
 
     def as_dict(self) -> dict[str, Any]:
-        """The settings as plain nested values."""
-        return asdict(self)
+        """The settings as plain nested values, the velocity solver with its name."""
+        plain = asdict(self)
+        plain["velocity"]["solver"]["name"] = type(self.velocity.solver).__name__
+        return plain

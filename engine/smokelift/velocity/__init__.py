@@ -16,8 +16,8 @@ subject to div u = 0, over velocities u on voxel faces, in voxels per frame, wit
 
 from coarse to fine grids (`pyramid`), linearised anew after every solve (`linearisation`, `coarse_to_fine`). Before and
 after are the densities that `preparation` makes of the given ones. Dividing by s makes every weight independent of the
-scales of density, space and time. k grows as u_p proves right: it is the given share of the change over the one that
-u_p leaves unexplained.
+scales of density, space and time. k is `unexplained` over the share of the change that u_p leaves unexplained, so it
+grows as u_p gets better.
 
 Sources: Cen, Zhang, Liang (2023), Entropy 25, 1348, section 3.3; Eckert et al. (2019), ACM TOG 38(6), 239 (ScalarFlow).
 """
@@ -63,8 +63,8 @@ def estimate_velocity(
         Sides of the box that are walls. None by default: the box of a video is cut out of the air around the
         smoke, which goes in and out through it freely. A floor, say, is ``("z-",)``.
     inflow
-        True in voxels where smoke enters, shape (nx, ny, nz): changes there are not taken for motion. It has to
-        hold all inlets, because others are not searched for then. Without it, sources are searched for.
+        True in voxels where smoke enters, shape (nx, ny, nz). Density changes there are treated as inflow. Mark every
+        inlet: no others are searched for. Without it, sources are searched for.
     prediction
         What the velocity should be near, such as `predict_velocity` of the frame before. How near is decided by how
         much of the change it explains; one that explains less than half is not used.

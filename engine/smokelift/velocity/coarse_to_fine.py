@@ -125,7 +125,7 @@ def _estimate(
             terms = _regularisation(unexplained, settings)
             problem, start = least_squares(linear, around, terms), around if from_rest else u
             direction, weight, smoke = linear.direction, linear.weight, linear.smoke
-            # The solver takes most of the memory: what it does not need goes before it.
+            # The solver takes most of the memory: free the linearisation before it, and the problem after it.
             del linear, around
             solution, figures = settings.solver.solve(problem, start)
             del problem, start

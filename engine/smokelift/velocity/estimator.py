@@ -83,7 +83,7 @@ def refined(coarse: Velocity, shape: tuple[int, int, int]) -> Velocity:
     """A velocity on a grid twice as fine, without divergence there; the residual stays as it is."""
     faces = refine(coarse, shape).faces
     for component in faces:
-        component *= np.float32(0.5)  # refined are voxels, of which there are twice as many to the way
+        component *= np.float32(0.5)  # refine() counts in finer voxels and so doubles speeds, but m/s do not change
     found = Velocity(faces, coarse.voxel_size / 2, coarse.closed, residual=coarse.residual)
     figures = dict(coarse.figures)
     if figures:

@@ -11,8 +11,8 @@ linearised change as the velocity itself, together with the trust t in the predi
 
     min sum W (r + d before + g . (t u_p + P(m) - u_k))^2
 
-d is the share of the smoke that dissolves or, below zero, that gets denser, as a clip that flickers has it. Either
-would else be read as motion. The result is the centre of the whole regulariser.
+d is the share of the smoke that dissolves or, below zero, that gets denser, as a clip that flickers has it. Without d
+either would be fitted as motion. The regulariser penalises the distance from the velocity that is fitted here.
 """
 
 from __future__ import annotations

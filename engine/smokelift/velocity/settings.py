@@ -21,8 +21,8 @@ class VelocitySettings:
     Attributes
     ----------
     coarsening
-        How often the grid of the estimate is half as fine as that of the densities. The velocity is interpolated to
-        the densities' grid. None takes as many in a clip as what its pictures show asks for (see `smokelift.setup`);
+        How many times the grid of the estimate is halved. The velocity is interpolated to the densities' grid.
+        None takes as many in a clip as what its pictures show asks for (see `smokelift.setup`);
         between two densities alone there are none.
     levels
         Grids, each half as fine as the one before, for an estimate without a prediction. None takes as many as the
@@ -44,9 +44,9 @@ class VelocitySettings:
     kinetic
         Weight of what departs from the prediction. It only holds what nothing else does.
     unexplained
-        Share of the change between the densities that the prediction leaves unexplained at which `smoothness` and
-        `kinetic` hold as they are. They grow in inverse proportion: the more a prediction proves right, the more it is
-        trusted (velocity-weights.md).
+        If a prediction leaves this share of the change between the densities unexplained, `smoothness` and `kinetic`
+        apply unscaled. They grow in inverse proportion to that share: a better prediction is trusted more
+        (velocity-weights.md).
     least_unexplained
         Share at which that growth ends.
     worthless
@@ -55,8 +55,8 @@ class VelocitySettings:
         Share of the fitted momentum (see `smokelift.velocity.momentum`) that an estimate without a prediction starts
         from. Below one, because the fit is to noise as well (velocity-momentum.md).
     brightening
-        Without a prediction all of the smoke may get denser only where that leaves at most this share of what motion
-        alone leaves unexplained. Flicker does; smoke that enters does not (velocity-momentum.md).
+        Without a prediction, overall brightening is allowed only if it cuts the unexplained change to this share.
+        Flicker does; smoke that enters does not (velocity-momentum.md).
     sources
         How smoke that enters is found, from which no motion is taken. None looks for none.
     smoke_threshold
@@ -65,8 +65,8 @@ class VelocitySettings:
         Standard deviation in voxels of the Gaussian that smooths the densities. Noise asks for more, smooth densities
         for none (see `smokelift.velocity.preparation`).
     noise
-        Noise that may be left in the change between two densities, in root mean square gradients, that is, in voxels
-        of motion (velocity-noise.md).
+        Allowed noise in the difference of two densities, divided by the root mean square gradient: voxels of motion
+        (velocity-noise.md).
     smooth
         The same limit for densities that are left as they are (velocity-noise.md).
     solver

@@ -20,7 +20,7 @@ def test_further_views_keep_step_with_another_range(tmp_path: Path) -> None:
     assert later.clip == replace(scene.clip, frames=(3, 7))
     assert [each.clip.frames for each in later.views] == [None, (8, 12)]
     began = replace(scene, clip=replace(scene.clip, frames=(6, 10)), views=(said,))
-    with pytest.raises(SceneError, match="its clip begins 1 frames after frame 0 of the input"):
+    with pytest.raises(SceneError, match="has no picture before frame 1 of the input"):
         began.with_frames(0, 4)
 
 
