@@ -42,8 +42,8 @@ class BoxPrior:
     """
 
     deviation: float = 0.3
-    mean_deviation: float = 0.15
-    floor: float = 0.1
+    mean_deviation: float = 0.1
+    floor: float = 0.15
     base: float = 0.1
     growth: float = 1.5
 

@@ -44,7 +44,7 @@ def test_what_begins_higher_in_the_picture_stands_further_back() -> None:
     found = [estimate_axis(rising(depth), FRONT, BOX).at(np.array([-1.2]))[0] for depth in (-0.3, -0.15, 0.0, 0.2)]
     assert (np.diff(found) > 0.05).all()
     behind = [estimate_axis(rising(depth), FRONT, BOX).at(np.array([-1.2]))[0] for depth in (0.4, 0.6)]
-    assert (np.array(behind) > 0).all()
+    assert (0 < np.array(behind)).all()
     assert (np.array(behind) < 0.12).all()
 
 
@@ -82,7 +82,7 @@ def test_drifting_smoke_is_believed_less() -> None:
 def test_smoke_at_the_side_of_the_box_is_drawn_to_the_middle() -> None:
     """A box stands around its smoke."""
     found = estimate_axis(rising(-0.6), FRONT, BOX).at(np.array([-1.3, 0.7]))
-    assert (found > -0.4).all()
+    assert (-0.4 < found).all()
     assert (found < -0.2).all()
 
 
