@@ -1,4 +1,11 @@
-"""The axis of the smoke: where in depth its middle is, by height, and by column where there are several."""
+"""Where in depth the smoke stands: the axis that depth profiles are centred on.
+
+One picture of smoke in parallel light looks the same whether the smoke is near and small or far and large, so its place
+in depth has to come from something else. The floor gives it where smoke rises from there: a disc of smoke on the floor
+begins in the picture where the ray through the floor meets it, within a few rows. Elsewhere the axis of the domain is
+the best guess, because a box is put around its smoke. Where several columns rise from known places, each has an axis of
+its own, and the picture says whose smoke stands where.
+"""
 
 from __future__ import annotations
 
@@ -8,8 +15,34 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.density.screen import view_frame
-from smokelift.scene import Camera, Domain
+from smokelift.density.screen import Screen, Upright, upright_screen, view_frame
+from smokelift.scene import Camera, Domain, Inlet
+
+TRUSTED_FRAMES = 0.6
+"""Share of the frames that have to show the foot."""
+
+CONFIDENCE = 0.8
+"""Share of the foot's distance from the domain's axis that is believed: a pixel is many centimetres on the floor."""
+
+BEHIND = 0.3
+"""Distance of the foot behind the axis, in reaches of the domain, over which that belief falls (the standard deviation
+of a normal curve): smoke that begins somewhat above the floor shows the same picture as smoke further back on it. Where
+it seems far back, a box that stands around its smoke makes the former likelier."""
+
+JOINING = 1.45
+"""Growth of the smoke within half its width, in every frame, from which other smoke must have joined it: a column that
+only rises gets no thicker, and what piles up at its head moves on."""
+
+NEAR_SIDE = (0.3, 0.45)
+"""Distance of the foot from the axis, in reaches of the domain, from which (and from which on entirely) smoke is taken
+to lean to the other side, so that its mean is on the axis: a box would not be put so beside its smoke."""
+
+
+WIDENING = 0.15
+"""Growth of a column's radius per metre on its way up: it takes in air."""
+
+FOLLOWING = 0.5
+"""Share of its smoke by which a column stays where it was a row below: what else is there may not be its own."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,10 +98,10 @@ class SmokeAxis:
         ValueError
             If it is outside the domain.
         """
-        half = reach(domain, view_frame(camera)[1])
-        if abs(depth) >= half:
+        reach = _reach(domain, view_frame(camera)[1])
+        if abs(depth) >= reach:
             raise ValueError(
-                f"The axis depth {depth:g} m is outside the box, which reaches {half:.3g} m before and behind its "
+                f"The axis depth {depth:g} m is outside the box, which reaches {reach:.3g} m before and behind its "
                 "middle; give a number between."
             )
         return SmokeAxis.upright(depth)
@@ -99,7 +132,7 @@ class SmokeAxis:
         total, shares = np.zeros(np.shape(heights)), np.zeros(np.shape(heights))
         for column, value in zip(self.columns, values, strict=True):
             middle, width = (np.interp(heights, self.heights, of) for of in (column.middles, column.widths))
-            share = likelihood(laterals, middle, width) * (heights >= column.begins)
+            share = _likelihood(laterals, middle, width) * (heights >= column.begins)
             total += share * np.interp(heights, self.heights, value)
             shares += share
         lowest = min(range(len(values)), key=lambda k: self.columns[k].begins)
@@ -107,13 +140,184 @@ class SmokeAxis:
         return np.where(shares > 0, total / np.maximum(shares, 1e-30), below)
 
 
-def likelihood(
+@dataclass(frozen=True)
+class _Foot:
+    """Where smoke meets the floor: depth and lateral width (m), and the height (m) at which it shows on the axis."""
+
+    depth: float
+    width: float
+    height: float
+
+
+def estimate_axis(
+    amounts: Sequence[NDArray[np.float32]], camera: Camera, domain: Domain, sources: Sequence[Inlet] = ()
+) -> SmokeAxis:
+    """The axis of the smoke in some frames of a clip.
+
+    Parameters
+    ----------
+    amounts : sequence of (rows, columns)
+        Optical depths, 0 where there is no smoke.
+    camera
+        A camera that stands still.
+    sources
+        Where smoke is known to enter; else its foot on the floor is looked for.
+
+    Returns
+    -------
+    SmokeAxis
+        The domain's axis where nothing says otherwise: no smoke that stands on the domain's floor in most frames, or a
+        camera that does not look down on the floor.
+    """
+    screens = [
+        screen for screen in (upright_screen(amount, camera, domain) for amount in amounts) if screen.values.any()
+    ]
+    if not screens:
+        return SmokeAxis.upright()
+    rows = [screen.rows() for screen in screens]
+    heights = rows[0].heights
+    if sources:
+        depth, across, spread = _through(sources, heights, camera, domain)
+        columns = _columns(sources, screens, camera, domain) if len(sources) > 1 else ()
+        return SmokeAxis(heights, _believed(depth, across, rows, camera, domain), spread, columns)
+    found = [foot for foot in (_foot(row, camera, domain) for row in rows) if foot is not None]
+    if not found or len(found) < TRUSTED_FRAMES * len(amounts):
+        return SmokeAxis.upright()
+    deep = float(np.median([foot.depth for foot in found]))
+    depth = np.full(heights.shape, deep)
+    width = float(np.median([foot.width for foot in found]))
+    base = float(np.median([foot.height for foot in found]))
+    across = np.full(heights.shape, np.interp(base + width / 4, heights, _middle(rows)))
+    behind = max(deep, 0.0) / (BEHIND * _reach(domain, view_frame(camera)[1]))
+    believed = CONFIDENCE * np.exp(-(behind**2) / 2) * _believed(depth, across, rows, camera, domain)
+    join = _joined(np.array([row.total for row in rows]), heights, base + width / 2, width)
+    if join is not None:
+        believed *= np.clip((join + width / 2 - heights) / width, 0, 1)
+    return SmokeAxis(heights, believed, np.zeros_like(believed))
+
+
+def _through(
+    sources: Sequence[Inlet], heights: NDArray[np.float64], camera: Camera, domain: Domain
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Mean depth, mean lateral position and spread in depth (m), at some heights, of the sources below."""
+    lateral, along, height = view_frame(camera)
+    places = np.array([source.centre for source in sources]) - np.array(domain.centre)
+    places = places[np.argsort(places @ height)]
+    counts = np.arange(1, len(places) + 1)
+    depths = places @ along
+    means = np.cumsum(depths) / counts
+    variances = np.cumsum(depths**2) / counts - means**2
+    quantities = means, np.cumsum(places @ lateral) / counts, np.sqrt(np.maximum(variances, 0))
+    depth, across, spread = (np.interp(heights, places @ height, quantity) for quantity in quantities)
+    return depth, across, spread
+
+
+def _columns(sources: Sequence[Inlet], screens: Sequence[Screen], camera: Camera, domain: Domain) -> tuple[Column, ...]:
+    """The columns above several sources, followed upwards in the mean picture.
+
+    In every row the smoke is shared out among the columns that have begun (a mixture of Gaussians, by expectation
+    maximisation), each expected where it was in the row below and as wide as a rising column becomes; were the widths
+    free, one column would swallow the others.
+    """
+    lateral, along, up = view_frame(camera)
+    places = np.array([source.centre for source in sources]) - np.array(domain.centre)
+    radii = np.array([source.radius for source in sources])
+    starts, depths, begins = places @ lateral, places @ along, places @ up - radii
+    heights, across = screens[0].heights, screens[0].laterals
+    # a disc's standard deviation is half its radius
+    widths = (radii[:, None] + WIDENING * np.maximum(heights - begins[:, None], 0)) / 2
+    picture = np.sum([screen.values for screen in screens], 0)
+    picture /= np.maximum(picture.sum(1, keepdims=True), 1e-30)
+    middles = np.empty_like(widths)
+    now = starts.copy()
+    for row, smoke in enumerate(picture):
+        begun = heights[row] >= begins
+        for _ in range(3):
+            share = _likelihood(across, now[begun, None], widths[begun, row, None])
+            part = smoke * share / np.maximum(share.sum(0), 1e-30)
+            now[begun] = (FOLLOWING * now[begun] + part @ across) / (FOLLOWING + part.sum(1))
+        middles[:, row] = now
+    drift = (middles - starts[:, None]) / np.maximum(np.abs(depths), domain.voxel_size)[:, None]
+    believed = depths[:, None] / (1 + drift**2)
+    return tuple(Column(float(begins[k]), middles[k], widths[k], believed[k]) for k in range(len(sources)))
+
+
+def _likelihood(
     places: NDArray[np.float64], middles: NDArray[np.float64], widths: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """How likely smoke at some lateral places belongs to columns; never quite impossible."""
     return np.asarray(np.exp(-(((places - middles) / widths) ** 2) / 2) + 1e-9)
 
 
-def reach(domain: Domain, direction: NDArray[np.float64]) -> float:
-    """Half the domain's extent (m) along a direction."""
+def _believed(
+    depth: NDArray[np.float64], across: NDArray[np.float64], rows: Sequence[Upright], camera: Camera, domain: Domain
+) -> NDArray[np.float64]:
+    """What smoke that started at a depth and a lateral position says about the axis at each height."""
+    total = np.sum([row.total for row in rows], 0)
+    raised = np.cumsum(total) / total.sum()  # 1/2 in the smoke's mean
+    low, high = NEAR_SIDE
+    leaning = np.clip((np.abs(depth) / _reach(domain, view_frame(camera)[1]) - low) / (high - low), 0, 1)
+    # what drifts across the picture drifts in depth as well, nobody knows where to
+    drift = (_middle(rows) - across) / np.maximum(np.abs(depth), domain.voxel_size)
+    return np.asarray(depth * (1 - 2 * leaning * raised) / (1 + drift**2))
+
+
+def _middle(rows: Sequence[Upright]) -> NDArray[np.float64]:
+    """Mean lateral position (m) of the smoke at each height, over all frames."""
+    total = np.sum([row.total for row in rows], 0)
+    known = total > 0.02 * total.max()
+    mean = np.sum([row.total * row.mean for row in rows], 0)[known] / total[known]
+    return np.asarray(np.interp(rows[0].heights, rows[0].heights[known], mean))
+
+
+def _foot(row: Upright, camera: Camera, domain: Domain) -> _Foot | None:
+    """The foot in one frame, if the lower end of the smoke looks like one."""
+    _, along, height = view_frame(camera)
+    matrix = np.array(camera.matrix, np.float64)
+    centre = np.array(domain.centre)
+    if camera.type != "perspective" or abs(height[2]) < 1 or (matrix[:3, 3] - centre) @ along >= 0:
+        return None
+    above_floor = matrix[2, 3] - domain.min[2]
+    distance = float((centre - matrix[:3, 3]) @ along)
+    reach = _reach(domain, along)
+    # depth of the floor that one row of the picture shows
+    pixel = distance**2 / (max(above_floor, 1e-9) * camera.fy)
+    if pixel > reach / 2:
+        return None
+    heights, total = row.heights, row.total
+    smoky = total > 0.05 * np.percentile(total[total > 0], 75)
+    first = int(np.argmax(smoky))
+    base = heights[first]
+    near = smoky & (heights <= base + 12 * (heights[1] - heights[0]))
+    width = float(2 * np.sqrt(3) * np.average(row.spread[near], weights=total[near]))
+    level = float(np.median(total[smoky & (heights <= base + width)]))
+
+    def floor_depth(share: float) -> float:
+        """Depth at which the floor is seen where the rows first hold so much of their level."""
+        after = int(np.argmax(total > share * level))
+        if after == 0:
+            return -np.inf
+        before = after - 1
+        part = (share * level - total[before]) / (total[after] - total[before])
+        up = heights[before] + part * (heights[after] - heights[before]) + centre[2] - domain.min[2]
+        return distance * up / (above_floor - up) if up < above_floor else np.inf
+
+    front, middle, back = (floor_depth(share) for share in (0.2, 0.5, 0.8))
+    # a disc on the floor is as deep as it is wide; the lower end of what floats takes many more rows
+    if abs(middle) < reach and back - front < width + pixel:
+        return _Foot(middle, width, float(base))
+    return None
+
+
+def _reach(domain: Domain, direction: NDArray[np.float64]) -> float:
+    """Half the domain's extent along a direction."""
     return float(np.abs(direction) @ (np.array(domain.max) - np.array(domain.centre)))
+
+
+def _joined(totals: NDArray[np.float64], heights: NDArray[np.float64], above: float, width: float) -> float | None:
+    """The height from which on the smoke is not only that of the foot; None if there is none."""
+    step = max(1, round(0.5 * width / (heights[1] - heights[0])))
+    least = 1e-3 * totals.max()
+    growth = np.min(np.maximum(totals[:, step:], least) / np.maximum(totals[:, :-step], least), 0)
+    sudden = (growth > JOINING) & (heights[:-step] > above)
+    return float(heights[:-step][sudden][0]) if sudden.any() else None

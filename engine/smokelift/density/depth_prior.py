@@ -15,8 +15,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.density.axis import SmokeAxis
-from smokelift.density.axis_from_clip import estimate_axis
+from smokelift.density.axis import SmokeAxis, estimate_axis
 from smokelift.density.axis_from_light import refine_axis
 from smokelift.density.hull import centres_of
 from smokelift.density.observation import ObservedClip, View, ViewSet

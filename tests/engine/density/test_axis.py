@@ -1,12 +1,11 @@
-"""Where in depth smoke stands: found by its contact with the floor, else near the middle of its box."""
+"""Where in depth smoke stands: found by its foot on the floor, left on the domain's axis where nothing shows it."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from smokelift.density.axis import SmokeAxis
-from smokelift.density.axis_from_clip import estimate_axis
+from smokelift.density.axis import SmokeAxis, estimate_axis
 from smokelift.render import Renderer
 from smokelift.scene import Camera, Domain, Inlet, Medium
 
@@ -35,17 +34,18 @@ def rising(depth: float) -> list[np.ndarray]:
 
 @pytest.mark.parametrize("depth", [-0.3, -0.15, 0.0, 0.1])
 def test_smoke_on_the_floor_shows_its_depth(depth) -> None:
-    """To two voxels, the same at all heights; one pixel is 0.15 m on the floor here."""
-    np.testing.assert_allclose(estimate_axis(rising(depth), FRONT, BOX).at(np.array([-1.2, 0.5])), depth, atol=0.1)
+    """To less than a voxel, shrunk towards the axis a little, and the same at all heights."""
+    found = estimate_axis(rising(depth), FRONT, BOX)
+    assert found.at(np.array([-1.2])) == pytest.approx(0.8 * depth, abs=0.05)
+    assert found.at(np.array([0.5])) == pytest.approx(0.8 * depth, abs=0.06)
 
 
-def test_what_begins_higher_in_the_picture_stands_further_back() -> None:
-    """Up to where it is likelier that it begins above the floor, because a box is put around its smoke."""
-    found = [estimate_axis(rising(depth), FRONT, BOX).at(np.array([-1.2]))[0] for depth in (-0.3, -0.15, 0.0, 0.2)]
-    assert (np.diff(found) > 0.05).all()
-    behind = [estimate_axis(rising(depth), FRONT, BOX).at(np.array([-1.2]))[0] for depth in (0.4, 0.6)]
-    assert (0 < np.array(behind)).all()
-    assert (np.array(behind) < 0.12).all()
+def test_smoke_far_back_may_begin_above_the_floor() -> None:
+    """The picture is the same, so the depth is believed less, and far back not at all; a step more is never a jump."""
+    near, far, farther = (estimate_axis(rising(depth), FRONT, BOX).at(np.array([-1.2]))[0] for depth in (0.2, 0.4, 0.6))
+    assert 0.08 < near < 0.8 * 0.2
+    assert 0.06 < far < 0.4 / 2
+    assert 0 < farther < 0.12
 
 
 @pytest.mark.parametrize("low", [0.1, 0.2])
@@ -53,66 +53,63 @@ def test_smoke_that_begins_above_the_floor_stands_upright(low) -> None:
     """As from a bowl or a chimney: taken for smoke on the floor it would be far back, and lean over the box."""
     smoke = seen(*(column(0.1, low=low, high=high) for high in (1.4, 1.7, 2.0, 2.3)))
     found = estimate_axis(smoke, FRONT, BOX).at(np.linspace(-1.3, 1.0, 20))
-    np.testing.assert_allclose(found, 0.1, atol=0.1)
+    np.testing.assert_allclose(found, 0.1, atol=0.2)
 
 
 @pytest.mark.parametrize("depth", [-0.3, 0.3])
-@pytest.mark.parametrize("low", [0.05, 0.2, 1.0])
-def test_floating_smoke_is_left_on_the_axis(depth, low) -> None:
-    """Its lower end is no contact with the floor, wherever it floats."""
-    distance = (X[:, None, None] ** 2 + (Y[None, :, None] - depth) ** 2 + (Z - low - 0.3) ** 2) ** 0.5
-    ball = np.clip(1.5 - 4 * distance, 0, 1).astype(np.float32)
-    np.testing.assert_allclose(estimate_axis(seen(ball, ball), FRONT, BOX).depths, 0, atol=0.1)
+def test_floating_smoke_is_left_on_the_axis(depth) -> None:
+    """Its lower end is no foot, wherever it floats."""
+    for low in (0.05, 0.2, 1.0):
+        distance = (X[:, None, None] ** 2 + (Y[None, :, None] - depth) ** 2 + (Z - low - 0.3) ** 2) ** 0.5
+        ball = np.clip(1.5 - 4 * distance, 0, 1).astype(np.float32)
+        assert not estimate_axis(seen(ball, ball), FRONT, BOX).depths.any()
 
 
-def test_smoke_that_joins_ends_what_the_contact_says() -> None:
-    """Above a second source the axis is about the domain's again; below it the contact's still holds."""
+def test_smoke_that_joins_ends_what_the_foot_says() -> None:
+    """Above a second source the axis is the domain's again; below it the foot's still holds."""
     both = column(-0.25, radius=0.2) + column(0.3, low=1.0, radius=0.3)
     found = estimate_axis(seen(both, both), FRONT, BOX)
     assert found.at(np.array([-1.2])) == pytest.approx(-0.2, abs=0.05)
-    assert abs(found.at(np.array([0.2]))) < 0.05
+    assert abs(found.at(np.array([0.2]))) < 0.02
 
 
 def test_drifting_smoke_is_believed_less() -> None:
-    """What leans across the picture may lean in depth as well, rather to the middle of the box than out of it."""
-    depths = [estimate_axis(seen(column(-0.25, lean)), FRONT, BOX).at(np.array([0.4]))[0] for lean in (0, 0.1, 0.2)]
-    assert -0.25 < depths[0] < depths[1] < depths[2] < 0.1
+    """What leans across the picture may lean in depth as well."""
+    straight, leaning = (
+        estimate_axis(seen(column(-0.25, lean)), FRONT, BOX).at(np.array([0.4])) for lean in (0.0, 0.2)
+    )
+    assert 0.5 * straight < leaning < 0
 
 
-def test_smoke_at_the_side_of_the_box_is_drawn_to_the_middle() -> None:
-    """A box stands around its smoke."""
-    found = estimate_axis(rising(-0.6), FRONT, BOX).at(np.array([-1.3, 0.7]))
-    assert (-0.4 < found).all()
-    assert (found < -0.2).all()
+def test_smoke_from_the_side_of_the_box_comes_back() -> None:
+    """A box stands around its smoke, so a column near its side leans to the middle, or it would stand wrongly."""
+    found = estimate_axis(rising(-0.6), FRONT, BOX)
+    foot, head = found.at(np.array([-1.3, 0.7]))
+    assert foot < -0.3
+    assert head > 0.25 * foot
 
 
-def test_a_contact_in_few_frames_is_chance() -> None:
-    """What is not there in every frame joins the smoke that is."""
+def test_a_foot_in_few_frames_is_chance() -> None:
+    """Most frames have to show it."""
     ball = column(0.3, low=1.0)
-    found = estimate_axis(seen(column(0.3), ball, ball), FRONT, BOX).at(np.array([-1.2, 0.2, 0.7]))
-    np.testing.assert_allclose(found, 0, atol=0.1)
+    assert not estimate_axis(seen(column(0.3), ball, ball), FRONT, BOX).depths.any()
 
 
-def test_a_camera_as_high_as_the_floor_sees_no_contact() -> None:
+@pytest.mark.parametrize("height", [-0.5, 0.02])
+def test_a_camera_that_does_not_look_down_on_the_floor_sees_no_foot(height) -> None:
     """The floor is a line to it."""
-    low = Camera.look_at((0, -7, 0.02), (0, 0, 1.5), fov_y_degrees=35, size=(75, 113))
-    np.testing.assert_allclose(estimate_axis(seen(column(0.3), camera=low), low, BOX).depths, 0, atol=0.02)
+    low = Camera.look_at((0, -7, height), (0, 0, 1.5), fov_y_degrees=35, size=(75, 113))
+    assert not estimate_axis(seen(column(0.3), camera=low), low, BOX).depths.any()
 
 
-def test_a_camera_that_looks_steeply_down_sees_no_contact() -> None:
-    """Its rows are not heights."""
-    steep = Camera.look_at((0, -4, 7), (0, 0, 1.5), fov_y_degrees=35, size=(75, 113))
-    assert not estimate_axis(seen(column(0.3), camera=steep), steep, BOX).depths.any()
-
-
-def test_smoke_that_goes_on_below_the_box_is_left_near_the_axis() -> None:
+def test_smoke_that_goes_on_below_the_box_has_no_foot() -> None:
     """The box cuts it; where it stands is not seen."""
     deep = Domain((-1, -1, -1), (1, 1, 3), (32, 32, 64))
     z = -1 + (np.arange(64) + 0.5) / 16
     inside = (X[:, None, None] ** 2 + (Y[None, :, None] - 0.3) ** 2 < 0.06) & (z < 2)
     renderer = Renderer(FRONT, deep, Medium(extinction=1.0), (), np.ones(3), "absorption")
     amount = -np.log(renderer.image(inside.astype(np.float32))[..., 0])
-    np.testing.assert_allclose(estimate_axis([amount], FRONT, BOX).depths, 0, atol=0.15)
+    assert not estimate_axis([amount], FRONT, BOX).depths.any()
 
 
 CORNER = np.zeros((113, 75), np.float32)
@@ -132,13 +129,13 @@ def test_depth_is_away_from_the_camera() -> None:
     assert found.at(np.array([0.0])) == pytest.approx(-0.2, abs=0.06)
 
 
-def test_known_inlets_need_no_contact() -> None:
+def test_known_sources_need_no_foot() -> None:
     """Floating smoke stands where it is said to enter; above the second of two sources, between them."""
     smoke = seen(column(0.3, low=1.0), column(0.3, low=1.1))
     one = estimate_axis(smoke, FRONT, BOX, [Inlet((0.2, 0.25, 0.5), 0.2)])
     np.testing.assert_allclose(one.at(np.array([-1.0, 0.2])), 0.25, atol=0.01)
-    inlets = [Inlet((0.2, -0.05, 1.0), 0.2), Inlet((0.2, 0.25, 0.2), 0.2)]
-    two = estimate_axis(smoke, FRONT, BOX, inlets)
+    sources = [Inlet((0.2, -0.05, 1.0), 0.2), Inlet((0.2, 0.25, 0.2), 0.2)]
+    two = estimate_axis(smoke, FRONT, BOX, sources)
     np.testing.assert_allclose(two.at(np.array([-1.3, 0.2])), (0.25, 0.1), atol=0.01)
     np.testing.assert_allclose(two.spread_at(np.array([-1.3, 0.2])), (0.0, 0.15), atol=0.01)
 
