@@ -1,10 +1,10 @@
 """Where in depth the smoke stands: the axis that depth profiles are centred on.
 
 One picture of smoke in parallel light looks the same whether the smoke is near and small or far and large, so its place
-in depth has to come from something else. The floor gives it where smoke rises from there: a disc of smoke on the floor
-begins in the picture where the ray through the floor meets it, within a few rows. Elsewhere the axis of the domain is
-the best guess, because a box is put around its smoke. Where several columns rise from known places, each has an axis of
-its own, and the picture says whose smoke stands where.
+in depth has to come from something else. Where smoke rises from the floor, the contact gives it: a disc of smoke on the
+floor begins in the picture where the ray through the floor meets it, within a few rows. Elsewhere the axis of the
+domain is the best estimate, because a box is put around its smoke. Where several columns rise from known places, each
+has an axis of its own, and the picture shows whose smoke stands where.
 """
 
 from __future__ import annotations
@@ -18,31 +18,42 @@ from numpy.typing import NDArray
 from smokelift.density.screen import Screen, Upright, upright_screen, view_frame
 from smokelift.scene import Camera, Domain, Inlet
 
-TRUSTED_FRAMES = 0.6
-"""Share of the frames that have to show the foot."""
 
-CONFIDENCE = 0.8
-"""Share of the foot's distance from the domain's axis that is believed: a pixel is many centimetres on the floor."""
+@dataclass(frozen=True)
+class AxisSettings:
+    """How far floor contacts and inlets are trusted. Lengths along the depth are in reaches: half the domain's depth.
 
-BEHIND = 0.3
-"""Distance of the foot behind the axis, in reaches of the domain, over which that belief falls (the standard deviation
-of a normal curve): smoke that begins somewhat above the floor shows the same picture as smoke further back on it. Where
-it seems far back, a box that stands around its smoke makes the former likelier."""
+    Attributes
+    ----------
+    frames
+        Share of the frames that have to show a floor contact.
+    contact
+        Share of the contact's distance from the domain's axis that is trusted: a pixel is many centimetres on the
+        floor.
+    behind
+        Distance of the contact behind the axis, in reaches, over which that trust falls (standard deviation of a normal
+        curve). Smoke that begins above the floor shows the same picture as smoke further back on it.
+    joining
+        Growth of the smoke within half its width, in every frame, from which other smoke must have joined it: a column
+        that only rises gets no thicker, and what piles up at its head moves on.
+    near_side
+        Distances of the contact from the axis, in reaches. Between them the assumption fades in that smoke leans to the
+        other side, so that its mean is on the axis; beyond the second it holds fully: a box is around its smoke.
+    widening
+        Growth of a column's radius per metre on its way up, by the air that it takes in (density-columns.md).
+    inertia
+        Weight of a column's place in the row below, in shares of its smoke: other smoke there may not be its own.
 
-JOINING = 1.45
-"""Growth of the smoke within half its width, in every frame, from which other smoke must have joined it: a column that
-only rises gets no thicker, and what piles up at its head moves on."""
+    docs/experiments/density-axis.md has what they are worth, and the posterior that was no better.
+    """
 
-NEAR_SIDE = (0.3, 0.45)
-"""Distance of the foot from the axis, in reaches of the domain, from which (and from which on entirely) smoke is taken
-to lean to the other side, so that its mean is on the axis: a box would not be put so beside its smoke."""
-
-
-WIDENING = 0.15
-"""Growth of a column's radius per metre on its way up: it takes in air."""
-
-FOLLOWING = 0.5
-"""Share of its smoke by which a column stays where it was a row below: what else is there may not be its own."""
+    frames: float = 0.6
+    contact: float = 0.8
+    behind: float = 0.3
+    joining: float = 1.45
+    near_side: tuple[float, float] = (0.3, 0.45)
+    widening: float = 0.15
+    inertia: float = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +102,7 @@ class SmokeAxis:
 
     @staticmethod
     def given(depth: float, camera: Camera, domain: Domain) -> SmokeAxis:
-        """The depth that somebody says, at all heights.
+        """A depth that is known, at all heights.
 
         Raises
         ------
@@ -141,7 +152,7 @@ class SmokeAxis:
 
 
 @dataclass(frozen=True)
-class _Foot:
+class _FloorContact:
     """Where smoke meets the floor: depth and lateral width (m), and the height (m) at which it shows on the axis."""
 
     depth: float
@@ -150,7 +161,11 @@ class _Foot:
 
 
 def estimate_axis(
-    amounts: Sequence[NDArray[np.float32]], camera: Camera, domain: Domain, sources: Sequence[Inlet] = ()
+    amounts: Sequence[NDArray[np.float32]],
+    camera: Camera,
+    domain: Domain,
+    sources: Sequence[Inlet] = (),
+    settings: AxisSettings = AxisSettings(),
 ) -> SmokeAxis:
     """The axis of the smoke in some frames of a clip.
 
@@ -161,12 +176,14 @@ def estimate_axis(
     camera
         A camera that stands still.
     sources
-        Where smoke is known to enter; else its foot on the floor is looked for.
+        Where smoke is known to enter; else its contact with the floor is searched for.
+    settings
+        How far contacts and inlets are trusted.
 
     Returns
     -------
     SmokeAxis
-        The domain's axis where nothing says otherwise: no smoke that stands on the domain's floor in most frames, or a
+        The domain's axis where nothing else is known: no smoke that stands on the domain's floor in most frames, or a
         camera that does not look down on the floor.
     """
     screens = [
@@ -178,22 +195,24 @@ def estimate_axis(
     heights = rows[0].heights
     if sources:
         depth, across, spread = _through(sources, heights, camera, domain)
-        columns = _columns(sources, screens, camera, domain) if len(sources) > 1 else ()
-        return SmokeAxis(heights, _believed(depth, across, rows, camera, domain), spread, columns)
-    found = [foot for foot in (_foot(row, camera, domain) for row in rows) if foot is not None]
-    if not found or len(found) < TRUSTED_FRAMES * len(amounts):
+        columns = _columns(sources, screens, camera, domain, settings) if len(sources) > 1 else ()
+        trusted = _trusted(depth, across, rows, camera, domain, settings.near_side)
+        return SmokeAxis(heights, trusted, spread, columns)
+    found = [contact for contact in (_floor_contact(row, camera, domain) for row in rows) if contact is not None]
+    if not found or len(found) < settings.frames * len(amounts):
         return SmokeAxis.upright()
-    deep = float(np.median([foot.depth for foot in found]))
+    deep = float(np.median([contact.depth for contact in found]))
     depth = np.full(heights.shape, deep)
-    width = float(np.median([foot.width for foot in found]))
-    base = float(np.median([foot.height for foot in found]))
+    width = float(np.median([contact.width for contact in found]))
+    base = float(np.median([contact.height for contact in found]))
     across = np.full(heights.shape, np.interp(base + width / 4, heights, _middle(rows)))
-    behind = max(deep, 0.0) / (BEHIND * _reach(domain, view_frame(camera)[1]))
-    believed = CONFIDENCE * np.exp(-(behind**2) / 2) * _believed(depth, across, rows, camera, domain)
-    join = _joined(np.array([row.total for row in rows]), heights, base + width / 2, width)
+    behind = max(deep, 0.0) / (settings.behind * _reach(domain, view_frame(camera)[1]))
+    trusted = _trusted(depth, across, rows, camera, domain, settings.near_side)
+    trusted *= settings.contact * np.exp(-(behind**2) / 2)
+    join = _joined(np.array([row.total for row in rows]), heights, base + width / 2, width, settings.joining)
     if join is not None:
-        believed *= np.clip((join + width / 2 - heights) / width, 0, 1)
-    return SmokeAxis(heights, believed, np.zeros_like(believed))
+        trusted *= np.clip((join + width / 2 - heights) / width, 0, 1)
+    return SmokeAxis(heights, trusted, np.zeros_like(trusted))
 
 
 def _through(
@@ -212,7 +231,9 @@ def _through(
     return depth, across, spread
 
 
-def _columns(sources: Sequence[Inlet], screens: Sequence[Screen], camera: Camera, domain: Domain) -> tuple[Column, ...]:
+def _columns(
+    sources: Sequence[Inlet], screens: Sequence[Screen], camera: Camera, domain: Domain, settings: AxisSettings
+) -> tuple[Column, ...]:
     """The columns above several sources, followed upwards in the mean picture.
 
     In every row the smoke is shared out among the columns that have begun (a mixture of Gaussians, by expectation
@@ -225,7 +246,7 @@ def _columns(sources: Sequence[Inlet], screens: Sequence[Screen], camera: Camera
     starts, depths, begins = places @ lateral, places @ along, places @ up - radii
     heights, across = screens[0].heights, screens[0].laterals
     # a disc's standard deviation is half its radius
-    widths = (radii[:, None] + WIDENING * np.maximum(heights - begins[:, None], 0)) / 2
+    widths = (radii[:, None] + settings.widening * np.maximum(heights - begins[:, None], 0)) / 2
     picture = np.sum([screen.values for screen in screens], 0)
     picture /= np.maximum(picture.sum(1, keepdims=True), 1e-30)
     middles = np.empty_like(widths)
@@ -235,11 +256,11 @@ def _columns(sources: Sequence[Inlet], screens: Sequence[Screen], camera: Camera
         for _ in range(3):
             share = _likelihood(across, now[begun, None], widths[begun, row, None])
             part = smoke * share / np.maximum(share.sum(0), 1e-30)
-            now[begun] = (FOLLOWING * now[begun] + part @ across) / (FOLLOWING + part.sum(1))
+            now[begun] = (settings.inertia * now[begun] + part @ across) / (settings.inertia + part.sum(1))
         middles[:, row] = now
     drift = (middles - starts[:, None]) / np.maximum(np.abs(depths), domain.voxel_size)[:, None]
-    believed = depths[:, None] / (1 + drift**2)
-    return tuple(Column(float(begins[k]), middles[k], widths[k], believed[k]) for k in range(len(sources)))
+    trusted = depths[:, None] / (1 + drift**2)
+    return tuple(Column(float(begins[k]), middles[k], widths[k], trusted[k]) for k in range(len(sources)))
 
 
 def _likelihood(
@@ -249,13 +270,18 @@ def _likelihood(
     return np.asarray(np.exp(-(((places - middles) / widths) ** 2) / 2) + 1e-9)
 
 
-def _believed(
-    depth: NDArray[np.float64], across: NDArray[np.float64], rows: Sequence[Upright], camera: Camera, domain: Domain
+def _trusted(
+    depth: NDArray[np.float64],
+    across: NDArray[np.float64],
+    rows: Sequence[Upright],
+    camera: Camera,
+    domain: Domain,
+    near_side: tuple[float, float],
 ) -> NDArray[np.float64]:
-    """What smoke that started at a depth and a lateral position says about the axis at each height."""
+    """The axis at each height of smoke that started at a depth and a lateral position."""
     total = np.sum([row.total for row in rows], 0)
     raised = np.cumsum(total) / total.sum()  # 1/2 in the smoke's mean
-    low, high = NEAR_SIDE
+    low, high = near_side
     leaning = np.clip((np.abs(depth) / _reach(domain, view_frame(camera)[1]) - low) / (high - low), 0, 1)
     # what drifts across the picture drifts in depth as well, nobody knows where to
     drift = (_middle(rows) - across) / np.maximum(np.abs(depth), domain.voxel_size)
@@ -270,8 +296,8 @@ def _middle(rows: Sequence[Upright]) -> NDArray[np.float64]:
     return np.asarray(np.interp(rows[0].heights, rows[0].heights[known], mean))
 
 
-def _foot(row: Upright, camera: Camera, domain: Domain) -> _Foot | None:
-    """The foot in one frame, if the lower end of the smoke looks like one."""
+def _floor_contact(row: Upright, camera: Camera, domain: Domain) -> _FloorContact | None:
+    """The floor contact in one frame, if the lower end of the smoke is one."""
     _, along, height = view_frame(camera)
     matrix = np.array(camera.matrix, np.float64)
     centre = np.array(domain.centre)
@@ -305,7 +331,7 @@ def _foot(row: Upright, camera: Camera, domain: Domain) -> _Foot | None:
     front, middle, back = (floor_depth(share) for share in (0.2, 0.5, 0.8))
     # a disc on the floor is as deep as it is wide; the lower end of what floats takes many more rows
     if abs(middle) < reach and back - front < width + pixel:
-        return _Foot(middle, width, float(base))
+        return _FloorContact(middle, width, float(base))
     return None
 
 
@@ -314,10 +340,12 @@ def _reach(domain: Domain, direction: NDArray[np.float64]) -> float:
     return float(np.abs(direction) @ (np.array(domain.max) - np.array(domain.centre)))
 
 
-def _joined(totals: NDArray[np.float64], heights: NDArray[np.float64], above: float, width: float) -> float | None:
-    """The height from which on the smoke is not only that of the foot; None if there is none."""
+def _joined(
+    totals: NDArray[np.float64], heights: NDArray[np.float64], above: float, width: float, joining: float
+) -> float | None:
+    """The height from which on other smoke has joined that of the contact; None if there is none."""
     step = max(1, round(0.5 * width / (heights[1] - heights[0])))
     least = 1e-3 * totals.max()
     growth = np.min(np.maximum(totals[:, step:], least) / np.maximum(totals[:, :-step], least), 0)
-    sudden = (growth > JOINING) & (heights[:-step] > above)
+    sudden = (growth > joining) & (heights[:-step] > above)
     return float(heights[:-step][sudden][0]) if sudden.any() else None

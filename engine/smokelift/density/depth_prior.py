@@ -9,13 +9,13 @@ multiplicative fit scales ray by ray, and keeps of it only how the smoke of one 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.density.axis import SmokeAxis, estimate_axis
+from smokelift.density.axis import AxisSettings, SmokeAxis, estimate_axis
 from smokelift.density.axis_from_light import refine_axis
 from smokelift.density.hull import centres_of
 from smokelift.density.observation import ObservedClip, View, ViewSet
@@ -89,10 +89,13 @@ class RoundDepth:
         Where the smoke of one view stands in depth; None takes the middle of the domain, or estimates it from a clip.
     axis_depth
         The same as one number, in metres behind the domain's centre, if the user says it.
+    settings
+        How far floor contacts and inlets are trusted.
     """
 
     axis: SmokeAxis | None = None
     axis_depth: float | None = None
+    settings: AxisSettings = field(default_factory=AxisSettings)
 
     def of_clip(self, clip: ObservedClip) -> RoundDepth:
         """Estimate the axis from some frames, unless it is given, a camera moves or there are several."""
@@ -108,7 +111,7 @@ class RoundDepth:
         if len(first) > 1:
             return self
         views = [View.of(observations[0], clip.optics) for observations in (first, *moments)]
-        axis = estimate_axis([view.optical_depth for view in views], camera, domain, clip.inlets)
+        axis = estimate_axis([view.optical_depth for view in views], camera, domain, clip.inlets, self.settings)
         if not clip.inlets and clip.optics.scattering == "single":
             lit = [view for view in views[:: AXIS_FRAMES // LIGHT_FRAMES] if view.optical_depth.any()]
             axis = refine_axis(axis, lit, clip.optics)

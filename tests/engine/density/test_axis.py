@@ -1,4 +1,4 @@
-"""Where in depth smoke stands: found by its foot on the floor, left on the domain's axis where nothing shows it."""
+"""Where in depth smoke stands: found by its contact with the floor, else on the domain's axis."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_smoke_that_begins_above_the_floor_stands_upright(low) -> None:
 
 @pytest.mark.parametrize("depth", [-0.3, 0.3])
 def test_floating_smoke_is_left_on_the_axis(depth) -> None:
-    """Its lower end is no foot, wherever it floats."""
+    """Its lower end is no contact, wherever it floats."""
     for low in (0.05, 0.2, 1.0):
         distance = (X[:, None, None] ** 2 + (Y[None, :, None] - depth) ** 2 + (Z - low - 0.3) ** 2) ** 0.5
         ball = np.clip(1.5 - 4 * distance, 0, 1).astype(np.float32)
@@ -66,7 +66,7 @@ def test_floating_smoke_is_left_on_the_axis(depth) -> None:
 
 
 def test_smoke_that_joins_ends_what_the_foot_says() -> None:
-    """Above a second source the axis is the domain's again; below it the foot's still holds."""
+    """Above a second source the axis is the domain's again; below it the contact's still holds."""
     both = column(-0.25, radius=0.2) + column(0.3, low=1.0, radius=0.3)
     found = estimate_axis(seen(both, both), FRONT, BOX)
     assert found.at(np.array([-1.2])) == pytest.approx(-0.2, abs=0.05)
@@ -84,9 +84,9 @@ def test_drifting_smoke_is_believed_less() -> None:
 def test_smoke_from_the_side_of_the_box_comes_back() -> None:
     """A box stands around its smoke, so a column near its side leans to the middle, or it would stand wrongly."""
     found = estimate_axis(rising(-0.6), FRONT, BOX)
-    foot, head = found.at(np.array([-1.3, 0.7]))
-    assert foot < -0.3
-    assert head > 0.25 * foot
+    contact, head = found.at(np.array([-1.3, 0.7]))
+    assert contact < -0.3
+    assert head > 0.25 * contact
 
 
 def test_a_foot_in_few_frames_is_chance() -> None:
