@@ -37,7 +37,7 @@ def main(words: Sequence[str]) -> int:
     try:
         scene = _scene(choices)
         take = run.unfinished(scene) if choices.resume else None
-        take = take or run.begin(scene)
+        take = take or run.write_take(scene)
         job = Job(engine_command(take.arguments()), take.log_file)
     except (ShotError, TakeError, EngineMissingError) as error:
         print(f"smokelift: {error}", file=sys.stderr, flush=True)

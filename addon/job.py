@@ -98,7 +98,7 @@ class Job:
     sentence
         The result, or the reason of a failure.
     details
-        The fields of the engine's last message.
+        The fields of the engine's "done" message.
     status
         The engine's exit status; None before it ends.
     """

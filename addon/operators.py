@@ -32,7 +32,7 @@ class SMOKELIFT_OT_run(_NeedsClip, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         try:
-            take = run.begin(context.scene)
+            take = run.write_take(context.scene)
         except (ShotError, TakeError) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}

@@ -138,7 +138,7 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
     )
     output: StringProperty(
         name="Output",
-        description="Folder for the results; by default beside the .blend file",
+        description="Folder for the results; by default beside the .blend file, or beside the clip if that is unsaved",
         subtype="DIR_PATH",
         options=_PATH_OPTIONS,
     )

@@ -27,7 +27,7 @@ def output_folder(scene: bpy.types.Scene) -> Path:
     return scene_file.clip_path(settings.clip).parent / f"{name}_smokelift"
 
 
-def begin(scene: bpy.types.Scene) -> Take:
+def write_take(scene: bpy.types.Scene) -> Take:
     """Write the files of a new take.
 
     Raises
@@ -37,7 +37,7 @@ def begin(scene: bpy.types.Scene) -> Take:
     """
     tables = scene_file.shot_tables(scene)
     take = new_take(output_folder(scene))
-    take.begin(tables, scene_file.options(scene))
+    take.write(tables, scene_file.options(scene))
     return take
 
 
@@ -293,7 +293,7 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
         folder = Path(bpy.app.tempdir)
         try:
             take = Take(folder / "smokelift_check")
-            take.begin(scene_file.shot_tables(scene, quick=True), scene_file.options(scene))
+            take.write(scene_file.shot_tables(scene, quick=True), scene_file.options(scene))
             words = ["inspect", str(take.scene_file), "--progress", "json", *scene_file.options(scene)]
             self._check = Job(engine_command(words), take.log_file)
         except (scene_file.ShotError, TakeError, EngineMissingError) as error:

@@ -55,7 +55,7 @@ class Take:
         """The thumbnail of the last frame."""
         return self.directory.with_suffix(".png")
 
-    def begin(self, tables: Mapping[str, Any], options: Sequence[str]) -> None:
+    def write(self, tables: Mapping[str, Any], options: Sequence[str]) -> None:
         """Write the scene file from its tables, and the engine's further options.
 
         Raises

@@ -15,7 +15,7 @@ TABLES = {"clip": {"path": "/a b/clip.mp4", "frames": [0, 9]}}
 
 def begun(folder: Path) -> Take:
     take = new_take(folder)
-    take.begin(TABLES, ["--quality", "draft"])
+    take.write(TABLES, ["--quality", "draft"])
     return take
 
 
@@ -83,7 +83,7 @@ def test_a_folder_that_cannot_be_written_to(tmp_path) -> None:
     """One sentence with the folder."""
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(TakeError, match=r"file cannot be written to.*choose another output folder"):
-        Take(tmp_path / "file" / "take_0001").begin(TABLES, [])
+        Take(tmp_path / "file" / "take_0001").write(TABLES, [])
 
 
 def test_removing_takes_all_files_of_one_take(tmp_path) -> None:

@@ -24,7 +24,7 @@ CORNERS = [(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (0.0, 3.
 def engines(scene: bpy.types.Scene, folder: Path) -> Scene:
     """The scene as the engine reads it, through a file."""
     take = Take(folder / "take_0001")
-    take.begin(shot_tables(scene), [])
+    take.write(shot_tables(scene), [])
     return Scene.load(take.scene_file)
 
 

@@ -229,7 +229,7 @@ def test_going_on_with_what_was_stopped(shot, tmp_path) -> None:
     """From the last finished frame, with the settings of then, to a complete take."""
     settings = shot.smokelift
     choose(shot, tmp_path / "out")
-    take = run.begin(shot)
+    take = run.write_take(shot)
     stopped = Scene.load(take.scene_file)
     with Clip.open(stopped.clip) as clip:
         frames = smokelift.reconstruct(clip, stopped, Settings.preset("draft"), take.directory)
@@ -255,7 +255,7 @@ def test_scenes_have_their_own_smoke(shot, tmp_path) -> None:
     other.smokelift.quality = "draft"
     other.smokelift.first, other.smokelift.last = FIRST, FIRST + 1
     other.smokelift.output = str(tmp_path / "two")
-    run.enqueue(bpy.context, other, run.begin(other))
+    run.enqueue(bpy.context, other, run.write_take(other))
     rows = bpy.context.window_manager.smokelift.jobs
     assert [row.outcome for row in rows] == ["done", "done"]
     assert volume.shown_take(shot) == Take(tmp_path / "one" / "take_0001")
