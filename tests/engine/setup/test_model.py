@@ -39,12 +39,7 @@ from smokelift.setup.shot import Shot
 from smokelift.setup.velocity_grid import choose_coarsening, choose_levels, levels_for
 from smokelift.transport import Velocity
 from smokelift.velocity import CoarseToFine, VelocitySettings
-
-
-def shot_of(scene: Scene, settings: Settings) -> Shot:
-    assert scene.clip is not None
-    with Clip.open(scene.clip) as clip:
-        return prepare_shot(clip, scene, settings)
+from tests.engine.setup.shots import shot_of
 
 
 def chosen(shot: Shot, what: str) -> Choice:

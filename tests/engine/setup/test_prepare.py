@@ -30,12 +30,7 @@ from smokelift.setup.geometry import COARSEST
 from smokelift.setup.prepare import boundaries, prepare_shot
 from smokelift.setup.settings import LONGEST_SIDE, Settings
 from smokelift.setup.shot import Shot
-
-
-def shot_of(scene: Scene, settings: Settings) -> Shot:
-    assert scene.clip is not None
-    with Clip.open(scene.clip) as clip:
-        return prepare_shot(clip, scene, settings)
+from tests.engine.setup.shots import shot_of
 
 
 def bare(scene: Scene) -> Scene:

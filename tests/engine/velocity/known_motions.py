@@ -26,6 +26,7 @@ def structured_density(x, y, z, radius=6.0):
 
 
 def positions(shape):
+    """Voxels from the middle of the box."""
     return [i - (n - 1) / 2 for i, n in zip(np.indices(shape, dtype=float), shape, strict=True)]
 
 

@@ -12,24 +12,15 @@ import pytest
 from smokelift.scene import SIDES
 from smokelift.transport import Velocity, advect
 from smokelift.velocity import estimate_velocity, predict_velocity
+from tests.engine.velocity.known_motions import positions, structured_density
 
 DT, VOXEL = 1 / 24, 0.03
 SHAPE = (40, 32, 40)
 
 
-def positions(shape=SHAPE):
-    """Voxels from the middle of the box."""
-    return [i - (n - 1) / 2 for i, n in zip(np.indices(shape, dtype=float), shape, strict=True)]
-
-
 def blob(x, y, z, radius=7.0):
-    """Smoke with structure in all directions; arguments in voxels."""
-    waves = (
-        np.sin(0.4 * x + 0.16 * y) * np.cos(0.32 * z)
-        + np.cos(0.32 * y - 0.24 * z + 0.12 * x)
-        + np.sin(0.36 * z + 0.08 * y - 0.12 * x)
-    )
-    return np.exp(-(x**2 + y**2 + z**2) / radius**2) * np.exp(0.6 * waves)
+    """Smoke larger than that of the known motions."""
+    return structured_density(x, y, z, radius)
 
 
 def moved(motion, shape=SHAPE, radius=7.0):
@@ -40,14 +31,14 @@ def moved(motion, shape=SHAPE, radius=7.0):
 
 def turned(angle):
     """The blob turned about y."""
-    x, y, z = positions()
+    x, y, z = positions(SHAPE)
     c, s = np.cos(angle), np.sin(angle)
     return blob(c * x + s * z, y, c * z - s * x)
 
 
 def turning(angle):
     """Displacement at arrival of a turn about y."""
-    x, y, z = positions()
+    x, y, z = positions(SHAPE)
     c, s = np.cos(angle), np.sin(angle)
     return np.stack([x - (c * x + s * z), 0 * y, z - (c * z - s * x)], axis=-1)
 
