@@ -31,8 +31,8 @@ say("done", text="3 frames.", frames=3)
 
 POLITE = """
 import json, sys, time
-print(json.dumps({"event": "start", "total": 9, "done": 2}), flush=True)
 try:
+    print(json.dumps({"event": "start", "total": 9, "done": 2}), flush=True)
     while True:
         time.sleep(0.01)
 except KeyboardInterrupt:
