@@ -6,7 +6,8 @@
 A SCENE is a folder with a truth.npz and what `benchmarks.truth.picture` makes of it. A run is a reconstruction, as
 `benchmarks.accuracy.runs` reads its name, or one of three references: `billboard` (the front picture, unshifted, in
 every view), `truth` (the true density in Smokelift's renderer), `black`. Each reconstruction has a process of its own;
-one that is in OUT already is not repeated.
+one that is in OUT already is not repeated. The statistics of views are compared with the fronts of the other scenes, or
+with the scene's own if it is the only one.
 
 OUT gets accuracy.md, accuracy.csv and accuracy.png (real.* with --real).
 """
@@ -17,10 +18,10 @@ import argparse
 from datetime import date
 from pathlib import Path
 
-from benchmarks.accuracy.report import contact_sheet, markdown, write
+from benchmarks.accuracy.report import contact_sheet, error_columns, markdown, realism_columns, write
 from benchmarks.accuracy.runs import SMEAR
 from benchmarks.accuracy.scenes import KnownScene, baked_scene, captured_scene
-from benchmarks.accuracy.score import score
+from benchmarks.accuracy.score import front_statistics, score
 from benchmarks.machine import describe
 
 SHOWN = ("billboard", "paper")
@@ -55,11 +56,14 @@ def main() -> None:
 
     computer = describe()
     where = {"machine": f"{computer['processor']}, {computer['cores']} cores", "date": date.today().isoformat()}
+    fronts = {known.name: front_statistics(known) for known in scenes}
     rows = []
     for done, known in enumerate(scenes, 1):  # written after every scene: the next may take an hour
+        others = [front for name, front in fronts.items() if name != known.name] or [fronts[known.name]]
         for run in runs:
-            rows.append(score(known, run, folder(known, run)) | where)
-            print(markdown(rows[-1:], list(known.cameras)).splitlines()[-1], flush=True)
+            rows.append(score(known, run, folder(known, run), others) | where)
+            for columns in (error_columns, realism_columns):
+                print(markdown(rows[-1:], columns(list(known.cameras))).splitlines()[-1], flush=True)
         write(out, name, rows, scenes[:done])
         shown = options.show or [run for run in dict.fromkeys([runs[0], *SHOWN]) if run in runs]
         contact_sheet(scenes[:done], shown, folder, out / f"{name}.png")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks.accuracy.ablations import EvenDepth, UnprojectedPrediction, WithoutHull, leave_out
-from benchmarks.accuracy.report import markdown
+from benchmarks.accuracy.report import error_columns, markdown, realism_columns
 from benchmarks.accuracy.runs import run_method, run_settings, run_views
 from benchmarks.accuracy.scenes import picture_on_screen
 from smokelift.density import DensitySettings, GradientFit, NothingCarried, Observation, RoundDepth, ViewSet
@@ -73,6 +73,17 @@ def test_a_picture_on_a_screen_is_unchanged_for_its_own_camera():
 
 def test_the_table_shows_a_dash_for_a_figure_that_is_not_there():
     row = {"scene": "plume-1", "run": "draft", "psnr_0": 40.0, "psnr_90": None, "seconds": 1.25}
-    line = markdown([row], ["0", "90"]).splitlines()[-1]
+    line = markdown([row], error_columns(["0", "90"])).splitlines()[-1]
     assert line.startswith("| plume-1 | draft | 40.0 / - |")
     assert "| 1.25 |" in line
+
+
+def test_statistics_stand_beside_those_of_the_truth():
+    row = {"scene": "plume-1", "run": "draft", "spectrum_distance_new": 2.84, "copied_detail": 0.41}
+    row |= {"copied_detail_truth": 0.31, "row_constant_detail_90": 0.36, "row_constant_detail_truth_90": 0.17}
+    row |= {f"spectrum_{low}_new": value for low, value in ((2, 0.2), (4, -1.0), (8, -3.0), (16, None))}
+    line = markdown([row], realism_columns(["0", "90"])).splitlines()[-1]
+    assert "| 2.8 |" in line
+    assert "| +0.2 / -1.0 / -3.0 / - |" in line
+    assert "| 0.36 / 0.17 |" in line
+    assert "| 0.41 / 0.31 |" in line

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -10,9 +9,11 @@ import numpy.typing as npt
 from scipy import ndimage
 
 from smokelift.evaluation import metrics
+from smokelift.evaluation.picture_statistics import PictureSeries, PictureStatistics
 from smokelift.evaluation.resampling import resampled
+from smokelift.evaluation.series import finite_mean, flicker_of
 from smokelift.evaluation.truth import Truth
-from smokelift.footage.images import area_average, linear_to_srgb
+from smokelift.footage.images import linear_to_srgb
 from smokelift.render import Image, Volume
 from smokelift.transport import Array
 
@@ -23,9 +24,6 @@ SMOKE = 0.01
 
 AROUND = 2
 """Voxels around the smoke in which a velocity still matters: advection and motion blur reach there."""
-
-BLOCKS = 16
-"""Blocks along a picture's longer side for its flicker: coarser than any motion from frame to frame."""
 
 
 class PictureMeans:
@@ -38,12 +36,9 @@ class PictureMeans:
     """
 
     def __init__(self, background: Image) -> None:
-        self._background = eight_bit_values(background)
+        self._background = np.asarray(background, np.float32)
         self._frames: list[Figures] = []
-        self._power: list[npt.NDArray[np.float64]] = []
-        self._power_truth: list[npt.NDArray[np.float64]] = []
-        self._blocks: list[Array] = []
-        self._blocks_truth: list[Array] = []
+        self._found, self._true = PictureSeries(), PictureSeries()
 
     def add(self, image: Image, truth: Image) -> Figures:
         """Add a frame, linear radiance (rows, columns, 3), and return its own metrics.
@@ -53,8 +48,8 @@ class PictureMeans:
         ValueError
             If the shapes differ or a value is not finite.
         """
-        found, true = eight_bit_values(image), eight_bit_values(truth)
-        smoke, true_smoke = found - self._background, true - self._background
+        found, true, behind = (eight_bit_values(picture) for picture in _without_copies(image, truth, self._background))
+        smoke, true_smoke = found - behind, true - behind
         shifted, shift = metrics.shifted_psnr(smoke, true_smoke)
         figures = {
             "psnr": metrics.psnr(found, true),
@@ -62,26 +57,28 @@ class PictureMeans:
             "psnr_shifted": shifted,
             "shift": list(shift),
         }
-        grey, true_grey = smoke.mean(axis=-1), true_smoke.mean(axis=-1)
-        self._power.append(metrics.octave_power(grey))
-        self._power_truth.append(metrics.octave_power(true_grey))
-        self._blocks.append(_blocks(grey))
-        self._blocks_truth.append(_blocks(true_grey))
+        self._found.add(smoke.mean(axis=-1))
+        self._true.add(true_smoke.mean(axis=-1))
         self._frames.append(figures)
         return figures
 
+    def statistics(self) -> tuple[PictureStatistics, PictureStatistics]:
+        """Return what the pictures and the true ones look like, each on its own."""
+        return self._found.statistics(), self._true.statistics()
+
     def figures(self) -> Figures:
-        """Means over the frames (of decibels, those that are finite), spectrum and flicker of them all."""
+        """Means over the frames (of decibels, those that are finite), and the statistics of them all."""
+        found, true = self.statistics()
         distance, octaves = None, None
-        if np.sum(self._power_truth) > 0:
-            distance, ratios = metrics.spectrum_distance(sum(self._power), sum(self._power_truth))
+        if true.power.sum() > 0:
+            distance, ratios = metrics.spectrum_distance(found.power, true.power)
             octaves = ratios.tolist()
         return {
             **{name: finite_mean(f[name] for f in self._frames) for name in ("psnr", "ssim", "psnr_shifted")},
             "spectrum_distance": distance,
             "spectrum_octaves": octaves,
-            "flicker": _flicker(self._blocks),
-            "flicker_truth": _flicker(self._blocks_truth),
+            **found.figures,
+            **{f"{name}_truth": value for name, value in true.figures.items()},
         }
 
 
@@ -165,8 +162,8 @@ class VolumeMeans:
         names = dict.fromkeys(name for figures in self._frames for name in figures)
         return {
             **{name: finite_mean(f[name] for f in self._frames if name in f) for name in names},
-            "flicker": _flicker(self._layers),
-            "flicker_truth": _flicker(self._layers_truth),
+            "flicker": flicker_of(self._layers),
+            "flicker_truth": flicker_of(self._layers_truth),
         }
 
 
@@ -175,20 +172,13 @@ def eight_bit_values(image: npt.ArrayLike) -> Array:
     return np.asarray(np.rint(255 * np.clip(linear_to_srgb(image), 0, 1)) / 255, np.float32)
 
 
-def finite_mean(values: Iterable[float]) -> float | None:
-    """The mean of what is finite (equal pictures have infinite decibels); None where nothing is."""
-    finite = [value for value in values if np.isfinite(value)]
-    return float(np.mean(finite)) if finite else None
+def smoke_picture(image: Image, background: Image) -> Array:
+    """Return the smoke alone, (rows, columns): mean over the channels of the 8-bit sRGB values above the background."""
+    shown, behind = (eight_bit_values(picture) for picture in _without_copies(image, background))
+    return np.asarray((shown - behind).mean(axis=-1))
 
 
-def _blocks(grey: Array) -> Array:
-    rows, columns = grey.shape
-    edge = max(rows, columns) / BLOCKS
-    return area_average(grey, max(1, round(columns / edge)), max(1, round(rows / edge)))
-
-
-def _flicker(series: list[Array]) -> float | None:
-    if len(series) < 3:
-        return None
-    value = metrics.flicker(np.stack(series))
-    return value if np.isfinite(value) else None
+def _without_copies(*pictures: Image) -> tuple[Image, ...]:
+    """Pictures (..., 3) with one channel in place of three where all are grey: every figure is a mean over channels."""
+    grey = all(np.array_equal(picture[..., :-1], picture[..., 1:]) for picture in pictures)
+    return tuple(picture[..., :1] for picture in pictures) if grey else pictures

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from smokelift.evaluation.frame_means import PictureMeans, VolumeMeans, eight_bit_values, finite_mean
+from smokelift.evaluation.frame_means import PictureMeans, VolumeMeans, eight_bit_values
 from smokelift.evaluation.truth import Truth
 from smokelift.transport import Velocity
 
@@ -158,8 +158,3 @@ def test_a_velocity_after_a_gap_is_not_scored(truth) -> None:
 
 def test_values_are_those_of_an_8_bit_picture() -> None:
     np.testing.assert_allclose(eight_bit_values(np.array([-1, 0.2159, 7])) * 255, [0, 128, 255], rtol=1e-6)
-
-
-def test_means_leave_out_what_is_infinite() -> None:
-    assert finite_mean([1.0, np.inf, 3.0]) == 2.0
-    assert finite_mean([np.inf]) is None

@@ -42,6 +42,26 @@ def octave_power(picture: npt.ArrayLike) -> Array:
     return np.array([power[(low <= cycles) & (cycles < high)].sum() for low, high in OCTAVES])
 
 
+def octave_shares(power: npt.ArrayLike) -> Array:
+    """Return each octave's share of a power spectrum, in dB of the whole: what detail is like, however bright.
+
+    Parameters
+    ----------
+    power
+        A sum of `octave_power`. A millionth of its total is added to each octave, so that nothing is infinite.
+
+    Raises
+    ------
+    ValueError
+        If a value is not finite, or there is no power at all.
+    """
+    values = finite(power)
+    total = float(values.sum())
+    if total <= 0:
+        raise ValueError("the pictures show nothing: there is no spectrum")
+    return np.asarray(10 * np.log10(values / total + 1e-6))
+
+
 def spectrum_distance(power: npt.ArrayLike, truth: npt.ArrayLike) -> tuple[float, Array]:
     """Return how much stronger or weaker detail is than the truth's, wherever it is.
 
@@ -88,8 +108,8 @@ def row_constant_detail(picture: npt.ArrayLike) -> float:
         If a value is not finite.
     """
     values = finite(picture)
-    smoke = _smoke(values)
-    detail = np.where(smoke, _detail(values), 0.0)
+    smoke = smoke_pixels(values)
+    detail = np.where(smoke, fine_detail(values), 0.0)
     counts = np.maximum(smoke.sum(1), 1)
     return relative(float(np.sum(detail.sum(1) ** 2 / counts)), float(np.sum(detail**2)))
 
@@ -108,21 +128,23 @@ def detail_correlation(a: npt.ArrayLike, b: npt.ArrayLike) -> float:
         If the shapes differ or a value is not finite.
     """
     first, second = pair(a, b)
-    smoke = _smoke(first) | _smoke(second)
+    smoke = smoke_pixels(first) | smoke_pixels(second)
     if not smoke.any():
         return 0.0
-    one, other = (_detail(values)[smoke] for values in (first, second))
+    one, other = (fine_detail(values)[smoke] for values in (first, second))
     one, other = one - one.mean(), other - other.mean()
     norm = float(np.linalg.norm(one) * np.linalg.norm(other))
     return float(one @ other) / norm if norm > 0 else 0.0
 
 
-def _smoke(picture: Array) -> Mask:
+def smoke_pixels(picture: Array) -> Mask:
+    """Return where a picture, a difference from its background, shows smoke."""
     strength = np.abs(picture)
     return np.asarray(strength > SMOKE * strength.max(initial=0.0))
 
 
-def _detail(values: Array) -> Array:
+def fine_detail(values: Array) -> Array:
+    """Return what a blur of `DETAIL` pixels takes away from a picture (rows, columns)."""
     return np.asarray(values - ndimage.gaussian_filter(values, DETAIL))
 
 
