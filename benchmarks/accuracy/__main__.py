@@ -1,13 +1,17 @@
 """How near reconstructions from the front video alone come to the truth: volumes, motion, and views from elsewhere.
 
     python -m benchmarks.accuracy OUT SCENE... [--runs balanced paper smear billboard truth] [--frames 24]
-    python -m benchmarks.accuracy OUT --real FOLDER [--runs balanced billboard black]
+    python -m benchmarks.accuracy OUT --real FOLDER [--runs balanced billboard blurred black]
 
 A SCENE is a folder with a truth.npz and what `benchmarks.truth.picture` makes of it. A run is a reconstruction, as
-`benchmarks.accuracy.runs` reads its name, or one of three references: `billboard` (the front picture, unshifted, in
-every view), `truth` (the true density in Smokelift's renderer), `black`. Each reconstruction has a process of its own;
-one that is in OUT already is not repeated. The statistics of views are compared with the fronts of the other scenes, or
-with the scene's own if it is the only one.
+`benchmarks.accuracy.runs` reads its name, or one of four references: `billboard` (the front picture, unshifted, in
+every view), `blurred` (the same, blurred), `truth` (the true density in Smokelift's renderer), `black`. Each
+reconstruction has a process of its own; one that is in OUT already is not repeated. The statistics of views are
+compared with the fronts of the other scenes, or with the scene's own if it is the only one.
+
+The FOLDER of the ScalarFlow capture has scene.toml and any number of cameraNN.toml. Every tenth frame of 10 to 110 is
+compared at 270 x 480, as the cameras are calibrated and registered (the recordings moved as FluidNexus moves them), and
+each also with one gain a camera.
 
 OUT gets accuracy.md, accuracy.csv and accuracy.png (real.* with --real).
 """
@@ -18,7 +22,7 @@ import argparse
 from datetime import date
 from pathlib import Path
 
-from benchmarks.accuracy.report import contact_sheet, error_columns, markdown, realism_columns, write
+from benchmarks.accuracy.report import contact_sheet, markdown, table_columns, write
 from benchmarks.accuracy.runs import SMEAR
 from benchmarks.accuracy.scenes import KnownScene, baked_scene, captured_scene
 from benchmarks.accuracy.score import front_statistics, score
@@ -43,8 +47,8 @@ def main() -> None:
     if (options.real is None) == (not options.scenes):
         parser.error("give folders of scenes, or --real FOLDER")
     if options.real is not None:
-        scenes, name = [captured_scene(options.real)], "real"
-        runs = options.runs or ["balanced", SMEAR, "billboard", "black"]
+        scenes, name = [captured_scene(options.real, registered=moved) for moved in (False, True)], "real"
+        runs = options.runs or ["balanced", "billboard", "blurred", "black"]
     else:
         scenes, name = [baked_scene(folder, options.frames) for folder in options.scenes], "accuracy"
         runs = options.runs or ["balanced", "paper", SMEAR, "billboard", "truth"]
@@ -52,7 +56,7 @@ def main() -> None:
     out.mkdir(parents=True, exist_ok=True)
 
     def folder(known: KnownScene, run: str) -> Path:
-        return out / "runs" / known.name / run
+        return out / "runs" / known.scene_path.parent.name / run
 
     computer = describe()
     where = {"machine": f"{computer['processor']}, {computer['cores']} cores", "date": date.today().isoformat()}
@@ -62,8 +66,8 @@ def main() -> None:
         others = [front for name, front in fronts.items() if name != known.name] or [fronts[known.name]]
         for run in runs:
             rows.append(score(known, run, folder(known, run), others) | where)
-            for columns in (error_columns, realism_columns):
-                print(markdown(rows[-1:], columns(list(known.cameras))).splitlines()[-1], flush=True)
+            for columns in table_columns(known):
+                print(markdown(rows[-1:], columns).splitlines()[-1], flush=True)
         write(out, name, rows, scenes[:done])
         shown = options.show or [run for run in dict.fromkeys([runs[0], *SHOWN]) if run in runs]
         contact_sheet(scenes[:done], shown, folder, out / f"{name}.png")

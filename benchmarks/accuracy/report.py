@@ -19,9 +19,16 @@ from smokelift.output.sheet import write_sheet
 
 Row = dict[str, Any]
 
-
 Column = tuple[str, list[str], str]
 """Heading, the figures that share the column, and their format."""
+
+_COST: list[Column] = [("s a frame", ["seconds"], ".2f"), ("solves", ["solves"], ".0f"), ("MiB", ["memory_mib"], ".0f")]
+
+
+def table_columns(known: KnownScene) -> list[list[Column]]:
+    """Return the columns of a scene's tables: errors, then statistics."""
+    views = list(known.cameras)
+    return [capture_columns(views) if known.truth is None else error_columns(views), realism_columns(views)]
 
 
 def error_columns(views: list[str]) -> list[Column]:
@@ -37,9 +44,23 @@ def error_columns(views: list[str]) -> list[Column]:
         ("around", ["velocity_error_around", "velocity_cosine_around"], ".2f"),
         ("div (true)", ["divergence", "divergence_truth"], ".0e"),
         ("warp (true)", ["warp_error", "warp_error_truth"], ".2f"),
-        ("s a frame", ["seconds"], ".2f"),
-        ("solves", ["solves"], ".0f"),
-        ("MiB", ["memory_mib"], ".0f"),
+        *_COST,
+    ]
+
+
+def capture_columns(views: list[str]) -> list[Column]:
+    """Return the columns of the errors where only pictures are known, by cameras that differ in exposure."""
+    new = views[1:]
+    return [
+        ("PSNR input", [f"psnr_{views[0]}"], ".1f"),
+        (f"PSNR {' / '.join(new)}", [f"psnr_{view}" for view in new], ".1f"),
+        ("mean", ["psnr_new"], ".1f"),
+        ("with a gain", [f"gain_psnr_{view}" for view in new], ".1f"),
+        ("mean", ["gain_psnr_new"], ".1f"),
+        ("gain", [f"gain_{view}" for view in new], ".2f"),
+        ("SSIM input", [f"ssim_{views[0]}"], ".3f"),
+        ("SSIM new, with a gain", ["ssim_new", "gain_ssim_new"], ".3f"),
+        *_COST,
     ]
 
 
@@ -81,8 +102,9 @@ def write(out: Path, name: str, rows: list[Row], scenes: list[KnownScene]) -> No
         writer = csv.DictWriter(file, names)
         writer.writeheader()
         writer.writerows(rows)
-    views, all_rows = list(scenes[0].cameras), rows + _means(rows)
-    both = [markdown(all_rows, shown) for shown in (error_columns(views), realism_columns(views))]
+    # a capture is there twice, so its mean would say nothing
+    all_rows = rows + _means(rows) if scenes[0].truth is not None else rows
+    both = [markdown(all_rows, shown) for shown in table_columns(scenes[0])]
     said = f"{rows[0]['machine']}, {rows[0]['date']}"
     (out / f"{name}.md").write_text("\n\n".join([said, *both, f"![Pictures]({name}.png)"]) + "\n")
 

@@ -8,6 +8,8 @@ A name is a quality or "paper", then further views, then changes:
 - ``balanced:velocity.solver=primal-dual``: the other solver
 - ``balanced:without=depth``: a part of the method is left out, see `ablations.leave_out`
 - ``smear``: the front picture alone is fitted, with a density that is constant along the rays
+- ``billboard``, ``blurred``: the front picture in every view, as it is or blurred
+- ``billboard:axis_depth=-0.02``: it stands so many metres behind the middle of the box of a capture
 """
 
 from __future__ import annotations
@@ -35,6 +37,16 @@ SMEAR_FIT = GradientFit(DensitySettings(fit_iterations=24, descent_iterations=0,
 
 
 SOLVERS = {"primal-dual": PrimalDual(), "projected-cg": ProjectedCG()}
+
+
+def run_name(run: str) -> str:
+    """Return a run's name without its views and changes: "balanced" of "balanced+90:transport=0"."""
+    return run.partition(":")[0].split("+")[0]
+
+
+def billboard_depth(run: str) -> float:
+    """Return how far behind the middle of the box (m) a billboard stands: -0.02 of "billboard:axis_depth=-0.02"."""
+    return float(dict(_changes(run)).get("axis_depth", 0))
 
 
 def run_views(run: str) -> list[str]:
@@ -74,7 +86,7 @@ def run_settings(run: str) -> Settings:
     ValueError
         If there is no such quality.
     """
-    name = run.partition(":")[0].split("+")[0]
+    name = run_name(run)
     qualities: dict[str, Quality] = {quality: quality for quality in get_args(Quality)}
     if name != "paper" and name not in qualities:
         raise ValueError(f"{run}: expected paper or one of {', '.join(qualities)} before a colon.")

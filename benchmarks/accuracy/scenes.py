@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from smokelift import Camera, Clip, Scene
+from smokelift.density.screen import view_frame
 from smokelift.evaluation.truth import Truth
 from smokelift.footage.images import area_average
 from smokelift.render import Image
@@ -23,6 +24,10 @@ REAL_SIZE = (270, 480)
 
 REAL_FRAMES = range(10, 111, 10)
 """Frames of the ScalarFlow capture that are scored."""
+
+REGISTRATION = {"camera00": (-12, 18), "camera01": (52, 18), "camera03": (11, -12), "camera04": (11, -18)}
+"""(Rows, columns) of 1920 x 1080 by which FluidNexus (2025) moves the recorded pictures of the ScalarFlow capture down
+and to the right, because the published calibration is off by so much."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +76,7 @@ class KnownScene:
     seen
         Returns what a camera saw in a frame, linear (rows, columns, 3).
     billboard
-        Returns the input picture of a frame as it is put into a view.
+        Returns the input picture of a frame as it is put into a view, so many metres behind the middle of the box.
     truth
         Volumes and velocities, if they are known.
     """
@@ -82,7 +87,7 @@ class KnownScene:
     scored: range
     cameras: dict[str, Camera]
     seen: Callable[[str, int], Image]
-    billboard: Callable[[str, int], Image]
+    billboard: Callable[[str, int, float], Image]
     truth: Truth | None
 
 
@@ -91,31 +96,47 @@ def baked_scene(folder: Path, frames: int) -> KnownScene:
     truth, views = Truth.load(folder / "truth.npz"), BakedViews.load(folder)
     span = range(min(frames, truth.frames))
 
-    def billboard(_: str, frame: int) -> Image:
+    def billboard(_: str, frame: int, __: float) -> Image:
         return views.seen("0", frame)
 
     return KnownScene(folder.name, folder / "scene.toml", span, span, views.cameras, views.seen, billboard, truth)
 
 
-def captured_scene(folder: Path) -> KnownScene:
-    """Return the ScalarFlow capture: its input is camera 02; it is scored on camera 00, which is not reconstructed."""
-    names = {"input": "scene", "camera00": "camera00"}
-    described = {view: Scene.load(folder / f"{name}.toml") for view, name in names.items()}
-    cameras = {view: camera_of(folder / f"{name}.toml").resized(*REAL_SIZE) for view, name in names.items()}
-    clips = {view: Clip.open(scene.clip) for view, scene in described.items() if scene.clip is not None}
+def captured_scene(folder: Path, *, registered: bool = False) -> KnownScene:
+    """Return the ScalarFlow capture: its input is scene.toml, and it is scored on every cameraNN.toml beside it.
+
+    Parameters
+    ----------
+    folder
+        Of the scene files.
+    registered
+        Whether the recorded pictures are moved by `REGISTRATION`. Only cameras that it names are scored then.
+    """
+    paths = {"input": folder / "scene.toml"}
+    for path in sorted(folder.glob("camera[0-9][0-9].toml")):
+        if path.stem in REGISTRATION or not registered:
+            paths[path.stem] = path
+    described = {view: Scene.load(path) for view, path in paths.items()}
     domain = described["input"].domain
     if domain is None:
-        raise ValueError(f"{folder / 'scene.toml'}: has no [domain].")
-    centre = np.array(domain.centre)
+        raise ValueError(f"{paths['input']}: has no [domain].")
+    cameras = {view: camera_of(path).resized(*REAL_SIZE) for view, path in paths.items()}
+    clips = {view: Clip.open(scene.clip) for view, scene in described.items() if scene.clip is not None}
+    centre, behind = np.array(domain.centre), view_frame(cameras["input"])[1]
 
     def seen(view: str, frame: int) -> Image:
-        return area_average(clips[view].frame(frame), *REAL_SIZE)
+        picture = clips[view].frame(frame)
+        if registered and view in REGISTRATION:
+            rows, columns = REGISTRATION[view]
+            picture = moved(picture, round(rows * len(picture) / 1920), round(columns * len(picture) / 1920))
+        return area_average(picture, *REAL_SIZE)
 
-    def billboard(view: str, frame: int) -> Image:
-        return picture_on_screen(seen("input", frame), cameras["input"], cameras[view], centre)
+    def billboard(view: str, frame: int, depth: float) -> Image:
+        return picture_on_screen(seen("input", frame), cameras["input"], cameras[view], centre + depth * behind)
 
+    name = f"{folder.name}, {'registered' if registered else 'as calibrated'}"
     frames = range(REAL_FRAMES[-1] + 1)
-    return KnownScene(folder.name, folder / "scene.toml", frames, REAL_FRAMES, cameras, seen, billboard, None)
+    return KnownScene(name, folder / "scene.toml", frames, REAL_FRAMES, cameras, seen, billboard, None)
 
 
 def camera_of(path: Path) -> Camera:
@@ -124,6 +145,16 @@ def camera_of(path: Path) -> Camera:
     if camera is None:
         raise ValueError(f"{path}: has no [camera].")
     return camera
+
+
+def moved(picture: Image, down: int, right: int) -> Image:
+    """Return a picture (rows, columns, 3) moved by whole pixels; what comes in is black."""
+    rows, columns = picture.shape[:2]
+    whole = np.zeros_like(picture)
+    whole[max(down, 0) : rows + min(down, 0), max(right, 0) : columns + min(right, 0)] = picture[
+        max(-down, 0) : rows - max(down, 0), max(-right, 0) : columns - max(right, 0)
+    ]
+    return whole
 
 
 def picture_on_screen(picture: Image, source: Camera, view: Camera, centre: npt.NDArray[np.float64]) -> Image:

@@ -10,14 +10,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy import ndimage
 
-from benchmarks.accuracy.runs import run_views
+from benchmarks.accuracy.exposure import best_gain
+from benchmarks.accuracy.runs import billboard_depth, run_name, run_views
 from benchmarks.accuracy.scenes import KnownScene
 from benchmarks.process import run_module
 from smokelift import Scene
 from smokelift.evaluation import metrics
 from smokelift.evaluation.copies import CopiedDetail
-from smokelift.evaluation.frame_means import PictureMeans, VolumeMeans, smoke_picture
+from smokelift.evaluation.frame_means import PictureMeans, VolumeMeans, eight_bit_values, smoke_picture
 from smokelift.evaluation.picture_statistics import MOTION, PictureSeries, PictureStatistics, beside_references
 from smokelift.evaluation.series import finite_mean
 from smokelift.evaluation.truth import Truth
@@ -31,8 +33,15 @@ FRONT, BETWEEN, SIDE = "0", "45", "90"
 ALONG_RAYS = 1
 """Axis of the voxels that the front camera looks along."""
 
-BASELINES = ("billboard", "truth", "black")
+BILLBOARDS = ("billboard", "blurred")
+"""The input picture in every view, as it is and blurred."""
+
+BASELINES = (*BILLBOARDS, "truth", "black")
 """Runs without a reconstruction."""
+
+BLUR = 1 / 120
+"""Standard deviation of the blurred billboard's Gaussian, as a share of a picture's longer side. Of 1, 2, 3 and 4 / 120
+it is the best for camera 00 of the ScalarFlow capture, with and without a gain."""
 
 BLACK = np.zeros(3, np.float32)
 
@@ -65,9 +74,11 @@ def reconstructed(known: KnownScene, run: str, folder: Path) -> dict[str, Any]:
 
 def images(known: KnownScene, run: str, folder: Path, frames: range) -> Iterator[tuple[int, dict[str, Image]]]:
     """Yield frames with the linear picture (rows, columns, 3) that a run shows in every view."""
-    views = known.cameras
-    if run == "billboard":
-        yield from ((frame, {view: known.billboard(view, frame) for view in views}) for frame in frames)
+    views, name = known.cameras, run_name(run)
+    if name in BILLBOARDS:
+        depth, width = billboard_depth(run), BLUR if name == "blurred" else 0.0
+        for frame in frames:
+            yield frame, {view: _blurred(known.billboard(view, frame, depth), width) for view in views}
     elif run == "black":
         yield from ((frame, {view: 0 * known.seen(view, frame) for view in views}) for frame in frames)
     elif run == "truth":
@@ -109,13 +120,16 @@ def score(known: KnownScene, run: str, folder: Path, references: Sequence[Pictur
         Fronts of other clips, to compare the views with in their statistics.
     """
     row: dict[str, Any] = {"scene": known.name, "run": run, "frames": len(known.scored)}
-    row["method"] = "baseline" if run == "billboard" else "reference"
-    if run not in BASELINES:
+    baseline = run_name(run) in BASELINES
+    row["method"] = "baseline" if run_name(run) in BILLBOARDS else "reference"
+    if not baseline:
         about = reconstructed(known, run, folder)
         row |= {name: about[name] for name in (*RUN_FIGURES, "method")}
         row["resolution"] = "x".join(map(str, about["resolution"]))
     row |= _view_figures(known, run, folder, references)
-    if known.truth is not None and run not in BASELINES:
+    if known.truth is None:
+        row |= _exposure_figures(known, run, folder)
+    elif not baseline:
         row |= _volume_figures(known, known.truth, folder)
     return row
 
@@ -147,6 +161,26 @@ def _view_figures(known: KnownScene, run: str, folder: Path, references: Sequenc
         row[f"{name}_new"] = finite_mean(figures[name] for view, figures in found.items() if view not in used)
     if SIDE in known.cameras:
         row |= side.figures() | {f"{name}_truth": value for name, value in true_side.figures().items()}
+    return row
+
+
+def _exposure_figures(known: KnownScene, run: str, folder: Path) -> dict[str, Any]:
+    """Return what PSNR and SSIM become with one gain a camera, since real cameras differ in exposure; and the gains."""
+    shown: dict[str, list[Image]] = {view: [] for view in known.cameras}
+    for _, pictures in images(known, run, folder, known.scored):
+        for view, picture in pictures.items():
+            shown[view].append(picture)
+    row: dict[str, Any] = {}
+    for view, ours in shown.items():
+        seen = [known.seen(view, frame) for frame in known.scored]
+        gain = row[f"gain_{view}"] = best_gain(ours, seen)
+        gained = (np.float32(gain) * picture for picture in ours)
+        pairs = [(eight_bit_values(a), eight_bit_values(b)) for a, b in zip(gained, seen, strict=True)]
+        row[f"gain_psnr_{view}"] = finite_mean(metrics.psnr(*pair) for pair in pairs)
+        row[f"gain_ssim_{view}"] = finite_mean(metrics.ssim(*pair) for pair in pairs)
+    used = {next(iter(known.cameras)), *run_views(run)}
+    for name in ("gain_psnr", "gain_ssim"):
+        row[f"{name}_new"] = finite_mean(row[f"{name}_{view}"] for view in known.cameras if view not in used)
     return row
 
 
@@ -190,6 +224,12 @@ class SideCopies:
             "copied_detail_moments": self._front.any_moment(),
             "copied_detail_between": self._between.same_moment(),
         }
+
+
+def _blurred(picture: Image, width: float) -> Image:
+    """Return a picture (rows, columns, 3) after a Gaussian, as wide as a share of its longer side."""
+    sigma = width * max(picture.shape[:2])
+    return np.asarray(ndimage.gaussian_filter(picture, (sigma, sigma, 0)), np.float32)
 
 
 def _renderers(known: KnownScene, scene: Scene, shape: tuple[int, int, int]) -> dict[str, Renderer]:

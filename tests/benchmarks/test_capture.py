@@ -1,0 +1,90 @@
+"""The protocol for captured smoke: any number of cameras, as calibrated and registered, with and without a gain."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.accuracy.exposure import best_gain
+from benchmarks.accuracy.report import capture_columns, markdown
+from benchmarks.accuracy.scenes import REAL_FRAMES, REAL_SIZE, KnownScene, captured_scene, moved
+from benchmarks.accuracy.score import front_statistics, images, score
+from smokelift import Camera, ClipSource, Scene
+from smokelift.output.images import write_image
+from smokelift.scene import Domain
+
+WIDTH, HEIGHT = 54, 96
+
+
+@pytest.fixture(scope="module")
+def capture(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a capture with two further cameras at one place: 00 as bright as the input, 05 half so."""
+    folder = tmp_path_factory.mktemp("capture")
+    picture = np.zeros((HEIGHT, WIDTH, 3), np.float32)
+    picture[40:60, 20:34] = 0.4
+    picture[10, 10] = 0.01  # not quite half as bright in 8 bits
+    for name, brightness in (("input", 1.0), ("dim", 0.5)):
+        for frame in range(REAL_FRAMES[-1] + 1):
+            write_image(folder / f"{name}_{frame:04d}.png", np.float32(brightness) * picture)
+    scene = Scene(
+        ClipSource(folder / "input_####.png", fps=60.0),
+        camera=Camera.look_at((0, -5, 0), (0, 0, 0), fov_y_degrees=30, size=(WIDTH, HEIGHT)),
+        domain=Domain((-1, -1, -1), (1, 1, 1), (8, 8, 8)),
+    )
+    scene.save(folder / "scene.toml")
+    aside = Camera.look_at((5, 0, 0), (0, 0, 0), fov_y_degrees=30, size=(WIDTH, HEIGHT))
+    replace(scene, camera=aside).save(folder / "camera00.toml")
+    replace(scene, camera=aside, clip=ClipSource(folder / "dim_####.png", fps=60.0)).save(folder / "camera05.toml")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def known(capture: Path) -> KnownScene:
+    """The capture as calibrated, one frame of it scored."""
+    return replace(captured_scene(capture), scored=REAL_FRAMES[:1])
+
+
+def test_every_camera_of_the_folder_is_scored_and_only_registered_ones_are_moved(capture: Path):
+    calibrated, registered = (captured_scene(capture, registered=moved) for moved in (False, True))
+    assert list(calibrated.cameras) == ["input", "camera00", "camera05"]
+    assert list(registered.cameras) == ["input", "camera00"]  # nobody has registered camera 05
+    assert calibrated.name != registered.name and calibrated.scored == range(10, 111, 10)
+    before, after = (scene.seen("camera00", 10)[..., 0] for scene in (calibrated, registered))
+    assert before.shape == REAL_SIZE[::-1]
+    places = np.argwhere(after > 0.2).mean(0) - np.argwhere(before > 0.2).mean(0)
+    np.testing.assert_allclose(places, (-5, 5), atol=0.5)  # a pixel of 96 rows up, one to the right
+    np.testing.assert_array_equal(calibrated.seen("input", 10), registered.seen("input", 10))
+
+
+def test_a_moved_picture_is_black_where_nothing_was_recorded():
+    picture = np.arange(1.0, 13).reshape(3, 4)[..., None].repeat(3, -1).astype(np.float32)
+    np.testing.assert_array_equal(moved(picture, -1, 2)[..., 0], [[0, 0, 5, 6], [0, 0, 9, 10], [0, 0, 0, 0]])
+
+
+def test_the_gain_is_that_of_the_exposure():
+    picture = np.random.default_rng(0).random((11, 12, 3)).astype(np.float32)
+    assert best_gain([picture], [np.float32(0.5) * picture]) == pytest.approx(0.5, rel=0.01)
+    assert best_gain([0 * picture], [picture]) == 1
+
+
+def test_a_camera_with_another_exposure_is_met_with_a_gain(known: KnownScene, tmp_path: Path):
+    row = score(known, "billboard", tmp_path, [front_statistics(known)])
+    assert row["gain_camera05"] == pytest.approx(0.5, rel=0.02)
+    assert row["gain_psnr_camera05"] > row["psnr_camera05"] + 10
+    line = markdown([row], capture_columns(list(known.cameras))).splitlines()
+    assert "PSNR camera00 / camera05" in line[0]
+    assert f"| {row['gain_camera00']:.2f} / {row['gain_camera05']:.2f} |" in line[-1]
+
+
+def test_a_billboard_stands_where_it_is_told_and_a_blurred_one_is_smooth(known: KnownScene, tmp_path: Path):
+    def shown(run: str) -> np.ndarray:
+        return next(images(known, run, tmp_path, known.scored))[1]["camera00"][..., 0]
+
+    middle, behind, blurred = (shown(run) for run in ("billboard", "billboard:axis_depth=0.5", "blurred"))
+    # the camera looks along -x, so what is further along +y, behind the middle for the input, is further to its right
+    assert np.argwhere(behind > 0).mean(0)[1] - np.argwhere(middle > 0).mean(0)[1] > 20
+    assert np.abs(np.diff(blurred, axis=0)).max() < 0.5 * np.abs(np.diff(middle, axis=0)).max()
+    assert blurred.sum() == pytest.approx(middle.sum(), rel=0.02)
