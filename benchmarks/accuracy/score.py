@@ -18,7 +18,7 @@ from benchmarks.accuracy.scenes import KnownScene
 from benchmarks.process import run_module
 from smokelift import Scene
 from smokelift.evaluation import metrics
-from smokelift.evaluation.copies import CopiedDetail
+from smokelift.evaluation.copies import SideCopies
 from smokelift.evaluation.frame_means import PictureMeans, VolumeMeans, eight_bit_values, smoke_picture
 from smokelift.evaluation.picture_statistics import MOTION, PictureSeries, PictureStatistics, beside_references
 from smokelift.evaluation.series import finite_mean
@@ -143,8 +143,8 @@ def _view_figures(known: KnownScene, run: str, folder: Path, references: Sequenc
         for view, image in shown.items():
             scores[view].add(image, seen[view])
         if SIDE in shown:
-            side.add(shown)
-            true_side.add(seen)
+            side.add(*(smoke_picture(shown[view], BLACK) for view in (FRONT, BETWEEN, SIDE)))
+            true_side.add(*(smoke_picture(seen[view], BLACK) for view in (FRONT, BETWEEN, SIDE)))
     found: dict[str, dict[str, Any]] = {}
     for view, pictures in scores.items():
         figures = pictures.figures()
@@ -200,30 +200,6 @@ def _volume_figures(known: KnownScene, truth: Truth, folder: Path) -> dict[str, 
         "depth_anisotropy": finite_mean(changes),
         "depth_anisotropy_truth": finite_mean(true_changes),
     }
-
-
-class SideCopies:
-    """What the side view's fine detail has in common with other views of the same density."""
-
-    def __init__(self) -> None:
-        self._front, self._between = CopiedDetail(), CopiedDetail()
-        self._in_place: list[float] = []
-
-    def add(self, shown: dict[str, Image]) -> None:
-        """Add the pictures of a frame in all views, linear (rows, columns, 3) before black."""
-        front, between, side = (smoke_picture(shown[view], BLACK) for view in (FRONT, BETWEEN, SIDE))
-        self._in_place.append(metrics.detail_correlation(side, front))
-        self._front.add(side, front)
-        self._between.add(side, between)
-
-    def figures(self) -> dict[str, float | None]:
-        """Return the means over the frames."""
-        return {
-            "detail_correlation": finite_mean(self._in_place),
-            "copied_detail": self._front.same_moment(),
-            "copied_detail_moments": self._front.any_moment(),
-            "copied_detail_between": self._between.same_moment(),
-        }
 
 
 def _blurred(picture: Image, width: float) -> Image:

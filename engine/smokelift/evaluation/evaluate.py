@@ -1,4 +1,4 @@
-"""How near a sequence is to known volumes and to the clips of other cameras: what `smokelift evaluate` says."""
+"""How near a sequence is to known volumes and other cameras' clips, and whether its sides look like smoke."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ import numpy.typing as npt
 from PIL import Image as Pillow
 
 from smokelift.evaluation.frame_means import Figures, PictureMeans, VolumeMeans
-from smokelift.evaluation.reference_view import ReferenceView, first_frame, open_views
+from smokelift.evaluation.reference_view import INPUT, ReferenceView, first_frame, open_views
 from smokelift.evaluation.resampling import resampled
+from smokelift.evaluation.sides import DEGREES, look_from_sides
 from smokelift.evaluation.truth import Truth
 from smokelift.output.images import eight_bit
 from smokelift.output.sequence import Sequence
@@ -54,7 +55,10 @@ class Evaluation:
 def evaluate(
     sequence: Sequence, truth_path: Path | None = None, view_paths: tuple[tuple[Path, Path], ...] = ()
 ) -> Evaluation:
-    """Compare a sequence with the truth and with other views.
+    """Compare a sequence with the truth and with other views, and its sides with its front in their statistics.
+
+    The last needs neither truth nor view: what smoke looks like from another side is, in its statistics, what its front
+    looks like.
 
     Parameters
     ----------
@@ -77,26 +81,40 @@ def evaluate(
     tiles: Tiles = {number: [] for number in sorted(shown)}
     figures: Figures = {"directory": str(sequence.directory), "frames": len(frames), "notes": []}
     titles: list[str] = []
+    truth = None
     if truth_path is not None:
-        figures["truth"] = _against_truth(sequence, truth_path, tiles)
+        truth = _load_truth(sequence, truth_path)
+        figures["truth"] = {"path": str(truth_path), **_against_truth(sequence, truth, tiles)}
         titles += ["truth, along y", "sequence", "truth, along x", "sequence"]
-    if view_paths:
-        with ExitStack() as stack:
-            views = open_views(sequence, view_paths, stack, figures["notes"])
+    with ExitStack() as stack:
+        views = open_views(sequence, view_paths, stack, figures["notes"])
+        if view_paths:
             figures["views"] = [_against_view(sequence, view, tiles) for view in views]
             titles += [title for view in views for title in (view.name, "sequence")]
+        filmed = next((view for view in views if view.name == INPUT), None)
+        sides = look_from_sides(sequence, truth, filmed, shown)
+    figures["sides"] = sides.figures
+    for number, pictures in sides.pictures.items():
+        tiles[number] += [_fitted(eight_bit(picture)) for picture in pictures]
+    for degrees in DEGREES:
+        named = f"{degrees}\N{DEGREE SIGN}"
+        titles += [named] if truth is None else [f"truth, {named}", "sequence"]
     return Evaluation(figures, tuple(titles), tiles)
 
 
-def _against_truth(sequence: Sequence, path: Path, tiles: Tiles) -> Figures:
+def _load_truth(sequence: Sequence, path: Path) -> Truth:
     truth = Truth.load(path)
     _check_box(sequence, truth, path)
-    offset = first_frame(sequence) - 1
-    if (last := sequence.frames[-1] + offset) >= truth.frames:
+    if (last := sequence.frames[-1] + first_frame(sequence) - 1) >= truth.frames:
         raise ValueError(
             f"{path}: holds {truth.frames} frames, but the sequence goes on to frame {last} of its clip (from 0); "
             "give the truth of that clip, or evaluate a sequence of fewer frames."
         )
+    return truth
+
+
+def _against_truth(sequence: Sequence, truth: Truth, tiles: Tiles) -> Figures:
+    offset = first_frame(sequence) - 1
     means = VolumeMeans(truth)
     white = max(float(_projection(truth.density(n + offset), axis).max()) for n in tiles for axis in (0, 1))
     for number in sequence.frames:
@@ -107,7 +125,7 @@ def _against_truth(sequence: Sequence, path: Path, tiles: Tiles) -> Figures:
             true, found = truth.density(number + offset), resampled(density, truth.shape)
             for axis in (1, 0):
                 tiles[number] += [_tile(_projection(volume, axis) / max(white, 1e-30)) for volume in (true, found)]
-    return {"path": str(path), **means.figures()}
+    return means.figures()
 
 
 def _check_box(sequence: Sequence, truth: Truth, path: Path) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from smokelift.footage.background import background_picture, open_plates
-from smokelift.footage.clip import Clip, ClipError
+from smokelift.footage.clip import Clip
 from smokelift.footage.images import area_average
 from smokelift.output.sequence import Sequence
 from smokelift.output.viewer import Viewer
@@ -16,6 +16,9 @@ from smokelift.scene import Camera, Scene
 
 LONGEST_SIDE = 480
 """Pixels of a compared picture at most: larger ones are averaged over areas. Finer than any usual grid."""
+
+INPUT = "input"
+"""Name of the view that the sequence was made from."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,8 +85,8 @@ def open_views(
     elif scene.clip is not None:
         try:
             clip = stack.enter_context(Clip.open(scene.clip))
-            views.append(_view("input", scene.camera, None, clip, 0, sequence))
-        except ClipError as error:
+            views.append(_view(INPUT, scene.camera, None, clip, 0, sequence))
+        except ValueError as error:
             notes.append(f"The input view was left out: {error}")
     for camera_path, clip_path in paths:
         other = Scene.load(camera_path)
@@ -93,6 +96,12 @@ def open_views(
         behind = None if other.background is None else background_picture(other)
         views.append(_view(camera_path.stem, other.camera, behind, clip, first_frame(sequence), sequence))
     return views
+
+
+def at_most(camera: Camera) -> Camera:
+    """Return a camera with at most `LONGEST_SIDE` pixels."""
+    scale = min(1.0, LONGEST_SIDE / max(camera.size))
+    return camera.resized(*(max(1, round(side * scale)) for side in camera.size))
 
 
 def _view(
@@ -108,8 +117,7 @@ def _view(
             f"{clip.path}: has {len(clip)} frames, but the sequence goes on to frame {last} of its clip (from 0); "
             "give the whole clip of that camera."
         )
-    scale = min(1.0, LONGEST_SIDE / max(clip.size))
-    camera = camera.resized(*(max(1, round(side * scale)) for side in clip.size))
+    camera = at_most(camera.resized(*clip.size))
     if camera.moves:
         camera = replace(camera, matrix=camera.matrices[first], matrices=camera.matrices[first:])
     if background is None:

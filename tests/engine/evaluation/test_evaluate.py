@@ -149,6 +149,40 @@ def test_smoke_that_lies_too_deep_is_seen_from_the_side_only(plume, side, tmp_pa
     assert new["psnr_shifted"] > new["psnr"] + 5
 
 
+def test_without_truth_or_view_the_sides_are_compared_with_the_front(plume, perfect, tmp_path, capsys) -> None:
+    """A sequence that is its front picture drawn out in depth has other sides than fronts."""
+    drawn_out = [np.repeat(density.mean(1, keepdims=True), density.shape[1], 1) for density in plume.densities]
+    folder = write(tmp_path / "out", plume.scene, drawn_out)
+    true, wrong = (evaluate(capsys, sequence)["sides"] for sequence in (perfect, folder))
+    assert true["reference"] == "the input's pictures"
+    assert [view["degrees"] for view in true["views"]] == [45, 90, 135]
+    side, wrong_side = (sides["views"][1] for sides in (true, wrong))
+    assert side["reference_distance"] < 0.5 * wrong_side["reference_distance"]
+    assert side["flow_speed"] == pytest.approx(true["front"]["flow_speed"], rel=0.3)
+    assert len(side["octave_shares"]) == len(side["reference_octaves"]) == 4
+    assert true["depth_anisotropy"] == pytest.approx(1, abs=0.2)
+    assert wrong["depth_anisotropy"] < 0.01
+    assert "psnr" not in side
+    assert -1 <= true["copied_detail_between"] <= 1
+
+
+def test_sides_beside_the_truth(perfect, truth, capsys) -> None:
+    found = evaluate(capsys, perfect, "--truth", truth)["sides"]
+    for view in found["views"]:
+        assert view["psnr"] is None or view["psnr"] > 50
+        assert view["spectrum_distance"] < 0.1
+        assert view["flow_warp_error"] == pytest.approx(view["flow_warp_error_truth"], abs=0.02)
+    for name in ("copied_detail", "copied_detail_moments", "copied_detail_between", "depth_anisotropy"):
+        assert found[name] == pytest.approx(found[f"{name}_truth"], abs=0.02)
+
+
+def test_without_its_clip_a_sequence_is_its_own_reference(plume, tmp_path, capsys) -> None:
+    scene = replace(plume.scene, clip=replace(plume.scene.clip, path=tmp_path / "gone.mp4"))
+    found = evaluate(capsys, write(tmp_path / "out", scene, plume.densities))
+    assert found["sides"]["reference"] == "the sequence's own front"
+    assert "gone.mp4" in found["notes"][0]
+
+
 def test_json_and_picture_as_files(perfect, truth, side, tmp_path, capsys) -> None:
     files = ("--json", tmp_path / "a.json", "--picture", tmp_path / "a.png")
     assert main(["evaluate", *map(str, (perfect, "--truth", truth, "--view", *side, *files))]) == 0
@@ -159,8 +193,8 @@ def test_json_and_picture_as_files(perfect, truth, side, tmp_path, capsys) -> No
     with Image.open(tmp_path / "a.png") as sheet:
         pixels = np.asarray(sheet).max(-1)
     assert pixels.shape[0] > 5 * 320
-    # truth and sequence along y and x, then seen and sequence of two views
-    tiles = [240] * 4 + [229] * 4
+    # truth and sequence along y and x, then seen and sequence of two views, then truth and sequence from three sides
+    tiles = [240] * 4 + [229] * 10
     lefts = 4 + np.cumsum([0, *(width + 4 for width in tiles)])
     assert pixels.shape[1] == lefts[-1]
     for left, width in zip(lefts, tiles, strict=False):
@@ -220,10 +254,6 @@ def test_an_input_before_a_changing_background_is_left_out(plume, side, tmp_path
 
 
 # refusals
-
-
-def test_nothing_to_compare_with(perfect, capsys) -> None:
-    assert "--truth" in refused(capsys, perfect)
 
 
 def test_no_sequence_there(tmp_path, truth, capsys) -> None:

@@ -1,4 +1,4 @@
-"""``smokelift evaluate``: a sequence beside the truth, or beside other views."""
+"""``smokelift evaluate``: whether a sequence looks like smoke, and how near it is to the truth and to other views."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from smokelift.render import device
 def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
     """Add the command."""
     parser = commands.add_parser(
-        "evaluate", parents=[common], help="a sequence beside the truth, or beside other views"
+        "evaluate", parents=[common], help="whether its sides look like smoke; beside the truth or other views"
     )
     parser.add_argument("directory", type=Path)
     parser.add_argument("--truth", type=Path, metavar="truth.npz", help="known densities and velocities")
@@ -32,14 +32,12 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
         help="another camera and its clip; may be repeated",
     )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures there, not on standard output")
-    parser.add_argument("--picture", type=Path, metavar="FILE.png", help="truth and sequence side by side")
+    parser.add_argument("--picture", type=Path, metavar="FILE.png", help="its sides; truth and sequence side by side")
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace, say: Reporter) -> None:
     """Compare, and write the figures and a picture."""
-    if options.truth is None and not options.view:
-        raise ValueError("Say what to compare with: --truth truth.npz, or --view camera.toml clip.mp4.")
     for path in (options.json, options.picture):
         require_folder(path)
     if options.picture is not None and options.picture.suffix.lower() != ".png":
