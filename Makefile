@@ -1,4 +1,4 @@
-# make demo   lift the example clip to a VDB sequence in demo/sequence, with a contact sheet and a preview video
+# make demo   lift the example clip to a VDB sequence in demo/sequence, with pictures from all sides and a video
 # make test   formatting, types and tests; nothing that needs a GPU
 # make extension      the Blender extension's zips in dist/; ENGINE_WHEELS=DIR adds platforms built elsewhere
 # make test-blender   that zip in the bpy wheels and in a real Blender

@@ -10,7 +10,12 @@ RESUME = "resume.npz"
 LOCK = "run.lock"
 BACKGROUND = "background.exr"
 CONTACT_SHEET = "contact_sheet.png"
+ORBIT = "orbit.png"
+STRIP = "strip.png"
 PREVIEW = "preview.mp4"
+
+PICTURES = (CONTACT_SHEET, ORBIT, STRIP, PREVIEW)
+"""What shows a sequence at a glance; nothing is computed from it."""
 
 _FRAME = re.compile(r"smoke_\d{4,}\.(vdb|npz)")
 
@@ -25,5 +30,5 @@ def is_foreign(name: str) -> bool:
 
     What begins with a dot is left over from a killed run, or the file manager's.
     """
-    known = name in (INDEX, RESUME, LOCK, BACKGROUND, CONTACT_SHEET, PREVIEW)
-    return not (known or name.startswith(".") or _FRAME.fullmatch(name))
+    known = (INDEX, RESUME, LOCK, BACKGROUND, *PICTURES)
+    return not (name in known or name.startswith(".") or _FRAME.fullmatch(name))

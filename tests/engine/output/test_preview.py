@@ -9,9 +9,18 @@ import pytest
 from PIL import Image
 
 from smokelift.footage.clip import Clip
-from smokelift.output.images import write_image
-from smokelift.output.preview import SHEET_ANGLES, SHEET_HEIGHT, write_contact_sheet, write_preview
+from smokelift.output.images import eight_bit, write_image
+from smokelift.output.preview import (
+    SHEET_ANGLES,
+    SHEET_HEIGHT,
+    STRIP_FRAMES,
+    write_contact_sheet,
+    write_orbit,
+    write_preview,
+    write_strip,
+)
 from smokelift.output.sequence import Sequence
+from smokelift.output.viewer import Viewer
 from smokelift.output.writer import SequenceWriter
 from smokelift.scene import Background, completed
 from smokelift.transport import Velocity
@@ -42,6 +51,76 @@ def test_a_contact_sheet_has_all_tiles(plume, tmp_path, count) -> None:
     for column in range(columns):
         left = round((column + 0.25) * pixels.shape[1] / columns)
         assert pixels[:, left : left + width // 2].max() > 100
+
+
+def tiles(path, rows: int, columns: int) -> list[list[np.ndarray]]:
+    """The pictures of a sheet, by row and column."""
+    width = round(40 * SHEET_HEIGHT / 56)
+    with Image.open(path) as sheet:
+        pixels = np.asarray(sheet).astype(int)
+    assert pixels.shape[:2] == (16 + rows * (SHEET_HEIGHT + 20), 4 + columns * (width + 4))
+    return [
+        [pixels[32 + y * (SHEET_HEIGHT + 20) :, 4 + x * (width + 4) :][:SHEET_HEIGHT, :width] for x in range(columns)]
+        for y in range(rows)
+    ]
+
+
+def test_an_orbit_shows_one_moment_from_twelve_angles(plume, tmp_path) -> None:
+    """The first is the camera's own; each angle shows other smoke than the one opposite."""
+    sequence = written(plume.scene, plume.densities, tmp_path / "out")
+    write_orbit(tmp_path / "orbit.png", sequence)
+    shown = [tile for row in tiles(tmp_path / "orbit.png", 2, 6) for tile in row]
+    assert all(tile.max() > 100 for tile in shown)
+    viewer = Viewer(sequence.scene, sequence.scene.camera.resized(229, SHEET_HEIGHT))
+    own = eight_bit(viewer.image(4, plume.densities[3]))
+    assert np.abs(shown[0] - own).max() <= 1
+    assert np.abs(shown[0] - shown[6][:, ::-1]).max() > 20
+
+
+@pytest.mark.parametrize(("count", "columns"), [(1, 1), (5, 5), (14, STRIP_FRAMES)])
+def test_a_strip_shows_consecutive_frames_from_the_side(plume, tmp_path, count, columns) -> None:
+    """The clip above; as many as there are, at most eight, and of a long clip its later part."""
+    densities = [plume.densities[min(n, 4)] for n in range(count)]
+    scene = plume.write(tmp_path / "clip", densities, plume.scene)
+    sequence = written(scene, densities, tmp_path / "out")
+    with Clip.open(scene.clip) as clip:
+        write_strip(tmp_path / "strip.png", sequence, clip)
+    filmed, side = tiles(tmp_path / "strip.png", 2, columns)
+    assert all(tile.max() > 100 for tile in (*filmed, *side))
+    top = [np.flatnonzero(tile.max((1, 2)) > 100)[0] for tile in side]
+    assert top == sorted(top, reverse=True)
+    assert top[0] - top[-1] == pytest.approx({1: 0, 5: 55, 14: 0}[count], abs=8)
+
+
+def test_the_video_turns_while_it_plays(plume, tmp_path) -> None:
+    """Its last third begins with the front and leaves it, for smoke that does not move."""
+    still = [plume.densities[2]] * 5
+    scene = plume.write(tmp_path / "clip", still, plume.scene)
+    scene = replace(scene, clip=replace(scene.clip, fps=4.0))
+    sequence = written(scene, still, tmp_path / "out")
+    with Clip.open(scene.clip) as clip:
+        write_preview(tmp_path / "preview.mp4", sequence, clip)
+    with Clip.open(tmp_path / "preview.mp4") as preview:
+        width = preview.size[0] // 3
+        front, turning = ([preview.frame(n)[:, p * width : (p + 1) * width] for n in (0, 4)] for p in (1, 2))
+        assert np.abs(turning[0] - front[0]).mean() < 0.005
+        assert np.abs(front[1] - front[0]).max() < 0.04
+        assert np.abs(turning[1] - turning[0]).max() > 0.08
+
+
+def test_a_plate_does_not_turn_along(plume, tmp_path) -> None:
+    """The turning view has the plate's mean colour behind it, from its first frame on."""
+    halves = np.zeros((56, 40, 3), np.float32)
+    halves[:28] = 0.4
+    write_image(tmp_path / "plate.exr", halves)
+    scene = replace(plume.scene, background=Background(image=tmp_path / "plate.exr"))
+    sequence = written(scene, plume.densities, tmp_path / "out")
+    with Clip.open(scene.clip) as clip:
+        write_preview(tmp_path / "preview.mp4", sequence, clip)
+    with Clip.open(tmp_path / "preview.mp4") as preview:
+        for n in (0, 4):
+            corners = preview.frame(n)[[20, -20], -20]
+            np.testing.assert_allclose(corners, 0.2, atol=0.02)
 
 
 def test_a_preview_shows_three_views(plume, tmp_path) -> None:

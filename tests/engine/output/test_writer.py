@@ -88,7 +88,7 @@ def test_a_preview_in_the_directory_is_our_own(tmp_path: Path, no_vdb: None) -> 
         write(tmp_path, [1])
     (tmp_path / "preview.mp4").unlink()
     cut_off(tmp_path, [1])
-    for name in ("preview.mp4", "contact_sheet.png"):
+    for name in ("preview.mp4", "contact_sheet.png", "orbit.png", "strip.png"):
         (tmp_path / name).write_bytes(b"of frame 1")
     write(tmp_path, [2], resume=True)
     assert Sequence.open(tmp_path).frames == (1, 2)

@@ -1,4 +1,4 @@
-"""``smokelift preview``: a contact sheet and a preview video of a sequence."""
+"""``smokelift preview``: a contact sheet, an orbit, a strip and a video of a sequence."""
 
 from __future__ import annotations
 
@@ -8,30 +8,34 @@ from typing import Any
 
 from smokelift.app.progress import Reporter
 from smokelift.footage.clip import Clip
-from smokelift.output.layout import CONTACT_SHEET, PREVIEW
-from smokelift.output.preview import write_contact_sheet, write_preview
+from smokelift.output.layout import CONTACT_SHEET, ORBIT, PICTURES, PREVIEW, STRIP
+from smokelift.output.preview import write_contact_sheet, write_orbit, write_preview, write_strip
 from smokelift.output.sequence import Sequence
 from smokelift.render import device
 
 
 def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
     """Add the command."""
-    parser = commands.add_parser("preview", parents=[common], help="a contact sheet and a preview video")
+    parser = commands.add_parser(
+        "preview", parents=[common], help="a contact sheet, an orbit, a strip and a video that turns"
+    )
     parser.add_argument("directory", type=Path)
     parser.add_argument("--out", type=Path, help="directory for them; by default the sequence's own")
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace, say: Reporter) -> None:
-    """Write both files."""
+    """Write all four files."""
     sequence = Sequence.open(options.directory)
     if sequence.scene.clip is None or not sequence.frames:
         raise ValueError(f"{options.directory}: there are no finished frames of a clip to show yet.")
     device.start(options.device)
     out = options.out or sequence.directory
     out.mkdir(parents=True, exist_ok=True)
-    sheet, video = out / CONTACT_SHEET, out / PREVIEW
     with Clip.open(sequence.scene.clip) as clip:
-        write_contact_sheet(sheet, sequence, clip)
-        write_preview(video, sequence, clip)
-    say.finish(f"{sheet} and {video} written.", {"files": [str(sheet), str(video)]})
+        write_contact_sheet(out / CONTACT_SHEET, sequence, clip)
+        write_orbit(out / ORBIT, sequence)
+        write_strip(out / STRIP, sequence, clip)
+        write_preview(out / PREVIEW, sequence, clip)
+    files = [str(out / name) for name in PICTURES]
+    say.finish(f"{', '.join(files[:-1])} and {files[-1]} written.", {"files": files})
