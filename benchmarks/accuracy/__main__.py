@@ -13,7 +13,8 @@ The FOLDER of the ScalarFlow capture has scene.toml and any number of cameraNN.t
 compared at 270 x 480, as the cameras are calibrated and registered (the recordings moved as FluidNexus moves them), and
 each also with one gain a camera.
 
-OUT gets accuracy.md, accuracy.csv and accuracy.png (real.* with --real).
+OUT gets accuracy.md, accuracy.csv and accuracy.png (real.* with --real); of a SCENE also accuracy_orbit.png, one moment
+from twelve angles, and accuracy_strip.png, consecutive frames from the side, with truth and runs below each other.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from benchmarks.accuracy.report import contact_sheet, markdown, table_columns, w
 from benchmarks.accuracy.runs import SMEAR
 from benchmarks.accuracy.scenes import KnownScene, baked_scene, captured_scene
 from benchmarks.accuracy.score import front_statistics, score
+from benchmarks.accuracy.sheets import ORBIT_ANGLES, Row, orbit_rows, strip_rows, write_rows
 from benchmarks.machine import describe
 
 SHOWN = ("billboard", "paper")
@@ -62,6 +64,8 @@ def main() -> None:
     where = {"machine": f"{computer['processor']}, {computer['cores']} cores", "date": date.today().isoformat()}
     fronts = {known.name: front_statistics(known) for known in scenes}
     rows = []
+    orbits: list[Row] = []
+    strips: list[Row] = []
     for done, known in enumerate(scenes, 1):  # written after every scene: the next may take an hour
         others = [front for name, front in fronts.items() if name != known.name] or [fronts[known.name]]
         for run in runs:
@@ -71,6 +75,11 @@ def main() -> None:
         write(out, name, rows, scenes[:done])
         shown = options.show or [run for run in dict.fromkeys([runs[0], *SHOWN]) if run in runs]
         contact_sheet(scenes[:done], shown, folder, out / f"{name}.png")
+        if known.truth is not None:
+            orbits += orbit_rows(known, shown, folder)
+            strips += strip_rows(known, shown, folder)
+            write_rows(out / f"{name}_orbit.png", orbits, [f"{angle}\N{DEGREE SIGN}" for angle in ORBIT_ANGLES])
+            write_rows(out / f"{name}_strip.png", strips, [])
 
 
 if __name__ == "__main__":

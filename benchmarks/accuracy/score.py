@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,8 +23,8 @@ from smokelift.evaluation.frame_means import PictureMeans, VolumeMeans, eight_bi
 from smokelift.evaluation.picture_statistics import MOTION, PictureSeries, PictureStatistics, beside_references
 from smokelift.evaluation.series import finite_mean
 from smokelift.evaluation.truth import Truth
-from smokelift.render import Image, Renderer, scene_renderer
-from smokelift.scene import completed
+from smokelift.render import Image, scene_renderer
+from smokelift.scene import CompleteScene, completed
 from smokelift.transport import Array
 
 FRONT, BETWEEN, SIDE = "0", "45", "90"
@@ -81,19 +81,43 @@ def images(known: KnownScene, run: str, folder: Path, frames: range) -> Iterator
             yield frame, {view: _blurred(known.billboard(view, frame, depth), width) for view in views}
     elif run == "black":
         yield from ((frame, {view: 0 * known.seen(view, frame) for view in views}) for frame in frames)
-    elif run == "truth":
+    elif (densities := known_densities(known, run, folder)) is not None:
+        ours = {view: scene_renderer(densities.scene, camera, BLACK) for view, camera in views.items()}
+        for frame in frames:
+            density = densities.of_frame(frame)
+            yield frame, {view: ours[view].image(density) for view in views}
+
+
+@dataclass(frozen=True)
+class KnownDensities:
+    """The densities of a run, or the true ones.
+
+    Attributes
+    ----------
+    scene
+        On their grid; with the scattering that they are rendered with.
+    of_frame
+        Returns the density of a frame of the clip, (nx, ny, nz).
+    """
+
+    scene: CompleteScene
+    of_frame: Callable[[int], Array]
+
+
+def known_densities(known: KnownScene, run: str, folder: Path) -> KnownDensities | None:
+    """Return the densities of a run; None if it is a picture without any."""
+    if run_name(run) in BILLBOARDS or run == "black":
+        return None
+    if run == "truth":
         if known.truth is None:
             sys.exit(f"{known.name}: its volumes are not known, so there is no run truth.")
-        ours = _renderers(known, replace(Scene.load(known.scene_path), scattering="single"), known.truth.shape)
-        for frame in frames:
-            yield frame, {view: ours[view].image(known.truth.density(frame)) for view in views}
-    else:
-        about = json.loads((folder / "run.json").read_text())
-        scene = replace(Scene.load(folder / "scene.toml"), scattering=about["scattering"])
-        ours = _renderers(known, scene, tuple(about["resolution"]))
-        for frame in frames:
-            density = _volume(folder, known, frame)["density"]
-            yield frame, {view: ours[view].image(density) for view in views}
+        scene = replace(Scene.load(known.scene_path), scattering="single")
+        return KnownDensities(_on_grid(scene, known.truth.shape), known.truth.density)
+    about = json.loads((folder / "run.json").read_text())
+    scene = replace(Scene.load(folder / "scene.toml"), scattering=about["scattering"])
+    return KnownDensities(
+        _on_grid(scene, tuple(about["resolution"])), lambda frame: _volume(folder, known, frame)["density"]
+    )
 
 
 def front_statistics(known: KnownScene) -> PictureStatistics:
@@ -208,10 +232,9 @@ def _blurred(picture: Image, width: float) -> Image:
     return np.asarray(ndimage.gaussian_filter(picture, (sigma, sigma, 0)), np.float32)
 
 
-def _renderers(known: KnownScene, scene: Scene, shape: tuple[int, int, int]) -> dict[str, Renderer]:
+def _on_grid(scene: Scene, shape: tuple[int, int, int]) -> CompleteScene:
     complete = completed(scene)
-    complete = replace(complete, domain=replace(complete.domain, resolution=shape))
-    return {view: scene_renderer(complete, camera, BLACK) for view, camera in known.cameras.items()}
+    return replace(complete, domain=replace(complete.domain, resolution=shape))
 
 
 def _volume(folder: Path, known: KnownScene, frame: int) -> dict[str, Array]:
