@@ -79,7 +79,7 @@ def errors(path: Path) -> Array:
             below = round(lowered / h)
             low, shape = (*BOX[0][:2], BOX[0][2] - below * h), (*truth.shape[:2], truth.shape[2] + below)
             domain = Domain(low, BOX[1], shape)
-            estimated = estimate_axis(shot.amounts, shot.camera, domain)
+            estimated = estimate_axis(shot.amounts, shot.camera, domain).axis
             table.append([error(shot, domain, axis) for axis in (SmokeAxis.upright(), estimated)])
     return np.reshape(table, (-1, len(LOWERED), 2))
 

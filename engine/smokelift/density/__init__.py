@@ -3,6 +3,8 @@
 Observation -> View (observation) -> DepthEstimate (depth_prior) -> Start (temporal_prior) -> Density (fit)
 """
 
+from smokelift.density.axis import AxisEstimate
+from smokelift.density.clip_axis import clip_axis
 from smokelift.density.depth_prior import DepthEstimate, DepthPrior, ImposedView, RoundDepth
 from smokelift.density.fit import (
     Density,
@@ -16,6 +18,7 @@ from smokelift.density.observation import Observation, ObservedClip, View, ViewS
 from smokelift.density.temporal_prior import BlendCarried, NothingCarried, Start, TemporalPrior
 
 __all__ = [
+    "AxisEstimate",
     "BlendCarried",
     "Density",
     "DensityFit",
@@ -32,6 +35,7 @@ __all__ = [
     "TemporalPrior",
     "View",
     "ViewSet",
+    "clip_axis",
     "empty_density",
     "reconstruct_density",
 ]

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +44,11 @@ class AxisSettings:
         Growth of a column's radius per metre on its way up, by the air that it takes in (density-columns.md).
     inertia
         Weight of a column's place in the row below, in shares of its smoke: other smoke there may not be its own.
+    usual
+        Standard deviation, in reaches, of the smoke's mean about the middle of its box.
+    usual_count
+        How many boxes that counts as, beside the one at hand, which shows how far off the middle its smoke is across
+        the picture.
 
     docs/experiments/density-axis.md has what they are worth, and the posterior that was no better.
     """
@@ -54,6 +60,8 @@ class AxisSettings:
     near_side: tuple[float, float] = (0.3, 0.45)
     widening: float = 0.15
     inertia: float = 0.5
+    usual: float = 0.165
+    usual_count: float = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,6 +159,32 @@ class SmokeAxis:
         return np.where(shares > 0, total / np.maximum(shares, 1e-30), below)
 
 
+Cue = Literal["box", "floor contact", "inlets", "lamps"]
+"""What tells where the smoke stands; the box alone leaves it undetermined."""
+
+
+@dataclass(frozen=True, eq=False)
+class AxisEstimate:
+    """An axis, and how well it is known.
+
+    Attributes
+    ----------
+    axis
+        The most likely one.
+    cue
+        What tells it.
+    depth
+        Mean depth (m behind the domain's centre) of smoke that stands on it.
+    deviation
+        Standard deviation (m) of the mean depth's error.
+    """
+
+    axis: SmokeAxis
+    cue: Cue
+    depth: float
+    deviation: float
+
+
 @dataclass(frozen=True)
 class _FloorContact:
     """Where smoke meets the floor: depth and lateral width (m), and the height (m) at which it shows on the axis."""
@@ -166,7 +200,7 @@ def estimate_axis(
     domain: Domain,
     sources: Sequence[Inlet] = (),
     settings: AxisSettings = AxisSettings(),
-) -> SmokeAxis:
+) -> AxisEstimate:
     """The axis of the smoke in some frames of a clip.
 
     Parameters
@@ -182,37 +216,53 @@ def estimate_axis(
 
     Returns
     -------
-    SmokeAxis
+    AxisEstimate
         The domain's axis where nothing else is known: no smoke that stands on the domain's floor in most frames, or a
         camera that does not look down on the floor.
     """
+    reach = _reach(domain, view_frame(camera)[1])
     screens = [
         screen for screen in (upright_screen(amount, camera, domain) for amount in amounts) if screen.values.any()
     ]
     if not screens:
-        return SmokeAxis.upright()
+        return AxisEstimate(SmokeAxis.upright(), "box", 0.0, settings.usual * reach)
     rows = [screen.rows() for screen in screens]
-    heights = rows[0].heights
+    heights, total = rows[0].heights, np.sum([row.total for row in rows], 0)
+    usual = settings.usual_count * (settings.usual * reach) ** 2
+    unknown = float(np.sqrt((usual + np.average(_middle(rows), weights=total) ** 2) / (settings.usual_count + 1)))
     if sources:
         depth, across, spread = _through(sources, heights, camera, domain)
         columns = _columns(sources, screens, camera, domain, settings) if len(sources) > 1 else ()
         trusted = _trusted(depth, across, rows, camera, domain, settings.near_side)
-        return SmokeAxis(heights, trusted, spread, columns)
+        # as much in depth as across the picture; a disc's standard deviation is half its radius
+        radius = np.mean([source.radius for source in sources])
+        drift = float(np.hypot(np.sqrt(np.average((_middle(rows) - across) ** 2, weights=total)), radius / 2))
+        axis = SmokeAxis(heights, trusted, spread, columns)
+        return AxisEstimate(axis, "inlets", _mean(trusted, total), min(unknown, drift))
     found = [contact for contact in (_floor_contact(row, camera, domain) for row in rows) if contact is not None]
     if not found or len(found) < settings.frames * len(amounts):
-        return SmokeAxis.upright()
+        return AxisEstimate(SmokeAxis.upright(), "box", 0.0, unknown)
     deep = float(np.median([contact.depth for contact in found]))
     depth = np.full(heights.shape, deep)
     width = float(np.median([contact.width for contact in found]))
     base = float(np.median([contact.height for contact in found]))
     across = np.full(heights.shape, np.interp(base + width / 4, heights, _middle(rows)))
-    behind = max(deep, 0.0) / (settings.behind * _reach(domain, view_frame(camera)[1]))
+    behind = max(deep, 0.0) / (settings.behind * reach)
     trusted = _trusted(depth, across, rows, camera, domain, settings.near_side)
     trusted *= settings.contact * np.exp(-(behind**2) / 2)
     join = _joined(np.array([row.total for row in rows]), heights, base + width / 2, width, settings.joining)
     if join is not None:
         trusted *= np.clip((join + width / 2 - heights) / width, 0, 1)
-    return SmokeAxis(heights, trusted, np.zeros_like(trusted))
+    mean = _mean(trusted, total)
+    # as if that share of the distance were the box's and the contact's, weighted by their variances
+    believed = np.clip(mean / deep, 0, 1) if deep else 0.0
+    axis = SmokeAxis(heights, trusted, np.zeros_like(trusted))
+    return AxisEstimate(axis, "floor contact", mean, unknown * float(np.sqrt(1 - believed)))
+
+
+def _mean(depths: NDArray[np.float64], total: NDArray[np.float64]) -> float:
+    """Mean of depths by height over the smoke."""
+    return float(np.average(depths, weights=total))
 
 
 def _through(

@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from smokelift.density.axis import SmokeAxis
+from smokelift.density.axis import AxisEstimate, SmokeAxis
 from smokelift.density.hull import project_voxels, visual_hull
-from smokelift.density.observation import View
+from smokelift.density.observation import Observation, View
 from smokelift.density.profile import DepthProfile
 from smokelift.density.screen import upright_rows, view_frame
 from smokelift.footage.images import area_average
@@ -71,16 +71,16 @@ class LightSearch:
 
 
 def refine_axis(
-    axis: SmokeAxis, views: Sequence[View], optics: Optics, search: LightSearch = LightSearch()
-) -> SmokeAxis:
+    estimate: AxisEstimate, seen: Sequence[Observation], optics: Optics, search: LightSearch = LightSearch()
+) -> AxisEstimate:
     """Shift and lean the axis as the colours of the light ask for.
 
     Parameters
     ----------
-    axis
+    estimate
         What is known without the light.
-    views
-        Of a few frames, by one camera that stands still.
+    seen
+        A few frames of one camera that stands still.
     optics
         With a domain as fine as the pictures.
     search
@@ -88,16 +88,19 @@ def refine_axis(
 
     Returns
     -------
-    SmokeAxis
+    AxisEstimate
         The same one if the light is not that of lamps of different colours alone, or shows too little.
     """
-    coarse = replace(optics, domain=_coarse(optics.domain, search.voxels))
-    if axis.columns or not views or _colour_contrast(views[0].camera, coarse) <= search.least_contrast:
-        return axis
+    axis, coarse = estimate.axis, replace(optics, domain=coarse_domain(optics.domain, search.voxels))
+    if axis.columns or not seen or _colour_contrast(seen[0].camera, coarse) <= search.least_contrast:
+        return estimate
+    views = [view for view in (View.of(observation, optics) for observation in seen) if view.optical_depth.any()]
+    if not views:
+        return estimate
     rows = [upright_rows(view.optical_depth, view.camera, optics.domain) for view in views]
     heights, total = rows[0].heights, np.sum([row.total for row in rows], 0)
     if not total.any():
-        return axis
+        return estimate
     mean = float(np.average(heights, weights=total))
     size = 2 * float(np.sqrt(np.average((heights - mean) ** 2, weights=total)))
     found = float(np.average(axis.at(heights), weights=total))
@@ -110,7 +113,7 @@ def refine_axis(
     pictures = [_CoarsePicture(view, optics.domain, coarse, corners, search) for view in views]
     pictures = [picture for picture in pictures if picture.counted > search.least_pixels]
     if not pictures:
-        return axis
+        return estimate
 
     def misfit(tried: SmokeAxis) -> float:
         return float(np.mean([np.log(picture.misfit(tried)) for picture in pictures]))
@@ -118,7 +121,10 @@ def refine_axis(
     misfit(axis)  # from here on the rays hold about what they should
     start = misfit(axis)
     best, place = _minimum(lambda tried: misfit(moved(tried)), grid, search.steps)
-    return moved(place) if start - best > search.least_gain else axis
+    if start - best <= search.least_gain:
+        return estimate
+    # what the last tries are apart is twice the error that was measured on scenes whose depth is known
+    return AxisEstimate(moved(place), "lamps", found + size * float(place[0]), size * search.steps[-1])
 
 
 def _minimum(
@@ -206,7 +212,7 @@ class _CoarsePicture:
         return np.asarray(0.9 * np.clip(wanted / (power + 2), -0.7, 0.7), np.float32)
 
 
-def _coarse(domain: Domain, longest: int) -> Domain:
+def coarse_domain(domain: Domain, longest: int) -> Domain:
     """The domain, or a little more, in whole blocks of its voxels, so many along the longest side at most."""
     block = -(-max(domain.resolution) // longest)
     counts = [-(-n // block) for n in domain.resolution]

@@ -9,14 +9,14 @@ multiplicative fit scales ray by ray, and keeps of it only how the smoke of one 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.density.axis import AxisSettings, SmokeAxis, estimate_axis
-from smokelift.density.axis_from_light import refine_axis
+from smokelift.density.axis import SmokeAxis
+from smokelift.density.clip_axis import AXIS_FRAMES
 from smokelift.density.hull import centres_of
 from smokelift.density.observation import ObservedClip, View, ViewSet
 from smokelift.density.profile import DepthProfile
@@ -26,12 +26,6 @@ from smokelift.render import Volume
 LEAST_SHAPE = 0.05
 """With several views no profile is below this share of its peak inside the hull, since another view may see smoke there
 (docs/experiments/density-profile.md)."""
-
-AXIS_FRAMES = 16
-"""Frames of a clip from which the axis is estimated."""
-
-LIGHT_FRAMES = 4
-"""Those of them whose light is looked at as well: each costs 200 pictures on a coarse grid."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,36 +80,24 @@ class RoundDepth:
     Attributes
     ----------
     axis
-        Where the smoke of one view stands in depth; None takes the middle of the domain, or estimates it from a clip.
+        Where the smoke of one view stands in depth; None takes that of a clip, or the middle of the domain.
     axis_depth
         The same as one number, in metres behind the domain's centre, if the user says it.
-    settings
-        How far floor contacts and inlets are trusted.
     """
 
     axis: SmokeAxis | None = None
     axis_depth: float | None = None
-    settings: AxisSettings = field(default_factory=AxisSettings)
 
     def of_clip(self, clip: ObservedClip) -> RoundDepth:
-        """Estimate the axis from some frames, unless it is given, a camera moves or there are several."""
-        if self.axis is not None or (self.axis_depth is None and clip.moves):
+        """Take the axis that the clip's smoke was found to have, unless one is given."""
+        if self.axis is not None:
             return self
-        moments = filter(None, map(clip.observe, clip.spread(AXIS_FRAMES)))
-        first = next(moments, None)
+        if self.axis_depth is None:
+            return self if clip.place is None else replace(self, axis=clip.place.axis)
+        first = next(filter(None, map(clip.observe, clip.spread(AXIS_FRAMES))), None)
         if first is None:
             return self
-        domain, camera = clip.optics.domain, first[0].camera
-        if self.axis_depth is not None:
-            return replace(self, axis=SmokeAxis.given(self.axis_depth, camera, domain))
-        if len(first) > 1:
-            return self
-        views = [View.of(observations[0], clip.optics) for observations in (first, *moments)]
-        axis = estimate_axis([view.optical_depth for view in views], camera, domain, clip.inlets, self.settings)
-        if not clip.inlets and clip.optics.scattering == "single":
-            lit = [view for view in views[:: AXIS_FRAMES // LIGHT_FRAMES] if view.optical_depth.any()]
-            axis = refine_axis(axis, lit, clip.optics)
-        return replace(self, axis=axis)
+        return replace(self, axis=SmokeAxis.given(self.axis_depth, first[0].camera, clip.optics.domain))
 
     def estimate(self, views: ViewSet) -> DepthEstimate:
         """Spread the pictures' smoke by the profiles."""

@@ -10,6 +10,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from smokelift.density.axis import AxisEstimate
 from smokelift.density.hull import Projection, common_hull, project_voxels, reached
 from smokelift.footage.images import srgb_to_linear
 from smokelift.footage.matte import matte
@@ -67,6 +68,10 @@ class ObservedClip(Protocol):
     @property
     def moves(self) -> bool:
         """Whether a camera moves."""
+
+    @property
+    def place(self) -> AxisEstimate | None:
+        """Where in depth the smoke was found to stand (`density.clip_axis`); None where it was not looked for."""
 
     def spread(self, count: int) -> tuple[int, ...]:
         """Numbers of so many frames at most, from 0, spread evenly over the clip."""

@@ -17,7 +17,7 @@ class Choice(Generic[Chosen]):
     ----------
     what
         ``"scattering"``, ``"resolution"``, ``"domain"``, ``"environment directions"``, ``"iterations"``,
-        ``"velocity grid coarsening"`` or ``"velocity levels"``.
+        ``"velocity grid coarsening"``, ``"velocity levels"`` or ``"axis depth"``.
     chosen
         What will be used.
     reason

@@ -19,6 +19,7 @@ from smokelift.setup.further_views import disagreement, open_view
 from smokelift.setup.geometry import find_geometry
 from smokelift.setup.light import ambient_sun, richest_scattering
 from smokelift.setup.model import choose_model
+from smokelift.setup.place import placed
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot, ShotView
 from smokelift.setup.smoke import sample_smoke
@@ -100,8 +101,9 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
         estimated_background=plates.image if found.background is None and isinstance(plates, Plate) else None,
         notes=tuple(notes),
         choices=choices,
+        place=None,
     )
-    return replace(shot, notes=(*notes, *disagreement(shot))) if scene.views else shot
+    return replace(shot, notes=(*notes, *disagreement(shot))) if scene.views else placed(shot)
 
 
 def boundaries(scene: CompleteScene, settings: Settings) -> tuple[str, ...]:

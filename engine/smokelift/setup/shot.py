@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from smokelift.density import Observation
+from smokelift.density import AxisEstimate, Observation
 from smokelift.footage.clip import Clip
 from smokelift.footage.plate import Plates
 from smokelift.footage.working_picture import CameraError, WorkingPicture, working_picture
@@ -76,6 +76,8 @@ class Shot:
         What was assumed or estimated, a sentence each.
     choices
         What was chosen by measurement or by hand, with the figures that decided it.
+    place
+        Where in depth the smoke was found to stand; None where it is told, seen by several cameras or by a moving one.
     """
 
     scene: CompleteScene
@@ -85,6 +87,7 @@ class Shot:
     estimated_background: Image | None
     notes: tuple[str, ...]
     choices: tuple[Choice[Any], ...]
+    place: AxisEstimate | None
 
     @property
     def clip(self) -> Clip:

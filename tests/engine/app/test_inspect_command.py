@@ -29,6 +29,7 @@ def test_choices_are_said_and_kept(shot, finished, capsys) -> None:
     kept = Sequence.open(finished).choices
     assert [choice["what"] for choice in kept] == [
         "resolution", "domain", "scattering", "iterations", "velocity grid coarsening", "velocity levels",
+        "axis depth",
     ]  # fmt: skip
     assert json.loads((finished / "sequence.json").read_text())["choices"] == list(kept)
     assert command("inspect", shot, "--progress", "json", *QUICK) == 0

@@ -27,6 +27,11 @@ def seen(*densities: np.ndarray, camera: Camera = FRONT) -> list[np.ndarray]:
     return [-np.log(np.maximum(renderer.image(density)[..., 0], 1e-9)) for density in densities]
 
 
+def axis_of(*known) -> SmokeAxis:
+    """The axis that is estimated."""
+    return estimate_axis(*known).axis
+
+
 def rising(depth: float) -> list[np.ndarray]:
     """A column whose head rises from frame to frame."""
     return seen(*(column(depth, high=high) for high in (1.4, 1.7, 2.0, 2.3)))
@@ -35,14 +40,14 @@ def rising(depth: float) -> list[np.ndarray]:
 @pytest.mark.parametrize("depth", [-0.3, -0.15, 0.0, 0.1])
 def test_smoke_on_the_floor_shows_its_depth(depth) -> None:
     """To less than a voxel, shrunk towards the axis a little, and the same at all heights."""
-    found = estimate_axis(rising(depth), FRONT, BOX)
+    found = axis_of(rising(depth), FRONT, BOX)
     assert found.at(np.array([-1.2])) == pytest.approx(0.8 * depth, abs=0.05)
     assert found.at(np.array([0.5])) == pytest.approx(0.8 * depth, abs=0.06)
 
 
 def test_smoke_far_back_may_begin_above_the_floor() -> None:
     """The picture is the same, so the depth is believed less, and far back not at all; a step more is never a jump."""
-    near, far, farther = (estimate_axis(rising(depth), FRONT, BOX).at(np.array([-1.2]))[0] for depth in (0.2, 0.4, 0.6))
+    near, far, farther = (axis_of(rising(depth), FRONT, BOX).at(np.array([-1.2]))[0] for depth in (0.2, 0.4, 0.6))
     assert 0.08 < near < 0.8 * 0.2
     assert 0.06 < far < 0.4 / 2
     assert 0 < farther < 0.12
@@ -52,7 +57,7 @@ def test_smoke_far_back_may_begin_above_the_floor() -> None:
 def test_smoke_that_begins_above_the_floor_stands_upright(low) -> None:
     """As from a bowl or a chimney: taken for smoke on the floor it would be far back, and lean over the box."""
     smoke = seen(*(column(0.1, low=low, high=high) for high in (1.4, 1.7, 2.0, 2.3)))
-    found = estimate_axis(smoke, FRONT, BOX).at(np.linspace(-1.3, 1.0, 20))
+    found = axis_of(smoke, FRONT, BOX).at(np.linspace(-1.3, 1.0, 20))
     np.testing.assert_allclose(found, 0.1, atol=0.2)
 
 
@@ -62,28 +67,26 @@ def test_floating_smoke_is_left_on_the_axis(depth) -> None:
     for low in (0.05, 0.2, 1.0):
         distance = (X[:, None, None] ** 2 + (Y[None, :, None] - depth) ** 2 + (Z - low - 0.3) ** 2) ** 0.5
         ball = np.clip(1.5 - 4 * distance, 0, 1).astype(np.float32)
-        assert not estimate_axis(seen(ball, ball), FRONT, BOX).depths.any()
+        assert not axis_of(seen(ball, ball), FRONT, BOX).depths.any()
 
 
 def test_smoke_that_joins_ends_what_the_foot_says() -> None:
     """Above a second source the axis is the domain's again; below it the contact's still holds."""
     both = column(-0.25, radius=0.2) + column(0.3, low=1.0, radius=0.3)
-    found = estimate_axis(seen(both, both), FRONT, BOX)
+    found = axis_of(seen(both, both), FRONT, BOX)
     assert found.at(np.array([-1.2])) == pytest.approx(-0.2, abs=0.05)
     assert abs(found.at(np.array([0.2]))) < 0.02
 
 
 def test_drifting_smoke_is_believed_less() -> None:
     """What leans across the picture may lean in depth as well."""
-    straight, leaning = (
-        estimate_axis(seen(column(-0.25, lean)), FRONT, BOX).at(np.array([0.4])) for lean in (0.0, 0.2)
-    )
+    straight, leaning = (axis_of(seen(column(-0.25, lean)), FRONT, BOX).at(np.array([0.4])) for lean in (0.0, 0.2))
     assert 0.5 * straight < leaning < 0
 
 
 def test_smoke_from_the_side_of_the_box_comes_back() -> None:
     """A box stands around its smoke, so a column near its side leans to the middle, or it would stand wrongly."""
-    found = estimate_axis(rising(-0.6), FRONT, BOX)
+    found = axis_of(rising(-0.6), FRONT, BOX)
     contact, head = found.at(np.array([-1.3, 0.7]))
     assert contact < -0.3
     assert head > 0.25 * contact
@@ -92,14 +95,14 @@ def test_smoke_from_the_side_of_the_box_comes_back() -> None:
 def test_a_foot_in_few_frames_is_chance() -> None:
     """Most frames have to show it."""
     ball = column(0.3, low=1.0)
-    assert not estimate_axis(seen(column(0.3), ball, ball), FRONT, BOX).depths.any()
+    assert not axis_of(seen(column(0.3), ball, ball), FRONT, BOX).depths.any()
 
 
 @pytest.mark.parametrize("height", [-0.5, 0.02])
 def test_a_camera_that_does_not_look_down_on_the_floor_sees_no_foot(height) -> None:
     """The floor is a line to it."""
     low = Camera.look_at((0, -7, height), (0, 0, 1.5), fov_y_degrees=35, size=(75, 113))
-    assert not estimate_axis(seen(column(0.3), camera=low), low, BOX).depths.any()
+    assert not axis_of(seen(column(0.3), camera=low), low, BOX).depths.any()
 
 
 def test_smoke_that_goes_on_below_the_box_has_no_foot() -> None:
@@ -109,7 +112,7 @@ def test_smoke_that_goes_on_below_the_box_has_no_foot() -> None:
     inside = (X[:, None, None] ** 2 + (Y[None, :, None] - 0.3) ** 2 < 0.06) & (z < 2)
     renderer = Renderer(FRONT, deep, Medium(extinction=1.0), (), np.ones(3), "absorption")
     amount = -np.log(renderer.image(inside.astype(np.float32))[..., 0])
-    assert not estimate_axis([amount], FRONT, BOX).depths.any()
+    assert not axis_of([amount], FRONT, BOX).depths.any()
 
 
 CORNER = np.zeros((113, 75), np.float32)
@@ -119,23 +122,23 @@ CORNER[0, 0] = 1
 @pytest.mark.parametrize("amounts", [[], [0 * CORNER], [CORNER]])
 def test_no_smoke_in_the_box_is_on_the_axis(amounts) -> None:
     """Nothing to find, nothing refused."""
-    assert not estimate_axis(amounts, FRONT, BOX).depths.any()
+    assert not axis_of(amounts, FRONT, BOX).depths.any()
 
 
 def test_depth_is_away_from_the_camera() -> None:
     """From behind, the same smoke is as far the other way."""
     behind = Camera.look_at((0, 7, 1.5), (0, 0, 1.5), fov_y_degrees=30, size=(75, 113))
-    found = estimate_axis(seen(column(0.25), camera=behind), behind, BOX)
+    found = axis_of(seen(column(0.25), camera=behind), behind, BOX)
     assert found.at(np.array([0.0])) == pytest.approx(-0.2, abs=0.06)
 
 
 def test_known_sources_need_no_foot() -> None:
     """Floating smoke stands where it is said to enter; above the second of two sources, between them."""
     smoke = seen(column(0.3, low=1.0), column(0.3, low=1.1))
-    one = estimate_axis(smoke, FRONT, BOX, [Inlet((0.2, 0.25, 0.5), 0.2)])
+    one = axis_of(smoke, FRONT, BOX, [Inlet((0.2, 0.25, 0.5), 0.2)])
     np.testing.assert_allclose(one.at(np.array([-1.0, 0.2])), 0.25, atol=0.01)
     sources = [Inlet((0.2, -0.05, 1.0), 0.2), Inlet((0.2, 0.25, 0.2), 0.2)]
-    two = estimate_axis(smoke, FRONT, BOX, sources)
+    two = axis_of(smoke, FRONT, BOX, sources)
     np.testing.assert_allclose(two.at(np.array([-1.3, 0.2])), (0.25, 0.1), atol=0.01)
     np.testing.assert_allclose(two.spread_at(np.array([-1.3, 0.2])), (0.0, 0.15), atol=0.01)
 
@@ -164,7 +167,7 @@ def beside(lean: float = 0.0) -> np.ndarray:
 
 def test_columns_beside_one_another_have_depths_of_their_own() -> None:
     """Each as deep as its source, and as wide as it is itself, however far apart they stand."""
-    found = estimate_axis(seen(beside(), beside()), FRONT, BOX, [NEAR_RIGHT, FAR_LEFT])
+    found = axis_of(seen(beside(), beside()), FRONT, BOX, [NEAR_RIGHT, FAR_LEFT])
     heights, right, left = np.array([-0.9, 0.0, 0.4]), np.full(3, 0.45), np.full(3, -0.35)
     np.testing.assert_allclose(found.at(heights, right), -0.3, atol=0.03)
     np.testing.assert_allclose(found.at(heights, left), 0.3, atol=0.03)
@@ -176,7 +179,7 @@ def test_columns_beside_one_another_have_depths_of_their_own() -> None:
 
 def test_where_columns_meet_both_may_stand() -> None:
     """Between them the depth is the mean, and the spread says how far they are apart."""
-    found = estimate_axis(seen(beside(), beside()), FRONT, BOX, [NEAR_RIGHT, FAR_LEFT])
+    found = axis_of(seen(beside(), beside()), FRONT, BOX, [NEAR_RIGHT, FAR_LEFT])
     middle = np.array([0.05])
     assert abs(found.at(np.array([0.0]), middle)[0]) < 0.1
     assert found.spread_at(np.array([0.0]), middle)[0] == pytest.approx(0.3, abs=0.05)
@@ -185,10 +188,38 @@ def test_where_columns_meet_both_may_stand() -> None:
 def test_columns_are_followed_where_they_lean() -> None:
     """A column keeps its depth on its way across the picture, and is believed less the further it went."""
     smoke = beside(lean=0.12)
-    found = estimate_axis(seen(smoke, smoke), FRONT, BOX, [NEAR_RIGHT, FAR_LEFT])
+    found = axis_of(seen(smoke, smoke), FRONT, BOX, [NEAR_RIGHT, FAR_LEFT])
     heights = np.array([-1.2, -0.5])
     np.testing.assert_allclose(
         found.columns[0].middles[np.searchsorted(found.heights, heights)], (0.41, 0.33), atol=0.03
     )
     low, high = found.at(heights, 0.45 - 0.12 * (heights + 1.5))
     assert -0.3 < low < -0.28 < high < -0.22
+
+
+def test_what_nothing_tells_is_as_uncertain_as_the_box_is_badly_centred() -> None:
+    """Across the picture the smoke's distance from the middle is seen, and in depth it may be as large."""
+    floating = column(0.3, low=1.0)
+    aside, central = (estimate_axis(seen(np.roll(floating, by, 0)), FRONT, BOX) for by in (6, -3))
+    assert (aside.cue, aside.depth) == ("box", 0)
+    assert 0.134 < central.deviation < 0.14 < aside.deviation < 0.6
+    nothing = estimate_axis([], FRONT, BOX)
+    assert (nothing.cue, nothing.deviation) == ("box", 0.165)
+
+
+def test_a_floor_contact_is_less_certain_the_less_of_it_is_believed() -> None:
+    """Before the middle it is believed most; far behind it may be smoke that begins above the floor."""
+    before, behind, far = (estimate_axis(rising(depth), FRONT, BOX) for depth in (-0.25, 0.25, 0.6))
+    assert before.cue == behind.cue == far.cue == "floor contact"
+    assert before.depth == pytest.approx(-0.2, abs=0.05)
+    assert before.deviation < behind.deviation < far.deviation
+    assert before.deviation < 0.6 * estimate_axis(seen(column(-0.25, low=1.0)), FRONT, BOX).deviation
+
+
+def test_an_inlet_is_as_certain_as_its_smoke_goes_straight_up() -> None:
+    """What drifts across the picture drifts in depth as well."""
+    inlet = [Inlet((0.2, 0.25, 0.1), 0.1)]
+    straight, drifting = (estimate_axis(seen(column(0.25, lean, radius=0.1)), FRONT, BOX, inlet) for lean in (0.0, 0.1))
+    assert straight.cue == "inlets"
+    assert straight.depth == pytest.approx(0.25, abs=0.02)
+    assert straight.deviation < 0.08 < drifting.deviation

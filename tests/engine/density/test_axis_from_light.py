@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from smokelift.density import Observation, View
-from smokelift.density.axis import SmokeAxis
+from smokelift.density import Observation
+from smokelift.density.axis import AxisEstimate, SmokeAxis
 from smokelift.density.axis_from_light import refine_axis
 from smokelift.density.hull import voxel_centres
 from smokelift.footage.images import linear_to_srgb, srgb_to_linear
@@ -27,6 +27,9 @@ SCENE = Scene(
 )
 
 
+UNKNOWN = AxisEstimate(SmokeAxis.upright(), "box", 0.0, 0.15)
+
+
 def column(depth: float, lean: float) -> np.ndarray:
     """Smoke that is soft at its edge, half a metre and more from floor and ceiling."""
     x, y, z = np.moveaxis(voxel_centres(SCENE.domain), -1, 0)
@@ -35,29 +38,29 @@ def column(depth: float, lean: float) -> np.ndarray:
     return inside.astype(np.float32)
 
 
-def found(scene: Scene, depth: float, lean: float = 0.0) -> tuple[SmokeAxis, SmokeAxis]:
-    """The axis before and after a look at an 8-bit picture."""
+def found(scene: Scene, depth: float, lean: float = 0.0) -> tuple[AxisEstimate, AxisEstimate]:
+    """What is known before and after a look at an 8-bit picture."""
     picture = linear_to_srgb(render(column(depth, lean), scene))
     picture = srgb_to_linear(np.rint(255 * picture) / 255).astype(np.float32)
     noise = np.full(3, 1e-3, np.float32)
     plate = Plate(np.zeros_like(picture), np.ones(picture.shape[:2], np.float32), noise)
-    before = SmokeAxis.upright()
+    before = UNKNOWN
     optics = scene_optics(completed(scene))
-    view = View.of(Observation(scene.camera, picture, plate), optics)
-    return before, refine_axis(before, [view], optics)
+    return before, refine_axis(before, [Observation(scene.camera, picture, plate)], optics)
 
 
 @pytest.mark.parametrize("depth", [-0.25, 0.3])
 def test_lamps_before_and_behind_show_the_depth(depth) -> None:
     """What is redder is nearer to the red lamp."""
-    _, axis = found(SCENE, depth)
-    assert axis.at(np.array([0.0]))[0] == pytest.approx(depth, abs=0.1)
+    _, estimate = found(SCENE, depth)
+    assert estimate.cue == "lamps" and abs(estimate.depth - depth) < 2 * estimate.deviation < 0.2
+    assert estimate.axis.at(np.array([0.0]))[0] == pytest.approx(depth, abs=0.1)
 
 
 def test_lamps_before_and_behind_show_the_lean() -> None:
     """Top and bottom of a column that leans away are lit by different lamps."""
-    _, axis = found(SCENE, 0.0, lean=0.4)
-    low, high = axis.at(np.array([-0.4, 0.4]))
+    _, estimate = found(SCENE, 0.0, lean=0.4)
+    low, high = estimate.axis.at(np.array([-0.4, 0.4]))
     assert high - low == pytest.approx(0.8 * 0.4, abs=0.15)
 
 
@@ -74,7 +77,7 @@ def test_lamps_before_and_behind_show_the_lean() -> None:
     ids=["one colour", "one place", "left and right", "parallel", "one lamp", "none"],
 )
 def test_other_lights_say_nothing(lights) -> None:
-    """The axis is what it was."""
+    """What is known is what it was."""
     before, after = found(replace(SCENE, lights=lights), 0.3)
     assert after is before
 
@@ -82,7 +85,6 @@ def test_other_lights_say_nothing(lights) -> None:
 def test_no_pictures_say_nothing() -> None:
     """Nothing to look at, or nothing in it."""
     optics = scene_optics(completed(SCENE))
-    axis = SmokeAxis.upright(0.1)
-    assert refine_axis(axis, [], optics) is axis
-    black = View.of(Observation(SCENE.camera, np.zeros((32, 32, 3), np.float32)), optics)
-    assert refine_axis(axis, [black], optics) is axis
+    assert refine_axis(UNKNOWN, [], optics) is UNKNOWN
+    black = Observation(SCENE.camera, np.zeros((32, 32, 3), np.float32))
+    assert refine_axis(UNKNOWN, [black], optics) is UNKNOWN

@@ -310,6 +310,7 @@ def test_every_choice_has_a_sentence_and_a_figure(plume, draft) -> None:
     shot = shot_of(plume.scene, draft)
     assert [choice.what for choice in shot.choices] == [
         "resolution", "domain", "scattering", "iterations", "velocity grid coarsening", "velocity levels",
+        "axis depth",
     ]  # fmt: skip
     for choice in shot.choices:
         record = choice.as_dict()

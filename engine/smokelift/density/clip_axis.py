@@ -1,0 +1,51 @@
+"""Where the smoke of a whole clip stands in depth, from some of its frames."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smokelift.density.axis import AxisEstimate, estimate_axis
+from smokelift.density.axis_from_light import coarse_domain, refine_axis
+from smokelift.density.observation import Observation, ObservedClip, unshadowed_optical_depth
+from smokelift.footage.matte import matte
+from smokelift.render import Optics
+
+AXIS_FRAMES = 16
+"""Frames of a clip from which the axis is estimated."""
+
+LIGHT_FRAMES = 4
+"""Those of them whose light is looked at as well: each costs 200 pictures on a coarse grid."""
+
+
+LONGEST = 512
+"""Voxels along the longest side at most: finer grids show the place no better."""
+
+
+def clip_axis(clip: ObservedClip) -> AxisEstimate | None:
+    """The axis of a clip's smoke; None where there is none, where a camera moves, or where there are several.
+
+    Inlets that are marked come first, then the contact with the floor, shifted by what the colours of lamps tell.
+    """
+    if clip.moves:
+        return None
+    moments = [observations for frame in clip.spread(AXIS_FRAMES) if (observations := clip.observe(frame))]
+    if not moments or len(moments[0]) > 1:
+        return None
+    seen = [observations[0] for observations in moments]
+    optics = replace(clip.optics, domain=coarse_domain(clip.optics.domain, LONGEST))
+    amounts = [_optical_depth(observation, optics) for observation in seen]
+    if not np.any([amount.any() for amount in amounts]):
+        return None
+    estimate = estimate_axis(amounts, seen[0].camera, optics.domain, clip.inlets)
+    if clip.inlets or optics.scattering != "single":
+        return estimate
+    return refine_axis(estimate, seen[:: AXIS_FRAMES // LIGHT_FRAMES], optics)
+
+
+def _optical_depth(observation: Observation, optics: Optics) -> NDArray[np.float32]:
+    """Optical depth (rows, columns) that an observation shows."""
+    image, plate = observation.image, observation.plate
+    return unshadowed_optical_depth(image, plate, matte(image, plate).mask, optics)

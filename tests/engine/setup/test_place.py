@@ -1,0 +1,45 @@
+"""What is said of where the smoke stands in depth."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from smokelift.density.axis import AxisEstimate, Cue, SmokeAxis
+from smokelift.scene import Inlet
+from smokelift.setup.place import place_choice
+from smokelift.setup.settings import Settings
+from tests.engine.setup.shots import shot_of
+
+
+@pytest.mark.parametrize(
+    ("cue", "depth", "said"),
+    [
+        ("box", 0.0, "undetermined: the middle of the box is taken, give or take 0.12 m."),
+        ("floor contact", -0.25, "contact with the floor of the box the smoke stands 0.25 m before the middle"),
+        ("inlets", 0.1, "marked inlets the smoke stands 0.1 m behind the middle of the box, give or take 0.12 m."),
+        ("lamps", 0.1, "colours of the lamps"),
+    ],
+)
+def test_the_cue_and_the_uncertainty_are_said(cue: Cue, depth: float, said: str) -> None:
+    """With a way to tell it where it is not known well."""
+    choice = place_choice(AxisEstimate(SmokeAxis.upright(depth), cue, depth, 0.123))
+    assert said in choice.reason
+    assert ("--axis-depth" in choice.reason) == (cue in ("box", "floor contact"))
+    assert (choice.chosen == "undetermined") == (cue == "box")
+    assert json.loads(json.dumps(choice.as_dict()))["measured"] == {"depth": depth, "deviation": 0.123}
+
+
+def test_a_shot_knows_where_its_smoke_stands(plume, draft: Settings) -> None:
+    """Unless the user says it, or the method does not ask."""
+    blind = replace(plume.scene, inlets=())
+    found = shot_of(blind, draft)
+    assert found.place is not None and found.choices[-1] == place_choice(found.place)
+    marked = shot_of(replace(blind, inlets=(Inlet(plume.scene.domain.centre, 0.2),)), draft)
+    assert marked.place is not None and marked.place.cue == "inlets"
+    for settings in (replace(draft, axis_depth=0.1), Settings.preset(draft.quality, method="paper")):
+        told = shot_of(blind, settings)
+        assert told.place is None
+        assert "axis depth" not in [choice.what for choice in told.choices]
