@@ -75,6 +75,7 @@ def realism_columns(views: list[str]) -> list[Column]:
         ("spectrum, new", ["spectrum_distance_new"], ".1f"),
         (f"spectrum, {views[-1]}", [f"spectrum_distance{last}"], ".1f"),
         ("by octave, new", [f"spectrum_{low:.0f}_new" for low, _ in OCTAVES], "+.1f"),
+        (f"from own front (true), {views[-1]}", beside_truth("front_distance", last), ".1f"),
         (f"from other fronts (true), {views[-1]}", beside_truth("reference_distance", last), ".1f"),
         (f"row-constant detail (true), {views[-1]}", beside_truth("row_constant_detail", last), ".2f"),
         ("depth anisotropy (true)", beside_truth("depth_anisotropy"), ".2f"),

@@ -47,7 +47,8 @@ BLACK = np.zeros(3, np.float32)
 
 VIEW_FIGURES = (
     "psnr", "ssim", "psnr_shifted", "spectrum_distance", *(f"spectrum_{low:.0f}" for low, _ in metrics.OCTAVES),
-    "row_constant_detail", "row_constant_detail_truth", "reference_distance", "reference_distance_truth",
+    "row_constant_detail", "row_constant_detail_truth", "front_distance", "front_distance_truth",
+    "reference_distance", "reference_distance_truth",
 )  # fmt: skip
 CONSECUTIVE_FIGURES = tuple(f"{name}{which}" for name in ("flicker", *MOTION) for which in ("", "_truth"))
 """Of views, from frames that follow each other."""
@@ -170,13 +171,14 @@ def _view_figures(known: KnownScene, run: str, folder: Path, references: Sequenc
             side.add(*(smoke_picture(shown[view], BLACK) for view in (FRONT, BETWEEN, SIDE)))
             true_side.add(*(smoke_picture(seen[view], BLACK) for view in (FRONT, BETWEEN, SIDE)))
     found: dict[str, dict[str, Any]] = {}
+    _, own_front = scores[next(iter(known.cameras))].statistics()
     for view, pictures in scores.items():
         figures = pictures.figures()
         octaves = figures["spectrum_octaves"] or [None] * len(metrics.OCTAVES)
         figures |= {f"spectrum_{low:.0f}": ratio for (low, _), ratio in zip(metrics.OCTAVES, octaves, strict=True)}
         for which, statistics in zip(("", "_truth"), pictures.statistics(), strict=True):
-            distance = beside_references(statistics, references)["reference_distance"]
-            figures |= {f"reference_distance{which}": distance}
+            for name, fronts in (("front", [own_front]), ("reference", references)):
+                figures[f"{name}_distance{which}"] = beside_references(statistics, fronts)["reference_distance"]
         found[view] = figures
     used = {next(iter(known.cameras)), *run_views(run)}
     row: dict[str, Any] = {}

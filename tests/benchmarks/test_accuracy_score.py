@@ -89,7 +89,9 @@ def test_a_front_drawn_out_in_depth_shows_in_its_side(known, drawn_out) -> None:
     row = score(known, "draft", drawn_out, [front_statistics(known)])
     assert row["depth_anisotropy"] < 0.01 < 0.7 < row["depth_anisotropy_truth"]
     assert row["spectrum_distance_90"] > 2
-    assert row["reference_distance_90"] > row["reference_distance_truth_90"]
+    for name in ("front_distance", "reference_distance"):
+        assert row[f"{name}_90"] > row[f"{name}_truth_90"]
+    assert row["front_distance_truth_0"] == pytest.approx(0, abs=1e-6)
 
 
 def test_frames_that_do_not_follow_each_other_have_no_motion(known, tmp_path) -> None:
