@@ -15,15 +15,15 @@ FRAMES = 8
 
 def clip(seed: int) -> np.ndarray:
     """Rising smoke, grey [frame, row, column]."""
-    noise = ndimage.gaussian_filter(np.random.default_rng(seed).standard_normal((160, 64)), 1.5) * 5
-    rows, columns = np.indices((96, 64))
-    ball = np.exp(-(((rows - 48) / 24) ** 2) - ((columns - 32) / 14) ** 2)
-    return np.stack([0.3 * ball * np.maximum(1 + noise[frame : frame + 96], 0) for frame in range(FRAMES)])
+    noise = ndimage.gaussian_filter(np.random.default_rng(seed).standard_normal((120, 48)), 1.5) * 5
+    rows, columns = np.indices((72, 48))
+    ball = np.exp(-(((rows - 36) / 20) ** 2) - ((columns - 24) / 12) ** 2)
+    return np.stack([0.3 * ball * np.maximum(1 + noise[frame : frame + 72], 0) for frame in range(FRAMES)])
 
 
 @pytest.fixture(scope="module")
 def found() -> dict[str, dict[str, float | None]]:
-    camera = Camera.look_at((0, -6, 1), (0, 0, 1), fov_y_degrees=27, size=(64, 96))
+    camera = Camera.look_at((0, -6, 1), (0, 0, 1), fov_y_degrees=27, size=(48, 72))
     views, other = (
         BakedViews(dict.fromkeys(("0", "45", "90"), camera), {view: clip(seed + n) for n, view in enumerate(names)})
         for seed, names in ((1, ("0", "45", "90")), (5, ("0",)))

@@ -67,7 +67,8 @@ def evaluate(
     truth_path
         A truth.npz over the same box and at the same rate; resolutions may differ.
     view_paths
-        Camera files and clips, whose frame 0 is the input clip's. With any, the input is compared as well.
+        Camera files and clips, whose frame 0 is the input clip's. With any, or without a truth, the input is compared
+        as well.
 
     Raises
     ------
@@ -88,7 +89,7 @@ def evaluate(
         titles += ["truth, along y", "sequence", "truth, along x", "sequence"]
     with ExitStack() as stack:
         views = open_views(sequence, view_paths, stack, figures["notes"])
-        if view_paths:
+        if view_paths or truth is None:
             figures["views"] = [_against_view(sequence, view, tiles) for view in views]
             titles += [title for view in views for title in (view.name, "sequence")]
         filmed = next((view for view in views if view.name == INPUT), None)
@@ -96,9 +97,8 @@ def evaluate(
     figures["sides"] = sides.figures
     for number, pictures in sides.pictures.items():
         tiles[number] += [_fitted(eight_bit(picture)) for picture in pictures]
-    for degrees in DEGREES:
-        named = f"{degrees}\N{DEGREE SIGN}"
-        titles += [named] if truth is None else [f"truth, {named}", "sequence"]
+    turned = [f"{degrees}\N{DEGREE SIGN}" for degrees in DEGREES]
+    titles += turned if truth is None else [title for name in turned for title in (f"truth, {name}", "sequence")]
     return Evaluation(figures, tuple(titles), tiles)
 
 

@@ -153,7 +153,9 @@ def test_without_truth_or_view_the_sides_are_compared_with_the_front(plume, perf
     """A sequence that is its front picture drawn out in depth has other sides than fronts."""
     drawn_out = [np.repeat(density.mean(1, keepdims=True), density.shape[1], 1) for density in plume.densities]
     folder = write(tmp_path / "out", plume.scene, drawn_out)
-    true, wrong = (evaluate(capsys, sequence)["sides"] for sequence in (perfect, folder))
+    found, other = (evaluate(capsys, sequence) for sequence in (perfect, folder))
+    assert [view["name"] for view in found["views"]] == ["input"]
+    true, wrong = found["sides"], other["sides"]
     assert true["reference"] == "the input's pictures"
     assert [view["degrees"] for view in true["views"]] == [45, 90, 135]
     side, wrong_side = (sides["views"][1] for sides in (true, wrong))
