@@ -115,6 +115,9 @@ def _estimate(
             linear, first = first or linearise(level, u, settings.smoke_threshold, searched), None
             if linear is None:
                 return None
+            if from_rest and sources is not None and not pair.noisy and number < count - 1:
+                first_weight = sources.first_weight(linear.direction, linear.offset, linear.smoke)
+                linear = replace(linear, weight=linear.weight * first_weight)
             if level.coarseness == coarsest or level is not finest:
                 centre = fit_centre(prediction, level.after, linear, u, share, settings.brightening)
             elif number == 0:  # twelve projections are too much for the finest grid

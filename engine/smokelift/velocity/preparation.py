@@ -42,12 +42,15 @@ class PreparedPair:
         Variance of the noise that is left in their difference.
     reduced
         Whether they are the power of 3/4 of the densities.
+    noisy
+        Whether noise is so strong that smoke at rest seems to move.
     """
 
     before: Array
     after: Array
     noise: float
     reduced: bool
+    noisy: bool = False
 
     def density(self, values: Array) -> Array:
         """The density that such values stand for."""
@@ -79,7 +82,7 @@ def prepare(before: Array, after: Array, settings: VelocitySettings) -> Prepared
     widths = (settings.blur, *(width for width in NOISE_WIDTHS if width > settings.blur))
     limits = tuple((width, settings.noise) for width in widths)
     noisy, _ = without_noise(before, after, limits, threshold)
-    return PreparedPair(*noisy, reduced=False)
+    return PreparedPair(*noisy, reduced=False, noisy=True)
 
 
 def reduced_contrast(density: Array) -> Array:

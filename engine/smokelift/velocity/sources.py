@@ -7,6 +7,10 @@ voxels, beside the mean of its magnitude: their ratio, the coherence, is near on
 A source also stands out from what is left unexplained in the rest of the smoke, and from other sources. The front of
 smoke that is faster than the estimate looks like a wide, weak source; were it taken for one, the estimate would get
 slower still. An inlet that is read as motion turns the flow at the base around.
+
+Before anything is known of the velocity, an inlet cannot be seen: its smoke is renewed as it leaves, so it stands still
+like smoke at rest. Taken for rest it holds the flow, and a flow that is held leaves nothing unexplained that would show
+the inlet. So the first estimate believes smoke by how far it is seen to move, and takes what stands still from around.
 """
 
 from __future__ import annotations
@@ -17,10 +21,13 @@ import numpy as np
 import numpy.typing as npt
 
 import smokelift._core as _core
-from smokelift.transport import Array, ResidualMeans
+from smokelift.transport import Array, Faces, ResidualMeans
 
 FAINT = np.float32(1e-4)
 """Fraction of the largest density below which a residual means nothing."""
+
+RESTING = np.float32(0.05)
+"""Voxels a frame below which smoke rests."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +49,8 @@ class SourceDetection:
     news
         How much the frame at hand counts in a mean over frames. Inlets stand still; what a wrong velocity leaves moves
         on.
+    still
+        Speed that smoke is seen to move at, in medians over the smoke, at which a first estimate believes it by half.
     """
 
     width: float = 2.0
@@ -49,6 +58,7 @@ class SourceDetection:
     strength: tuple[float, float] = (3.0, 6.0)
     prominence: tuple[float, float] = (0.1, 0.2)
     news: float = 0.2
+    still: float = 8.0
 
     def means(self, residual: Array, density: Array, coarseness: float, past: ResidualMeans | None) -> ResidualMeans:
         """Means of a residual over a few voxels, and over the frames before.
@@ -72,6 +82,31 @@ class SourceDetection:
                 now *= np.float32(self.news)
                 now += np.float32(1 - self.news) * before
         return ResidualMeans(mean, magnitude)
+
+    def first_weight(self, direction: Faces, change: Array, smoke: npt.NDArray[np.bool_]) -> Array:
+        """How far the change of each voxel may be taken for motion before anything is known of the velocity.
+
+        Parameters
+        ----------
+        direction
+            Gradient of the density at voxel centres, one array (nx, ny, nz) for each component.
+        change : (nx, ny, nz) float32
+            Of the density from one frame to the next.
+        smoke : (nx, ny, nz) bool
+            Where there is smoke.
+
+        Returns
+        -------
+        (nx, ny, nz) float32
+            0 where smoke stands still, 1 where it is seen to move fast.
+        """
+        squares = np.square(change), np.sum([np.square(g) for g in direction], axis=0)
+        moved, steepness = (_core.blur(values, 1.0, 3.0) for values in squares)
+        speed = moved / (steepness + FAINT * max(steepness.max(), np.float32(1e-20)))
+        # where most smoke is at rest, what stands still is believed
+        usual = float(np.median(speed[smoke])) if smoke.any() else 0.0
+        weight: Array = (speed + RESTING**2) / (speed + RESTING**2 + np.float32(self.still**2 * usual))
+        return weight
 
     def weight(self, found: ResidualMeans, smoke: npt.NDArray[np.bool_]) -> Array:
         """How far the change of each voxel may be taken for motion.
