@@ -35,12 +35,25 @@ def add_run_options(parser: argparse.ArgumentParser) -> None:
         metavar="METRES",
         help="how far behind the middle of the box the smoke stands (before it: less than 0), if you know",
     )
+    parser.add_argument(
+        "--detail",
+        type=float,
+        metavar="SHARE",
+        help="fine structure in depth, made up from other moments of the clip: 0 (smooth, best for measuring) to 1 "
+        "(default)",
+    )
+    parser.add_argument(
+        "--seed", type=int, default=0, metavar="N", help="which of the plausible smokes of the clip, from 0 (default)"
+    )
 
 
 def settings_of(options: argparse.Namespace) -> Settings:
     """Return the settings that the options of `add_run_options` say."""
     preset = Settings.preset(options.quality, options.method, options.resolution)
-    return replace(preset, scattering=options.scattering, axis_depth=options.axis_depth)
+    detail = preset.detail if options.detail is None else options.detail
+    return replace(
+        preset, scattering=options.scattering, axis_depth=options.axis_depth, detail=detail, seed=options.seed
+    )
 
 
 def scene_of(options: argparse.Namespace) -> tuple[Scene, ClipSource]:

@@ -46,6 +46,8 @@ class Index:
         All settings that decide the result.
     choices
         What was chosen for the clip and why.
+    provenance
+        What of the result is measured, estimated, assumed and made up.
     frames
         The figures of every finished frame, by its number as text.
     complete
@@ -57,6 +59,7 @@ class Index:
     scene: dict[str, Any]
     settings: dict[str, Any]
     choices: list[Any] = field(default_factory=list)
+    provenance: list[Any] = field(default_factory=list)
     frames: dict[str, Any] = field(default_factory=dict)
     complete: bool = False
     versions: dict[str, Any] = field(default_factory=software_versions)
@@ -90,8 +93,17 @@ class Index:
             raise SequenceError(f"{path}: cannot be read: {error}") from error
         if not isinstance(data, dict) or data.get("format") != FORMAT:
             raise SequenceError(f"{path}: is not a sequence of format {FORMAT}, which this version reads")
-        data.setdefault("choices", [])  # early versions made none
-        kinds = {"scene": dict, "settings": dict, "choices": list, "frames": dict, "complete": bool, "versions": dict}
+        for key in ("choices", "provenance"):  # early versions wrote none
+            data.setdefault(key, [])
+        kinds = {
+            "scene": dict,
+            "settings": dict,
+            "choices": list,
+            "provenance": list,
+            "frames": dict,
+            "complete": bool,
+            "versions": dict,
+        }
         for key, kind in kinds.items():
             if not isinstance(data.get(key), kind):
                 raise SequenceError(f"{path}: is damaged: {key} is missing or of another type")

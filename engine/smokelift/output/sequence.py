@@ -36,6 +36,9 @@ class Sequence:
     choices
         What was chosen for the clip: ``what``, ``chosen``, ``reason``, ``measured``, ``tolerance`` and ``by_hand`` of
         each (see `smokelift.setup`).
+    provenance
+        What of the result is measured, estimated, assumed and made up: ``what``, ``origin``, ``how`` and ``settings``
+        of each part (see `smokelift.setup`). Empty for sequences of early versions.
     """
 
     directory: Path
@@ -45,6 +48,7 @@ class Sequence:
     frames: tuple[int, ...]
     complete: bool
     choices: tuple[Mapping[str, Any], ...]
+    provenance: tuple[Mapping[str, Any], ...]
     _figures: Mapping[str, Mapping[str, Any]]
 
     @classmethod
@@ -71,6 +75,7 @@ class Sequence:
             index.numbers,
             index.complete,
             tuple(index.choices),
+            tuple(index.provenance),
             index.frames,
         )
 

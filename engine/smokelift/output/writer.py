@@ -51,6 +51,8 @@ class SequenceWriter:
     choices
         What was chosen for the clip and why, as JSON can hold it. Kept, and not compared when a run goes on: what they
         decided is in the scene and the settings.
+    provenance
+        What of the result is measured, estimated, assumed and made up, as JSON can hold it. Kept, and not compared.
 
     Attributes
     ----------
@@ -74,6 +76,7 @@ class SequenceWriter:
         resume: bool = False,
         background: Array | None = None,
         choices: Iterable[Mapping[str, Any]] = (),
+        provenance: Iterable[Mapping[str, Any]] = (),
     ) -> None:
         self.directory = Path(directory)
         self.state: ResumeState | None = None
@@ -83,7 +86,11 @@ class SequenceWriter:
             scene = replace(scene, background=Background(image=self.directory / BACKGROUND))
         # Through JSON, so that it compares equal to what is read back.
         run = {"scene": scene_to_dict(scene, self.directory.resolve()), "settings": dict(settings)}
-        self._index = Index(**json.loads(json.dumps(run, allow_nan=False)), choices=plain(list(choices)))
+        self._index = Index(
+            **json.loads(json.dumps(run, allow_nan=False)),
+            choices=plain(list(choices)),
+            provenance=plain(list(provenance)),
+        )
         self._kinds = ("vdb", "npz") if npz else ("vdb",)
         self._resume = resume
         self._lock = Lock(self.directory / LOCK)

@@ -26,6 +26,7 @@ from smokelift.pipeline.method import Method, compose
 from smokelift.render import Volume
 from smokelift.scene import Domain, Scene
 from smokelift.setup.prepare import prepare_shot
+from smokelift.setup.provenance import provenance
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
 from smokelift.transport import Array, ResidualMeans, Velocity, advect
@@ -107,6 +108,7 @@ def reconstruct(
         resume=resume,
         background=shot.estimated_background,
         choices=[choice.as_dict() for choice in shot.choices],
+        provenance=[part.as_dict() for part in provenance(shot)],
     ) as writer:
         if writer.state is None and writer.finished:
             return

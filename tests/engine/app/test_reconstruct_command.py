@@ -99,6 +99,32 @@ def test_a_depth_outside_the_box(shot, tmp_path, capsys) -> None:
     assert not (tmp_path / "out").exists()
 
 
+def test_what_is_made_up_is_chosen_said_and_kept(shot, finished, tmp_path, capsys) -> None:
+    """Detail and seed reach the settings and the record; a run goes on with its own seed only."""
+    out, words = tmp_path / "out", ("--npz", "--frames", "0:1", *QUICK)
+    assert command("reconstruct", shot, "--out", out, "--detail", "0.5", "--seed", "3", *words) == 0
+    sequence = Sequence.open(out)
+    assert (sequence.settings["detail"], sequence.settings["seed"]) == (0.5, 3)
+    (part,) = (part for part in sequence.provenance if part["origin"] == "made up")
+    assert part["settings"] == {"detail": 0.5, "seed": 3}
+    assert part["how"] in " ".join(capsys.readouterr().out.split())
+    sentence = refused(capsys, "reconstruct", shot, "--out", out, "--resume", "--detail", "0.5", "--seed", "4", *words)
+    assert "settings.seed was 3 and is now 4" in sentence
+    plain = Sequence.open(finished)
+    assert (plain.settings["detail"], plain.settings["seed"]) == (1.0, 0)
+    assert "made up" in {part["origin"] for part in plain.provenance}
+
+
+def test_without_detail_nothing_is_said_to_be_made_up(shot, capsys) -> None:
+    """Neither is it with the paper's method, which cannot be told to."""
+    for words in (("--detail", "0", *QUICK), ("--method", "paper", *QUICK)):
+        assert command("inspect", shot, *words) == 0
+        assert "borrowed" not in capsys.readouterr().out
+    assert command("inspect", shot, *QUICK) == 0
+    assert "borrowed" in capsys.readouterr().out
+    assert "detail must be 0" in refused(capsys, "inspect", shot, "--method", "paper", "--detail", "1")
+
+
 def test_scattering_and_resolution_by_option(shot, tmp_path, capsys) -> None:
     """What is said is used, and said to be by hand; auto measures the resolution of a given box."""
     out = tmp_path / "out"

@@ -60,12 +60,28 @@ def test_frames_in_the_wrong_order(shot, tmp_path, capsys) -> None:
         ("--resolution", "a,b,c"),
         ("--scattering", "many"),
         ("--axis-depth", "far"),
+        ("--detail", "much"),
+        ("--seed", "1.5"),
     ],
 )
 def test_options_that_make_no_sense(shot, tmp_path, capsys, option) -> None:
     """Status 2, and the last line names the option."""
     assert command("reconstruct", shot, "--out", tmp_path / "out", *option) == 2
     assert option[0] in capsys.readouterr().err.splitlines()[-1]
+
+
+@pytest.mark.parametrize(
+    ("option", "words"),
+    [
+        (("--detail", "1.5"), "detail must be a number from 0 to 1, not 1.5"),
+        (("--detail", "nan"), "detail must be a number from 0 to 1, not nan"),
+        (("--seed", "-1"), "seed must be a whole number from 0, not -1"),
+    ],
+)
+def test_what_is_made_up_has_limits(shot, tmp_path, capsys, option, words) -> None:
+    """One sentence with the range, before anything is written."""
+    assert words in refused(capsys, "reconstruct", shot, "--out", tmp_path / "out", *option)
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_resolution_too_low(shot, tmp_path, capsys) -> None:

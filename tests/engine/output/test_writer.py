@@ -50,6 +50,19 @@ def test_choices_are_kept_and_not_compared(tmp_path: Path, no_vdb: None) -> None
     assert Sequence.open(tmp_path).choices == ()
 
 
+def test_provenance_is_kept_and_not_compared(tmp_path: Path, no_vdb: None) -> None:
+    """It says what is known, and what decides it is in the settings. Sequences of before there was any open."""
+    cut_off(tmp_path, [1], provenance=[{"what": "velocity", "origin": "estimated"}])
+    assert Sequence.open(tmp_path).provenance == ({"what": "velocity", "origin": "estimated"},)
+    other = ({"what": "velocity", "origin": "assumed"},)
+    write(tmp_path, [2], resume=True, provenance=other)
+    assert Sequence.open(tmp_path).provenance == other
+    index = json.loads((tmp_path / "sequence.json").read_text())
+    del index["provenance"]
+    (tmp_path / "sequence.json").write_text(json.dumps(index))
+    assert Sequence.open(tmp_path).provenance == ()
+
+
 def test_numpy_files_alone_need_no_vdb_module(tmp_path: Path, no_vdb: None) -> None:
     write(tmp_path / "out", [1])
     assert names(tmp_path / "out") == ["sequence.json", "smoke_0001.npz"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
-from dataclasses import FrozenInstanceError
+from dataclasses import FrozenInstanceError, replace
 from typing import Any
 
 import pytest
@@ -33,6 +33,14 @@ def test_the_papers_method_measures_nothing() -> None:
     assert (usual.method, usual.selection.measure) == ("default", True)
 
 
+def test_detail_is_made_up_unless_somebody_measures() -> None:
+    """All of it by default; the paper's method knows none, and says so."""
+    assert (Settings.preset().detail, Settings.preset().seed) == (1.0, 0)
+    assert Settings.preset(method="paper").detail == 0
+    with pytest.raises(ValueError, match="detail must be 0 with it"):
+        replace(Settings.preset(method="paper"), detail=0.5)
+
+
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("quality", QUALITIES)
 def test_json_holds_all_settings(quality: Any, method: Any) -> None:
@@ -40,6 +48,7 @@ def test_json_holds_all_settings(quality: Any, method: Any) -> None:
     settings = Settings.preset(quality, method, (16, 16, 24))
     read = json.loads(json.dumps(settings.as_dict(), allow_nan=False))
     assert (read["quality"], read["method"], read["resolution"]) == (quality, method, [16, 16, 24])
+    assert (read["detail"], read["seed"]) == (settings.detail, settings.seed)
     assert read["density"]["descent_iterations"] == settings.density.descent_iterations
     assert read["velocity"]["smoothness"] == settings.velocity.smoothness
 
@@ -52,6 +61,11 @@ def test_json_holds_all_settings(quality: Any, method: Any) -> None:
         ({"transport": 1.5}, "transport must be a number from 0 to 1"),
         ({"transport": float("nan")}, "transport must be a number from 0 to 1"),
         ({"axis_depth": float("inf")}, "axis_depth must be a finite number"),
+        ({"detail": -0.1}, "detail must be a number from 0 to 1, not -0.1"),
+        ({"detail": float("nan")}, "detail must be a number from 0 to 1, not nan"),
+        ({"detail": float("inf")}, "detail must be a number from 0 to 1, not inf"),
+        ({"seed": -1}, "seed must be a whole number from 0, not -1"),
+        ({"seed": 1.5}, "seed must be a whole number from 0, not 1.5"),
         ({"resolution": (7, 64, 64)}, "at least 8 voxels"),
         ({"resolution": (64, 64)}, "three numbers"),
     ],

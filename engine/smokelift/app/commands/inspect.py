@@ -13,6 +13,7 @@ from smokelift.footage.clip import Clip
 from smokelift.render import device
 from smokelift.scene import scene_to_dict
 from smokelift.setup.prepare import boundaries, prepare_shot
+from smokelift.setup.provenance import made_up
 
 
 def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
@@ -33,7 +34,12 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         shot = prepare_shot(clip, scene, settings)
         frames = len(clip)
     domain = shot.scene.domain
-    for note in (*shot.notes, *boundaries(shot.scene, settings), *(choice.reason for choice in shot.choices)):
+    for note in (
+        *shot.notes,
+        *boundaries(shot.scene, settings),
+        *(choice.reason for choice in shot.choices),
+        *made_up(shot),
+    ):
         say.note(note)
     cost = estimate_cost(domain, frames, settings.quality, len(shot.views) - 1)
     voxels = " x ".join(map(str, domain.resolution))

@@ -21,6 +21,7 @@ from smokelift.output.sequence import Sequence
 from smokelift.pipeline import Frame, reconstruct
 from smokelift.render import device
 from smokelift.setup.prepare import prepare_shot
+from smokelift.setup.provenance import made_up
 from smokelift.setup.shot import Shot
 
 
@@ -46,7 +47,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     with Clip.open(source) as clip:
         shot = prepare_shot(clip, scene, settings)
         require_memory(shot.scene.domain)
-        for note in (*shot.notes, *(choice.reason for choice in shot.choices)):
+        for note in (*shot.notes, *(choice.reason for choice in shot.choices), *made_up(shot)):
             say.note(note)
         frames = reconstruct(clip, scene, settings, options.out, npz=options.npz, resume=options.resume, shot=shot)
         for first in frames:

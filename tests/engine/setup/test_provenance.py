@@ -1,0 +1,70 @@
+"""What is said of a result's origin follows from what was given and chosen."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from smokelift.setup.provenance import Provenance, made_up, provenance
+from smokelift.setup.settings import Settings
+from smokelift.setup.shot import Shot
+from tests.engine.setup.shots import shot_of
+
+
+@pytest.fixture(scope="module")
+def shot(plume, draft) -> Shot:
+    """One camera, everything known."""
+    return shot_of(plume.scene, draft)
+
+
+def parts(shot: Shot) -> dict[str, Provenance]:
+    """By what they are of."""
+    return {part.what: part for part in provenance(shot)}
+
+
+def test_only_what_the_pictures_show_is_measured(shot) -> None:
+    """The rays' optical depths are, the distribution along them is not, and the velocity follows from both."""
+    assert [(part.what, part.origin) for part in provenance(shot)] == [
+        ("optical depth of every ray", "measured"),
+        ("velocity", "estimated"),
+        ("distribution along the rays", "assumed"),
+        ("fine structure along the rays", "made up"),
+    ]
+    assert all(part.how.endswith(".") for part in provenance(shot))
+
+
+def test_made_up_detail_names_its_settings(shot) -> None:
+    """So that the same can be made again."""
+    other = replace(shot, settings=replace(shot.settings, detail=0.5, seed=3))
+    assert parts(other)["fine structure along the rays"].settings == {"detail": 0.5, "seed": 3}
+    assert made_up(other) == (parts(other)["fine structure along the rays"].how,)
+
+
+@pytest.mark.parametrize("settings", [replace(Settings.preset(), detail=0.0), Settings.preset(method="paper")])
+def test_without_detail_nothing_is_made_up(shot, settings) -> None:
+    """Whatever the seed."""
+    smooth = replace(shot, settings=replace(settings, seed=3))
+    assert "made up" not in {part.origin for part in provenance(smooth)}
+    assert made_up(smooth) == ()
+
+
+def test_what_is_assumed_depends_on_cameras_and_method(shot) -> None:
+    """Further cameras limit it; the paper's method takes the picture for the side view."""
+
+    def assumed(shot: Shot) -> str:
+        return parts(shot)["distribution along the rays"].how
+
+    assert "as deep as it is wide" in assumed(shot)
+    assert "90 degrees" in assumed(replace(shot, settings=Settings.preset(method="paper")))
+    two = replace(shot, views=shot.views * 2)
+    assert assumed(two).startswith("2 cameras limit it")
+    assert "pictures of 2 cameras" in parts(two)["optical depth of every ray"].how
+
+
+def test_json_holds_it(shot) -> None:
+    """As plain values, nothing lost."""
+    plain = [part.as_dict() for part in provenance(shot)]
+    assert json.loads(json.dumps(plain, allow_nan=False)) == plain
+    assert [Provenance(**part) for part in plain] == list(provenance(shot))
