@@ -10,10 +10,11 @@ cancelled (and resumable).
 import argparse
 import importlib
 import importlib.util
+import math
 import signal
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -93,6 +94,10 @@ def _scene(choices: argparse.Namespace) -> bpy.types.Scene:
             raise ShotError(f"The clip {choices.clip} cannot be opened.") from None
     if choices.quality:
         settings.quality = choices.quality
+    if choices.detail is not None:
+        settings.detail = choices.detail
+    if choices.seed is not None:
+        settings.seed = choices.seed
     if choices.axis_depth is not None:
         settings.use_axis_depth, settings.axis_depth = True, choices.axis_depth
     if choices.output:
@@ -116,11 +121,17 @@ def _render(scene: bpy.types.Scene, path: Path) -> None:
 
 
 def _parser() -> argparse.ArgumentParser:
-    qualities = bpy.context.scene.smokelift.bl_rna.properties["quality"].enum_items.keys()
+    known = bpy.context.scene.smokelift.bl_rna.properties
     parser = argparse.ArgumentParser(prog="smokelift", description="Turn the scene's clip into a volume of smoke.")
     parser.add_argument("--clip", type=Path, help="clip in place of the scene's")
     parser.add_argument("--frames", type=_frames, metavar="A:B", help="first and last frame of the clip, from 0")
-    parser.add_argument("--quality", choices=qualities)
+    parser.add_argument("--quality", choices=known["quality"].enum_items.keys())
+    parser.add_argument(
+        "--detail", type=_within(known["detail"], float), metavar="SHARE", help="depth detail: 0 (smooth) to 1"
+    )
+    parser.add_argument(
+        "--seed", type=_within(known["seed"], int), metavar="N", help="variation of the depth detail, from 0"
+    )
     parser.add_argument(
         "--axis-depth",
         type=float,
@@ -135,6 +146,23 @@ def _parser() -> argparse.ArgumentParser:
         "--render", type=Path, metavar="PICTURE", help="render the current frame, or all if the name has ####"
     )
     return parser
+
+
+def _within(setting: bpy.types.Property, kind: type[float]) -> Callable[[str], float]:
+    """Read a number that a setting can hold; Blender itself would take the nearest without a word."""
+
+    def read(text: str) -> float:
+        low, high = setting.hard_min, setting.hard_max
+        try:
+            value = kind(text)
+        except ValueError:
+            value = math.nan
+        if not low <= value <= high:
+            what = "whole number" if kind is int else "number"
+            raise argparse.ArgumentTypeError(f"{text!r}: expected a {what} from {low} to {high}")
+        return value
+
+    return read
 
 
 def _frames(text: str) -> tuple[int, int]:

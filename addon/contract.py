@@ -10,6 +10,9 @@ DONE, BAD_INPUT, CANCELLED = 0, 2, 130
 INDEX_FILE = "sequence.json"
 """In a sequence's directory: scene, settings and finished frames."""
 
+MADE_UP = "made up"
+"""Origin, in the sequence's provenance, of what no camera shows and clips do not determine."""
+
 FRAME_FILE = "smoke_{:04d}.vdb"
 """In a sequence's directory, by frame number from 1."""
 

@@ -7,6 +7,7 @@ from bpy.props import StringProperty
 from mathutils import Vector
 
 from . import run, shot_setup, volume
+from .properties import SEEDS
 from .scene_file import ShotError, box_of
 from .take import Take, TakeError, takes
 
@@ -31,13 +32,43 @@ class SMOKELIFT_OT_run(_NeedsClip, bpy.types.Operator):
     bl_label = "Make Smoke"
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        try:
-            take = run.write_take(context.scene)
-        except (ShotError, TakeError) as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        run.enqueue(context, context.scene, take)
-        return {"FINISHED"}
+        return _make_smoke(self, context)
+
+
+class SMOKELIFT_OT_vary(_NeedsClip, bpy.types.Operator):
+    """Make the smoke anew with the next variation: it looks the same from the camera, and different from the side"""
+
+    bl_idname = "smokelift.vary"
+    bl_label = "Another Variation"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not super().poll(context):
+            return False
+        if context.scene.smokelift.detail == 0.0:
+            cls.poll_message_set("Without detail in depth there is only one smoke: raise Depth Detail first")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        settings = context.scene.smokelift
+        before = settings.seed
+        settings.seed = (before + 1) % SEEDS
+        outcome = _make_smoke(self, context)
+        if outcome == {"CANCELLED"}:
+            settings.seed = before
+        return outcome
+
+
+def _make_smoke(operator: bpy.types.Operator, context: bpy.types.Context) -> set[str]:
+    """Write a take and queue it; the operator reports what is in the way."""
+    try:
+        take = run.write_take(context.scene)
+    except (ShotError, TakeError) as error:
+        operator.report({"ERROR"}, str(error))
+        return {"CANCELLED"}
+    run.enqueue(context, context.scene, take)
+    return {"FINISHED"}
 
 
 class SMOKELIFT_OT_resume(_NeedsClip, bpy.types.Operator):
@@ -249,6 +280,7 @@ class SMOKELIFT_OT_remove_takes(_NeedsClip, bpy.types.Operator):
 
 _CLASSES = (
     SMOKELIFT_OT_run,
+    SMOKELIFT_OT_vary,
     SMOKELIFT_OT_resume,
     SMOKELIFT_OT_cancel,
     SMOKELIFT_OT_check,

@@ -34,6 +34,10 @@ class _Main:
         _draw_shot(layout, context)
         column = layout.column()
         column.prop(settings, "quality")
+        column.prop(settings, "detail")
+        row = column.row()
+        row.active = settings.detail > 0.0
+        row.prop(settings, "seed")
         _draw_cost(column, context)
         layout.prop(settings, "output", placeholder=str(run.output_folder(context.scene)))
         _draw_run(layout, context)
@@ -113,6 +117,10 @@ def _draw_run(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     for row in jobs:
         _draw_job(layout, context, row)
     if volume.shown_take(scene) is not None:
+        known = volume.provenance_note(scene)
+        if known:
+            _label(layout, context, known, "INFO")
+        layout.operator("smokelift.vary", icon="MOD_NOISE")
         layout.operator("smokelift.set_up", icon="CAMERA_DATA")
 
 

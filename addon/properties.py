@@ -12,6 +12,9 @@ from bpy.props import (
     StringProperty,
 )
 
+SEEDS = 2**31
+"""Numbers of variations: as many as Blender's whole numbers have from 0."""
+
 # Blender 4.5 and later need this option for // as the .blend's folder; older ones do not know it.
 _PATH_OPTIONS = {"ANIMATABLE"} | ({"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) else set())
 
@@ -135,6 +138,25 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
         ],
         default="balanced",
         update=_changed,
+    )
+    detail: FloatProperty(
+        name="Depth Detail",
+        description=(
+            "How much fine structure in depth is made up from other frames, since the clip does not show it. "
+            "At 0 the smoke is smooth from the side, which is best for measuring; at 1 it is as detailed as in the clip"
+        ),
+        subtype="FACTOR",
+        default=1.0,
+        min=0.0,
+        max=1.0,
+        update=_changed,
+    )
+    seed: IntProperty(
+        name="Variation",
+        description="Which of the plausible smokes is made: all look alike from the camera, and differ from the side",
+        default=0,
+        min=0,
+        max=SEEDS - 1,
     )
     output: StringProperty(
         name="Output",

@@ -74,6 +74,7 @@ def options(scene: bpy.types.Scene) -> list[str]:
     """The engine's options that the scene file does not hold."""
     settings = scene.smokelift
     words = ["--quality", settings.quality, "--device", settings.device]
+    words += [f"--detail={settings.detail:g}", f"--seed={settings.seed}"]
     if settings.camera_mode == "SCENE" and not settings.longest_side:
         words += ["--resolution", "auto"]  # the engine measures the clip's detail
     if settings.use_axis_depth:

@@ -8,12 +8,15 @@ import bpy
 from bpy.app.handlers import persistent
 from mathutils import Vector
 
-from .contract import FRAME_FILE
+from .contract import FRAME_FILE, MADE_UP
 from .scene_file import engine_to_world, frame_rate
 from .take import Take
 
 SHADER = "Smokelift"
 """Name of the shader node that holds the fitted values; a material without it is the user's own."""
+
+PROVENANCE = "smokelift_provenance"
+"""Custom property of the Volume that says what of the smoke is measured, also where its files are not at hand."""
 
 
 def show(scene: bpy.types.Scene, take: Take) -> bpy.types.Object | None:
@@ -33,6 +36,7 @@ def show(scene: bpy.types.Scene, take: Take) -> bpy.types.Object | None:
     _correct_position(obj, index["scene"]["domain"])
     _set_sequence(obj.data, scene, take, index)
     _set_material(obj.data, index["scene"]["medium"])
+    obj.data[PROVENANCE] = _provenance(index.get("provenance", []))
     return obj
 
 
@@ -42,6 +46,22 @@ def shown_take(scene: bpy.types.Scene) -> Take | None:
     if obj is None or obj.type != "VOLUME" or not obj.data.filepath:
         return None
     return Take(_absolute(obj.data).parent)
+
+
+def provenance_note(scene: bpy.types.Scene) -> str:
+    """What of the smoke on show is measured and what is not, as a line for the panel; empty if that is unknown."""
+    obj = scene.smokelift.volume
+    return "" if obj is None or obj.type != "VOLUME" else obj.data.get(PROVENANCE, "")
+
+
+def _provenance(parts: list[dict[str, Any]]) -> str:
+    if not parts:  # the engine of earlier versions did not say
+        return ""
+    for part in parts:
+        if part["origin"] == MADE_UP:
+            detail, seed = part["settings"]["detail"], part["settings"]["seed"]
+            return f"The camera's view is measured. Depth detail {detail:.2g} is made up: variation {seed}."
+    return "The camera's view is measured. Nothing is made up: the depth is smooth."
 
 
 def _absolute(volume: bpy.types.Volume) -> Path:

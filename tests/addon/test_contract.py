@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
@@ -11,6 +12,7 @@ from smokelift.app import cli
 from smokelift.footage.images import READABLE
 from smokelift.output.layout import INDEX, frame_path
 from smokelift.scene import EnvironmentLight, SceneError
+from smokelift.setup.provenance import Origin
 from smokelift.setup.settings import LONGEST_SIDE, Settings
 
 
@@ -23,6 +25,11 @@ def test_files_of_a_sequence() -> None:
     """The index, and a frame."""
     assert contract.INDEX_FILE == INDEX
     assert contract.FRAME_FILE.format(12) == frame_path(Path(), 12, "vdb").name
+
+
+def test_origins() -> None:
+    """The one that the add-on looks for."""
+    assert contract.MADE_UP in get_args(Origin)
 
 
 def test_resolutions() -> None:

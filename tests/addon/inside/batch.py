@@ -70,16 +70,18 @@ def test_a_shot_from_the_command_line(saved, tmp_path) -> None:
 
 
 def test_options_override_the_file(saved, tmp_path) -> None:
-    """Clip, frames, quality, place in depth, folder."""
+    """Clip, frames, quality, detail in depth and its seed, place in depth, folder."""
     clip = tmp_path / "other.mp4"
     clip.write_bytes((EXAMPLE / "clip.mp4").read_bytes())
     words = ("--clip", clip, "--frames", "1:2", "--quality", "fine", "--axis-depth", "-0.1")
+    words += ("--detail", "0.5", "--seed", "3")
     assert blender(saved, *words, "--output", tmp_path / "elsewhere").returncode == 0
     sequence = Sequence.open(tmp_path / "elsewhere" / "take_0001")
     assert sequence.scene.clip.path == clip
     assert sequence.scene.clip.frames == (1, 2)
     assert sequence.settings["quality"] == "fine"
     assert sequence.settings["axis_depth"] == pytest.approx(-0.1)
+    assert (sequence.settings["detail"], sequence.settings["seed"]) == (0.5, 3)
 
 
 @pytest.mark.parametrize(
@@ -92,6 +94,10 @@ def test_options_override_the_file(saved, tmp_path) -> None:
         (("--frames", "5"), 2, "--frames"),
         (("--quality", "best"), 2, "--quality"),
         (("--axis-depth", "far"), 2, "--axis-depth"),
+        (("--detail", "1.5"), 2, "a number from 0.0 to 1.0"),
+        (("--detail", "nan"), 2, "a number from 0.0 to 1.0"),
+        (("--seed=-1",), 2, "a whole number from 0"),
+        (("--seed", "1.5"), 2, "a whole number from 0"),
         (("--unknown",), 2, "--unknown"),
         (("--help",), 0, ""),
     ],

@@ -11,7 +11,7 @@ import addon
 from smokelift.footage.images import Transfer
 from smokelift.render.device import DeviceName
 from smokelift.scene import Medium
-from smokelift.setup.settings import QUALITIES
+from smokelift.setup.settings import QUALITIES, Settings
 
 
 def ours() -> set[str]:
@@ -57,6 +57,17 @@ def test_names_follow_blenders_rules() -> None:
 def test_choices_are_the_engines(scene, name, expected) -> None:
     """In the engine's order."""
     assert tuple(scene.smokelift.bl_rna.properties[name].enum_items.keys()) == expected
+
+
+def test_what_is_made_up_is_the_engines_by_default(scene) -> None:
+    """And the panel's limits are within the engine's."""
+    properties = scene.smokelift.bl_rna.properties
+    for name in ("detail", "seed"):
+        setting = properties[name]
+        assert setting.default == getattr(Settings.preset(), name)
+        for limit in (setting.hard_min, setting.hard_max):
+            Settings(**{name: limit})
+    assert properties["detail"].subtype == "FACTOR"
 
 
 def test_default_medium_is_the_engines(scene) -> None:

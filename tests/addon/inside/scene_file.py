@@ -423,6 +423,13 @@ def test_a_known_depth(shot) -> None:
     assert "--axis-depth=0" in module.options(shot)
 
 
+def test_depth_detail_and_variation(shot) -> None:
+    """Said to the engine always, as they are shown: the slider's 0.3 is not 0.30000001."""
+    assert {"--detail=1", "--seed=0"} <= set(module.options(shot))
+    shot.smokelift.detail, shot.smokelift.seed = 0.3, 12
+    assert {"--detail=0.3", "--seed=12"} <= set(module.options(shot))
+
+
 def test_an_inlet_needs_a_box_of_its_own(shot) -> None:
     """In a box that is found it would stand anywhere."""
     add_inlet(shot)

@@ -237,6 +237,36 @@ def test_the_material_is_the_mediums(shot, tmp_path) -> None:
     assert data.display.density == 4.0
 
 
+@pytest.mark.parametrize(
+    ("parts", "said"),
+    [
+        (
+            [
+                {"what": "velocity", "origin": "estimated", "how": "", "settings": {}},
+                {"what": "detail", "origin": "made up", "how": "", "settings": {"detail": 0.5, "seed": 3}},
+            ],
+            "The camera's view is measured. Depth detail 0.5 is made up: variation 3.",
+        ),
+        (
+            [{"what": "velocity", "origin": "estimated", "how": "", "settings": {}}],
+            "The camera's view is measured. Nothing is made up: the depth is smooth.",
+        ),
+        ([], ""),
+    ],
+)
+def test_what_is_made_up_is_said(shot, tmp_path, parts, said) -> None:
+    """In the panel, and with the Volume wherever it goes; nothing where the engine did not say."""
+    assert volume.provenance_note(shot) == ""
+    take = made(tmp_path)
+    file = take.directory / "sequence.json"
+    file.write_text(json.dumps({**json.loads(file.read_text()), "provenance": parts}))
+    volume.show(shot, take)
+    assert volume.provenance_note(shot) == said
+    assert shot.smokelift.volume.data[volume.PROVENANCE] == said
+    volume.show(shot, made(tmp_path, number=2))
+    assert volume.provenance_note(shot) == ""
+
+
 def test_running_again_replaces(shot, tmp_path) -> None:
     """One object, one volume, one material, with the new values."""
     volume.show(shot, made(tmp_path))

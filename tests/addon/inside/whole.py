@@ -195,6 +195,29 @@ def test_running_twice_makes_a_second_take_and_one_smoke(shot, kept, tmp_path) -
     assert Take(tmp_path / "out" / "take_0002").complete()
 
 
+def test_another_variation(shot, kept, tmp_path) -> None:
+    """A second take with the next seed takes the place of the first, and the panel says which it is."""
+    made(shot, tmp_path / "out", kept)
+    assert "made up: variation 0" in volume.provenance_note(shot)
+    assert bpy.ops.smokelift.vary() == {"FINISHED"}
+    (row,) = bpy.context.window_manager.smokelift.jobs
+    assert (row.outcome, shot.smokelift.seed) == ("done", 1)
+    assert row.take.endswith("take_0002")
+    assert Sequence.open(row.take).settings["seed"] == 1
+    assert "made up: variation 1" in volume.provenance_note(shot)
+
+
+def test_another_variation_needs_something_to_vary(shot, tmp_path) -> None:
+    """Without detail the button is off; a shot that cannot be run keeps its variation."""
+    shot.smokelift.detail = 0.0
+    assert not bpy.ops.smokelift.vary.poll()
+    shot.smokelift.detail, shot.smokelift.seed = 0.5, 7
+    shot.smokelift.first = 999
+    with pytest.raises(RuntimeError, match="Frames 999 to"):
+        bpy.ops.smokelift.vary()
+    assert shot.smokelift.seed == 7
+
+
 def test_a_failure_is_a_sentence_and_a_log(shot, kept, tmp_path) -> None:
     """And leaves the smoke that was there."""
     made(shot, tmp_path / "out", kept)
