@@ -127,7 +127,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--frames", type=_frames, metavar="A:B", help="first and last frame of the clip, from 0")
     parser.add_argument("--quality", choices=known["quality"].enum_items.keys())
     parser.add_argument(
-        "--detail", type=_within(known["detail"], float), metavar="SHARE", help="depth detail: 0 (smooth) to 1"
+        "--detail", type=_within(known["detail"], float), metavar="0..1", help="depth detail: 0 (smooth) to 1"
     )
     parser.add_argument(
         "--seed", type=_within(known["seed"], int), metavar="N", help="variation of the depth detail, from 0"

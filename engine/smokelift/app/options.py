@@ -38,7 +38,7 @@ def add_run_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--detail",
         type=float,
-        metavar="SHARE",
+        metavar="0..1",
         help="fine structure in depth, made up from other moments of the clip: 0 (smooth, best for measuring) to 1 "
         "(default)",
     )
