@@ -129,7 +129,7 @@ def psnr(found: Any, wanted: Any) -> float:
 
 
 def test_window(root, installed) -> None:
-    """The tab is drawn, a click on the button runs the job beside a Blender that goes on, and smoke appears."""
+    """The tab is drawn, a click on a button runs the job beside a Blender that goes on, and smoke appears."""
     pictures = WORK / "pictures"
     # where an artist would have it; the folder is gone with the command
     blend = Path("/home/artist/plume/shot.blend")
@@ -154,6 +154,7 @@ def test_window(root, installed) -> None:
             assert change(idle, done, middle) > 1, "no smoke is to be seen"
     assert max(report["clip_editor"]["longest_gaps"]) < LONGEST_GAP
     assert report["volumes"] == 1, "the second run did not replace the first"
+    assert report["variation"] == 1, "the second run is no other variation"
     assert change(load(pictures / "view_3d_done.png"), load(pictures / "rendered.png"), middle) > 10
 
 
