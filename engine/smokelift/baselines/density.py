@@ -57,7 +57,7 @@ class OrthogonalCopy:
         front = views.views[0]
         camera = orbit(front.camera, domain, 90)
         side = replace(front, camera=camera, projection=project_voxels(camera, domain))
-        return DepthEstimate(fog, inside, (ImposedView(side, inside[0]),))
+        return DepthEstimate(fog, inside, (ImposedView(side, inside[0], views.optics),))
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ Observation -> View (observation) -> DepthEstimate (depth_prior) -> Start (tempo
 """
 
 from smokelift.density.axis import AxisEstimate
+from smokelift.density.borrowed_moments import BorrowedMoments
 from smokelift.density.clip_axis import clip_axis
 from smokelift.density.depth_prior import DepthEstimate, DepthPrior, ImposedView, RoundDepth
 from smokelift.density.fit import (
@@ -20,6 +21,7 @@ from smokelift.density.temporal_prior import BlendCarried, NothingCarried, Start
 __all__ = [
     "AxisEstimate",
     "BlendCarried",
+    "BorrowedMoments",
     "Density",
     "DensityFit",
     "DensitySettings",

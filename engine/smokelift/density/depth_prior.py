@@ -21,7 +21,7 @@ from smokelift.density.hull import centres_of
 from smokelift.density.observation import ObservedClip, View, ViewSet
 from smokelift.density.profile import DepthProfile
 from smokelift.density.screen import view_frame
-from smokelift.render import Volume
+from smokelift.render import Optics, Volume
 
 LEAST_SHAPE = 0.05
 """With several views no profile is below this share of its peak inside the hull, since another view may see smoke there
@@ -38,10 +38,13 @@ class ImposedView:
         The picture against the grid. Smoke that it does not show is not ruled out.
     weight : (rows, columns)
         How much each pixel counts beside a camera's, from 0.
+    optics
+        How light travels in it: it need not be taken in the scene's own light.
     """
 
     view: View
     weight: NDArray[np.float32]
+    optics: Optics
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,11 +59,14 @@ class DepthEstimate:
         Of each view, the share of every ray's smoke that lies inside the domain.
     imposed
         Pictures to be met beside the cameras'.
+    smooth : (nx, ny, nz) float32, optional
+        What is known of the density without what the prior makes up; None if it makes nothing up.
     """
 
     density: Volume
     inside: tuple[NDArray[np.float32], ...]
     imposed: tuple[ImposedView, ...] = ()
+    smooth: Volume | None = None
 
 
 class DepthPrior(Protocol):

@@ -13,14 +13,14 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.density.depth_prior import DepthEstimate, DepthPrior, RoundDepth
+from smokelift.density.depth_prior import DepthEstimate, DepthPrior, ImposedView, RoundDepth
 from smokelift.density.descent import descend
 from smokelift.density.multiplicative import fit_multiplicative
-from smokelift.density.objective import Term
-from smokelift.density.observation import BLACK, Observation, View, ViewSet, eight_bit_plate
+from smokelift.density.objective import Term, camera_terms
+from smokelift.density.observation import BLACK, Observation, ViewSet, eight_bit_plate
 from smokelift.footage.background import background_picture
 from smokelift.footage.plate import Plate
-from smokelift.render import Image, Volume, scene_optics
+from smokelift.render import Image, Renderer, Volume, scene_optics
 from smokelift.scene import CompleteScene, Domain, Scene, completed
 
 TRACE = 1e-9
@@ -43,10 +43,6 @@ class DensitySettings:
         Share of the objective that an iteration has to gain for another to follow.
     patience
         Steps of descent in a row without that gain which end it (density-descent.md).
-    least_share
-        Lower bound of the share of a ray's smoke that is taken to lie inside the domain. With less, smoke that the
-        prior puts outside is missing in the picture; with more, density spikes grow at floor and ceiling
-        (density-profile.md).
     bound
         Bound of the density, in multiples of the densest voxel of the prior's estimate (or of a denser start). Where
         smoke hardly changes the picture, in shadow or before what hides it, nothing else bounds it (density-bound.md).
@@ -58,7 +54,6 @@ class DensitySettings:
     descent_iterations: int = 12
     tolerance: float = 0.02
     patience: int = 2
-    least_share: float = 0.3
     bound: float = 3.0
 
 
@@ -75,11 +70,14 @@ class Density:
         ``loss`` (sum of squared differences over all pictures) and ``psnr`` (dB, peak 1) of the input's picture, in
         linear radiance, over the pixels that its smoke's voxels can change, all counted alike; ``psnr_view_1``, ... of
         further views; ``iterations``; ``hull_share``, the hull's share of the voxels.
+    smooth : (nx, ny, nz) float32, optional
+        What is known of the density without what the depth prior makes up; None if it makes nothing up.
     """
 
     values: Volume
     hull: NDArray[np.bool_]
     figures: Mapping[str, float] = field(default_factory=dict)
+    smooth: Volume | None = None
 
 
 class DensityFit(Protocol):
@@ -116,12 +114,15 @@ class GradientFit:
         hull, settings = views.hull, self.settings
         if not hull.any():
             return empty_density(views)
-        terms = _terms(views, depth, settings.least_share)
+        cameras = camera_terms(views, depth.inside)
+        imposed = [Term(each.view, _renderer(each, hull), each.weight) for each in depth.imposed]
         start = np.where(hull, depth.density if initial is None else initial, 0).astype(np.float32)
-        # the terms take turns, so several need as many times more iterations
-        scaled = fit_multiplicative(terms, start, settings.fit_iterations * len(terms), settings.tolerance)
+        # The terms take turns, the cameras last. Several cameras need as many times more iterations; imposed pictures
+        # yield, so nothing waits for them, and the descent leaves of them what the cameras' pictures allow.
+        iterations = settings.fit_iterations * len(cameras)
+        scaled = fit_multiplicative([*imposed, *cameras], start, iterations, settings.tolerance)
         final = descend(
-            terms,
+            cameras,
             scaled.density,
             hull,
             settings.descent_iterations,
@@ -129,8 +130,8 @@ class GradientFit:
             settings.patience,
             bound=float(max(settings.bound * depth.density.max(), start.max())),
         )
-        iterations = scaled.iterations + final.iterations
-        return Density(without_traces(final.density), hull, fit_figures(views, final.residuals, iterations))
+        figures = fit_figures(views, final.residuals, scaled.iterations + final.iterations)
+        return Density(without_traces(final.density), hull, figures, depth.smooth)
 
 
 def reconstruct_density(
@@ -190,19 +191,9 @@ def _with_plate(observation: Observation, scene: CompleteScene) -> Observation:
     return replace(observation, plate=eight_bit_plate(background_picture(scene, camera), camera.size))
 
 
-def _terms(views: ViewSet, depth: DepthEstimate, least_share: float) -> list[Term]:
-    """The objective: a term for every camera's picture, then those that the prior imposes."""
-    weighted: list[tuple[View, NDArray[np.float32]]] = [
-        # Smoke of a ray that lies outside the domain is not modelled. The residual counts by the share inside, so
-        # that the few voxels which a ray crosses on its way out do not have to hold all that it shows.
-        (view, view.counted * np.maximum(inside, least_share) ** 2)
-        for view, inside in zip(views.views, depth.inside, strict=True)
-    ]
-    weighted += [(imposed.view, imposed.weight) for imposed in depth.imposed]
-    return [
-        Term(view, views.optics.renderer(view.camera, view.plate.image, views.hull), weight)
-        for view, weight in weighted
-    ]
+def _renderer(imposed: ImposedView, hull: NDArray[np.bool_]) -> Renderer:
+    """The renderer of an imposed picture, in its own light."""
+    return imposed.optics.renderer(imposed.view.camera, imposed.view.plate.image, hull)
 
 
 def empty_density(views: ViewSet) -> Density:

@@ -18,8 +18,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.density.observation import View
+from smokelift.density.observation import View, ViewSet
 from smokelift.render import Image, Renderer, Volume
+
+LEAST_SHARE = 0.3
+"""Lower bound of the share of a ray's smoke that is taken to lie inside the domain. With less, smoke that the prior
+puts outside is missing in the picture; with more, density spikes grow at floor and ceiling
+(docs/experiments/density-profile.md)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +56,29 @@ class Term:
     def noise_floor(self) -> float:
         """What the picture's noise leaves of the objective at the true density."""
         return self.loss(self.view.noise)
+
+
+def camera_terms(views: ViewSet, inside: Sequence[NDArray[np.float32]]) -> list[Term]:
+    """Return a term for every camera's picture.
+
+    Smoke of a ray that lies outside the domain is not modelled. The residual counts by the share inside, so that the
+    few voxels which a ray crosses on its way out do not have to hold all that it shows.
+
+    Parameters
+    ----------
+    views
+        The pictures.
+    inside : sequence of (rows, columns)
+        Of each, the share of every ray's smoke that lies inside the domain.
+    """
+    return [
+        Term(
+            view,
+            views.optics.renderer(view.camera, view.plate.image, views.hull),
+            view.counted * np.maximum(share, LEAST_SHARE) ** 2,
+        )
+        for view, share in zip(views.views, inside, strict=True)
+    ]
 
 
 @dataclass(frozen=True, eq=False)

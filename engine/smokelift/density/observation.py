@@ -73,6 +73,10 @@ class ObservedClip(Protocol):
     def place(self) -> AxisEstimate | None:
         """Where in depth the smoke was found to stand (`density.clip_axis`); None where it was not looked for."""
 
+    @property
+    def length(self) -> int:
+        """Number of frames."""
+
     def spread(self, count: int) -> tuple[int, ...]:
         """Numbers of so many frames at most, from 0, spread evenly over the clip."""
 

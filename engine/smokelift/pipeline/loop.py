@@ -45,12 +45,16 @@ class Frame:
         In m/s, from the frame before to this one; the first frame has the second's.
     figures
         Measures of the fit and seconds spent.
+    smooth : (nx, ny, nz) float32, optional
+        The density without what the depth prior makes up, which the velocity is estimated from; None if that is all of
+        it.
     """
 
     number: int
     density: Volume
     velocity: Velocity
     figures: Mapping[str, Any]
+    smooth: Volume | None = None
 
 
 def reconstruct(
@@ -115,10 +119,15 @@ def reconstruct(
         start = None if writer.state is None else _resumed(writer.state, shot)
         for frame in _frames(shot, method, start):
             if frame.number not in writer.finished:
-                memory = frame.velocity.residual
-                extra = {} if memory is None else {"residual_mean": memory.mean, "residual_magnitude": memory.magnitude}
-                writer.write(frame.number, frame.density, frame.velocity.faces, frame.figures, extra)
+                writer.write(frame.number, frame.density, frame.velocity.faces, frame.figures, _kept(frame))
                 yield frame
+
+
+def _kept(frame: Frame) -> dict[str, Array]:
+    """What the next frame needs of one besides density and velocity."""
+    memory = frame.velocity.residual
+    kept = {} if memory is None else {"residual_mean": memory.mean, "residual_magnitude": memory.magnitude}
+    return kept if frame.smooth is None else kept | {"smooth": frame.smooth}
 
 
 def _resumed(state: ResumeState, shot: Shot) -> Frame:
@@ -126,7 +135,7 @@ def _resumed(state: ResumeState, shot: Shot) -> Frame:
     mean, magnitude = state.extra.get("residual_mean"), state.extra.get("residual_magnitude")
     residual = None if mean is None or magnitude is None else ResidualMeans(mean, magnitude)
     velocity = Velocity(state.velocity, shot.optics.domain.voxel_size, shot.scene.closed, residual=residual)
-    return Frame(state.number, state.density, velocity, {})
+    return Frame(state.number, state.density, velocity, {}, state.extra.get("smooth"))
 
 
 def _frames(shot: Shot, method: Method, start: Frame | None) -> Iterator[Frame]:
@@ -158,8 +167,7 @@ def _frame(index: int, before: Frame | None, shot: Shot, method: Method) -> Fram
     velocity = Velocity.zero(domain.resolution, domain.voxel_size, shot.scene.closed)
     if before is not None:
         velocity = method.velocity_estimator.estimate(
-            before.density,
-            density.values,
+            *_measured(before, density),
             dt,
             domain.voxel_size,
             closed=shot.scene.closed,
@@ -175,7 +183,14 @@ def _frame(index: int, before: Frame | None, shot: Shot, method: Method) -> Fram
         "seconds_density": fitted - began,
         "seconds_velocity": done - fitted,
     }
-    return Frame(index + 1, density.values, velocity, figures)
+    return Frame(index + 1, density.values, velocity, figures, density.smooth)
+
+
+def _measured(before: Frame, density: Density) -> tuple[Volume, Volume]:
+    """The densities of two frames, without what is made up if that is known of both: it shows no motion of its own."""
+    if before.smooth is None or density.smooth is None:
+        return before.density, density.values
+    return before.smooth, density.smooth
 
 
 def _density(

@@ -11,6 +11,7 @@ from smokelift.baselines.density import AllCarried, FixedRateDescent, Orthogonal
 from smokelift.baselines.velocity import PaperVelocity
 from smokelift.density import (
     BlendCarried,
+    BorrowedMoments,
     DensityFit,
     DepthPrior,
     GradientFit,
@@ -52,10 +53,15 @@ def compose(settings: Settings) -> Method:
 def _default(settings: Settings) -> Method:
     return Method(
         density_fit=GradientFit(settings.density),
-        depth_prior=RoundDepth(axis_depth=settings.axis_depth),
+        depth_prior=_depth_prior(settings),
         velocity_estimator=CoarseToFine(settings.velocity),
         temporal_prior=BlendCarried(settings.transport) if settings.transport > 0 else NothingCarried(),
     )
+
+
+def _depth_prior(settings: Settings) -> DepthPrior:
+    smooth = RoundDepth(axis_depth=settings.axis_depth)
+    return BorrowedMoments(smooth, settings.detail, settings.seed) if settings.detail > 0 else smooth
 
 
 def _paper(settings: Settings) -> Method:

@@ -104,6 +104,11 @@ class Shot:
         """Whether the camera moves."""
         return self.scene.camera.moves
 
+    @property
+    def length(self) -> int:
+        """Number of frames."""
+        return len(self.clip)
+
     def spread(self, count: int) -> tuple[int, ...]:
         """Numbers of so many frames at most, from 0, spread evenly over the clip."""
         return tuple(self.clip.spread(count))

@@ -1,0 +1,172 @@
+"""Detail in depth: what other sides of the smoke may look like, borrowed from other moments of the clip.
+
+The smooth answer of `RoundDepth` is the mean of all smokes that show one picture. From the side it is a spindle without
+detail. Turbulent smoke looks, in its statistics, the same from all sides, and after some frames it looks unlike itself.
+So another moment's picture is one that this moment could show from the side.
+
+From each of three sides the smooth answer's picture gets the detail of another moment (`borrowed_picture`). These are
+soft observations of the density fit, which meets them as far as the camera's picture allows. Every row of theirs keeps
+the amount, the middle and the width that the smooth answer has there. The idea is Okabe et al.'s (2015), who give the
+sides the front's statistics.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import ndimage
+
+from smokelift.density.borrowed_picture import borrowed_picture
+from smokelift.density.depth_prior import DepthEstimate, ImposedView, RoundDepth
+from smokelift.density.hull import project_voxels
+from smokelift.density.moments import Moments
+from smokelift.density.multiplicative import fit_multiplicative
+from smokelift.density.objective import camera_terms
+from smokelift.density.observation import ObservedClip, View, ViewSet, eight_bit_plate
+from smokelift.density.turntable import Array
+from smokelift.render import Optics, Volume
+from smokelift.scene import Camera, Medium
+
+
+@dataclass(frozen=True)
+class BorrowedSide:
+    """A side that a picture is borrowed for.
+
+    Attributes
+    ----------
+    degrees
+        From the camera's side, about the view's height.
+    strength
+        Weight of its picture's pixels, as the square root.
+    apart
+        Frames to the moment that is borrowed, in shares of `Moments.offset`: unlike one another, so that no two sides
+        are copies.
+    """
+
+    degrees: float
+    strength: float
+    apart: float
+
+
+SIDES = (BorrowedSide(90, 1.0, 1.0), BorrowedSide(45, 0.35, 0.8), BorrowedSide(135, 0.35, 0.6))
+"""The side says most about what the front cannot see. The two between keep the detail from being drawn out along the
+rays of the first (docs/experiments/depth-detail.md)."""
+
+NEAR = 22.5
+"""Degrees from a camera within which nothing is borrowed: half the distance between sides."""
+
+THIN = 0.5
+"""Largest optical depth of a side's picture, so that every voxel on a ray counts alike."""
+
+WHITE = np.ones(3, np.float32)
+"""Radiance behind a side's picture."""
+
+AROUND = 0.05
+"""Share of the smooth answer that is spread around it: the borrowed outlines need something to work on."""
+
+SPREAD = 3.0
+"""Standard deviation (voxels) of that spread."""
+
+ENDS = 3.0
+"""Rows at the top and the bottom over which the sides' weight fades in: voxels there hold what the domain cuts off."""
+
+SMOOTH_ITERATIONS = 4
+"""Multiplicative iterations for the smooth answer; its rows' amounts are what the borrowed pictures take over."""
+
+
+@dataclass(frozen=True, eq=False)
+class BorrowedMoments:
+    """Round smoke with detail; see the module.
+
+    Attributes
+    ----------
+    smooth
+        The prior of the smooth answer.
+    detail
+        Strength, from 0 (the smooth answer) to 1.
+    seed
+        Of another plausible smoke of the same clip.
+    moments
+        Of the clip; None borrows nothing.
+    """
+
+    smooth: RoundDepth
+    detail: float = 1.0
+    seed: int = 0
+    moments: Moments | None = None
+
+    def of_clip(self, clip: ObservedClip) -> BorrowedMoments:
+        """Look at all frames of a clip, unless there is no detail to borrow."""
+        moments = Moments.of(clip) if self.detail > 0 else None
+        return replace(self, smooth=self.smooth.of_clip(clip), moments=moments)
+
+    def estimate(self, views: ViewSet) -> DepthEstimate:
+        """The smooth answer, and pictures from the sides."""
+        estimate = self.smooth.estimate(views)
+        if self.moments is None or not views.hull.any():
+            return estimate
+        start = np.where(views.hull, estimate.density, 0).astype(np.float32)
+        smooth = fit_multiplicative(camera_terms(views, estimate.inside), start, SMOOTH_ITERATIONS, 0.02).density
+        imposed = self._sides(self.moments, smooth, views)
+        around = AROUND * min(1.0, 2 * self.detail)
+        spread = (1 - around) * smooth + around * ndimage.gaussian_filter(smooth, SPREAD)
+        density = np.where(views.hull, spread, 0).astype(np.float32)
+        return replace(estimate, density=density, imposed=tuple(imposed), smooth=smooth)
+
+    def _sides(self, moments: Moments, smooth: Volume, views: ViewSet) -> Iterator[ImposedView]:
+        """Borrowed pictures of the sides that no camera is near to."""
+        random = np.random.default_rng(self.seed)
+        turn, mirrored = random.uniform(-NEAR / 2, NEAR / 2), random.integers(2, size=len(SIDES))
+        seen_from = [moments.turntable.degrees(view.camera) for view in views.views]
+        for side, flip in zip(SIDES, mirrored, strict=True):
+            degrees = side.degrees + turn
+            if any(_apart(degrees, other) < NEAR for other in seen_from):
+                continue
+            camera = moments.turntable.camera(degrees)
+            seen = _optical_depth(smooth, camera, views)
+            lent = moments.apart(views.frame, round(side.apart * moments.offset))
+            picture = borrowed_picture(seen, [(share, moment[:, ::-1] if flip else moment) for share, moment in lent])
+            if picture is not None:
+                yield _shadowgraph(picture, camera, side.strength * self.detail, views.optics)
+
+
+def _apart(a: float, b: float) -> float:
+    """Degrees between two directions; what is seen from the back is what is seen from the front."""
+    return abs((a - b + 90) % 180 - 90)
+
+
+def _optical_depth(density: Volume, camera: Camera, views: ViewSet) -> Array:
+    """Optical depth (rows, columns) of a density as a camera sees it."""
+    renderer = _absorbing(views.optics).renderer(camera, WHITE, views.hull)
+    renderer.image(density)
+    clear = np.maximum(renderer.transmittance, np.finfo(np.float32).tiny)
+    return np.asarray(-np.log(clear), np.float64)
+
+
+def _shadowgraph(optical_depth: Array, camera: Camera, strength: float, optics: Optics) -> ImposedView:
+    """A picture of smoke that takes light away and scatters none: it says how much of it each ray meets."""
+    thin = THIN / optical_depth.max()
+    depth = (thin * optical_depth).astype(np.float32)
+    everywhere = np.ones(depth.shape, np.bool_)
+    view = View(
+        camera=camera,
+        image=np.exp(-depth)[..., None] * WHITE,
+        plate=eight_bit_plate(WHITE, camera.size),
+        mask=everywhere,
+        optical_depth=depth,
+        projection=project_voxels(camera, optics.domain),
+        counted=everywhere,
+    )
+    rows = np.arange(len(depth)) + 0.5
+    fade = np.clip(np.minimum(rows, rows[::-1]) / ENDS, 0, 1)
+    weight = np.broadcast_to((strength * fade[:, None]) ** 2, depth.shape).astype(np.float32)
+    return ImposedView(view, weight, _absorbing(optics, thin))
+
+
+def _absorbing(optics: Optics, share: float = 1.0) -> Optics:
+    """The optics of smoke that only absorbs, with a share of its extinction."""
+    return replace(
+        optics, medium=Medium(extinction=share * optics.medium.extinction), lights=(), scattering="absorption"
+    )

@@ -1,0 +1,126 @@
+"""The picture from a side: what is known of it, with the detail of a picture of another moment.
+
+The smooth answer knows how much smoke every row of the side's picture holds, where its middle is and how wide it is.
+How the smoke is spread within the row it does not know. That is borrowed: the other moment's picture is moved and
+stretched row by row until its rows have those middles and widths, and its detail, relative to its own blurred picture,
+multiplies the blurred picture of the smooth answer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from smokelift.density.moments import DETAIL
+
+Array = NDArray[np.float64]
+
+LARGEST = 2.5
+"""Bound of the detail's ratio to the blurred picture: beyond it lies an edge, where the blurred picture is thin."""
+
+FAINT = 1e-3
+"""Share of the largest blurred value below which a ratio means nothing."""
+
+OUTLINE = 4.0
+"""The target falls to zero where the ratio is below one part in so many: outside the borrowed outline is no smoke."""
+
+ROWS = 4.0
+"""Standard deviation (rows) over which middles and widths are smoothed: a row's own lean is detail."""
+
+END = 0.02
+"""Share of the smoke beyond the rows at which it is said to begin and end."""
+
+
+def borrowed_picture(smooth: Array, others: Sequence[tuple[float, Array]]) -> Array | None:
+    """Return the smooth answer's picture with the detail of others.
+
+    Parameters
+    ----------
+    smooth : (rows, columns)
+        Optical depth of the smooth answer from the side.
+    others
+        Shares that add up to 1, and pictures (rows, columns) of other moments, which are dissolved into one another.
+        A mean of unlike details is fainter than either, so that it is strengthened by what the mean loses.
+
+    Returns
+    -------
+    (rows, columns), every row with the sum of the smooth answer's; None if no other picture shows smoke.
+    """
+    shown = [(share, picture) for share, picture in others if share > 0 and picture.any()]
+    if not shown or not smooth.any():
+        return None
+    total = sum(share for share, _ in shown)
+    ratio = sum(share / total * _relative(_fitted(picture, smooth)) for share, picture in shown)
+    ratio = 1 + (ratio - 1) / np.sqrt(sum((share / total) ** 2 for share, _ in shown))
+    target = _blurred(smooth) * np.clip(ratio, 0, LARGEST) * np.clip(OUTLINE * ratio, 0, 1)
+    return _with_rows(target, smooth.sum(1))
+
+
+def _fitted(other: Array, smooth: Array) -> Array:
+    """The other picture, its rows moved to where the smooth picture has theirs, as wide and with as much smoke."""
+    rows = matching_rows(smooth.sum(1), other.sum(1))
+    middle, width = _middles_and_widths(smooth)
+    other_middle, other_width = (np.interp(rows, np.arange(len(other)), of) for of in _middles_and_widths(other))
+    columns = np.arange(smooth.shape[1])
+    at = other_middle[:, None] + (columns - middle[:, None]) * (other_width / width)[:, None]
+    fitted = ndimage.map_coordinates(other, (np.broadcast_to(rows[:, None], at.shape), at), order=1, mode="constant")
+    return _with_rows(ndimage.gaussian_filter(fitted, (0.6, 0.5)), smooth.sum(1))
+
+
+def matching_rows(amounts: Array, others: Array) -> Array:
+    """Return which row of another picture corresponds to each row of a picture, so that both smokes begin and end alike.
+
+    Parameters
+    ----------
+    amounts, others : (rows,)
+        Smoke in the rows of both.
+
+    Returns
+    -------
+    (rows,), fractional, evenly spaced. Equal shares of the smoke would flicker: they stretch parts of the picture anew
+    in every frame.
+    """
+    first, last = _ends(amounts)
+    other_first, other_last = _ends(others)
+    stretch = max(other_last - other_first, 1.0) / max(last - first, 1.0)
+    return np.asarray(other_first + (np.arange(len(amounts)) - first) * stretch)
+
+
+def _ends(amounts: Array) -> tuple[float, float]:
+    """Rows, fractional, at which the smoke begins and ends."""
+    share = np.cumsum(ndimage.gaussian_filter1d(amounts, 1.0)) / amounts.sum()
+    first, last = np.interp((END, 1 - END), share + 1e-9 * np.arange(len(share)), np.arange(len(share)))
+    return float(first), float(last)
+
+
+def _middles_and_widths(picture: Array) -> tuple[Array, Array]:
+    """Mean column and standard deviation (at least a pixel) of each row, smoothed; the neighbours' in empty rows."""
+    columns, amount = np.arange(picture.shape[1]), picture.sum(1)
+    known = amount > 1e-6 * amount.max()
+    weight = ndimage.gaussian_filter1d(amount, ROWS) + 1e-9 * amount.max()
+
+    def smoothed(values: Array) -> Array:
+        mean = ndimage.gaussian_filter1d(np.where(known, amount * values, 0), ROWS) / weight
+        return np.asarray(np.interp(np.arange(len(mean)), np.flatnonzero(known), mean[known]), np.float64)
+
+    mean = picture @ columns / np.maximum(amount, 1e-30)
+    variance = np.sum(picture * (columns - mean[:, None]) ** 2, 1) / np.maximum(amount, 1e-30)
+    return smoothed(mean), np.sqrt(np.maximum(smoothed(variance), 1))
+
+
+def _relative(picture: Array) -> Array:
+    """A picture in units of itself blurred."""
+    blurred = _blurred(picture)
+    return np.asarray(picture / (blurred + FAINT * blurred.max()))
+
+
+def _blurred(picture: Array) -> Array:
+    return np.asarray(ndimage.gaussian_filter(picture, DETAIL))
+
+
+def _with_rows(picture: Array, sums: Array) -> Array:
+    """A picture with the rows scaled to some sums."""
+    return np.asarray(picture * (sums / np.maximum(picture.sum(1), 1e-30))[:, None])
