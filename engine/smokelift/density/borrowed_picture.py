@@ -71,7 +71,7 @@ def _fitted(other: Array, smooth: Array) -> Array:
 
 
 def matching_rows(amounts: Array, others: Array) -> Array:
-    """Return which row of another picture corresponds to each row of a picture, so that both smokes begin and end alike.
+    """Return which row of another picture belongs to each row of a picture: both smokes begin and end alike.
 
     Parameters
     ----------

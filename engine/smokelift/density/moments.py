@@ -13,8 +13,8 @@ from smokelift.density.observation import ObservedClip, View
 from smokelift.density.turntable import Array, Turntable
 
 DETAIL = 4.0
-"""Standard deviation (pixels, of a voxel each) of the blur that leaves of a picture what the smooth answer shows as well;
-what it takes away is detail (docs/experiments/depth-detail.md)."""
+"""Standard deviation (pixels, a voxel each) of the blur that leaves of a picture what the smooth answer shows as well.
+What it takes away is detail (docs/experiments/depth-detail.md)."""
 
 UNLIKE = 0.35
 """Correlation of two pictures' detail under the best shift below which neither looks like a copy of the other: so much
@@ -75,7 +75,7 @@ class Moments:
 
 
 def unlike_offset(pictures: NDArray[np.float16]) -> int:
-    """Return after how many frames smoke in pictures (frames, rows, columns) looks unlike itself; at most half of all."""
+    """Return after how many frames smoke looks unlike itself in pictures (frames, rows, columns), at most half."""
     longest = len(pictures) // 2
     for offset in range(1, longest):
         alike = [_likeness(a, b) for a, b in _pairs(pictures, offset)]
