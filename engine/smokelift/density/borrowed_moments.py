@@ -25,7 +25,7 @@ from smokelift.density.moments import Moments
 from smokelift.density.multiplicative import fit_multiplicative
 from smokelift.density.objective import camera_terms
 from smokelift.density.observation import ObservedClip, View, ViewSet, eight_bit_plate
-from smokelift.density.turntable import Array
+from smokelift.density.row_shape import Array
 from smokelift.render import Optics, Volume
 from smokelift.scene import Camera, Medium
 
@@ -43,11 +43,14 @@ class BorrowedSide:
     apart
         Frames to the moment that is borrowed, in shares of `Moments.offset`: unlike one another, so that no two sides
         are copies.
+    mirrored
+        Whether the picture is.
     """
 
     degrees: float
     strength: float
     apart: float
+    mirrored: bool = False
 
 
 SIDES = (BorrowedSide(90, 1.0, 1.0), BorrowedSide(45, 0.35, 0.8), BorrowedSide(135, 0.35, 0.6))
@@ -117,19 +120,31 @@ class BorrowedMoments:
 
     def _sides(self, moments: Moments, smooth: Volume, views: ViewSet) -> Iterator[ImposedView]:
         """Borrowed pictures of the sides that no camera is near to."""
-        random = np.random.default_rng(self.seed)
-        turn, mirrored = random.uniform(-NEAR / 2, NEAR / 2), random.integers(2, size=len(SIDES))
         seen_from = [moments.turntable.degrees(view.camera) for view in views.views]
-        for side, flip in zip(SIDES, mirrored, strict=True):
-            degrees = side.degrees + turn
-            if any(_apart(degrees, other) < NEAR for other in seen_from):
+        for side in varied_sides(self.seed):
+            if any(_apart(side.degrees, other) < NEAR for other in seen_from):
                 continue
-            camera = moments.turntable.camera(degrees)
+            camera = moments.turntable.camera(side.degrees)
             seen = _optical_depth(smooth, camera, views)
             lent = moments.apart(views.frame, round(side.apart * moments.offset))
-            picture = borrowed_picture(seen, [(share, moment[:, ::-1] if flip else moment) for share, moment in lent])
+            picture = borrowed_picture(
+                seen, [(share, moment[:, ::-1] if side.mirrored else moment) for share, moment in lent]
+            )
             if picture is not None:
                 yield _shadowgraph(picture, camera, side.strength * self.detail, views.optics)
+
+
+def varied_sides(seed: int) -> list[BorrowedSide]:
+    """Return the sides of another plausible smoke: turned, borrowed from moments less far away, and mirrored.
+
+    Multiples of irrational numbers are spread evenly, so that the smokes of neighbouring seeds are never alike.
+    """
+    turn = NEAR * (np.sqrt(5) * seed % 1 - 0.5 * (seed > 0))
+    nearer = 1 - 0.3 * (np.sqrt(2) * seed % 1)
+    return [
+        replace(side, degrees=side.degrees + turn, apart=side.apart * nearer, mirrored=bool(seed >> number & 1))
+        for number, side in enumerate(SIDES)
+    ]
 
 
 def _apart(a: float, b: float) -> float:

@@ -11,12 +11,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
-from smokelift.density.moments import DETAIL
-
-Array = NDArray[np.float64]
+from smokelift.density.row_shape import Array, coarse, middles_and_widths
 
 LARGEST = 2.5
 """Bound of the detail's ratio to the blurred picture: beyond it lies an edge, where the blurred picture is thin."""
@@ -26,9 +23,6 @@ FAINT = 1e-3
 
 OUTLINE = 4.0
 """The target falls to zero where the ratio is below one part in so many: outside the borrowed outline is no smoke."""
-
-ROWS = 4.0
-"""Standard deviation (rows) over which middles and widths are smoothed: a row's own lean is detail."""
 
 END = 0.02
 """Share of the smoke beyond the rows at which it is said to begin and end."""
@@ -53,17 +47,18 @@ def borrowed_picture(smooth: Array, others: Sequence[tuple[float, Array]]) -> Ar
     if not shown or not smooth.any():
         return None
     total = sum(share for share, _ in shown)
-    ratio = sum(share / total * _relative(_fitted(picture, smooth)) for share, picture in shown)
+    known = coarse(smooth, smooth)
+    ratio = sum(share / total * _relative(_fitted(picture, smooth), smooth) for share, picture in shown)
     ratio = 1 + (ratio - 1) / np.sqrt(sum((share / total) ** 2 for share, _ in shown))
-    target = _blurred(smooth) * np.clip(ratio, 0, LARGEST) * np.clip(OUTLINE * ratio, 0, 1)
+    target = known * np.clip(ratio, 0, LARGEST) * np.clip(OUTLINE * ratio, 0, 1)
     return _with_rows(target, smooth.sum(1))
 
 
 def _fitted(other: Array, smooth: Array) -> Array:
     """The other picture, its rows moved to where the smooth picture has theirs, as wide and with as much smoke."""
     rows = matching_rows(smooth.sum(1), other.sum(1))
-    middle, width = _middles_and_widths(smooth)
-    other_middle, other_width = (np.interp(rows, np.arange(len(other)), of) for of in _middles_and_widths(other))
+    middle, width = middles_and_widths(smooth)
+    other_middle, other_width = (np.interp(rows, np.arange(len(other)), of) for of in middles_and_widths(other))
     columns = np.arange(smooth.shape[1])
     at = other_middle[:, None] + (columns - middle[:, None]) * (other_width / width)[:, None]
     fitted = ndimage.map_coordinates(other, (np.broadcast_to(rows[:, None], at.shape), at), order=1, mode="constant")
@@ -96,29 +91,10 @@ def _ends(amounts: Array) -> tuple[float, float]:
     return float(first), float(last)
 
 
-def _middles_and_widths(picture: Array) -> tuple[Array, Array]:
-    """Mean column and standard deviation (at least a pixel) of each row, smoothed; the neighbours' in empty rows."""
-    columns, amount = np.arange(picture.shape[1]), picture.sum(1)
-    known = amount > 1e-6 * amount.max()
-    weight = ndimage.gaussian_filter1d(amount, ROWS) + 1e-9 * amount.max()
-
-    def smoothed(values: Array) -> Array:
-        mean = ndimage.gaussian_filter1d(np.where(known, amount * values, 0), ROWS) / weight
-        return np.asarray(np.interp(np.arange(len(mean)), np.flatnonzero(known), mean[known]), np.float64)
-
-    mean = picture @ columns / np.maximum(amount, 1e-30)
-    variance = np.sum(picture * (columns - mean[:, None]) ** 2, 1) / np.maximum(amount, 1e-30)
-    return smoothed(mean), np.sqrt(np.maximum(smoothed(variance), 1))
-
-
-def _relative(picture: Array) -> Array:
-    """A picture in units of itself blurred."""
-    blurred = _blurred(picture)
+def _relative(picture: Array, smooth: Array) -> Array:
+    """A picture in units of itself without the detail."""
+    blurred = coarse(picture, smooth)
     return np.asarray(picture / (blurred + FAINT * blurred.max()))
-
-
-def _blurred(picture: Array) -> Array:
-    return np.asarray(ndimage.gaussian_filter(picture, DETAIL))
 
 
 def _with_rows(picture: Array, sums: Array) -> Array:

@@ -7,14 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft, ndimage
+from scipy import fft
 
 from smokelift.density.observation import ObservedClip, View
-from smokelift.density.turntable import Array, Turntable
-
-DETAIL = 4.0
-"""Standard deviation (pixels, a voxel each) of the blur that leaves of a picture what the smooth answer shows as well.
-What it takes away is detail (docs/experiments/depth-detail.md)."""
+from smokelift.density.row_shape import Array, coarse
+from smokelift.density.turntable import Turntable
 
 UNLIKE = 0.35
 """Correlation of two pictures' detail under the best shift below which neither looks like a copy of the other: so much
@@ -101,5 +98,5 @@ def _likeness(a: Array, b: Array) -> float:
 
 def _detail(picture: Array) -> Array:
     """What a blur takes away of a picture, at unit norm."""
-    detail = picture - ndimage.gaussian_filter(picture, DETAIL)
+    detail = picture - coarse(picture, picture)
     return np.asarray(detail / max(float(np.linalg.norm(detail)), 1e-30))

@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from smokelift.density.row_shape import Array
 from smokelift.density.screen import view_frame
 from smokelift.scene import Camera, Domain, as_matrix
 from smokelift.scene.projection import project
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,9 +39,10 @@ class Turntable:
     @property
     def shape(self) -> tuple[int, int]:
         """Rows and columns of the screen, which holds the domain however it is turned."""
-        voxels = (np.array(self.domain.max) - self.domain.min) / self.domain.voxel_size
-        columns = np.hypot(np.abs(self.lateral) @ voxels, np.abs(self.depth) @ voxels)
-        return int(np.ceil(np.abs(self.height) @ voxels - 1e-6)), int(np.ceil(columns - 1e-6))
+        corners = (self.domain.corners() - np.array(self.domain.centre)) / self.domain.voxel_size
+        rows = np.max(corners @ self.height)
+        columns = np.max(np.hypot(corners @ self.lateral, corners @ self.depth))
+        return int(np.ceil(2 * rows - 1e-6)), int(np.ceil(2 * columns - 1e-6))
 
     def camera(self, degrees: float) -> Camera:
         """Return the orthographic camera that sees the domain turned; it stands to the right at 90 degrees."""

@@ -300,7 +300,7 @@ def test_further_views_put_the_smoke_in_its_place(plume, two_views, draft, tmp_p
 
 def test_with_nothing_carried_along_a_frame_is_that_of_its_pictures(two_views, draft) -> None:
     """The pictures of all views of that moment, and nothing else."""
-    settings = replace(draft, transport=0.0)
+    settings = replace(draft, transport=0.0, detail=0.0)
     scene = two_views.with_frames(0, 2)
     frames = frames_of(scene, settings)
     with Clip.open(scene.clip) as clip:

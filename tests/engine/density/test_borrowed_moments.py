@@ -1,0 +1,143 @@
+"""Depth with detail: the front is met, the side has detail, and nothing of it is there where it is not asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import ndimage
+
+from smokelift.density import BorrowedMoments, DensitySettings, GradientFit, RoundDepth, ViewSet
+from smokelift.footage.clip import Clip
+from smokelift.scene import Scene
+from smokelift.setup.prepare import prepare_shot
+from smokelift.setup.settings import Settings
+from smokelift.setup.shot import Shot
+
+FRAMES = 6
+FIT = GradientFit(DensitySettings(fit_iterations=6, descent_iterations=8))
+
+
+def rising(frames: int) -> list[np.ndarray]:
+    """A column of thin smoke as detailed along every axis, whose detail rises and changes."""
+    random = np.random.default_rng(3)
+    noise = ndimage.gaussian_filter(random.normal(size=(24, 24, 32 + 3 * frames)), 1.4)
+    x, y, z = np.meshgrid(*(np.arange(n) + 0.5 - n / 2 for n in (24, 24, 32)), indexing="ij")
+    column = np.exp(-((np.hypot(x, y) / 6) ** 4) - (z / 12) ** 4)
+    parts = (noise[..., 3 * (frames - n) : 3 * (frames - n) + 32] for n in range(frames))
+    return [(0.2 * column * np.clip(0.5 + 1.2 * part / noise.std(), 0, None)).astype(np.float32) for part in parts]
+
+
+@pytest.fixture(scope="module")
+def shot(plume, tmp_path_factory) -> Iterator[Shot]:
+    """The column's clip from the front."""
+    scene = plume.write(tmp_path_factory.mktemp("rising"), rising(FRAMES))
+    with Clip.open(scene.clip) as clip:
+        yield prepare_shot(clip, scene, Settings.preset("draft"))
+
+
+def fitted(shot: Shot, prior: BorrowedMoments, frame: int = 2) -> tuple[np.ndarray, float]:
+    """The density of a frame, and its picture's PSNR."""
+    views = ViewSet.of(shot.observe(frame), shot.optics, frame)
+    found = FIT.fit(views, prior.of_clip(shot).estimate(views), None)
+    return found.values, found.figures["psnr"]
+
+
+def fine(density: np.ndarray, axis: int) -> np.ndarray:
+    """What a blur across takes away of the projection along an axis, in units of the projection."""
+    picture = density.sum(axis, dtype=np.float64)
+    return (picture - ndimage.gaussian_filter1d(picture, 2, axis=0)) / np.linalg.norm(picture)
+
+
+def detail(density: np.ndarray, axis: int) -> float:
+    """Its strength."""
+    return float(np.linalg.norm(fine(density, axis)))
+
+
+def test_the_side_gets_detail_and_the_front_stays(shot) -> None:
+    """More with more of it, nearly as much as the front has, for a decibel or two of a front that is met."""
+    strengths = (0.0, 0.5, 1.0)
+    found = [fitted(shot, BorrowedMoments(RoundDepth(), detail=strength)) for strength in strengths]
+    sides = [detail(density, 0) for density, _ in found]
+    assert sides[0] < sides[1] < sides[2]
+    assert sides[2] > 1.2 * sides[0]
+    assert sides[2] > 0.5 * detail(found[2][0], 1)
+    assert min(psnr for _, psnr in found) > found[0][1] - 4
+    assert min(psnr for _, psnr in found) > 38
+
+
+def test_no_detail_is_the_smooth_prior_itself(shot) -> None:
+    """To the bit, and the clip is not looked at."""
+    views = ViewSet.of(shot.observe(2), shot.optics, 2)
+    prior = BorrowedMoments(RoundDepth(), detail=0.0).of_clip(shot)
+    assert prior.moments is None
+    estimate = prior.estimate(views)
+    np.testing.assert_array_equal(estimate.density, RoundDepth().of_clip(shot).estimate(views).density)
+    assert estimate.imposed == ()
+    assert estimate.smooth is None
+
+
+def test_another_seed_is_another_smoke(shot) -> None:
+    """From the side; from the front it is the same, and the same seed is the same smoke."""
+    first, again, other = (fitted(shot, BorrowedMoments(RoundDepth(), seed=seed))[0] for seed in (0, 0, 1))
+    np.testing.assert_array_equal(first, again)
+
+    side, front = (np.linalg.norm(fine(first, axis) - fine(other, axis)) / detail(first, axis) for axis in (0, 1))
+    assert side > 0.3
+    assert front < 0.15
+
+
+def test_what_is_known_of_the_side_is_kept(shot) -> None:
+    """Amount of smoke by height, and where it is in depth."""
+    views = ViewSet.of(shot.observe(2), shot.optics, 2)
+    estimate = BorrowedMoments(RoundDepth()).of_clip(shot).estimate(views)
+    assert estimate.smooth is not None
+    found = FIT.fit(views, estimate, None).values
+    layers, kept = (density.sum((0, 1), dtype=np.float64) for density in (found, estimate.smooth))
+    assert np.abs(layers - kept).sum() < 0.1 * kept.sum()
+    place, smooth = (float(d.sum((0, 2)) @ np.arange(24) / d.sum()) for d in (found, estimate.smooth))
+    assert place == pytest.approx(smooth, abs=0.6)
+
+
+def test_a_camera_at_the_side_takes_the_place_of_borrowed_pictures(shot, two_views) -> None:
+    """Those within half the distance between sides; the others stay."""
+    with Clip.open(two_views.clip) as clip:
+        seen = prepare_shot(clip, two_views, Settings.preset("draft"))
+        views = ViewSet.of(seen.observe(1), seen.optics, 1)
+        both = BorrowedMoments(RoundDepth()).of_clip(seen).estimate(views)
+    alone = BorrowedMoments(RoundDepth()).of_clip(shot)
+    assert len(alone.estimate(ViewSet.of(shot.observe(1), shot.optics, 1)).imposed) == 3
+    assert len(both.imposed) == 2
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_a_short_clip_lends_what_it_has(plume, tmp_path, count) -> None:
+    """A single picture lends itself: the front is met all the same."""
+    scene: Scene = plume.write(tmp_path, rising(FRAMES)[:count])
+    with Clip.open(scene.clip) as clip:
+        shot = prepare_shot(clip, scene, Settings.preset("draft"))
+        density, psnr = fitted(shot, BorrowedMoments(RoundDepth()), 0)
+    assert np.isfinite(density).all()
+    assert psnr > 36
+
+
+def test_a_frame_without_smoke_stays_empty(plume, tmp_path) -> None:
+    """Whatever other moments show."""
+    densities = [*rising(3), np.zeros((24, 24, 32), np.float32)]
+    scene: Scene = plume.write(tmp_path, densities)
+    with Clip.open(scene.clip) as clip:
+        shot = prepare_shot(clip, scene, Settings.preset("draft"))
+        prior = BorrowedMoments(RoundDepth())
+        views = ViewSet.of(shot.observe(3), shot.optics, 3)
+        found = FIT.fit(views, prior.of_clip(shot).estimate(views), None)
+    assert not found.values.any()
+
+
+def test_the_moment_decides_what_is_borrowed(shot) -> None:
+    """The same picture at another moment of the clip gets other detail."""
+    prior = BorrowedMoments(RoundDepth()).of_clip(shot)
+    views = ViewSet.of(shot.observe(2), shot.optics, 2)
+    early, late = (prior.estimate(replace(views, frame=frame)).imposed[0] for frame in (0, FRAMES - 1))
+    assert not np.array_equal(early.view.image, late.view.image)
