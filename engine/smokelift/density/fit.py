@@ -117,10 +117,14 @@ class GradientFit:
         cameras = camera_terms(views, depth.inside)
         imposed = [Term(each.view, _renderer(each, hull), each.weight) for each in depth.imposed]
         start = np.where(hull, depth.density if initial is None else initial, 0).astype(np.float32)
-        # The terms take turns, the cameras last. Several cameras need as many times more iterations; imposed pictures
-        # yield, so nothing waits for them, and the descent leaves of them what the cameras' pictures allow.
+        # The terms take turns, so several cameras need as many times more iterations. Imposed pictures yield: the last
+        # third of the iterations and the descent are the cameras' alone.
         iterations = settings.fit_iterations * len(cameras)
-        scaled = fit_multiplicative([*imposed, *cameras], start, iterations, settings.tolerance)
+        done = 0
+        if imposed:
+            shared = fit_multiplicative([*imposed, *cameras], start, 2 * iterations // 3, settings.tolerance)
+            start, done, iterations = shared.density, shared.iterations, iterations - 2 * iterations // 3
+        scaled = fit_multiplicative(cameras, start, iterations, settings.tolerance)
         final = descend(
             cameras,
             scaled.density,
@@ -130,7 +134,7 @@ class GradientFit:
             settings.patience,
             bound=float(max(settings.bound * depth.density.max(), start.max())),
         )
-        figures = fit_figures(views, final.residuals, scaled.iterations + final.iterations)
+        figures = fit_figures(views, final.residuals, done + scaled.iterations + final.iterations)
         return Density(without_traces(final.density), hull, figures, depth.smooth)
 
 
