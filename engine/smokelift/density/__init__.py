@@ -1,6 +1,9 @@
 """Density from pictures: views, what is assumed of their depth, and the fit.
 
 Observation -> View (observation) -> DepthEstimate (depth_prior) -> Start (temporal_prior) -> Density (fit)
+
+The default estimate (borrowed_moments) is round, smooth smoke with pictures of its sides, whose detail is that of other
+moments of the clip. The fit meets them as far as the cameras' pictures allow.
 """
 
 from smokelift.density.axis import AxisEstimate

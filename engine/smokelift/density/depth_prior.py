@@ -1,9 +1,10 @@
 """What is assumed of the smoke's depth, which one picture leaves undetermined.
 
-`RoundDepth`, the default, takes the smoke to be as deep as it is wide. It spreads the smoke of one picture about an
-axis that comes from the whole clip. With several pictures the density is the product of their depth profiles, scaled in
-each horizontal layer to the optical depth of the view that shows most there. It need not look like any picture: the
-multiplicative fit scales ray by ray, and keeps of it only how the smoke of one ray relates to that of another.
+`RoundDepth` takes the smoke to be as deep as it is wide. Its answer is smooth; the default, `BorrowedMoments`, gives it
+detail (`borrowed_moments`). It spreads the smoke of one picture about an axis that comes from the whole clip. With
+several pictures the density is the product of their depth profiles, scaled in each horizontal layer to the optical
+depth of the view that shows most there. It need not look like any picture: the multiplicative fit scales ray by ray,
+and keeps of it only how the smoke of one ray relates to that of another.
 """
 
 from __future__ import annotations
@@ -30,14 +31,17 @@ LEAST_SHAPE = 0.05
 
 @dataclass(frozen=True, eq=False)
 class ImposedView:
-    """A picture that no camera took: a soft observation that a prior adds to the objective.
+    """A picture that no camera took: a soft observation, which shapes the density and yields to the cameras' pictures.
+
+    It has a turn before theirs in every multiplicative iteration, and none in the descent that follows. (The paper's
+    fit takes it for another camera's.)
 
     Attributes
     ----------
     view
         The picture against the grid. Smoke that it does not show is not ruled out.
     weight : (rows, columns)
-        How much each pixel counts beside a camera's, from 0.
+        How much each pixel counts beside a camera's, from 0: the steps towards it are as long as its square root.
     optics
         How light travels in it: it need not be taken in the scene's own light.
     """
@@ -58,9 +62,9 @@ class DepthEstimate:
     inside : tuple of (rows, columns)
         Of each view, the share of every ray's smoke that lies inside the domain.
     imposed
-        Pictures to be met beside the cameras'.
+        Pictures to be met as far as the cameras' allow.
     smooth : (nx, ny, nz) float32, optional
-        What is known of the density without what the prior makes up; None if it makes nothing up.
+        A density that shows about what the pictures do, without what the prior makes up; None if it makes nothing up.
     """
 
     density: Volume

@@ -1,7 +1,8 @@
 """Density from pictures (algorithm 3): views and a scene's optics in, a volume that renders to the pictures out.
 
-A depth prior gives the start, `multiplicative` scales it ray by ray until it is nearly right, and `descent` follows the
-exact gradient from there.
+A depth prior gives the start, and pictures of sides that no camera sees. `multiplicative` scales the start ray by ray
+until it is nearly right, towards those pictures as well. From there `descent` follows the exact gradient of the
+cameras' pictures alone.
 """
 
 from __future__ import annotations
@@ -67,11 +68,11 @@ class Density:
     hull : (nx, ny, nz) bool
         Voxels that the pictures allow to hold smoke.
     figures
-        ``loss`` (sum of squared differences over all pictures) and ``psnr`` (dB, peak 1) of the input's picture, in
-        linear radiance, over the pixels that its smoke's voxels can change, all counted alike; ``psnr_view_1``, ... of
-        further views; ``iterations``; ``hull_share``, the hull's share of the voxels.
+        ``loss`` (sum of squared differences over all cameras' pictures) and ``psnr`` (dB, peak 1) of the input's
+        picture, in linear radiance, over the pixels that its smoke's voxels can change, all counted alike;
+        ``psnr_view_1``, ... of further views; ``iterations``; ``hull_share``, the hull's share of the voxels.
     smooth : (nx, ny, nz) float32, optional
-        What is known of the density without what the depth prior makes up; None if it makes nothing up.
+        The depth prior's `DepthEstimate.smooth`.
     """
 
     values: Volume
