@@ -68,7 +68,7 @@ def leave_out(part: str, method: Method) -> Method:
 
     - transport: every frame starts from its own pictures
     - hull: smoke may be wherever a camera looks
-    - depth: the initial density is even along the rays
+    - depth: the initial density is even along the rays, without detail (settings leave out the detail alone)
     - sources: smoke that enters is taken for motion
     - projection: the predicted velocity keeps its divergence
 

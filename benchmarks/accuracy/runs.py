@@ -6,6 +6,7 @@ A name is a quality or "paper", then further views, then changes:
 - ``balanced+90``, ``balanced+90+45``: the views 90 and 45 are input too; of a capture ``balanced+camera00``
 - ``balanced:transport=0``, ``fine:velocity.levels=2``, ``draft:resolution=32x32x48``: settings that differ
 - ``balanced:velocity.solver=primal-dual``: the other solver
+- ``balanced:detail=0``, ``balanced:seed=1``: the smooth answer; another plausible one
 - ``balanced:without=depth``: a part of the method is left out, see `ablations.leave_out`
 - ``smear``: the front picture alone is fitted, with a density that is constant along the rays
 - ``billboard``, ``blurred``: the front picture in every view, as it is or blurred

@@ -11,7 +11,15 @@ from benchmarks.accuracy.ablations import EvenDepth, UnprojectedPrediction, With
 from benchmarks.accuracy.report import error_columns, markdown, realism_columns
 from benchmarks.accuracy.runs import run_method, run_settings, run_views
 from benchmarks.accuracy.scenes import picture_on_screen
-from smokelift.density import DensitySettings, GradientFit, NothingCarried, Observation, RoundDepth, ViewSet
+from smokelift.density import (
+    BorrowedMoments,
+    DensitySettings,
+    GradientFit,
+    NothingCarried,
+    Observation,
+    RoundDepth,
+    ViewSet,
+)
 from smokelift.pipeline import compose
 from smokelift.render import Optics
 from smokelift.scene import Camera, DirectionalLight, Domain, Medium
@@ -30,6 +38,8 @@ def test_a_name_says_quality_views_and_changes():
     assert (settings.quality, settings.transport, settings.velocity.levels) == ("draft", 0.2, 2)
     assert settings.resolution == (8, 9, 10)
     assert run_settings("paper").method == "paper"
+    smooth = run_settings("draft:detail=0,seed=3")
+    assert (smooth.detail, smooth.seed, settings.detail) == (0, 3, 1)
     with pytest.raises(ValueError, match="draft, balanced, fine"):
         run_settings("best")
 
@@ -40,6 +50,8 @@ def test_a_method_without_a_part_is_a_composition():
     assert leave_out("transport", usual) == replace(usual, temporal_prior=NothingCarried())
     assert leave_out("hull", usual) == replace(usual, density_fit=WithoutHull(usual.density_fit))
     assert leave_out("depth", usual) == replace(usual, depth_prior=EvenDepth())
+    assert isinstance(run_method("draft", settings).depth_prior, BorrowedMoments)
+    assert isinstance(run_method("draft", replace(settings, detail=0.0)).depth_prior, RoundDepth)
     both = run_method("draft:without=projection,without=sources", settings).velocity_estimator
     assert both == UnprojectedPrediction(replace(settings.velocity, sources=None))
     for run in ("draft:without=luck", "paper:without=sources"):
