@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +16,7 @@ import psutil
 import scipy.fft
 
 from smokelift.scene import Domain
-from smokelift.setup.settings import Quality
+from smokelift.setup.settings import Quality, Settings
 
 Resolution = tuple[int, int, int]
 
@@ -25,6 +25,10 @@ SOLVES_A_FRAME: Mapping[Quality, float] = {"draft": 65.0, "balanced": 70.0, "fin
 
 SHARE_A_VIEW = 0.5
 """Part of a frame's time that each further view adds."""
+
+SHARE_OF_DETAIL = 0.7
+"""Part of a frame's time that detail in depth adds: the smooth answer, and three pictures more in every multiplicative
+iteration. It is less where the fit to the clip takes longer."""
 
 START_SECONDS = 5.0
 """Seconds to start, to compile and to estimate the background."""
@@ -35,6 +39,12 @@ BYTES_A_VOXEL_ON_DISK = 8
 BYTES_A_VOXEL = 220
 """Bytes of memory at a run's peak, where smoke fills much of the box: the velocity solver's arrays beside two
 densities, three velocities and a projection a view (docs/experiments/memory-and-time.md)."""
+
+BYTES_A_VOXEL_OF_DETAIL = 75
+"""Bytes that detail in depth adds: projections and records of three pictures more, the smooth answer of two frames."""
+
+BYTES_A_PIXEL_OF_DETAIL = 4
+"""Bytes of a pixel of every frame on the turntable's screen, 16 bits that are held twice while they are gathered."""
 
 BASE_BYTES = 350 * 2**20
 """Bytes of memory for the interpreter, libraries, compiled kernels and decoded pictures."""
@@ -70,20 +80,27 @@ class Cost:
     disk: int
 
 
-def estimate_cost(domain: Domain, frames: int, quality: Quality, further_views: int = 0) -> Cost:
+def estimate_cost(domain: Domain, frames: int, settings: Settings, further_views: int = 0) -> Cost:
     """Estimate the cost of a run over so many frames; it takes up to a second."""
-    solves = frames * SOLVES_A_FRAME[quality] * (1 + SHARE_A_VIEW * further_views)
+    solves = frames * SOLVES_A_FRAME[settings.quality] * (1 + SHARE_A_VIEW * further_views)
+    if settings.detail > 0:
+        solves *= 1 + SHARE_OF_DETAIL
     return Cost(
         seconds=START_SECONDS + solves * _solve_seconds(domain.resolution),
-        memory=memory_needed(domain.resolution),
+        memory=memory_needed(domain.resolution, frames, settings),
         memory_free=memory_free(),
         disk=frames * math.prod(domain.resolution) * BYTES_A_VOXEL_ON_DISK,
     )
 
 
-def memory_needed(resolution: Resolution) -> int:
-    """Return the bytes that a run takes at its peak."""
-    return BASE_BYTES + BYTES_A_VOXEL * math.prod(resolution)
+def memory_needed(resolution: Resolution, frames: int, settings: Settings) -> int:
+    """Return the bytes that a run over so many frames takes at its peak."""
+    voxels = math.prod(resolution)
+    needed = BASE_BYTES + BYTES_A_VOXEL * voxels
+    if settings.detail > 0:
+        x, y, z = resolution
+        needed += BYTES_A_VOXEL_OF_DETAIL * voxels + BYTES_A_PIXEL_OF_DETAIL * frames * math.ceil(math.hypot(x, y)) * z
+    return needed
 
 
 def memory_free() -> int:
@@ -91,8 +108,8 @@ def memory_free() -> int:
     return int(psutil.virtual_memory().available)
 
 
-def require_memory(domain: Domain) -> None:
-    """Check that a domain's grid fits into the memory that is free.
+def require_memory(domain: Domain, frames: int, settings: Settings) -> None:
+    """Check that a run over so many frames fits into the memory that is free.
 
     Raises
     ------
@@ -100,11 +117,11 @@ def require_memory(domain: Domain) -> None:
         With the largest resolution of the same shape that fits.
     """
     free = memory_free()
-    needed = memory_needed(domain.resolution)
+    needed = memory_needed(domain.resolution, frames, settings)
     if needed <= free:
         return
     shape = " x ".join(map(str, domain.resolution))
-    fits = _largest(domain.resolution, free)
+    fits = _largest(domain.resolution, lambda smaller: memory_needed(smaller, frames, settings) <= free)
     advice = (
         f"the largest that fits is --resolution {','.join(map(str, fits))}"
         if fits
@@ -115,12 +132,12 @@ def require_memory(domain: Domain) -> None:
     )
 
 
-def _largest(resolution: Resolution, free: int) -> Resolution | None:
+def _largest(resolution: Resolution, fits: Callable[[Resolution], bool]) -> Resolution | None:
     """Return the largest resolution that fits, of the same proportions so that voxels stay cubes."""
     common = math.gcd(*resolution)
     x, y, z = (n // common for n in resolution)
     candidates = ((x * times, y * times, z * times) for times in range(common - 1, 0, -1))
-    return next((c for c in candidates if memory_needed(c) <= free and min(c) >= LEAST_VOXELS), None)
+    return next((c for c in candidates if min(c) >= LEAST_VOXELS and fits(c)), None)
 
 
 def _solve_seconds(resolution: Resolution) -> float:

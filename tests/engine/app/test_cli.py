@@ -19,6 +19,9 @@ from command_line import ENVIRONMENT, MODULE, QUICK, command, events, names, ref
 from smokelift.app import cost
 from smokelift.output.sequence import Sequence
 from smokelift.render import device
+from smokelift.setup.settings import Settings
+
+DRAFT = Settings.preset("draft")
 
 
 def test_a_gpu_that_is_not_there(shot, tmp_path) -> None:
@@ -49,13 +52,13 @@ def test_a_grid_too_large_for_the_memory(plume, tmp_path, capsys) -> None:
     named = re.search(r"--resolution (\d+),(\d+),(\d+)", sentence)
     assert named
     x, y, z = (int(count) for count in named.groups())
-    assert cost.memory_needed((x, y, z)) < 1.1 * cost.psutil.virtual_memory().available + 2**30
+    assert cost.memory_needed((x, y, z), 3, DRAFT) < 1.1 * cost.psutil.virtual_memory().available + 2**30
     assert not (tmp_path / "out").exists()
 
 
 def test_the_named_resolution_is_accepted(shot, tmp_path, capsys, monkeypatch) -> None:
     """Whoever follows the advice on a calibrated domain gets a sequence."""
-    little = SimpleNamespace(available=cost.memory_needed((23, 23, 31)))
+    little = SimpleNamespace(available=cost.memory_needed((23, 23, 31), 3, DRAFT))
     monkeypatch.setattr(cost.psutil, "virtual_memory", lambda: little)
     sentence = refused(capsys, "reconstruct", shot, "--out", tmp_path / "out", "--npz", *QUICK, status=3)
     named = re.search(r"--resolution (\S+?)\.?$", sentence)

@@ -11,7 +11,11 @@ import pytest
 from smokelift.app import cost
 from smokelift.app.cost import NotEnoughMemoryError, estimate_cost, memory_needed, require_memory
 from smokelift.scene import Domain
+from smokelift.setup.settings import Settings
 
+DETAILED = Settings.preset()
+SMOOTH = replace(DETAILED, detail=0.0)
+FRAMES = 24
 DOMAINS = {
     "cube": Domain((-1, -1, 0), (1, 1, 2), (128, 128, 128)),
     "paper": Domain((-1, -1, 0), (1, 1, 3), (128, 128, 192)),
@@ -26,7 +30,7 @@ def free(monkeypatch: pytest.MonkeyPatch, gigabytes: float) -> None:
 
 def suggestion(domain: Domain) -> tuple[int, int, int]:
     with pytest.raises(NotEnoughMemoryError) as caught:
-        require_memory(domain)
+        require_memory(domain, FRAMES, DETAILED)
     found = re.search(r"--resolution (\d+),(\d+),(\d+)", str(caught.value))
     assert found
     x, y, z = (int(count) for count in found.groups())
@@ -35,14 +39,15 @@ def suggestion(domain: Domain) -> tuple[int, int, int]:
 
 def test_more_voxels_need_more() -> None:
     """Eight times the voxels need up to eight times the memory, and nothing is free."""
-    assert memory_needed((8, 8, 8)) > 0
-    assert 4 * memory_needed((128, 128, 128)) < memory_needed((256, 256, 256)) < 8 * memory_needed((128, 128, 128))
+    least, small, large = (memory_needed((n, n, n), FRAMES, SMOOTH) for n in (8, 128, 256))
+    assert least > 0
+    assert 4 * small < large < 8 * small
 
 
 def test_what_fits_is_accepted(monkeypatch) -> None:
     """No word if there is room."""
     free(monkeypatch, 64)
-    require_memory(DOMAINS["paper"])
+    require_memory(DOMAINS["paper"], FRAMES, DETAILED)
 
 
 @pytest.mark.parametrize("domain", DOMAINS.values(), ids=DOMAINS.keys())
@@ -51,7 +56,7 @@ def test_the_suggestion_fits(monkeypatch, domain, gigabytes) -> None:
     """The named resolution is accepted at once, and is smaller than what was refused."""
     free(monkeypatch, gigabytes)
     smaller = suggestion(domain)
-    assert memory_needed(smaller) <= gigabytes * 2**30
+    assert memory_needed(smaller, FRAMES, DETAILED) <= gigabytes * 2**30
     assert all(a < b for a, b in zip(smaller, domain.resolution, strict=True))
 
 
@@ -67,22 +72,31 @@ def test_the_sentence_says_how_much(monkeypatch) -> None:
     """What is wanted, what is needed and what is free."""
     free(monkeypatch, 0.7)
     with pytest.raises(MemoryError, match=r"128 x 128 x 192 voxels need about 1\.0 GiB .* 0\.7 GiB are free"):
-        require_memory(DOMAINS["paper"])
+        require_memory(DOMAINS["paper"], FRAMES, SMOOTH)
 
 
 def test_nothing_fits_is_said_too(monkeypatch) -> None:
     """With less memory than the bare program takes no resolution is promised to fit."""
     free(monkeypatch, 0.3)
     with pytest.raises(NotEnoughMemoryError) as caught:
-        require_memory(DOMAINS["cube"])
+        require_memory(DOMAINS["cube"], FRAMES, DETAILED)
     assert "the largest that fits" not in str(caught.value)
 
 
 def test_more_frames_views_and_voxels_cost_more() -> None:
-    """Time and disk follow them; memory follows the voxels only."""
-    base = estimate_cost(DOMAINS["cube"], 10, "balanced")
-    longer = estimate_cost(DOMAINS["cube"], 1000, "balanced")
+    """Time and disk follow them; without detail memory follows the voxels only."""
+    base = estimate_cost(DOMAINS["cube"], 10, SMOOTH)
+    longer = estimate_cost(DOMAINS["cube"], 1000, SMOOTH)
     assert longer.disk == 100 * base.disk == 1000 * 128**3 * 8
-    assert longer.memory == base.memory < estimate_cost(DOMAINS["paper"], 10, "balanced").memory
+    assert longer.memory == base.memory < estimate_cost(DOMAINS["paper"], 10, SMOOTH).memory
     assert longer.seconds > 10 * base.seconds
-    assert estimate_cost(DOMAINS["cube"], 1000, "balanced", further_views=20).seconds > 2 * longer.seconds
+    assert estimate_cost(DOMAINS["cube"], 1000, SMOOTH, further_views=20).seconds > 2 * longer.seconds
+
+
+def test_detail_costs_time_and_memory(monkeypatch) -> None:
+    """Memory for every frame, since it comes from all of them; nothing on disk."""
+    monkeypatch.setattr(cost, "_solve_seconds", lambda resolution: 0.01)
+    smooth, detailed = (estimate_cost(DOMAINS["cube"], 1000, settings) for settings in (SMOOTH, DETAILED))
+    assert 1.3 * smooth.seconds < detailed.seconds < 2 * smooth.seconds
+    assert smooth.memory < memory_needed((128, 128, 128), 10, DETAILED) < detailed.memory
+    assert detailed.disk == smooth.disk

@@ -41,7 +41,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         *made_up(shot),
     ):
         say.note(note)
-    cost = estimate_cost(domain, frames, settings.quality, len(shot.views) - 1)
+    cost = estimate_cost(domain, frames, settings, len(shot.views) - 1)
     voxels = " x ".join(map(str, domain.resolution))
     say.finish(
         f"{frames} frames of {voxels} voxels: about {cost.seconds:.0f} s, {cost.memory / 2**30:.1f} GiB of memory "

@@ -46,7 +46,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     device.start(options.device)
     with Clip.open(source) as clip:
         shot = prepare_shot(clip, scene, settings)
-        require_memory(shot.scene.domain)
+        require_memory(shot.scene.domain, len(clip), settings)
         for note in (*shot.notes, *(choice.reason for choice in shot.choices), *made_up(shot)):
             say.note(note)
         frames = reconstruct(clip, scene, settings, options.out, npz=options.npz, resume=options.resume, shot=shot)
