@@ -12,7 +12,7 @@ sides the front's statistics.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,6 +26,7 @@ from smokelift.density.multiplicative import fit_multiplicative
 from smokelift.density.objective import camera_terms
 from smokelift.density.observation import ObservedClip, View, ViewSet, eight_bit_plate
 from smokelift.density.row_shape import Array
+from smokelift.density.turntable import Turntable
 from smokelift.render import Optics, Volume
 from smokelift.scene import Camera, Medium
 
@@ -120,10 +121,7 @@ class BorrowedMoments:
 
     def _sides(self, moments: Moments, smooth: Volume, views: ViewSet) -> Iterator[ImposedView]:
         """Borrowed pictures of the sides that no camera is near to."""
-        seen_from = [moments.turntable.degrees(view.camera) for view in views.views]
-        for side in varied_sides(self.seed):
-            if any(_apart(side.degrees, other) < NEAR for other in seen_from):
-                continue
+        for side in unseen_sides(moments.turntable, [view.camera for view in views.views], self.seed):
             camera = moments.turntable.camera(side.degrees)
             seen = _optical_depth(smooth, camera, views)
             lent = moments.apart(views.frame, round(side.apart * moments.offset))
@@ -145,6 +143,12 @@ def varied_sides(seed: int) -> list[BorrowedSide]:
         replace(side, degrees=side.degrees + turn, apart=side.apart * nearer, mirrored=bool(seed >> number & 1))
         for number, side in enumerate(SIDES)
     ]
+
+
+def unseen_sides(turntable: Turntable, cameras: Sequence[Camera], seed: int) -> list[BorrowedSide]:
+    """Return the sides that no camera is near to."""
+    seen_from = [turntable.degrees(camera) for camera in cameras]
+    return [side for side in varied_sides(seed) if all(_apart(side.degrees, other) >= NEAR for other in seen_from)]
 
 
 def _apart(a: float, b: float) -> float:

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
+from smokelift.density.borrowed_moments import unseen_sides
+from smokelift.density.turntable import Turntable
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
 
@@ -57,13 +59,13 @@ def provenance(shot: Shot) -> tuple[Provenance, ...]:
         ),
         Provenance("distribution along the rays", "assumed", _assumed(settings, cameras)),
     ]
-    if settings.detail > 0:
+    if settings.detail > 0 and _unseen(shot):
         told.append(
             Provenance(
                 "fine structure along the rays",
                 "made up",
-                "No camera shows the smoke's fine structure in depth: it is borrowed from other moments of the clip. "
-                "Another seed borrows differently, detail 0 not at all.",
+                f"The detail of sides that no camera is near to is borrowed from {_lender(shot)}. Another seed borrows "
+                "differently, detail 0 not at all.",
                 {"detail": settings.detail, "seed": settings.seed},
             )
         )
@@ -83,6 +85,17 @@ def _assumed(settings: Settings, cameras: int) -> str:
     if paper:
         return "One camera does not show it: its picture is taken to be the view from 90 degrees as well."
     return "One camera does not show it: the smoke is taken to be as deep as it is wide."
+
+
+def _unseen(shot: Shot) -> bool:
+    """Whether the depth prior has anything to borrow for: a side that no camera is near to."""
+    cameras = [view.working.camera for view in shot.views]
+    turntable = Turntable.before(cameras[0], shot.optics.domain)
+    return bool(unseen_sides(turntable, cameras, shot.settings.seed))
+
+
+def _lender(shot: Shot) -> str:
+    return "other moments of the clip" if shot.length > 1 else "the clip's only picture"
 
 
 def _cameras(count: int) -> str:
