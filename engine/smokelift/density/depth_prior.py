@@ -33,8 +33,8 @@ LEAST_SHAPE = 0.05
 class ImposedView:
     """A picture that no camera took: a soft observation, which shapes the density and yields to the cameras' pictures.
 
-    It has a turn before theirs in every multiplicative iteration, and none in the descent that follows. (The paper's
-    fit takes it for another camera's.)
+    It has a turn before theirs in the first multiplicative iterations of `GradientFit`, and none after these. (The
+    paper's fit takes it for another camera's.)
 
     Attributes
     ----------

@@ -1,8 +1,8 @@
 """Density from pictures (algorithm 3): views and a scene's optics in, a volume that renders to the pictures out.
 
 A depth prior gives the start, and pictures of sides that no camera sees. `multiplicative` scales the start ray by ray
-until it is nearly right, towards those pictures as well. From there `descent` follows the exact gradient of the
-cameras' pictures alone.
+until it is nearly right, at first towards those pictures as well. From there `descent` follows the exact gradient of
+the cameras' pictures alone.
 """
 
 from __future__ import annotations
