@@ -26,9 +26,9 @@ SOLVES_A_FRAME: Mapping[Quality, float] = {"draft": 65.0, "balanced": 70.0, "fin
 SHARE_A_VIEW = 0.5
 """Part of a frame's time that each further view adds."""
 
-SHARE_OF_DETAIL = 0.7
-"""Part of a frame's time that detail in depth adds: the smooth answer, and three pictures more in every multiplicative
-iteration. It is less where the fit to the clip takes longer."""
+SHARE_OF_DETAIL = 0.8
+"""Part of a frame's time that detail in depth adds: the smooth answer, and three pictures more in most multiplicative
+iterations. It is less where the fit to the clip takes longer."""
 
 START_SECONDS = 5.0
 """Seconds to start, to compile and to estimate the background."""
