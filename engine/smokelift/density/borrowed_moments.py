@@ -113,11 +113,13 @@ class BorrowedMoments:
             return estimate
         start = np.where(views.hull, estimate.density, 0).astype(np.float32)
         smooth = fit_multiplicative(camera_terms(views, estimate.inside), start, SMOOTH_ITERATIONS, 0.02).density
-        imposed = self._sides(self.moments, smooth, views)
+        imposed = tuple(self._sides(self.moments, smooth, views))
+        if not imposed:
+            return estimate
         around = AROUND * min(1.0, 2 * self.detail)
         spread = (1 - around) * smooth + around * ndimage.gaussian_filter(smooth, SPREAD)
         density = np.where(views.hull, spread, 0).astype(np.float32)
-        return replace(estimate, density=density, imposed=tuple(imposed), smooth=smooth)
+        return replace(estimate, density=density, imposed=imposed, smooth=smooth)
 
     def _sides(self, moments: Moments, smooth: Volume, views: ViewSet) -> Iterator[ImposedView]:
         """Borrowed pictures of the sides that no camera is near to."""
