@@ -56,7 +56,7 @@ class Centre:
     trust
         Factor t of the prediction, 0 to 1.
     dissipation
-        Share of the smoke that dissolves in a frame; below zero where all of it gets denser.
+        Share of the smoke that dissolves in a frame, at most 1; below zero where all of it gets denser.
     momentum : (1 or 4, 3)
         Voxels a frame at density 1: constant, and along x, y, z, for each component.
     """
@@ -111,7 +111,7 @@ def fit_centre(
         columns.append(_core.directional_derivative(linear.direction, prediction.velocity.faces))
     products = _core.weighted_products([*columns, linear.carried, linear.offset], linear.weight)
     found, rest = _least_squares(products)
-    dissipation = float(found[-1])
+    dissipation = min(float(found[-1]), 1.0)  # where smoke vanishes the linearised change may ask for more than all
     if dissipation < 0 and prediction is None:
         kept = np.delete(np.arange(len(products)), -2)
         steady, without = _least_squares(products[np.ix_(kept, kept)])
