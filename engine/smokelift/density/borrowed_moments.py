@@ -79,6 +79,9 @@ ENDS = 3.0
 SMOOTH_ITERATIONS = 4
 """Multiplicative iterations for the smooth answer; its rows' amounts are what the borrowed pictures take over."""
 
+SMOOTH_TOLERANCE = 0.02
+"""Share of the objective that one of them has to gain for another to follow, as in the fit."""
+
 
 @dataclass(frozen=True, eq=False)
 class BorrowedMoments:
@@ -112,7 +115,9 @@ class BorrowedMoments:
         if self.moments is None or not views.hull.any():
             return estimate
         start = np.where(views.hull, estimate.density, 0).astype(np.float32)
-        smooth = fit_multiplicative(camera_terms(views, estimate.inside), start, SMOOTH_ITERATIONS, 0.02).density
+        smooth = fit_multiplicative(
+            camera_terms(views, estimate.inside), start, SMOOTH_ITERATIONS, SMOOTH_TOLERANCE
+        ).density
         imposed = tuple(self._sides(self.moments, smooth, views))
         if not imposed:
             return estimate

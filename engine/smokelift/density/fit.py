@@ -123,8 +123,9 @@ class GradientFit:
         iterations = settings.fit_iterations * len(cameras)
         done = 0
         if imposed:
-            shared = fit_multiplicative([*imposed, *cameras], start, 2 * iterations // 3, settings.tolerance)
-            start, done, iterations = shared.density, shared.iterations, iterations - 2 * iterations // 3
+            shared = 2 * iterations // 3
+            met = fit_multiplicative([*imposed, *cameras], start, shared, settings.tolerance)
+            start, done, iterations = met.density, met.iterations, iterations - shared
         scaled = fit_multiplicative(cameras, start, iterations, settings.tolerance)
         final = descend(
             cameras,

@@ -92,9 +92,12 @@ def upright_screen(amount: NDArray[np.float32], camera: Camera, domain: Domain, 
     ends = reach_up + reach_along / 2
     up = np.arange(-ends + h / (2 * per_voxel), ends, h / per_voxel)
     points = centre + across[None, :, None] * lateral + up[:, None, None] * height
+    return Screen(up, across, seen_at(points, amount, camera))
+
+
+def seen_at(points: NDArray[np.float64], picture: NDArray[np.float32], camera: Camera) -> NDArray[np.float64]:
+    """Return what a picture (rows, columns) shows at points (..., 3), in metres; zero outside and behind the camera."""
     pixels, distance = project(camera, points)
-    values = ndimage.map_coordinates(
-        amount.astype(np.float64), (pixels[..., 1] - 0.5, pixels[..., 0] - 0.5), order=1, mode="constant"
-    )
-    values[distance <= 0] = 0
-    return Screen(up, across, values)
+    at = pixels[..., 1] - 0.5, pixels[..., 0] - 0.5
+    values = ndimage.map_coordinates(picture.astype(np.float64), at, order=1, mode="constant")
+    return np.where(distance > 0, values, 0.0)

@@ -6,12 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from smokelift.density.row_shape import Array
-from smokelift.density.screen import view_frame
+from smokelift.density.screen import seen_at, view_frame
 from smokelift.scene import Camera, Domain, as_matrix
-from smokelift.scene.projection import project
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +67,4 @@ class Turntable:
         side = (np.arange(columns) + 0.5 - columns / 2) * h
         up = (rows / 2 - np.arange(rows) - 0.5) * h
         points = np.array(self.domain.centre) + side[None, :, None] * self.lateral + up[:, None, None] * self.height
-        pixels, distance = project(camera, points)
-        at = pixels[..., 1] - 0.5, pixels[..., 0] - 0.5
-        placed = ndimage.map_coordinates(picture.astype(np.float64), at, order=1, mode="constant")
-        return np.where(distance > 0, placed, 0.0)
+        return seen_at(points, picture, camera)

@@ -310,6 +310,32 @@ def test_with_nothing_carried_along_a_frame_is_that_of_its_pictures(two_views, d
     np.testing.assert_array_equal(frames[2].density, alone.values)
 
 
+def test_detail_that_is_made_up_shows_no_motion(plume, draft) -> None:
+    """The first velocity is that between the densities without it, to the bit."""
+    settings = replace(draft, transport=0.0)
+    frames = frames_of(plume.scene, settings)
+    with Clip.open(plume.scene.clip) as clip:
+        shot = prepare_shot(clip, plume.scene, settings)
+    estimator, domain = compose(shot.settings).velocity_estimator, shot.optics.domain
+
+    def velocity(before: np.ndarray, after: np.ndarray) -> Velocity:
+        dt = 1 / plume.scene.clip.fps
+        return estimator.estimate(
+            before,
+            after,
+            dt,
+            domain.voxel_size,
+            closed=shot.scene.closed,
+            inflow=shot.scene.inflow(),
+            prediction=None,
+        )
+
+    first, second = frames[:2]
+    assert first.smooth is not None and second.smooth is not None
+    np.testing.assert_array_equal(second.velocity.centres(), velocity(first.smooth, second.smooth).centres())
+    assert not np.array_equal(second.velocity.centres(), velocity(first.density, second.density).centres())
+
+
 def test_smoke_from_a_moving_camera_stands_where_it_stood(plume, tracked, draft, tmp_path) -> None:
     """The pictures are met, the smoke is in its place to half a voxel; a still camera's would drift off."""
     still = replace(tracked, camera=tracked.camera.at(0))
