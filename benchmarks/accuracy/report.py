@@ -22,7 +22,11 @@ Row = dict[str, Any]
 Column = tuple[str, list[str], str]
 """Heading, the figures that share the column, and their format."""
 
-_COST: list[Column] = [("s a frame", ["seconds"], ".2f"), ("solves", ["solves"], ".0f"), ("MiB", ["memory_mib"], ".0f")]
+_COST: list[Column] = [
+    ("processor s a frame", ["seconds"], ".2f"),
+    ("solves", ["solves"], ".0f"),
+    ("MiB", ["memory_mib"], ".0f"),
+]
 
 
 def table_columns(known: KnownScene) -> list[list[Column]]:

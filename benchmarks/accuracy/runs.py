@@ -5,6 +5,7 @@ A name is a quality or "paper", then further views, then changes:
 - ``balanced``, ``paper``
 - ``balanced+90``, ``balanced+90+45``: the views 90 and 45 are input too; of a capture ``balanced+camera00``
 - ``balanced:transport=0``, ``fine:velocity.levels=2``, ``draft:resolution=32x32x48``: settings that differ
+- ``fine:resolution=auto``: as many voxels as the clip's detail deserves and the quality allows
 - ``balanced:velocity.solver=primal-dual``: the other solver
 - ``balanced:detail=0``, ``balanced:seed=1``: the smooth answer; another plausible one
 - ``balanced:without=depth``: a part of the method is left out, see `ablations.leave_out`
@@ -19,7 +20,7 @@ import json
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, Literal, get_args
 
 from benchmarks.accuracy.ablations import leave_out, smear
 from benchmarks.accuracy.scenes import VIEWS, BakedViews, camera_of
@@ -96,8 +97,7 @@ def run_settings(run: str) -> Settings:
         if key == "without":
             continue
         if key == "resolution":
-            x, y, z = (int(count) for count in text.split("x"))
-            settings = replace(settings, resolution=(x, y, z))
+            settings = replace(settings, resolution=_resolution(text))
         else:
             settings = _changed(settings, key, text)
     return settings
@@ -128,6 +128,14 @@ def _changes(run: str) -> list[tuple[str, str]]:
     """Return the keys and values behind the colon of a run's name."""
     pairs = [change.partition("=") for change in run.partition(":")[2].split(",") if change]
     return [(key, text) for key, _, text in pairs]
+
+
+def _resolution(text: str) -> tuple[int, int, int] | Literal["auto"]:
+    """Return the voxels that "64x64x96" says; "auto" is chosen by the clip."""
+    if text == "auto":
+        return "auto"
+    x, y, z = (int(count) for count in text.split("x"))
+    return x, y, z
 
 
 def _changed(settings: Settings, key: str, text: str) -> Settings:

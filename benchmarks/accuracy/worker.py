@@ -4,7 +4,8 @@
 
 reads the clip's frames FIRST to LAST (and those of further views that RUN names). It writes OUT/0001.npz, ... (density,
 and the velocity at voxel centres in m/s if the run has one), OUT/scene.toml with what was estimated, and OUT/run.json.
-Only the reconstruction is timed, from decoding the clip to OpenVDB files on disk, not the writing of the arrays.
+Only the reconstruction is timed, from decoding the clip to OpenVDB files on disk, not the writing of the arrays. Times
+are the processor's, over all cores, so that other work on the machine changes none.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from __future__ import annotations
 import json
 import sys
 import tempfile
+import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -47,7 +49,7 @@ def main() -> None:
             )
             found = ({"density": frame.density, "velocity": frame.velocity.centres()} for frame in frames)
         shape = shot.scene.domain.resolution
-        times = FrameTimes(shape)
+        times = FrameTimes(shape, time.process_time)
         for number, arrays in enumerate(times.over(found), 1):
             np.savez(out / f"{number:04d}.npz", **arrays)
     result = {

@@ -37,6 +37,7 @@ def test_a_name_says_quality_views_and_changes():
     assert run_views(run) == ["90", "45"]
     assert (settings.quality, settings.transport, settings.velocity.levels) == ("draft", 0.2, 2)
     assert settings.resolution == (8, 9, 10)
+    assert run_settings("fine:resolution=auto").resolution == "auto"
     assert run_settings("paper").method == "paper"
     smooth = run_settings("draft:detail=0,seed=3")
     assert (smooth.detail, smooth.seed, settings.detail) == (0, 3, 1)

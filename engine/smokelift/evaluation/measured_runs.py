@@ -12,9 +12,16 @@ import numpy as np
 ERRORS = {
     "input_error": "error of the input view (RMS of sRGB values, white is 1)",
     "view_error": "error of new views (RMS of sRGB values, white is 1)",
+    "spectrum_error": "spectrum of new views against the truth's (RMS of four octaves, dB)",
     "density_error": "error of the density (relative L2)",
     "velocity_error": "error of the velocity in smoke (relative L2)",
 }
+
+DEFAULT = "balanced"
+"""The quality that a run has unless another is asked for."""
+
+_CHOSEN = "resolution=auto"
+"""Says in a run's name that its grid was chosen by the clip, as it is where a user says nothing."""
 
 _NEEDED = ("scene", "run", "method", "frames", "seconds", "psnr_new", "density_error", "velocity_error")
 _SAID = ("machine", "date")
@@ -36,7 +43,7 @@ class Run:
     resolution
         "64x64x96"; empty for a baseline that has none.
     seconds
-        A frame; None for a baseline that nothing was computed for.
+        Of the processor a frame; None for a baseline that nothing was computed for.
     errors
         By the names of `ERRORS`; what was not measured is missing.
     """
@@ -53,12 +60,28 @@ class Run:
         return self.name.partition(":")[0]
 
     @property
-    def changes(self) -> str:
-        """What was changed besides the resolution, "coarsening=0" for "velocity.coarsening=0"."""
-        changes = self.name.partition(":")[2].split(",")
-        return ", ".join(
-            change.rpartition(".")[2] for change in changes if change and not change.startswith("resolution=")
-        )
+    def changes(self) -> dict[str, str]:
+        """What was changed besides the resolution, and to what: "coarsening" to "0" by "velocity.coarsening=0"."""
+        said = (change.partition("=") for change in self._said if change)
+        return {key.rpartition(".")[2]: value for key, _, value in said if key != "resolution"}
+
+    @property
+    def chosen(self) -> bool:
+        """Whether its grid was chosen by each clip, which is all that was said about it."""
+        return self._said == [_CHOSEN]
+
+    @property
+    def label(self) -> str:
+        """What tells it from the others of its series: its changes, its name, or the voxels along its longest side."""
+        if self.changes:
+            return ", ".join(f"{key} {value}" for key, value in self.changes.items())
+        if self.chosen or not self.resolution:
+            return self.series
+        return str(max(int(count) for count in self.resolution.split("x")))
+
+    @property
+    def _said(self) -> list[str]:
+        return self.name.partition(":")[2].split(",")
 
 
 @dataclass(frozen=True)
@@ -75,6 +98,12 @@ class Runs:
 
     runs: tuple[Run, ...]
     caption: str
+
+    @property
+    def default(self) -> Run | None:
+        """What a user gets who says nothing but the clip, else the default quality on a given grid."""
+        by_name = {run.name: run for run in self.runs}
+        return by_name.get(f"{DEFAULT}:{_CHOSEN}", by_name.get(DEFAULT))
 
 
 def read_runs(path: Path) -> Runs:
@@ -121,6 +150,8 @@ def _mean(path: Path, name: str, rows: list[dict[str, str]], decibels: dict[str,
         return float(np.mean(values)) if len(values) == len(rows) and np.isfinite(values).all() else None
 
     errors = {"density_error": mean("density_error"), "velocity_error": mean("velocity_error")}
+    if "spectrum_distance_new" in rows[0]:
+        errors["spectrum_error"] = mean("spectrum_distance_new")
     for key, column in decibels.items():
         if (value := mean(column)) is not None:
             errors[key] = 10 ** (-value / 20)

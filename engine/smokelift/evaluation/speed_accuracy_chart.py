@@ -1,16 +1,43 @@
-"""Speed against accuracy: seconds a frame against four errors, from the figures of `python -m benchmarks.accuracy`."""
+"""Speed against accuracy: time, errors and realism, from the figures of `python -m benchmarks.accuracy`."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from smokelift.evaluation.label_placement import place_labels
 from smokelift.evaluation.measured_runs import ERRORS, Run, Runs
 from smokelift.output.atomic import atomic_path
+
+SECONDS = "seconds"
+
+PANELS = (
+    (SECONDS, "input_error"),
+    (SECONDS, "view_error"),
+    (SECONDS, "spectrum_error"),
+    ("view_error", "spectrum_error"),
+    (SECONDS, "density_error"),
+    (SECONDS, "velocity_error"),
+)
+"""What is across and what is up: every error against time, and how like smoke a side looks against how right it is."""
+
+NAMES = {SECONDS: "processor seconds a frame", **ERRORS}
+
+LEADER = 18.0
+"""Pixels between a point and its label from which on a line joins them."""
+
+MARGIN = 2.0
+"""Pixels between two labels at least, on either side."""
+
+EDGE = 40.0
+"""Pixels from the right edge at which a level that has no time gets its label."""
+
+DPI = 130
 
 
 def pareto_front(points: Sequence[tuple[float, float]]) -> list[int]:
@@ -23,7 +50,7 @@ def pareto_front(points: Sequence[tuple[float, float]]) -> list[int]:
 
 
 def draw(runs: Runs, path: Path) -> None:
-    """Write the chart as a PNG: a panel for each error, log axes, the Pareto front marked.
+    """Write the chart as a PNG.
 
     Raises
     ------
@@ -32,71 +59,124 @@ def draw(runs: Runs, path: Path) -> None:
     """
     if path.suffix.lower() != ".png":
         raise ValueError(f"{path}: the chart is written as .png.")
-    shown = [key for key in ERRORS if any(run.seconds is not None and key in run.errors for run in runs.runs)]
-    if not shown:
+    figure = chart(runs)
+    with atomic_path(path) as aside:
+        figure.savefig(aside, format="png")
+
+
+def chart(runs: Runs) -> Any:
+    """Return the chart as a matplotlib figure: log axes, the Pareto fronts, the default, and the curve of the detail.
+
+    Raises
+    ------
+    ValueError
+        If matplotlib is not installed, or no run has both a time and an error.
+    """
+    shown = [panel for panel in PANELS if any(_at(run, panel) is not None for run in runs.runs)]
+    if not any(across == SECONDS for across, _ in shown):
         raise ValueError("No run has both a time and an error; there is nothing to draw.")
     try:
         from matplotlib.figure import Figure
     except ImportError:
         raise ValueError("smokelift chart needs matplotlib: pip install matplotlib.") from None
-    across = min(len(shown), 2)
-    down = -(-len(shown) // across)
-    figure = Figure(figsize=(6.5 * across, 5.2 * down), layout="constrained")
-    series = dict.fromkeys(run.series for run in runs.runs)
-    colours = {name: f"C{index}" for index, name in enumerate(series)}
-    panels = np.atleast_1d(figure.subplots(down, across)).ravel()
-    for axes, key in zip(panels, shown, strict=False):
-        _panel(axes, [run for run in runs.runs if key in run.errors], key, colours)
+    columns = min(len(shown), 2)
+    rows = -(-len(shown) // columns)
+    figure = Figure(figsize=(6.5 * columns, 5.2 * rows), dpi=DPI, layout="constrained")
+    colours = {name: f"C{index}" for index, name in enumerate(dict.fromkeys(run.series for run in runs.runs))}
+    panels = np.atleast_1d(figure.subplots(rows, columns)).ravel()
+    for axes, panel in zip(panels, shown, strict=False):
+        _panel(axes, runs, panel, colours)
     for axes in panels[len(shown) :]:
         axes.set_axis_off()
     handles = {name: handle for axes in panels for handle, name in zip(*axes.get_legend_handles_labels(), strict=True)}
     figure.legend(handles.values(), handles, loc="outside upper center", ncols=len(handles), fontsize=9, frameon=False)
     figure.supxlabel(runs.caption, fontsize=7)
-    with atomic_path(path) as aside:
-        figure.savefig(aside, dpi=130, format="png")
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")  # places in pixels hold from here on
+    for axes, panel in zip(panels, shown, strict=False):
+        _label(axes, runs, panel)
+    return figure
 
 
-def _panel(axes: Any, runs: list[Run], key: str, colours: dict[str, str]) -> None:
-    timed = [(run, run.seconds, run.errors[key]) for run in runs if run.seconds is not None]
-    front = pareto_front([(seconds, error) for _, seconds, error in timed])
+def _at(run: Run, panel: tuple[str, str]) -> tuple[float, float] | None:
+    """Where a run stands in a panel; None if one of the two was not measured."""
+    across, up = (run.seconds if key == SECONDS else run.errors.get(key) for key in panel)
+    return None if across is None or up is None else (across, up)
+
+
+def _panel(axes: Any, runs: Runs, panel: tuple[str, str], colours: dict[str, str]) -> None:
+    placed = [(run, at) for run in runs.runs if (at := _at(run, panel)) is not None]
+    points = [at for _, at in placed]
+    front = [points[index] for index in pareto_front(points)]
     axes.plot(
-        [timed[i][1] for i in front],
-        [timed[i][2] for i in front],
-        color="black", linewidth=1, marker="o", markersize=11, fillstyle="none", label="Pareto front",
+        *zip(*front, strict=True),
+        color="black", linewidth=1, marker="o", markersize=12, fillstyle="none", label="Pareto front",
     )  # fmt: skip
-    for name in dict.fromkeys(run.series for run, _, _ in timed):
-        plain = sorted((seconds, error) for run, seconds, error in timed if run.series == name and not run.changes)
-        changed = [(seconds, error) for run, seconds, error in timed if run.series == name and run.changes]
-        if plain:
-            axes.plot(*zip(*plain, strict=True), color=colours[name], marker="o", linewidth=0.8, label=name)
-        if changed:
-            axes.plot(*zip(*changed, strict=True), color=colours[name], marker="D", fillstyle="none", linestyle="none")
-    times = [seconds for _, seconds, _ in timed]
-    late = min(times) ** (1 / 3) * max(times) ** (2 / 3)
-    for text, seconds, error in _labels(timed):
-        aside, side = ((-7, 5), "right") if seconds > late else ((7, 5), "left")
-        axes.annotate(text, (seconds, error), aside, textcoords="offset points", fontsize=7, ha=side)
-    for run in runs:
-        if run.seconds is None:
-            axes.axhline(run.errors[key], color=colours[run.series], linestyle="--", linewidth=1)
-            whole_width = axes.get_yaxis_transform()
-            axes.text(0.99, run.errors[key], run.name, fontsize=8, ha="right", va="bottom", transform=whole_width)
-    axes.set(xscale="log", yscale="log", xlabel="seconds a frame", title=ERRORS[key])
-    axes.title.set_fontsize(9)
-    _readable(axes.xaxis, times, room=1.5)
-    _readable(axes.yaxis, [run.errors[key] for run in runs], room=1.3)
+    for name in dict.fromkeys(run.series for run, _ in placed):
+        of_series = [(run, at) for run, at in placed if run.series == name]
+        given = sorted(at for run, at in of_series if not run.changes and not run.chosen)
+        detail = sorted((float(run.changes["detail"]), at) for run, at in of_series if [*run.changes] == ["detail"])
+        curve = [at for _, at in detail] + [at for run, at in of_series if run.name == name and detail]
+        for line, style in ((given, {"marker": "o"}), (curve, {"linestyle": "--"})):
+            if line:
+                axes.plot(*zip(*line, strict=True), color=colours[name], linewidth=0.8, **style)
+        for run, at in of_series:
+            if run.changes or run.chosen:
+                axes.plot(*at, color=colours[name], marker="s" if run.chosen else "D", fillstyle="none")
+        axes.plot([], [], color=colours[name], marker="o", label=name)
+    if runs.default is not None and (at := _at(runs.default, panel)) is not None:
+        axes.plot(*at, color="gold", marker="*", markersize=17, markeredgecolor="black", linestyle="none",
+                  zorder=1, label="default")  # fmt: skip
+    across, up = panel
+    levels = [(run, run.errors[up]) for run in runs.runs if up in run.errors and _at(run, panel) is None]
+    for run, level in levels:
+        axes.axhline(level, color=colours[run.series], linestyle="--", linewidth=1)
+    axes.set(xscale="log", yscale="log", xlabel=NAMES[across], ylabel=NAMES[up])
+    axes.xaxis.label.set_fontsize(9)
+    axes.yaxis.label.set_fontsize(9)
+    _readable(axes.xaxis, [x for x, _ in points], room=1.5)
+    _readable(axes.yaxis, [*(y for _, y in points), *(level for _, level in levels)], room=1.3)
     axes.grid(alpha=0.3, which="both")
 
 
-def _labels(timed: list[tuple[Run, float, float]]) -> list[tuple[str, float, float]]:
-    """What is written beside which point: every change, and every resolution of a method once, at its slowest run."""
-    labels = [(run.changes, seconds, error) for run, seconds, error in timed if run.changes]
-    slowest: dict[tuple[str, str], tuple[str, float, float]] = {}
-    for run, seconds, error in timed:
-        beside = (run.method, run.resolution)
-        if not run.changes and (beside not in slowest or seconds > slowest[beside][1]):
-            slowest[beside] = (run.resolution, seconds, error)
-    return [*labels, *slowest.values()]
+def _label(axes: Any, runs: Runs, panel: tuple[str, str]) -> None:
+    """Write beside every point what it is, where it hides no other label and as few lines as can be."""
+    from matplotlib.transforms import IdentityTransform
+
+    pixels = IdentityTransform()
+    window = axes.get_window_extent()
+    points, texts = [], []
+    for run in runs.runs:
+        if (at := _at(run, panel)) is not None:
+            points.append(axes.transData.transform(at))
+        elif panel[1] in run.errors:  # its level is a line
+            points.append((window.x1 - EDGE, axes.transData.transform((1, run.errors[panel[1]]))[1]))
+        else:
+            continue
+        texts.append(axes.text(0, 0, run.label, fontsize=8, va="bottom", transform=pixels))
+    extents = [text.get_window_extent() for text in texts]
+    sizes = np.array([[extent.width, extent.height] for extent in extents]) + 2 * MARGIN
+    bounds = np.array([window.x0, window.y0, window.x1, window.y1])
+    corners = place_labels(np.array(points), sizes, _drawn(axes), bounds)
+    for text, point, corner, size in zip(texts, points, corners, sizes, strict=True):
+        text.set_position(corner + MARGIN)
+        end = np.clip(point, corner, corner + size)
+        if np.linalg.norm(end - point) > LEADER:
+            axes.plot(*zip(point, end, strict=True), color="black", linewidth=0.4, transform=pixels)
+
+
+def _drawn(axes: Any) -> Any:
+    """Boxes (boxes, 4) of some pixels along every line of a panel, its markers among them."""
+    step, half = 6.0, 4.0
+    found = []
+    for line in axes.lines:
+        path = line.get_transform().transform(np.column_stack(line.get_data()).astype(float))
+        for start, end in pairwise(path):
+            count = int(np.linalg.norm(end - start) / step) + 1
+            found.append(start + np.linspace(0, 1, count)[:, None] * (end - start))
+        found.append(path)
+    middles = np.concatenate(found) if found else np.zeros((0, 2))
+    return np.concatenate([middles - half, middles + half], axis=-1)
 
 
 def _readable(axis: Any, values: list[float], room: float) -> None:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import sys
+from itertools import combinations
 from pathlib import Path
 
 import pytest
 
+from smokelift import Settings
 from smokelift.app.cli import main
-from smokelift.evaluation.measured_runs import Run, read_runs
-from smokelift.evaluation.speed_accuracy_chart import pareto_front
+from smokelift.evaluation.measured_runs import DEFAULT, Run, Runs, read_runs
+from smokelift.evaluation.speed_accuracy_chart import chart, pareto_front
 
 HEADER = "scene,run,method,frames,seconds,psnr_new,density_error,velocity_error,machine,date\n"
 ROWS = (
@@ -63,8 +65,43 @@ def test_the_input_view_counts_where_it_is_known(tmp_path) -> None:
 def test_a_run_says_what_was_changed() -> None:
     """Runs that differ in resolution alone belong together."""
     run = Run("fine:resolution=32x32x48,transport=0", "default", "32x32x48", 1.0, {})
-    assert (run.series, run.changes) == ("fine", "transport=0")
-    assert Run("fine:resolution=32x32x48", "default", "32x32x48", 1.0, {}).changes == ""
+    assert (run.series, run.changes, run.label) == ("fine", {"transport": "0"}, "transport 0")
+    grid = Run("fine:resolution=32x32x48", "default", "32x32x48", 1.0, {})
+    assert (grid.changes, grid.chosen, grid.label) == ({}, False, "48")
+    detail = Run("balanced:velocity.levels=2,detail=0.25", "default", "32x32x48", 1.0, {})
+    assert detail.changes == {"levels": "2", "detail": "0.25"}
+    chosen = Run("fine:resolution=auto", "default", "62x62x93", 1.0, {})
+    assert (chosen.changes, chosen.chosen, chosen.label) == ({}, True, "fine")
+
+
+def test_the_default_is_what_a_user_gets_who_says_nothing(tmp_path) -> None:
+    assert Settings().quality == DEFAULT
+    given = (HEADER + ROWS).replace("draft", "balanced")
+    assert read_runs(write(tmp_path)).default is None
+    assert read_runs(write(tmp_path, given)).default.name == "balanced"
+    chosen = ROWS.replace("draft", "balanced:resolution=auto").splitlines(keepends=True)[:2]
+    assert read_runs(write(tmp_path, given + "".join(chosen))).default.name == "balanced:resolution=auto"
+
+
+def test_no_label_lies_over_another_or_leaves_its_panel() -> None:
+    pytest.importorskip("matplotlib")
+    crowd = [f"{quality}:resolution={n}x{n}x{n}" for quality in ("draft", "balanced", "fine") for n in (32, 48, 64, 96)]
+    names = [*crowd, "balanced:resolution=auto", *(f"balanced:detail={share}" for share in (0, 0.25, 0.5, 0.75))]
+    error = dict.fromkeys(("view_error", "spectrum_error"), 0.07)
+    runs = [
+        Run(name, "default", "8x8x96", 1 + 0.02 * index, {key: value + 1e-4 * index for key, value in error.items()})
+        for index, name in enumerate(names)
+    ]
+    figure = chart(Runs((*runs, Run("billboard", "baseline", "", None, error)), "crowded"))
+    panels = [axes for axes in figure.axes if axes.axison]
+    assert len(panels) == 3
+    for axes in panels:
+        window = axes.get_window_extent()
+        boxes = [text.get_window_extent() for text in axes.texts]
+        assert len(boxes) == len(runs) + 1
+        assert not [1 for a, b in combinations(boxes, 2) if a.overlaps(b)]
+        assert all(window.x0 <= box.x0 and box.x1 <= window.x1 for box in boxes)
+        assert all(window.y0 <= box.y0 and box.y1 <= window.y1 for box in boxes)
 
 
 def test_only_scenes_that_all_share_count(tmp_path) -> None:
