@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.accuracy.blind import ANGLES, trial
+from benchmarks.accuracy.blind import FRAMES as TRIAL_FRAMES
 from benchmarks.accuracy.scenes import KnownScene
 from benchmarks.accuracy.score import BLACK, front_statistics, score
 from benchmarks.accuracy.sheets import ORBIT_ANGLES, STRIP_FRAMES, orbit_rows, strip_rows, write_rows
@@ -111,3 +113,15 @@ def test_orbits_and_strips_show_truth_and_runs_below_each_other(known, drawn_out
     assert side > front
     write_rows(tmp_path / "orbit.png", orbits, [])
     assert read_image(tmp_path / "orbit.png").shape[1] > len(ORBIT_ANGLES) * 24
+
+
+def test_a_blind_trial_shows_every_run_once_in_any_order(known, drawn_out) -> None:
+    orders = set()
+    for seed in range(4):
+        rows, order = trial(known, ["truth", drawn_out.name], drawn_out.parent, np.random.default_rng(seed))
+        assert sorted(order) == sorted(["truth", drawn_out.name])
+        assert [len(row) for row in rows] == [len(ANGLES) * TRIAL_FRAMES] * 2
+        lit = {run: (row[-1] > 8).mean() for run, row in zip(order, rows, strict=True)}
+        assert lit["truth"] < lit[drawn_out.name]  # from the side that is drawn out
+        orders.add(tuple(order))
+    assert len(orders) == 2
