@@ -4,12 +4,19 @@
 #include "compiler.h"
 #include "memory.h"
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 
 namespace smokelift {
 
 using Shape = std::array<int, 3>;
+
+// A place among indices, rounded towards zero: what is too low or NaN ends at `low`, what is too high at
+// `high`.
+SMOKELIFT_INLINE int index_within(double place, int low, int high) {
+    return static_cast<int>(std::min(std::max(double(low), place), double(high)));
+}
 
 inline std::size_t volume(const Shape &n) { return std::size_t(n[0]) * n[1] * n[2]; }
 

@@ -47,8 +47,8 @@ struct Cone : PointLight::Face {
     }
     // The voxels of a lateral axis that belong to this face, first and end.
     std::array<int, 2> owned(int lateral, int count, double distance) const {
-        int first = std::max(0, static_cast<int>(std::floor(light[lateral] - distance)));
-        int end = std::min(count, static_cast<int>(std::ceil(light[lateral] + distance)) + 1);
+        int first = index_within(std::floor(light[lateral] - distance), 0, count);
+        int end = index_within(std::ceil(light[lateral] + distance) + 1, 0, count);
         while (first < end && !owns(lateral, first, distance))
             ++first;
         while (first < end && !owns(lateral, end - 1, distance))
@@ -73,14 +73,15 @@ bool row_is_empty(const Spans &spans, const Cone &cone, int k, int i) {
 template <class Visit>
 SMOKELIFT_INLINE void along_row(const Cone &cone, double distance, const Visit &visit) {
     const double scale = distance / cone.far, light = cone.light_c();
-    const int first = std::max(cone.first_q, static_cast<int>(std::ceil((-1 - light) / scale)));
-    const int last = std::min(cone.first_q + cone.count_q - 1,
-                              static_cast<int>(std::floor((cone.count_c - light) / scale)));
+    const int low = cone.first_q, end = low + cone.count_q;
+    const int first = index_within(std::ceil((-1 - light) / scale), low, end);
+    const int last = index_within(std::floor((cone.count_c - light) / scale), low - 1, end - 1);
     for (int q = first; q <= last; ++q) {
         const double c = light + q * scale;
-        const int j = static_cast<int>(std::floor(c));
-        if (j >= -1 && j < cone.count_c)
+        if (c >= -1 && c < cone.count_c) {
+            const int j = static_cast<int>(std::floor(c));
             visit(q, j, static_cast<float>(c - j));
+        }
     }
 }
 
@@ -99,8 +100,10 @@ void accumulate(const Cone &cone, const Voxels &medium, const Spans &spans, floa
             float *const out = columns + cone.offset(number, p);
             std::copy(sums.begin(), sums.end(), out);
             const double distance = cone.distance(number), b = cone.light_b() + p * distance / cone.far;
+            if (!(b >= -1 && b < cone.count_b))
+                continue;
             const int i = static_cast<int>(std::floor(b));
-            if (i < -1 || i >= cone.count_b || row_is_empty(spans, cone, k, i))
+            if (row_is_empty(spans, cone, k, i))
                 continue;
             const float f = static_cast<float>(b - i);
             const float *const row = medium.at(cone.axis, k, i, 0);
@@ -227,8 +230,10 @@ void scatter_plane(const Cone &cone, const Voxels &gradient, const Spans &spans,
     const double distance = cone.distance(number);
     for (int p = cone.first_p; p < cone.first_p + cone.count_p; ++p) {
         const double b = cone.light_b() + p * distance / cone.far;
+        if (!(b >= -1 && b < cone.count_b))
+            continue;
         const int i = static_cast<int>(std::floor(b));
-        if (i < -1 || i >= cone.count_b || row_is_empty(spans, cone, k, i))
+        if (row_is_empty(spans, cone, k, i))
             continue;
         const float f = static_cast<float>(b - i);
         float *const row = gradient.at(cone.axis, k, i, 0);

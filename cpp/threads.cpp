@@ -1,5 +1,9 @@
 #include "threads.h"
 
+#include <algorithm>
+#include <system_error>
+#include <utility>
+
 #if defined(__linux__)
 #include <sched.h>
 #endif
@@ -24,8 +28,13 @@ void set_threads(int count) { threads_set = count; }
 
 Workers::Workers() {
     const int threads = threads_set > 0 ? threads_set.load() : usable_cores();
-    for (int t = 1; t < threads; ++t)
-        threads_.emplace_back([this] { serve(); });
+    threads_.reserve(std::max(threads - 1, 0));
+    try {
+        for (int t = 1; t < threads; ++t)
+            threads_.emplace_back([this] { serve(); });
+    } catch (const std::system_error &) {
+        // The system allows no more threads; those that run do all the work.
+    }
 }
 
 Workers::~Workers() {
@@ -39,8 +48,14 @@ Workers::~Workers() {
 }
 
 void Workers::work() {
-    for (int i; (i = next_.fetch_add(1)) < count_;)
-        (*task_)(i);
+    try {
+        for (int i; (i = next_.fetch_add(1)) < count_;)
+            (*task_)(i);
+    } catch (...) { // run() throws it, where a caller can catch it
+        std::lock_guard<std::mutex> lock(mutex_);
+        failure_ = std::current_exception();
+        next_ = count_;
+    }
 }
 
 void Workers::serve() {
@@ -79,6 +94,8 @@ void Workers::run(int count, const std::function<void(int)> &task) {
     work();
     while (busy_ > 0)
         std::this_thread::yield();
+    if (failure_)
+        std::rethrow_exception(std::exchange(failure_, nullptr));
 }
 
 double Workers::sum(int count, const std::function<double(int)> &partial) {

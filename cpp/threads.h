@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <condition_variable>
+#include <exception>
 #include <functional>
 #include <mutex>
 #include <thread>
@@ -22,7 +23,8 @@ public:
     Workers &operator=(const Workers &) = delete;
 
     // Runs task(0) ... task(count - 1), in any order and on any thread. What a task computes must not depend
-    // on that order; sums are therefore formed per task and added up afterwards (see sum()).
+    // on that order; sums are therefore formed per task and added up afterwards (see sum()). Throws what a
+    // task throws; the tasks that are not begun by then are left out.
     void run(int count, const std::function<void(int)> &task);
 
     // The sum of partial(0) ... partial(count - 1), added in that order whatever the number of threads.
@@ -40,6 +42,7 @@ private:
     std::atomic<int> next_{0}, busy_{0};
     int count_ = 0;
     const std::function<void(int)> *task_ = nullptr;
+    std::exception_ptr failure_; // what a task threw
 };
 
 } // namespace smokelift

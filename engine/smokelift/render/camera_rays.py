@@ -74,6 +74,7 @@ def camera_rays(camera: Camera, domain: Domain) -> Rays:
     planes = np.stack([axis, travel, first, last], -1).astype(np.int32)
     hit = planes[..., 2] <= planes[..., 3]
     lines = np.stack([offset[..., 0], slope[..., 0], offset[..., 1], slope[..., 1]], -1)
+    lines = np.where(hit[..., None], lines, 0.0)  # a ray that misses can pass at any distance
     to_grid = np.eye(4)
     to_grid[:3, :3] *= domain.voxel_size
     to_grid[:3, 3] = np.array(domain.min) + 0.5 * domain.voxel_size

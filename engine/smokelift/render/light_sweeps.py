@@ -135,8 +135,8 @@ def lighting(lights: Sequence[FiniteLight], domain: Domain, corner: Box, shape: 
 
     Raises
     ------
-    ValueError
-        If a point light stands inside the domain.
+    SceneError
+        If a point light stands inside the domain or too far away.
     """
     bright = [light for light in lights if any(_colour(light))]
     if not bright:
@@ -182,8 +182,7 @@ def _parallel(light: DirectionalLight, energy: Array, domain: Domain, corner: Bo
 
 
 def _point(light: PointLight, energy: Array, domain: Domain, corner: Box, shape: Box) -> PointSweep:
-    if domain.contains(light.position):
-        raise ValueError(f"The point light at {list(light.position)} is inside the domain; it must be outside.")
+    light.require_place(domain)
     h = domain.voxel_size
     position = (np.array(light.position) - np.array(domain.min)) / h - 0.5 - np.array(corner)
     faces = []

@@ -9,11 +9,14 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.scene.checks import SceneError, Vector, integer, items, number, set_fields, shown, unexpected, vector
+from smokelift.scene.checks import SceneError, Vector, integer, items, number, positive, set_fields, shown, unexpected, vector
 from smokelift.scene.domain import Domain
 
 Matrix = tuple[tuple[float, float, float, float], ...]
 """4x4, row-major."""
+
+LARGEST_PICTURE = 2**15
+"""Pixels along a side of a picture, at most."""
 
 
 @dataclass(frozen=True)
@@ -60,8 +63,7 @@ class Camera:
         if self.matrices and self.matrix != self.matrices[0]:
             raise SceneError("matrix must be the first of matrices", key="matrices")
         for key in ("fx", "fy"):
-            value = number(getattr(self, key), key, "a number above 0", lambda v: v > 0.0)
-            set_fields(self, **{key: value})
+            set_fields(self, **{key: positive(getattr(self, key), key)})
         set_fields(self, cx=number(self.cx, "cx"), cy=number(self.cy, "cy"))
 
     @classmethod
@@ -140,16 +142,14 @@ class Camera:
 
 def picture_size(value: Any) -> tuple[int, int]:
     """Return a picture's width and height in pixels, checked."""
-    expected = "[width, height] in pixels, both at least 1"
-    width, height = (integer(v, "size", expected) for v in items(value, 2, "size", expected))
-    if min(width, height) < 1:
-        raise unexpected([width, height], "size", expected)
+    expected = f"[width, height] in pixels, both at least 1 and at most {LARGEST_PICTURE}"
+    width, height = (integer(v, "size", expected, 1, LARGEST_PICTURE) for v in items(value, 2, "size", expected))
     return width, height
 
 
 def focal_length(fov_y_degrees: Any, height: int) -> float:
     """Return the focal length in pixels of a picture ``height`` pixels high."""
-    degrees = number(fov_y_degrees, "fov_y_degrees", "a number between 0 and 180", lambda v: 0.0 < v < 180.0)
+    degrees = number(fov_y_degrees, "fov_y_degrees", "a number between 0.001 and 179.99", lambda v: 0.001 <= v <= 179.99)
     return 0.5 * height / math.tan(math.radians(degrees) / 2)
 
 

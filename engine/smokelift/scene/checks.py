@@ -12,6 +12,10 @@ import numpy as np
 Vector = tuple[float, float, float]
 """x, y, z or red, green, blue."""
 
+LARGEST, SMALLEST = 1e9, 1e-9
+"""No number of a scene is larger, and none that must be above 0 is smaller: what is computed of a few of them stays a
+normal number of 32 bits."""
+
 
 class SceneError(ValueError):
     """A scene that cannot be used: what was expected, and what was found.
@@ -47,17 +51,29 @@ def one_of(names: Iterable[str]) -> str:
 
 
 def number(value: Any, key: str, expected: str = "a number", valid: Callable[[float], bool] = math.isfinite) -> float:
-    """Return ``value`` as a finite float that is ``valid``, or raise a SceneError that names ``key``."""
+    """Return ``value`` as a float that is ``valid``, of a magnitude up to `LARGEST`; or raise a SceneError."""
     if isinstance(value, int | float | np.number) and not isinstance(value, bool):
-        result = float(value)
-        if math.isfinite(result) and valid(result):
-            return result
+        if abs(value) <= LARGEST:  # an int of 400 digits is no float
+            if valid(float(value)):
+                return float(value)
+        elif abs(value) < math.inf:
+            expected += f", {LARGEST:g} at most"
     raise unexpected(value, key, expected)
 
 
-def integer(value: Any, key: str, expected: str = "a whole number", least: int | None = None) -> int:
-    """Return ``value`` as an int that is not below ``least``, or raise a SceneError that names ``key``."""
-    if isinstance(value, int | np.integer) and not isinstance(value, bool) and (least is None or value >= least):
+def positive(value: Any, key: str, expected: str = "a number above 0") -> float:
+    """Return ``value`` as a float from `SMALLEST` to `LARGEST`, or raise a SceneError that names ``key``."""
+    result = number(value, key, expected, lambda v: v > 0.0)
+    if result < SMALLEST:
+        raise unexpected(value, key, f"{expected}, {SMALLEST:g} at least")
+    return result
+
+
+def integer(
+    value: Any, key: str, expected: str = "a whole number", least: int = -int(LARGEST), most: int = int(LARGEST)
+) -> int:
+    """Return ``value`` as an int from ``least`` to ``most``, or raise a SceneError that names ``key``."""
+    if isinstance(value, int | np.integer) and not isinstance(value, bool) and least <= value <= most:
         return int(value)
     raise unexpected(value, key, expected)
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from smokelift.scene.checks import file_path, integer, items, number, set_fields, unexpected
+from smokelift.scene.checks import file_path, integer, items, positive, set_fields, unexpected
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class ClipSource:
         """Check the values."""
         set_fields(self, path=file_path(self.path, "path"))
         if self.fps is not None:
-            set_fields(self, fps=number(self.fps, "fps", "a number above 0", lambda v: v > 0.0))
+            set_fields(self, fps=positive(self.fps, "fps"))
         if self.frames is not None:
             expected = "[first, last], whole numbers from 0, first not after last"
             first, last = (integer(v, "frames", expected) for v in items(self.frames, 2, "frames", expected))

@@ -27,6 +27,9 @@ from smokelift.scene.reading import read_file
 from smokelift.scene.view import View
 from smokelift.scene.writing import write_file
 
+MOST_LISTED = 256
+"""Lights, inlets or views of a scene, at most: the time of a run grows with their number."""
+
 
 @dataclass(frozen=True)
 class Scene:
@@ -50,8 +53,8 @@ class Scene:
     Raises
     ------
     SceneError
-        If a camera can see the domain in no frame, a point light stands inside it, an inlet lies outside, or a side
-        or the kind of scattering is unknown.
+        If a camera can see the domain in no frame, a point light stands inside it or too far away, an inlet lies
+        outside, a side or the kind of scattering is unknown, or there are too many lights, inlets or views.
     """
 
     clip: ClipSource | None = None
@@ -68,6 +71,9 @@ class Scene:
     def __post_init__(self) -> None:
         """Check what no table can check alone."""
         set_fields(self, lights=tuple(self.lights), views=tuple(self.views), inlets=tuple(self.inlets))
+        for table, listed in (("inlet", self.inlets), ("lights", self.lights), ("views", self.views)):
+            if len(listed) > MOST_LISTED:
+                raise SceneError(f"is given {len(listed)} times; {MOST_LISTED} at most", table=table)
         set_fields(self, closed=checked_sides(self.closed), scattering=checked_scattering(self.scattering))
         if self.domain is not None:
             self._check_places(self.domain)
@@ -84,12 +90,11 @@ class Scene:
                 )
         for index, light in enumerate(self.lights):
             for sample in () if isinstance(light, EnvironmentLight) else light.samples():
-                if isinstance(sample, PointLight) and domain.contains(sample.position):
-                    raise SceneError(
-                        f"position {shown(list(sample.position))} is inside the domain; it must be outside",
-                        key="position",
-                        table=f"lights.{index}",
-                    )
+                if isinstance(sample, PointLight):
+                    try:
+                        sample.require_place(domain)
+                    except SceneError as error:
+                        raise SceneError(str(error), key=error.key, table=f"lights.{index}") from error
         cameras = {f"views.{index}.camera": view.camera for index, view in enumerate(self.views)}
         if self.camera is not None:
             cameras = {"camera": self.camera, **cameras}

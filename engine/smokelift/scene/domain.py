@@ -9,10 +9,13 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.scene.checks import SceneError, Vector, integer, items, number, one_of, set_fields, unexpected, vector
+from smokelift.scene.checks import SceneError, Vector, integer, items, one_of, positive, set_fields, unexpected, vector
 
 Side = Literal["x-", "x+", "y-", "y+", "z-", "z+"]
 SIDES: tuple[Side, ...] = ("x-", "x+", "y-", "y+", "z-", "z+")
+
+LONGEST, MOST_VOXELS = 4096, 2**30
+"""Voxels along a side of a box, and in all of it, at most: 32 bits know a place along a longer side too roughly."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +32,7 @@ class Domain:
     Raises
     ------
     SceneError
-        If the box is empty, or its voxels are not cubes to 0.1 %.
+        If the box is empty, or its voxels are not cubes to 0.1 %, too many, too large or too small.
     """
 
     min: Vector
@@ -39,10 +42,10 @@ class Domain:
     def __post_init__(self) -> None:
         """Check every value and store plain tuples."""
         set_fields(self, min=vector(self.min, "min"), max=vector(self.max, "max"))
-        expected = "three whole numbers [nx, ny, nz], all at least 1"
-        counts = tuple(integer(v, "resolution", expected) for v in items(self.resolution, 3, "resolution", expected))
-        if min(counts) < 1:
-            raise unexpected(list(counts), "resolution", expected)
+        key, expected = "resolution", f"three whole numbers [nx, ny, nz], all at least 1 and at most {LONGEST}"
+        counts = tuple(integer(v, key, expected, 1, LONGEST) for v in items(self.resolution, 3, key, expected))
+        if math.prod(counts) > MOST_VOXELS:
+            raise SceneError(f"{key} makes {math.prod(counts)} voxels; {MOST_VOXELS} at most", key=key)
         set_fields(self, resolution=counts)
         for axis, low, high in zip("xyz", self.min, self.max, strict=True):
             if not low < high:
@@ -58,6 +61,8 @@ class Domain:
                 + " m",
                 key="resolution",
             )
+        if not 1e-6 <= self.voxel_size <= 1e6:
+            raise SceneError(f"voxels must be from 1e-6 to 1e6 m wide; they would be {self.voxel_size:g} m", key="max")
 
     @property
     def voxel_size(self) -> float:
@@ -108,7 +113,7 @@ class Inlet:
 
     def __post_init__(self) -> None:
         """Check the values."""
-        radius = number(self.radius, "radius", "a number of metres above 0", lambda v: v > 0.0)
+        radius = positive(self.radius, "radius", "a number of metres above 0")
         set_fields(self, centre=vector(self.centre, "centre"), radius=radius)
 
     def reaches(self, domain: Domain) -> bool:

@@ -7,6 +7,9 @@ from pathlib import Path
 
 from smokelift.scene.checks import file_path, integer, number, set_fields, unexpected
 
+MOST_DIRECTIONS = 4096
+"""Parallel lights that stand for one environment, at most: every picture sweeps the voxels once for each."""
+
 
 @dataclass(frozen=True)
 class EnvironmentLight:
@@ -29,4 +32,5 @@ class EnvironmentLight:
         rotation = number(self.rotation_degrees, "rotation_degrees")
         set_fields(self, image=image, rotation_degrees=rotation, strength=strength)
         if self.directions is not None:
-            set_fields(self, directions=integer(self.directions, "directions", "a whole number from 1", least=1))
+            expected = f"a whole number from 1 to {MOST_DIRECTIONS}"
+            set_fields(self, directions=integer(self.directions, "directions", expected, 1, MOST_DIRECTIONS))

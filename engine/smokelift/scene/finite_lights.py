@@ -6,7 +6,11 @@ import math
 from dataclasses import dataclass
 from typing import Protocol
 
-from smokelift.scene.checks import SceneError, Vector, colour, set_fields, vector
+from smokelift.scene.checks import SceneError, Vector, colour, set_fields, shown, vector
+from smokelift.scene.domain import Domain
+
+FARTHEST = 1e6
+"""Voxels between a point light and the box, at most: its rays are parallel long before."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +51,16 @@ class PointLight:
     def samples(self) -> tuple[FiniteLight, ...]:
         """Return the light itself; see `SampledLight`."""
         return (self,)
+
+    def require_place(self, domain: Domain) -> None:
+        """Refuse a place from which no light can be swept through a box: inside it, or too far away."""
+        at = f"position {shown(list(self.position))} is"
+        if domain.contains(self.position):
+            raise SceneError(f"{at} inside the domain; it must be outside", key="position")
+        if math.dist(self.position, domain.centre) > FARTHEST * domain.voxel_size:
+            raise SceneError(
+                f"{at} more than a million voxels away; give a directional light instead", key="position"
+            )
 
 
 FiniteLight = DirectionalLight | PointLight

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from smokelift.scene.checks import number, one_of, set_fields, unexpected
+from smokelift.scene.checks import number, one_of, positive, set_fields, unexpected
 
 Scattering = Literal["single", "unshadowed", "absorption"]
 """How light is scattered: once and with self-shadowing, once without, or not at all."""
@@ -35,7 +35,7 @@ class Medium:
         """Check every value."""
         set_fields(
             self,
-            extinction=number(self.extinction, "extinction", "a number above 0", lambda v: v > 0.0),
+            extinction=positive(self.extinction, "extinction"),
             albedo=number(self.albedo, "albedo", "a number from 0 to 1", lambda v: 0.0 <= v <= 1.0),
             anisotropy=number(self.anisotropy, "anisotropy", "a number between -1 and 1", lambda v: -1.0 < v < 1.0),
         )

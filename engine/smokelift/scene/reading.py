@@ -20,9 +20,10 @@ from typing import Any, TypeVar, get_args, get_type_hints
 
 from smokelift.scene.background import Background
 from smokelift.scene.camera import Camera, focal_length, look_at_matrix, picture_size
-from smokelift.scene.checks import SceneError, number, one_of, shown, unexpected
+from smokelift.scene.checks import SceneError, one_of, positive, shown, unexpected
 from smokelift.scene.clip_source import ClipSource
 from smokelift.scene.domain import Domain, Inlet
+from smokelift.scene.files import read_text
 from smokelift.scene.lights import LIGHT_TYPES, Light
 from smokelift.scene.medium import Medium
 from smokelift.scene.toml_lines import Place, find_lines
@@ -48,14 +49,14 @@ def read_file(path: Path, build: Callable[..., Described]) -> Described:
         With the file, the line, the key, what was expected and what was found.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_text(path)
     except OSError as error:
-        raise SceneError(f"{path}: cannot be read: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise SceneError(f"{path}: is not a text file in UTF-8") from error
+        raise SceneError(str(error)) from error
     try:
         data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except RecursionError as error:
+        raise SceneError(f"{path.name}: is not a scene: lists or tables are nested too deeply") from error
+    except ValueError as error:  # an integer of 5000 digits is no error of TOML's
         raise SceneError(f"{path.name}: is not valid TOML: {error}") from error
     return _Reader(path.name, path.absolute().parent, find_lines(text)).scene(data, build)
 
@@ -234,5 +235,5 @@ def _scales(data: Table, lens: str, height: int) -> tuple[Any, Any]:
     if lens == "fov_y_degrees":
         focal = focal_length(data[lens], height)
     else:
-        focal = height / number(data[lens], lens, "a number of metres above 0", lambda v: v > 0.0)
+        focal = height / positive(data[lens], lens, "a number of metres above 0")
     return focal, focal

@@ -13,7 +13,6 @@ from smokelift.transport.grid import (
     StaggeredGrid,
     Velocity,
     at_centres,
-    require_positive,
     require_same_shape,
 )
 
@@ -58,7 +57,7 @@ def advect(
     Raises
     ------
     ValueError
-        If the shapes differ, a value is not finite, `dt` is not positive, the scheme is unknown, or mass is to be
+        If the shapes differ, a value or the way in `dt` is not finite, `dt` is not positive, the scheme is unknown, or mass is to be
         kept of what has none: a velocity, or negative values.
 
     Notes
@@ -67,7 +66,6 @@ def advect(
     the displacement at arrival. A physical path bends, but neither a midpoint step nor two half steps predict baked
     scenes better (docs/experiments/transport-scheme.md).
     """
-    require_positive("dt", dt)
     if scheme not in ("maccormack", "semi-lagrangian"):
         raise ValueError(f"unknown scheme {scheme!r}: expected 'maccormack' or 'semi-lagrangian'.")
     displacement = velocity.displacement(dt)

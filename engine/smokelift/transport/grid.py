@@ -138,8 +138,18 @@ class Velocity(StaggeredGrid):
             raise ValueError("the velocity holds values that are not finite.")
 
     def displacement(self, dt: float) -> StaggeredGrid:
-        """The way that smoke goes in `dt` seconds, in voxels, on a grid of unit voxels."""
-        x, y, z = (component * np.float32(dt / self.voxel_size) for component in self.faces)
+        """The way that smoke goes in `dt` seconds, in voxels, on a grid of unit voxels.
+
+        Raises
+        ------
+        ValueError
+            If `dt` is not positive, or the way is longer than numbers of 32 bits can say.
+        """
+        require_positive("dt", dt)
+        with np.errstate(over="ignore", invalid="ignore"):
+            x, y, z = (component * np.float32(dt / self.voxel_size) for component in self.faces)
+        if not all(np.isfinite(component).all() for component in (x, y, z)):
+            raise ValueError(f"the velocity, dt = {dt:g} s and voxels of {self.voxel_size:g} m make no finite way.")
         return StaggeredGrid((x, y, z), 1.0, self.closed)
 
 

@@ -28,6 +28,9 @@ from smokelift.velocity.pyramid import coarsen_faces, refine
 Density = npt.NDArray[np.floating[Any]]
 Mask = npt.NDArray[np.bool_]
 
+LARGEST_DENSITY = 1e12
+"""Above this, sums of fourth powers of densities are not finite in 32 bits."""
+
 
 class VelocityEstimator(Protocol):
     """A way to find the velocity between two densities, and to predict the next one."""
@@ -166,4 +169,6 @@ def _density(name: str, values: Density) -> Array:
         raise ValueError(f"{name} holds densities that are not finite.")
     if values.min() < 0:
         raise ValueError(f"{name} holds negative densities.")
+    if values.max() > LARGEST_DENSITY:
+        raise ValueError(f"{name} holds densities up to {values.max():g}; scale them to {LARGEST_DENSITY:g} at most.")
     return np.ascontiguousarray(values, np.float32)

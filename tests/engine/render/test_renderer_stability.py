@@ -130,3 +130,17 @@ def test_same_result_for_any_number_of_threads(set_threads):
     several = render(density, scene)
     set_threads(1)
     np.testing.assert_array_equal(render(density, scene), several)
+
+
+@pytest.mark.parametrize("density", [1e38, np.inf, np.nan])
+def test_a_density_without_a_finite_depth_is_refused(density):
+    domain = make_domain((4, 4, 4))
+    with pytest.raises(ValueError, match="optical depth|not finite"):
+        render(np.full((4, 4, 4), density, np.float32), Scene(domain=domain, camera=make_camera(domain)))
+
+
+def test_a_light_that_is_too_far_away_is_refused():
+    domain = make_domain((4, 4, 4))
+    scene = Scene(camera=make_camera(domain), lights=(PointLight((1e9, 0, 0), (1, 1, 1)),))
+    with pytest.raises(ValueError, match="more than a million voxels away"):
+        render(np.ones((4, 4, 4), np.float32), replace(scene, domain=domain))

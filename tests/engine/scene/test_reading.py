@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -207,6 +208,24 @@ def test_a_file_may_hold_any_one_table(tmp_path: Path) -> None:
             "line 25: [[inlet]] is outside the domain: nothing within 1 m of centre [0.0, 0.0, -2.0] is in the box",
         ),
         ("albedo = 0.5", "albedo = ", "scene.toml: is not valid TOML: "),
+        ("fps = 24", "fps = 1e-38", "line 4: [clip] fps must be a number above 0, 1e-09 at least, not 1e-38"),
+        ("fps = 24", "fps = 1e300", "line 4: [clip] fps must be a number above 0, 1e+09 at most, not 1e+300"),
+        ("albedo = 0.5", "extinction = 1e-40", "extinction must be a number above 0, 1e-09 at least, not 1e-40"),
+        ("albedo = 0.5", "extinction = 1e300", "extinction must be a number above 0, 1e+09 at most, not 1e+300"),
+        ("albedo = 0.5", f"albedo = {'9' * 400}", "albedo must be a number from 0 to 1, 1e+09 at most, not 999"),
+        ("albedo = 0.5", f"albedo = {'9' * 5000}", "scene.toml: is not valid TOML: "),
+        ("albedo = 0.5", f"albedo = {'[' * 900}{']' * 900}", "nested too deeply"),
+        ("[0, 10]", f"[0, {'9' * 400}]", "line 5: [clip] frames must be"),
+        ("[1, 2, 3]", "[1, 2, 1e38]", "line 27: [[lights]] irradiance must be three numbers"),
+        ("[0, -5, 5]", "[0, -5e6, 5]", "line 31: [[lights]] position [0.0, -5000000.0, 5.0] is more than a million"),
+        ("fov_y_degrees = 30", "fov_y_degrees = 1e-5", "line 10: [camera] fov_y_degrees must be a number between"),
+        ("size = [256, 384]", "size = [256, 100000]", "line 11: [camera] size must be [width, height]"),
+        ("64, 64,", "64000, 64000,", "line 16: [domain] resolution must be three whole numbers [nx, ny, nz], all"),
+        ("  64, 64,  # across\n  96", "4000, 4000, 6000", "line 16: [domain] resolution must be three whole numbers"),
+        ("  64, 64,  # across\n  96", "2000, 2000, 3000", "line 16: [domain] resolution makes 12000000000 voxels"),
+        ("max = [1, 1, 3]", "max = [9e8, 9e8, 1.35e9]", "line 15: [domain] max must be three numbers"),
+        ("[-1, -1, 0]\nmax = [1, 1, 3]", "[0, 0, 0]\nmax = [4e-8, 4e-8, 6e-8]", "voxels must be from 1e-6 to 1e6 m"),
+        ("[medium]", "[[inlet]]\ncentre = [0, 0, 1]\nradius = 1\n" * 300 + "[medium]", "[inlet] is given 300 times"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_named_with_its_line(tmp_path: Path, old: str, new: str, message: str | None) -> None:
@@ -219,6 +238,19 @@ def test_what_is_wrong_is_named_with_its_line(tmp_path: Path, old: str, new: str
         load(tmp_path, text)
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_a_pipe_or_a_device_is_not_waited_for(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe.toml"
+    os.mkfifo(pipe)
+    for path in (pipe, Path("/dev/zero"), tmp_path):
+        with pytest.raises(SceneError, match="cannot be read: it is a folder, a pipe or a device"):
+            Scene.load(path)
+    large = tmp_path / "large.toml"
+    with large.open("wb") as file:
+        file.truncate(2**40)
+    with pytest.raises(SceneError, match="large.toml: cannot be read: it holds more than 64 MiB"):
+        Scene.load(large)
 
 
 def test_inline_tables_are_named_by_their_own_line(tmp_path: Path) -> None:

@@ -298,7 +298,7 @@ def test_directions_by_hand_win(plume, draft, tmp_path) -> None:
     assert len(scene_optics(completed(scene)).lights) == 6
     choice = chosen(shot_of(scene, draft), "environment directions")
     assert (choice.chosen, choice.by_hand) == (6, True)
-    with pytest.raises(SceneError, match="directions must be a whole number from 1, not 0"):
+    with pytest.raises(SceneError, match="directions must be a whole number from 1 to 4096, not 0"):
         replace(light, directions=0)
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -31,6 +34,32 @@ def test_a_displacement_that_is_not_a_number_stays_in_the_array():
     field, faces = np.ones(SHAPE, np.float32), random_faces(np.random.default_rng(9))
     faces[0][:] = np.nan
     np.testing.assert_array_equal(_core.advect_cells(field, faces, False, True), 1)
+
+
+@pytest.mark.parametrize(("speed", "voxel_size", "dt"), [(0, 0.1, 1e300), (3e38, 0.1, 1), (-3e38, 0.1, 1), (1, 1e-44, 1)])
+def test_a_way_that_is_not_finite_is_refused(speed, voxel_size, dt):
+    velocity = uniform((speed,) * 3, voxel_size=voxel_size)
+    with pytest.raises(ValueError, match="make no finite way"):
+        advect(np.ones(SHAPE, np.float32), velocity, dt)
+    with pytest.raises(ValueError, match="make no finite way"):
+        advect(velocity, velocity, dt)
+
+
+def test_where_the_system_gives_no_thread_one_does_all_the_work():
+    """A process that may have no second thread; std::terminate would end it."""
+    code = """
+import os, resource
+import numpy as np
+from smokelift import _core
+if os.getuid() == 0:
+    os.setuid(54321)  # root may have any number
+resource.setrlimit(resource.RLIMIT_NPROC, (1, 1))
+_core.set_threads(4)
+print(_core.blur(np.ones((8, 8, 8), np.float32), 1.0, 3.0).sum())
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert float(done.stdout) == pytest.approx(512)
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)

@@ -55,6 +55,12 @@ def voxels_a_frame(velocity):
     return velocity.centres() * (DT / VOXEL)
 
 
+def test_densities_that_squares_of_overflow_are_refused():
+    before, after = moved((1, 0, 0))
+    with pytest.raises(ValueError, match=r"before holds densities up to .*; scale them to 1e\+12 at most"):
+        estimate_velocity(before * np.float32(1e38), after, DT, VOXEL)
+
+
 def mean_motion(velocity, density):
     """Voxels a frame of the smoke as a whole."""
     return np.average(voxels_a_frame(velocity).reshape(-1, 3), axis=0, weights=density.ravel())
