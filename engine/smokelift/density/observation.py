@@ -17,7 +17,7 @@ from smokelift.footage.matte import matte
 from smokelift.footage.noise import EIGHT_BIT_STEP
 from smokelift.footage.plate import Plate, noise_at
 from smokelift.render import Image, Optics
-from smokelift.scene import Camera, Inlet
+from smokelift.scene import Camera, Domain, Inlet
 
 THINNEST_CLEAR = 0.05
 """Transmittance at least: optical depth above 3 cannot be told from a brightness."""
@@ -155,10 +155,11 @@ class ViewSet:
         Raises
         ------
         ValueError
-            If a picture is not finite or has another size than its camera, or if a camera moves.
+            If a picture is not finite or has another size than its camera, or if a camera moves or stands inside the
+            domain.
         """
         for observation in observations:
-            _check(observation)
+            _check(observation, optics.domain)
         views = tuple(View.of(observation, optics) for observation in observations)
         hull = common_hull([view.mask for view in views], [view.projection for view in views])
         return ViewSet(views, hull, optics, frame)
@@ -182,8 +183,9 @@ def unshadowed_optical_depth(
     return np.where(mask, depth, 0).astype(np.float32)
 
 
-def _check(observation: Observation) -> None:
+def _check(observation: Observation, domain: Domain) -> None:
     camera, image = observation.camera, observation.image
+    camera.require_outside(domain)
     if camera.moves:
         raise ValueError("The camera moves; give the scene the one of the picture's frame, camera.at(frame).")
     width, height = camera.size

@@ -59,11 +59,14 @@ class Screen:
         Of the columns, in metres from the centre.
     values : (n, m)
         What the picture shows there.
+    width
+        Of a column, in metres.
     """
 
     heights: NDArray[np.float64]
     laterals: NDArray[np.float64]
     values: NDArray[np.float64]
+    width: float
 
     def rows(self, part: slice = slice(None)) -> Upright:
         """Sums along the rows, of some of the columns."""
@@ -72,7 +75,7 @@ class Screen:
         safe = np.where(total > 0, total, 1.0)
         mean = (values * across).sum(1) / safe
         variance = (values * (across - mean[:, None]) ** 2).sum(1) / safe
-        return Upright(self.heights, total * (self.laterals[1] - self.laterals[0]), mean, np.sqrt(variance))
+        return Upright(self.heights, total * self.width, mean, np.sqrt(variance))
 
 
 def upright_rows(amount: NDArray[np.float32], camera: Camera, domain: Domain, *, per_voxel: int = 2) -> Upright:
@@ -92,7 +95,7 @@ def upright_screen(amount: NDArray[np.float32], camera: Camera, domain: Domain, 
     ends = reach_up + reach_along / 2
     up = np.arange(-ends + h / (2 * per_voxel), ends, h / per_voxel)
     points = centre + across[None, :, None] * lateral + up[:, None, None] * height
-    return Screen(up, across, seen_at(points, amount, camera))
+    return Screen(up, across, seen_at(points, amount, camera), h)
 
 
 def seen_at(points: NDArray[np.float64], picture: NDArray[np.float32], camera: Camera) -> NDArray[np.float64]:

@@ -9,7 +9,18 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.scene.checks import SceneError, Vector, integer, items, number, positive, set_fields, shown, unexpected, vector
+from smokelift.scene.checks import (
+    SceneError,
+    Vector,
+    integer,
+    items,
+    number,
+    positive,
+    set_fields,
+    shown,
+    unexpected,
+    vector,
+)
 from smokelift.scene.domain import Domain
 
 Matrix = tuple[tuple[float, float, float, float], ...]
@@ -109,6 +120,23 @@ class Camera:
         """Whether it has a matrix for every frame."""
         return bool(self.matrices)
 
+    def require_outside(self, domain: Domain) -> None:
+        """Refuse a perspective camera that stands inside a box in any frame: nothing bounds the smoke around it.
+
+        Raises
+        ------
+        SceneError
+            With the position.
+        """
+        for matrix in self.matrices or (self.matrix,):
+            x, y, z = (row[3] for row in matrix[:3])
+            if self.type == "perspective" and domain.contains((x, y, z)):
+                raise SceneError(
+                    f"The camera at {shown([x, y, z])} stands inside the domain; move it out, or make the domain "
+                    "smaller.",
+                    table="camera",
+                )
+
     def at(self, frame: int) -> Camera:
         """Return the camera as it stands in a frame, counted from 0 at the first that is used.
 
@@ -149,7 +177,9 @@ def picture_size(value: Any) -> tuple[int, int]:
 
 def focal_length(fov_y_degrees: Any, height: int) -> float:
     """Return the focal length in pixels of a picture ``height`` pixels high."""
-    degrees = number(fov_y_degrees, "fov_y_degrees", "a number between 0.001 and 179.99", lambda v: 0.001 <= v <= 179.99)
+    degrees = number(
+        fov_y_degrees, "fov_y_degrees", "a number between 0.001 and 179.99", lambda v: 0.001 <= v <= 179.99
+    )
     return 0.5 * height / math.tan(math.radians(degrees) / 2)
 
 

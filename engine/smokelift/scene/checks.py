@@ -53,10 +53,11 @@ def one_of(names: Iterable[str]) -> str:
 def number(value: Any, key: str, expected: str = "a number", valid: Callable[[float], bool] = math.isfinite) -> float:
     """Return ``value`` as a float that is ``valid``, of a magnitude up to `LARGEST`; or raise a SceneError."""
     if isinstance(value, int | float | np.number) and not isinstance(value, bool):
-        if abs(value) <= LARGEST:  # an int of 400 digits is no float
+        magnitude: Any = abs(value)
+        if magnitude <= LARGEST:  # an int of 400 digits is no float
             if valid(float(value)):
                 return float(value)
-        elif abs(value) < math.inf:
+        elif magnitude < math.inf:
             expected += f", {LARGEST:g} at most"
     raise unexpected(value, key, expected)
 

@@ -58,9 +58,7 @@ class PointLight:
         if domain.contains(self.position):
             raise SceneError(f"{at} inside the domain; it must be outside", key="position")
         if math.dist(self.position, domain.centre) > FARTHEST * domain.voxel_size:
-            raise SceneError(
-                f"{at} more than a million voxels away; give a directional light instead", key="position"
-            )
+            raise SceneError(f"{at} more than a million voxels away; give a directional light instead", key="position")
 
 
 FiniteLight = DirectionalLight | PointLight

@@ -129,6 +129,10 @@ def _check(clip: Clip, scene: Scene) -> None:
     moves = scene.camera is not None and scene.camera.moves
     if scene.views and (scene.camera is None or scene.domain is None):
         raise ValueError("Further [[views]] need the input's [camera] and the [domain], in the same metres as theirs.")
+    if scene.domain is not None:
+        for camera in (scene.camera, *(view.camera for view in scene.views)):
+            if camera is not None:
+                camera.require_outside(scene.domain)
     if scene.views and (moves or any(view.camera.moves for view in scene.views)):
         raise ValueError("With further [[views]] no camera may move; give one matrix a camera, or one view only.")
     if scene.camera is not None and moves and len(scene.camera.matrices) != len(clip):

@@ -57,8 +57,8 @@ def advect(
     Raises
     ------
     ValueError
-        If the shapes differ, a value or the way in `dt` is not finite, `dt` is not positive, the scheme is unknown, or mass is to be
-        kept of what has none: a velocity, or negative values.
+        If the shapes differ, a value or the way in `dt` is not finite, `dt` is not positive, the scheme is unknown,
+        or mass is to be kept of what has none: a velocity, or negative values.
 
     Notes
     -----

@@ -594,3 +594,51 @@ def test_density_holds_no_traces(plume):
     picture = render(plume.densities[0], scene)
     values = reconstruct_density(picture, scene).values
     assert (values[values > 0] >= 1e-20).all()
+
+
+@pytest.mark.parametrize("resolution", [(1, 1, 1), (1, 1, 2), (3, 1, 1), (1, 2, 3)])
+def test_a_grid_of_a_few_voxels(resolution) -> None:
+    domain = Domain((0, 0, 0), tuple(0.5 * n for n in resolution), resolution)
+    camera = Camera.look_at((0.2, -4, 0.4), domain.centre, fov_y_degrees=30, size=(24, 24))
+    scene = Scene(
+        camera=camera,
+        domain=domain,
+        lights=(DirectionalLight((0, 1, -1), (9, 9, 9)),),
+        background=Background(color=(0, 0, 0)),
+    )
+    smoke = np.full(resolution, 0.5, np.float32)
+    picture = render(smoke, scene)
+    found = reconstruct_density(picture, scene, settings=QUICK)
+    assert np.isfinite(found.values).all()
+    assert np.square(render(found.values, scene) - picture).sum() < np.square(picture).sum()
+
+
+def test_a_camera_inside_the_domain_is_refused(small) -> None:
+    """It was said to see no smoke."""
+    inside = replace(small, camera=Camera.look_at((0, 0, 0.8), (0, 1, 0.8), fov_y_degrees=30, size=(30, 42)))
+    with pytest.raises(ValueError, match=r"camera at \[0.0, 0.0, 0.8\] stands inside the domain; move it out"):
+        reconstruct_density(np.ones((42, 30, 3)), inside)
+
+
+@pytest.mark.parametrize("later", [0, 1, 2])
+def test_a_descent_ends_whatever_the_gradient(small, plume, later) -> None:
+    """A gradient that stops being a number ends it where it is."""
+
+    class Broken:
+        def __init__(self, renderer) -> None:
+            self._renderer, self._left = renderer, later
+
+        def image(self, density, *, keep_record):
+            return self._renderer.image(density, keep_record=keep_record)
+
+        def gradient(self, image_gradient):
+            self._left -= 1
+            return self._renderer.gradient(image_gradient) * (np.nan if self._left < 0 else 1)
+
+    complete = completed(small)
+    views = ViewSet.of([Observation(small.camera, render(plume.densities[1], small))], scene_optics(complete))
+    renderer = Broken(views.optics.renderer(small.camera, np.zeros(3), views.hull))
+    term = Term(views.views[0], renderer, np.ones((42, 30), np.float32))
+    found = descend([term], np.full((24, 24, 32), 0.1, np.float32), views.hull, 1000, 0.0, 1000)
+    assert found.iterations <= later
+    assert np.isfinite(found.density).all()

@@ -135,7 +135,7 @@ def test_same_result_for_any_number_of_threads(set_threads):
 @pytest.mark.parametrize("density", [1e38, np.inf, np.nan])
 def test_a_density_without_a_finite_depth_is_refused(density):
     domain = make_domain((4, 4, 4))
-    with pytest.raises(ValueError, match="optical depth|not finite"):
+    with pytest.raises(ValueError, match=r"optical depth|not finite"):
         render(np.full((4, 4, 4), density, np.float32), Scene(domain=domain, camera=make_camera(domain)))
 
 

@@ -249,7 +249,7 @@ def test_a_pipe_or_a_device_is_not_waited_for(tmp_path: Path) -> None:
     large = tmp_path / "large.toml"
     with large.open("wb") as file:
         file.truncate(2**40)
-    with pytest.raises(SceneError, match="large.toml: cannot be read: it holds more than 64 MiB"):
+    with pytest.raises(SceneError, match=r"large\.toml: cannot be read: it holds more than 64 MiB"):
         Scene.load(large)
 
 

@@ -36,7 +36,9 @@ def test_a_displacement_that_is_not_a_number_stays_in_the_array():
     np.testing.assert_array_equal(_core.advect_cells(field, faces, False, True), 1)
 
 
-@pytest.mark.parametrize(("speed", "voxel_size", "dt"), [(0, 0.1, 1e300), (3e38, 0.1, 1), (-3e38, 0.1, 1), (1, 1e-44, 1)])
+@pytest.mark.parametrize(
+    ("speed", "voxel_size", "dt"), [(0, 0.1, 1e300), (3e38, 0.1, 1), (-3e38, 0.1, 1), (1, 1e-44, 1)]
+)
 def test_a_way_that_is_not_finite_is_refused(speed, voxel_size, dt):
     velocity = uniform((speed,) * 3, voxel_size=voxel_size)
     with pytest.raises(ValueError, match="make no finite way"):
