@@ -20,6 +20,10 @@ QUALITIES: tuple[Quality, ...] = ("draft", "balanced", "fine")
 LONGEST_SIDE: Mapping[Quality, int] = {"draft": 64, "balanced": 96, "fine": 144}
 """Voxels along the domain's longest side at most, where they are chosen; 96 is the paper's smallest grid."""
 
+LOST_DETAIL: Mapping[Quality, float] = {"draft": 0.02, "balanced": 0.01, "fine": 0.005}
+"""Share of the smoke's contrast that a chosen grid may lose: a quality loses half as much as the one before, for three
+to four times the voxels (docs/experiments/resolution-selection.md)."""
+
 ITERATIONS: Mapping[Quality, tuple[int, int]] = {"draft": (4, 6), "balanced": (6, 12), "fine": (8, 30)}
 """Multiplicative iterations and steps of descent at most (docs/experiments/density-descent.md)."""
 
@@ -34,8 +38,8 @@ class SelectionSettings:
         Measure open choices on the clip. Without it a guessed box gets the finest grid of the quality, and the richest
         model of scattering that the known light allows is taken.
     lost_detail
-        Share of the smoke's contrast that a grid may lose against the finest of the quality: a quarter of the error
-        that even the finest leaves in the input view of a sharp clip (docs/experiments/resolution-selection.md).
+        Share of the smoke's contrast that a grid may lose against the finest of the quality; a preset has that of
+        `LOST_DETAIL`.
     scattering_error
         Error, as a share of what the smoke changes in the picture, that a cheaper model of scattering may add. Without
         shadows that is reached at an optical depth of about 0.15, where the mass comes out 5 % too small
@@ -46,7 +50,7 @@ class SelectionSettings:
     """
 
     measure: bool = True
-    lost_detail: float = 0.01
+    lost_detail: float = LOST_DETAIL["balanced"]
     scattering_error: float = 0.02
     velocity_side: int = 30
 
@@ -60,7 +64,8 @@ class Settings:
     method
         ``"default"``, or ``"paper"``: the paper's loop as it is, for comparison.
     quality
-        ``"draft"``, ``"balanced"`` or ``"fine"``: resolution (unless given) and iterations.
+        ``"draft"``, ``"balanced"`` or ``"fine"``: how much of the clip's detail the grid shows (unless it is
+        given), and iterations.
     resolution
         Voxels along x, y, z. ``"auto"`` takes as few as the detail of the clip's smoke allows, up to the quality's
         limit. None takes the scene's, or ``"auto"`` if it has none.
@@ -139,7 +144,8 @@ class Settings:
             return cls(method=method, quality=quality, resolution=resolution, selection=selection, detail=0.0)
         fit, descent = ITERATIONS[quality]
         density = DensitySettings(fit_iterations=fit, descent_iterations=descent)
-        return cls(method=method, quality=quality, resolution=resolution, density=density)
+        selection = SelectionSettings(lost_detail=LOST_DETAIL[quality])
+        return cls(method=method, quality=quality, resolution=resolution, density=density, selection=selection)
 
     def as_dict(self) -> dict[str, Any]:
         """The settings as plain nested values, the velocity solver with its name."""

@@ -13,9 +13,12 @@ from smokelift.setup.settings import LONGEST_SIDE, METHODS, QUALITIES, Settings
 
 
 def test_better_qualities_cost_more() -> None:
-    """Resolution and iterations rise from draft to fine."""
+    """Resolution, the detail that it keeps, and iterations rise from draft to fine."""
     presets = [Settings.preset(quality) for quality in QUALITIES]
-    costs = [(LONGEST_SIDE[p.quality], p.density.fit_iterations, p.density.descent_iterations) for p in presets]
+    costs = [
+        (LONGEST_SIDE[p.quality], -p.selection.lost_detail, p.density.fit_iterations, p.density.descent_iterations)
+        for p in presets
+    ]
     for less, more in itertools.pairwise(costs):
         assert all(a < b for a, b in zip(less, more, strict=True))
 
