@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-import zipfile
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
-from smokelift.scene import Side
+from smokelift.output.archive import Shape, read_arrays
+from smokelift.scene import SIDES, Side
+from smokelift.scene.domain import checked_sides
 from smokelift.transport import Velocity, face_shapes
 
 Array = npt.NDArray[np.float32]
@@ -56,28 +58,31 @@ class Truth:
         TruthError
             If there is no such file, it is damaged, or it holds something else.
         """
+        faces = tuple(f"velocity_{axis}" for axis in "xyz")
+        scalars: dict[str, Shape | None] = {"voxel_size": (), "fps": ()}
         try:
-            with path.open("rb") as opened, np.load(opened) as file:
-                truth = Truth(
-                    densities=file["density"],
-                    faces=tuple(file[f"velocity_{axis}"] for axis in "xyz"),
-                    inflow_packed=file["inflow_packed"],
-                    voxel_size=float(file["voxel_size"]),
-                    fps=float(file["fps"]),
-                    closed=tuple(file["closed"].tolist()) if "closed" in file else (),
-                )
-        except FileNotFoundError:
-            raise TruthError(f"{path}: no such file.") from None
-        except KeyError as missing:
-            raise TruthError(f"{path}: is no truth.npz: {missing.args[0]}.") from None
-        except (OSError, ValueError, EOFError, TypeError, AttributeError, zipfile.BadZipFile) as error:
-            raise TruthError(f"{path}: cannot be read as a truth.npz: {error}.") from error
+            file = read_arrays(
+                path, dict.fromkeys(("density", *faces, "inflow_packed")) | scalars, others={"closed": (len(SIDES),)}
+            )
+            truth = Truth(
+                densities=file["density"],
+                faces=tuple(file[name] for name in faces),
+                inflow_packed=file["inflow_packed"],
+                voxel_size=float(file["voxel_size"]),
+                fps=float(file["fps"]),
+                closed=checked_sides(file["closed"].tolist()) if "closed" in file else (),
+            )
+        except (OSError, ValueError) as error:
+            raise TruthError(f"{error}.") from error
         truth._check(path)
         return truth
 
     def _check(self, path: Path) -> None:
-        if self.densities.ndim != 4:
+        if self.densities.ndim != 4 or 0 in self.densities.shape:
             raise TruthError(f"{path}: density must be [frame, x, y, z], not of shape {self.densities.shape}.")
+        packed = (self.frames, -(-math.prod(self.shape) // 8))
+        if self.inflow_packed.shape != packed or self.inflow_packed.dtype != np.uint8:
+            raise TruthError(f"{path}: inflow_packed must be bytes of shape {packed}, not {self.inflow_packed.shape}.")
         wanted = [(self.frames, *shape) for shape in face_shapes(self.shape)]
         if (found := [face.shape for face in self.faces]) != wanted:
             raise TruthError(f"{path}: velocity on faces must have the shapes {wanted}, not {found}.")

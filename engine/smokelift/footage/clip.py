@@ -101,6 +101,12 @@ class Clip:
             source.close()
             raise
 
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """What the frames are read from: the video, or the pictures of the range."""
+        files = self._source.files
+        return files if len(files) == 1 else files[self.first : self.first + self._count]
+
     def frame(self, n: int) -> Picture:
         """Return frame ``n``, counted from 0 at the start of the range.
 

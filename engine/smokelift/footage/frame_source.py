@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Protocol
 
 from smokelift.footage.images import Picture
@@ -25,11 +26,14 @@ class FrameSource(Protocol):
         Frames a second.
     warning
         A sentence about a defect, else None.
+    files
+        The video, or a picture a frame.
     """
 
     count: int
     fps: float
     warning: str | None
+    files: tuple[Path, ...]
 
     def read(self, n: int) -> Picture:
         """Return a frame, linear; raise ClipError if it is damaged."""

@@ -29,9 +29,9 @@ class ImageSequence:
     """
 
     def __init__(self, path: Path, transfer: Transfer | None, fps: float | None) -> None:
-        self._paths = _numbered(path)
+        self.files = tuple(_numbered(path))
         self._transfer = transfer
-        self.count = len(self._paths)
+        self.count = len(self.files)
         self.fps = DEFAULT_FPS
         self.warning = None
         if fps is None and self.count > 1:
@@ -46,13 +46,13 @@ class ImageSequence:
     def read(self, n: int) -> Picture:
         """Return a picture, or raise ClipError if it is damaged or of another size than the first."""
         try:
-            image = read_image(self._paths[n], self._transfer)
+            image = read_image(self.files[n], self._transfer)
         except ImageError as error:
             raise ClipError(str(error)) from error
         self._shape = self._shape or image.shape
         if image.shape != self._shape:
             raise ClipError(
-                f"{self._paths[n]}: is {image.shape[1]} x {image.shape[0]} pixels, "
+                f"{self.files[n]}: is {image.shape[1]} x {image.shape[0]} pixels, "
                 f"the first picture {self._shape[1]} x {self._shape[0]}"
             )
         return image

@@ -42,6 +42,7 @@ class Video:
 
     def __init__(self, path: Path, transfer: Transfer | None) -> None:
         self._path = path
+        self.files: tuple[Path, ...] = (path,)
         self._transfer = transfer
         self.warning: str | None = None
         if not path.exists():

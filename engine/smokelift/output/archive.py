@@ -1,17 +1,23 @@
-"""NumPy archives that appear whole or not at all."""
+"""NumPy archives that appear whole or not at all, and are read only if they are sound."""
 
 from __future__ import annotations
 
 import io
+import math
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from smokelift.output.atomic import atomic_path
+
+Shape = tuple[int, ...]
+
+MOST_VALUES = 2**32
+"""Values of an array whose shape is not known before, at most."""
 
 
 def write_arrays(path: Path, arrays: Mapping[str, npt.NDArray[Any]], *, compressed: bool = True) -> None:
@@ -29,16 +35,73 @@ def write_arrays(path: Path, arrays: Mapping[str, npt.NDArray[Any]], *, compress
         aside.write_bytes(buffer.getbuffer())
 
 
-def read_arrays(path: Path, *names: str) -> dict[str, npt.NDArray[Any]]:
-    """Read the arrays of these names from a ``.npz``, or all without names.
+def read_arrays(
+    path: Path, expected: Mapping[str, Shape | None], *, others: Mapping[str, Shape] | None = None
+) -> dict[str, npt.NDArray[Any]]:
+    """Read arrays of real, finite numbers, or of text, from a ``.npz``.
+
+    Sizes are compared with what the file really holds, and with what is expected, before memory is taken.
+
+    Parameters
+    ----------
+    path
+        The file.
+    expected
+        Names of the arrays that it must hold, with their shapes where these are known.
+    others
+        Beginnings of the names of arrays that it may hold, with the most values along each axis.
 
     Raises
     ------
+    FileNotFoundError
+        If there is no such file.
     OSError
-        If the file is missing or damaged, or lacks an array.
+        With the path and the reason, if it is damaged, lacks an array, or holds others than expected.
     """
+    if not path.is_file():
+        raise FileNotFoundError(f"{path}: no such file")
     try:
-        with path.open("rb") as file, np.load(file) as data:
-            return {name: data[name] for name in names or data.files}
-    except (OSError, ValueError, LookupError, EOFError, zipfile.BadZipFile) as error:
-        raise OSError(f"{path}: cannot be read: {error}") from error
+        with zipfile.ZipFile(path) as archive:
+            members = {info.filename.removesuffix(".npy"): info for info in archive.infolist()}
+            arrays = {}
+            for name, shape in expected.items():
+                if name not in members:
+                    raise ValueError(f"it lacks {name}")
+                arrays[name] = _array(archive, members[name], exactly=shape)
+            for start, most in (others or {}).items():
+                for name in members:
+                    if name.startswith(start):
+                        arrays[name] = _array(archive, members[name], at_most=most)
+            return arrays
+    except MemoryError:
+        raise
+    # A damaged archive fails in zipfile, in any decompressor, in Python's parser or in NumPy, each with errors of
+    # its own; to the caller they all say the same.
+    except Exception as error:
+        raise OSError(f"{path}: cannot be read: {' '.join(str(error).split())}") from error
+
+
+def _array(
+    archive: zipfile.ZipFile, info: zipfile.ZipInfo, exactly: Shape | None = None, at_most: Shape | None = None
+) -> npt.NDArray[Any]:
+    read_header: dict[tuple[int, int], Callable[[IO[bytes]], tuple[Shape, bool, np.dtype[Any]]]] = {
+        (1, 0): np.lib.format.read_array_header_1_0,
+        (2, 0): np.lib.format.read_array_header_2_0,
+    }
+    with archive.open(info) as file:
+        shape, _, kind = read_header[np.lib.format.read_magic(file)](file)  # type: ignore[no-untyped-call]  # NumPy's
+    if kind.kind not in "biufU":
+        raise ValueError(f"{info.filename} holds no real numbers, but {kind}")
+    count = math.prod(shape)
+    unexpected = exactly not in (None, shape) or (at_most is not None and not _within(shape, at_most))
+    if unexpected or count > MOST_VALUES or count * kind.itemsize > info.file_size:
+        raise ValueError(f"{info.filename} cannot have the shape {shape}")
+    with archive.open(info) as file:
+        values: npt.NDArray[Any] = np.lib.format.read_array(file)  # type: ignore[no-untyped-call]  # NumPy's
+    if kind.kind == "f" and not np.isfinite(values).all():
+        raise ValueError(f"{info.filename} holds values that are not finite")
+    return values
+
+
+def _within(shape: Shape, most: Shape) -> bool:
+    return len(shape) <= len(most) and all(n <= m for n, m in zip(shape, most, strict=False))

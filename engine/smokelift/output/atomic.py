@@ -19,6 +19,8 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
     aside = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
         yield aside
+        with aside.open("rb+") as file:  # else a power cut could leave the new name with nothing in it
+            os.fsync(file.fileno())
         aside.replace(path)
     except BaseException:
         aside.unlink(missing_ok=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import platform
+import re
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -16,6 +17,8 @@ import numpy as np
 
 from smokelift.output.atomic import atomic_path
 from smokelift.output.layout import INDEX
+from smokelift.scene.checks import shown
+from smokelift.scene.files import read_text
 
 FORMAT = 1
 """Version of the file's structure; any other is refused."""
@@ -50,6 +53,10 @@ class Index:
         What of the result is measured, estimated, assumed and made up.
     frames
         The figures of every finished frame, by its number as text.
+    sources
+        Size and content of every file that was read, by its table in a scene file; empty for early versions.
+    checksums
+        Of the frames' files, by name (`smokelift.output.checksum`); empty for early versions.
     complete
         Whether the run came to its end.
     versions
@@ -61,6 +68,8 @@ class Index:
     choices: list[Any] = field(default_factory=list)
     provenance: list[Any] = field(default_factory=list)
     frames: dict[str, Any] = field(default_factory=dict)
+    sources: dict[str, Any] = field(default_factory=dict)
+    checksums: dict[str, str] = field(default_factory=dict)
     complete: bool = False
     versions: dict[str, Any] = field(default_factory=software_versions)
 
@@ -86,27 +95,34 @@ class Index:
         """
         path = directory / INDEX
         try:
-            data = json.loads(path.read_text(encoding="utf-8"))
+            data = json.loads(read_text(path))
         except FileNotFoundError:
             raise SequenceError(f"{directory}: holds no sequence ({INDEX} is missing)") from None
-        except (OSError, ValueError) as error:
+        except OSError as error:
+            raise SequenceError(str(error)) from error
+        except (ValueError, RecursionError) as error:
             raise SequenceError(f"{path}: cannot be read: {error}") from error
         if not isinstance(data, dict) or data.get("format") != FORMAT:
             raise SequenceError(f"{path}: is not a sequence of format {FORMAT}, which this version reads")
-        for key in ("choices", "provenance"):  # early versions wrote none
-            data.setdefault(key, [])
+        for key, nothing in (("choices", []), ("provenance", []), ("sources", {}), ("checksums", {})):
+            data.setdefault(key, nothing)  # early versions wrote none
         kinds = {
             "scene": dict,
             "settings": dict,
             "choices": list,
             "provenance": list,
             "frames": dict,
+            "sources": dict,
+            "checksums": dict,
             "complete": bool,
             "versions": dict,
         }
         for key, kind in kinds.items():
             if not isinstance(data.get(key), kind):
                 raise SequenceError(f"{path}: is damaged: {key} is missing or of another type")
+        for number, figures in data["frames"].items():
+            if not re.fullmatch(r"0|[1-9][0-9]{0,8}", number) or not isinstance(figures, dict):
+                raise SequenceError(f"{path}: is damaged: there can be no frame {shown(number)} of {shown(figures)}")
         return Index(**{key: data[key] for key in kinds})
 
 

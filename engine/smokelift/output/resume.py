@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from smokelift.output.archive import read_arrays, write_arrays
-from smokelift.transport import Array, Faces
+from smokelift.transport import Array, Faces, face_shapes
 
 _EXTRA = "extra_"
 
@@ -44,8 +44,8 @@ class ResumeState:
         write_arrays(path, arrays, compressed=False)
 
     @staticmethod
-    def read(path: Path) -> ResumeState | None:
-        """Read the state, or return None if no frame was finished.
+    def read(path: Path, shape: tuple[int, int, int]) -> ResumeState | None:
+        """Read the state on a grid of so many voxels, or return None if no frame was finished.
 
         Raises
         ------
@@ -54,11 +54,12 @@ class ResumeState:
         """
         if not path.is_file():
             return None
-        arrays = read_arrays(path)
-        try:
-            number, density = int(arrays["number"]), arrays["density"]
-            velocity = arrays["velocity_x"], arrays["velocity_y"], arrays["velocity_z"]
-        except (KeyError, TypeError) as error:
-            raise OSError(f"{path}: lacks {error}") from error
-        extra = {name.removeprefix(_EXTRA): value for name, value in arrays.items() if name.startswith(_EXTRA)}
-        return ResumeState(number, density, velocity, extra)
+        names = ("velocity_x", "velocity_y", "velocity_z")
+        expected = {"number": (), "density": shape, **dict(zip(names, face_shapes(shape), strict=True))}
+        arrays = read_arrays(path, expected, others={_EXTRA: shape})
+        number, density = arrays.pop("number"), arrays.pop("density")
+        x, y, z = (arrays.pop(name) for name in names)
+        extra = {name.removeprefix(_EXTRA): value for name, value in arrays.items()}
+        if number.dtype.kind != "i" or number < 0 or density.min() < 0:
+            raise OSError(f"{path}: cannot be read: number or density is negative")
+        return ResumeState(int(number), density, (x, y, z), extra)

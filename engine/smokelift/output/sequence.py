@@ -8,13 +8,17 @@ from pathlib import Path
 from typing import Any
 
 from smokelift.output.archive import read_arrays
+from smokelift.output.checksum import checksum
 from smokelift.output.index import Index, SequenceError
 from smokelift.output.layout import INDEX, frame_path
 from smokelift.output.vdb import read_vdb
 from smokelift.output.viewer import Viewer
 from smokelift.render import Image
 from smokelift.scene import Camera, CompleteScene, Scene, completed, scene_from_dict
-from smokelift.transport import Array, Velocity
+from smokelift.transport import Array, Velocity, face_shapes
+
+FACES = ("velocity_x", "velocity_y", "velocity_z")
+"""Names of a velocity's components in a NumPy twin."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +54,7 @@ class Sequence:
     choices: tuple[Mapping[str, Any], ...]
     provenance: tuple[Mapping[str, Any], ...]
     _figures: Mapping[str, Mapping[str, Any]]
+    _checksums: Mapping[str, str]
 
     @classmethod
     def open(cls, directory: str | Path) -> Sequence:
@@ -77,6 +82,7 @@ class Sequence:
             tuple(index.choices),
             tuple(index.provenance),
             index.frames,
+            index.checksums,
         )
 
     def density(self, number: int) -> Array:
@@ -99,11 +105,11 @@ class Sequence:
         SequenceError
             If there is no such frame, or its file is missing or damaged.
         """
-        arrays = self._read(number, "velocity_x", "velocity_y", "velocity_z")
+        arrays = self._read(number, *FACES)
         if "velocity" in arrays:
             return arrays["velocity"]
-        faces = arrays["velocity_x"], arrays["velocity_y"], arrays["velocity_z"]
-        return Velocity(faces, self.scene.domain.voxel_size).centres()
+        x, y, z = (arrays[name] for name in FACES)
+        return Velocity((x, y, z), self.scene.domain.voxel_size).centres()
 
     def render(self, number: int, camera: Camera | None = None) -> Image:
         """Render a frame as the scene's own camera sees it, or another.
@@ -149,12 +155,17 @@ class Sequence:
         """The arrays of these names from a NumPy twin, or else density and velocity at centres from OpenVDB."""
         self._check(number)
         twin, grids = (frame_path(self.directory, number, kind) for kind in ("npz", "vdb"))
+        shape = self.scene.domain.shape
+        path = twin if twin.is_file() else grids
+        if not path.is_file():
+            raise SequenceError(f"{path}: is missing")
         try:
-            if twin.is_file():
-                return read_arrays(twin, *names)
-            if not grids.is_file():
-                raise SequenceError(f"{grids}: is missing")
-            density, velocity = read_vdb(grids, self.scene.domain.shape)
+            if checksum([path]) != self._checksums.get(path.name, checksum([path])):
+                raise SequenceError(f"{path}: is not the file that was written: it is damaged, or was changed since")
+            if path is twin:
+                shapes = {"density": shape, **dict(zip(FACES, face_shapes(shape), strict=True))}
+                return read_arrays(path, {name: shapes[name] for name in names})
+            density, velocity = read_vdb(path, shape)
         except OSError as error:
             raise SequenceError(str(error)) from error
         return {"density": density, "velocity": velocity}
@@ -162,4 +173,7 @@ class Sequence:
 
 def _with_scattering(scene: Scene, settings: Mapping[str, Any]) -> Scene:
     """The scene with its model of scattering, which sequences of version 1.0 keep in their settings alone."""
-    return scene if scene.scattering else replace(scene, scattering=settings.get("density", {}).get("scattering"))
+    density = settings.get("density")
+    if scene.scattering or not isinstance(density, dict):
+        return scene
+    return replace(scene, scattering=density.get("scattering"))

@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from smokelift.output.archive import write_arrays
+from smokelift.output.checksum import checksum
 from smokelift.output.images import write_image
 from smokelift.output.index import Index, SequenceError, difference, plain
 from smokelift.output.layout import BACKGROUND, INDEX, LOCK, RESUME, frame_path, is_foreign
@@ -53,6 +54,8 @@ class SequenceWriter:
         decided is in the scene and the settings.
     provenance
         What of the result is measured, estimated, assumed and made up, as JSON can hold it. Kept, and not compared.
+    sources
+        Size and content of the files that the run reads, as JSON can hold it.
 
     Attributes
     ----------
@@ -77,6 +80,7 @@ class SequenceWriter:
         background: Array | None = None,
         choices: Iterable[Mapping[str, Any]] = (),
         provenance: Iterable[Mapping[str, Any]] = (),
+        sources: Mapping[str, Any] | None = None,
     ) -> None:
         self.directory = Path(directory)
         self.state: ResumeState | None = None
@@ -90,6 +94,7 @@ class SequenceWriter:
             **json.loads(json.dumps(run, allow_nan=False)),
             choices=plain(list(choices)),
             provenance=plain(list(provenance)),
+            sources=plain(sources or {}),
         )
         self._kinds = ("vdb", "npz") if npz else ("vdb",)
         self._resume = resume
@@ -131,6 +136,7 @@ class SequenceWriter:
     ) -> None:
         try:
             if kind is None:
+                self._check_files()
                 self._index = replace(self._index, complete=True)
                 self._index.write(self.directory)
                 (self.directory / RESUME).unlink(missing_ok=True)
@@ -180,10 +186,12 @@ class SequenceWriter:
         x, y, z = (face.copy() for face in faces)
         state = ResumeState(number, rho.copy(), (x, y, z), kept)
         try:
-            for kind in self._kinds:
-                self._write_arrays(frame_path(self.directory, number, kind), rho, faces)
-            figures = plain(figures or {})
-            self._index = replace(self._index, frames={**self._index.frames, str(number): figures})
+            paths = [frame_path(self.directory, number, kind) for kind in self._kinds]
+            for path in paths:
+                self._write_arrays(path, rho, faces)
+            frames = {**self._index.frames, str(number): plain(figures or {})}
+            checksums = {**self._index.checksums, **{path.name: checksum([path]) for path in paths}}
+            self._index = replace(self._index, frames=frames, checksums=checksums)
             self._index.write(self.directory)
             # Last: a state without its frame could not be told from a frame that was lost.
             state.write(self.directory / RESUME)
@@ -220,13 +228,15 @@ class SequenceWriter:
                     "or choose another directory"
                 )
             return
-        changed = difference("scene", there.scene, self._index.scene) or difference(
-            "settings", there.settings, self._index.settings
-        )
-        if changed:
-            raise SequenceError(
-                f"{self.directory}: was begun differently and cannot be resumed: {changed}; choose another directory"
-            )
+        for part in ("scene", "settings", "sources", "versions"):
+            before, now = (getattr(index, part) for index in (there, self._index))
+            # early versions kept no sources; a patch of Python changes no result
+            changed = difference(part, before, now | {"python": before.get("python")} if part == "versions" else now)
+            if changed and before:
+                raise SequenceError(
+                    f"{self.directory}: was begun differently and cannot be resumed: {changed}; choose another "
+                    "directory"
+                )
         for leftover in self.directory.glob(".*.tmp"):
             leftover.unlink(missing_ok=True)
         frames = there.frames
@@ -234,21 +244,23 @@ class SequenceWriter:
             self.state = self._last_state()
             last = self.state.number if self.state is not None else -1
             frames = {number: figures for number, figures in frames.items() if int(number) <= last}
-        self._index = replace(self._index, frames=frames, complete=there.complete)
+        kept = {frame_path(self.directory, int(number), kind).name for number in frames for kind in ("vdb", "npz")}
+        checksums = {name: digits for name, digits in there.checksums.items() if name in kept}
+        self._index = replace(self._index, frames=frames, checksums=checksums, complete=there.complete)
         self._check_files()
 
     def _last_state(self) -> ResumeState | None:
         try:
-            return ResumeState.read(self.directory / RESUME)
+            return ResumeState.read(self.directory / RESUME, self._domain.shape)
         except OSError as error:
             raise SequenceError(f"{error}; this run cannot be resumed, choose another directory") from error
 
     def _check_files(self) -> None:
-        """Refuse to go on if files of finished frames were taken away."""
+        """Refuse to go on, or to call the sequence complete, if files of finished frames were taken away."""
         for path in (frame_path(self.directory, number, kind) for number in self.finished for kind in self._kinds):
             if not path.is_file():
                 raise SequenceError(
-                    f"{path}: is missing, so this run cannot be resumed with this output; choose another directory"
+                    f"{path}: is missing, so this run cannot go on with this output; choose another directory"
                 )
 
     def _failed(self, what: str, error: OSError) -> SequenceError:

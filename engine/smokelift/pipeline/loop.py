@@ -23,6 +23,7 @@ from smokelift.footage.clip import Clip
 from smokelift.output.resume import ResumeState
 from smokelift.output.writer import SequenceWriter
 from smokelift.pipeline.method import Method, compose
+from smokelift.pipeline.sources import sources
 from smokelift.render import Volume
 from smokelift.scene import Domain, Scene
 from smokelift.setup.prepare import prepare_shot
@@ -113,6 +114,7 @@ def reconstruct(
         background=shot.estimated_background,
         choices=[choice.as_dict() for choice in shot.choices],
         provenance=[part.as_dict() for part in provenance(shot)],
+        sources=sources(shot),
     ) as writer:
         if writer.state is None and writer.finished:
             return

@@ -84,7 +84,7 @@ def test_what_is_no_sequence_is_named(tmp_path: Path, no_vdb: None) -> None:
     with pytest.raises(SequenceError, match="there is no frame 2; it has 1 to 1"):
         Sequence.open(tmp_path).density(2)
     (tmp_path / "smoke_0001.npz").write_bytes(b"half")
-    with pytest.raises(SequenceError, match=r"smoke_0001\.npz: cannot be read"):
+    with pytest.raises(SequenceError, match=r"smoke_0001\.npz: is not the file that was written"):
         Sequence.open(tmp_path).density(1)
     (tmp_path / "smoke_0001.npz").unlink()
     with pytest.raises(SequenceError, match="is missing"):
@@ -93,9 +93,45 @@ def test_what_is_no_sequence_is_named(tmp_path: Path, no_vdb: None) -> None:
     for text, message in (
         ("{", "cannot be read"),
         ("{}", "is not a sequence of format 1"),
+        ("[" * 100_000, "cannot be read"),
         (json.dumps({**index, "frames": 3}), "is damaged: frames"),
+        (json.dumps({**index, "frames": {"1": None}}), "is damaged: there can be no frame"),
+        (json.dumps({**index, "frames": {"one": {}}}), "is damaged: there can be no frame"),
+        (json.dumps({**index, "frames": {"-1": {}}}), "is damaged: there can be no frame"),
+        (json.dumps({**index, "frames": {"9" * 30: {}}}), "is damaged: there can be no frame"),
+        (json.dumps({**index, "scene": {}}), "no camera"),
+        (json.dumps({**index, "scene": {**index["scene"], "domain": None}}), "must be a table"),
+        (json.dumps(index).replace("[8, 8, 12]", "[80000, 80000, 120000]"), "resolution must be"),
+        (json.dumps({**index, "scene": {**index["scene"], "medium": {}}, "settings": {"density": 3}}), ""),
         (json.dumps({**index, "scene": {"medium": {"albedo": 3}}}), "albedo must be"),
     ):
         (tmp_path / "sequence.json").write_text(text)
+        if not message:
+            assert Sequence.open(tmp_path).scene.scattering == "single"
+            continue
         with pytest.raises(SequenceError, match=message):
             Sequence.open(tmp_path)
+
+
+@pytest.mark.parametrize("kind", ["npz", pytest.param("vdb", marks=needs_vdb)])
+def test_a_file_that_was_changed_is_refused_before_it_is_read(tmp_path: Path, kind: str) -> None:
+    """A flipped bit in an OpenVDB file can cost minutes and all memory."""
+    write(tmp_path, [1, 2], npz=kind == "npz")
+    path = tmp_path / f"smoke_0002.{kind}"
+    changed = bytearray(path.read_bytes())
+    changed[len(changed) // 2] ^= 1
+    path.write_bytes(changed)
+    opened = Sequence.open(tmp_path)
+    for read in (opened.density, opened.velocity, opened.render):
+        with pytest.raises(SequenceError, match=rf"smoke_0002\.{kind}: is not the file that was written"):
+            read(2)
+    assert opened.density(1).any()
+
+
+def test_a_sequence_without_checksums_opens(tmp_path: Path, no_vdb: None) -> None:
+    """Early versions wrote none."""
+    write(tmp_path, [1])
+    index = json.loads((tmp_path / "sequence.json").read_text())
+    del index["checksums"], index["sources"]
+    (tmp_path / "sequence.json").write_text(json.dumps(index))
+    np.testing.assert_array_equal(Sequence.open(tmp_path).density(1), frame(1)[0])

@@ -184,6 +184,86 @@ def test_another_run_is_not_resumed(tmp_path: Path, no_vdb: None) -> None:
         assert writer.finished == (1,)  # the refusals left no lock behind
 
 
+def test_other_files_and_other_software_are_not_resumed(
+    tmp_path: Path, no_vdb: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They would be mixed without a word. A patch of Python changes nothing; early versions kept no sources."""
+    cut_off(tmp_path, [1], sources={"clip": {"bytes": 9, "sha256": "ab"}})
+    with pytest.raises(SequenceError, match=r'sources\.clip\.sha256 was "ab" and is now "cd"; choose another'):
+        write(tmp_path, [2], resume=True, sources={"clip": {"bytes": 9, "sha256": "cd"}})
+    index = json.loads((tmp_path / "sequence.json").read_text())
+    newer = {**index, "versions": {**index["versions"], "numpy": "1.0"}}
+    (tmp_path / "sequence.json").write_text(json.dumps(newer))
+    with pytest.raises(SequenceError, match=r'versions\.numpy was "1.0" and is now'):
+        write(tmp_path, [2], resume=True, sources=index["sources"])
+    early = {**index, "sources": {}, "versions": {**index["versions"], "python": "3.11.0"}}
+    (tmp_path / "sequence.json").write_text(json.dumps(early))
+    write(tmp_path, [2], resume=True, sources=index["sources"])
+    assert Sequence.open(tmp_path).frames == (1, 2)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"density": np.full((8, 8, 12), np.inf, np.float32)},
+        {"density": np.full((8, 8, 12), -1, np.float32)},
+        {"density": np.ones((8, 8, 13), np.float32)},
+        {"density": np.ones((8, 8, 12), np.complex64)},
+        {"velocity_x": np.ones((8, 8, 12), np.float32)},
+        {"number": np.array(-1)},
+        {"number": np.array(1.5)},
+        {"extra_smooth": np.zeros((800, 8, 12), np.float32)},
+        {"extra_gain": np.array(np.nan)},
+    ],
+)
+def test_a_state_that_no_run_can_have_is_not_resumed(tmp_path: Path, no_vdb: None, change: dict[str, Any]) -> None:
+    cut_off(tmp_path, [1])
+    with np.load(tmp_path / "resume.npz") as state:
+        arrays = dict(state)
+    np.savez(tmp_path / "resume.npz", **{**arrays, **change})
+    with pytest.raises(SequenceError, match=r"resume\.npz: cannot be read: .*; this run cannot be resumed"):
+        write(tmp_path, [2], resume=True)
+
+
+def test_files_reach_the_disk_before_they_get_their_names(
+    tmp_path: Path, no_vdb: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A power cut must leave the old file or the new one."""
+    synced: set[int] = set()
+    sync, rename = os.fsync, Path.replace
+
+    def recorded(file: int) -> None:
+        sync(file)
+        synced.add(os.fstat(file).st_ino)
+
+    def checked(path: Path, target: Path) -> Path:
+        assert path.stat().st_ino in synced
+        return rename(path, target)
+
+    monkeypatch.setattr(os, "fsync", recorded)
+    monkeypatch.setattr(Path, "replace", checked)
+    write(tmp_path, [1])
+    assert synced
+
+
+def test_files_that_vanish_during_a_run_are_missed(tmp_path: Path, no_vdb: None) -> None:
+    """A folder that is moved away, or a frame that is deleted, is no complete sequence."""
+    with (
+        pytest.raises(SequenceError, match=r"smoke_0001\.npz: is missing"),
+        SequenceWriter(tmp_path / "out", SCENE, SETTINGS, npz=True) as writer,
+    ):
+        writer.write(1, *frame(1))
+        (tmp_path / "out" / "smoke_0001.npz").unlink()
+    assert not Sequence.open(tmp_path / "out").complete
+    with (
+        pytest.raises(SequenceError, match=r"could not be written|is missing"),
+        SequenceWriter(tmp_path / "other", SCENE, SETTINGS, npz=True) as writer,
+    ):
+        writer.write(1, *frame(1))
+        (tmp_path / "other").rename(tmp_path / "away")
+        (tmp_path / "other").mkdir()
+
+
 def test_lost_files_and_damaged_states_are_not_resumed(tmp_path: Path, no_vdb: None) -> None:
     cut_off(tmp_path, [1, 2])
     state = (tmp_path / "resume.npz").read_bytes()

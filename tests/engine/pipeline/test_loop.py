@@ -18,6 +18,7 @@ from smokelift.density.hull import project_voxels, voxel_centres
 from smokelift.density.screen import view_frame
 from smokelift.evaluation.metrics import psnr
 from smokelift.footage.clip import Clip
+from smokelift.footage.images import read_image
 from smokelift.output.images import write_image
 from smokelift.output.index import SequenceError
 from smokelift.output.sequence import Sequence
@@ -253,6 +254,22 @@ def test_a_run_that_was_cut_off_goes_on_exactly(run, plume, draft, tmp_path, cou
     assert [name for name, _ in found] == [name for name, _ in wanted]
     for (name, value), (_, other) in zip(wanted, found, strict=True):
         np.testing.assert_array_equal(other, value, err_msg=name)
+
+
+@pytest.mark.parametrize("replaced", ["clip", "background"])
+def test_a_file_that_was_replaced_under_its_name_is_not_mixed_in(plume, draft, tmp_path, replaced) -> None:
+    """Half a sequence of one clip and half of another would look like one."""
+    scene = plume.write(tmp_path / "clip", plume.densities)
+    write_image(tmp_path / "plate.png", np.zeros((56, 40, 3)))
+    scene = replace(scene, background=Background(image=tmp_path / "plate.png"))
+    cut_off(scene, draft, tmp_path / "out", 2)
+    changed = tmp_path / "clip" / "frame_0004.png" if replaced == "clip" else tmp_path / "plate.png"
+    picture = read_image(changed)
+    picture[0, 0] = 0.01
+    write_image(changed, picture)
+    with pytest.raises(SequenceError, match=rf"begun differently .* sources\.{replaced}\."):
+        frames_of(scene, draft, tmp_path / "out", npz=True, resume=True)
+    assert Sequence.open(tmp_path / "out").frames == (1, 2)
 
 
 def test_an_estimated_background_resumes_and_moves(plume, draft, tmp_path) -> None:

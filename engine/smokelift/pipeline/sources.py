@@ -1,0 +1,42 @@
+"""The files that a shot is read from, with what tells them from others of the same names."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from smokelift.footage.plate import ChangingPlate
+from smokelift.output.checksum import checksum
+from smokelift.scene import Background, EnvironmentLight
+from smokelift.setup.shot import Shot, ShotView
+
+
+def sources(shot: Shot) -> dict[str, dict[str, Any]]:
+    """Return size and content of what a shot is read from, by its table in a scene file.
+
+    Raises
+    ------
+    OSError
+        If a file cannot be read any more.
+    """
+    files: dict[str, tuple[Path, ...]] = {}
+    for number, view in enumerate(shot.views):
+        table = f"views.{number - 1}." if number else ""
+        files[f"{table}clip"] = view.clip.files
+        given = shot.scene.views[number - 1].background if number else shot.scene.background
+        files[f"{table}background"] = _background(given, view)
+    for number, light in enumerate(shot.scene.lights):
+        if isinstance(light, EnvironmentLight):
+            files[f"lights.{number}"] = (light.image,)
+    return {
+        table: {"bytes": sum(path.stat().st_size for path in paths), "sha256": checksum(paths)}
+        for table, paths in files.items()
+        if paths
+    }
+
+
+def _background(given: Background | None, view: ShotView) -> tuple[Path, ...]:
+    """The files of a background; none where it is a colour, or estimated."""
+    if isinstance(view.plates, ChangingPlate):
+        return view.plates.clip.files
+    return () if given is None or given.image is None else (given.image,)
