@@ -1,4 +1,6 @@
+#include "blocks.h"
 #include "camera.h"
+#include "diffuse_light.h"
 #include "lighting.h"
 #include "python.h"
 
@@ -74,6 +76,26 @@ Strided<T> box_of(const py::array_t<float> &a, Data data, const Support &support
         data += corner[axis] * stride[axis];
     }
     return {data, stride};
+}
+
+// An array over blocks, [channel][x][y][z].
+using OverBlocks = py::array_t<float, py::array::c_style>;
+
+OverBlocks over_blocks(int channels, const Shape &n) {
+    return OverBlocks({py::ssize_t(channels), py::ssize_t(n[0]), py::ssize_t(n[1]), py::ssize_t(n[2])});
+}
+
+Shape blocks_shape(const OverBlocks &a, int channels) {
+    require_fit(a.ndim() == 4 && a.shape(0) == channels);
+    return {int(a.shape(1)), int(a.shape(2)), int(a.shape(3))};
+}
+
+// Blocks that reach around all voxels of a support.
+void require_around(const Blocks &blocks, const Support &support) {
+    for (int axis = 0; axis < 3; ++axis)
+        require_fit(blocks.size > 0 && 2 * blocks.offset[axis] + 1 >= blocks.size &&
+                    2 * (blocks.offset[axis] + support.shape()[axis]) - 1 <
+                        (2 * blocks.n[axis] - 1) * blocks.size);
 }
 
 // Zeros that get memory where they are touched.
@@ -238,6 +260,108 @@ void register_render(py::module_ &module) {
         },
         "rays"_a, "depth"_a.noconvert(), "of_scattered"_a.noconvert(), "of_transmittance"_a.noconvert(),
         "record"_a.noconvert(), "gradient"_a.noconvert(), "support"_a);
+
+    py::class_<Blocks>(module, "Blocks")
+        .def(py::init([](const std::array<int, 3> &shape, int size, const std::array<int, 3> &offset) {
+                 return Blocks{shape, size, offset};
+             }),
+             py::kw_only(), "shape"_a, "size"_a, "offset"_a);
+
+    module.def(
+        "average",
+        [](Floats medium, const Support &support, const Blocks &blocks) {
+            const Voxels voxels = voxels_of(medium, support);
+            require_around(blocks, support);
+            OverBlocks means = over_blocks(voxels.width, blocks.n);
+            float *const to = means.mutable_data();
+            released([&](Workers &workers) { average(voxels, support.spans, blocks, to, workers); });
+            return means;
+        },
+        "medium"_a.noconvert(), "support"_a, "blocks"_a);
+
+    module.def(
+        "average_adjoint",
+        [](Floats medium, const Support &support, const Blocks &blocks, const OverBlocks &of_means,
+           Floats gradient) {
+            const Voxels voxels = voxels_of(medium, support), slopes = voxels_of(gradient, support);
+            require_around(blocks, support);
+            require_fit(slopes.width == voxels.width && blocks_shape(of_means, voxels.width) == blocks.n);
+            released([&](Workers &workers) {
+                average_adjoint(voxels, support.spans, blocks, of_means.data(), slopes, workers);
+            });
+        },
+        "medium"_a.noconvert(), "support"_a, "blocks"_a, "of_means"_a.noconvert(), "gradient"_a.noconvert());
+
+    module.def(
+        "add_interpolated",
+        [](const OverBlocks &values, float factor, const Blocks &blocks, Floats medium,
+           const Support &support) {
+            const Voxels voxels = voxels_of(medium, support);
+            require_around(blocks, support);
+            require_fit(blocks_shape(values, voxels.width - 1) == blocks.n);
+            released([&](Workers &workers) {
+                add_interpolated(values.data(), factor, blocks, voxels, support.spans, workers);
+                extend_into_border(voxels);
+            });
+        },
+        "values"_a.noconvert(), "factor"_a, "blocks"_a, "medium"_a.noconvert(), "support"_a);
+
+    module.def(
+        "interpolate_adjoint",
+        [](Floats gradient, const Support &support, float factor, const Blocks &blocks) {
+            const Voxels slopes = voxels_of(gradient, support);
+            require_around(blocks, support);
+            OverBlocks of_values = over_blocks(slopes.width - 1, blocks.n);
+            float *const to = of_values.mutable_data();
+            released([&](Workers &workers) {
+                fold_border(slopes);
+                interpolate_adjoint(slopes, support.spans, factor, blocks, to, workers);
+            });
+            return of_values;
+        },
+        "gradient"_a.noconvert(), "support"_a, "factor"_a, "blocks"_a);
+
+    module.def(
+        "diffuse",
+        [](const OverBlocks &means, float albedo, float edge) {
+            require_fit(means.ndim() == 4 && means.shape(0) > 1);
+            const int channels = static_cast<int>(means.shape(0)) - 1;
+            const Shape n = blocks_shape(means, channels + 1);
+            OverBlocks radiance = over_blocks(channels, n);
+            float *const phi = radiance.mutable_data();
+            released([&](Workers &workers) {
+                const std::size_t count = volume(n);
+                const BlockTransport transport(means.data(), albedo, n, edge);
+                for (int channel = 0; channel < channels; ++channel)
+                    transport.solve(means.data() + (channel + 1) * count, phi + channel * count, workers);
+            });
+            return radiance;
+        },
+        "means"_a.noconvert(), "albedo"_a, "edge"_a);
+
+    module.def(
+        "diffuse_adjoint",
+        [](const OverBlocks &means, const OverBlocks &radiance, const OverBlocks &of_radiance, float albedo,
+           float edge) {
+            require_fit(means.ndim() == 4 && means.shape(0) > 1);
+            const int channels = static_cast<int>(means.shape(0)) - 1;
+            const Shape n = blocks_shape(means, channels + 1);
+            require_fit(blocks_shape(radiance, channels) == n && blocks_shape(of_radiance, channels) == n);
+            OverBlocks of_means = over_blocks(channels + 1, n);
+            float *const result = of_means.mutable_data();
+            released([&](Workers &workers) {
+                const std::size_t count = volume(n);
+                const BlockTransport transport(means.data(), albedo, n, edge);
+                std::fill_n(result, count, 0.0f);
+                for (int channel = 0; channel < channels; ++channel)
+                    transport.solve_adjoint(means.data() + (channel + 1) * count,
+                                            radiance.data() + channel * count,
+                                            of_radiance.data() + channel * count,
+                                            result + (channel + 1) * count, result, workers);
+            });
+            return of_means;
+        },
+        "means"_a.noconvert(), "radiance"_a.noconvert(), "of_radiance"_a.noconvert(), "albedo"_a, "edge"_a);
 }
 
 } // namespace smokelift

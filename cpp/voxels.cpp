@@ -1,6 +1,7 @@
 #include "voxels.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace smokelift {
 namespace {
@@ -120,7 +121,7 @@ void fold_border(const Voxels &gradient) {
     for (int axis = 0; axis < 3; ++axis)
         over_border(gradient, axis, [&](float *border, float *nearest) {
             for (int channel = 1; channel < gradient.width; ++channel)
-                nearest[channel] += border[channel];
+                nearest[channel] += std::exchange(border[channel], 0.0f);
         });
 }
 

@@ -69,7 +69,7 @@ void unpack(const Voxels &gradient, const unsigned char *marked, float extinctio
 
 void clear(const Voxels &voxels, Workers &workers);
 
-// In-scattered radiance of the border: the nearest voxel's. And the adjoint.
+// In-scattered radiance of the border: the nearest voxel's. And the adjoint, which leaves zeros there.
 void extend_into_border(const Voxels &medium);
 void fold_border(const Voxels &gradient);
 

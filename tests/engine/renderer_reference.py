@@ -115,9 +115,55 @@ def inscatter_of(kappa, camera, domain, medium, lights, scattering):
             depth = light_optical_depth(kappa, h, travel)
         cosine = np.sum(to_eye * travel, -1)
         phase = (1 - g * g) / (4 * np.pi * (1 + g * g - 2 * g * cosine) ** 1.5)
-        shadow = np.exp(-depth) if scattering == "single" else np.ones_like(depth)
-        total += medium.albedo * (phase * shadow)[..., None] * energy
-    return total
+        shadow = np.ones_like(depth) if scattering == "unshadowed" else np.exp(-depth)
+        total = total + medium.albedo * (phase * shadow)[..., None] * energy
+    return total + diffuse_inscatter(kappa, total, h, medium.albedo) if scattering == "multiple" else total
+
+
+def diffuse_inscatter(kappa, inscatter, h, albedo, size=3):
+    """What light that has been scattered adds to the in-scattered radiance, by a dense matrix over blocks of voxels."""
+    # the blocks reach around the voxels, so the first begins up to a block before the grid
+    indices = [np.arange(-size, n + size) // size + 1 for n in kappa.shape]
+    blocks = [int(index[-1]) + 1 for index in indices]
+    inside = tuple(index[size:-size] for index in indices)
+    means = np.zeros((4, *blocks), inscatter.dtype)
+    for number, values in enumerate((kappa, *np.moveaxis(kappa[..., None] * inscatter, -1, 0))):
+        np.add.at(means[number], np.ix_(*inside), values / size**3)
+    extinction, emission = means[0], means[1:].reshape(3, -1)
+    transport = block_transport(extinction, h * size)
+    count = extinction.size
+    radiance = np.linalg.solve(
+        np.eye(count) - transport * (albedo * extinction).ravel(), transport @ emission.T
+    ).reshape(*blocks, 3)
+    for axis, n in enumerate(kappa.shape):
+        at = (np.arange(n) + 0.5) / size - 0.5 + 1
+        low = np.floor(at).astype(int)
+        part = (at - low).reshape([-1 if a == axis else 1 for a in range(4)])
+        radiance = (1 - part) * radiance.take(low, axis) + part * radiance.take(low + 1, axis)
+    return albedo * radiance
+
+
+def block_transport(extinction, edge):
+    """Matrix from the emission of blocks to their mean radiance: every pair of blocks on a line of the lattice."""
+    transport = np.zeros((extinction.size,) * 2, extinction.dtype)
+    number = np.arange(extinction.size).reshape(extinction.shape)
+    for direction in np.ndindex(3, 3, 3):
+        step = np.array(direction) - 1
+        axes = int(np.abs(step).sum())
+        if axes not in (1, 3):
+            continue
+        weight, length = (1 / 15, edge) if axes == 1 else (3 / 40, edge * np.sqrt(3))
+        t = np.where(extinction == 0, 1e-9, extinction) * length
+        escaped = np.where(np.abs(t) < 1e-4, 1 - t / 2, -np.expm1(-t) / t)
+        own = np.where(np.abs(t) < 1e-4, 0.5 - t / 6, (1 - escaped) / t)
+        for begin in np.ndindex(*extinction.shape):
+            transport[number[begin], number[begin]] += weight * length * own[begin]
+            beam, at = length * escaped[begin], np.array(begin) + step
+            while np.all(at >= 0) and np.all(at < extinction.shape):
+                to = tuple(at)
+                transport[number[to], number[begin]] += weight * escaped[to] * beam
+                beam, at = beam * np.exp(-t[to]), at + step
+    return transport
 
 
 def render(density, camera, domain, medium, lights, background, scattering="single"):

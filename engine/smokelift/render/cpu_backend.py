@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import smokelift._core as _core
+from smokelift.render.diffuse_light import DiffuseLight
 from smokelift.render.light_sweeps import ParallelSweep, PointSweep
 from smokelift.render.plan import RenderPlan
 
@@ -45,6 +46,7 @@ class CpuBackend:
         self._depth = np.zeros(pixels, np.float32)
         self._phase = _core.Phase(to_eye=plan.to_eye, albedo=plan.medium.albedo, anisotropy=plan.medium.anisotropy)
         self._lights = [_compiled(light) for light in plan.lighting.lights]
+        self._diffuse = DiffuseLight(plan, self._support) if plan.diffuse else None
         if not plan.everywhere:
             mask = np.zeros((x + 2, y + 2, z + 2, 1), np.float32)
             mask[1:-1, 1:-1, 1:-1, 0] = plan.marked
@@ -59,6 +61,8 @@ class CpuBackend:
         _core.pack(density, plan.corner, self._support, plan.medium.extinction, self._medium)
         if plan.shadows:
             _core.shade(self._medium, self._support, self._phase, self._lights)
+        if self._diffuse:
+            self._diffuse.add(self._medium)
         if keep_record and self._record is None:
             self._record = _core.zeros((plan.lighting.channels + 1, max(plan.shape), *self._depth.shape))
         record = self._record if keep_record else None
@@ -73,6 +77,8 @@ class CpuBackend:
         _core.march_adjoint(
             self._rays, self._depth, of_scattered, of_transmittance, self._record, self._gradient, self._support
         )
+        if self._diffuse:
+            self._diffuse.pull_back(self._medium, self._gradient)
         if plan.shadows:
             if self._scratch is None:
                 self._scratch = _core.zeros((*self._medium.shape[:3], 1))

@@ -24,7 +24,7 @@ class Optics:
     lights
         Directional and point lights only; an environment is split into many.
     scattering
-        ``"single"`` with self-shadowing, ``"unshadowed"`` or ``"absorption"``.
+        ``"multiple"`` times, ``"single"`` with self-shadowing, ``"unshadowed"`` or ``"absorption"``.
     """
 
     domain: Domain

@@ -39,6 +39,8 @@ class RenderPlan:
         The lights, in coordinates of the box. Without channels the smoke only absorbs.
     shadows
         Whether light is attenuated on its way to the voxels.
+    diffuse
+        Whether scattered light is scattered again.
     """
 
     domain: Domain
@@ -49,6 +51,7 @@ class RenderPlan:
     to_eye: NDArray[np.float64]
     lighting: Lighting
     shadows: bool
+    diffuse: bool
 
     @property
     def shape(self) -> Box:
@@ -73,6 +76,11 @@ def plan_render(
     """Plan the rendering for a camera; `smokelift.render.Renderer` says what the parameters are."""
     if scattering not in get_args(Scattering):
         raise ValueError(f"scattering must be one of {', '.join(get_args(Scattering))}, not {scattering!r}.")
+    if scattering == "multiple" and medium.anisotropy != 0.0:
+        raise ValueError(
+            f'Scattering "multiple" needs anisotropy 0, not {medium.anisotropy:g}; take scattering "single", or smoke '
+            "that scatters alike in all directions."
+        )
     if support is None:
         support = np.broadcast_to(np.True_, domain.resolution)
     corner, part = _box_around(support)
@@ -86,7 +94,8 @@ def plan_render(
         rays=camera_rays(camera, box),
         to_eye=_to_eye(camera, box),
         lighting=found,
-        shadows=scattering == "single" and found.channels > 0,
+        shadows=scattering in ("multiple", "single") and found.channels > 0,
+        diffuse=scattering == "multiple" and found.channels > 0,
     )
 
 

@@ -36,8 +36,9 @@ class Renderer:
     background : (rows, columns, 3) or (3,)
         Linear radiance behind the smoke.
     scattering
-        ``"single"``: single scattering with self-shadowing; ``"unshadowed"``: light reaches every voxel
-        unattenuated; ``"absorption"``: the background attenuated, nothing else.
+        ``"multiple"``: scattering of all orders, isotropic smoke only; ``"single"``: single scattering with
+        self-shadowing; ``"unshadowed"``: light reaches every voxel unattenuated; ``"absorption"``: the background
+        attenuated, nothing else.
     support : (nx, ny, nz) bool, optional
         Voxels that may hold smoke: what the density says elsewhere does not count, the gradient is zero there, and
         the work follows their number.
@@ -45,7 +46,7 @@ class Renderer:
     Raises
     ------
     ValueError
-        If a point light stands inside the domain.
+        If a point light stands inside the domain, or if light is to be scattered many times by anisotropic smoke.
     """
 
     def __init__(

@@ -30,7 +30,8 @@ class CompleteScene:
     background
         Behind the smoke.
     scattering
-        How light is scattered: ``"single"`` with self-shadowing, ``"unshadowed"`` or ``"absorption"``.
+        How light is scattered: ``"multiple"`` times, ``"single"`` with self-shadowing, ``"unshadowed"`` or
+        ``"absorption"``.
     clip, views, closed, inlets
         As in `Scene`; a scene that was never filmed has no clip.
     """

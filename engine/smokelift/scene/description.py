@@ -48,7 +48,8 @@ class Scene:
     inlets
         All the places where smoke enters. If there is none, they are estimated.
     scattering
-        How light is scattered: ``"single"`` with self-shadowing, ``"unshadowed"`` or ``"absorption"``.
+        How light is scattered: ``"multiple"`` times, ``"single"`` with self-shadowing, ``"unshadowed"`` or
+        ``"absorption"``.
 
     Raises
     ------

@@ -7,10 +7,10 @@ from typing import Any, Literal
 
 from smokelift.scene.checks import number, one_of, positive, set_fields, unexpected
 
-Scattering = Literal["single", "unshadowed", "absorption"]
-"""How light is scattered: once and with self-shadowing, once without, or not at all."""
+Scattering = Literal["multiple", "single", "unshadowed", "absorption"]
+"""How light is scattered: any number of times, once and with self-shadowing, once without, or not at all."""
 
-SCATTERINGS: tuple[Scattering, ...] = ("single", "unshadowed", "absorption")
+SCATTERINGS: tuple[Scattering, ...] = ("multiple", "single", "unshadowed", "absorption")
 
 
 @dataclass(frozen=True)

@@ -29,9 +29,9 @@ def taichi_on_the_processor():
 
 
 @pytest.mark.parametrize("lights", LIGHTS.values(), ids=LIGHTS.keys())
-@pytest.mark.parametrize("scattering", ["single", "unshadowed"])
+@pytest.mark.parametrize(("scattering", "anisotropy"), [("multiple", 0.0), ("single", 0.3), ("unshadowed", 0.3)])
 @pytest.mark.parametrize("hull", [False, True])
-def test_both_backends_agree(lights, scattering, hull):
+def test_both_backends_agree(lights, scattering, anisotropy, hull):
     """The same picture and the same derivative, twice in a row, with and without a hull."""
     rng = np.random.default_rng(1)
     density = (rng.random(SHAPE) * (rng.random(SHAPE) > 0.3)).astype(np.float32)
@@ -41,7 +41,7 @@ def test_both_backends_agree(lights, scattering, hull):
         support[:2], support[:, -3:] = False, False
         density = np.where(support, density, 0).astype(np.float32)
     camera = Camera.look_at((2.5, -1.2, 2.4), (0.45, 0.5, 0.6), fov_y_degrees=40, size=(14, 16))
-    plan = plan_render(camera, DOMAIN, Medium(4.0, 0.9, 0.3), lights, scattering, support)
+    plan = plan_render(camera, DOMAIN, Medium(4.0, 0.9, anisotropy), lights, scattering, support)
     backends = CpuBackend(plan), GpuBackend(plan)
     for values in (density / 2, density):
         results = []

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+import smokelift._core as _core
+from smokelift.render.diffuse_light import DiffuseLight
 from smokelift.render.gpu import camera_kernels as camera
 from smokelift.render.gpu import light_kernels as light
 from smokelift.render.gpu import taichi_runtime as taichi
@@ -41,6 +43,7 @@ class GpuBackend:
         self._scratch: Any = None
         self._to_eye = taichi.matrix(plan.to_eye)
         self._columns: dict[tuple[int, int, int], Any] = {}
+        self._diffuse = DiffuseLight(plan, _core.Support(plan.marked)) if plan.diffuse else None
         if self._channels and not plan.shadows:
             self._shade()
 
@@ -50,6 +53,10 @@ class GpuBackend:
         camera.pack(taichi.upload(density[self._box]), self._marked, self._medium, plan.medium.extinction)
         if plan.shadows:
             self._shade()
+        if self._diffuse:  # blocks are few, so the processor follows the light among them
+            medium = taichi.download(self._medium)
+            self._diffuse.add(medium)
+            self._medium = taichi.upload(medium)
         if keep_record and self._record is None:
             self._record = taichi.zeros((max(plan.shape), *plan.rays.length.shape, self._channels + 1))
         record = self._record if keep_record else self._medium
@@ -76,6 +83,10 @@ class GpuBackend:
                 self._record, self._lines, self._planes, to_pixel, self._near, self._gradient,
                 axis, self._channels, number,
             )  # fmt: skip
+        if self._diffuse:
+            gradient = taichi.download(self._gradient)
+            self._diffuse.pull_back(taichi.download(self._medium), gradient)
+            self._gradient = taichi.upload(gradient)
         if plan.shadows:
             self._shade_adjoint()
         in_box = taichi.zeros(plan.shape)

@@ -1,0 +1,54 @@
+"""Light that is scattered more than once, on blocks of voxels (``cpp/diffuse_light.h``).
+
+It comes from all sides and changes slowly, so a coarse grid holds it: light goes from block to block along 14
+directions, and conjugate gradients solve for all orders of scattering. What the lights themselves scatter, with its
+sharp shadows, stays on the voxels. Figures: docs/experiments/multiple-scattering.md.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+import smokelift._core as _core
+from smokelift.render.plan import RenderPlan
+
+Floats = NDArray[np.float32]
+
+BLOCK = 3
+"""Voxels along the edge of a block (docs/experiments/multiple-scattering.md)."""
+
+
+class DiffuseLight:
+    """The diffuse light of one `RenderPlan`, in voxels with a border of one, (x + 2, y + 2, z + 2, channels + 1)."""
+
+    def __init__(self, plan: RenderPlan, support: _core.Support) -> None:
+        self._support = support
+        self._albedo = plan.medium.albedo
+        self._edge = BLOCK * plan.domain.voxel_size
+        # blocks lie alike in the domain whatever the box; their centres reach around all voxels of the box
+        corner, count = np.array(plan.corner), np.array(plan.shape)
+        first = np.floor((corner + 0.5) / BLOCK - 0.5).astype(int)
+        last = np.floor((corner + count - 0.5) / BLOCK - 0.5).astype(int) + 1
+        shape, offset = (last - first + 1).tolist(), (corner - BLOCK * first).tolist()
+        self._blocks = _core.Blocks(shape=shape, size=BLOCK, offset=offset)
+        self._means: Floats | None = None
+        self._radiance: Floats | None = None
+
+    def add(self, medium: Floats) -> None:
+        """Add to the radiance that the voxels scatter what they scatter of scattered light."""
+        self._means = _core.average(medium, self._support, self._blocks)
+        self._radiance = _core.diffuse(self._means, self._albedo, self._edge)
+        _core.add_interpolated(self._radiance, self._albedo, self._blocks, medium, self._support)
+
+    def pull_back(self, medium: Floats, gradient: Floats) -> None:
+        """Add to a derivative by extinction and scattered radiance what it says of them through the light added.
+
+        The medium is left as it was before `add`.
+        """
+        if self._means is None or self._radiance is None:
+            raise RuntimeError("No diffuse light has been added.")
+        _core.add_interpolated(self._radiance, -self._albedo, self._blocks, medium, self._support)
+        of_radiance = _core.interpolate_adjoint(gradient, self._support, self._albedo, self._blocks)
+        of_means = _core.diffuse_adjoint(self._means, self._radiance, of_radiance, self._albedo, self._edge)
+        _core.average_adjoint(medium, self._support, self._blocks, of_means, gradient)

@@ -1,0 +1,92 @@
+"""Scattering of all orders: the same sums in float64, conservation of energy, the derivative by finite differences."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import renderer_reference as reference
+
+from smokelift.render import Renderer
+from smokelift.scene import Camera, DirectionalLight, Domain, Medium
+
+SHAPE = (8, 9, 7)
+DOMAIN = Domain((0.0, 0.0, 0.0), (0.8, 0.9, 0.7), SHAPE)
+MEDIUM = Medium(12.0, 0.95)
+SUN = DirectionalLight((0.57, 0.45, -0.68), (3.0, 3.0, 3.0))
+SKY = DirectionalLight((0.1, 0.2, -1.0), (0.5, 1.0, 2.0))
+CAMERA = Camera.look_at((0.3, -2.0, 0.9), (0.4, 0.45, 0.35), fov_y_degrees=30, size=(12, 11))
+WALL = np.array((0.3, 0.2, 0.4), np.float32)
+
+
+@pytest.fixture(scope="module")
+def density():
+    rng = np.random.default_rng(3)
+    return (rng.random(SHAPE) * (rng.random(SHAPE) > 0.3)).astype(np.float32)
+
+
+def renderer(lights=(SUN,), medium=MEDIUM, support=None, background=WALL):
+    return Renderer(CAMERA, DOMAIN, medium, lights, background, "multiple", support)
+
+
+def exact(density, lights=(SUN,), medium=MEDIUM):
+    return reference.render(density, CAMERA, DOMAIN, medium, lights, WALL.astype(float), "multiple")
+
+
+@pytest.mark.parametrize("lights", [(SUN,), (SUN, SKY)], ids=["one light", "several colours"])
+@pytest.mark.parametrize("extinction", [0.1, 12.0, 100.0])
+def test_image_equals_the_sums_in_double_precision(density, lights, extinction):
+    medium = replace(MEDIUM, extinction=extinction)
+    image = renderer(lights, medium).image(density)
+    np.testing.assert_allclose(image, exact(density.astype(float), lights, medium), rtol=5e-4)
+
+
+@pytest.mark.parametrize("lights", [(SUN,), (SUN, SKY)], ids=["one light", "several colours"])
+@pytest.mark.parametrize("hull", [False, True])
+def test_gradient_equals_a_complex_step(density, lights, hull):
+    """In voxels at random, those that light reaches late among them."""
+    rng = np.random.default_rng(5)
+    support = density > 0.2 if hull else None
+    values = np.where(support, density, 0) if hull else density
+    weights = rng.standard_normal((11, 12, 3))
+    ours = renderer(lights, support=support)
+    ours.image(values.astype(np.float32), keep_record=True)
+    gradient = ours.gradient(weights.astype(np.float32))
+    for voxel in rng.choice(np.argwhere(values > 0), 6, replace=False):
+        moved = values.astype(complex)
+        moved[tuple(voxel)] += 1e-30j
+        slope = np.sum(weights * exact(moved, lights)).imag / 1e-30
+        assert gradient[tuple(voxel)] == pytest.approx(slope, rel=2e-3, abs=1e-3 * np.abs(gradient).max())
+
+
+def test_the_box_around_the_smoke_changes_nothing(density):
+    """Blocks lie alike whatever the support, and light crosses the empty ones."""
+    values = density.copy()
+    values[:4], values[:, :2], values[:, :, 5:] = 0, 0, 0
+    whole, part = renderer().image(values).copy(), renderer(support=values > 0).image(values)
+    np.testing.assert_allclose(part, whole, rtol=1e-4)
+
+
+@pytest.mark.parametrize(("extinction", "lost"), [(0.5, 0.02), (2.0, 0.08)])
+def test_white_smoke_gives_back_the_light_of_a_white_room(extinction, lost):
+    """Where radiance 1 comes from everywhere, smoke that absorbs nothing can hardly be seen, and never shines."""
+    rng = np.random.default_rng(8)
+    directions = rng.standard_normal((200, 3))
+    directions = np.concatenate([directions, -directions])
+    irradiance = (4 * np.pi / len(directions),) * 3
+    room = tuple(DirectionalLight(tuple(d), irradiance) for d in directions)
+    room_renderer = renderer(room, Medium(extinction, 1.0), background=np.ones(3, np.float32))
+    image = room_renderer.image(np.ones(SHAPE, np.float32))
+    assert image.min() > 1 - lost
+    assert image.max() < 1 + 1e-5
+
+
+def test_thin_smoke_scatters_once(density):
+    medium = replace(MEDIUM, extinction=1e-4)
+    single = Renderer(CAMERA, DOMAIN, medium, (SUN,), np.zeros(3, np.float32)).image(density)
+    multiple = renderer(medium=medium, background=np.zeros(3, np.float32)).image(density)
+    np.testing.assert_allclose(multiple, single, rtol=1e-3)
+
+
+def test_anisotropic_smoke_is_refused():
+    with pytest.raises(ValueError, match="needs anisotropy 0, not 0.3"):
+        renderer(medium=replace(MEDIUM, anisotropy=0.3))
