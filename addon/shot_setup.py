@@ -95,7 +95,7 @@ def _estimated_sun(scene: bpy.types.Scene, index: dict[str, Any]) -> None:
     sun.data.color = [part / strongest for part in table["irradiance"]]
     # sequences of version 1.0 keep the model of scattering in their settings
     scattering = index["scene"]["medium"].get("scattering") or index["settings"]["density"]["scattering"]
-    sun.data.use_shadow = scattering == "single"
+    sun.data.use_shadow = scattering in ("multiple", "single")
     sun.rotation_euler = Vector(table["direction"]).to_track_quat("-Z", "Y").to_euler()
 
 

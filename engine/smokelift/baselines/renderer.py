@@ -64,7 +64,8 @@ class PaperRenderer:
     background : (rows, columns, 3) or (3,)
         Linear radiance behind the smoke.
     scattering
-        ``"single"``, ``"unshadowed"`` or ``"absorption"``, as in `Renderer`.
+        ``"single"``, ``"unshadowed"`` or ``"absorption"``, as in `Renderer`; ``"multiple"`` is ``"single"``, since the
+        paper's renderer stops there.
 
     Raises
     ------

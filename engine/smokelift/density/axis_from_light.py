@@ -184,7 +184,7 @@ class _CoarsePicture:
         self._weight = mask / np.mean(np.square(noise_at(self._picture, small)), -1)
         self._projection = project_voxels(self._camera, coarse)
         self._hull = visual_hull(self._amount > 0.01 * self._amount.max(), self._projection)
-        self._renderer = replace(optics, scattering="single").renderer(fine, self._background, self._hull)
+        self._renderer = optics.renderer(fine, self._background, self._hull)
         self._scale = np.zeros(self._amount.shape, np.float32)
 
     def misfit(self, axis: SmokeAxis) -> float:

@@ -40,7 +40,7 @@ def clip_axis(clip: ObservedClip) -> AxisEstimate | None:
     if not np.any([amount.any() for amount in amounts]):
         return None
     estimate = estimate_axis(amounts, seen[0].camera, optics.domain, clip.inlets)
-    if clip.inlets or optics.scattering != "single":
+    if clip.inlets or optics.scattering not in ("multiple", "single"):
         return estimate
     return refine_axis(estimate, seen[:: AXIS_FRAMES // LIGHT_FRAMES], optics)
 

@@ -37,14 +37,20 @@ class Optics:
         return Renderer(camera, self.domain, self.medium, self.lights, background, self.scattering, support)
 
     def unshadowed_source(self) -> NDArray[np.float64]:
-        """Source radiance (3,), W/m^2/sr, of isotropic smoke in the middle of the domain, with nothing before it."""
+        """Source radiance (3,), W/m^2/sr, of isotropic smoke in the middle of the domain, with nothing before it.
+
+        Light that is scattered many times raises it as it raises that of the surface of a half-space, on the mean over
+        all directions of the light: 2 / (1 + sqrt(1 - albedo)), the mean of Chandrasekhar's H function (1950,
+        Radiative Transfer, section 38).
+        """
         total = np.zeros(3)
         for light in self.lights:
             if isinstance(light, PointLight):
                 total += np.array(light.intensity) / np.sum((np.array(self.domain.centre) - light.position) ** 2)
             else:
                 total += light.irradiance
-        return self.medium.albedo / (4 * np.pi) * total
+        orders = 2 / (1 + np.sqrt(1 - self.medium.albedo)) if self.scattering == "multiple" else 1.0
+        return orders * self.medium.albedo / (4 * np.pi) * total
 
 
 def scene_optics(scene: CompleteScene) -> Optics:

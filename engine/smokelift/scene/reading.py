@@ -4,8 +4,9 @@ A scene file holds the tables [clip], [camera], [domain], [[inlet]], [medium], [
 each of them optional. Their keys are the fields of the classes of the same names, with these exceptions:
 
 - ``[domain] closed`` lists the walls of the box. A ``[domain]`` that holds nothing else leaves the box to be estimated.
-- ``[medium] scattering`` is how light is scattered: ``"single"`` (once, with shadows), ``"unshadowed"`` (once, without)
-  or ``"absorption"`` (not at all). A ``[medium]`` that holds nothing else leaves the medium to be estimated.
+- ``[medium] scattering`` is how light is scattered: ``"multiple"`` (any number of times), ``"single"`` (once, with
+  shadows), ``"unshadowed"`` (once, without) or ``"absorption"`` (not at all). A ``[medium]`` that holds nothing else
+  leaves the medium to be estimated.
 - ``[camera]`` takes ``position``, ``target`` and ``up`` in place of ``matrix``, and ``fov_y_degrees``, or the
   ``height`` in metres of an orthographic picture, in place of ``fx`` and ``fy``.
 """

@@ -20,9 +20,9 @@ def richest_scattering(asked: Scattering | None, lights: tuple[Light, ...], medi
     ValueError
         If shadows are asked for without a light to cast them.
     """
-    if asked == "single" and not lights:
+    if asked in ("multiple", "single") and not lights:
         raise ValueError(
-            'Scattering "single" needs a light that casts the shadows; give one in [[lights]], or leave it to "auto".'
+            f'Scattering "{asked}" needs a light that casts the shadows; give one in [[lights]], or leave it to "auto".'
         )
     if asked is not None:
         return asked

@@ -70,8 +70,9 @@ class Settings:
         Voxels along x, y, z. ``"auto"`` takes as few as the detail of the clip's smoke allows, up to the quality's
         limit. None takes the scene's, or ``"auto"`` if it has none.
     scattering
-        How light is scattered: ``"single"`` (self-shadowed), ``"unshadowed"``, ``"absorption"``, or ``"auto"``: what
-        the scene says, else the cheapest model that finds as good a density as the richest.
+        How light is scattered: ``"multiple"`` times, ``"single"`` (self-shadowed), ``"unshadowed"``,
+        ``"absorption"``, or ``"auto"``: what the scene says, else the cheapest model that finds as good a density as
+        the richest.
     selection
         How open choices are made.
     transport

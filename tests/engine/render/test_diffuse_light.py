@@ -88,5 +88,5 @@ def test_thin_smoke_scatters_once(density):
 
 
 def test_anisotropic_smoke_is_refused():
-    with pytest.raises(ValueError, match="needs anisotropy 0, not 0.3"):
+    with pytest.raises(ValueError, match=r"needs anisotropy 0, not 0\.3"):
         renderer(medium=replace(MEDIUM, anisotropy=0.3))

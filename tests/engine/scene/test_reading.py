@@ -103,7 +103,8 @@ def test_a_file_may_hold_any_one_table(tmp_path: Path) -> None:
         (
             "albedo = 0.5",
             'scattering = "double"',
-            'line 22: [medium] scattering must be one of "multiple", "single", "unshadowed", "absorption", not "double"',
+            'line 22: [medium] scattering must be one of "multiple", "single", "unshadowed", "absorption", not '
+            '"double"',
         ),
         ("albedo = 0.5", "scattering = [1]", "line 22: [medium] scattering must be one of"),
         ("albedo = 0.5", "extinction = 0", "line 22: [medium] extinction must be a number above 0"),
