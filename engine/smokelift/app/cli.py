@@ -6,22 +6,53 @@ Exit status: 0 done, 2 bad input, 3 device or memory, 130 cancelled (and resumab
 from __future__ import annotations
 
 import argparse
+import errno
+import io
+import os
 import signal
 import sys
 from collections.abc import Sequence
 from types import FrameType
+from typing import NoReturn
 
 from smokelift.app.commands import COMMANDS
-from smokelift.app.progress import reporter
+from smokelift.app.progress import OutputError, printable, reporter
 from smokelift.output.vdb import VdbUnavailable
 from smokelift.render import DeviceError
 
 DONE, BAD_INPUT, NO_DEVICE, CANCELLED = 0, 2, 3, 130
 
+_HINT = " Finished frames stay, --resume goes on from them."
+
+
+class _Parser(argparse.ArgumentParser):
+    """Says what is wrong with a word without obeying the control characters in it."""
+
+    def error(self, message: str) -> NoReturn:
+        super().error(printable(message))
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command and return the exit status."""
-    options = _parser().parse_args(arguments)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # a letter that the terminal's encoding lacks is no reason to stop
+            stream.reconfigure(errors="backslashreplace")
+    try:
+        try:
+            return _run(_parser().parse_args(arguments))
+        finally:
+            try:
+                sys.stdout.flush()
+            except OSError as error:
+                raise OutputError(error) from error
+    except OutputError as error:
+        # what is left in the buffer would fail again when the interpreter ends
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        print(f"{error}{_HINT}", file=sys.stderr)
+        return CANCELLED if error.closed else BAD_INPUT
+
+
+def _run(options: argparse.Namespace) -> int:
     say = reporter(getattr(options, "progress", "text"))
     terminated = False
 
@@ -41,20 +72,28 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 raise KeyboardInterrupt from error
             raise
     except KeyboardInterrupt:
-        hint = "; finished frames stay, --resume goes on from them" if options.command == "reconstruct" else ""
-        say.fail(f"Cancelled{hint}.", CANCELLED)
+        hint = _HINT if options.command == "reconstruct" else ""
+        say.fail(f"Cancelled.{hint}", CANCELLED)
         return CANCELLED
+    except OutputError:
+        raise
     except (DeviceError, MemoryError) as error:
         say.fail(str(error) or "Out of memory; choose a lower --resolution.", NO_DEVICE)
         return NO_DEVICE
-    except (ValueError, VdbUnavailable, OSError) as error:
+    except (ValueError, VdbUnavailable, OSError, RuntimeError) as error:
+        # the system's limits: ulimit -v, ulimit -u
+        if getattr(error, "errno", None) in (errno.EAGAIN, errno.ENOMEM) or "start new thread" in str(error):
+            say.fail(f"The system gives no more memory or threads ({error}); end other programs.", NO_DEVICE)
+            return NO_DEVICE
+        if isinstance(error, RuntimeError) and not isinstance(error, VdbUnavailable):
+            raise
         say.fail(str(error), BAD_INPUT)
         return BAD_INPUT
     return DONE
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="smokelift", description="Turn a video of smoke into an OpenVDB sequence of density and velocity."
     )
     commands = parser.add_subparsers(dest="command", required=True)

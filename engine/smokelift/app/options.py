@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal
@@ -11,9 +12,18 @@ from smokelift.scene import SCATTERINGS, ClipSource, Scene
 from smokelift.setup.settings import METHODS, QUALITIES, Settings
 
 
+def named_path(text: str) -> Path:
+    """Return the path that a word on the command line names, which the libraries need as text."""
+    try:
+        text.encode("utf-8")
+    except UnicodeEncodeError:
+        raise argparse.ArgumentTypeError("the path is no text in UTF-8: rename the file or the folder") from None
+    return Path(text)
+
+
 def add_run_options(parser: argparse.ArgumentParser) -> None:
     """Add the clip or scene file, and all that decides how it is reconstructed."""
-    parser.add_argument("input", type=Path, help="scene.toml, or a video, or frame_####.png")
+    parser.add_argument("input", type=named_path, help="scene.toml, or a video, or frame_####.png")
     parser.add_argument("--quality", choices=QUALITIES, default="balanced")
     parser.add_argument("--method", choices=METHODS, default="default", help="paper: the published loop")
     parser.add_argument(
@@ -79,10 +89,16 @@ def require_folder(path: Path | None) -> None:
     Raises
     ------
     ValueError
-        If its folder does not exist.
+        If its folder does not exist or cannot be written to, or the path is that of a folder.
     """
-    if path is not None and not path.absolute().parent.is_dir():
+    if path is None:
+        return
+    if not path.absolute().parent.is_dir():
         raise ValueError(f"{path}: the folder {path.parent} does not exist.")
+    if path.is_dir():
+        raise ValueError(f"{path}: is a folder; give the name of a file.")
+    if not os.access(path.absolute().parent, os.W_OK | os.X_OK):
+        raise ValueError(f"{path}: the folder {path.parent} cannot be written to.")
 
 
 def _resolution(text: str) -> tuple[int, int, int] | Literal["auto"]:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from types import TracebackType
 from typing import Any, Literal, Protocol
 
@@ -12,6 +15,34 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 Style = Literal["text", "json"]
+
+
+class OutputError(OSError):
+    """Standard output takes nothing more; ``closed`` if whoever read it has gone."""
+
+    def __init__(self, error: OSError) -> None:
+        super().__init__(f"Standard output cannot be written: {error.strerror}.")
+        self.closed = isinstance(error, BrokenPipeError)
+
+
+def printable(text: str) -> str:
+    """Return a text whose control characters, which a terminal would obey, are spelt out."""
+    return "".join(c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text)
+
+
+class _Console(Console):
+    """Tells of a closed pipe where Rich would leave with status 1."""
+
+    def on_broken_pipe(self) -> None:
+        raise BrokenPipeError(errno.EPIPE, os.strerror(errno.EPIPE))
+
+
+@contextmanager
+def _output() -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise OutputError(error) from error
 
 
 class Reporter(Protocol):
@@ -46,8 +77,8 @@ def reporter(style: Style) -> Reporter:
 
 class _Text:
     def __init__(self) -> None:
-        self._console = Console(highlight=False)
-        self._errors = Console(stderr=True, highlight=False)
+        self._console = _Console(highlight=False)
+        self._errors = _Console(stderr=True, highlight=False)
         self._bar = Progress(
             TextColumn("{task.description}"),
             BarColumn(),
@@ -68,28 +99,32 @@ class _Text:
         self._stop()
 
     def _stop(self) -> None:
-        if self._bar.live.is_started:  # a bar that never started would leave an empty line
-            self._bar.stop()
+        with _output():
+            if self._bar.live.is_started:  # a bar that never started would leave an empty line
+                self._bar.stop()
 
     def note(self, text: str) -> None:
-        self._console.print(text, markup=False, soft_wrap=True)
+        with _output():
+            self._console.print(printable(text), markup=False, soft_wrap=True)
 
     def start(self, total: int, done: int) -> None:
-        self._bar.update(self._task, total=total, completed=done)
-        self._bar.start_task(self._task)
-        self._bar.start()
+        with _output():
+            self._bar.update(self._task, total=total, completed=done)
+            self._bar.start_task(self._task)
+            self._bar.start()
 
     def frame(self, number: int, figures: Mapping[str, Any]) -> None:
         fit = f"fit {figures['psnr']:.1f} dB" if figures["hull_share"] > 0 else "no smoke"
-        self._bar.update(self._task, advance=1, fit=fit)
+        with _output():
+            self._bar.update(self._task, advance=1, fit=fit)
 
     def finish(self, text: str, details: Mapping[str, Any]) -> None:
         self._stop()
-        self._console.print(text, markup=False, soft_wrap=True)
+        self.note(text)
 
     def fail(self, text: str, status: int) -> None:
         self._stop()
-        self._errors.print(text, markup=False, soft_wrap=True)
+        self._errors.print(printable(text), markup=False, soft_wrap=True)
 
 
 class _Json:
@@ -135,4 +170,5 @@ class _Json:
         self._say("error", text=text, status=status)
 
     def _say(self, event: str, **fields: Any) -> None:
-        print(json.dumps({"event": event, **fields}), file=sys.stdout, flush=True)
+        with _output():
+            print(json.dumps({"event": event, **fields}), file=sys.stdout, flush=True)

@@ -11,15 +11,20 @@ import re
 from pathlib import Path
 from typing import Any, Literal
 
-import av
 import numpy as np
 import numpy.typing as npt
 import OpenEXR
 import scipy.sparse
 from PIL import Image, ImageOps
 
+from smokelift.footage.container import open_container
+from smokelift.scene import LARGEST_PICTURE
+
 Picture = npt.NDArray[np.float32]
 Transfer = Literal["srgb", "linear"]
+
+MOST_PIXELS = 2**28
+"""Pixels of a picture, at most."""
 
 READABLE = (".png", ".jpg", ".jpeg", ".exr", ".hdr")
 
@@ -96,13 +101,22 @@ def read_image(path: str | Path, transfer: Transfer | None = None) -> Picture:
     except ImageError:
         raise
     # Three libraries, each with its own exceptions; to the caller they all say the same.
-    except (RuntimeError, ValueError, SyntaxError, OSError) as error:
-        raise ImageError(f"{path}: cannot be read: {error}") from error
+    except (RuntimeError, ValueError, LookupError, SyntaxError, OSError, Image.DecompressionBombError) as error:
+        raise ImageError(f"{path}: cannot be read: {' '.join(str(error).split())}") from error
+
+
+def _require_size(path: Path, width: int, height: int) -> None:
+    """Refuse what a header says before memory is taken for it."""
+    if not (0 < width <= LARGEST_PICTURE and 0 < height <= LARGEST_PICTURE and width * height <= MOST_PIXELS):
+        raise ImageError(f"{path}: cannot be read: it says that it has {width} x {height} pixels")
 
 
 def _read_with_ffmpeg(path: Path, pixels: str) -> npt.NDArray[Any]:
-    with av.open(str(path)) as container:
-        return next(container.decode(video=0)).to_ndarray(format=pixels)
+    # with a pattern, "frame_%d.png" would mean other files
+    with open_container(path, "image2", pattern_type="none") as container:
+        stream = container.streams.video[0]
+        _require_size(path, stream.width, stream.height)
+        return next(container.decode(stream)).to_ndarray(format=pixels)
 
 
 def _read_radiance(path: Path) -> npt.NDArray[Any]:
@@ -120,11 +134,16 @@ def _read_integers(path: Path) -> npt.NDArray[Any]:
     if head.startswith(b"\x89PNG") and head[24:] == b"\x10":
         return _read_with_ffmpeg(path, "rgba64le")  # Pillow would cut 16 bit colour to 8
     with Image.open(path) as picture:
+        _require_size(path, *picture.size)
         upright = ImageOps.exif_transpose(picture)
         return np.asarray(upright.convert("RGBA" if upright.has_transparency_data else "RGB"))
 
 
 def _read_exr(path: Path) -> Picture:
+    for part in OpenEXR.File(str(path), header_only=True).parts:
+        for window in ("displayWindow", "dataWindow"):
+            low, high = part.header[window]
+            _require_size(path, int(high[0]) - int(low[0]) + 1, int(high[1]) - int(low[1]) + 1)
     parts = OpenEXR.File(str(path), separate_channels=True).parts
     if not parts:  # the library's way to say that it met damaged pixels
         raise ImageError(f"{path}: cannot be read: it is truncated or damaged")

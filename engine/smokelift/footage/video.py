@@ -24,8 +24,10 @@ import numpy.typing as npt
 from av.sidedata.sidedata import Type as SideData
 from av.video.reformatter import Interpolation
 
+from smokelift.footage.container import open_container
 from smokelift.footage.frame_source import DEFAULT_FPS, ClipError
 from smokelift.footage.images import Picture, Transfer, decode_integers
+from smokelift.scene import LARGEST_PICTURE
 
 _EXACT_CONVERSION = int(
     Interpolation.BICUBIC | Interpolation.ACCURATE_RND | Interpolation.FULL_CHR_H_INT | Interpolation.FULL_CHR_H_INP
@@ -49,6 +51,8 @@ class Video:
             raise ClipError(f"{path}: no such file")
         if path.is_dir():
             raise ClipError(f"{path}: is a folder; for pictures give a pattern such as {path}/frame_####.png")
+        if not path.is_file():
+            raise ClipError(f"{path}: is a pipe or a device, which cannot be read twice; save it as a file")
         self._start()
         self._times, self._keys, broken = self._index()
         if not self._times:
@@ -63,13 +67,16 @@ class Video:
     def _start(self) -> None:
         """Open the file at its beginning."""
         try:
-            self._container = av.open(str(self._path))
+            self._container = open_container(self._path)
         except (av.FFmpegError, ValueError) as error:
             raise ClipError(f"{self._path}: is not a video, or is damaged: {_reason(error)}") from error
         if not self._container.streams.video:
             self._container.close()
             raise ClipError(f"{self._path}: holds no video stream")
         self._stream = self._container.streams.video[0]
+        if max(self._stream.width, self._stream.height) > LARGEST_PICTURE:
+            self._container.close()
+            raise ClipError(f"{self._path}: has pictures wider or higher than {LARGEST_PICTURE} pixels")
         self._stream.thread_type = "AUTO"
         self._decoded: Iterator[av.VideoFrame] = self._container.decode(self._stream)
         self._next = 0  # index into _times of the frame that decoding on will give

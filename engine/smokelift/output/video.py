@@ -25,7 +25,7 @@ VIDEO_KINDS = {
 def write_video(path: Path, frames: Iterable[Image], fps: float) -> None:
     """Write linear frames (rows, columns, 3) of one size; the suffix says which kind of `VIDEO_KINDS`."""
     container_format, codec = VIDEO_KINDS[path.suffix.lower()]
-    with atomic_path(path) as aside, av.open(str(aside), "w", format=container_format) as container:
+    with atomic_path(path) as aside, av.open(f"file:{aside.absolute()}", "w", format=container_format) as container:
         stream: Any = None
         for frame in frames:
             picture = eight_bit(frame)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import errno
 import json
+import os
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -96,7 +97,8 @@ class SequenceWriter:
             provenance=plain(list(provenance)),
             sources=plain(sources or {}),
         )
-        self._kinds = ("vdb", "npz") if npz else ("vdb",)
+        self._npz = npz
+        self._kinds: tuple[str, ...] = ()
         self._resume = resume
         self._lock = Lock(self.directory / LOCK)
 
@@ -106,12 +108,7 @@ class SequenceWriter:
         return self._index.numbers
 
     def __enter__(self) -> SequenceWriter:
-        try:
-            vdb_module()
-        except VdbUnavailable as error:
-            if "npz" not in self._kinds:
-                raise SequenceError(str(error)) from error
-            self._kinds = ("npz",)
+        self._kinds = _kinds(self._npz)
         try:
             self.directory.mkdir(parents=True, exist_ok=True)
             if not self._lock.acquire():
@@ -209,24 +206,8 @@ class SequenceWriter:
 
     def _take_over(self) -> None:
         """Judge what is in the directory, and read what can be gone on from."""
-        names = sorted(file.name for file in self.directory.iterdir() if not file.name.startswith("."))
-        has_index = INDEX in names
-        # Without an index nothing here was written by a run, whatever it is called.
-        foreign = [name for name in names if is_foreign(name) or not (has_index or name == LOCK)]
-        if foreign:
-            raise SequenceError(
-                f"{self.directory}: holds other files ({foreign[0]}); nothing was overwritten, "
-                "choose an empty directory"
-            )
-        if not has_index:
-            return
-        there = Index.read(self.directory)
-        if not self._resume:
-            if there.frames:
-                raise SequenceError(
-                    f"{self.directory}: holds {len(there.frames)} finished frames; go on with --resume, "
-                    "or choose another directory"
-                )
+        there = _begun(self.directory, self._resume)
+        if there is None:
             return
         for part in ("scene", "settings", "sources", "versions"):
             before, now = (getattr(index, part) for index in (there, self._index))
@@ -269,6 +250,58 @@ class SequenceWriter:
             f"{self.directory}: {what} could not be written: {reason}; "
             f"{len(self.finished)} finished frames stay and --resume goes on from them"
         )
+
+
+def check_directory(directory: Path, *, npz: bool, resume: bool) -> None:
+    """Refuse, before anything is computed or written, a directory that a `SequenceWriter` would refuse for itself.
+
+    Parameters
+    ----------
+    directory, npz, resume
+        As in `SequenceWriter`.
+
+    Raises
+    ------
+    SequenceError
+        With the reason.
+    """
+    _kinds(npz)
+    if directory.is_dir():
+        _begun(directory, resume)
+    nearest = next(folder for folder in (directory, *directory.absolute().parents) if folder.exists())
+    if not nearest.is_dir() or not os.access(nearest, os.W_OK | os.X_OK):
+        raise SequenceError(f"{directory}: cannot be written to: {nearest} is no folder, or may not be changed")
+
+
+def _kinds(npz: bool) -> tuple[str, ...]:
+    """The kinds of files of a frame; without an OpenVDB module the NumPy twin alone."""
+    try:
+        vdb_module()
+    except VdbUnavailable as error:
+        if not npz:
+            raise SequenceError(str(error)) from error
+        return ("npz",)
+    return ("vdb", "npz") if npz else ("vdb",)
+
+
+def _begun(directory: Path, resume: bool) -> Index | None:
+    """The run in a directory that can be gone on with, or None if there is nothing; SequenceError for all else."""
+    names = sorted(file.name for file in directory.iterdir() if not file.name.startswith("."))
+    has_index = INDEX in names
+    # Without an index nothing here was written by a run, whatever it is called.
+    foreign = [name for name in names if is_foreign(name) or not (has_index or name == LOCK)]
+    if foreign:
+        raise SequenceError(
+            f"{directory}: holds other files ({foreign[0]}); nothing was overwritten, choose an empty directory"
+        )
+    there = Index.read(directory) if has_index else None
+    if there is None or resume:
+        return there
+    if there.frames:
+        raise SequenceError(
+            f"{directory}: holds {len(there.frames)} finished frames; go on with --resume, or choose another directory"
+        )
+    return None
 
 
 def _checked(density: npt.ArrayLike, faces: Any, shape: tuple[int, int, int]) -> tuple[Array, Faces]:

@@ -4,7 +4,7 @@
 """
 
 from smokelift.scene.background import Background
-from smokelift.scene.camera import Camera, as_matrix, look_at_matrix, orbit, shared_part
+from smokelift.scene.camera import LARGEST_PICTURE, Camera, as_matrix, look_at_matrix, orbit, shared_part
 from smokelift.scene.checks import SceneError
 from smokelift.scene.clip_source import ClipSource
 from smokelift.scene.complete import CompleteScene, completed
@@ -18,6 +18,7 @@ from smokelift.scene.medium import SCATTERINGS, Medium, Scattering
 from smokelift.scene.view import View
 
 __all__ = [
+    "LARGEST_PICTURE",
     "SCATTERINGS",
     "SIDES",
     "Background",

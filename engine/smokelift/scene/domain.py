@@ -14,8 +14,8 @@ from smokelift.scene.checks import SceneError, Vector, integer, items, one_of, p
 Side = Literal["x-", "x+", "y-", "y+", "z-", "z+"]
 SIDES: tuple[Side, ...] = ("x-", "x+", "y-", "y+", "z-", "z+")
 
-LONGEST, MOST_VOXELS = 4096, 2**30
-"""Voxels along a side of a box, and in all of it, at most: 32 bits know a place along a longer side too roughly."""
+LONGEST = 4096
+"""Voxels along a side of a box, at most: 32 bits know a place along a longer side too roughly."""
 
 
 @dataclass(frozen=True)
@@ -44,8 +44,6 @@ class Domain:
         set_fields(self, min=vector(self.min, "min"), max=vector(self.max, "max"))
         key, expected = "resolution", f"three whole numbers [nx, ny, nz], all at least 1 and at most {LONGEST}"
         counts = tuple(integer(v, key, expected, 1, LONGEST) for v in items(self.resolution, 3, key, expected))
-        if math.prod(counts) > MOST_VOXELS:
-            raise SceneError(f"{key} makes {math.prod(counts)} voxels; {MOST_VOXELS} at most", key=key)
         set_fields(self, resolution=counts)
         for axis, low, high in zip("xyz", self.min, self.max, strict=True):
             if not low < high:

@@ -144,7 +144,7 @@ def test_without_detail_nothing_is_said_to_be_made_up(shot, capsys) -> None:
 def test_scattering_and_resolution_by_option(shot, tmp_path, capsys) -> None:
     """What is said is used, and said to be by hand; auto measures the resolution of a given box."""
     out = tmp_path / "out"
-    arguments = ("--npz", "--frames", "0:1", "--scattering", "unshadowed", "--resolution", "auto", *QUICK)
+    arguments = ("--npz", "--frames", "0:1", "--scattering", "unshadowed", "--resolution", "auto")
     assert command("reconstruct", shot, "--out", out, *arguments) == 0
     sequence = Sequence.open(out)
     assert sequence.scene.scattering == "unshadowed"

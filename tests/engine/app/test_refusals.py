@@ -134,3 +134,44 @@ def test_errors_as_json(tmp_path, capsys) -> None:
     last = events(captured.out)[-1]
     assert (last["event"], last["status"]) == ("error", 2)
     assert "no.mp4" in last["text"]
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (("--out", "file"), "file: cannot be written to"),
+        (("--out", "file/out"), "cannot be written to"),
+        (("--out", "others"), r"holds other files (holiday.jpg)"),
+        (("--out", "damaged"), "sequence.json: cannot be read"),
+        (("--out", "out", "--thumbnail", "nowhere/a.png"), "the folder nowhere does not exist"),
+        (("--out", "out", "--thumbnail", "others"), "others: is a folder"),
+        (("--out", "out", "--thumbnail", "out.png/a.png"), "the folder out.png does not exist"),
+        (("--out", "others", "--thumbnail", "others/a.png", "--resume"), "holds other files"),
+        (("--out", ".", "--thumbnail", "deep/a.png"), "holds other files"),
+    ],
+)
+def test_what_cannot_be_written_is_refused_before_the_clip_is_looked_at(
+    shot, tmp_path, capsys, monkeypatch, words, sentence
+) -> None:
+    """The analysis of a clip takes minutes."""
+
+    def look(*_arguments: object) -> None:
+        raise AssertionError("the clip was looked at")
+
+    monkeypatch.setattr("smokelift.app.commands.reconstruct.prepare_shot", look)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "file").touch()
+    for folder in ("others", "damaged", "deep"):
+        (tmp_path / folder).mkdir()
+    (tmp_path / "others" / "holiday.jpg").touch()
+    (tmp_path / "damaged" / "sequence.json").write_text("{")
+    assert sentence in refused(capsys, "reconstruct", shot, *words)
+
+
+def test_a_thumbnail_among_the_frames_is_refused(shot, tmp_path, capsys) -> None:
+    """It would keep the run from going on."""
+    out = tmp_path / "out"
+    out.mkdir()
+    sentence = refused(capsys, "reconstruct", shot, "--out", out, "--thumbnail", out / "last.png")
+    assert "the thumbnail cannot lie in" in sentence
+    assert names(out) == []

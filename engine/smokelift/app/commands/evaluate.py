@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import argparse
 import json
-from pathlib import Path
 from typing import Any
 
-from smokelift.app.options import require_folder
+from smokelift.app.options import named_path, require_folder
 from smokelift.app.progress import Reporter
 from smokelift.evaluation.evaluate import evaluate
 from smokelift.output.atomic import atomic_path
@@ -20,19 +19,23 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
     parser = commands.add_parser(
         "evaluate", parents=[common], help="whether its sides look like smoke; beside the truth or other views"
     )
-    parser.add_argument("directory", type=Path)
-    parser.add_argument("--truth", type=Path, metavar="truth.npz", help="known densities and velocities")
+    parser.add_argument("directory", type=named_path)
+    parser.add_argument("--truth", type=named_path, metavar="truth.npz", help="known densities and velocities")
     parser.add_argument(
         "--view",
-        type=Path,
+        type=named_path,
         nargs=2,
         action="append",
         default=[],
         metavar=("camera.toml", "clip.mp4"),
         help="another camera and its clip; may be repeated",
     )
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures there, not on standard output")
-    parser.add_argument("--picture", type=Path, metavar="FILE.png", help="its sides; truth and sequence side by side")
+    parser.add_argument(
+        "--json", type=named_path, metavar="FILE", help="write the figures there, not on standard output"
+    )
+    parser.add_argument(
+        "--picture", type=named_path, metavar="FILE.png", help="its sides; truth and sequence side by side"
+    )
     parser.set_defaults(run=run)
 
 

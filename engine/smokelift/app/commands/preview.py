@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import Any
 
+from smokelift.app.options import named_path
 from smokelift.app.progress import Reporter
 from smokelift.footage.clip import Clip
 from smokelift.output.layout import CONTACT_SHEET, ORBIT, PICTURES, PREVIEW, STRIP
@@ -19,8 +19,8 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
     parser = commands.add_parser(
         "preview", parents=[common], help="a contact sheet, an orbit, a strip and a video that turns"
     )
-    parser.add_argument("directory", type=Path)
-    parser.add_argument("--out", type=Path, help="directory for them; by default the sequence's own")
+    parser.add_argument("directory", type=named_path)
+    parser.add_argument("--out", type=named_path, help="directory for them; by default the sequence's own")
     parser.set_defaults(run=run)
 
 

@@ -12,12 +12,13 @@ import numpy as np
 from PIL import Image
 
 from smokelift.app.cost import require_memory
-from smokelift.app.options import add_run_options, scene_of, settings_of
+from smokelift.app.options import add_run_options, named_path, require_folder, scene_of, settings_of
 from smokelift.app.progress import Reporter
 from smokelift.footage.clip import Clip
 from smokelift.output.atomic import atomic_path
 from smokelift.output.images import eight_bit
 from smokelift.output.sequence import Sequence
+from smokelift.output.writer import check_directory
 from smokelift.pipeline import Frame, reconstruct
 from smokelift.render import device
 from smokelift.setup.prepare import prepare_shot
@@ -29,10 +30,10 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
     """Add the command."""
     parser = commands.add_parser("reconstruct", parents=[common], help="a clip or scene file to a VDB sequence")
     add_run_options(parser)
-    parser.add_argument("--out", type=Path, required=True, help="directory for the sequence")
+    parser.add_argument("--out", type=named_path, required=True, help="directory for the sequence")
     parser.add_argument("--npz", action="store_true", help="write NumPy twins as well")
     parser.add_argument(
-        "--thumbnail", type=Path, metavar="FILE.png", help="keep a small picture of the last frame there"
+        "--thumbnail", type=named_path, metavar="FILE.png", help="keep a small picture of the last frame there"
     )
     parser.add_argument("--resume", action="store_true", help="go on from the frames that are there")
     parser.set_defaults(run=run)
@@ -42,6 +43,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     """Reconstruct, and say what was assumed, every frame and whether there was any smoke."""
     began = time.monotonic()
     settings = settings_of(options)
+    _check_outputs(options)
     scene, source = scene_of(options)
     device.start(options.device)
     with Clip.open(source) as clip:
@@ -67,6 +69,15 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         f"{len(sequence.frames)} frames in {options.out} ({seconds:.0f} s).",
         {"directory": str(options.out), "frames": len(sequence.frames), "seconds": round(seconds, 1)},
     )
+
+
+def _check_outputs(options: argparse.Namespace) -> None:
+    """Refuse what cannot be written before the clip is looked at, which takes minutes."""
+    out, thumbnail = options.out, options.thumbnail
+    check_directory(out, npz=options.npz, resume=options.resume)
+    require_folder(thumbnail)
+    if thumbnail is not None and out.resolve() in thumbnail.resolve().parents:
+        raise ValueError(f"{thumbnail}: the thumbnail cannot lie in {out}, which is for the sequence alone.")
 
 
 def _write_thumbnail(path: Path, shot: Shot, frame: Frame) -> None:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import argparse
 import math
-from pathlib import Path
 from typing import Any
 
-from smokelift.app.options import require_folder
+from smokelift.app.options import named_path, require_folder
 from smokelift.app.progress import Reporter
 from smokelift.output.images import write_image
 from smokelift.output.sequence import Sequence
@@ -26,10 +25,10 @@ USUAL_FPS = 24.0
 def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
     """Add the command."""
     parser = commands.add_parser("render", parents=[common], help="an image or video of a sequence")
-    parser.add_argument("directory", type=Path)
+    parser.add_argument("directory", type=named_path)
     parser.add_argument("--frame", type=int, help="one frame; the first for an image, all for a video by default")
     parser.add_argument("--camera", default="front", help="front, side, YAW,PITCH in degrees, or camera.toml")
-    parser.add_argument("--out", type=Path, required=True, help="image.exr, image.png or video.mp4")
+    parser.add_argument("--out", type=named_path, required=True, help="image.exr, image.png or video.mp4")
     parser.set_defaults(run=run)
 
 

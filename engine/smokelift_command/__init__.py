@@ -1,0 +1,32 @@
+"""The command ``smokelift``, apart from the engine: that takes a second to load, and a signal may come in that time."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from types import FrameType
+
+CANCELLED = 130
+
+
+def main() -> int:
+    """Load the engine, run its command and return the exit status; see `smokelift.app.cli`."""
+    terminated = False
+
+    def terminate(_number: int, _frame: FrameType | None) -> None:
+        nonlocal terminated
+        terminated = True
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGTERM, terminate)
+    try:
+        from smokelift.app import cli
+
+        return cli.main()
+    except KeyboardInterrupt:
+        pass
+    except Exception:
+        if not terminated:  # a library may turn the interrupt into an error of its own
+            raise
+    print("Cancelled.", file=sys.stderr)
+    return CANCELLED

@@ -1,0 +1,112 @@
+"""Where a command's words go: closed pipes, full disks, poor encodings, hostile names, and signals at any time."""
+
+from __future__ import annotations
+
+import errno
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from command_line import ENVIRONMENT, MODULE, command, refused
+
+from smokelift.app.progress import printable
+from smokelift.render import device
+
+MISSING = ("inspect", "missing.toml")
+
+
+def ended(*words: str | bytes, **options: Any) -> tuple[int, list[str]]:
+    """Status and lines of standard error of a command in a process of its own."""
+    options = {"env": ENVIRONMENT, "stdout": subprocess.PIPE, **options}
+    done = subprocess.run([*MODULE, *words], stderr=subprocess.PIPE, timeout=60, check=False, **options)
+    return done.returncode, done.stderr.decode("ascii").splitlines()
+
+
+def test_a_closed_pipe_cancels() -> None:
+    """As with `smokelift ... | head -1`."""
+    read, write = os.pipe()
+    os.close(read)
+    status, lines = ended(*MISSING, "--progress", "json", stdout=write)
+    os.close(write)
+    assert status == 130
+    assert lines == [
+        "Standard output cannot be written: Broken pipe. Finished frames stay, --resume goes on from them."
+    ]
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+def test_a_full_disk_is_bad_output() -> None:
+    with Path("/dev/full").open("wb") as full:
+        status, lines = ended(*MISSING, "--progress", "json", stdout=full)
+    assert status == 2
+    assert [line[:52] for line in lines] == ["Standard output cannot be written: No space left on "]
+
+
+def test_letters_that_the_encoding_lacks_are_spelt_out() -> None:
+    status, lines = ended("inspect", "räuchern.toml", env={**ENVIRONMENT, "PYTHONIOENCODING": "ascii"})
+    assert (status, lines) == (2, [r"r\xe4uchern.toml: cannot be read: No such file or directory"])
+
+
+def test_a_path_that_is_no_text_is_refused() -> None:
+    status, lines = ended(*MISSING, b"--frames", b"0:1", b"\xff\xfe.toml")
+    assert status == 2
+    assert lines[-1].endswith(r"unrecognized arguments: \udcff\udcfe.toml")
+    status, lines = ended("reconstruct", "a.mp4", "--out", b"\xff")
+    assert status == 2
+    assert lines[-1].endswith("argument --out: the path is no text in UTF-8: rename the file or the folder")
+
+
+def test_a_terminal_obeys_no_name(capsys) -> None:
+    """An escape sequence in a path could rename the window or hide what is written."""
+    sentence = refused(capsys, "inspect", "\x1b]0;owned\x07\x9b31m.toml")
+    assert sentence == r"\x1b]0;owned\x07\x9b31m.toml: cannot be read: No such file or directory"
+    assert printable("two\nlines, räuchern, 烟") == "two\nlines, räuchern, 烟"
+
+
+@pytest.mark.parametrize("number", ["SIGTERM", "SIGINT"])
+def test_a_signal_while_the_engine_is_loaded_cancels(number) -> None:
+    code = f"""
+import os, signal, sys
+import smokelift_command
+
+class Finder:
+    def find_spec(self, name, path=None, target=None):
+        if name == "smokelift.density":
+            os.kill(os.getpid(), signal.{number})
+
+signal.signal(signal.SIGINT, signal.default_int_handler)
+sys.meta_path.insert(0, Finder())
+sys.exit(smokelift_command.main())
+"""
+    done = subprocess.run([sys.executable, "-c", code], env=ENVIRONMENT, capture_output=True, timeout=60, check=False)
+    assert (done.returncode, done.stderr) == (130, b"Cancelled.\n")
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        BlockingIOError(errno.EAGAIN, os.strerror(errno.EAGAIN)),
+        OSError(errno.ENOMEM, os.strerror(errno.ENOMEM)),
+        RuntimeError("can't start new thread"),
+    ],
+)
+def test_limits_of_the_system_are_said_to_be_limits(shot, capsys, monkeypatch, error) -> None:
+    """As with `ulimit -v` and `ulimit -u`; status 3 like all lack of memory."""
+
+    def fail(_choice: str) -> None:
+        raise error
+
+    monkeypatch.setattr(device, "start", fail)
+    assert "gives no more memory or threads" in refused(capsys, "inspect", shot, status=3)
+
+
+def test_another_error_is_not_hidden(shot, monkeypatch) -> None:
+    def fail(_choice: str) -> None:
+        raise RuntimeError("a bug")
+
+    monkeypatch.setattr(device, "start", fail)
+    with pytest.raises(RuntimeError, match="a bug"):
+        command("inspect", shot)
