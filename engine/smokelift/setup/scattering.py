@@ -1,11 +1,14 @@
 """How light is scattered: the cheapest model that finds as good a density as the richest.
 
-    absorption -> unshadowed -> single (with self-shadowing)
+    absorption -> unshadowed -> single (with self-shadowing) -> multiple
 
 A wrong model can still reproduce its own picture: before black, unshadowed smoke fits any picture by being too thin in
 shadow. So every model fits a coarse density to one half of the clip's pixels, and the
 richest one, which holds the others as special cases, shows that density; the error of the other half says how good it
 is. Where smoke is brighter than its background, absorption is not even tried.
+
+Single scattering is no special case of multiple scattering, which makes the same smoke brighter. Of these two the
+richest is the one whose own picture of its own density is nearer (docs/experiments/multiple-scattering.md).
 """
 
 from __future__ import annotations
@@ -23,13 +26,14 @@ from smokelift.scene import Scattering
 from smokelift.setup.choice import Choice
 from smokelift.setup.coarse import CoarseFrame
 
-MODELS: tuple[Scattering, ...] = ("absorption", "unshadowed", "single")
+MODELS: tuple[Scattering, ...] = ("absorption", "unshadowed", "single", "multiple")
 """From the cheapest to the richest."""
 
 _WORDS: Mapping[str, str] = {
     "absorption": "absorption only",
     "unshadowed": "scattering without shadows",
     "single": "single scattering with shadows",
+    "multiple": "multiple scattering",
 }
 
 
@@ -43,13 +47,18 @@ def choose_scattering(
     frames
         At least one; the lights of their scenes are finite.
     richest
-        What the light that is known allows: shadows need its direction.
+        What the light that is known allows: shadows need its direction. Where it is single scattering by isotropic
+        smoke, multiple scattering is tried too.
     settings
         How to fit.
     tolerance
         Error, as a share of what the smoke changes in the picture, that a cheaper model may add.
     """
     errors = {richest: _error(frames, richest, richest, settings)}
+    if richest == "single" and frames[0].scene.medium.anisotropy == 0.0:
+        errors["multiple"] = _error(frames, "multiple", "multiple", settings)
+        if errors["multiple"] < errors["single"]:
+            richest = "multiple"
     chosen = richest
     for model in MODELS[: MODELS.index(richest)]:
         if model == "absorption" and (brightened := _brightened(frames)) > errors[richest] + tolerance:

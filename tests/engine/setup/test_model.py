@@ -66,6 +66,15 @@ def thin(plume, tmp_path_factory) -> Scene:
     return plume.write(tmp_path_factory.mktemp("thin"), plume.densities, haze)
 
 
+@pytest.fixture(scope="module")
+def white(plume, tmp_path_factory) -> Scene:
+    """The blob as thick white smoke, in light that is scattered any number of times."""
+    (sun,) = plume.scene.lights
+    dim = replace(sun, irradiance=(5.0, 5.0, 5.0))  # nothing is brighter than a picture can be
+    white = replace(plume.scene, medium=Medium(20.0, 0.98), lights=(dim,), scattering="multiple")
+    return replace(plume.write(tmp_path_factory.mktemp("white"), plume.densities, white), scattering=None)
+
+
 # scattering
 
 
@@ -87,14 +96,25 @@ def test_thick_lit_smoke_needs_shadows(plume, draft) -> None:
     assert choice.measured["error_absorption"] > 0.9
 
 
+def test_thick_white_smoke_scatters_light_many_times(white, plume, draft) -> None:
+    """Single scattering cannot be that bright; anisotropic smoke has no richer model."""
+    shot = shot_of(white, draft)
+    choice = chosen(shot, "scattering")
+    assert shot.scene.scattering == choice.chosen == "multiple"
+    assert choice.measured["error_multiple"] < choice.measured["error_single"] - choice.tolerance
+    assert "multiple scattering; with single scattering" in choice.reason
+    forward = replace(plume.scene, medium=replace(plume.scene.medium, anisotropy=0.3))
+    assert "error_multiple" not in chosen(shot_of(forward, draft), "scattering").measured
+
+
 def test_thin_smoke_needs_no_shadows(thin, draft) -> None:
     """It is lit, but casts none that are seen."""
     choice = chosen(shot_of(thin, draft), "scattering")
     assert choice.chosen == "unshadowed"
-    assert set(choice.measured) == {"error_absorption", "error_unshadowed", "error_single"}
+    assert set(choice.measured) == {"error_absorption", "error_unshadowed", "error_single", "error_multiple"}
 
 
-@pytest.mark.parametrize("model", ["absorption", "unshadowed", "single"])
+@pytest.mark.parametrize("model", ["absorption", "unshadowed", "single", "multiple"])
 def test_scattering_by_hand_wins(plume, thin, draft, model) -> None:
     """Whatever the clip shows; nothing is measured for it, and the run keeps it."""
     for scene in (plume.scene, thin):
@@ -105,13 +125,14 @@ def test_scattering_by_hand_wins(plume, thin, draft, model) -> None:
 
 def test_shadows_need_a_light(silhouette, draft) -> None:
     """A light that was made up has no direction to cast them in."""
-    with pytest.raises(ValueError, match=r'"single" needs a light .* \[\[lights\]\]'):
-        shot_of(silhouette, with_scattering(draft, "single"))
+    for model in ("single", "multiple"):
+        with pytest.raises(ValueError, match=rf'"{model}" needs a light .* \[\[lights\]\]'):
+            shot_of(silhouette, with_scattering(draft, model))
 
 
 def test_unknown_models_are_refused(draft) -> None:
     """Where the settings are made."""
-    with pytest.raises(ValueError, match="one of auto, single, unshadowed, absorption, not 'many'"):
+    with pytest.raises(ValueError, match="one of auto, multiple, single, unshadowed, absorption, not 'many'"):
         with_scattering(draft, "many")
 
 
