@@ -22,6 +22,9 @@ from typing import Any
 from . import toml
 from .contract import INDEX_FILE
 
+OPTIONS = ("--quality", "--device", "--detail", "--seed", "--resolution", "--axis-depth")
+"""The engine's options that a take may hold: those that decide the result."""
+
 _NAME = re.compile(r"take_(\d{4,})")
 
 
@@ -78,13 +81,17 @@ class Take:
         Raises
         ------
         TakeError
-            If its files are missing or damaged.
+            If its files are missing or damaged, or hold an option that is none of `OPTIONS`.
         """
         try:
             request = json.loads(self.request_file.read_text(encoding="utf-8"))
             options = [str(word) for word in request["options"]]
-        except (OSError, ValueError, LookupError, TypeError) as error:
+        except (OSError, ValueError, LookupError, TypeError, RecursionError) as error:
             raise TakeError(f"{self.request_file} is missing or damaged: run the shot anew.") from error
+        for word in options:
+            # the file may come with somebody else's project, and must not choose what is written where
+            if word.startswith("-") and word.partition("=")[0] not in OPTIONS:
+                raise TakeError(f"{self.request_file} asks for {word!r}, which no shot does: run the shot anew.")
         files = ["--out", str(self.directory), "--thumbnail", str(self.thumbnail_file)]
         return ["reconstruct", str(self.scene_file), *files, "--resume", "--progress", "json", *options]
 
@@ -92,7 +99,7 @@ class Take:
         """The content of `sequence.json`; None before the engine writes it."""
         try:
             index = json.loads((self.directory / INDEX_FILE).read_text(encoding="utf-8"))
-        except (OSError, ValueError):
+        except (OSError, ValueError, RecursionError):
             return None
         return index if isinstance(index, dict) else None
 

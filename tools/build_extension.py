@@ -4,7 +4,7 @@ A zip holds the add-on, the manifest, the licence, and wheels of everything that
 Python that a Blender carries: it is installed from disk and works at once, without a network. Only numpy is left out,
 because Blender has its own and another one beside it breaks both.
 
-Wheels of others are downloaded, in the versions that pyproject.toml pins under `bundle`. The engine's own have been
+Wheels of others are downloaded, as tools/bundle.txt pins them. The engine's own have been
 built before, here (engine_wheels.py) or on a machine of the platform they are for.
 """
 
@@ -142,7 +142,7 @@ def build(engine_wheels: Sequence[Path], out: Path) -> list[Path]:
     wheels.mkdir(parents=True)
     for platform in PLATFORMS:
         if platform.name in engines:
-            gather(platform, engines[platform.name], project["dependency-groups"]["bundle"], wheels)
+            gather(platform, engines[platform.name], pins(), wheels)
     stage_add_on(manifest, [platform.name for platform in PLATFORMS if platform.name in engines])
 
     out.mkdir(parents=True, exist_ok=True)
@@ -173,7 +173,25 @@ def engines_by_platform(folders: Iterable[Path], version: str) -> dict[str, dict
     return {name: engines for name, engines in found.items() if len(engines) == len(PYTHONS)}
 
 
-def gather(platform: Platform, engines: Mapping[str, Path], pins: Iterable[str], folder: Path) -> None:
+def pins() -> list[str]:
+    """Return the lines of tools/bundle.txt: a requirement with the hashes of its wheels each."""
+    lines = (ROOT / "tools" / "bundle.txt").read_text(encoding="utf-8").replace("\\\n", "").splitlines()
+    return [line for line in lines if not line.startswith("#")]
+
+
+def requirements_of(platform: Platform, python: str, lines: Iterable[str]) -> list[str]:
+    """Return the lines of a requirements file that apply to a platform, for pip, which asks its own instead."""
+    wanted = []
+    for line in lines:
+        name, *hashes = line.split(" --hash=")
+        requirement = Requirement(name)
+        if requirement.marker is None or requirement.marker.evaluate(_markers(platform, python)):
+            hashed = " ".join(f"--hash={digits.strip()}" for digits in hashes)
+            wanted.append(f"{requirement.name}{requirement.specifier} {hashed}")
+    return wanted
+
+
+def gather(platform: Platform, engines: Mapping[str, Path], lines: Sequence[str], folder: Path) -> None:
     """Bring all wheels for a platform together in a folder, and check that nothing is missing.
 
     Raises
@@ -182,18 +200,19 @@ def gather(platform: Platform, engines: Mapping[str, Path], pins: Iterable[str],
         If a wheel cannot be had, or they do not fit each other.
     """
     for python in PYTHONS:
-        requirements = [Requirement(pin) for pin in pins]
-        wanted = [r for r in requirements if r.marker is None or r.marker.evaluate(_markers(platform, python))]
         aside = STAGE / "downloads" / f"{platform.name}-{python}"
+        aside.mkdir(parents=True)
+        wanted = aside / "requirements.txt"
+        wanted.write_text("\n".join(requirements_of(platform, python, lines)) + "\n", encoding="utf-8")
         command = [sys.executable, "-m", "pip", "--disable-pip-version-check", "download", "--quiet", "--no-deps"]
-        command += ["--only-binary", ":all:", "--implementation", "cp", "--python-version", python]
+        command += ["--require-hashes", "--only-binary", ":all:", "--implementation", "cp", "--python-version", python]
         command += [word for abi in (_tag(python), "abi3", "none") for word in ("--abi", abi)]
         command += [word for tag in platform.tags for word in ("--platform", tag)]
-        command += ["--dest", str(aside), *(f"{requirement.name}{requirement.specifier}" for requirement in wanted)]
+        command += ["--dest", str(aside), "--requirement", str(wanted)]
         if subprocess.run(command).returncode != 0:
             raise BuildError(
                 f"the wheels for {platform.name} and Python {python} could not be downloaded (see above): check the "
-                "network, and the versions under bundle in pyproject.toml."
+                "network, and the versions and hashes in tools/bundle.txt."
             )
         shutil.copy(engines[python], aside)
         files = sorted(aside.glob("*.whl"))

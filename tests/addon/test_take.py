@@ -79,6 +79,15 @@ def test_a_damaged_request_is_said(tmp_path, damage) -> None:
         take.arguments()
 
 
+@pytest.mark.parametrize("words", [["--out", "/etc"], ["--out=/etc"], ["--ou=/etc"], ["--npz"], ["-h"]])
+def test_a_request_for_something_else_is_refused(tmp_path, words) -> None:
+    """A project from elsewhere brings its takes along, and they must not write where they like."""
+    take = begun(tmp_path)
+    take.request_file.write_text(json.dumps({"options": ["--quality", "draft", *words]}))
+    with pytest.raises(TakeError, match=r"take_0001\.json asks for '-.*', which no shot does: run the shot anew"):
+        take.arguments()
+
+
 def test_a_folder_that_cannot_be_written_to(tmp_path) -> None:
     """One sentence with the folder."""
     (tmp_path / "file").write_text("in the way")

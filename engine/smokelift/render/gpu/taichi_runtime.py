@@ -75,8 +75,9 @@ def _initialise(arch: Any) -> str:
     cache = _cache_directory()
     try:
         cache.mkdir(parents=True, exist_ok=True)
+        where: dict[str, Any] = {"offline_cache_file_path": str(cache)}
     except OSError:
-        cache = Path(tempfile.gettempdir()) / "smokelift-taichi"
+        where = {"offline_cache": False}  # in a shared folder others could put kernels for us
     with tempfile.TemporaryFile() as log:
         with _diverted(log):
             ti.init(
@@ -84,7 +85,7 @@ def _initialise(arch: Any) -> str:
                 default_fp=ti.f32,
                 # exact operations: x != x must stay a test for NaN, and CPU and GPU should agree
                 fast_math=False,
-                offline_cache_file_path=str(cache),
+                **where,
                 log_level=ti.TRACE,  # nothing else tells the device's name
             )
             ti.set_logging_level(ti.ERROR)
