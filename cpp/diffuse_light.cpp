@@ -23,12 +23,12 @@ using Direction = std::array<int, 3>;
 
 constexpr Direction LINES[7] = {{1, 0, 0},  {0, 1, 0},  {0, 0, 1},  {1, 1, 1},
                                 {1, 1, -1}, {1, -1, 1}, {1, -1, -1}};
+constexpr int AXES = 3; // the lines before the diagonals
 
-constexpr float TOLERANCE = 1e-4f; // of the mean radiance, relative
+constexpr float TOLERANCE = 3e-4f; // of the mean radiance, relative
 constexpr int MOST_ITERATIONS = 100;
 
-bool is_axial(const Direction &d) { return std::abs(d[0]) + std::abs(d[1]) + std::abs(d[2]) == 1; }
-float weight(const Direction &d) { return is_axial(d) ? 1.0f / 15 : 3.0f / 40; }
+int class_of(const Direction &d) { return std::abs(d[0]) + std::abs(d[1]) + std::abs(d[2]) == 1 ? 0 : 1; }
 Direction opposite(const Direction &d) { return {-d[0], -d[1], -d[2]}; }
 
 // sum over n of (-t)^n / (n + shift)!, or of (-t)^n (n + 1) / (n + shift)!; to rounding for t below 1/2.
@@ -55,144 +55,178 @@ double weighted(const std::vector<float> &weights, const std::vector<float> &a, 
 } // namespace
 
 BlockTransport::BlockTransport(const float *extinction, float albedo, const Shape &n, float edge)
-    : n_(n), albedo_(albedo), scattering_(extinction, extinction + volume(n)) {
+    : n_(n), albedo_(albedo), scattering_(extinction, extinction + volume(n)), own_(volume(n), 0.0f),
+      of_own_(volume(n), 0.0f) {
     for (float &value : scattering_)
         value *= albedo;
-    axial_.length = edge;
-    diagonal_.length = edge * std::sqrt(3.0f);
-    for (Crossing *crossing : {&axial_, &diagonal_})
-        cross(extinction, volume(n), *crossing);
+    classes_[0].length = edge;
+    classes_[0].weight = 1.0f / 15;
+    classes_[1].length = edge * std::sqrt(3.0f);
+    classes_[1].weight = 3.0f / 40;
+    cross(extinction, 6, classes_[0], own_, of_own_);
+    cross(extinction, 8, classes_[1], own_, of_own_);
 }
 
+// Of a block's emission e, the part B l e with B = (1 - P) / t is its own mean along a beam.
 SMOKELIFT_CLONES
-void BlockTransport::cross(const float *extinction, std::size_t count, Crossing &c) {
-    for (auto *values : {&c.passed, &c.escaped, &c.own, &c.of_escaped, &c.of_own})
-        values->resize(count);
-    for (std::size_t i = 0; i < count; ++i) {
+void BlockTransport::cross(const float *extinction, int directions, Crossing &c, std::vector<float> &own,
+                           std::vector<float> &of_own) {
+    const float share = float(directions) * c.weight * c.length;
+    for (auto *values : {&c.passed, &c.escaped, &c.of_escaped})
+        values->resize(own.size());
+    for (std::size_t i = 0; i < own.size(); ++i) {
         const float t = c.length * extinction[i], safe = std::max(t, 0.5f);
         const Attenuation through = attenuation(t);
-        const float escaped = through.opacity / safe, own = (1 - escaped) / safe;
-        const float of_escaped = (through.transmittance - escaped) / safe;
+        const float escaped = through.opacity / safe, left = (1 - escaped) / safe;
+        const float of_escaped = (through.transmittance - escaped) / safe,
+                    of_left = -(of_escaped + left) / safe;
         const bool thin = t < 0.5f;
         c.passed[i] = through.transmittance;
         c.escaped[i] = thin ? series<1, false>(t) : escaped;
-        c.own[i] = thin ? series<2, false>(t) : own;
         c.of_escaped[i] = thin ? -series<2, true>(t) : of_escaped;
-        c.of_own[i] = thin ? -series<3, true>(t) : -(of_escaped + own) / safe;
+        own[i] += share * (thin ? series<2, false>(t) : left);
+        of_own[i] += share * c.length * (thin ? -series<3, true>(t) : of_left);
     }
 }
 
-const BlockTransport::Crossing &BlockTransport::crossing(const Direction &direction) const {
-    return is_axial(direction) ? axial_ : diagonal_;
+BlockTransport::Sources BlockTransport::sources(const float *emission) const {
+    Sources result;
+    for (std::size_t number = 0; number < classes_.size(); ++number) {
+        const Crossing &c = classes_[number];
+        result[number].resize(own_.size());
+        for (std::size_t i = 0; i < own_.size(); ++i)
+            result[number][i] = c.escaped[i] * c.length * emission[i];
+    }
+    return result;
 }
 
-// Follows all beams of a direction. visit(first, count, in, out) gets neighbouring blocks along z with the
-// radiance that enters each, and says what leaves.
+// Follows all beams of a direction. visit(first, count, arriving) gets neighbouring blocks along z with the
+// radiance that enters each.
 template <class Visit>
-SMOKELIFT_INLINE void BlockTransport::sweep(const Direction &d, const Visit &visit) const {
+SMOKELIFT_INLINE void BlockTransport::follow(const Direction &d, const Sources &sources,
+                                             const Visit &visit) const {
     const auto [nx, ny, nz] = n_;
+    const float *const all_passed = classes_[class_of(d)].passed.data();
+    const float *const all_sources = sources[class_of(d)].data();
     const auto place = [](int step, int along, int count) { return along > 0 ? step : count - 1 - step; };
+    const auto cross_row = [&](std::size_t first, const float *__restrict in, float *__restrict out)
+                               SMOKELIFT_INLINE_LAMBDA {
+                                   visit(first, nz, in);
+                                   const float *__restrict passed = all_passed + first;
+                                   const float *__restrict source = all_sources + first;
+                                   for (int i = 0; i < nz; ++i)
+                                       out[i] = passed[i] * in[i] + source[i];
+                               };
     if (d[0]) { // planes across x, with a border that nothing leaves
         const int pitch = nz + 2;
         std::vector<float> arriving(std::size_t(ny + 2) * pitch, 0.0f), leaving(arriving);
         for (int step = 0; step < nx; ++step) {
             const int x = place(step, d[0], nx);
             for (int y = 0; y < ny; ++y)
-                visit((std::size_t(x) * ny + y) * nz, nz, &arriving[(y + 1 - d[1]) * pitch + 1 - d[2]],
-                      &leaving[(y + 1) * pitch + 1]);
+                cross_row((std::size_t(x) * ny + y) * nz, &arriving[(y + 1 - d[1]) * pitch + 1 - d[2]],
+                          &leaving[(y + 1) * pitch + 1]);
             arriving.swap(leaving);
         }
-        return;
-    }
-    const int rows = d[1] ? nx : nx * ny, steps = d[1] ? ny : nz, width = d[1] ? nz : 1;
-    std::vector<float> arriving(width), leaving(width);
-    for (int row = 0; row < rows; ++row) {
-        std::fill(arriving.begin(), arriving.end(), 0.0f);
-        for (int step = 0; step < steps; ++step) {
-            const int k = place(step, d[1] + d[2], steps);
-            visit((std::size_t(row) * steps + k) * width, width, arriving.data(), leaving.data());
-            arriving.swap(leaving);
+    } else if (d[1]) {
+        std::vector<float> arriving(nz), leaving(nz);
+        for (int x = 0; x < nx; ++x) {
+            std::fill(arriving.begin(), arriving.end(), 0.0f);
+            for (int step = 0; step < ny; ++step) {
+                cross_row((std::size_t(x) * ny + place(step, d[1], ny)) * nz, arriving.data(),
+                          leaving.data());
+                arriving.swap(leaving);
+            }
+        }
+    } else {
+        std::vector<float> arriving(nz);
+        for (std::size_t first = 0; first < own_.size(); first += nz) {
+            float beam = 0;
+            for (int step = 0; step < nz; ++step) {
+                const int z = place(step, d[2], nz);
+                arriving[z] = beam;
+                beam = all_passed[first + z] * beam + all_sources[first + z];
+            }
+            visit(first, nz, arriving.data());
         }
     }
 }
 
 SMOKELIFT_CLONES
-void BlockTransport::add_mean(const Direction &direction, const float *emission, float *mean) const {
-    const Crossing &c = crossing(direction);
-    const float share = weight(direction), length = c.length;
-    sweep(direction, [&](std::size_t first, int count, const float *__restrict in,
-                         float *__restrict out) SMOKELIFT_INLINE_LAMBDA {
-        const float *__restrict passed = &c.passed[first], *__restrict escaped = &c.escaped[first];
-        const float *__restrict own = &c.own[first], *__restrict emitted = emission + first;
-        float *__restrict to = mean + first;
-        for (int i = 0; i < count; ++i) {
-            const float source = length * emitted[i];
-            to[i] += share * (escaped[i] * in[i] + own[i] * source);
-            out[i] = passed[i] * in[i] + escaped[i] * source;
-        }
-    });
+void BlockTransport::add_arriving(const Direction &direction, const Sources &sources, float *sum) const {
+    follow(direction, sources,
+           [&](std::size_t first, int count, const float *__restrict in) SMOKELIFT_INLINE_LAMBDA {
+               float *__restrict to = sum + first;
+               for (int i = 0; i < count; ++i)
+                   to[i] += in[i];
+           });
 }
 
-// With M the radiance of l weights that comes from the other end, and L that of l emission:
-//     d(weights^T G emission) / dkappa = -T L M + P' (l emission M + l weights L) + B' l weights l emission.
+// products += what arrives of the one along the direction x what arrives of the other against it.
 SMOKELIFT_CLONES
-void BlockTransport::add_gradient(const Direction &direction, const float *emission, const float *weights,
-                                  float *arriving, float *result) const {
-    const Crossing &c = crossing(direction);
-    const float share = weight(direction), length = c.length;
-    sweep(direction, [&](std::size_t first, int count, const float *__restrict in,
-                         float *__restrict out) SMOKELIFT_INLINE_LAMBDA {
-        const float *__restrict passed = &c.passed[first], *__restrict escaped = &c.escaped[first];
-        const float *__restrict emitted = emission + first;
-        float *__restrict to = arriving + first;
-        for (int i = 0; i < count; ++i) {
-            to[i] = in[i];
-            out[i] = passed[i] * in[i] + escaped[i] * length * emitted[i];
-        }
-    });
-    sweep(opposite(direction), [&](std::size_t first, int count, const float *__restrict in,
-                                   float *__restrict out) SMOKELIFT_INLINE_LAMBDA {
-        const float *__restrict passed = &c.passed[first], *__restrict escaped = &c.escaped[first];
-        const float *__restrict of_escaped = &c.of_escaped[first], *__restrict of_own = &c.of_own[first];
-        const float *__restrict emitted = emission + first, *__restrict weighs = weights + first;
-        const float *__restrict from = arriving + first;
-        float *__restrict to = result + first;
-        for (int i = 0; i < count; ++i) {
-            const float source = length * emitted[i], back = length * weighs[i];
-            to[i] += share * (of_escaped[i] * (source * in[i] + back * from[i]) + of_own[i] * back * source -
-                              passed[i] * from[i] * in[i]);
-            out[i] = passed[i] * in[i] + escaped[i] * back;
-        }
-    });
+void BlockTransport::add_products(const Direction &direction, const Sources &forwards,
+                                  const Sources &backwards, float *kept, float *products) const {
+    follow(direction, forwards,
+           [&](std::size_t first, int count, const float *__restrict in)
+               SMOKELIFT_INLINE_LAMBDA { std::copy_n(in, count, kept + first); });
+    follow(opposite(direction), backwards,
+           [&](std::size_t first, int count, const float *__restrict in) SMOKELIFT_INLINE_LAMBDA {
+               const float *__restrict from = kept + first;
+               float *__restrict to = products + first;
+               for (int i = 0; i < count; ++i)
+                   to[i] += from[i] * in[i];
+           });
 }
 
-// result = the sum of what work(direction, sum) adds up for both directions of each line, whatever the number
-// of threads.
 template <class Work>
-void BlockTransport::add_by_lines(float *result, Workers &workers, const Work &work) const {
-    const std::size_t count = volume(n_);
+BlockTransport::Sources BlockTransport::sum_by_class(Workers &workers, const Work &work) const {
+    const std::size_t count = own_.size();
     std::vector<float> sums(std::size(LINES) * count, 0.0f);
     workers.run(std::size(LINES), [&](int line) {
         work(LINES[line], sums.data() + line * count);
         work(opposite(LINES[line]), sums.data() + line * count);
     });
+    Sources result{std::vector<float>(count, 0.0f), std::vector<float>(count, 0.0f)};
     for (std::size_t line = 0; line < std::size(LINES); ++line)
         for (std::size_t i = 0; i < count; ++i)
-            result[i] += sums[line * count + i];
+            result[line < AXES ? 0 : 1][i] += sums[line * count + i];
+    return result;
 }
 
 void BlockTransport::mean_radiance(const float *emission, float *mean, Workers &workers) const {
-    std::fill_n(mean, volume(n_), 0.0f);
-    add_by_lines(mean, workers,
-                 [&](const Direction &direction, float *sum) { add_mean(direction, emission, sum); });
+    const Sources from = sources(emission);
+    const Sources arriving = sum_by_class(
+        workers, [&](const Direction &direction, float *sum) { add_arriving(direction, from, sum); });
+    for (std::size_t i = 0; i < own_.size(); ++i) {
+        mean[i] = own_[i] * emission[i];
+        for (std::size_t number = 0; number < classes_.size(); ++number)
+            mean[i] += classes_[number].weight * classes_[number].escaped[i] * arriving[number][i];
+    }
 }
 
+// With M what arrives of l weights against each direction, and L of l emission along it:
+//     d(weights^T G emission) / dkappa = -T L M + P' (l emission M + l weights L) + l^2 B' weights emission.
 void BlockTransport::add_extinction_gradient(const float *emission, const float *weights, float *result,
                                              Workers &workers) const {
-    add_by_lines(result, workers, [&](const Direction &direction, float *sum) {
-        std::vector<float> arriving(volume(n_));
-        add_gradient(direction, emission, weights, arriving.data(), sum);
+    const Sources of_emission = sources(emission), of_weights = sources(weights);
+    const auto arriving = [&](const Sources &from) {
+        return sum_by_class(
+            workers, [&](const Direction &direction, float *sum) { add_arriving(direction, from, sum); });
+    };
+    const Sources emitted = arriving(of_emission), weighed = arriving(of_weights);
+    const Sources products = sum_by_class(workers, [&](const Direction &direction, float *sum) {
+        std::vector<float> kept(own_.size());
+        add_products(direction, of_emission, of_weights, kept.data(), sum);
     });
+    for (std::size_t i = 0; i < own_.size(); ++i) {
+        result[i] += of_own_[i] * weights[i] * emission[i];
+        for (std::size_t number = 0; number < classes_.size(); ++number) {
+            const Crossing &c = classes_[number];
+            result[i] +=
+                c.weight * (c.of_escaped[i] * c.length *
+                                (emission[i] * weighed[number][i] + weights[i] * emitted[number][i]) -
+                            c.passed[i] * products[number][i]);
+        }
+    }
 }
 
 void BlockTransport::solve(const float *emission, float *phi, Workers &workers) const {

@@ -5,6 +5,7 @@
 
 #include "threads.h"
 
+#include <array>
 #include <vector>
 
 namespace smokelift {
@@ -24,22 +25,29 @@ public:
                        float *of_extinction, Workers &workers) const;
 
 private:
-    // What a block does to light that crosses it along a direction, on a path of length l: depth t = kappa l,
-    // transmittance T = exp(-t), share (1 - T) / t of what it emits that leaves it, P, and the part (1 - P) /
-    // t of the emission times l that is its own mean radiance, B. The derivatives of P and B are by t.
-    struct Crossing {
-        float length;
-        std::vector<float> passed, escaped, own, of_escaped, of_own;
-    };
     using Direction = std::array<int, 3>;
 
-    static void cross(const float *extinction, std::size_t count, Crossing &crossing);
-    const Crossing &crossing(const Direction &direction) const;
-    template <class Visit> void sweep(const Direction &direction, const Visit &visit) const;
-    template <class Work> void add_by_lines(float *result, Workers &workers, const Work &work) const;
-    void add_mean(const Direction &direction, const float *emission, float *mean) const;
-    void add_gradient(const Direction &direction, const float *emission, const float *weights,
-                      float *arriving, float *result) const;
+    // What a block does to light that crosses it along a direction of the class, on a path of length l: depth
+    // t = kappa l, transmittance T = exp(-t), share P = (1 - T) / t of what it emits that leaves it, and P'
+    // by t.
+    struct Crossing {
+        float length, weight; // m; of a direction of the class in the mean over all
+        std::vector<float> passed, escaped, of_escaped;
+    };
+    // By class, the source P l e of the beams.
+    using Sources = std::array<std::vector<float>, 2>;
+
+    static void cross(const float *extinction, int directions, Crossing &crossing, std::vector<float> &own,
+                      std::vector<float> &of_own);
+    Sources sources(const float *emission) const;
+    template <class Visit>
+    void follow(const Direction &direction, const Sources &sources, const Visit &visit) const;
+    void add_arriving(const Direction &direction, const Sources &sources, float *sum) const;
+    void add_products(const Direction &direction, const Sources &forwards, const Sources &backwards,
+                      float *kept, float *products) const;
+    // Adds up, class by class, what work(direction, sum) adds for all directions, whatever the number of
+    // threads.
+    template <class Work> Sources sum_by_class(Workers &workers, const Work &work) const;
     void mean_radiance(const float *emission, float *mean, Workers &workers) const; // G
     // result += derivative of  weights^T G emission  by the extinction.
     void add_extinction_gradient(const float *emission, const float *weights, float *result,
@@ -47,8 +55,11 @@ private:
 
     Shape n_;
     float albedo_;
-    std::vector<float> scattering_; // albedo x extinction
-    Crossing axial_, diagonal_;
+    std::vector<float> scattering_;   // albedo x extinction
+    std::array<Crossing, 2> classes_; // axes, diagonals
+    // Part of a block's emission that is its own mean radiance, over all directions, and the derivative by
+    // kappa.
+    std::vector<float> own_, of_own_;
 };
 
 } // namespace smokelift
