@@ -59,11 +59,10 @@ class Truth:
             If there is no such file, it is damaged, or it holds something else.
         """
         faces = tuple(f"velocity_{axis}" for axis in "xyz")
-        scalars: dict[str, Shape | None] = {"voxel_size": (), "fps": ()}
+        wanted: dict[str, Shape | None] = dict.fromkeys(("density", *faces, "inflow_packed"))
+        wanted |= {"voxel_size": (), "fps": ()}
         try:
-            file = read_arrays(
-                path, dict.fromkeys(("density", *faces, "inflow_packed")) | scalars, others={"closed": (len(SIDES),)}
-            )
+            file = read_arrays(path, wanted, others={"closed": (len(SIDES),)}, text={"closed"})
             truth = Truth(
                 densities=file["density"],
                 faces=tuple(file[name] for name in faces),

@@ -7,7 +7,11 @@ PNG colours are multiplied by it in linear light.
 
 from __future__ import annotations
 
+import os
 import re
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Literal
 
@@ -139,12 +143,29 @@ def _read_integers(path: Path) -> npt.NDArray[Any]:
         return np.asarray(upright.convert("RGBA" if upright.has_transparency_data else "RGB"))
 
 
+@contextmanager
+def _silent() -> Iterator[None]:
+    """Keep what OpenEXR writes to standard error by itself from it: the error that follows says it."""
+    sys.stderr.flush()
+    kept = os.dup(2)
+    with Path(os.devnull).open("wb") as nowhere:
+        os.dup2(nowhere.fileno(), 2)
+    try:
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+
+
 def _read_exr(path: Path) -> Picture:
-    for part in OpenEXR.File(str(path), header_only=True).parts:
+    with _silent():
+        headers = OpenEXR.File(str(path), header_only=True).parts
+    for part in headers:
         for window in ("displayWindow", "dataWindow"):
             low, high = part.header[window]
             _require_size(path, int(high[0]) - int(low[0]) + 1, int(high[1]) - int(low[1]) + 1)
-    parts = OpenEXR.File(str(path), separate_channels=True).parts
+    with _silent():
+        parts = OpenEXR.File(str(path), separate_channels=True).parts
     if not parts:  # the library's way to say that it met damaged pixels
         raise ImageError(f"{path}: cannot be read: it is truncated or damaged")
     part = parts[0]

@@ -74,6 +74,9 @@ class Video:
             self._container.close()
             raise ClipError(f"{self._path}: holds no video stream")
         self._stream = self._container.streams.video[0]
+        if self._stream.codec_context is None:
+            self._container.close()
+            raise ClipError(f"{self._path}: holds video of a kind that cannot be decoded")
         if max(self._stream.width, self._stream.height) > LARGEST_PICTURE:
             self._container.close()
             raise ClipError(f"{self._path}: has pictures wider or higher than {LARGEST_PICTURE} pixels")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import math
 import zipfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import IO, Any
 
@@ -15,6 +15,12 @@ import numpy.typing as npt
 from smokelift.output.atomic import atomic_path
 
 Shape = tuple[int, ...]
+
+NUMBERS = "biuf"
+"""NumPy's kinds of real numbers."""
+
+LARGEST = 1e12
+"""Magnitude that no density, velocity or residual reaches; sums of squares of larger ones are not finite in 32 bits."""
 
 MOST_VALUES = 2**32
 """Values of an array whose shape is not known before, at most."""
@@ -36,9 +42,13 @@ def write_arrays(path: Path, arrays: Mapping[str, npt.NDArray[Any]], *, compress
 
 
 def read_arrays(
-    path: Path, expected: Mapping[str, Shape | None], *, others: Mapping[str, Shape] | None = None
+    path: Path,
+    expected: Mapping[str, Shape | None],
+    *,
+    others: Mapping[str, Shape] | None = None,
+    text: Collection[str] = (),
 ) -> dict[str, npt.NDArray[Any]]:
-    """Read arrays of real, finite numbers, or of text, from a ``.npz``.
+    """Read arrays of real, finite numbers from a ``.npz``.
 
     Sizes are compared with what the file really holds, and with what is expected, before memory is taken.
 
@@ -50,6 +60,8 @@ def read_arrays(
         Names of the arrays that it must hold, with their shapes where these are known.
     others
         Beginnings of the names of arrays that it may hold, with the most values along each axis.
+    text
+        Names of those of them that hold text instead.
 
     Raises
     ------
@@ -67,11 +79,13 @@ def read_arrays(
             for name, shape in expected.items():
                 if name not in members:
                     raise ValueError(f"it lacks {name}")
-                arrays[name] = _array(archive, members[name], exactly=shape)
+                arrays[name] = _array(archive, members[name], NUMBERS, exactly=shape)
             for start, most in (others or {}).items():
                 for name in members:
                     if name.startswith(start):
-                        arrays[name] = _array(archive, members[name], at_most=most)
+                        arrays[name] = _array(
+                            archive, members[name], at_most=most, kinds="U" if name in text else NUMBERS
+                        )
             return arrays
     except MemoryError:
         raise
@@ -82,7 +96,11 @@ def read_arrays(
 
 
 def _array(
-    archive: zipfile.ZipFile, info: zipfile.ZipInfo, exactly: Shape | None = None, at_most: Shape | None = None
+    archive: zipfile.ZipFile,
+    info: zipfile.ZipInfo,
+    kinds: str,
+    exactly: Shape | None = None,
+    at_most: Shape | None = None,
 ) -> npt.NDArray[Any]:
     read_header: dict[tuple[int, int], Callable[[IO[bytes]], tuple[Shape, bool, np.dtype[Any]]]] = {
         (1, 0): np.lib.format.read_array_header_1_0,
@@ -90,16 +108,16 @@ def _array(
     }
     with archive.open(info) as file:
         shape, _, kind = read_header[np.lib.format.read_magic(file)](file)  # type: ignore[no-untyped-call]  # NumPy's
-    if kind.kind not in "biufU":
-        raise ValueError(f"{info.filename} holds no real numbers, but {kind}")
+    if kind.kind not in kinds:
+        raise ValueError(f"{info.filename} holds {kind}")
     count = math.prod(shape)
     unexpected = exactly not in (None, shape) or (at_most is not None and not _within(shape, at_most))
     if unexpected or count > MOST_VALUES or count * kind.itemsize > info.file_size:
         raise ValueError(f"{info.filename} cannot have the shape {shape}")
     with archive.open(info) as file:
         values: npt.NDArray[Any] = np.lib.format.read_array(file)  # type: ignore[no-untyped-call]  # NumPy's
-    if kind.kind == "f" and not np.isfinite(values).all():
-        raise ValueError(f"{info.filename} holds values that are not finite")
+    if kind.kind == "f" and not (np.abs(values) <= LARGEST).all():
+        raise ValueError(f"{info.filename} holds values that are not finite, or beyond {LARGEST:g}")
     return values
 
 

@@ -91,9 +91,12 @@ class Sequence:
         Raises
         ------
         SequenceError
-            If there is no such frame, or its file is missing or damaged.
+            If there is no such frame, its file is missing or damaged, or a density is negative.
         """
-        return self._read(number, "density")["density"]
+        density = self._read(number, "density")["density"]
+        if density.min() < 0:
+            raise SequenceError(f"{self.directory}: frame {number} holds negative densities")
+        return density
 
     def velocity(self, number: int) -> Array:
         """Return the velocity of a frame in m/s at voxel centres, shape (nx, ny, nz, 3).

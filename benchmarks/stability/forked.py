@@ -1,0 +1,89 @@
+"""Runs a command in a fork of this process, which has loaded the engine: that saves its second for every case."""
+
+from __future__ import annotations
+
+import faulthandler
+import os
+import resource
+import signal
+import sys
+import time
+import traceback
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+CRASHED = 70
+"""Status of an exception that the command does not handle (EX_SOFTWARE)."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a case may take: seconds of processor time, seconds in all, and bytes of address space."""
+
+    processor_seconds: int = 30
+    seconds: float = 120.0
+    memory: int = 6 * 2**30
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a command ended: its status (negative: by that signal), what it said, and whether it was stopped."""
+
+    status: int
+    output: str
+    errors: str
+    hung: bool
+
+
+def run(command: Callable[[Sequence[str]], int], words: Sequence[str], folder: Path, limits: Limits) -> Ended:
+    """Run a command in a fork of this process.
+
+    Parameters
+    ----------
+    command
+        Takes the words and returns the status; for example `smokelift.app.cli.main`.
+    words
+        Of the command line.
+    folder
+        Working directory; standard output and error are kept beside it.
+    limits
+        A command that takes more is stopped.
+    """
+    spoken = [folder.with_name(f"{folder.name}.{name}") for name in ("out", "err")]
+    child = os.fork()
+    if child == 0:
+        status = CRASHED
+        try:
+            for number, path in enumerate(spoken, 1):
+                os.dup2(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), number)
+            faulthandler.disable()
+            sys.stdout, sys.stderr = (os.fdopen(n, "w", encoding="utf-8", closefd=False) for n in (1, 2))
+            resource.setrlimit(resource.RLIMIT_CPU, (limits.processor_seconds, limits.processor_seconds + 5))
+            resource.setrlimit(resource.RLIMIT_AS, (limits.memory, limits.memory))
+            resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+            os.chdir(folder)
+            status = command(words)
+        except SystemExit as leaving:
+            status = leaving.code if isinstance(leaving.code, int) else CRASHED
+        except BaseException:
+            traceback.print_exc()
+        finally:
+            sys.stdout.flush()
+            sys.stderr.flush()
+            os._exit(status)
+    status, hung = _wait(child, limits.seconds)
+    output, errors = (path.read_text(encoding="utf-8", errors="replace") for path in spoken)
+    return Ended(status, output, errors, hung or status in (-signal.SIGXCPU, -signal.SIGKILL))
+
+
+def _wait(child: int, seconds: float) -> tuple[int, bool]:
+    """Status of a process, and whether it had to be stopped."""
+    began = time.monotonic()
+    while time.monotonic() - began < seconds:
+        ended, status = os.waitpid(child, os.WNOHANG)
+        if ended:
+            return os.waitstatus_to_exitcode(status), False
+        time.sleep(0.005)
+    os.kill(child, signal.SIGKILL)
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), True

@@ -1,0 +1,73 @@
+"""A shot of a few pixels, whose files a campaign damages: a video, pictures, a plate, a sequence finished and begun."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from smokelift import Background, Camera, Clip, ClipSource, DirectionalLight, Domain, Medium, Scene, Settings
+from smokelift.output.images import write_image
+from smokelift.output.video import write_video
+from smokelift.pipeline import reconstruct
+from smokelift.render import render
+
+FRAMES = 3
+
+
+@dataclass(frozen=True)
+class TinyShot:
+    """Folders with a scene file each, or a sequence.
+
+    Attributes
+    ----------
+    video, pictures
+        ``scene.toml`` with ``clip.mp4``; with ``frame_0000.png`` and so on and ``plate.exr``.
+    finished, begun
+        A sequence with NumPy twins in ``out``, beside the scene file and the clip; the second has its first two frames.
+    """
+
+    video: Path
+    pictures: Path
+    finished: Path
+    begun: Path
+
+
+def tiny_shot(folder: Path) -> TinyShot:
+    """Make the shot in a folder."""
+    folder = folder.absolute()
+    shot = TinyShot(*(folder / name for name in ("video", "pictures", "finished", "begun")))
+    scene = Scene(
+        camera=Camera.look_at((0, -4, 0.8), (0, 0, 0.8), fov_y_degrees=27, size=(24, 32)),
+        domain=Domain((-0.6, -0.6, 0), (0.6, 0.6, 1.6), (12, 12, 16)),
+        medium=Medium(extinction=8.0),
+        lights=(DirectionalLight((0.3, 0.5, -0.8), (12.0, 11.0, 10.0)),),
+    )
+    x, y, z = np.meshgrid(*(np.linspace(-1, 1, n) for n in (12, 12, 16)), indexing="ij")
+    densities = [
+        np.maximum(np.exp(-6 * (x**2 + y**2 + (z + 0.4 - 0.2 * n) ** 2)) - 0.1, 0).astype(np.float32)
+        for n in range(FRAMES)
+    ]
+    images = [render(density, replace(scene, background=Background(color=(0, 0, 0)))) for density in densities]
+    for place in (shot.video, shot.pictures, shot.finished, shot.begun):
+        place.mkdir(parents=True)
+        if place == shot.video:
+            write_video(place / "clip.mp4", images, 24)
+            known = replace(scene, clip=ClipSource(place / "clip.mp4"), background=Background(color=(0, 0, 0)))
+        else:
+            for number, image in enumerate(images):
+                write_image(place / f"frame_{number:04d}.png", image)
+            write_image(place / "plate.exr", np.zeros((32, 24, 3)))
+            clip = ClipSource(place / "frame_####.png", fps=24.0)
+            known = replace(scene, clip=clip, background=Background(image=place / "plate.exr"))
+        known.save(place / "scene.toml")
+        if place in (shot.finished, shot.begun):
+            assert known.clip is not None
+            with Clip.open(known.clip) as opened:
+                frames = reconstruct(opened, known, Settings.preset("draft"), place / "out", npz=True)
+                for frame in frames:
+                    if place == shot.begun and frame.number == FRAMES - 1:
+                        frames.close()  # type: ignore[attr-defined]  # a generator: as if the run were cancelled
+                        break
+    return shot
