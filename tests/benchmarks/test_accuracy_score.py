@@ -11,7 +11,7 @@ import pytest
 
 from benchmarks.accuracy.blind import ANGLES, trial
 from benchmarks.accuracy.blind import FRAMES as TRIAL_FRAMES
-from benchmarks.accuracy.drift import fastest, parts_of
+from benchmarks.accuracy.drift import course, parts_of, watched
 from benchmarks.accuracy.scenes import KnownScene
 from benchmarks.accuracy.score import BLACK, front_statistics, score
 from benchmarks.accuracy.sheets import ORBIT_ANGLES, STRIP_FRAMES, orbit_rows, strip_rows, write_rows
@@ -129,13 +129,17 @@ def test_a_blind_trial_shows_every_run_once_in_any_order(known, drawn_out) -> No
 
 
 def test_a_long_run_is_scored_by_its_parts(known, tmp_path) -> None:
-    """Smoke that is fast in the second half only is fast there only."""
+    """Smoke that is fast and thin in the second half only is so there only."""
     parts = list(parts_of(known, 2))
     assert [frame for part in parts for frame in part.scored] == list(known.scored)
     for frame in range(FRAMES):
         velocity = np.zeros((*SHAPE, 3), np.float32)
         velocity[3, 4, 5] = (0, 3, 4) if frame >= FRAMES // 2 else (0, 0, 1)
-        np.savez(tmp_path / f"{frame + 1:04d}.npz", velocity=velocity)
-    slow, quick = (fastest(part, known.truth, tmp_path) for part in parts)
+        share = 0.5 if frame >= FRAMES // 2 else 1
+        np.savez(tmp_path / f"{frame + 1:04d}.npz", velocity=velocity, density=share * known.truth.density(frame))
+    slow, quick = (course(part, known.truth, tmp_path) for part in parts)
     assert (slow["fastest"], slow["fastest_ever"], quick["fastest_ever"]) == pytest.approx((1, 1, 5))
+    assert (slow["mass"], quick["mass_least"], quick["mass_largest"]) == pytest.approx((1, 0.5, 0.5))
     assert quick["fastest_truth"] == 0
+    assert watched(parts[1]).scored == parts[1].scored  # it is short
+    assert watched(replace(known, scored=range(100))).scored == range(38, 62)
