@@ -19,7 +19,7 @@ from smokelift.density.fit import (
     reconstruct_density,
 )
 from smokelift.density.observation import Observation, ObservedClip, View, ViewSet
-from smokelift.density.temporal_prior import BlendCarried, NothingCarried, Start, TemporalPrior
+from smokelift.density.temporal_prior import BlendCarried, GuidedSimulation, NothingCarried, Start, TemporalPrior
 
 __all__ = [
     "AxisEstimate",
@@ -31,6 +31,7 @@ __all__ = [
     "DepthEstimate",
     "DepthPrior",
     "GradientFit",
+    "GuidedSimulation",
     "ImposedView",
     "NothingCarried",
     "Observation",

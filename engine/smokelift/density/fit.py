@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from smokelift.density.depth_prior import DepthEstimate, DepthPrior, ImposedView, RoundDepth
 from smokelift.density.descent import descend
-from smokelift.density.multiplicative import fit_multiplicative
+from smokelift.density.multiplicative import fit_multiplicative, take_turns
 from smokelift.density.objective import Term, camera_terms
 from smokelift.density.observation import BLACK, Observation, ViewSet, eight_bit_plate
 from smokelift.footage.background import background_picture
@@ -73,12 +73,16 @@ class Density:
         ``psnr_view_1``, ... of further views; ``iterations``; ``hull_share``, the hull's share of the voxels.
     smooth : (nx, ny, nz) float32, optional
         The depth prior's `DepthEstimate.smooth`.
+    steady : (nx, ny, nz) float32, optional
+        The density before the descent, which a next frame carries along; None if that is `values`. What the descent
+        makes of single pixels would pile up along the rays from frame to frame.
     """
 
     values: Volume
     hull: NDArray[np.bool_]
     figures: Mapping[str, float] = field(default_factory=dict)
     smooth: Volume | None = None
+    steady: Volume | None = None
 
 
 class DensityFit(Protocol):
@@ -119,13 +123,14 @@ class GradientFit:
         imposed = [Term(each.view, _renderer(each, hull), each.weight) for each in depth.imposed]
         start = np.where(hull, depth.density if initial is None else initial, 0).astype(np.float32)
         # The terms take turns, so several cameras need as many times more iterations. Imposed pictures yield: the last
-        # third of the iterations and the descent are the cameras' alone.
-        iterations = settings.fit_iterations * len(cameras)
-        done = 0
+        # third of the iterations and the descent are the cameras' alone. What is carried along has met imposed pictures
+        # before, so that it meets them in half as many rounds.
+        iterations, rounds = settings.fit_iterations * len(cameras), 0
         if imposed:
             shared = 2 * iterations // 3
-            met = fit_multiplicative([*imposed, *cameras], start, shared, settings.tolerance)
-            start, done, iterations = met.density, met.iterations, iterations - shared
+            iterations -= shared
+            rounds = shared if initial is None else -(-shared // 2)
+            start = take_turns([*imposed, *cameras], start, rounds)
         scaled = fit_multiplicative(cameras, start, iterations, settings.tolerance)
         final = descend(
             cameras,
@@ -136,8 +141,9 @@ class GradientFit:
             settings.patience,
             bound=float(max(settings.bound * depth.density.max(), start.max())),
         )
-        figures = fit_figures(views, final.residuals, done + scaled.iterations + final.iterations)
-        return Density(without_traces(final.density), hull, figures, depth.smooth)
+        figures = fit_figures(views, final.residuals, rounds + scaled.iterations + final.iterations)
+        steady = scaled.density if imposed else None
+        return Density(without_traces(final.density), hull, figures, depth.smooth, steady)
 
 
 def reconstruct_density(

@@ -35,7 +35,7 @@ DAMPING = 0.4
 """Relative sensitivity at which the step is halved."""
 
 PROBE = 1.05
-"""Scale of the density for the secant dL / d ln s."""
+"""Scale of the density for the difference quotient dL / d ln s."""
 
 
 def fit_multiplicative(terms: Sequence[Term], density: Volume, iterations: int, tolerance: float) -> Fit:
@@ -70,6 +70,26 @@ def fit_multiplicative(terms: Sequence[Term], density: Volume, iterations: int, 
     return replace(best, iterations=done)
 
 
+def take_turns(terms: Sequence[Term], density: Volume, rounds: int) -> Volume:
+    """Scale the smoke of every ray towards each picture in turn, whatever the others lose by it.
+
+    Parameters
+    ----------
+    terms
+        The pictures, in the order of their turns. The last is met best.
+    density : (nx, ny, nz)
+        Start; voxels at zero stay there.
+    rounds
+        Turns of each.
+    """
+    filled = np.flatnonzero(density)
+    places = [_Places.of(filled, term.view.projection) for term in terms]
+    for _ in range(rounds):
+        for term, place in zip(terms, places, strict=True):
+            density = _scaled(density, filled, place, term, term.renderer.image(density))
+    return density
+
+
 @dataclass(frozen=True, eq=False)
 class _Places:
     """Where some voxels (n,) lie in a picture: rows, columns, and whether they are in it."""
@@ -87,14 +107,21 @@ class _Places:
 def _scaled(density: Volume, filled: NDArray[np.intp], places: _Places, term: Term, image: Image) -> Volume:
     """The density whose picture is nearer to a term's, from the one that renders to `image`."""
     transmittance = term.renderer.transmittance
-    secant = (term.renderer.image(density * np.float32(PROBE)) - image) / np.log(PROBE)
-    step = read_bilinearly(_log_scale(image, transmittance, secant, term), places.rows, places.columns)
+    slope = _slope(density, term, image, transmittance)
+    step = read_bilinearly(_log_scale(image, transmittance, slope, term), places.rows, places.columns)
     scaled = density.copy()
     scaled.ravel()[filled] *= np.exp(RELAXATION * np.where(places.visible, step, np.float32(0)))
     return scaled
 
 
-def _log_scale(image: Image, transmittance: Image, secant: Image, term: Term) -> NDArray[np.float32]:
+def _slope(density: Volume, term: Term, image: Image, transmittance: Image) -> Image:
+    """dL / d ln s (rows, columns, 3) of a density, whose image and transmittance are given."""
+    if term.renderer.absorbs_only:  # L = T B and ln T is proportional to s
+        return np.asarray(image * np.log(np.maximum(transmittance, 1e-30))[..., None])
+    return np.asarray((term.renderer.image(density * np.float32(PROBE)) - image) / np.log(PROBE))
+
+
+def _log_scale(image: Image, transmittance: Image, slope: Image, term: Term) -> NDArray[np.float32]:
     """Logarithm of each pixel's scale, damped and smoothed, (rows, columns)."""
     background, share = term.view.plate.image, np.sqrt(term.weight)
     clear = transmittance[..., None]
@@ -106,7 +133,7 @@ def _log_scale(image: Image, transmittance: Image, secant: Image, term: Term) ->
     wanted = np.clip(np.sum((term.view.image - source) * contrast, -1) / (power + 1e-20), 1e-4, 1.0)
     scale = np.log(wanted) / np.minimum(np.log(np.maximum(transmittance, 1e-30)), -1e-6)
     change = np.sqrt(np.sum((image - background) ** 2, -1))
-    sensitivity = np.sqrt(np.sum(secant**2, -1)) / np.maximum(change, 1e-6)
+    sensitivity = np.sqrt(np.sum(slope**2, -1)) / np.maximum(change, 1e-6)
     gain = share * sensitivity**2 / (sensitivity**2 + DAMPING**2)
     step = gain * np.log(np.clip(scale, *STEP_RANGE))
     trust = share * power / (power + floor)

@@ -2,11 +2,10 @@
 
     E(rho) = sum over terms, pixels, channels of  w (L(rho) - I)^2,    0 <= rho <= bound,  rho = 0 outside the hull
 
-A term is a picture I with the weight w of its pixels. There is one term a camera. In the first multiplicative
-iterations (two thirds of them) there are those of the pictures that a depth prior imposes (soft observations) as well.
-The iterations after these and the descent have the cameras' terms alone, so that imposed pictures yield: what is left
-of them is what the cameras' pictures allow. A prior has no penalty term. Beyond those pictures it acts through the
-start and, with it, the preconditioner of the descent.
+A term is a picture I with the weight w of its pixels. There is one term a camera. The pictures that a depth prior
+imposes (soft observations) are no part of it: before, the start is scaled towards them in turn with the cameras'
+pictures, and what is left of them is what those allow. A prior has no penalty term. Beyond its pictures it acts through
+the start and, with it, the preconditioner of the descent.
 
 Noise of standard deviation s leaves E = sum w s^2 at the true density. Below that a fit reproduces noise, so it stops
 there (discrepancy principle: Morozov 1966). The figures that a fit reports are plain: unweighted, of the cameras alone.

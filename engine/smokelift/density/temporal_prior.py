@@ -1,8 +1,8 @@
 """Where the fit of a frame starts, from the depth prior's density and the one carried along from the frame before.
 
 The carried (advected) density knows optical depths that the renderer has corrected for shadows already, and structures
-along the rays. `BlendCarried`, the default, judges it before any correction by D, the squared difference between the
-input's picture and what a density renders to. It blends in two shares:
+along the rays. `BlendCarried`, for the smooth answer, judges it before any correction by D, the squared difference
+between the input's picture and what a density renders to. It blends in two shares:
 
     of the rays' optical depths, by skill against the prior:      largest (1 - D(carried) / (D(prior) + noise))
     of the density itself, by skill against persistence:          largest (1 - D(carried) / (D(before) + noise))
@@ -11,6 +11,9 @@ and never below zero. `before` is the density of the frame before, left where it
 weather forecasts is measured. A wrong velocity is no better than none, and then nothing is blended in. `largest` limits
 both (docs/experiments/temporal-prior.md), so that errors which no picture corrects, in thick smoke or in shadow, do not
 grow from frame to frame.
+
+`GuidedSimulation`, for smoke with made-up detail, is a simulation that the clip guides: the detail of the frame before
+moves on with the flow, and the smooth answer of the new picture says how much smoke is where.
 """
 
 from __future__ import annotations
@@ -23,12 +26,22 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+import smokelift._core as _core
 from smokelift.density.depth_prior import DepthEstimate
 from smokelift.density.observation import View, ViewSet
 from smokelift.render import Image, Volume
 
+TINY = np.finfo(np.float32).tiny
+
 FAINT = 1e-3
 """Optical depth, as a fraction of the largest, below which its logarithm means nothing."""
+
+GUIDED = 3.0
+"""Standard deviation (voxels) of the blur whose result the smooth answer decides; what is finer is the simulation's."""
+
+LARGEST_GAIN = 3.0
+"""Bound of the factor by which carried smoke is made denser. Where that is too little the prior's smoke is added: there
+smoke has entered, or has moved otherwise than was predicted."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,6 +132,46 @@ class BlendCarried:
                 "loss_before": loss_before,
             },
         )
+
+
+@dataclass(frozen=True)
+class GuidedSimulation:
+    """The detail of the carried density, in the amounts of the depth prior's smooth answer.
+
+    With B a blur, the smooth answer rho_s, the prior's density rho_p and the carried one rho_c:
+
+        start = kept rho_c B(rho_s)' / B(rho_c) + (1 - kept B(rho_s)' / B(rho_s)) rho_p,
+        B(rho_s)' = min(B(rho_s), LARGEST_GAIN B(rho_c))
+
+    Detail is born where nothing is carried, at inlets above all, and moves on from there. In every frame `kept` leaves
+    some to be renewed (docs/experiments/guided-simulation.md).
+
+    Attributes
+    ----------
+    largest
+        Of `BlendCarried`, which stands in where the depth prior makes nothing up.
+    kept
+        Share of the detail that a frame takes over.
+    """
+
+    largest: float
+    kept: float = 0.9
+
+    def start(self, views: ViewSet, depth: DepthEstimate, carried: Volume, before: Volume) -> Start:
+        """The carried density in the smooth answer's amounts; see `TemporalPrior`.
+
+        Its figure ``share`` is the share of the smoke that is taken over.
+        """
+        if depth.smooth is None:
+            return BlendCarried(self.largest).start(views, depth, carried, before)
+        wanted, have = (_core.blur(values, GUIDED, 3.0) for values in (depth.smooth, carried))
+        reached = np.float32(self.kept) * np.minimum(wanted, np.float32(LARGEST_GAIN) * have)
+        taken_over = carried * reached / np.maximum(have, TINY)
+        density = taken_over + (1 - reached / np.maximum(wanted, TINY)) * depth.density
+        density = np.where(views.hull, density, np.float32(0))
+        total = float(density.sum(dtype=np.float64))
+        share = float(taken_over.sum(dtype=np.float64, where=views.hull)) / total if total > 0 else 0.0
+        return Start(density, {"share": share})
 
 
 def _skill(loss: float, reference: float) -> float:

@@ -49,6 +49,8 @@ class Frame:
     smooth : (nx, ny, nz) float32, optional
         The density without what the depth prior makes up, which the velocity is estimated from; None if that is all of
         it.
+    steady : (nx, ny, nz) float32, optional
+        What the next frame carries along, if not the density: see `smokelift.density.Density`.
     """
 
     number: int
@@ -56,6 +58,7 @@ class Frame:
     velocity: Velocity
     figures: Mapping[str, Any]
     smooth: Volume | None = None
+    steady: Volume | None = None
 
 
 def reconstruct(
@@ -129,7 +132,8 @@ def _kept(frame: Frame) -> dict[str, Array]:
     """What the next frame needs of one besides density and velocity."""
     memory = frame.velocity.residual
     kept = {} if memory is None else {"residual_mean": memory.mean, "residual_magnitude": memory.magnitude}
-    return kept if frame.smooth is None else kept | {"smooth": frame.smooth}
+    volumes = {"smooth": frame.smooth, "steady": frame.steady}
+    return kept | {name: volume for name, volume in volumes.items() if volume is not None}
 
 
 def _resumed(state: ResumeState, shot: Shot) -> Frame:
@@ -137,7 +141,7 @@ def _resumed(state: ResumeState, shot: Shot) -> Frame:
     mean, magnitude = state.extra.get("residual_mean"), state.extra.get("residual_magnitude")
     residual = None if mean is None or magnitude is None else ResidualMeans(mean, magnitude)
     velocity = Velocity(state.velocity, shot.optics.domain.voxel_size, shot.scene.closed, residual=residual)
-    return Frame(state.number, state.density, velocity, {}, state.extra.get("smooth"))
+    return Frame(state.number, state.density, velocity, {}, state.extra.get("smooth"), state.extra.get("steady"))
 
 
 def _frames(shot: Shot, method: Method, start: Frame | None) -> Iterator[Frame]:
@@ -163,7 +167,8 @@ def _frame(index: int, before: Frame | None, shot: Shot, method: Method) -> Fram
     if before is not None and index >= 2 and before.density.any():
         predicted = method.velocity_estimator.predict(before.velocity, dt)
         # what a moving camera does not see no picture corrects, so that its mass has to be kept
-        carried = advect(before.density, predicted, dt, conserve=shot.moves)
+        moved = before.density if before.steady is None else before.steady
+        carried = advect(moved, predicted, dt, conserve=shot.moves)
     density, taken_over = _density(index, before, carried, shot, method)
     fitted = time.perf_counter()
     velocity = Velocity.zero(domain.resolution, domain.voxel_size, shot.scene.closed)
@@ -185,7 +190,7 @@ def _frame(index: int, before: Frame | None, shot: Shot, method: Method) -> Fram
         "seconds_density": fitted - began,
         "seconds_velocity": done - fitted,
     }
-    return Frame(index + 1, density.values, velocity, figures, density.smooth)
+    return Frame(index + 1, density.values, velocity, figures, density.smooth, density.steady)
 
 
 def _measured(before: Frame, density: Density) -> tuple[Volume, Volume]:
@@ -211,7 +216,7 @@ def _density(
     if shot.moves:
         # what a moving camera does not see now it may have seen before
         visible = project_voxels(observations[0].camera, shot.optics.domain).visible
-        density = replace(density, values=np.where(visible, density.values, carried))
+        density = replace(density, values=np.where(visible, density.values, carried), steady=None)
     return density, start.figures
 
 

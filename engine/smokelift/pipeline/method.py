@@ -15,6 +15,7 @@ from smokelift.density import (
     DensityFit,
     DepthPrior,
     GradientFit,
+    GuidedSimulation,
     NothingCarried,
     RoundDepth,
     TemporalPrior,
@@ -55,13 +56,19 @@ def _default(settings: Settings) -> Method:
         density_fit=GradientFit(settings.density),
         depth_prior=_depth_prior(settings),
         velocity_estimator=CoarseToFine(settings.velocity),
-        temporal_prior=BlendCarried(settings.transport) if settings.transport > 0 else NothingCarried(),
+        temporal_prior=_temporal_prior(settings),
     )
 
 
 def _depth_prior(settings: Settings) -> DepthPrior:
     smooth = RoundDepth(axis_depth=settings.axis_depth)
     return BorrowedMoments(smooth, settings.detail, settings.seed) if settings.detail > 0 else smooth
+
+
+def _temporal_prior(settings: Settings) -> TemporalPrior:
+    if settings.transport == 0:
+        return NothingCarried()
+    return GuidedSimulation(settings.transport) if settings.detail > 0 else BlendCarried(settings.transport)
 
 
 def _paper(settings: Settings) -> Method:

@@ -93,6 +93,11 @@ class Renderer:
         return np.asarray(scattered @ self._colour + self.transmittance[..., None] * self._background)
 
     @property
+    def absorbs_only(self) -> bool:
+        """Whether no light is scattered: pictures are the attenuated background."""
+        return not self._colour.size
+
+    @property
     def transmittance(self) -> Image:
         """Transmittance (rows, columns) of the last image's rays."""
         return np.asarray(np.exp(-self._depth))

@@ -78,7 +78,8 @@ class Settings:
     transport
         At most this share (0 to 1) of what a frame's fit starts from is the advected density of the frame before. Every
         frame takes as much as proves right (`smokelift.density.temporal_prior`). Beyond a half the velocity's errors
-        smear the depth (docs/experiments/temporal-prior.md). The paper's method takes all.
+        smear the depth (docs/experiments/temporal-prior.md). Made-up detail is carried on whatever the share, unless it
+        is 0. The paper's method takes all.
     axis_depth
         How far behind the domain's centre (metres, away from the camera) the middle of the smoke stands; None estimates
         it from where the smoke meets the floor and from the light of coloured lamps, else takes the domain's centre.

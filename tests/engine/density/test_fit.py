@@ -22,7 +22,7 @@ from smokelift.density import (
 from smokelift.density.axis import SmokeAxis
 from smokelift.density.descent import descend
 from smokelift.density.hull import common_hull, project_voxels, visual_hull
-from smokelift.density.multiplicative import fit_multiplicative
+from smokelift.density.multiplicative import fit_multiplicative, take_turns
 from smokelift.density.objective import Term
 from smokelift.density.profile import DepthProfile, inflated
 from smokelift.evaluation.metrics import psnr
@@ -263,6 +263,29 @@ def test_the_multiplicative_fit_gets_better(plume, small) -> None:
     losses = [fit_multiplicative([term], start, count, 0.0).loss for count in range(6)]
     assert all(after <= before for before, after in itertools.pairwise(losses))
     assert losses[-1] < 0.1 * losses[0]
+
+
+@pytest.mark.parametrize(("scattering", "behind"), [("single", 0.0), ("absorption", 0.5)])
+def test_turns_meet_every_picture(plume, small, scattering, behind) -> None:
+    """Each round brings both pictures nearer, whether or not smoke scatters light; no round changes nothing."""
+    scene = replace(small, scattering=scattering, background=Background(color=(behind,) * 3))
+    optics = scene_optics(completed(scene))
+    plate = noisy_plate(np.full((42, 30, 3), behind))
+    terms = []
+    for degrees in (90.0, 0.0):
+        camera = orbit(scene.camera, scene.domain, degrees)
+        view = View.of(Observation(camera, render(plume.densities[1], scene, camera), plate), optics)
+        terms.append(Term(view, optics.renderer(camera, plate.image), np.ones(view.mask.shape, np.float32)))
+        assert terms[-1].renderer.absorbs_only == (scattering == "absorption")
+    start = 0.5 * plume.densities[1]
+
+    def losses(density: np.ndarray) -> list[float]:
+        return [term.loss(term.renderer.image(density) - term.view.image) for term in terms]
+
+    after = [losses(take_turns(terms, start, rounds)) for rounds in (0, 1, 2, 4)]
+    assert after[0] == losses(start)
+    assert all(b < a for one, two in itertools.pairwise(after) for a, b in zip(one, two, strict=True))
+    assert sum(after[-1]) < 0.1 * sum(after[0])
 
 
 def even_start(density: np.ndarray, scene: Scene) -> tuple[Term, np.ndarray, np.ndarray]:

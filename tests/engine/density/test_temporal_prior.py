@@ -6,8 +6,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
-from smokelift.density import BlendCarried, DepthEstimate, NothingCarried, Observation, RoundDepth, Start, ViewSet
+from smokelift.density import (
+    BlendCarried,
+    DepthEstimate,
+    GuidedSimulation,
+    NothingCarried,
+    Observation,
+    RoundDepth,
+    Start,
+    ViewSet,
+)
+from smokelift.density.temporal_prior import GUIDED, LARGEST_GAIN
 from smokelift.footage.plate import Plate
 from smokelift.render import Volume, render, scene_optics
 from smokelift.scene import completed
@@ -104,3 +115,47 @@ def test_nothing_carried_is_the_priors_density(moment) -> None:
     start = NothingCarried().start(moment.views, moment.depth, moment.true, moment.before)
     assert start.density is moment.prior
     assert start.figures == {}
+
+
+def blurred(density: Volume) -> Volume:
+    """A density without what the simulation decides."""
+    return ndimage.gaussian_filter(density, GUIDED, truncate=3.0)
+
+
+@pytest.fixture(scope="module")
+def guess(moment) -> DepthEstimate:
+    """What a depth prior says that has made something up: its smooth answer beside a density."""
+    return replace(moment.depth, smooth=moment.prior, density=0.9 * moment.prior + 0.1 * blurred(moment.prior))
+
+
+def guided(moment: Moment, guess: DepthEstimate, carried: Volume) -> Start:
+    """Where a guided simulation starts, with all of what is carried."""
+    return GuidedSimulation(LARGEST, kept=1.0).start(moment.views, guess, carried, moment.before)
+
+
+def test_a_simulation_is_guided_to_the_smooth_answers_amounts(moment, guess) -> None:
+    """Coarsely the start is the smooth answer, finely it is what was carried, however much that was."""
+    hull = moment.views.hull
+    starts = [guided(moment, guess, np.float32(factor) * moment.true).density for factor in (1.0, 8.0)]
+    wanted, found = blurred(moment.prior)[hull], blurred(starts[0])[hull]
+    assert np.linalg.norm(found - wanted) < 0.15 * np.linalg.norm(wanted)
+    detail, carried = ((density - blurred(density))[hull] for density in (starts[0], moment.true))
+    assert np.corrcoef(detail, carried)[0, 1] > 0.8
+    np.testing.assert_allclose(starts[1], starts[0], rtol=1e-3, atol=1e-6)
+
+
+def test_detail_is_born_where_nothing_is_carried(moment, guess) -> None:
+    """There the prior's density is all that there is; likewise where far too little is carried."""
+    hull = moment.views.hull
+    empty = guided(moment, guess, np.zeros_like(moment.true))
+    np.testing.assert_array_equal(empty.density[hull], guess.density[hull])
+    assert empty.figures["share"] == 0
+    little = guided(moment, guess, np.float32(0.01) * moment.prior)
+    assert 0 < little.figures["share"] <= 0.011 * LARGEST_GAIN
+    np.testing.assert_allclose(little.density.sum(), guess.density[hull].sum(), rtol=0.02)
+
+
+def test_without_anything_made_up_the_carried_density_is_judged(moment) -> None:
+    """A depth prior that has no smooth answer of its own gets the blend."""
+    found = GuidedSimulation(LARGEST).start(moment.views, moment.depth, moment.true, moment.before)
+    np.testing.assert_array_equal(found.density, moment.start(moment.true).density)
