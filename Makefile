@@ -1,5 +1,7 @@
 # make demo   lift the example clip to a VDB sequence in demo/sequence, with pictures from all sides and a video
 # make test   formatting, types and tests; nothing that needs a GPU
+# make sanitize       tests of the compiled core with one that checks itself for accesses outside arrays and the like
+# make stability      ten minutes of damaged files against the command line
 # make extension      the Blender extension's zips in dist/; ENGINE_WHEELS=DIR adds platforms built elsewhere
 # make test-blender   that zip in the bpy wheels and in a real Blender
 # All set up what they need in .venv first. Only Python 3.11 to 3.13 and a C++17 compiler are assumed; the last two
@@ -19,7 +21,7 @@ QUIET_PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
 HAS_VDB = $(shell $(BIN)/python -c 'import importlib.util as u; print("yes" if u.find_spec("bpy") else "")')
 
-.PHONY: demo test pytest lint extension test-blender clean
+.PHONY: demo test pytest lint sanitize stability extension test-blender clean
 
 demo: $(VENV)/engine.stamp
 	rm -rf demo/sequence
@@ -30,6 +32,14 @@ test: lint pytest
 
 pytest: $(VENV)/engine.stamp
 	$(BIN)/python -m pytest -n 2 --dist worksteal
+
+sanitize: $(VENV)/engine.stamp
+	$(BIN)/python tools/sanitize.py
+
+stability: $(VENV)/engine.stamp
+	rm -rf build/stability
+	mkdir -p build
+	$(BIN)/python -m benchmarks.stability build/stability --cases 150
 
 lint: $(VENV)/engine.stamp
 	$(BIN)/ruff check .

@@ -2,8 +2,9 @@
 #pragma once
 
 // Hot loops are compiled for several instruction sets; the loader picks one. Elsewhere: the compiler's
-// target.
-#if defined(__GNUC__) && !defined(__clang__) && __GNUC__ >= 12 && defined(__x86_64__) && defined(__linux__)
+// target. AddressSanitizer is not there yet when the loader picks.
+#if defined(__GNUC__) && !defined(__clang__) && __GNUC__ >= 12 && defined(__x86_64__) &&                     \
+    defined(__linux__) && !defined(__SANITIZE_ADDRESS__)
 #define SMOKELIFT_CLONES __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
 #else
 #define SMOKELIFT_CLONES

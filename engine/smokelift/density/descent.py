@@ -24,6 +24,9 @@ FLOOR = 0.1
 SUFFICIENT = 1e-4
 """Armijo's constant: share of the linear prediction that a step has to gain."""
 
+LONGEST = 1e30
+"""Step that is tried, at most: a start of next to nothing asks for more than 32 bits hold."""
+
 SHORTEN = 0.3
 """Factor of a step that gains too little."""
 
@@ -87,7 +90,7 @@ def descend(
         slope = _dot(gradient, gradient)
         if not slope > 0:
             break
-        trial = step or 0.1 * loss / slope
+        trial = min(step or 0.1 * loss / slope, LONGEST)
         for _ in range(SHORTENINGS):
             candidate = np.clip(current - np.float32(trial) * scale * gradient, 0, bound)
             moved = (candidate - current) / scale

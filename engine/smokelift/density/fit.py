@@ -24,6 +24,9 @@ from smokelift.footage.plate import Plate
 from smokelift.render import Image, Renderer, Volume, scene_optics
 from smokelift.scene import CompleteScene, Domain, Scene, completed
 
+LARGEST_START = 1e12
+"""Initial density, at most: squares of larger ones are not finite in 32 bits."""
+
 TRACE = 1e-9
 """Density below which a voxel is empty: no picture can show it. Libraries may switch numbers below float32's normal
 range to 0 for a whole process, so a run that is resumed would otherwise differ in its last bits."""
@@ -187,7 +190,9 @@ def reconstruct_density(
     """
     complete = completed(scene)
     optics = scene_optics(complete)
-    own = Observation(complete.camera, np.asarray(image, np.float32), plate or BLACK)
+    with np.errstate(over="ignore"):
+        picture = np.asarray(image, np.float32)
+    own = Observation(complete.camera, picture, plate or BLACK)
     seen = ViewSet.of([_with_plate(each, complete) for each in (own, *views)], optics)
     if initial is not None:
         initial = _checked_initial(initial, optics.domain)
@@ -236,9 +241,12 @@ def fit_figures(views: ViewSet, residuals: Sequence[Image], iterations: int) -> 
 
 
 def _checked_initial(initial: Volume, domain: Domain) -> Volume:
-    initial = np.asarray(initial, np.float32)
+    with np.errstate(over="ignore"):
+        initial = np.asarray(initial, np.float32)
     if initial.shape != domain.resolution:
         raise ValueError(f"The initial density must have the shape {domain.resolution}, not {initial.shape}.")
     if not np.isfinite(initial).all() or initial.min() < 0:
         raise ValueError("The initial density must be finite and not negative.")
+    if initial.max() > LARGEST_START:
+        raise ValueError(f"The initial density must be {LARGEST_START:g} at most, not {initial.max():g}.")
     return initial

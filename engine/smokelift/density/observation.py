@@ -18,6 +18,7 @@ from smokelift.footage.noise import EIGHT_BIT_STEP
 from smokelift.footage.plate import Plate, noise_at
 from smokelift.render import Image, Optics
 from smokelift.scene import Camera, Domain, Inlet
+from smokelift.scene.checks import LARGEST
 
 THINNEST_CLEAR = 0.05
 """Transmittance at least: optical depth above 3 cannot be told from a brightness."""
@@ -191,5 +192,5 @@ def _check(observation: Observation, domain: Domain) -> None:
     width, height = camera.size
     if image.shape != (height, width, 3):
         raise ValueError(f"The picture must have the shape {(height, width, 3)} of the camera, not {image.shape}.")
-    if not np.isfinite(image).all():
-        raise ValueError("The picture holds values that are not finite.")
+    if not (np.abs(image) <= LARGEST).all():
+        raise ValueError(f"The picture holds values that are not finite, or beyond {LARGEST:g}.")

@@ -10,7 +10,10 @@ import numpy as np
 from smokelift.footage.background import background_picture
 from smokelift.render.optics import scene_renderer
 from smokelift.render.renderer import Image, Renderer, Volume
-from smokelift.scene import Camera, CompleteScene, Domain, Scene, completed
+from smokelift.scene import Camera, CompleteScene, Scene, completed
+
+LARGEST_DEPTH = 1e20
+"""Optical depth of a voxel, at most: that of a ray through thousands of them is still a number of 32 bits."""
 
 
 def render(density: Volume, scene: Scene | CompleteScene, camera: Camera | None = None) -> Image:
@@ -51,7 +54,7 @@ def render(density: Volume, scene: Scene | CompleteScene, camera: Camera | None 
     ((24, 32, 3), dtype('float32'))
     """
     renderer = _renderer(scene, camera)
-    return renderer.image(_checked(density, renderer.domain))
+    return renderer.image(_checked(density, renderer))
 
 
 @overload
@@ -131,18 +134,23 @@ def _of_view(density: Volume, renderer: Renderer, target: Image) -> tuple[float,
         raise ValueError(f"The target image must have the shape {(height, width, 3)}, not {target.shape}.")
     if not np.isfinite(target).all():
         raise ValueError("The target image holds values that are not finite.")
-    image = renderer.image(_checked(density, renderer.domain), keep_record=True)
+    image = renderer.image(_checked(density, renderer), keep_record=True)
     difference = image - target
     loss = float(np.sum(np.square(difference, dtype=np.float64)))
     return loss, renderer.gradient(2 * difference), image
 
 
-def _checked(density: Volume, domain: Domain) -> Volume:
-    density = np.asarray(density, np.float32)
-    if density.shape != domain.resolution:
-        raise ValueError(f"The density has the shape {density.shape}, the domain {domain.resolution}; they must agree.")
+def _checked(density: Volume, renderer: Renderer) -> Volume:
+    with np.errstate(over="ignore"):
+        density = np.asarray(density, np.float32)
+    wanted = renderer.domain.resolution
+    if density.shape != wanted:
+        raise ValueError(f"The density has the shape {density.shape}, the domain {wanted}; they must agree.")
     if not np.isfinite(density).all():
         raise ValueError("The density holds values that are not finite.")
     if density.min(initial=0.0) < 0:
         raise ValueError("The density holds negative values.")
+    depth = float(density.max(initial=0.0)) * renderer.medium.extinction * renderer.domain.voxel_size
+    if depth > LARGEST_DEPTH:
+        raise ValueError(f"The densest voxel has an optical depth of {depth:g}; {LARGEST_DEPTH:g} at most.")
     return density

@@ -20,6 +20,9 @@ from smokelift.scene import DirectionalLight, Domain, FiniteLight, PointLight
 Array = NDArray[np.float64]
 Box = tuple[int, int, int]
 
+DARKEST = 1e-18
+"""Energy of a light, at least: squares of less vanish in 32 bits."""
+
 CLOSEST = 1e-3
 """Voxels. Planes nearer to a point light than this are skipped: no voxel there belongs to their axis."""
 
@@ -138,7 +141,7 @@ def lighting(lights: Sequence[FiniteLight], domain: Domain, corner: Box, shape: 
     SceneError
         If a point light stands inside the domain or too far away.
     """
-    bright = [light for light in lights if any(_colour(light))]
+    bright = [light for light in lights if max(_colour(light)) >= DARKEST]
     if not bright:
         return Lighting((), np.zeros((0, 3)))
     colour, energies = _channels(np.array([_colour(light) for light in bright], np.float64))

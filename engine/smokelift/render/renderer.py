@@ -20,9 +20,6 @@ from smokelift.scene import Camera, Domain, FiniteLight, Medium, Scattering
 Image = NDArray[np.float32]
 Volume = NDArray[np.float32]
 
-LARGEST_DEPTH = 1e20
-"""Optical depth of a voxel, at most: that of a ray through thousands of them is still a number of 32 bits."""
-
 
 class Renderer:
     """A differentiable renderer for one camera and one grid.
@@ -80,15 +77,7 @@ class Renderer:
         -------
         (rows, columns, 3) float32
             Linear radiance, row 0 at the top.
-
-        Raises
-        ------
-        ValueError
-            If a density is not a number, or so large that optical depths are not finite.
         """
-        largest = float(np.max(density)) * self.medium.extinction * self.domain.voxel_size
-        if not largest <= LARGEST_DEPTH:  # nor if it is not a number
-            raise ValueError(f"The densest voxel has an optical depth of {largest:g}; {LARGEST_DEPTH:g} at most.")
         scattered, self._depth = self._backend.image(density, keep_record)
         return np.asarray(scattered @ self._colour + self.transmittance[..., None] * self._background)
 

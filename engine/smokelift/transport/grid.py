@@ -6,7 +6,6 @@ Harlow and Welch 1965), where its divergence and the pressure projection are exa
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple, Self
@@ -15,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from smokelift.scene import SIDES, Side
+from smokelift.scene.checks import LARGEST, SMALLEST
 
 Array = npt.NDArray[np.float32]
 Faces = tuple[Array, Array, Array]
@@ -143,13 +143,13 @@ class Velocity(StaggeredGrid):
         Raises
         ------
         ValueError
-            If `dt` is not positive, or the way is longer than numbers of 32 bits can say.
+            If `dt` is not positive, or the way is longer than `LARGEST` voxels.
         """
         require_positive("dt", dt)
         with np.errstate(over="ignore", invalid="ignore"):
             x, y, z = (component * np.float32(dt / self.voxel_size) for component in self.faces)
-        if not all(np.isfinite(component).all() for component in (x, y, z)):
-            raise ValueError(f"the velocity, dt = {dt:g} s and voxels of {self.voxel_size:g} m make no finite way.")
+        if not all((np.abs(component) <= LARGEST).all() for component in (x, y, z)):
+            raise ValueError(f"the velocity moves smoke by more than {LARGEST:g} voxels in {dt:g} s.")
         return StaggeredGrid((x, y, z), 1.0, self.closed)
 
 
@@ -174,9 +174,9 @@ def _in_order(closed: Iterable[Side]) -> tuple[Side, ...]:
 
 
 def require_positive(name: str, value: float) -> None:
-    """Refuse what is not a positive finite number."""
-    if not (value > 0 and math.isfinite(value)):
-        raise ValueError(f"{name} must be positive and finite, not {value}.")
+    """Refuse what is not positive, or beyond what a scene may hold."""
+    if not SMALLEST <= value <= LARGEST:
+        raise ValueError(f"{name} must be positive and finite, from {SMALLEST:g} to {LARGEST:g}, not {value}.")
 
 
 def require_same_shape(what: str, shape: tuple[int, ...], expected: tuple[int, ...]) -> None:

@@ -36,15 +36,19 @@ def test_a_displacement_that_is_not_a_number_stays_in_the_array():
     np.testing.assert_array_equal(_core.advect_cells(field, faces, False, True), 1)
 
 
-@pytest.mark.parametrize(
-    ("speed", "voxel_size", "dt"), [(0, 0.1, 1e300), (3e38, 0.1, 1), (-3e38, 0.1, 1), (1, 1e-44, 1)]
-)
-def test_a_way_that_is_not_finite_is_refused(speed, voxel_size, dt):
-    velocity = uniform((speed,) * 3, voxel_size=voxel_size)
-    with pytest.raises(ValueError, match="make no finite way"):
-        advect(np.ones(SHAPE, np.float32), velocity, dt)
-    with pytest.raises(ValueError, match="make no finite way"):
-        advect(velocity, velocity, dt)
+@pytest.mark.parametrize("speed", [3e38, -3e38, 1e9])
+def test_a_way_beyond_all_measure_is_refused(speed):
+    velocity = uniform((speed,) * 3, voxel_size=0.1)
+    for carried in (np.ones(SHAPE, np.float32), velocity):
+        with pytest.raises(ValueError, match=r"moves smoke by more than 1e\+09 voxels in 1 s"):
+            advect(carried, velocity, 1)
+
+
+def test_a_time_step_or_a_voxel_beyond_all_measure_is_refused():
+    with pytest.raises(ValueError, match="dt must be positive and finite, from 1e-09"):
+        advect(np.ones(SHAPE, np.float32), uniform((0, 0, 0)), 1e300)
+    with pytest.raises(ValueError, match="voxel_size must be positive and finite, from 1e-09"):
+        uniform((1, 1, 1), voxel_size=1e-44)
 
 
 def test_where_the_system_gives_no_thread_one_does_all_the_work():
