@@ -27,6 +27,7 @@ from smokelift.density import DepthEstimate, Observation, View, ViewSet
 from smokelift.density.descent import descend
 from smokelift.density.objective import Term
 from smokelift.footage.images import linear_to_srgb
+from smokelift.footage.noise import lasting_noise
 from smokelift.footage.plate import Plate
 from smokelift.render import Image, Optics, Renderer, Volume
 from smokelift.scene import Camera, DirectionalLight, Domain, Medium, orbit
@@ -94,7 +95,7 @@ def step(renderer: Renderer, target: Image, density: Volume, count: int) -> Volu
 
 def seen(target: Image) -> View:
     """Return the target as a view without noise, so that a fit goes on to the end."""
-    clean = Plate(np.broadcast_to(WALL, target.shape), np.ones(target.shape[:2], np.float32), np.zeros(3, np.float32))
+    clean = Plate(np.broadcast_to(WALL, target.shape), np.ones(target.shape[:2], np.float32), lasting_noise(0.0))
     return replace(View.of(Observation(CAMERA, target), OPTICS), plate=clean)
 
 

@@ -114,7 +114,7 @@ class _Text:
             self._bar.start()
 
     def frame(self, number: int, figures: Mapping[str, Any]) -> None:
-        fit = f"fit {figures['psnr']:.1f} dB" if figures["hull_share"] > 0 else "no smoke"
+        fit = f"fit {figures['psnr']:.1f} dB" if "psnr" in figures else "no smoke"
         with _output():
             self._bar.update(self._task, advance=1, fit=fit)
 

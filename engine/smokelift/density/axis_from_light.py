@@ -172,7 +172,8 @@ class _CoarsePicture:
         columns, rows = (pixels * n for n in self._size)
         fine, self._camera = view.camera.resized(columns, rows), view.camera.resized(*self._size)
         self._picture = area_average(view.image, columns, rows)
-        small = view.plate.through(lambda whole: area_average(whole, columns, rows))
+        averaged = view.camera.size[0] * view.camera.size[1] / (columns * rows)
+        small = view.plate.through(lambda whole: area_average(whole, columns, rows), averaged)
         self._background = small.image
         self._amount = area_average(view.optical_depth, *self._size) + np.float32(1e-3)
         self._optics = optics

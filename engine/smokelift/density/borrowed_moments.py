@@ -27,6 +27,8 @@ from smokelift.density.objective import camera_terms
 from smokelift.density.observation import ObservedClip, View, ViewSet, eight_bit_plate
 from smokelift.density.row_shape import Array
 from smokelift.density.turntable import Turntable
+from smokelift.footage.images import srgb_to_linear
+from smokelift.footage.noise import EIGHT_BIT_STEP, lasting_noise, linear_per_srgb
 from smokelift.render import Optics, Volume
 from smokelift.scene import Camera, Medium
 
@@ -66,6 +68,9 @@ THIN = 0.5
 
 WHITE = np.ones(3, np.float32)
 """Radiance behind a side's picture."""
+
+SHADOWGRAPH_NOISE = lasting_noise(srgb_to_linear(EIGHT_BIT_STEP) / linear_per_srgb(np.ones(3, np.float32)))
+"""Of pictures of smoke before white that are as clean as those before black with eight bits, in linear light."""
 
 AROUND = 0.05
 """Share of the smooth answer that is spread around it: the borrowed outlines need something to work on."""
@@ -179,7 +184,7 @@ def _shadowgraph(optical_depth: Array, camera: Camera, strength: float, optics: 
     view = View(
         camera=camera,
         image=np.exp(-depth)[..., None] * WHITE,
-        plate=eight_bit_plate(WHITE, camera.size),
+        plate=replace(eight_bit_plate(WHITE, camera.size), noise=SHADOWGRAPH_NOISE),
         mask=everywhere,
         optical_depth=depth,
         projection=project_voxels(camera, optics.domain),

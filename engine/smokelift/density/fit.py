@@ -73,7 +73,8 @@ class Density:
     figures
         ``loss`` (sum of squared differences over all cameras' pictures) and ``psnr`` (dB, peak 1) of the input's
         picture, in linear radiance, over the pixels that its smoke's voxels can change, all counted alike;
-        ``psnr_view_1``, ... of further views; ``iterations``; ``hull_share``, the hull's share of the voxels.
+        ``psnr_view_1``, ... of further views, each absent where its picture shows no smoke; ``iterations``;
+        ``hull_share``, the hull's share of the voxels.
     smooth : (nx, ny, nz) float32, optional
         The depth prior's `DepthEstimate.smooth`.
     steady : (nx, ny, nz) float32, optional
@@ -226,15 +227,16 @@ def without_traces(density: Volume) -> Volume:
 
 def fit_figures(views: ViewSet, residuals: Sequence[Image], iterations: int) -> dict[str, float]:
     """Figures of a fit that leaves residuals (rows, columns, 3), one a view at least; see `Density`."""
-    losses, decibels = [], []
-    for view, residual in zip(views.views, residuals, strict=False):
+    losses, decibels = [], {}
+    for number, (view, residual) in enumerate(zip(views.views, residuals, strict=False)):
         left = residual[view.counted]
         losses.append(float(np.sum(np.square(left, dtype=np.float64))))
-        decibels.append(float(-10 * np.log10(max(losses[-1] / max(left.size, 3), 1e-12))))
+        if left.size:
+            name = f"psnr_view_{number}" if number else "psnr"
+            decibels[name] = float(-10 * np.log10(max(losses[-1] / left.size, 1e-12)))
     return {
         "loss": sum(losses),
-        "psnr": decibels[0],
-        **{f"psnr_view_{number}": value for number, value in enumerate(decibels[1:], 1)},
+        **decibels,
         "iterations": float(iterations),
         "hull_share": float(views.hull.mean()),
     }

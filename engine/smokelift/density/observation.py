@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 
 from smokelift.density.axis import AxisEstimate
 from smokelift.density.hull import Projection, common_hull, project_voxels, reached
-from smokelift.footage.images import srgb_to_linear
 from smokelift.footage.matte import matte
-from smokelift.footage.noise import EIGHT_BIT_STEP
+from smokelift.footage.noise import EIGHT_BIT_NOISE
 from smokelift.footage.plate import Plate, noise_at
 from smokelift.render import Image, Optics
 from smokelift.scene import Camera, Domain, Inlet
@@ -28,7 +27,7 @@ def eight_bit_plate(background: Image, size: tuple[int, int]) -> Plate:
     """The plate of a known background, (rows, columns, 3) or (3,), with the noise of 8 bits; size as a camera's."""
     width, height = size
     picture = np.broadcast_to(background, (height, width, 3)).astype(np.float32)
-    return Plate(picture, np.ones((height, width), np.float32), srgb_to_linear(np.full(3, EIGHT_BIT_STEP)))
+    return Plate(picture, np.ones((height, width), np.float32), EIGHT_BIT_NOISE)
 
 
 BLACK = eight_bit_plate(np.zeros(3, np.float32), (1, 1))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import TracebackType
 
@@ -142,6 +142,19 @@ class Clip:
         numbers = np.unique(np.linspace(0, len(self) - 1, min(count, len(self))).round())
         return [int(number) for number in numbers]
 
+    def whole(self) -> Clip:
+        """Return all of the file, whatever part of it this clip is. The two share the open file."""
+        return Clip(self.path, self._source, self.fps, None)
+
+    def part(self, first: int, last: int) -> Clip:
+        """Return the frames of the file from one number to another, both included. The two share the open file."""
+        return Clip(self.path, self._source, self.fps, (first, last))
+
+    def changed(self, change: Callable[[int, Picture], Picture]) -> Clip:
+        """Return the clip with each frame, by its number, replaced. The two share the open file."""
+        last = self.first + len(self) - 1
+        return Clip(self.path, _Changed(self._source, self.first, change), self.fps, (self.first, last))
+
     def close(self) -> None:
         """Close the file."""
         self._source.close()
@@ -153,6 +166,21 @@ class Clip:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+class _Changed:
+    """The frames of a source, each replaced; numbers count from a first one."""
+
+    def __init__(self, source: FrameSource, first: int, change: Callable[[int, Picture], Picture]) -> None:
+        self._source, self._first, self._change = source, first, change
+        self.count, self.fps, self.warning = source.count, source.fps, source.warning
+        self.files = source.files
+
+    def read(self, n: int) -> Picture:
+        return self._change(n - self._first, self._source.read(n))
+
+    def close(self) -> None:
+        self._source.close()
 
 
 def is_video(path: Path) -> bool:

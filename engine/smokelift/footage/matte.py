@@ -1,6 +1,6 @@
 """Where a frame shows smoke: its deviation from the background, in units of the clip's noise.
 
-How much the constants matter: docs/experiments/background-plate.md.
+How much the constants matter: docs/experiments/background.md.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import numpy.typing as npt
 from scipy import ndimage
 
 from smokelift.footage.images import Picture, linear_to_srgb
-from smokelift.footage.plate import Plate, encoded_noise
+from smokelift.footage.plate import Plate
 
 SMOKE_THRESHOLD = 4.0
 """Deviation of a pixel that may be smoke, in units of noise. Twice as much is smoke for certain (hysteresis:
@@ -36,8 +36,7 @@ class Matte:
     Attributes
     ----------
     deviation : (rows, columns)
-        From the plate, in units of noise, smoothed over two pixels. About 1 or less without smoke; at least 8 where
-        the plate is less than half certain, since such a pixel was never seen without smoke.
+        From the plate, in units of noise, smoothed over two pixels. About 1 or less without smoke.
     mask : (rows, columns) bool
         Patches of a deviation above `SMOKE_THRESHOLD` in which `CERTAIN_AREA` of the picture exceeds twice as much.
     """
@@ -66,13 +65,13 @@ def matte(frame: npt.ArrayLike, plate: Plate) -> Matte:
         raise ValueError(f"the frame {linear.shape} and the plate {plate.image.shape} must have one shape")
     if not np.isfinite(linear).all():
         raise ValueError("the frame must be finite")
-    difference = (linear_to_srgb(linear) - linear_to_srgb(plate.image)) / encoded_noise(plate)
+    # as far as white noise goes, a Gaussian is a mean over so many pixels
+    noise = plate.noise.averaged(4 * np.pi * SMOOTHING**2).total
+    difference = (linear_to_srgb(linear) - linear_to_srgb(plate.image)) / noise
     smooth = ndimage.gaussian_filter(difference, (SMOOTHING, SMOOTHING, 0.0))
     deviation = np.sqrt((smooth**2).mean(axis=2))
     deviation /= np.clip(np.median(deviation), 1.0, GLOBAL_DEVIATION)
-    # A pixel that was never seen clear has smoke in every frame.
     certain = 2.0 * SMOKE_THRESHOLD
-    deviation = np.maximum(deviation, np.float32(2.0 * certain) * (1.0 - plate.confidence))
     patches, count = ndimage.label(deviation > SMOKE_THRESHOLD, structure=np.ones((3, 3)))
     certain_pixels = np.bincount(patches[deviation > certain], minlength=count + 1)
     is_smoke = certain_pixels > CERTAIN_AREA * patches.size

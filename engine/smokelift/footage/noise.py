@@ -1,9 +1,14 @@
-"""The noise of a clip: sensor and compression together, measured on frames spread over it.
+"""The noise of a clip, measured in sRGB values, where that of cameras and codecs is about the same at every brightness.
 
-Noise is measured in sRGB values, where that of cameras and codecs is about the same at every brightness.
+It has two parts: one that differs from pixel to pixel, of which a mean over n pixels keeps the n-th part of the
+variance, and one that lasts over many pixels, as a codec's does, of which a mean keeps all.
+
+All statistics are quantiles over time, so that a flash, a cut or a dropped frame changes none of them.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -12,10 +17,23 @@ from smokelift.footage.clip import Clip
 from smokelift.footage.images import Picture, linear_to_srgb, srgb_to_linear
 
 EIGHT_BIT_STEP = np.float32(1 / 255)
-"""One step of 8 bit video, in sRGB values: the least noise that a clip is taken to have."""
+"""One step of 8 bit video, in sRGB values: the least noise that a clip is taken to have, since codecs shift whole
+blocks by that."""
 
 NOISE_STRIDE = 3
 """Pixels from one row or column to the next where noise is measured: a ninth of the picture is enough for a median."""
+
+BLOCK = 5
+"""Pixels along the blocks over whose means the lasting noise is measured; they hold about as many as `matte` averages
+over."""
+
+STEADY_SHARE, STEADY_WIDTH = 0.9, 1.645
+"""Share of a pixel's deviations over time that its noise is measured on, and how many standard deviations normal ones
+reach there. The others may be a flash, a cut or smoke; a smaller share would miss the drift of a codec."""
+
+SMOKE_TO_NOISE = 3.0
+"""Deviation over time, in units of the stillest tenth's, above which it is smoke and not noise
+(docs/experiments/background.md)."""
 
 _FIXED_POINT = 8192
 """Steps of a stored sample in one unit of sRGB: 16 bits hold values up to 8."""
@@ -24,7 +42,42 @@ _SAMPLE_BYTES = 512 * 2**20
 """Memory for the stored samples of a clip: 32 frames of 1080p fit."""
 
 
-def sample_frames(clip: Clip, count: int, stride: int = 1) -> npt.NDArray[np.uint16]:
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """Standard deviations of a static pixel, in sRGB values.
+
+    Attributes
+    ----------
+    white : (3,)
+        Of what differs from pixel to pixel.
+    lasting : (3,)
+        Of what neighbours share.
+    """
+
+    white: Picture
+    lasting: Picture
+
+    @property
+    def total(self) -> Picture:
+        """Standard deviation of a pixel, shape (3,)."""
+        total: Picture = np.sqrt(self.white**2 + self.lasting**2)
+        return total
+
+    def averaged(self, pixels: float) -> Noise:
+        """Return the noise of means over so many pixels."""
+        return Noise(self.white / np.float32(np.sqrt(max(pixels, 1.0))), self.lasting)
+
+
+def lasting_noise(deviation: npt.ArrayLike) -> Noise:
+    """Return noise that no mean lessens, of a standard deviation in sRGB values, one or one a channel."""
+    return Noise(np.zeros(3, np.float32), np.broadcast_to(np.asarray(deviation, np.float32), (3,)).copy())
+
+
+EIGHT_BIT_NOISE = lasting_noise(EIGHT_BIT_STEP)
+"""Of footage that is as clean as eight bits allow."""
+
+
+def sample_frames(clip: Clip, count: int) -> npt.NDArray[np.uint16]:
     """Return frames spread evenly over a clip, in fixed point; `decode_samples` reads them.
 
     Parameters
@@ -33,8 +86,6 @@ def sample_frames(clip: Clip, count: int, stride: int = 1) -> npt.NDArray[np.uin
         The footage.
     count
         How many frames; fewer are returned of a shorter clip, and of pictures so large that they need too much memory.
-    stride
-        Of each frame every ``stride``-th row and column is taken.
 
     Returns
     -------
@@ -47,14 +98,17 @@ def sample_frames(clip: Clip, count: int, stride: int = 1) -> npt.NDArray[np.uin
         If a frame cannot be read.
     """
     width, height = clip.size
-    most = max(3, stride**2 * _SAMPLE_BYTES // (width * height * 6))
+    most = max(3, _SAMPLE_BYTES // (width * height * 6))
     numbers = clip.spread(min(count, most))
-    rows, columns = len(range(0, height, stride)), len(range(0, width, stride))
-    samples = np.empty((len(numbers), rows, columns, 3), np.uint16)
+    samples = np.empty((len(numbers), height, width, 3), np.uint16)
     for sample, number in zip(samples, numbers, strict=True):
-        encoded = linear_to_srgb(clip.frame(number)[::stride, ::stride])
-        sample[...] = np.clip(encoded * _FIXED_POINT + 0.5, 0, 65535)
+        sample[...] = encode_sample(clip.frame(number))
     return samples
+
+
+def encode_sample(linear: Picture) -> npt.NDArray[np.uint16]:
+    """Return a linear picture in sRGB values as fixed point."""
+    return np.clip(linear_to_srgb(linear) * _FIXED_POINT + 0.5, 0, 65535).astype(np.uint16)
 
 
 def decode_samples(samples: npt.NDArray[np.uint16]) -> Picture:
@@ -62,41 +116,79 @@ def decode_samples(samples: npt.NDArray[np.uint16]) -> Picture:
     return samples.astype(np.float32) / np.float32(_FIXED_POINT)
 
 
-def temporal_noise(frames: Picture) -> Picture:
-    """Return the noise of static pixels, in sRGB values, shape (3,).
+def linear_samples(samples: npt.NDArray[np.uint16]) -> Picture:
+    """Return what `sample_frames` stored as float32 linear values."""
+    return _LINEAR[samples]
 
-    It is the median over the pixels of the deviation over time, which smoke over less than half of the picture does
-    not disturb. Differences of successive frames would be too small: a codec repeats a static block for some frames
-    and then replaces it.
+
+def block_means(pictures: Picture) -> Picture:
+    """Return the means over blocks of pictures (frames, rows, columns, 3); what fills no block is left out."""
+    size = min(BLOCK, *pictures.shape[1:3])
+    frames, rows, columns = len(pictures), pictures.shape[1] // size, pictures.shape[2] // size
+    whole = pictures[:, : rows * size, : columns * size]
+    means: Picture = whole.reshape(frames, rows, size, columns, size, 3).mean(axis=(2, 4))
+    return means
+
+
+def temporal_noise(deviations: Picture, blocks: Picture) -> Noise:
+    """Return the noise of the pixels that show no smoke; of it at least one step of 8 bit video lasts.
+
+    A pixel's noise follows from the quantile of its deviations over time that holds `STEADY_SHARE` of them. Smoke is
+    over the pixels whose noise exceeds that of the stillest tenth by `SMOKE_TO_NOISE`; the median of the
+    others is the clip's. Differences of successive frames would be too small: a codec repeats a static block for some
+    frames and then replaces it.
 
     Parameters
     ----------
-    frames : (frames, rows, columns, 3)
-        sRGB values.
+    deviations : (frames, rows, columns, 3)
+        From the background, in sRGB values.
+    blocks : (frames, rows, columns, 3)
+        The same of `block_means`.
     """
-    deviation = frames.std(axis=0).reshape(-1, 3)
-    noise: Picture = np.maximum(np.median(deviation, axis=0), EIGHT_BIT_STEP).astype(np.float32)
-    return noise
+    single, shared = (
+        np.array([clear_deviation(each[..., channel]) for channel in range(3)]) for each in (deviations, blocks)
+    )
+    pixels = np.float32(BLOCK**2)
+    white = np.maximum(single**2 - shared**2, 0) * pixels / (pixels - 1)
+    lasting = np.sqrt(np.maximum(single**2 - white, 0))
+    return Noise(np.sqrt(white).astype(np.float32), np.maximum(lasting, EIGHT_BIT_STEP).astype(np.float32))
 
 
-def noise_of_clear_pixels(frames: Picture, background: Picture) -> Picture:
-    """Return the noise of the tenth of the pixels that stay nearest to a known background, in sRGB values, shape (3,).
+def over_time(deviations: Picture) -> Picture:
+    """Return the standard deviation over time, the first axis, of all but a flash."""
+    width: Picture = np.quantile(np.abs(deviations), STEADY_SHARE, axis=0) / np.float32(STEADY_WIDTH)
+    return width
 
-    Smoke may pass over the other nine tenths.
+
+def clear_deviation(deviations: Picture) -> float:
+    """Return the standard deviation over time of the pixels without smoke; see `temporal_noise`.
 
     Parameters
     ----------
-    frames : (frames, rows, columns, 3)
-        sRGB values.
-    background : (rows, columns, 3)
-        sRGB values.
+    deviations : (frames, rows, columns)
+        From the background.
     """
-    deviation = np.sqrt(np.mean((frames - background) ** 2, axis=0)).reshape(-1, 3)
-    noise: Picture = np.maximum(np.quantile(deviation, 0.1, axis=0), EIGHT_BIT_STEP).astype(np.float32)
-    return noise
+    return float(np.median(_of_clear(deviations)))
+
+
+def drift(deviations: Picture) -> float:
+    """Return the root mean square where `clear_deviation` returns the median: what a codec lets drift counts."""
+    return float(np.sqrt(np.mean(_of_clear(deviations) ** 2)))
+
+
+def _of_clear(deviations: Picture) -> Picture:
+    """The noise of each pixel without smoke, (n,)."""
+    each = over_time(deviations)
+    stillest = max(float(np.quantile(each, 0.1)), float(EIGHT_BIT_STEP))
+    clear: Picture = each[each <= SMOKE_TO_NOISE * stillest]
+    return clear
 
 
 def linear_per_srgb(encoded: Picture) -> Picture:
     """Return the derivative of linear light by the sRGB value, at sRGB values: what turns their noise into linear."""
     half = EIGHT_BIT_STEP / 2
     return (srgb_to_linear(encoded + half) - srgb_to_linear(encoded - half)) / EIGHT_BIT_STEP
+
+
+_LINEAR = srgb_to_linear(np.arange(65536, dtype=np.float32) / np.float32(_FIXED_POINT))
+"""Linear values of all stored samples."""

@@ -9,19 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from smokelift.footage.clip import Clip
-from smokelift.footage.images import Picture, area_average, linear_to_srgb, srgb_to_linear
-from smokelift.footage.noise import (
-    NOISE_STRIDE,
-    decode_samples,
-    linear_per_srgb,
-    noise_of_clear_pixels,
-    sample_frames,
-    temporal_noise,
-)
-
-SMOKE_TO_NOISE = 3.0
-"""Deviation over time, in units of the clear pixels' noise, above which it is smoke and not noise
-(docs/experiments/background-plate.md)."""
+from smokelift.footage.exposure import gain_of, small
+from smokelift.footage.images import Picture, area_average, linear_to_srgb
+from smokelift.footage.noise import NOISE_STRIDE, Noise, block_means, lasting_noise, linear_per_srgb, temporal_noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,34 +24,29 @@ class Plate:
         Linear.
     confidence : (rows, columns)
         From 0 (filled from neighbours) to 1 (seen clear in many frames).
-    noise : (3,)
-        Standard deviation of a static pixel, sensor and compression together, in linear light at the plate's median
-        brightness; at least one step of 8 bit video.
+    noise
+        Of the camera's pictures.
     """
 
     image: Picture
     confidence: Picture
-    noise: Picture
-
-    @classmethod
-    def from_srgb(cls, encoded: Picture, confidence: Picture, noise: Picture) -> Plate:
-        """Return the plate of a picture and a noise that are given in sRGB values."""
-        linear_noise = noise * linear_per_srgb(np.median(encoded, axis=(0, 1)))
-        return cls(srgb_to_linear(encoded), confidence, linear_noise.astype(np.float32))
+    noise: Noise
 
     def at(self, frame: int) -> Plate:
         """Return the plate of a frame: this one, since the background stands still."""
         return self
 
-    def through(self, cut: Callable[[Picture], Picture]) -> Plate:
+    def through(self, cut: Callable[[Picture], Picture], pixels: float = 1.0) -> Plate:
         """Return the plate of a part of the picture, or of a smaller one.
 
         Parameters
         ----------
         cut
             Makes the part from a picture (rows, columns, ...).
+        pixels
+            Of which each new one is the mean.
         """
-        return Plate(cut(self.image), cut(self.confidence), self.noise)
+        return Plate(cut(self.image), cut(self.confidence), self.noise.averaged(pixels))
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,21 +61,22 @@ class ChangingPlate:
         Its frame that is behind frame 0 of the footage.
     size
         Width and height of the footage in pixels.
-    noise : (3,)
-        Of the footage, in sRGB values.
+    noise
+        Of the footage.
     cuts
-        What makes the part of the picture that is asked for, applied in this order.
+        What makes the part of the picture that is asked for, with the pixels of which each new one is the mean, applied
+        in this order.
     """
 
     clip: Clip
     first: int
     size: tuple[int, int]
-    noise: Picture
-    cuts: tuple[Callable[[Picture], Picture], ...] = ()
+    noise: Noise
+    cuts: tuple[tuple[Callable[[Picture], Picture], float], ...] = ()
 
-    def encoded(self, frame: int) -> Picture:
-        """Return the whole background of a frame in sRGB values, (rows, columns, 3)."""
-        return linear_to_srgb(area_average(self.clip.frame(self.first + frame), *self.size))
+    def whole(self, frame: int) -> Picture:
+        """Return the whole background of a frame, linear, (rows, columns, 3)."""
+        return area_average(self.clip.frame(self.first + frame), *self.size)
 
     def at(self, frame: int) -> Plate:
         """Return the plate of a frame of the footage, counted from 0.
@@ -101,14 +87,14 @@ class ChangingPlate:
             If its picture cannot be read.
         """
         width, height = self.size
-        plate = Plate.from_srgb(self.encoded(frame), np.ones((height, width), np.float32), self.noise)
-        for cut in self.cuts:
-            plate = plate.through(cut)
+        plate = Plate(self.whole(frame), np.ones((height, width), np.float32), self.noise)
+        for cut, pixels in self.cuts:
+            plate = plate.through(cut, pixels)
         return plate
 
-    def through(self, cut: Callable[[Picture], Picture]) -> ChangingPlate:
+    def through(self, cut: Callable[[Picture], Picture], pixels: float = 1.0) -> ChangingPlate:
         """Return the plates of a part of the picture, or of a smaller one; see `Plate.through`."""
-        return replace(self, cuts=(*self.cuts, cut))
+        return replace(self, cuts=(*self.cuts, (cut, pixels)))
 
 
 Plates = Plate | ChangingPlate
@@ -140,13 +126,10 @@ def known_plate(background: npt.ArrayLike, clip: Clip, sample_count: int = 32) -
         linear = np.broadcast_to(linear, (height, width, 3))
     if linear.ndim != 3 or linear.shape[2] != 3 or not np.isfinite(linear).all():
         raise ValueError(f"a background must be a finite colour or RGB picture, not of shape {linear.shape}")
-    encoded = linear_to_srgb(area_average(linear, width, height))
-    frames = decode_samples(sample_frames(clip, sample_count, NOISE_STRIDE))
-    temporal = temporal_noise(frames)
-    clear = noise_of_clear_pixels(frames, encoded[::NOISE_STRIDE, ::NOISE_STRIDE])
-    # Where smoke passes over most of the picture, most of what changes over time is smoke.
-    noise = np.where(temporal > SMOKE_TO_NOISE * clear, clear, temporal)
-    return Plate.from_srgb(encoded, np.ones((height, width), np.float32), noise)
+    image = area_average(linear, width, height)
+    confidence = np.ones((height, width), np.float32)
+    silent = Plate(image, confidence, lasting_noise(0.0))
+    return Plate(image, confidence, _noise_before(silent, clip, sample_count))
 
 
 def changing_plate(plates: Clip, clip: Clip, sample_count: int = 32) -> ChangingPlate:
@@ -174,18 +157,20 @@ def changing_plate(plates: Clip, clip: Clip, sample_count: int = 32) -> Changing
             f"{plates.path}: has {len(plates)} of the frames 0 to {last} that are needed; give a clean plate with a "
             "picture for every frame of the clip, or a color, in [background]."
         )
-    silent = ChangingPlate(plates, clip.first, clip.size, np.zeros(3, np.float32))
-    stride = slice(None, None, NOISE_STRIDE)
-    deviations = [
-        (linear_to_srgb(clip.frame(number)) - silent.encoded(number))[stride, stride]
-        for number in clip.spread(sample_count)
-    ]
-    return replace(silent, noise=temporal_noise(np.stack(deviations)))
+    silent = ChangingPlate(plates, clip.first, clip.size, lasting_noise(0.0))
+    return replace(silent, noise=_noise_before(silent, clip, sample_count))
 
 
-def encoded_noise(plate: Plate) -> Picture:
-    """Return the noise of a plate in sRGB values, where it is the same at every brightness, shape (3,)."""
-    return plate.noise / linear_per_srgb(np.median(linear_to_srgb(plate.image), axis=(0, 1)))
+def _noise_before(plates: Plates, clip: Clip, count: int) -> Noise:
+    """The noise of a clip before backgrounds that are known."""
+    single, blocks = [], []
+    for number in clip.spread(count):
+        behind, frame = plates.at(number).image, clip.frame(number)
+        gains = gain_of(small(frame), small(behind))
+        deviation = linear_to_srgb(frame / gains) - linear_to_srgb(behind)
+        single.append(deviation[::NOISE_STRIDE, ::NOISE_STRIDE])
+        blocks.append(block_means(deviation[None])[0])
+    return temporal_noise(np.stack(single), np.stack(blocks))
 
 
 def noise_at(picture: npt.ArrayLike, plate: Plate) -> Picture:
@@ -196,11 +181,11 @@ def noise_at(picture: npt.ArrayLike, plate: Plate) -> Picture:
     picture : (rows, columns, 3)
         Linear.
     plate
-        For its noise, which is that at its median brightness.
+        For its noise, which is even in sRGB values.
 
     Returns
     -------
     (rows, columns, 3) float32
         Standard deviation.
     """
-    return encoded_noise(plate) * linear_per_srgb(linear_to_srgb(np.asarray(picture, np.float32)))
+    return plate.noise.total * linear_per_srgb(linear_to_srgb(np.asarray(picture, np.float32)))

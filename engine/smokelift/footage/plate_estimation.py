@@ -1,52 +1,117 @@
 """The clean plate of a clip from its frames alone.
 
-Assumed: camera and background stand still, and a pixel is clear in some share of the frames. A clear pixel keeps
-returning to one value within the noise; smoke moves and spreads its values widely. So the plate is, pixel by pixel,
-the mode of the samples: the value with the most of them in a window as wide as the noise.
+Assumed: camera and background stand still. A pixel is a mixture over time of two states: clear, when it has one value
+within the noise, and smoke, when it has any. Three facts tell them apart:
 
-Smoke that stays for long makes a second, sometimes larger, mode. Where smoke only brightens what is behind it (white
-smoke before a darker wall), the darkest well-supported value is taken instead, and where it only darkens, the
-brightest. Which of these holds is measured on the clip.
+- A clear pixel stays; smoke goes on. Of two successive samples of smoke, some share is alike by chance, and it is
+  measured on the pixel. A value at which a pixel stays for so many pairs of successive samples that smoke does so once
+  in `FALSE_ALARM` only is its background, or smoke as steady as a background.
+- Smoke draws every background towards its own brightness. So of several such values, the background is the one that is
+  farthest from the smoke's.
+- Stock footage stands before one colour, mostly black. Where the pixels that never change have one, it is behind all
+  that do.
 
-A pixel that is never clear (over the source, as a rule) is unknown. Its confidence is near 0 and it is filled smoothly
-from its neighbours. What never moves, a nozzle or a perfectly steady jet, is background.
+A pixel without a certain value (over the source, as a rule) is unknown. What is behind it follows smoothly from its
+neighbours; its detail is that of its samples, with the contrast that the smoke takes from it given back.
 
 A camera that moves shows another part of the background in every frame, so a pixel has no value of its own: the
 background has to be of one colour, or known frame by frame.
-
-How much the constants matter: docs/experiments/background-plate.md.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
 from smokelift.footage.clip import Clip
-from smokelift.footage.images import Picture, area_average
-from smokelift.footage.matte import matte
-from smokelift.footage.noise import NOISE_STRIDE, decode_samples, sample_frames, temporal_noise
-from smokelift.footage.plate import Plate, encoded_noise
+from smokelift.footage.exposure import sample_gains, small
+from smokelift.footage.images import Picture, area_average, linear_to_srgb, srgb_to_linear
+from smokelift.footage.matte import SMOOTHING, matte
+from smokelift.footage.noise import (
+    BLOCK,
+    NOISE_STRIDE,
+    SMOKE_TO_NOISE,
+    Noise,
+    block_means,
+    clear_deviation,
+    decode_samples,
+    drift,
+    encode_sample,
+    linear_samples,
+    over_time,
+    sample_frames,
+    temporal_noise,
+)
+from smokelift.footage.plate import Plate
 
-MODE_WINDOW = 6.0
-"""Width of the window of samples around a value, in units of noise: plus and minus three standard deviations."""
+STRIDE = 4
+"""Pixels from one row or column to the next where it is measured what the smoke is like."""
+
+MOST = 0.8
+"""Share of a pixel's samples that have one value which is then its background for certain."""
 
 ONE_SIDED = 0.9
-"""Share of the deviations to one side from which on smoke is taken to only brighten (or darken) its background."""
+"""Share of the changes by smoke to one side from which on it only brightens, or darkens, and the rest is noise."""
 
-WELL_SUPPORTED = 0.35
-"""Samples in a value's window, as a share of the mode's, from which on the value may be the background."""
+FALSE_ALARM = 1e-3
+"""Share of the pixels always under smoke that pass for clear at times."""
 
-CLEAR_RUN = (2, 6)
-"""Successive samples at the chosen value: a pixel is never clear up to the first number, certainly from the second."""
+WINDOW = 6.0
+"""Width of the window of a pixel's clear samples in units of noise: plus and minus three standard deviations."""
 
-CLEAR_SHARE = (0.3, 0.6)
-"""The same as shares of all samples, for clips that have few."""
+LEAST_WINDOW = 3 / 255
+"""The same at least: rounding to eight bits, and the shift of a codec by a step either way."""
+
+DRIFT = 8 / 255
+"""Change in sRGB values by a codec or by the light, at most. The matte takes as much for smoke."""
+
+LIKE_SURROUNDINGS = 3 * DRIFT
+"""Difference in sRGB values from what the surroundings let expect, of a background."""
+
+PRIOR_PAIRS = 4.0
+"""Pairs of samples that the clip's share of like pairs counts for beside a pixel's own."""
+
+ONE_COLOUR = 0.8
+"""Share of the pixels that never change which has to have one colour for it to be the backdrop's; the others are a
+nozzle, a floor, a logo."""
 
 ONE_COLOUR_NOISE = np.float32(6 / 255)
 """Most noise of a background of one colour, in sRGB values: a pixel that varies more while the camera moves sees more
 than one colour."""
+
+ISLAND = 0.01
+"""Share of the picture up to which what seems clear is taken for an accident."""
+
+DETAIL = 4.0
+"""Standard deviation in pixels of the Gaussian above which a background's detail is finer than that of smoke."""
+
+MOST_DETAIL = 0.95
+"""Quantile of the known background's detail that bounds that of the unknown; what is beyond it is smoke's."""
+
+LEAST_TRANSMITTANCE = 0.2
+"""Light let through by the smoke from which the detail behind it can be told from noise."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Smoke:
+    """What the smoke of a clip is like, in sRGB values.
+
+    Attributes
+    ----------
+    likeness
+        Share of the pairs of successive samples of smoke that are within a window.
+    brightness
+        Grey value that smoke draws every background towards.
+    brightens : (rows, columns) bool
+        Pixels whose background is darker than that, every `STRIDE`-th along both axes.
+    """
+
+    likeness: float
+    brightness: float
+    brightens: npt.NDArray[np.bool_]
 
 
 def estimate_plate(clip: Clip, sample_count: int = 32) -> Plate:
@@ -64,34 +129,133 @@ def estimate_plate(clip: Clip, sample_count: int = 32) -> Plate:
     ClipError
         If a frame cannot be read.
     """
-    samples = sample_frames(clip, sample_count)
-    noise = temporal_noise(decode_samples(samples[:, ::NOISE_STRIDE, ::NOISE_STRIDE]))
-    window = MODE_WINDOW * float(np.sqrt((noise**2).mean()))
-    sign = _smoke_sign(samples[:, ::4, ::4], window)
+    samples = steady_samples(clip, sample_count)
+    noise = _noise(samples)
+    backdrop = _backdrop(samples, noise)
+    if backdrop is not None:
+        return Plate(backdrop, np.ones(backdrop.shape[:2], np.float32), noise)
+    grey = np.stack([_smooth_grey(sample) for sample in samples])
+    coarse = decode_samples(grey[:, ::STRIDE, ::STRIDE])
+    window = max(WINDOW * clear_deviation(coarse - np.median(coarse, axis=0)), LEAST_WINDOW)
+    smoke = _smoke(coarse, window)
+    brightens = np.repeat(np.repeat(smoke.brightens, STRIDE, 0), STRIDE, 1)[: grey.shape[1], : grey.shape[2]]
     height, width = samples.shape[1:3]
     image = np.empty((height, width, 3), np.float32)
-    run = np.empty((height, width), np.int16)
+    known, calm = np.empty((height, width), np.bool_), np.empty((height, width), np.bool_)
     for row in range(0, height, 64):  # in bands, for the sake of memory
         band = slice(row, row + 64)
-        image[band], run[band] = _clear_value(samples[:, band], window, sign)
-    low, high = (min(bound, share * len(samples)) for bound, share in zip(CLEAR_RUN, CLEAR_SHARE, strict=True))
-    # A clear speck amid smoke is an accident of the samples.
-    run = np.minimum(run, ndimage.median_filter(run, 7))
-    confidence = np.clip((run - low) / (high - low), 0.0, 1.0)
-    # What is less than half certain is filled as a whole: a part of it would spread its smoke.
-    known = np.clip(2.0 * confidence - 1.0, 0.0, 1.0)
-    return Plate.from_srgb(_filled(image, known), confidence.astype(np.float32), noise)
+        away = np.where(brightens[band], decode_samples(grey[:, band]), -decode_samples(grey[:, band]))
+        image[band], known[band], calm[band] = _clear_value(samples[:, band], away, window, smoke.likeness)
+    known = _in_one_piece(known)
+    if not known.all():
+        # what changes by drift at most and looks like its surroundings is no smoke
+        unlike = np.abs((linear_to_srgb(image) - _filled(linear_to_srgb(image), known.astype(np.float32))).mean(-1))
+        known = _in_one_piece(known | (calm & (unlike <= LIKE_SURROUNDINGS)))
+    return Plate(_completed(image, known, samples, smoke.brightness, brightens), known.astype(np.float32), noise)
 
 
 def one_colour(plate: Plate) -> tuple[float, float, float] | None:
     """Return the linear colour of a plate that was estimated from a moving camera, or None if it has more than one."""
     known = plate.confidence > 0.5
-    if known.mean() < 0.5 or encoded_noise(plate).max() > ONE_COLOUR_NOISE:
+    if known.mean() < 0.5 or plate.noise.total.max() > ONE_COLOUR_NOISE:
         return None
     red, green, blue = (float(v) for v in np.median(plate.image[known], axis=0))
     colour = np.broadcast_to(np.array([red, green, blue], np.float32), plate.image.shape)
     differs = matte(plate.image, Plate(colour, np.ones_like(plate.confidence), plate.noise)).mask
     return None if (differs & known).any() else (red, green, blue)
+
+
+def steady_samples(clip: Clip, count: int) -> npt.NDArray[np.uint16]:
+    """Return frames spread over a clip, all of one exposure; as `sample_frames`."""
+    samples = sample_frames(clip, count)
+    gains = sample_gains(np.stack([small(linear_samples(sample)) for sample in samples]))
+    for sample, gain in zip(samples, gains, strict=True):
+        if (gain != 1).any():
+            sample[...] = encode_sample(linear_samples(sample) / gain)
+    return samples
+
+
+def _noise(samples: npt.NDArray[np.uint16]) -> Noise:
+    """The noise of a clip before a background that is not known yet."""
+    single = decode_samples(samples[:, ::NOISE_STRIDE, ::NOISE_STRIDE])
+    blocks = np.concatenate([block_means(decode_samples(sample[None])) for sample in samples])
+    single, blocks = (each - np.median(each, axis=0) for each in (single, blocks))
+    noise = temporal_noise(single, blocks)
+    # what drifts differs from the one background that is found
+    drifting = np.array([drift(blocks[..., channel]) for channel in range(3)], np.float32)
+    return replace(noise, lasting=np.maximum(noise.lasting, drifting))
+
+
+def _backdrop(samples: npt.NDArray[np.uint16], noise: Noise) -> Picture | None:
+    """The linear picture (rows, columns, 3) of a background of one colour, or None if it has more.
+
+    Whatever never changes and has another colour stands before the backdrop, and is part of the picture.
+    """
+    size = min(BLOCK, *samples.shape[1:3])
+    linear = np.concatenate([block_means(linear_samples(sample[None])) for sample in samples])
+    blocks = linear_to_srgb(linear)
+    middle, limit = np.median(blocks, axis=0), SMOKE_TO_NOISE * noise.averaged(BLOCK**2).total
+    still = (over_time(blocks - middle) <= limit).all(-1)
+    if not still.any():
+        return None
+    colour = np.median(middle[still], axis=0)
+    alike = (np.abs(middle - colour) <= limit).all(-1)
+    if alike[still].mean() < ONE_COLOUR:
+        return None
+    clear = np.median(linear, axis=0)
+    low, high = np.quantile(blocks, [0.05, 0.95], axis=0)
+    fixed = still & ~alike & ((high - low) <= limit).all(-1)
+    picture = np.where(fixed[..., None], clear, clear[still & alike].mean(0))
+    height, width = samples.shape[1:3]
+    rows, columns = (np.minimum(np.arange(n) // size, m - 1) for n, m in zip((height, width), fixed.shape, strict=True))
+    whole: Picture = picture[rows][:, columns].astype(np.float32)
+    own = fixed[rows][:, columns]
+    if own.any():
+        whole[own] = np.median(linear_samples(samples[:, own]), axis=0)
+    return whole
+
+
+def _smooth_grey(sample: npt.NDArray[np.uint16]) -> npt.NDArray[np.uint16]:
+    """The grey of a sample, so smooth that most of its noise is gone."""
+    smooth: Picture = ndimage.gaussian_filter(sample.mean(-1, dtype=np.float32), SMOOTHING)
+    return smooth.astype(np.uint16)
+
+
+def _smoke(grey: Picture, window: float) -> _Smoke:
+    """What the smoke in samples (frames, rows, columns) is like."""
+    shape = grey.shape[1:]
+    values = grey.reshape(len(grey), -1)
+    ordered = np.sort(values, axis=0)
+    counts = _supports(ordered, window)
+    background = np.take_along_axis(ordered, counts.argmax(0)[None], 0)[0] + np.float32(0.5 * window)
+    away = values - background
+    smoky = np.abs(away) > window
+    pairs = smoky[1:] & smoky[:-1]
+    alike = np.abs(np.diff(values, axis=0)) <= window
+    likeness = float(alike[pairs].mean()) if pairs.any() else 0.5
+    # what most samples agree on is the background for certain
+    certain = counts.max(0) > MOST * len(values)
+    change = np.where(smoky & certain, away, 0.0)
+    if not change.any():
+        return _Smoke(likeness, 1.0, np.ones(shape, np.bool_))
+    turn = _turn(background, np.maximum(change, 0).sum(0), np.maximum(-change, 0).sum(0))
+    thickest = np.quantile(values[change != 0], [0.01, 0.99])
+    brightness = float(np.clip(turn, *thickest))
+    behind = _filled(background.reshape(*shape, 1), certain.reshape(shape).astype(np.float32))[..., 0]
+    return _Smoke(likeness, brightness, behind <= turn)
+
+
+def _turn(background: Picture, brighter: Picture, darker: Picture) -> float:
+    """The grey value below which backgrounds are brightened and above which they are darkened, each by so much."""
+    one_sided = ONE_SIDED * float((brighter + darker).sum())
+    if brighter.sum() >= one_sided:
+        return np.inf
+    if darker.sum() >= one_sided:
+        return -np.inf
+    order = np.argsort(background)
+    # the value that explains the most of the changes
+    wrong = np.cumsum(darker[order]) + np.cumsum(brighter[order][::-1])[::-1]
+    return float(background[order][wrong.argmin()])
 
 
 def _supports(ordered: Picture, window: float) -> npt.NDArray[np.int16]:
@@ -102,45 +266,76 @@ def _supports(ordered: Picture, window: float) -> npt.NDArray[np.int16]:
     return counts
 
 
-def _smoke_sign(samples: npt.NDArray[np.uint16], window: float) -> int:
-    """Return 1 if smoke only brightens the background, -1 if it only darkens it, else 0."""
-    grey = decode_samples(samples).mean(axis=-1)
-    ordered = np.sort(grey, axis=0)
-    counts = _supports(ordered, window)
-    best = counts.argmax(axis=0)[None]
-    mode = np.take_along_axis(ordered, best, axis=0) + 0.5 * window
-    # Where most samples agree, the mode is the background for certain; small deviations may be drift.
-    deviation = np.where(counts.max(axis=0) > 0.6 * len(grey), grey - mode, 0.0)
-    brighter, darker = (int((sign * deviation > 2.0 * window).sum()) for sign in (1, -1))
-    if brighter > ONE_SIDED * (brighter + darker):
-        return 1
-    return -1 if darker > ONE_SIDED * (brighter + darker) else 0
+def _clear_value(
+    samples: npt.NDArray[np.uint16], away: Picture, window: float, likeness: float
+) -> tuple[Picture, npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
+    """Return the background of each pixel, linear, whether it is certain, and whether the pixel changes like drift.
 
-
-def _clear_value(samples: npt.NDArray[np.uint16], window: float, sign: int) -> tuple[Picture, npt.NDArray[np.int16]]:
-    """Return the background value of each pixel, in sRGB, and how many samples in a row have it at most."""
-    colours = decode_samples(samples)
-    grey = colours.mean(axis=-1)
-    ordered = np.sort(grey, axis=0)
-    counts = _supports(ordered, window)
-    supported = counts >= WELL_SUPPORTED * counts.max(axis=0)
-    if sign > 0:
-        chosen = supported.argmax(axis=0)
-    elif sign < 0:
-        chosen = len(supported) - 1 - supported[::-1].argmax(axis=0)
-    else:
-        chosen = counts.argmax(axis=0)
-    centre = np.take_along_axis(ordered, chosen[None], axis=0) + 0.5 * window
+    Where it is not certain it is the least smoky value. That of a pixel that drifts is its middle one. ``away`` is the
+    grey value of the samples, with its sign turned where smoke darkens: the less, the clearer.
+    """
+    alike, pairs = (np.abs(np.diff(away, axis=0)) <= window).sum(0), max(len(away) - 1, 0)
+    ordered = np.sort(away, axis=0)
+    lowest, highest = ordered[min(1, len(away) - 1)], ordered[max(len(away) - 2, 0)]  # one sample may be astray
+    calm = highest - lowest <= window + DRIFT
+    best = np.full(away.shape[1:], np.inf, np.float32)
+    for sample in away:
+        inside = (away >= sample) & (away <= sample + window)
+        stays = (inside[1:] & inside[:-1]).sum(0)
+        share = (alike - stays + PRIOR_PAIRS * likeness) / (pairs - stays + PRIOR_PAIRS)
+        certain = stays * np.log(np.clip(share, 1e-6, 1 - 1e-6)) < np.log(FALSE_ALARM)
+        certain |= inside.all(0)
+        best = np.where(certain & (sample < best), sample, best)
+    known = np.isfinite(best)
+    centre = np.where(known, best, lowest) + np.float32(0.5 * window)
+    centre = np.where(calm, ordered[len(away) // 2], centre)
     for _ in range(3):  # the window starts at a sample; mean shift settles it around the mean of its samples
-        inside = np.abs(grey - centre) <= 0.5 * window * 1.001
+        inside = np.abs(away - centre) <= 0.5 * window * 1.001
         number = np.maximum(inside.sum(axis=0), 1)
-        centre = (grey * inside).sum(axis=0, keepdims=True) / number
-    value = np.einsum("tyxc,tyx->yxc", colours, inside.astype(np.float32)) / number[..., None]
-    run = longest = np.zeros(grey.shape[1:], np.int16)
-    for hit in inside:
-        run = (run + 1) * hit
-        longest = np.maximum(longest, run)
-    return value.astype(np.float32), longest
+        centre = (away * inside).sum(axis=0) / number
+    value = np.einsum("tyxc,tyx->yxc", linear_samples(samples), inside.astype(np.float32)) / number[..., None]
+    return value.astype(np.float32), known, calm
+
+
+def _in_one_piece(known: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """Without specks: a clear island amid smoke, or an unknown one amid the clear, is an accident of the samples."""
+    smooth = ndimage.median_filter(known.astype(np.uint8), 7) > 0
+    islands, count = ndimage.label(smooth)
+    large = np.bincount(islands.ravel(), minlength=count + 1) > ISLAND * known.size
+    large[0] = False
+    kept: npt.NDArray[np.bool_] = large[islands]
+    return kept
+
+
+def _completed(
+    image: Picture,
+    known: npt.NDArray[np.bool_],
+    samples: npt.NDArray[np.uint16],
+    brightness: float,
+    brightens: npt.NDArray[np.bool_],
+) -> Picture:
+    """Return a linear plate with what is unknown filled in.
+
+    Smoke of transmittance T and brightness J shows J + T (B - J) of a background B. The mean over time has T from its
+    coarse part and that of the surroundings, and so what of its detail is the background's.
+    """
+    if known.all():
+        return image
+    smooth = _filled(linear_to_srgb(image), known.astype(np.float32))
+    mean = np.mean([decode_samples(sample) for sample in samples], axis=0, dtype=np.float32)
+    coarse = ndimage.gaussian_filter(mean, (DETAIL, DETAIL, 0))
+    contrast = smooth.mean(-1) - brightness
+    seen = (coarse.mean(-1) - brightness) / np.where(np.abs(contrast) > 0.02, contrast, np.inf)
+    detail = mean - coarse
+    most = np.quantile(np.abs(detail[known]), MOST_DETAIL, axis=0) if known.any() else np.zeros(3, np.float32)
+    detail = np.clip(detail / np.clip(seen, LEAST_TRANSMITTANCE, 1)[..., None], -most, most)
+    filled = smooth + np.where(seen > LEAST_TRANSMITTANCE, 1, 0)[..., None] * detail
+    # smoke has drawn the pixel towards its own brightness, never away from it
+    beyond = filled.mean(-1) - linear_to_srgb(image).mean(-1)
+    beyond -= np.clip(beyond, -DRIFT, DRIFT)
+    filled -= np.where(brightens, np.maximum(beyond, 0), np.minimum(beyond, 0))[..., None]
+    filled = srgb_to_linear(np.maximum(filled, 0))
+    return np.where(known[..., None], image, filled)
 
 
 def _filled(image: Picture, confidence: Picture) -> Picture:
@@ -153,9 +348,9 @@ def _filled(image: Picture, confidence: Picture) -> Picture:
     weight: Picture = confidence[..., None]
     if min(height, width) == 1 or float(confidence.min()) >= 1.0:
         return image
-    small = ((width + 1) // 2, (height + 1) // 2)
-    total = area_average(weight, *small)
-    mean = area_average(image * weight, *small) / np.maximum(total, 1e-6)
+    small_size = ((width + 1) // 2, (height + 1) // 2)
+    total = area_average(weight, *small_size)
+    mean = area_average(image * weight, *small_size) / np.maximum(total, 1e-6)
     # A block of which a quarter is known is known: its mean is as good as any.
     coarse = _filled(mean, np.minimum(4.0 * total[..., 0], 1.0))
     blend: Picture = image * weight + area_average(coarse, width, height) * (np.float32(1.0) - weight)

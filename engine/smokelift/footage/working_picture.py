@@ -30,6 +30,12 @@ class WorkingPicture:
     width: int
     height: int
 
+    @property
+    def pixels(self) -> float:
+        """Pixels of the full picture of which each small one is the mean."""
+        columns, rows = self.camera.size
+        return self.width * self.height / (columns * rows)
+
     def part(self, picture: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return the part of a full picture (rows, columns, ...), at its own resolution."""
         return picture[self.top : self.top + self.height, self.left : self.left + self.width]

@@ -223,5 +223,5 @@ def _density(
 def _unseen(domain: Domain, carried: Volume | None) -> Density:
     """The density of a frame whose picture shows nothing of the domain: what was carried along."""
     nothing: Array = np.zeros(domain.resolution, np.float32)
-    figures = {"loss": 0.0, "psnr": 0.0, "iterations": 0.0, "hull_share": 0.0}
+    figures = {"loss": 0.0, "iterations": 0.0, "hull_share": 0.0}
     return Density(nothing if carried is None else carried, nothing > 0, figures)

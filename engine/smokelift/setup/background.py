@@ -8,9 +8,17 @@ import numpy as np
 
 from smokelift.footage.background import given_plates
 from smokelift.footage.clip import Clip
-from smokelift.footage.plate import Plates, known_plate
+from smokelift.footage.evidence import evidence
+from smokelift.footage.exposure import gain_of, small
+from smokelift.footage.plate import Plate, Plates, known_plate
 from smokelift.footage.plate_estimation import estimate_plate, one_colour
 from smokelift.scene import Background, Camera
+
+BLACK = 0.001
+"""Linear radiance below which a background is called black."""
+
+EXPOSURE_SAMPLES = 16
+"""Frames whose exposure is looked at before a run."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,11 +61,9 @@ def find_plates(clip: Clip, camera: Camera | None, background: Background | None
     given = given_plates(background, camera, clip)
     if given is not None:
         return FoundPlates(given, background)
-    plate = estimate_plate(clip)
+    plate = estimate_plate(clip if moves else evidence(clip))
     if not moves:
-        unseen = float(np.mean(plate.confidence < 0.5))
-        note = f"Background estimated from the clip; {unseen:.0%} of the picture is hardly ever free of smoke."
-        return FoundPlates(plate, None, (note,))
+        return FoundPlates(plate, None, (_estimated(plate),))
     colour = one_colour(plate)
     if colour is None:
         raise ValueError(
@@ -66,3 +72,29 @@ def find_plates(clip: Clip, camera: Camera | None, background: Background | None
         )
     note = f"Background not given: one colour, {', '.join(f'{v:.2g}' for v in colour)} (linear)."
     return FoundPlates(known_plate(colour, clip), Background(color=colour), (note,))
+
+
+def exposure_notes(clip: Clip, plates: Plates) -> tuple[str, ...]:
+    """What is to be said of a clip whose exposure changes, a sentence; nothing of others."""
+    gains = [gain_of(small(clip.frame(n)), small(plates.at(n).image)) for n in clip.spread(EXPOSURE_SAMPLES)]
+    most = float(np.abs(np.log(gains)).max())
+    if most == 0:
+        return ()
+    return (
+        f"The exposure of the clip changes by up to {np.expm1(most):.0%}: every frame is brought to the background's.",
+    )
+
+
+def _estimated(plate: Plate) -> str:
+    """How a background was estimated."""
+    unknown = float(np.mean(plate.confidence < 0.5))
+    if unknown == 0 and np.ptp(plate.image.reshape(-1, 3), axis=0).max() == 0:
+        colour = ", ".join(f"{v:.2g}" for v in plate.image[0, 0])
+        black = plate.image[0, 0].max() < BLACK
+        return f"Background not given: it is {'black' if black else f'of one colour, {colour} (linear)'}."
+    if unknown == 0:
+        return "Background estimated from the clip, which shows every part of it free of smoke."
+    return (
+        f"Background estimated from the clip; {unknown:.0%} of the picture is hardly ever free of smoke, and what is "
+        "behind it there is continued from around it. A clean plate in [background] would show it."
+    )

@@ -105,7 +105,7 @@ def coarse_frame(frame: Image, camera: Camera, scene: CompleteScene, plate: Plat
     odd = ((rows + columns) % 2).astype(np.float32)
     return CoarseFrame(
         replace(scene, camera=working.camera, domain=domain),
-        plate.through(working.cut),
+        plate.through(working.cut, working.pixels),
         working.cut(frame),
         _part(frame, 1 - odd, working),
         _part(frame, odd, working),

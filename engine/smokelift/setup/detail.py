@@ -17,7 +17,7 @@ from scipy import ndimage
 
 from smokelift.footage.images import area_average, linear_to_srgb
 from smokelift.footage.matte import matte
-from smokelift.footage.plate import Plate, encoded_noise
+from smokelift.footage.plate import Plate
 from smokelift.render.renderer import Image
 
 EDGE = 3
@@ -70,9 +70,10 @@ def smoke_detail(frames: Iterable[tuple[Image, Plate, float]], finest: int) -> D
         rows, columns = (max(1, round(n / max(pixels, 1.0))) for n in picture.shape[:2])
         image, behind = (area_average(whole, columns, rows) for whole in (picture, plate.image))
         change = (linear_to_srgb(image) - linear_to_srgb(behind)).mean(-1, dtype=np.float64)
-        smoke = matte(image, Plate(behind, area_average(plate.confidence, columns, rows), plate.noise)).mask
+        averaged = plate.noise.averaged(max(pixels, 1.0) ** 2)
+        smoke = matte(image, Plate(behind, area_average(plate.confidence, columns, rows), averaged)).mask
         still = ~ndimage.binary_dilation(smoke, iterations=EDGE)
-        noise = _noise(change, still, float(encoded_noise(plate).mean()) / max(pixels, 1.0))
+        noise = _noise(change, still, float(averaged.total.mean()))
         energy += _beyond_noise(change, noise, min(pixels, 1.0))
     return Detail(energy, finest)
 

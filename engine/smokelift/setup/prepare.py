@@ -11,10 +11,11 @@ from dataclasses import replace
 from smokelift.density.axis import SmokeAxis
 from smokelift.footage.clip import Clip
 from smokelift.footage.plate import Plate
+from smokelift.footage.steady import steady
 from smokelift.footage.working_picture import CameraError, WorkingPicture, working_picture
 from smokelift.render import scene_optics
 from smokelift.scene import Background, Camera, CompleteScene, Domain, Medium, Scene
-from smokelift.setup.background import find_plates
+from smokelift.setup.background import exposure_notes, find_plates
 from smokelift.setup.further_views import disagreement, open_view
 from smokelift.setup.geometry import find_geometry
 from smokelift.setup.light import ambient_sun, richest_scattering
@@ -48,11 +49,13 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
     _check(clip, scene)
     found = find_plates(clip, scene.camera, scene.background)
     plates = found.plates
+    exposure = exposure_notes(clip, plates)
+    clip = steady(clip, plates)
     samples = sample_smoke(clip, plates)
     geometry = find_geometry(clip, scene, settings, plates, samples)
     camera, domain = geometry.camera, geometry.domain
     notes = [clip.warning] if clip.warning else []
-    notes += [*found.notes, *geometry.notes]
+    notes += [*found.notes, *exposure, *geometry.notes]
     if settings.axis_depth is not None:
         SmokeAxis.given(settings.axis_depth, camera, domain)  # refuse early what cannot be
     medium = scene.medium

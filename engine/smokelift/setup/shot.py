@@ -45,7 +45,7 @@ class ShotView:
                 working = working_picture(self.camera.at(frame), domain)
             except CameraError:
                 return None
-            plate = self.plates.at(frame).through(working.cut)
+            plate = self.plates.at(frame).through(working.cut, working.pixels)
         else:
             plate = self._still_plates.at(frame)
         return Observation(working.camera, working.cut(self.clip.frame(frame)), plate)
@@ -53,7 +53,7 @@ class ShotView:
     @cached_property
     def _still_plates(self) -> Plates:
         """Those of the small picture of a camera that stands still."""
-        return self.plates.through(self.working.cut)
+        return self.plates.through(self.working.cut, self.working.pixels)
 
 
 @dataclass(frozen=True, eq=False)

@@ -53,7 +53,7 @@ def sample_smoke(clip: Clip, plates: Plates) -> SmokeSamples:
     colours, behind = [], []
     amounts: dict[int, int] = {}
     for number in clip.spread(SAMPLES):
-        plate = plates.at(number).through(lambda whole: area_average(whole, columns, rows))
+        plate = plates.at(number).through(lambda whole: area_average(whole, columns, rows), scale**2)
         picture = area_average(clip.frame(number), columns, rows)
         mask = matte(picture, plate).mask
         covered |= mask

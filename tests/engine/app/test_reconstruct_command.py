@@ -156,13 +156,14 @@ def test_scattering_and_resolution_by_option(shot, tmp_path, capsys) -> None:
 
 
 def test_no_smoke_at_all_is_said(plume, tmp_path, capsys) -> None:
-    """Empty frames, exit 0, and a note that names the threshold."""
+    """Empty frames, exit 2, no figure of the fit, and a sentence that says what to do."""
     nothing = np.zeros_like(plume.densities[0])
     plume.write(tmp_path / "clip", [nothing] * 2).save(tmp_path / "scene.toml")
     out = tmp_path / "out"
-    assert command("reconstruct", tmp_path / "scene.toml", "--out", out, "--npz", *QUICK) == 0
-    assert "No smoke found" in capsys.readouterr().out
-    assert not any(Sequence.open(out).density(n).any() for n in (1, 2))
+    assert "No smoke found" in refused(capsys, "reconstruct", tmp_path / "scene.toml", "--out", out, "--npz", *QUICK)
+    sequence = Sequence.open(out)
+    assert not any(sequence.density(n).any() for n in (1, 2))
+    assert not any("psnr" in sequence.figures(n) for n in (1, 2))
 
 
 def test_resuming_what_is_complete_changes_nothing(finished, shot) -> None:

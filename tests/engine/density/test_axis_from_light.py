@@ -12,6 +12,7 @@ from smokelift.density.axis import AxisEstimate, SmokeAxis
 from smokelift.density.axis_from_light import refine_axis
 from smokelift.density.hull import voxel_centres
 from smokelift.footage.images import linear_to_srgb, srgb_to_linear
+from smokelift.footage.noise import EIGHT_BIT_NOISE
 from smokelift.footage.plate import Plate
 from smokelift.render import render, scene_optics
 from smokelift.scene import Background, Camera, DirectionalLight, Domain, Medium, PointLight, Scene, completed
@@ -42,8 +43,7 @@ def found(scene: Scene, depth: float, lean: float = 0.0) -> tuple[AxisEstimate, 
     """What is known before and after a look at an 8-bit picture."""
     picture = linear_to_srgb(render(column(depth, lean), scene))
     picture = srgb_to_linear(np.rint(255 * picture) / 255).astype(np.float32)
-    noise = np.full(3, 1e-3, np.float32)
-    plate = Plate(np.zeros_like(picture), np.ones(picture.shape[:2], np.float32), noise)
+    plate = Plate(np.zeros_like(picture), np.ones(picture.shape[:2], np.float32), EIGHT_BIT_NOISE)
     before = UNKNOWN
     optics = scene_optics(completed(scene))
     return before, refine_axis(before, [Observation(scene.camera, picture, plate)], optics)

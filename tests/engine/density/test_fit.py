@@ -26,6 +26,8 @@ from smokelift.density.multiplicative import fit_multiplicative, take_turns
 from smokelift.density.objective import Term
 from smokelift.density.profile import DepthProfile, inflated
 from smokelift.evaluation.metrics import psnr
+from smokelift.footage.images import linear_to_srgb
+from smokelift.footage.noise import lasting_noise, linear_per_srgb
 from smokelift.footage.plate import Plate
 from smokelift.render import render, scene_optics
 from smokelift.scene import Background, Camera, DirectionalLight, Domain, Medium, Scene, completed, orbit
@@ -46,7 +48,8 @@ def small(plume) -> Scene:
 def noisy_plate(picture: np.ndarray) -> Plate:
     """A background known to one step of 8 bits."""
     rows, columns = picture.shape[:2]
-    return Plate(picture.astype(np.float32), np.ones((rows, columns), np.float32), np.full(3, 1e-3, np.float32))
+    slope = linear_per_srgb(linear_to_srgb(np.median(picture, axis=(0, 1))))
+    return Plate(picture.astype(np.float32), np.ones((rows, columns), np.float32), lasting_noise(1e-3 / slope))
 
 
 # hull
@@ -293,7 +296,7 @@ def even_start(density: np.ndarray, scene: Scene) -> tuple[Term, np.ndarray, np.
     target = render(density, scene)
     hull = visual_hull(target.max(-1) > 0.01, project_voxels(scene.camera, scene.domain))
     term = term_of(scene, Observation(scene.camera, target), hull)
-    exact = replace(term.view, plate=replace(term.view.plate, noise=np.zeros(3, np.float32)))
+    exact = replace(term.view, plate=replace(term.view.plate, noise=lasting_noise(0.0)))
     return replace(term, view=exact), hull, np.where(hull, np.float32(0.02), np.float32(0))
 
 

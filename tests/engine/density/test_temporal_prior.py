@@ -19,6 +19,7 @@ from smokelift.density import (
     ViewSet,
 )
 from smokelift.density.temporal_prior import GUIDED, LARGEST_GAIN
+from smokelift.footage.noise import lasting_noise
 from smokelift.footage.plate import Plate
 from smokelift.render import Volume, render, scene_optics
 from smokelift.scene import completed
@@ -50,7 +51,7 @@ def moment(plume) -> Moment:
     """The third frame, before black with the noise of 8 bits."""
     scene, before, true = plume.scene, *plume.densities[1:3]
     image = render(true, scene)
-    plate = Plate(np.zeros_like(image), np.ones(image.shape[:2], np.float32), np.full(3, 1e-4))
+    plate = Plate(np.zeros_like(image), np.ones(image.shape[:2], np.float32), lasting_noise(1e-4 * 12.92))
     views = ViewSet.of([Observation(scene.camera, image, plate)], scene_optics(completed(scene)))
     return Moment(views, RoundDepth().estimate(views), true, before)
 

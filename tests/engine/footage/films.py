@@ -20,7 +20,7 @@ def wall(low: float, high: float) -> np.ndarray:
     return srgb_to_linear(np.kron(blocks, np.ones((8, 8, 1))))
 
 
-def puff(n: int) -> np.ndarray:
+def puff(n: float) -> np.ndarray:
     """Return the opacity of a round puff that rises through the picture."""
     rows, columns = np.mgrid[:HEIGHT, :WIDTH]
     centre = HEIGHT - 2.5 * n, WIDTH / 2 + 6 * np.sin(n / 3)

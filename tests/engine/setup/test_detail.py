@@ -12,7 +12,7 @@ from scipy import ndimage
 
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import linear_to_srgb, srgb_to_linear
-from smokelift.footage.noise import EIGHT_BIT_STEP
+from smokelift.footage.noise import EIGHT_BIT_NOISE, EIGHT_BIT_STEP, lasting_noise
 from smokelift.footage.plate import Plate
 from smokelift.output.images import write_image
 from smokelift.scene import Camera, ClipSource, Domain, Scene
@@ -91,7 +91,7 @@ def test_noise_is_no_detail() -> None:
     noisy = srgb_to_linear((linear_to_srgb(clean) + noise).astype(np.float32))
     clear = np.ones((256, 192), np.float32)
     lost = [
-        smoke_detail([(picture, Plate(grey, clear, srgb_to_linear(np.full(3, deviation))), 1.0)], 256).lost(64)
+        smoke_detail([(picture, Plate(grey, clear, lasting_noise(deviation)), 1.0)], 256).lost(64)
         for picture, deviation in ((clean, EIGHT_BIT_STEP), (noisy, np.float32(3 / 255)))
     ]
     assert lost[0] < 0.01
@@ -127,9 +127,7 @@ def test_a_grid_loses_what_is_finer_than_two_of_its_voxels() -> None:
     """A wave of six pixels is there with voxels of three and not with four; what there is not is not lost."""
     columns = np.indices((192, 192))[1]
     wave = (0.3 + 0.1 * np.cos(2 * np.pi * (columns + 0.5) / 6)).astype(np.float32)
-    plate = Plate(
-        np.zeros((192, 192, 3), np.float32), np.ones((192, 192), np.float32), srgb_to_linear(np.full(3, EIGHT_BIT_STEP))
-    )
+    plate = Plate(np.zeros((192, 192, 3), np.float32), np.ones((192, 192), np.float32), EIGHT_BIT_NOISE)
     detail = smoke_detail([(np.repeat(wave[..., None], 3, -1), plate, 1.0)], 192)
     assert detail.lost(192 // 3 + 4) < 0.05
     assert detail.lost(192 // 4) > 0.1

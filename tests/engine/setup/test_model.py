@@ -13,9 +13,8 @@ from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
 from smokelift.footage.clip import Clip
-from smokelift.footage.images import srgb_to_linear
 from smokelift.footage.matte import matte
-from smokelift.footage.noise import EIGHT_BIT_STEP
+from smokelift.footage.noise import EIGHT_BIT_NOISE
 from smokelift.footage.plate import Plate
 from smokelift.output.images import write_image
 from smokelift.pipeline import compose, reconstruct
@@ -217,9 +216,7 @@ def test_the_halves_of_a_picture_are_apart(plume) -> None:
     height, width = 112, 80
     rows, columns = np.indices((height, width))
     picture = np.repeat(np.where((rows + columns) % 2, 0.5, 0.2)[..., None], 3, -1).astype(np.float32)
-    plate = Plate(
-        np.zeros_like(picture), np.ones((height, width), np.float32), srgb_to_linear(np.full(3, EIGHT_BIT_STEP))
-    )
+    plate = Plate(np.zeros_like(picture), np.ones((height, width), np.float32), EIGHT_BIT_NOISE)
     scene = replace(plume.scene, camera=plume.scene.camera.resized(width, height))
     frame = coarse_frame(picture, scene.camera, completed(scene), plate)
     np.testing.assert_allclose(frame.fitted, 0.2, atol=1e-5)

@@ -15,6 +15,7 @@ from smokelift.app.cost import require_memory
 from smokelift.app.options import add_run_options, named_path, require_folder, scene_of, settings_of
 from smokelift.app.progress import Reporter
 from smokelift.footage.clip import Clip
+from smokelift.footage.matte import SMOKE_THRESHOLD
 from smokelift.output.atomic import atomic_path
 from smokelift.output.images import eight_bit
 from smokelift.output.sequence import Sequence
@@ -40,7 +41,13 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, say: Reporter) -> None:
-    """Reconstruct, and say what was assumed, every frame and whether there was any smoke."""
+    """Reconstruct, and say what was assumed and every frame.
+
+    Raises
+    ------
+    ValueError
+        If no frame shows any smoke; the empty frames are written.
+    """
     began = time.monotonic()
     settings = settings_of(options)
     _check_outputs(options)
@@ -60,9 +67,10 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
                 say.frame(frame.number, frame.figures)
     sequence = Sequence.open(options.out)
     if not any((sequence.figures(number).get("hull_share") or 0) > 0 for number in sequence.frames):
-        say.note(
-            "No smoke found: in no frame does a patch differ from the background by six times the clip's noise. "
-            "Check the clean plate, or give one with [background] in a scene file."
+        raise ValueError(
+            f"No smoke found: in no frame does a patch differ from the background by {2 * SMOKE_THRESHOLD:g} times the "
+            f"clip's noise, so all frames in {options.out} are empty. Give a clean plate with [background] in a scene "
+            "file, or check the one that is given."
         )
     seconds = time.monotonic() - began
     say.finish(

@@ -1,0 +1,1 @@
+"""How well the background of a clip and the smoke before it are found, on clips whose background is known."""

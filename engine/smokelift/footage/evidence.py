@@ -1,0 +1,59 @@
+"""How much of a file shows what a clip of it does: all of that is evidence for the background, whatever is trimmed."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from smokelift.footage.clip import Clip, ClipError
+from smokelift.footage.exposure import gain_of, small
+from smokelift.footage.images import Picture, linear_to_srgb
+
+SAMPLES = 24
+"""Frames of the file that are compared, and as many of the clip at most."""
+
+STILL = 4 / 255
+"""Change of a pixel, in sRGB values, up to which it has not changed."""
+
+SAME_SHOT = 0.25
+"""Share of the pixels that do not change within the clip which a frame of the same shot leaves as they are; smoke may
+be over the others."""
+
+
+def evidence(clip: Clip) -> Clip:
+    """Return the part of a clip's file around it that was filmed in one shot with it.
+
+    Raises
+    ------
+    ClipError
+        If a frame cannot be read.
+    """
+    whole = clip.whole()
+    if len(whole) == len(clip):
+        return clip
+    own = np.stack([small(clip.frame(number)) for number in clip.spread(SAMPLES)])
+    reference = np.median(own, axis=0)
+    still = np.quantile(np.abs(linear_to_srgb(own) - linear_to_srgb(reference)).max(-1), 0.9, axis=0) < STILL
+    first, last = clip.first, clip.first + len(clip) - 1
+    numbers = whole.spread(SAMPLES)
+    for number in [n for n in numbers if n > last]:
+        if not _same(whole, number, reference, still):
+            break
+        last = number
+    for number in [n for n in numbers[::-1] if n < first]:
+        if not _same(whole, number, reference, still):
+            break
+        first = number
+    return whole.part(first, last)
+
+
+def _same(whole: Clip, number: int, reference: Picture, still: npt.NDArray[np.bool_]) -> bool:
+    """Whether a frame of the file can be read and belongs to the shot."""
+    try:
+        picture = small(whole.frame(number))
+    except ClipError:
+        return False
+    if not still.any():
+        return True
+    alike = np.abs(linear_to_srgb(picture / gain_of(picture, reference)) - linear_to_srgb(reference)).max(-1) < STILL
+    return bool(alike[still].mean() >= SAME_SHOT)

@@ -1,0 +1,36 @@
+"""The gain of a frame against its background."""
+
+from __future__ import annotations
+
+import numpy as np
+from films import HEIGHT, WIDTH, puff, wall
+
+from smokelift.footage.exposure import gain_of, sample_gains
+
+GAINS = np.array([1.3, 1.0, 0.8], np.float32)
+
+
+def test_a_gain_is_found_beside_smoke() -> None:
+    """A puff over a part of the picture does not disturb the gain of the rest, one a channel."""
+    behind = wall(0.3, 0.7).astype(np.float32)
+    alpha = puff(12)[..., None]
+    seen = (behind * (1 - alpha) + 0.4 * alpha) * GAINS
+    np.testing.assert_allclose(gain_of(seen.astype(np.float32), behind), GAINS, rtol=0.01)
+
+
+def test_smoke_is_no_gain() -> None:
+    """Before black nothing tells a gain, and smoke over most of a steady picture is none."""
+    black = np.zeros((HEIGHT, WIDTH, 3), np.float32)
+    assert (gain_of(black + 0.3, black) == 1).all()
+    behind = wall(0.3, 0.7).astype(np.float32)
+    rows = np.arange(HEIGHT)[:, None, None]
+    assert (gain_of(np.where(rows < 0.85 * HEIGHT, 0.5 * behind + 0.2, behind), behind) == 1).all()
+
+
+def test_a_flash_has_its_own_gain() -> None:
+    """It changes the gain of no other frame."""
+    frames = np.repeat(wall(0.2, 0.4).astype(np.float32)[None], 9, 0)
+    frames[4] *= 3
+    gains = sample_gains(frames)
+    np.testing.assert_allclose(gains[4], 3, rtol=0.01)
+    assert (np.delete(gains, 4, 0) == 1).all()
