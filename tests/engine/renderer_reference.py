@@ -120,8 +120,9 @@ def inscatter_of(kappa, camera, domain, medium, lights, scattering):
     return total + diffuse_inscatter(kappa, total, h, medium.albedo) if scattering == "multiple" else total
 
 
-def diffuse_inscatter(kappa, inscatter, h, albedo, size=3):
+def diffuse_inscatter(kappa, inscatter, h, albedo):
     """What light that has been scattered adds to the in-scattered radiance, by a dense matrix over blocks of voxels."""
+    size = min(max(round(max(kappa.shape) / 32), 1), 3)
     # the blocks reach around the voxels, so the first begins up to a block before the grid
     indices = [np.arange(-size, n + size) // size + 1 for n in kappa.shape]
     blocks = [int(index[-1]) + 1 for index in indices]
@@ -156,7 +157,7 @@ def block_transport(extinction, edge):
         t = np.where(extinction == 0, 1e-9, extinction) * length
         escaped = np.where(np.abs(t) < 1e-4, 1 - t / 2, -np.expm1(-t) / t)
         own = np.where(np.abs(t) < 1e-4, 0.5 - t / 6, (1 - escaped) / t)
-        for begin in np.ndindex(*extinction.shape):
+        for begin in map(tuple, np.argwhere(extinction != 0)):  # nothing else emits
             transport[number[begin], number[begin]] += weight * length * own[begin]
             beam, at = length * escaped[begin], np.array(begin) + step
             while np.all(at >= 0) and np.all(at < extinction.shape):

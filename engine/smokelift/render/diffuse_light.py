@@ -15,8 +15,11 @@ from smokelift.render.plan import RenderPlan
 
 Floats = NDArray[np.float32]
 
-BLOCK = 3
-"""Voxels along the edge of a block (docs/experiments/multiple-scattering.md)."""
+BLOCKS = 32
+"""Blocks along the longest side of a domain, about: coarse grids show what fine ones show."""
+
+LARGEST = 3
+"""Voxels along the edge of a block, at most: larger ones are too dark (docs/experiments/multiple-scattering.md)."""
 
 
 class DiffuseLight:
@@ -25,13 +28,14 @@ class DiffuseLight:
     def __init__(self, plan: RenderPlan, support: _core.Support) -> None:
         self._support = support
         self._albedo = plan.medium.albedo
-        self._edge = BLOCK * plan.domain.voxel_size
+        size = min(max(round(max(plan.domain.resolution) / BLOCKS), 1), LARGEST)
+        self._edge = size * plan.domain.voxel_size
         # blocks lie alike in the domain whatever the box; their centres reach around all voxels of the box
         corner, count = np.array(plan.corner), np.array(plan.shape)
-        first = np.floor((corner + 0.5) / BLOCK - 0.5).astype(int)
-        last = np.floor((corner + count - 0.5) / BLOCK - 0.5).astype(int) + 1
-        shape, offset = (last - first + 1).tolist(), (corner - BLOCK * first).tolist()
-        self._blocks = _core.Blocks(shape=shape, size=BLOCK, offset=offset)
+        first = np.floor((corner + 0.5) / size - 0.5).astype(int)
+        last = np.floor((corner + count - 0.5) / size - 0.5).astype(int) + 1
+        shape, offset = (last - first + 1).tolist(), (corner - size * first).tolist()
+        self._blocks = _core.Blocks(shape=shape, size=size, offset=offset)
         self._means: Floats | None = None
         self._radiance: Floats | None = None
 

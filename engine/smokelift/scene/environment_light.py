@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from smokelift.scene.checks import file_path, integer, number, set_fields, unexpected
@@ -34,3 +34,7 @@ class EnvironmentLight:
         if self.directions is not None:
             expected = f"a whole number from 1 to {MOST_DIRECTIONS}"
             set_fields(self, directions=integer(self.directions, "directions", expected, 1, MOST_DIRECTIONS))
+
+    def scaled(self, factor: float) -> EnvironmentLight:
+        """Return the light ``factor`` times as strong."""
+        return replace(self, strength=factor * self.strength)

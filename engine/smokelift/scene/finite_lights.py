@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 from smokelift.scene.checks import SceneError, Vector, colour, set_fields, shown, vector
@@ -36,6 +36,11 @@ class DirectionalLight:
         """Return the light itself; see `SampledLight`."""
         return (self,)
 
+    def scaled(self, factor: float) -> DirectionalLight:
+        """Return the light ``factor`` times as strong."""
+        red, green, blue = self.irradiance
+        return replace(self, irradiance=(factor * red, factor * green, factor * blue))
+
 
 @dataclass(frozen=True)
 class PointLight:
@@ -51,6 +56,11 @@ class PointLight:
     def samples(self) -> tuple[FiniteLight, ...]:
         """Return the light itself; see `SampledLight`."""
         return (self,)
+
+    def scaled(self, factor: float) -> PointLight:
+        """Return the light ``factor`` times as strong."""
+        red, green, blue = self.intensity
+        return replace(self, intensity=(factor * red, factor * green, factor * blue))
 
     def require_place(self, domain: Domain) -> None:
         """Refuse a place from which no light can be swept through a box: inside it, or too far away."""
@@ -70,4 +80,8 @@ class SampledLight(Protocol):
 
     def samples(self) -> tuple[FiniteLight, ...]:
         """Return the simple lights."""
+        ...
+
+    def scaled(self, factor: float) -> SampledLight:
+        """Return the light ``factor`` times as strong."""
         ...

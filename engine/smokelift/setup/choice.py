@@ -16,8 +16,8 @@ class Choice(Generic[Chosen]):
     Attributes
     ----------
     what
-        ``"scattering"``, ``"resolution"``, ``"domain"``, ``"environment directions"``, ``"iterations"``,
-        ``"velocity grid coarsening"``, ``"velocity levels"`` or ``"axis depth"``.
+        ``"scattering"``, ``"light strength"``, ``"resolution"``, ``"domain"``, ``"environment directions"``,
+        ``"iterations"``, ``"velocity grid coarsening"``, ``"velocity levels"`` or ``"axis depth"``.
     chosen
         What will be used.
     reason

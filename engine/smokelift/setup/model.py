@@ -17,7 +17,8 @@ from smokelift.scene import CompleteScene
 from smokelift.setup.choice import Choice
 from smokelift.setup.coarse import CoarseFrame, coarse_frame
 from smokelift.setup.directions import choose_directions
-from smokelift.setup.scattering import choose_scattering
+from smokelift.setup.light_strength import choose_strength, scaled
+from smokelift.setup.scattering import choose_scattering, tries_multiple
 from smokelift.setup.settings import Settings
 from smokelift.setup.velocity_grid import choose_coarsening, choose_levels
 from smokelift.velocity import VelocitySettings
@@ -30,7 +31,8 @@ class Model:
     Attributes
     ----------
     scene
-        With its model of scattering and a number of directions for each environment.
+        With its model of scattering, a number of directions for each environment, and lights as strong as the clip
+        needs.
     velocity
         With the grids that velocities are estimated on.
     choices
@@ -78,6 +80,12 @@ def choose_model(
     if not frames:
         return Model(scene, replace(velocity, levels=velocity.grids), ())
     lit, directions = choose_directions(scene, frames, settings.density)
+    strength: tuple[Choice[str], ...] = ()
+    # what single scattering lacks would be taken for light that is missing
+    if scene.scattering == "multiple" or (scene.scattering == "single" and tries_multiple(scene) and not by_hand):
+        alike = [frame.in_light_of(lit).scattered_by("multiple") for frame in frames]
+        factor, strength = choose_strength(alike, settings.density, settings.selection.scattering_error)
+        scene, lit = scaled(scene, factor), scaled(lit, factor)
     frames = [frame.in_light_of(lit) for frame in frames]
     if by_hand:
         said = scene.scattering
@@ -110,6 +118,7 @@ def choose_model(
         moved = Choice[int]("velocity levels", levels, f"Velocity grids by hand: {levels}.", by_hand=True)
     choices: tuple[Choice[Any], ...] = (
         _inside(densities, scene),
+        *strength,
         scattered,
         *directions,
         _iterations(densities, settings),

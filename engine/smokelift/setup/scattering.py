@@ -22,7 +22,7 @@ from smokelift.density import DensitySettings, reconstruct_density
 from smokelift.density.hull import project_voxels, reached
 from smokelift.footage.matte import matte
 from smokelift.render import scene_optics
-from smokelift.scene import Scattering
+from smokelift.scene import CompleteScene, Scattering
 from smokelift.setup.choice import Choice
 from smokelift.setup.coarse import CoarseFrame
 
@@ -54,9 +54,9 @@ def choose_scattering(
     tolerance
         Error, as a share of what the smoke changes in the picture, that a cheaper model may add.
     """
-    errors = {richest: _error(frames, richest, richest, settings)}
-    if richest == "single" and frames[0].scene.medium.anisotropy == 0.0:
-        errors["multiple"] = _error(frames, "multiple", "multiple", settings)
+    errors = {richest: held_out_error(frames, richest, richest, settings)}
+    if richest == "single" and tries_multiple(frames[0].scene):
+        errors["multiple"] = held_out_error(frames, "multiple", "multiple", settings)
         if errors["multiple"] < errors["single"]:
             richest = "multiple"
     chosen = richest
@@ -64,11 +64,16 @@ def choose_scattering(
         if model == "absorption" and (brightened := _brightened(frames)) > errors[richest] + tolerance:
             errors[model] = brightened
             continue
-        errors[model] = _error(frames, model, richest, settings)
+        errors[model] = held_out_error(frames, model, richest, settings)
         if errors[model] <= errors[richest] + tolerance:
             chosen = model
             break
     return chosen, _choice(chosen, richest, errors, tolerance)
+
+
+def tries_multiple(scene: CompleteScene) -> bool:
+    """Whether multiple scattering is tried where single scattering is allowed: smoke that is isotropic has it."""
+    return scene.medium.anisotropy == 0.0
 
 
 def _choice(
@@ -102,7 +107,9 @@ def _brightened(frames: Sequence[CoarseFrame]) -> float:
     return float(np.sqrt(brighter / max(change, 1e-30)))
 
 
-def _error(frames: Sequence[CoarseFrame], model: Scattering, judge: Scattering, settings: DensitySettings) -> float:
+def held_out_error(
+    frames: Sequence[CoarseFrame], model: Scattering, judge: Scattering, settings: DensitySettings
+) -> float:
     """Error of what the judge shows of a model's densities, in the other half of the pixels.
 
     Root mean square, in shares of what the smoke changes there.

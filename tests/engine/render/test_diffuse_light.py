@@ -9,19 +9,23 @@ import renderer_reference as reference
 from smokelift.render import Renderer
 from smokelift.scene import Camera, DirectionalLight, Domain, Medium
 
-SHAPE = (8, 9, 7)
-DOMAIN = Domain((0.0, 0.0, 0.0), (0.8, 0.9, 0.7), SHAPE)
+SHAPE = (7, 6, 81)  # high enough for blocks of three voxels
+SMOKY = slice(30, 37)
+DOMAIN = Domain((0.0, 0.0, -3.0), (0.7, 0.6, 5.1), SHAPE)
 MEDIUM = Medium(12.0, 0.95)
 SUN = DirectionalLight((0.57, 0.45, -0.68), (3.0, 3.0, 3.0))
 SKY = DirectionalLight((0.1, 0.2, -1.0), (0.5, 1.0, 2.0))
-CAMERA = Camera.look_at((0.3, -2.0, 0.9), (0.4, 0.45, 0.35), fov_y_degrees=30, size=(12, 11))
+CAMERA = Camera.look_at((0.3, -2.0, 0.9), (0.35, 0.3, 0.35), fov_y_degrees=30, size=(12, 11))
 WALL = np.array((0.3, 0.2, 0.4), np.float32)
 
 
 @pytest.fixture(scope="module")
 def density():
     rng = np.random.default_rng(3)
-    return (rng.random(SHAPE) * (rng.random(SHAPE) > 0.3)).astype(np.float32)
+    values = np.zeros(SHAPE, np.float32)
+    part = values[..., SMOKY]
+    part[:] = rng.random(part.shape) * (rng.random(part.shape) > 0.3)
+    return values
 
 
 def renderer(lights=(SUN,), medium=MEDIUM, support=None, background=WALL):
@@ -40,8 +44,7 @@ def test_image_equals_the_sums_in_double_precision(density, lights, extinction):
     np.testing.assert_allclose(image, exact(density.astype(float), lights, medium), rtol=5e-4)
 
 
-@pytest.mark.parametrize("lights", [(SUN,), (SUN, SKY)], ids=["one light", "several colours"])
-@pytest.mark.parametrize("hull", [False, True])
+@pytest.mark.parametrize(("hull", "lights"), [(False, (SUN,)), (True, (SUN, SKY))], ids=["one light", "several, hull"])
 def test_gradient_equals_a_complex_step(density, lights, hull):
     """In voxels at random, those that light reaches late among them."""
     rng = np.random.default_rng(5)
@@ -51,7 +54,7 @@ def test_gradient_equals_a_complex_step(density, lights, hull):
     ours = renderer(lights, support=support)
     ours.image(values.astype(np.float32), keep_record=True)
     gradient = ours.gradient(weights.astype(np.float32))
-    for voxel in rng.choice(np.argwhere(values > 0), 6, replace=False):
+    for voxel in rng.choice(np.argwhere(values > 0), 3, replace=False):
         moved = values.astype(complex)
         moved[tuple(voxel)] += 1e-30j
         slope = np.sum(weights * exact(moved, lights)).imag / 1e-30
@@ -61,7 +64,7 @@ def test_gradient_equals_a_complex_step(density, lights, hull):
 def test_the_box_around_the_smoke_changes_nothing(density):
     """Blocks lie alike whatever the support, and light crosses the empty ones."""
     values = density.copy()
-    values[:4], values[:, :2], values[:, :, 5:] = 0, 0, 0
+    values[:4], values[:, :2], values[:, :, SMOKY.stop - 2 :] = 0, 0, 0
     whole, part = renderer().image(values).copy(), renderer(support=values > 0).image(values)
     np.testing.assert_allclose(part, whole, rtol=1e-4)
 
@@ -75,9 +78,11 @@ def test_white_smoke_gives_back_the_light_of_a_white_room(extinction, lost):
     irradiance = (4 * np.pi / len(directions),) * 3
     room = tuple(DirectionalLight(tuple(d), irradiance) for d in directions)
     room_renderer = renderer(room, Medium(extinction, 1.0), background=np.ones(3, np.float32))
-    image = room_renderer.image(np.ones(SHAPE, np.float32))
+    smoke = np.zeros(SHAPE, np.float32)
+    smoke[..., SMOKY] = 1
+    image = room_renderer.image(smoke)
     assert image.min() > 1 - lost
-    assert image.max() < 1 + 1e-5
+    assert image.max() < 1 + 3e-4
 
 
 def test_thin_smoke_scatters_once(density):
