@@ -20,14 +20,16 @@ _NUMBER = re.compile(r"(?<![\w#.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w#.])")
 
 
 def damaged_text(text: str, random: np.random.Generator) -> str:
-    """A scene file with a number, a value or a line changed."""
+    """A scene file with a number, a value or a line changed; half of the numbers by a power of ten or in their sign."""
     for _ in range(1 + int(random.integers(3))):
         lines = text.splitlines()
         place = int(random.integers(len(lines)))
         kind = int(random.integers(6))
         if kind <= 2 and (numbers := list(_NUMBER.finditer(text))):
             match = numbers[int(random.integers(len(numbers)))]
-            text = text[: match.start()] + _one_of(EXTREMES, random) + text[match.end() :]
+            scaled = f"{float(match[0]) * random.choice([-1, 1]) * 10.0 ** random.integers(-10, 11):.6g}"
+            value = _one_of(EXTREMES, random) if kind == 0 else scaled
+            text = text[: match.start()] + value + text[match.end() :]
             continue
         if kind == 3 and " = " in lines[place]:
             lines[place] = f"{lines[place].partition(' = ')[0]} = {_one_of(EXTREMES, random)}"
