@@ -7,8 +7,9 @@ shadow. So every model fits a coarse density to one half of the clip's pixels, a
 richest one, which holds the others as special cases, shows that density; the error of the other half says how good it
 is. Where smoke is brighter than its background, absorption is not even tried.
 
-Single scattering is no special case of multiple scattering, which makes the same smoke brighter. Of these two the
-richest is the one whose own picture of its own density is nearer (docs/experiments/multiple-scattering.md).
+Single scattering is no special case of multiple scattering, which makes the same smoke brighter. Of these two multiple
+scattering is the richest only where its own picture of its own density is clearly nearer: smoke whose picture both
+models meet is twice as dense in one as in the other (docs/experiments/multiple-scattering.md).
 """
 
 from __future__ import annotations
@@ -57,7 +58,7 @@ def choose_scattering(
     errors = {richest: held_out_error(frames, richest, richest, settings)}
     if richest == "single" and tries_multiple(frames[0].scene):
         errors["multiple"] = held_out_error(frames, "multiple", "multiple", settings)
-        if errors["multiple"] < errors["single"]:
+        if errors["multiple"] < errors["single"] - tolerance:
             richest = "multiple"
     chosen = richest
     for model in MODELS[: MODELS.index(richest)]:

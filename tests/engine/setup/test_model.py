@@ -30,6 +30,7 @@ from smokelift.scene import (
     completed,
     look_at_matrix,
 )
+from smokelift.setup import scattering
 from smokelift.setup.choice import Choice
 from smokelift.setup.coarse import LONGEST, coarse_domain, coarse_frame
 from smokelift.setup.prepare import prepare_shot
@@ -104,6 +105,16 @@ def test_thick_white_smoke_scatters_light_many_times(white, plume, draft) -> Non
     assert "multiple scattering; with single scattering" in choice.reason
     forward = replace(plume.scene, medium=replace(plume.scene.medium, anisotropy=0.3))
     assert "error_multiple" not in chosen(shot_of(forward, draft), "scattering").measured
+
+
+def test_single_scattering_is_kept_where_both_meet_the_picture(plume, draft, monkeypatch) -> None:
+    """Multiple scattering has to be clearly nearer: it finds half as dense a smoke for the same picture."""
+    own = {"single": 0.030, "multiple": 0.026}
+    monkeypatch.setattr(scattering, "held_out_error", lambda _, model, judge, __: own[judge] if model == judge else 0.4)
+    choice = chosen(shot_of(plume.scene, draft), "scattering")
+    assert choice.chosen == "single"
+    own["single"] = 0.2
+    assert chosen(shot_of(plume.scene, draft), "scattering").chosen == "multiple"
 
 
 def test_thin_smoke_needs_no_shadows(thin, draft) -> None:
