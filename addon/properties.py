@@ -209,6 +209,7 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
         description="Extinction coefficient per metre of smoke of density 1",
         default=5.0,
         min=0.001,
+        max=1e9,
         soft_max=50.0,
     )
     albedo: FloatProperty(

@@ -26,9 +26,9 @@ SOLVES_A_FRAME: Mapping[Quality, float] = {"draft": 65.0, "balanced": 70.0, "fin
 SHARE_A_VIEW = 0.5
 """Part of a frame's time that each further view adds."""
 
-SHARE_OF_DETAIL = 0.8
-"""Part of a frame's time that detail in depth adds: the smooth answer, and three pictures more in most multiplicative
-iterations. It is less where the fit to the clip takes longer."""
+SHARE_OF_DETAIL = 0.4
+"""Part of a frame's time that detail in depth adds: the smooth answer, and two rounds of three pictures more. It is
+less where the fit to the clip takes longer."""
 
 START_SECONDS = 5.0
 """Seconds to start, to compile and to estimate the background."""
@@ -41,7 +41,8 @@ BYTES_A_VOXEL = 220
 densities, three velocities and a projection a view (docs/experiments/memory-and-time.md)."""
 
 BYTES_A_VOXEL_OF_DETAIL = 75
-"""Bytes that detail in depth adds: projections and records of three pictures more, the smooth answer of two frames."""
+"""Bytes that detail in depth adds: projections and records of three pictures more, the smooth answer of two frames, and
+what is carried on."""
 
 BYTES_A_PIXEL_OF_DETAIL = 4
 """Bytes of a pixel of every frame on the turntable's screen, 16 bits that are held twice while they are gathered."""

@@ -36,7 +36,7 @@ TINY = np.finfo(np.float32).tiny
 FAINT = 1e-3
 """Optical depth, as a fraction of the largest, below which its logarithm means nothing."""
 
-GUIDED = 3.0
+GUIDED = 5.0
 """Standard deviation (voxels) of the blur whose result the smooth answer decides; what is finer is the simulation's."""
 
 LARGEST_GAIN = 3.0
