@@ -48,8 +48,10 @@ def borrowed_picture(smooth: Array, others: Sequence[tuple[float, Array]]) -> Ar
         return None
     total = sum(share for share, _ in shown)
     known = coarse(smooth, smooth)
-    ratio = sum(share / total * _relative(_fitted(picture, smooth), smooth) for share, picture in shown)
-    ratio = 1 + (ratio - 1) / np.sqrt(sum((share / total) ** 2 for share, _ in shown))
+    details = [(share / total, _relative(_fitted(picture, smooth), smooth) - 1) for share, picture in shown]
+    mean = sum(share * detail for share, detail in details)
+    left, own = np.linalg.norm(known * mean), sum(share * np.sum((known * detail) ** 2) for share, detail in details)
+    ratio = 1 + mean * (np.sqrt(own) / left if left > 0 else 1.0)
     target = known * np.clip(ratio, 0, LARGEST) * np.clip(OUTLINE * ratio, 0, 1)
     return _with_rows(target, smooth.sum(1))
 

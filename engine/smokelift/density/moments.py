@@ -17,6 +17,10 @@ UNLIKE = 0.35
 """Correlation of two pictures' detail under the best shift below which neither looks like a copy of the other: so much
 true pictures from the front and from the side have in common (docs/experiments/side-measures.md)."""
 
+NEARLY = 0.05
+"""Correlation above the least of a clip that is as good: smoke that keeps its shape never gets unlike itself, and the
+further away a moment is, the more else is different (docs/experiments/long-runs.md)."""
+
 PAIRS = 12
 """Pairs of frames, spread over the clip, from which a correlation is measured."""
 
@@ -72,13 +76,27 @@ class Moments:
 
 
 def unlike_offset(pictures: NDArray[np.float16]) -> int:
-    """Return after how many frames smoke looks unlike itself in pictures (frames, rows, columns), at most half."""
-    longest = len(pictures) // 2
-    for offset in range(1, longest):
+    """Return after how many frames smoke looks unlike itself in pictures (frames, rows, columns), at most half.
+
+    Where it never does, as few frames as leave it nearly as unlike as it gets.
+    """
+    likeness: dict[int, float] = {}
+    for offset in _steps(len(pictures) // 2):
         alike = [_likeness(a, b) for a, b in _pairs(pictures, offset)]
-        if alike and np.mean(alike) < UNLIKE:
-            return offset
-    return longest
+        if alike:
+            likeness[offset] = float(np.mean(alike))
+            if likeness[offset] < UNLIKE:
+                return offset
+    least = min(likeness.values(), default=0.0)
+    return next((offset for offset, value in likeness.items() if value <= least + NEARLY), len(pictures) // 2)
+
+
+def _steps(longest: int) -> Iterator[int]:
+    """Offsets up to the longest: all small ones, then each an eighth more than the one before."""
+    offset = 1
+    while offset <= longest:
+        yield offset
+        offset += max(1, offset // 8)
 
 
 def _pairs(pictures: NDArray[np.float16], offset: int) -> Iterator[tuple[Array, Array]]:

@@ -79,6 +79,14 @@ def test_a_dissolve_is_as_detailed_as_either_end() -> None:
     assert power[2] == pytest.approx((power[0] + power[1]) / 2, rel=0.35)
 
 
+def test_a_dissolve_of_a_picture_into_itself_is_that_picture() -> None:
+    """Nothing is lost by their mean, so that nothing is made up for: smoke at rest stays as it is."""
+    whole = borrowed_picture(spindle(), [(1.0, detailed())])
+    half = borrowed_picture(spindle(), [(0.5, detailed()), (0.5, detailed())])
+    assert whole is not None and half is not None
+    np.testing.assert_allclose(half, whole, rtol=1e-6, atol=1e-9)
+
+
 def test_without_smoke_nothing_is_borrowed() -> None:
     """Neither for an empty side nor from an empty moment; an empty one beside another does not count."""
     assert borrowed_picture(np.zeros((ROWS, COLUMNS)), [(1.0, detailed())]) is None

@@ -34,10 +34,23 @@ def test_smoke_that_changes_faster_is_unlike_itself_sooner() -> None:
 
 
 @pytest.mark.parametrize("frames", [1, 2, 3, 24])
-def test_a_clip_that_never_changes_lends_from_half_its_length(frames) -> None:
-    """However short it is."""
+def test_a_clip_that_never_changes_lends_from_next_door(frames) -> None:
+    """However short it is: nothing further away would be less alike."""
     still = np.repeat(changing(1, 1.0), frames, axis=0)
-    assert unlike_offset(still) == frames // 2
+    assert unlike_offset(still) == min(1, frames // 2)
+
+
+def test_smoke_that_comes_back_lends_from_where_it_is_least_alike() -> None:
+    """Half a period away, or some periods and a half."""
+    there, back = changing(2, 0.1).astype(np.float64)
+    period = [there + (back - there) * (1 - np.cos(2 * np.pi * n / 8)) / 2 for n in range(8)]
+    assert unlike_offset(np.stack(period * 8).astype(np.float16)) % 8 in (3, 4, 5)
+
+
+def test_smoke_that_keeps_its_shape_lends_from_where_that_shows() -> None:
+    """A part that stays holds the likeness up; then the first moment is taken from which on nothing is gained."""
+    pictures = changing(120, 1.0) + 2 * np.repeat(changing(1, 1.0), 120, axis=0)
+    assert 2 <= unlike_offset(pictures) <= 8
 
 
 def test_frames_without_smoke_say_nothing() -> None:
