@@ -75,12 +75,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--cases", type=int, default=750, help="of every class")
     parser.add_argument("--classes", nargs="+", choices=CLASSES, default=list(CLASSES), metavar="CLASS")
     options = parser.parse_args(arguments)
-    shot = tiny_shot(options.folder / "shot")
-    check(shot, options.classes, options.folder)
+    folder = options.folder.resolve()  # commands are run from elsewhere
+    shot = tiny_shot(folder / "shot")
+    check(shot, options.classes, folder)
     print("| class | cases | done | refused | failed |\n|---|---|---|---|---|")
     all_failed = []
     for name in options.classes:
-        statuses, failed = failures(shot, name, options.cases, options.folder)
+        statuses, failed = failures(shot, name, options.cases, folder)
         refused = sum(count for status, count in statuses.items() if status in (2, 3))
         print(f"| {name} | {options.cases} | {statuses[0]} | {refused} | {len(failed)} |", flush=True)
         all_failed += failed
