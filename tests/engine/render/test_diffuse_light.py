@@ -58,7 +58,7 @@ def test_gradient_equals_a_complex_step(density, lights, hull):
         moved = values.astype(complex)
         moved[tuple(voxel)] += 1e-30j
         slope = np.sum(weights * exact(moved, lights)).imag / 1e-30
-        assert gradient[tuple(voxel)] == pytest.approx(slope, rel=2e-3, abs=1e-3 * np.abs(gradient).max())
+        assert gradient[tuple(voxel)] == pytest.approx(slope, rel=2e-3, abs=1e-3 * float(np.abs(gradient).max()))
 
 
 def test_the_box_around_the_smoke_changes_nothing(density):
