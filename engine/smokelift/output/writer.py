@@ -108,7 +108,7 @@ class SequenceWriter:
         return self._index.numbers
 
     def __enter__(self) -> SequenceWriter:
-        self._kinds = _kinds(self._npz)
+        self._kinds = written_kinds(self._npz)
         try:
             self.directory.mkdir(parents=True, exist_ok=True)
             if not self._lock.acquire():
@@ -252,12 +252,12 @@ class SequenceWriter:
         )
 
 
-def check_directory(directory: Path, *, npz: bool, resume: bool) -> None:
+def check_directory(directory: Path, *, resume: bool) -> None:
     """Refuse, before anything is computed or written, a directory that a `SequenceWriter` would refuse for itself.
 
     Parameters
     ----------
-    directory, npz, resume
+    directory, resume
         As in `SequenceWriter`.
 
     Raises
@@ -265,7 +265,6 @@ def check_directory(directory: Path, *, npz: bool, resume: bool) -> None:
     SequenceError
         With the reason.
     """
-    _kinds(npz)
     if directory.is_dir():
         _begun(directory, resume)
     nearest = next(folder for folder in (directory, *directory.absolute().parents) if folder.exists())
@@ -273,8 +272,19 @@ def check_directory(directory: Path, *, npz: bool, resume: bool) -> None:
         raise SequenceError(f"{directory}: cannot be written to: {nearest} is no folder, or may not be changed")
 
 
-def _kinds(npz: bool) -> tuple[str, ...]:
-    """The kinds of files of a frame; without an OpenVDB module the NumPy twin alone."""
+def written_kinds(npz: bool) -> tuple[str, ...]:
+    """Return the kinds of files of a frame: without an OpenVDB module the NumPy twin alone.
+
+    Parameters
+    ----------
+    npz
+        Whether twins are asked for.
+
+    Raises
+    ------
+    SequenceError
+        If nothing could be written.
+    """
     try:
         vdb_module()
     except VdbUnavailable as error:

@@ -47,7 +47,16 @@ def test_a_grid_too_large_for_the_memory(plume, tmp_path, capsys) -> None:
     """Status 3 before anything is written, and the resolution that is named would fit."""
     clip = str(plume.scene.clip.path)
     sentence = refused(
-        capsys, "reconstruct", clip, "--out", tmp_path / "out", "--resolution", "4000,4000,4000", *QUICK, status=3
+        capsys,
+        "reconstruct",
+        clip,
+        "--out",
+        tmp_path / "out",
+        "--npz",
+        "--resolution",
+        "4000,4000,4000",
+        *QUICK,
+        status=3,
     )
     named = re.search(r"--resolution (\d+),(\d+),(\d+)", sentence)
     assert named

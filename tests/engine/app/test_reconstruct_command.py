@@ -93,7 +93,7 @@ def test_the_smoke_stands_where_the_command_says(shot, finished, tmp_path) -> No
 
 def test_a_depth_outside_the_box(shot, tmp_path, capsys) -> None:
     """One sentence, also before a run, and nothing is written."""
-    for words in (("reconstruct", shot, "--out", tmp_path / "out"), ("inspect", shot)):
+    for words in (("reconstruct", shot, "--out", tmp_path / "out", "--npz"), ("inspect", shot)):
         sentence = refused(capsys, *words, "--axis-depth", "0.7", *QUICK)
         assert "outside the box, which reaches 0.6 m" in sentence
     assert not (tmp_path / "out").exists()

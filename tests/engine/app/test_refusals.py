@@ -92,7 +92,7 @@ def test_a_resolution_too_low(shot, tmp_path, capsys) -> None:
 
 def test_a_resolution_without_cubes(shot, tmp_path, capsys) -> None:
     """A calibrated box fixes the shape."""
-    sentence = refused(capsys, "reconstruct", shot, "--out", tmp_path / "out", "--resolution", "16,16,16")
+    sentence = refused(capsys, "reconstruct", shot, "--out", tmp_path / "out", "--npz", "--resolution", "16,16,16")
     assert "cubic voxels" in sentence
 
 

@@ -19,7 +19,7 @@ from smokelift.footage.matte import SMOKE_THRESHOLD
 from smokelift.output.atomic import atomic_path
 from smokelift.output.images import eight_bit
 from smokelift.output.sequence import Sequence
-from smokelift.output.writer import check_directory
+from smokelift.output.writer import check_directory, written_kinds
 from smokelift.pipeline import Frame, reconstruct
 from smokelift.render import device
 from smokelift.setup.prepare import prepare_shot
@@ -54,6 +54,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     scene, source = scene_of(options)
     device.start(options.device)
     with Clip.open(source) as clip:
+        written_kinds(options.npz)  # before the clip is looked at, which takes minutes
         shot = prepare_shot(clip, scene, settings)
         require_memory(shot.scene.domain, len(clip), settings)
         for note in (*shot.notes, *(choice.reason for choice in shot.choices), *made_up(shot)):
@@ -80,9 +81,9 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
 
 
 def _check_outputs(options: argparse.Namespace) -> None:
-    """Refuse what cannot be written before the clip is looked at, which takes minutes."""
+    """Refuse what cannot be written to."""
     out, thumbnail = options.out, options.thumbnail
-    check_directory(out, npz=options.npz, resume=options.resume)
+    check_directory(out, resume=options.resume)
     require_folder(thumbnail)
     if thumbnail is not None and out.resolve() in thumbnail.resolve().parents:
         raise ValueError(f"{thumbnail}: the thumbnail cannot lie in {out}, which is for the sequence alone.")
