@@ -88,7 +88,15 @@ def work(context: bpy.types.Context) -> None:
 def workers(manager: bpy.types.WindowManager) -> list[bpy.types.Operator]:
     """The running worker, if any."""
     running = [operator for window in manager.windows for operator in window.modal_operators]
-    return [operator for operator in running if operator.bl_idname == SMOKELIFT_OT_work.__name__]
+    return [operator for operator in running if _works(operator)]
+
+
+def _works(operator: bpy.types.Operator) -> bool:
+    """Whether an operator is a worker; one whose add-on was switched off has no name, and ends with its next event."""
+    try:
+        return operator.bl_idname == SMOKELIFT_OT_work.__name__
+    except ValueError:
+        return False
 
 
 def check_soon(context: bpy.types.Context) -> None:
