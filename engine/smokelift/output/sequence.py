@@ -163,7 +163,8 @@ class Sequence:
         if not path.is_file():
             raise SequenceError(f"{path}: is missing")
         try:
-            if checksum([path]) != self._checksums.get(path.name, checksum([path])):
+            written = self._checksums.get(path.name)
+            if written is not None and checksum([path]) != written:
                 raise SequenceError(f"{path}: is not the file that was written: it is damaged, or was changed since")
             if path is twin:
                 shapes = {"density": shape, **dict(zip(FACES, face_shapes(shape), strict=True))}
