@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from smokelift.output.archive import Shape, read_arrays
+from smokelift.output.archive import VELOCITY, Shape, read_arrays
 from smokelift.scene import SIDES, Side
 from smokelift.scene.domain import checked_sides
 from smokelift.transport import Velocity, face_shapes
@@ -58,14 +58,13 @@ class Truth:
         TruthError
             If there is no such file, it is damaged, or it holds something else.
         """
-        faces = tuple(f"velocity_{axis}" for axis in "xyz")
-        wanted: dict[str, Shape | None] = dict.fromkeys(("density", *faces, "inflow_packed"))
+        wanted: dict[str, Shape | None] = dict.fromkeys(("density", *VELOCITY, "inflow_packed"))
         wanted |= {"voxel_size": (), "fps": ()}
         try:
             file = read_arrays(path, wanted, others={"closed": (len(SIDES),)}, text={"closed"})
             truth = Truth(
                 densities=file["density"],
-                faces=tuple(file[name] for name in faces),
+                faces=tuple(file[name] for name in VELOCITY),
                 inflow_packed=file["inflow_packed"],
                 voxel_size=float(file["voxel_size"]),
                 fps=float(file["fps"]),

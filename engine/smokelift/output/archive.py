@@ -22,6 +22,9 @@ NUMBERS = "biuf"
 LARGEST = 1e12
 """Magnitude that no density, velocity or residual reaches; sums of squares of larger ones are not finite in 32 bits."""
 
+VELOCITY = ("velocity_x", "velocity_y", "velocity_z")
+"""Names of the components of a velocity on faces."""
+
 MOST_VALUES = 2**32
 """Values of an array whose shape is not known before, at most."""
 

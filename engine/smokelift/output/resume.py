@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from smokelift.output.archive import read_arrays, write_arrays
+from smokelift.output.archive import VELOCITY, read_arrays, write_arrays
 from smokelift.transport import Array, Faces, face_shapes
 
 _EXTRA = "extra_"
@@ -38,7 +38,7 @@ class ResumeState:
 
     def write(self, path: Path) -> None:
         """Write the state; OSError if that fails."""
-        velocity = {f"velocity_{axis}": face for axis, face in zip("xyz", self.velocity, strict=True)}
+        velocity = dict(zip(VELOCITY, self.velocity, strict=True))
         extra = {f"{_EXTRA}{name}": value for name, value in self.extra.items()}
         arrays = {"number": np.array(self.number), "density": self.density, **velocity, **extra}
         write_arrays(path, arrays, compressed=False)
@@ -54,11 +54,10 @@ class ResumeState:
         """
         if not path.is_file():
             return None
-        names = ("velocity_x", "velocity_y", "velocity_z")
-        expected = {"number": (), "density": shape, **dict(zip(names, face_shapes(shape), strict=True))}
+        expected = {"number": (), "density": shape, **dict(zip(VELOCITY, face_shapes(shape), strict=True))}
         arrays = read_arrays(path, expected, others={_EXTRA: shape})
         number, density = arrays.pop("number"), arrays.pop("density")
-        x, y, z = (arrays.pop(name) for name in names)
+        x, y, z = (arrays.pop(name) for name in VELOCITY)
         extra = {name.removeprefix(_EXTRA): value for name, value in arrays.items()}
         if number.dtype.kind != "i" or number < 0 or density.min() < 0:
             raise OSError(f"{path}: cannot be read: number or density is negative")

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from smokelift.output.archive import read_arrays
+from smokelift.output.archive import VELOCITY, read_arrays
 from smokelift.output.checksum import checksum
 from smokelift.output.index import Index, SequenceError
 from smokelift.output.layout import INDEX, frame_path
@@ -16,9 +16,6 @@ from smokelift.output.viewer import Viewer
 from smokelift.render import Image
 from smokelift.scene import Camera, CompleteScene, Scene, completed, scene_from_dict
 from smokelift.transport import Array, Velocity, face_shapes
-
-FACES = ("velocity_x", "velocity_y", "velocity_z")
-"""Names of a velocity's components in a NumPy twin."""
 
 
 @dataclass(frozen=True)
@@ -108,10 +105,10 @@ class Sequence:
         SequenceError
             If there is no such frame, or its file is missing or damaged.
         """
-        arrays = self._read(number, *FACES)
+        arrays = self._read(number, *VELOCITY)
         if "velocity" in arrays:
             return arrays["velocity"]
-        x, y, z = (arrays[name] for name in FACES)
+        x, y, z = (arrays[name] for name in VELOCITY)
         return Velocity((x, y, z), self.scene.domain.voxel_size).centres()
 
     def render(self, number: int, camera: Camera | None = None) -> Image:
@@ -167,7 +164,7 @@ class Sequence:
             if written is not None and checksum([path]) != written:
                 raise SequenceError(f"{path}: is not the file that was written: it is damaged, or was changed since")
             if path is twin:
-                shapes = {"density": shape, **dict(zip(FACES, face_shapes(shape), strict=True))}
+                shapes = {"density": shape, **dict(zip(VELOCITY, face_shapes(shape), strict=True))}
                 return read_arrays(path, {name: shapes[name] for name in names})
             density, velocity = read_vdb(path, shape)
         except OSError as error:

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from smokelift.output.archive import write_arrays
+from smokelift.output.archive import VELOCITY, write_arrays
 from smokelift.output.checksum import checksum
 from smokelift.output.images import write_image
 from smokelift.output.index import Index, SequenceError, difference, plain
@@ -198,8 +198,7 @@ class SequenceWriter:
 
     def _write_arrays(self, path: Path, density: Array, faces: Faces) -> None:
         if path.suffix == ".npz":
-            velocity = {f"velocity_{axis}": face for axis, face in zip("xyz", faces, strict=True)}
-            write_arrays(path, {"density": density, **velocity})
+            write_arrays(path, {"density": density, **dict(zip(VELOCITY, faces, strict=True))})
         else:
             centres = Velocity(faces, self._domain.voxel_size).centres()
             write_vdb(path, density, centres, self._domain, self._index.settings)
