@@ -12,6 +12,7 @@ from smokelift.density.axis_from_light import coarse_domain, refine_axis
 from smokelift.density.observation import Observation, ObservedClip, unshadowed_optical_depth
 from smokelift.footage.matte import matte
 from smokelift.render import Optics
+from smokelift.scene import SHADOWED
 
 AXIS_FRAMES = 16
 """Frames of a clip from which the axis is estimated."""
@@ -40,7 +41,7 @@ def clip_axis(clip: ObservedClip) -> AxisEstimate | None:
     if not np.any([amount.any() for amount in amounts]):
         return None
     estimate = estimate_axis(amounts, seen[0].camera, optics.domain, clip.inlets)
-    if clip.inlets or optics.scattering not in ("multiple", "single"):
+    if clip.inlets or optics.scattering not in SHADOWED:
         return estimate
     return refine_axis(estimate, seen[:: AXIS_FRAMES // LIGHT_FRAMES], optics)
 

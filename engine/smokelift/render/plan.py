@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from smokelift.render.camera_rays import Rays, camera_rays
 from smokelift.render.light_sweeps import Box, Lighting, lighting
-from smokelift.scene import Camera, Domain, FiniteLight, Medium, Scattering
+from smokelift.scene import SHADOWED, Camera, Domain, FiniteLight, Medium, Scattering
 
 Slices = tuple[slice, slice, slice]
 
@@ -94,7 +94,7 @@ def plan_render(
         rays=camera_rays(camera, box),
         to_eye=_to_eye(camera, box),
         lighting=found,
-        shadows=scattering in ("multiple", "single") and found.channels > 0,
+        shadows=scattering in SHADOWED and found.channels > 0,
         diffuse=scattering == "multiple" and found.channels > 0,
     )
 

@@ -14,12 +14,13 @@ from smokelift.scene.domain import SIDES, Domain, Inlet, Side
 from smokelift.scene.environment_light import EnvironmentLight
 from smokelift.scene.finite_lights import DirectionalLight, FiniteLight, PointLight
 from smokelift.scene.lights import Light
-from smokelift.scene.medium import SCATTERINGS, Medium, Scattering
+from smokelift.scene.medium import SCATTERINGS, SHADOWED, Medium, Scattering
 from smokelift.scene.view import View
 
 __all__ = [
     "LARGEST_PICTURE",
     "SCATTERINGS",
+    "SHADOWED",
     "SIDES",
     "Background",
     "Camera",

@@ -12,6 +12,9 @@ Scattering = Literal["multiple", "single", "unshadowed", "absorption"]
 
 SCATTERINGS: tuple[Scattering, ...] = ("multiple", "single", "unshadowed", "absorption")
 
+SHADOWED: tuple[Scattering, ...] = ("multiple", "single")
+"""Those in which smoke casts shadows on itself."""
+
 
 @dataclass(frozen=True)
 class Medium:

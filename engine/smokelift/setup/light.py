@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from smokelift.scene import DirectionalLight, Light, Medium, Scattering
+from smokelift.scene import SHADOWED, DirectionalLight, Light, Medium, Scattering
 from smokelift.setup.smoke import SmokeSamples
 
 BEYOND = 0.1
@@ -20,7 +20,7 @@ def richest_scattering(asked: Scattering | None, lights: tuple[Light, ...], medi
     ValueError
         If shadows are asked for without a light to cast them.
     """
-    if asked in ("multiple", "single") and not lights:
+    if asked in SHADOWED and not lights:
         raise ValueError(
             f'Scattering "{asked}" needs a light that casts the shadows; give one in [[lights]], or leave it to "auto".'
         )
