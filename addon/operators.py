@@ -261,7 +261,7 @@ def _text_editor(context: bpy.types.Context) -> bpy.types.Space:
 
 
 class SMOKELIFT_OT_remove_takes(_NeedsClip, bpy.types.Operator):
-    """Delete the files of all results in the output folder except the one on show"""
+    """Delete the files of all results in the output folder except those that a Volume of this file shows"""
 
     bl_idname = "smokelift.remove_takes"
     bl_label = "Delete Earlier Results?"
@@ -270,10 +270,11 @@ class SMOKELIFT_OT_remove_takes(_NeedsClip, bpy.types.Operator):
         return context.window_manager.invoke_confirm(self, event)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        kept = {str(take.directory) for scene in bpy.data.scenes if (take := volume.shown_take(scene))}
-        kept |= {row.take for row in context.window_manager.smokelift.jobs}
+        shown = {volume.take_of(data).directory for data in bpy.data.volumes if data.filepath}
+        queued = {Path(row.take) for row in context.window_manager.smokelift.jobs}
+        kept = {directory.resolve() for directory in shown | queued}  # a link may lead to the same folder
         for take in takes(run.output_folder(context.scene)):
-            if str(take.directory) not in kept:
+            if take.directory.resolve() not in kept:
                 take.remove()
         return {"FINISHED"}
 

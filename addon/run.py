@@ -9,6 +9,7 @@ import bpy.utils.previews
 
 from . import scene_file, shot_setup, volume
 from .job import ENDED, EngineMissingError, Job, Queue, engine_command
+from .paths import absolute
 from .take import Take, TakeError, new_take, takes
 
 TICK_SECONDS = 0.1
@@ -20,7 +21,7 @@ def output_folder(scene: bpy.types.Scene) -> Path:
     """The folder of a scene's takes: the chosen one, else beside the .blend, else beside the clip."""
     settings = scene.smokelift
     if settings.output:
-        return Path(bpy.path.abspath(settings.output))
+        return absolute(settings.output)
     name = bpy.path.clean_name(Path(settings.clip.filepath).stem)
     if bpy.data.filepath:
         return Path(bpy.data.filepath).parent / "smokelift" / name

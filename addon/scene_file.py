@@ -16,6 +16,7 @@ from bpy_extras.object_utils import world_to_camera_view
 from mathutils import Matrix, Vector
 
 from .contract import FEWEST_VOXELS, IMAGE_SUFFIXES, LONGEST_SIDE, PANORAMA_SUFFIXES
+from .paths import absolute
 
 LENS = ("fx", "fy", "cx", "cy")
 CAMERA_SAMPLES = 9
@@ -94,7 +95,7 @@ def engine_to_world(scene: bpy.types.Scene) -> Matrix:
 
 def clip_path(clip: bpy.types.MovieClip) -> Path:
     """The absolute path of a clip."""
-    return Path(bpy.path.abspath(clip.filepath, library=clip.library))
+    return absolute(clip.filepath, clip.library)
 
 
 def clip_table(scene: bpy.types.Scene) -> dict[str, Any]:
@@ -156,10 +157,10 @@ def start_frame(scene: bpy.types.Scene) -> int:
 def _existing(path: str, what: str) -> str:
     if not path:
         raise ShotError(f"Choose the {what}, or choose From the Clip.")
-    absolute = Path(bpy.path.abspath(path))
-    if not absolute.is_file():
-        raise ShotError(f"The {what} {absolute} is not there: choose it again.")
-    return str(absolute)
+    file = absolute(path)
+    if not file.is_file():
+        raise ShotError(f"The {what} {file} is not there: choose it again.")
+    return str(file)
 
 
 # camera
@@ -403,7 +404,7 @@ def _world_tables(scene: bpy.types.Scene, rotation: Matrix) -> list[dict[str, An
         strength = node.inputs["Strength"].default_value
         if source is None or source.type != "TEX_ENVIRONMENT" or source.image is None or strength == 0.0:
             continue
-        path = Path(bpy.path.abspath(source.image.filepath, library=source.image.library))
+        path = absolute(source.image.filepath, source.image.library)
         if source.projection != "EQUIRECTANGULAR" or path.suffix.lower() not in PANORAMA_SUFFIXES:
             raise ShotError(
                 f"The world's picture {source.image.name} cannot be used: it has to be an .exr or .hdr panorama."

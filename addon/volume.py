@@ -1,7 +1,6 @@
 """The result: a Volume object that plays the sequence, with a material of the smoke's optical properties."""
 
 import math
-from pathlib import Path
 from typing import Any
 
 import bpy
@@ -9,6 +8,7 @@ from bpy.app.handlers import persistent
 from mathutils import Vector
 
 from .contract import FRAME_FILE, MADE_UP
+from .paths import absolute, relative
 from .scene_file import engine_to_world, frame_rate
 from .take import Take
 
@@ -45,7 +45,12 @@ def shown_take(scene: bpy.types.Scene) -> Take | None:
     obj = scene.smokelift.volume
     if obj is None or obj.type != "VOLUME" or not obj.data.filepath:
         return None
-    return Take(_absolute(obj.data).parent)
+    return take_of(obj.data)
+
+
+def take_of(volume: bpy.types.Volume) -> Take:
+    """The take that a Volume with a file plays."""
+    return Take(absolute(volume.filepath, volume.library).parent)
 
 
 def provenance_note(scene: bpy.types.Scene) -> str:
@@ -62,10 +67,6 @@ def _provenance(parts: list[dict[str, Any]]) -> str:
             detail, seed = part["settings"]["detail"], part["settings"]["seed"]
             return f"The camera's view is measured. Depth detail {detail:.2g} is made up: variation {seed}."
     return "The camera's view is measured. Nothing is made up: the depth is smooth."
-
-
-def _absolute(volume: bpy.types.Volume) -> Path:
-    return Path(bpy.path.abspath(volume.filepath, library=volume.library))
 
 
 def _object(scene: bpy.types.Scene) -> bpy.types.Object:
@@ -97,9 +98,7 @@ def _correct_position(obj: bpy.types.Object, domain: dict[str, Any]) -> None:
 
 def _set_sequence(volume: bpy.types.Volume, scene: bpy.types.Scene, take: Take, index: dict[str, Any]) -> None:
     numbers = sorted(int(number) for number in index["frames"])
-    path = str(take.directory / FRAME_FILE.format(numbers[0]))
-    if bpy.data.filepath:
-        path = _relative(path)
+    path = relative(take.directory / FRAME_FILE.format(numbers[0]))
     if volume.filepath != path:
         volume.filepath = path
     volume.is_sequence = True
@@ -127,13 +126,6 @@ def _set_sequence(volume: bpy.types.Volume, scene: bpy.types.Scene, take: Take, 
     volume.velocity_scale = 1.0 if real else ratio
     volume.render.clipping = 0.0
     volume.display.density = index["scene"]["medium"]["extinction"]  # the viewport shows the render's optical depth
-
-
-def _relative(path: str) -> str:
-    try:
-        return bpy.path.relpath(path)
-    except ValueError:  # on another drive
-        return path
 
 
 def _set_material(volume: bpy.types.Volume, medium: dict[str, float]) -> None:

@@ -88,7 +88,7 @@ class SequenceWriter:
         self._domain = scene.domain
         self._background = background
         if background is not None:
-            scene = replace(scene, background=Background(image=self.directory / BACKGROUND))
+            scene = replace(scene, background=Background(image=self.directory.resolve() / BACKGROUND))
         # Through JSON, so that it compares equal to what is read back.
         run = {"scene": scene_to_dict(scene, self.directory.resolve()), "settings": dict(settings)}
         self._index = Index(

@@ -331,6 +331,44 @@ def test_it_survives_saving_and_loading(shot, tmp_path) -> None:
     assert settings.volume.data.materials[0].node_tree.nodes[volume.SHADER].inputs["Density"].default_value == 4.0
 
 
+def reopened(folder: Path) -> bpy.types.Scene:
+    """Save the file in a folder and open it again; returns its scene."""
+    folder.mkdir()
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "shot.blend"))
+    quietly(lambda: bpy.ops.wm.open_mainfile(filepath=str(folder / "shot.blend")))
+    return bpy.context.scene
+
+
+@pytest.mark.parametrize("saved_first", [False, True])
+def test_deleting_earlier_results_spares_what_is_on_show(shot, tmp_path, saved_first) -> None:
+    """Whichever Volume of the file shows it, and however Blender writes the way to an output beside its folder."""
+    output = tmp_path / "elsewhere"
+    shot.smokelift.output = str(output)
+    if saved_first:
+        shot = reopened(tmp_path / "shot")
+    for number in (1, 2, 3):
+        made(output, number=number)
+    copy = volume.show(shot, Take(output / "take_0002")).copy()
+    copy.data = copy.data.copy()
+    shot.collection.objects.link(copy)
+    volume.show(shot, Take(output / "take_0003"))
+    shot = reopened(tmp_path / "later")
+    assert bpy.ops.smokelift.remove_takes() == {"FINISHED"}
+    assert sorted(path.name for path in output.iterdir()) == ["take_0002", "take_0003"]
+    assert plays(shot, 3) == 3
+
+
+def test_a_stopped_run_is_found_again_under_its_own_name(shot, tmp_path) -> None:
+    """The engine resumes what lies at the path it knows: also after the file was first saved, somewhere else."""
+    take = made(tmp_path / "elsewhere")
+    index = json.loads((take.directory / "sequence.json").read_text())
+    (take.directory / "sequence.json").write_text(json.dumps({**index, "complete": False}))
+    take.write({}, [])
+    volume.show(shot, take)
+    shot = reopened(tmp_path / "shot")
+    assert run.unfinished(shot) == take
+
+
 def test_nothing_of_the_session_is_saved(shot, tmp_path) -> None:
     """Jobs belong to the Blender that runs them."""
     bpy.context.window_manager.smokelift.jobs.add().take = "somewhere"

@@ -171,6 +171,16 @@ def test_a_frame_without_its_state_is_made_again(tmp_path: Path, no_vdb: None) -
     assert Sequence.open(tmp_path).frames == (1, 2, 3)
 
 
+def test_a_run_is_resumed_through_another_path_to_its_directory(tmp_path: Path, no_vdb: None) -> None:
+    """Blender's relative paths have ``..`` in them."""
+    background = np.zeros((4, 4, 3), np.float32)
+    cut_off(tmp_path / "run", [1], background=background)
+    (tmp_path / "shot").mkdir()
+    other = tmp_path / "shot" / ".." / "run"
+    with SequenceWriter(other, SCENE, SETTINGS, npz=True, resume=True, background=background) as writer:
+        assert writer.finished == (1,)
+
+
 def test_another_run_is_not_resumed(tmp_path: Path, no_vdb: None) -> None:
     cut_off(tmp_path, [1])
     other = {**SETTINGS, "density": {"iterations": 13}}

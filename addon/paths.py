@@ -1,0 +1,30 @@
+"""Blender's paths as the file system has them."""
+
+import os
+from pathlib import Path
+
+import bpy
+
+
+def absolute(path: str, library: bpy.types.Library | None = None) -> Path:
+    """The absolute path, without the ``..`` that Blender's relative paths begin with: so it can be compared.
+
+    Parameters
+    ----------
+    path
+        As Blender keeps it; ``//`` is the folder of the .blend, or of the library.
+    library
+        The .blend that the owner of the path is linked from.
+    """
+    found = bpy.path.abspath(path, library=library)
+    return Path(os.path.abspath(found))  # noqa: PTH100 - resolve() follows links, which Blender keeps
+
+
+def relative(path: Path) -> str:
+    """The path as Blender keeps it: relative to a saved .blend on the same drive, else absolute."""
+    if not bpy.data.filepath:
+        return str(path)
+    try:
+        return bpy.path.relpath(str(path))
+    except ValueError:  # on another drive
+        return str(path)
