@@ -243,6 +243,11 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
             ("gpu", "Graphics Card", "The graphics card, or fail"),
         ],
     )
+    assumed_camera: PointerProperty(
+        name="Assumed Camera",
+        description="Camera object that stands where the clip was assumed to be filmed from",
+        type=bpy.types.Object,
+    )
     volume: PointerProperty(name="Result", description="Volume object that shows the smoke", type=bpy.types.Object)
 
 

@@ -11,6 +11,7 @@ from typing import Any
 import bpy
 from mathutils import Matrix, Vector
 
+from .kept import set_unless_changed
 from .take import Take
 
 NAME = "Smokelift"
@@ -53,19 +54,24 @@ def set_up(scene: bpy.types.Scene, take: Take, index: dict[str, Any]) -> None:
 
 
 def assumed_camera(scene: bpy.types.Scene, index: dict[str, Any]) -> bpy.types.Object | None:
-    """The camera that the engine assumed, made or moved; None if the engine used the scene's own."""
-    if scene.smokelift.camera_mode != "GUESS":
+    """The camera that the engine assumed, made or moved; None if the engine used the scene's own.
+
+    Its place and its lens stay where the artist changed them.
+    """
+    settings = scene.smokelift
+    if settings.camera_mode != "GUESS":
         return None
     table = index["scene"]["camera"]
     name = f"{NAME} Camera"
-    camera = scene.objects.get(name)
-    if camera is None or camera.type != "CAMERA":
+    camera = settings.assumed_camera or scene.objects.get(name)
+    if camera is None or camera.type != "CAMERA" or camera.name not in scene.objects:
         camera = bpy.data.objects.new(name, bpy.data.cameras.new(name))
+        camera.data.sensor_fit, camera.data.sensor_width = "AUTO", SENSOR_WIDTH
         scene.collection.objects.link(camera)
-    camera.matrix_world = Matrix(table["matrix"])
-    camera.data.sensor_fit = "AUTO"
-    camera.data.sensor_width = SENSOR_WIDTH
-    camera.data.lens = table["fx"] * SENSOR_WIDTH / max(table["size"])
+    settings.assumed_camera = camera
+    set_unless_changed(camera, "place", camera, "matrix_basis", Matrix(table["matrix"]))
+    lens = table["fx"] * camera.data.sensor_width / max(table["size"])
+    set_unless_changed(camera.data, "lens", camera.data, "lens", lens)
     if scene.camera is None:
         scene.camera = camera
     return camera

@@ -8,6 +8,7 @@ from bpy.app.handlers import persistent
 from mathutils import Vector
 
 from .contract import FRAME_FILE, MADE_UP
+from .kept import set_unless_changed
 from .paths import absolute, relative
 from .scene_file import engine_to_world, frame_rate
 from .take import Take
@@ -22,6 +23,8 @@ PROVENANCE = "smokelift_provenance"
 def show(scene: bpy.types.Scene, take: Take) -> bpy.types.Object | None:
     """Show a take's finished frames in the scene's Volume object, which is made if there is none.
 
+    What the artist changed of its place and material stays.
+
     Returns
     -------
     The Volume object, or None while no frame is finished.
@@ -32,7 +35,7 @@ def show(scene: bpy.types.Scene, take: Take) -> bpy.types.Object | None:
     obj = _object(scene)
     if shown_take(scene) != take:
         obj.delta_location = (0.0, 0.0, 0.0)
-        obj.matrix_world = engine_to_world(scene)
+        set_unless_changed(obj, "place", obj, "matrix_basis", engine_to_world(scene))
     _correct_position(obj, index["scene"]["domain"])
     _set_sequence(obj.data, scene, take, index)
     _set_material(obj.data, index["scene"]["medium"])
@@ -124,8 +127,9 @@ def _set_sequence(volume: bpy.types.Volume, scene: bpy.types.Scene, take: Take, 
         volume.velocity_grid = "velocity"
     volume.velocity_unit = "SECOND"
     volume.velocity_scale = 1.0 if real else ratio
-    volume.render.clipping = 0.0
-    volume.display.density = index["scene"]["medium"]["extinction"]  # the viewport shows the render's optical depth
+    set_unless_changed(volume, "clipping", volume.render, "clipping", 0.0)
+    # the viewport shows the render's optical depth
+    set_unless_changed(volume, "density", volume.display, "density", index["scene"]["medium"]["extinction"])
 
 
 def _set_material(volume: bpy.types.Volume, medium: dict[str, float]) -> None:
@@ -137,9 +141,13 @@ def _set_material(volume: bpy.types.Volume, medium: dict[str, float]) -> None:
     shader = material.node_tree.nodes.get(SHADER) if material.node_tree else None
     if shader is None:
         return  # the user's own material
-    shader.inputs["Density"].default_value = medium["extinction"]
-    shader.inputs["Color"].default_value = (*[medium["albedo"]] * 3, 1.0)
-    shader.inputs["Anisotropy"].default_value = medium["anisotropy"]
+    values = {
+        "Density": medium["extinction"],
+        "Color": (*[medium["albedo"]] * 3, 1.0),
+        "Anisotropy": medium["anisotropy"],
+    }
+    for name, value in values.items():
+        set_unless_changed(material, name.lower(), shader.inputs[name], "default_value", value)
 
 
 def _material(name: str) -> bpy.types.Material:

@@ -20,7 +20,7 @@ from conftest import quietly, rendered
 from smokelift.output.images import write_image
 from smokelift.output.vdb import write_vdb
 from smokelift.output.video import write_video
-from smokelift.scene import Domain, Medium, Scene, scene_to_dict
+from smokelift.scene import Camera, Domain, Medium, Scene, scene_to_dict
 from tests.example_shot import EXAMPLE
 
 FRAMES = 6
@@ -208,15 +208,26 @@ def test_a_turned_box_turns_the_smoke(shot, tmp_path) -> None:
     assert list(shift) == pytest.approx([-0.0625] * 3 if HALF_VOXEL_TOO_FAR else [0.0] * 3, abs=1e-6)
 
 
-def test_smoke_that_was_moved_stays_where_it_was_put_while_it_grows(shot, tmp_path) -> None:
-    """Another take puts it into the shot again."""
+def test_smoke_that_was_moved_stays_where_it_was_put(shot, tmp_path) -> None:
+    """While it grows, and when it is made anew: also if the box was rotated meanwhile."""
     first = made(tmp_path)
     obj = volume.show(shot, first)
-    obj.location.x += 5.0
+    obj.location.x, obj.rotation_euler.z, obj.scale = obj.location.x + 5.0, 0.5, (2.0, 2.0, 2.0)
     volume.show(shot, first)
-    assert obj.location.x == pytest.approx(5.0)
+    shot.smokelift.box.rotation_euler.z = 0.7
+    bpy.context.view_layer.update()
     volume.show(shot, made(tmp_path, number=2))
-    assert obj.location.x == pytest.approx(0.0)
+    assert obj.location.x == pytest.approx(5.0)
+    assert (obj.rotation_euler.z, obj.scale.x) == pytest.approx((0.5, 2.0))
+
+
+def test_smoke_that_was_not_moved_follows_the_box(shot, tmp_path) -> None:
+    """Another take, in a box that was rotated meanwhile."""
+    obj = volume.show(shot, made(tmp_path))
+    shot.smokelift.box.rotation_euler.z = 0.7
+    bpy.context.view_layer.update()
+    volume.show(shot, made(tmp_path, number=2))
+    assert obj.rotation_euler.z == pytest.approx(0.7)
 
 
 # what it is made of
@@ -277,6 +288,19 @@ def test_running_again_replaces(shot, tmp_path) -> None:
     assert obj.data.frame_duration == 3
     shader = obj.data.materials[0].node_tree.nodes[volume.SHADER]
     assert shader.inputs["Density"].default_value == 9.0
+
+
+def test_a_material_that_was_changed_stays(shot, tmp_path) -> None:
+    """What was changed of it and of the view, when the smoke is made anew; the rest is the new medium's."""
+    obj = volume.show(shot, made(tmp_path))
+    inputs = obj.data.materials[0].node_tree.nodes[volume.SHADER].inputs
+    inputs["Density"].default_value, inputs["Color"].default_value = 12.0, (1.0, 0.5, 0.2, 1.0)
+    obj.data.display.density = 1.5
+    volume.show(shot, made(tmp_path, medium=Medium(9.0, 0.5, -0.2), number=2))
+    assert inputs["Density"].default_value == 12.0
+    assert list(inputs["Color"].default_value) == pytest.approx([1.0, 0.5, 0.2, 1.0])
+    assert inputs["Anisotropy"].default_value == pytest.approx(-0.2)
+    assert obj.data.display.density == 1.5
 
 
 def test_a_material_of_the_users_own_is_left_alone(shot, tmp_path) -> None:
@@ -386,8 +410,6 @@ def test_a_guessed_camera_is_made(shot, tmp_path, size) -> None:
     """With the engine's lens and place; the scene's own camera stays the scene's."""
     from bpy_extras.object_utils import world_to_camera_view
 
-    from smokelift.scene import Camera
-
     own = shot.camera
     shot.smokelift.camera_mode = "GUESS"
     shot.render.resolution_x, shot.render.resolution_y = size
@@ -410,3 +432,27 @@ def test_a_guessed_camera_is_made(shot, tmp_path, size) -> None:
     run.present(shot, take)
     assert shot.camera == obj
     assert replace(camera, size=size) == camera
+
+
+def test_a_guessed_camera_that_was_changed_stays(shot, tmp_path) -> None:
+    """Under any name: its place and its lens, each on its own."""
+    shot.smokelift.camera_mode = "GUESS"
+    takes = [made(tmp_path, number=number) for number in (1, 2)]
+    for take, distance in zip(takes, (5.0, 8.0), strict=True):
+        index = json.loads((take.directory / "sequence.json").read_text())
+        camera = Camera.look_at((0.0, -distance, 1.0), (0.0, 0.0, 1.0), fov_y_degrees=6 * distance, size=(256, 384))
+        index["scene"]["camera"] = scene_to_dict(Scene(camera=camera))["camera"]
+        (take.directory / "sequence.json").write_text(json.dumps(index))
+    run.present(shot, takes[0])
+    (obj,) = (obj for obj in shot.objects if obj.type == "CAMERA" and obj != shot.camera)
+    obj.name, obj.location.y = "Mine", -6.0
+    run.present(shot, takes[0])
+    assert obj.location.y == -6.0
+    run.present(shot, takes[1])
+    assert len([obj for obj in shot.objects if obj.type == "CAMERA"]) == 2
+    assert obj.location.y == -6.0
+    lens = obj.data.lens
+    assert lens == pytest.approx(18.0 / math.tan(math.radians(24.0)), rel=1e-4), "the lens was not changed by hand"
+    obj.data.lens = 85.0
+    run.present(shot, takes[0])
+    assert obj.data.lens == 85.0
