@@ -5,9 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from smokelift.footage.clip import Clip, is_video
-from smokelift.footage.images import Picture, area_average, read_image
+from smokelift.footage.images import Picture, area_average, linear_to_srgb, read_image
 from smokelift.footage.plate import Plates, changing_plate, known_plate
 from smokelift.scene import Background, Camera, CompleteScene, Scene, shared_part
+
+ALIKE, MOST = 8 / 255, 0.8
+"""Difference in sRGB values up to which a pixel has a backdrop's colour, and share of the pixels that have to have it:
+the others are a nozzle, a floor, a logo."""
 
 
 def open_plates(background: Background | None, camera: Camera | None) -> Clip | None:
@@ -111,3 +115,10 @@ def behind(plate: Picture, own: Camera, camera: Camera) -> Picture:
     if part is None:
         return np.asarray(plate.mean((0, 1)))
     return area_average(area_average(plate, *own.size)[part], *camera.size)
+
+
+def backdrop_colour(plate: Picture) -> Picture | None:
+    """Return the linear colour (3,) of a clean plate (rows, columns, 3) that has one, and None of others."""
+    colour = np.asarray(np.median(plate.reshape(-1, 3), axis=0), np.float32)
+    alike = (np.abs(linear_to_srgb(plate) - linear_to_srgb(colour)) <= ALIKE).all(-1)
+    return colour if alike.mean() >= MOST else None

@@ -9,6 +9,7 @@ import pytest
 from PIL import Image
 
 from smokelift.footage.clip import Clip
+from smokelift.output.framing import frame_smoke
 from smokelift.output.images import eight_bit, write_image
 from smokelift.output.preview import (
     SHEET_ANGLES,
@@ -22,7 +23,7 @@ from smokelift.output.preview import (
 from smokelift.output.sequence import Sequence
 from smokelift.output.viewer import Viewer
 from smokelift.output.writer import SequenceWriter
-from smokelift.scene import Background, completed
+from smokelift.scene import Background, Camera, completed
 from smokelift.transport import Velocity
 
 
@@ -39,11 +40,11 @@ def test_a_contact_sheet_has_all_tiles(plume, tmp_path, count) -> None:
     """Rows of frames, columns of input and views, whatever the number of frames; smoke in every tile."""
     sequence = written(plume.scene, plume.densities[:count], tmp_path / "out")
     with Clip.open(plume.scene.clip) as clip:
-        write_contact_sheet(tmp_path / "sheet.png", sequence, clip)
+        write_contact_sheet(tmp_path / "sheet.png", sequence, clip, frame_smoke(sequence))
     with Image.open(tmp_path / "sheet.png") as sheet:
         pixels = np.asarray(sheet)
     columns = 1 + len(SHEET_ANGLES)
-    width = round(40 * SHEET_HEIGHT / 56)
+    width = framed(sequence).size[0]
     assert width * columns < pixels.shape[1] < (width + 8) * columns + 8
     assert pixels.shape[0] > SHEET_HEIGHT
     rows = pixels.shape[0] // SHEET_HEIGHT
@@ -53,9 +54,14 @@ def test_a_contact_sheet_has_all_tiles(plume, tmp_path, count) -> None:
         assert pixels[:, left : left + width // 2].max() > 100
 
 
-def tiles(path, rows: int, columns: int) -> list[list[np.ndarray]]:
+def framed(sequence: Sequence) -> Camera:
+    """The camera of the pictures of a sheet."""
+    return frame_smoke(sequence).camera(sequence.scene.camera, SHEET_HEIGHT)
+
+
+def tiles(path, sequence: Sequence, rows: int, columns: int) -> list[list[np.ndarray]]:
     """The pictures of a sheet, by row and column."""
-    width = round(40 * SHEET_HEIGHT / 56)
+    width = framed(sequence).size[0]
     with Image.open(path) as sheet:
         pixels = np.asarray(sheet).astype(int)
     assert pixels.shape[:2] == (16 + rows * (SHEET_HEIGHT + 20), 4 + columns * (width + 4))
@@ -68,10 +74,11 @@ def tiles(path, rows: int, columns: int) -> list[list[np.ndarray]]:
 def test_an_orbit_shows_one_moment_from_twelve_angles(plume, tmp_path) -> None:
     """The first is the camera's own; each angle shows other smoke than the one opposite."""
     sequence = written(plume.scene, plume.densities, tmp_path / "out")
-    write_orbit(tmp_path / "orbit.png", sequence)
-    shown = [tile for row in tiles(tmp_path / "orbit.png", 2, 6) for tile in row]
+    framing = frame_smoke(sequence)
+    write_orbit(tmp_path / "orbit.png", sequence, framing)
+    shown = [tile for row in tiles(tmp_path / "orbit.png", sequence, 2, 6) for tile in row]
     assert all(tile.max() > 100 for tile in shown)
-    viewer = Viewer(sequence.scene, sequence.scene.camera.resized(229, SHEET_HEIGHT))
+    viewer = Viewer(sequence.scene, framed(sequence))
     own = eight_bit(viewer.image(4, plume.densities[3]))
     assert np.abs(shown[0] - own).max() <= 1
     assert np.abs(shown[0] - shown[6][:, ::-1]).max() > 20
@@ -84,12 +91,13 @@ def test_a_strip_shows_consecutive_frames_from_the_side(plume, tmp_path, count, 
     scene = plume.write(tmp_path / "clip", densities, plume.scene)
     sequence = written(scene, densities, tmp_path / "out")
     with Clip.open(scene.clip) as clip:
-        write_strip(tmp_path / "strip.png", sequence, clip)
-    filmed, side = tiles(tmp_path / "strip.png", 2, columns)
+        write_strip(tmp_path / "strip.png", sequence, clip, frame_smoke(sequence))
+    filmed, side = tiles(tmp_path / "strip.png", sequence, 2, columns)
     assert all(tile.max() > 100 for tile in (*filmed, *side))
     top = [np.flatnonzero(tile.max((1, 2)) > 100)[0] for tile in side]
     assert top == sorted(top, reverse=True)
-    assert top[0] - top[-1] == pytest.approx({1: 0, 5: 55, 14: 0}[count], abs=8)
+    rise = {1: 0, 5: 9.6, 14: 0}[count]  # in the clip's pixels
+    assert top[0] - top[-1] == pytest.approx(rise * SHEET_HEIGHT / frame_smoke(sequence).height, abs=10)
 
 
 def test_the_video_turns_while_it_plays(plume, tmp_path) -> None:
@@ -99,7 +107,7 @@ def test_the_video_turns_while_it_plays(plume, tmp_path) -> None:
     scene = replace(scene, clip=replace(scene.clip, fps=4.0))
     sequence = written(scene, still, tmp_path / "out")
     with Clip.open(scene.clip) as clip:
-        write_preview(tmp_path / "preview.mp4", sequence, clip)
+        write_preview(tmp_path / "preview.mp4", sequence, clip, frame_smoke(sequence))
     with Clip.open(tmp_path / "preview.mp4") as preview:
         width = preview.size[0] // 3
         front, turning = ([preview.frame(n)[:, p * width : (p + 1) * width] for n in (0, 4)] for p in (1, 2))
@@ -108,26 +116,35 @@ def test_the_video_turns_while_it_plays(plume, tmp_path) -> None:
         assert np.abs(turning[1] - turning[0]).max() > 0.08
 
 
-def test_a_plate_does_not_turn_along(plume, tmp_path) -> None:
-    """The turning view has the plate's mean colour behind it, from its first frame on."""
-    halves = np.zeros((56, 40, 3), np.float32)
-    halves[:28] = 0.4
-    write_image(tmp_path / "plate.exr", halves)
-    scene = replace(plume.scene, background=Background(image=tmp_path / "plate.exr"))
+@pytest.mark.parametrize(
+    ("plate", "scattering", "behind"),
+    [
+        ([0.4, 0.0], "single", 0.0),  # what is behind the smoke from aside is not known
+        ([0.4, 0.0], "absorption", 0.2),  # before black it would not be seen
+        ([0.4, 0.4], "single", 0.4),
+    ],
+)
+def test_a_plate_does_not_turn_along(plume, tmp_path, plate, scattering, behind) -> None:
+    """The turning view has one colour behind it, from its first frame on; the front has the plate."""
+    picture = np.repeat(np.float32(plate), 28)[:, None, None] * np.ones((1, 40, 3), np.float32)
+    write_image(tmp_path / "plate.exr", picture)
+    scene = replace(plume.scene, background=Background(image=tmp_path / "plate.exr"), scattering=scattering)
     sequence = written(scene, plume.densities, tmp_path / "out")
+    framing = replace(frame_smoke(sequence), left=0, top=0, width=40, height=56)
     with Clip.open(scene.clip) as clip:
-        write_preview(tmp_path / "preview.mp4", sequence, clip)
+        write_preview(tmp_path / "preview.mp4", sequence, clip, framing)
     with Clip.open(tmp_path / "preview.mp4") as preview:
         for n in (0, 4):
-            corners = preview.frame(n)[[20, -20], -20]
-            np.testing.assert_allclose(corners, 0.2, atol=0.02)
+            np.testing.assert_allclose(preview.frame(n)[[20, -20], -20], behind, atol=0.02)
+            front = preview.frame(n)[[20, -20], preview.size[0] // 2]
+            np.testing.assert_allclose(front.mean(-1), plate, atol=0.02)
 
 
 def test_a_preview_shows_three_views(plume, tmp_path) -> None:
     """Input, front and turned view side by side, a frame each, at the clip's rate."""
     sequence = written(plume.scene, plume.densities, tmp_path / "out")
     with Clip.open(plume.scene.clip) as clip:
-        write_preview(tmp_path / "preview.mp4", sequence, clip)
+        write_preview(tmp_path / "preview.mp4", sequence, clip, frame_smoke(sequence))
         rate = clip.fps
     with Clip.open(tmp_path / "preview.mp4") as preview:
         assert len(preview) == len(plume.densities)
@@ -147,8 +164,10 @@ def test_a_moving_camera_and_its_plates_are_followed(plume, tracked, tmp_path) -
         write_image(tmp_path / f"plate_{n}.exr", np.full((56, 40, 3), 0.1 * n, np.float32))
     sequence = written(scene, plume.densities, tmp_path / "out")
     with Clip.open(tracked.clip) as clip:
-        write_contact_sheet(tmp_path / "sheet.png", sequence, clip)
-        write_preview(tmp_path / "preview.mp4", sequence, clip)
+        write_contact_sheet(tmp_path / "sheet.png", sequence, clip, frame_smoke(sequence))
+        write_preview(tmp_path / "preview.mp4", sequence, clip, frame_smoke(sequence))
     with Clip.open(tmp_path / "preview.mp4") as preview:
-        corners = [preview.frame(n)[:40, 380:640] for n in (0, 4)]
-        assert corners[0].mean() < 0.02 < 0.3 < corners[1].mean()
+        third = preview.size[0] // 3
+        front, turning = ([preview.frame(n)[:20, p * third : (p + 1) * third] for n in (0, 4)] for p in (1, 2))
+        assert np.median(front[0]) < 0.02 < 0.3 < np.median(front[1])
+        assert np.median(turning[1]) < 0.02

@@ -8,6 +8,7 @@ from typing import Any
 from smokelift.app.options import named_path
 from smokelift.app.progress import Reporter
 from smokelift.footage.clip import Clip
+from smokelift.output.framing import frame_smoke
 from smokelift.output.layout import CONTACT_SHEET, ORBIT, PICTURES, PREVIEW, STRIP
 from smokelift.output.preview import write_contact_sheet, write_orbit, write_preview, write_strip
 from smokelift.output.sequence import Sequence
@@ -32,10 +33,11 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     device.start(options.device)
     out = options.out or sequence.directory
     out.mkdir(parents=True, exist_ok=True)
+    framing = frame_smoke(sequence)
     with Clip.open(sequence.scene.clip) as clip:
-        write_contact_sheet(out / CONTACT_SHEET, sequence, clip)
-        write_orbit(out / ORBIT, sequence)
-        write_strip(out / STRIP, sequence, clip)
-        write_preview(out / PREVIEW, sequence, clip)
+        write_contact_sheet(out / CONTACT_SHEET, sequence, clip, framing)
+        write_orbit(out / ORBIT, sequence, framing)
+        write_strip(out / STRIP, sequence, clip, framing)
+        write_preview(out / PREVIEW, sequence, clip, framing)
     files = [str(out / name) for name in PICTURES]
     say.finish(f"{', '.join(files[:-1])} and {files[-1]} written.", {"files": files})
