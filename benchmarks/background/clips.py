@@ -94,6 +94,7 @@ class Frames:
     warning: str | None = None
     fps = FPS
     files: tuple[Path, ...] = ()
+    notes: tuple[str, ...] = ()
 
     def __init__(self, codes: npt.NDArray[np.uint8]) -> None:
         self.codes, self.count = codes, len(codes)
@@ -101,6 +102,10 @@ class Frames:
     def read(self, n: int) -> Picture:
         """Return a frame, linear."""
         return srgb_to_linear(self.codes[n].astype(np.float32) / np.float32(255))
+
+    def damaged(self, first: int, last: int) -> tuple[int, ...]:
+        """None."""
+        return ()
 
     def close(self) -> None:
         """Nothing is open."""

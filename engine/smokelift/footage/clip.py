@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from functools import cached_property
 from pathlib import Path
 from types import TracebackType
 
 import numpy as np
 
-from smokelift.footage.frame_source import ClipError, FrameSource
+from smokelift.footage.frame_source import ClipError, DamagedFrameError, FrameSource
 from smokelift.footage.image_sequence import ImageSequence
 from smokelift.footage.images import Picture, Transfer
 from smokelift.footage.video import Video
@@ -103,9 +105,48 @@ class Clip:
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """What the frames are read from: the video, or the pictures of the range."""
+        """What the frames are read from: the video, or the pictures of the range that exist."""
         files = self._source.files
-        return files if len(files) == 1 else files[self.first : self.first + self._count]
+        own = files if len(files) == 1 else files[self.first : self.first + self._count]
+        return tuple(file for file in own if file.exists())
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """How the pictures are read where that is not the usual way, a sentence each."""
+        return self._source.notes
+
+    def remarks(self) -> tuple[str, ...]:
+        """What is to be said of the clip, a sentence each: defects, frames that are replaced, how pictures are read.
+
+        Raises
+        ------
+        ClipError
+            If most frames are damaged.
+        """
+        told = [self.warning] if self.warning else []
+        if self.damaged:
+            told.append(
+                f"{self.path}: {numbered([self.first + n for n in self.damaged])} missing or damaged; the last sound "
+                "frame stands in."
+            )
+        return (*told, *self.notes)
+
+    @cached_property
+    def damaged(self) -> tuple[int, ...]:
+        """Frames that cannot be decoded; for each the last one before it that can be, or else the next, stands in.
+
+        Raises
+        ------
+        ClipError
+            If there are more of them than of others.
+        """
+        damaged = self._source.damaged(self.first, self.first + self._count - 1)
+        if 2 * len(damaged) > self._count > 1:
+            raise ClipError(
+                f"{self.path}: {len(damaged)} of its {self._count} frames are missing or cannot be decoded; export "
+                "the clip anew, or choose sound frames"
+            )
+        return tuple(n - self.first for n in damaged)
 
     def frame(self, n: int) -> Picture:
         """Return frame ``n``, counted from 0 at the start of the range.
@@ -117,19 +158,31 @@ class Clip:
         Raises
         ------
         ClipError
-            If there is no such frame or it is damaged.
+            If there is no such frame, or most frames of the clip are damaged.
         """
         if not 0 <= n < self._count:
             raise ClipError(f"{self.path}: there is no frame {n}; there are 0 to {self._count - 1}")
         if n in self._cache:
             self._cache.move_to_end(n)
             return self._cache[n]
-        image = self._source.read(self.first + n)
+        image = self._read(n)
         image.flags.writeable = False
         self._cache[n] = image
         while len(self._cache) > max(1, CACHE_BYTES // image.nbytes):
             self._cache.popitem(last=False)
         return image
+
+    def _read(self, n: int) -> Picture:
+        """Return a frame from the file, or what stands in for it: the last sound one lasts on, as when one drops."""
+        try:
+            return self._source.read(self.first + n)
+        except DamagedFrameError as error:
+            damage = error
+        for other in (*reversed(range(n)), *range(n + 1, self._count)):
+            if other not in self.damaged:
+                with suppress(DamagedFrameError):
+                    return self._source.read(self.first + other)
+        raise damage
 
     def __len__(self) -> int:
         return self._count
@@ -176,11 +229,27 @@ class _Changed:
         self.count, self.fps, self.warning = source.count, source.fps, source.warning
         self.files = source.files
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        return self._source.notes
+
     def read(self, n: int) -> Picture:
         return self._change(n - self._first, self._source.read(n))
 
+    def damaged(self, first: int, last: int) -> tuple[int, ...]:
+        return self._source.damaged(first, last)
+
     def close(self) -> None:
         self._source.close()
+
+
+def numbered(frames: Sequence[int]) -> str:
+    """Return "frame 3 is", or "frames 3, 4 and 9 are"; of many the first five."""
+    words = [str(n) for n in frames[:5]]
+    if len(frames) == 1:
+        return f"frame {words[0]} is"
+    last = f"{len(frames) - 5} more" if len(frames) > 5 else words.pop()
+    return f"frames {', '.join(words)} and {last} are"
 
 
 def is_video(path: Path) -> bool:

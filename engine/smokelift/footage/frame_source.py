@@ -15,6 +15,10 @@ class ClipError(ValueError):
     """A clip, or a frame of it, that cannot be read."""
 
 
+class DamagedFrameError(ClipError):
+    """A frame that is missing or cannot be decoded; those around it may be sound."""
+
+
 class FrameSource(Protocol):
     """The frames of one file or sequence, counted from 0 over the whole of it.
 
@@ -35,8 +39,17 @@ class FrameSource(Protocol):
     warning: str | None
     files: tuple[Path, ...]
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """How the pictures are read where that is not the usual way, a sentence each."""
+        ...
+
     def read(self, n: int) -> Picture:
-        """Return a frame, linear; raise ClipError if it is damaged."""
+        """Return a frame, linear; raise `DamagedFrameError` if it cannot be decoded."""
+        ...
+
+    def damaged(self, first: int, last: int) -> tuple[int, ...]:
+        """Return which frames from one to another, both included, raise `DamagedFrameError`."""
         ...
 
     def close(self) -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from smokelift.footage.frame_source import DEFAULT_FPS, ClipError
-from smokelift.footage.images import READABLE, ImageError, Picture, Transfer, read_image
+from smokelift.footage.frame_source import DEFAULT_FPS, ClipError, DamagedFrameError
+from smokelift.footage.images import READABLE, ImageError, Picture, Transfer, area_average, read_image, reduction
 
 
 class ImageSequence:
@@ -25,7 +25,7 @@ class ImageSequence:
     Raises
     ------
     ClipError
-        If there is no such picture, or one is missing.
+        If there is no such picture, or more are missing than there are.
     """
 
     def __init__(self, path: Path, transfer: Transfer | None, fps: float | None) -> None:
@@ -43,26 +43,48 @@ class ImageSequence:
         """Return whether a path, to judge by its name, is that of one or more pictures."""
         return "#" in path.name or path.suffix.lower() in READABLE
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """That the pictures are reduced, if they are."""
+        if self._shape is None or reduction(*self._shape[:2]) == 1:
+            return ()
+        height, width = self._shape[:2]
+        small = " x ".join(str(round(side / reduction(width, height))) for side in (width, height))
+        return (f"The pictures of {width} x {height} pixels are reduced to {small}.",)
+
     def read(self, n: int) -> Picture:
         """Return a picture, or raise ClipError if it is damaged or of another size than the first."""
         try:
             image = read_image(self.files[n], self._transfer)
         except ImageError as error:
-            raise ClipError(str(error)) from error
+            raise DamagedFrameError(str(error)) from error
         self._shape = self._shape or image.shape
         if image.shape != self._shape:
             raise ClipError(
                 f"{self.files[n]}: is {image.shape[1]} x {image.shape[0]} pixels, "
                 f"the first picture {self._shape[1]} x {self._shape[0]}"
             )
-        return image
+        height, width = image.shape[:2]
+        divisor = reduction(width, height)
+        return image if divisor == 1 else area_average(image, round(width / divisor), round(height / divisor))
+
+    def damaged(self, first: int, last: int) -> tuple[int, ...]:
+        """Return which pictures from one to another are missing or cannot be read."""
+        return tuple(n for n in range(first, last + 1) if not self._readable(n))
+
+    def _readable(self, n: int) -> bool:
+        try:
+            self.read(n)
+        except DamagedFrameError:
+            return False
+        return True
 
     def close(self) -> None:
         """Nothing is held open."""
 
 
 def _numbered(path: Path) -> list[Path]:
-    """Return the pictures of a sequence in order, or raise ClipError naming the first that is missing."""
+    """Return the pictures of a sequence in order, or raise ClipError if most are missing."""
     hashes = re.fullmatch(r"([^#]*)(#+)([^#]*)", path.name)
     digits = re.fullmatch(r"(.*?)(\d+)(\.[^.]+)", path.name)
     if "#" in path.name and hashes is None:
@@ -81,9 +103,13 @@ def _numbered(path: Path) -> list[Path]:
     start = min(found, default=0) if hashes else int(number)
     if start not in found:
         raise ClipError(f"{path}: no such pictures")
-    last = max(found)
-    for n in range(start, last + 1):
-        if n not in found:
-            missing = path.with_name(f"{prefix}{n:0{len(number)}d}{suffix}")
-            raise ClipError(f"{missing}: this picture is missing; the sequence goes on to {found[last].name}")
-    return [found[n] for n in range(start, last + 1)]
+    later = [n for n in found if n >= start]
+    last = max(later)
+    if last - start + 1 > 2 * len(later):
+        missing = next(n for n in range(start, last) if n not in found)
+        name = path.with_name(f"{prefix}{missing:0{len(number)}d}{suffix}")
+        raise ClipError(
+            f"{name}: this picture is missing, as most are up to {found[last].name}; give the "
+            "first picture of those that belong together"
+        )
+    return [found.get(n) or path.with_name(f"{prefix}{n:0{len(number)}d}{suffix}") for n in range(start, last + 1)]

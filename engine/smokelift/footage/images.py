@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Literal
@@ -21,6 +21,7 @@ import OpenEXR
 import scipy.sparse
 from PIL import Image, ImageOps
 
+from smokelift.footage.colour import Encoding, hlg_to_linear, pq_to_linear
 from smokelift.footage.container import open_container
 from smokelift.scene import LARGEST_PICTURE
 
@@ -29,6 +30,10 @@ Transfer = Literal["srgb", "linear"]
 
 MOST_PIXELS = 2**28
 """Pixels of a picture, at most."""
+
+LONGEST_SIDE = 4096
+"""Pixels along the longer side of a clip's pictures; larger ones are reduced while they are read. The finest grid has
+144 voxels along a side, so smoke on a twentieth of the picture still has more pixels than voxels."""
 
 READABLE = (".png", ".jpg", ".jpeg", ".exr", ".hdr")
 
@@ -53,22 +58,33 @@ def linear_to_srgb(linear: npt.ArrayLike) -> Picture:
     return encoded
 
 
-def decode_integers(codes: npt.NDArray[np.uint8] | npt.NDArray[np.uint16], transfer: Transfer | None = None) -> Picture:
+_DECODERS: Mapping[Encoding, Callable[[npt.ArrayLike], Picture]] = {
+    "srgb": srgb_to_linear,
+    "hlg": hlg_to_linear,
+    "pq": pq_to_linear,
+}
+
+
+def decode_integers(
+    codes: npt.NDArray[np.uint8] | npt.NDArray[np.uint16], encoding: Encoding | None = None, white: float = 1.0
+) -> Picture:
     """Return integer pixels [row, column, rgb or rgba] as linear RGB, alpha over black.
 
     Parameters
     ----------
     codes
-        8 or 16 bit values whose largest is white.
-    transfer
+        8 or 16 bit values.
+    encoding
         How they encode light; None is ``"srgb"``.
+    white
+        Share of the largest value that stands for white, and for opaque.
     """
     top = np.iinfo(codes.dtype).max
-    steps = np.arange(top + 1, dtype=np.float32) / np.float32(top)
-    table = steps if transfer == "linear" else srgb_to_linear(steps)
+    steps = np.arange(top + 1, dtype=np.float32) / np.float32(top * white)
+    table = steps if encoding == "linear" else _DECODERS[encoding or "srgb"](steps)
     linear: Picture = table[codes[..., :3]]
     if codes.shape[-1] == 4:
-        linear *= steps[codes[..., 3:]]
+        linear *= np.minimum(steps, np.float32(1.0))[codes[..., 3:]]
     return linear
 
 
@@ -107,6 +123,11 @@ def read_image(path: str | Path, transfer: Transfer | None = None) -> Picture:
     # Three libraries, each with its own exceptions; to the caller they all say the same.
     except (RuntimeError, ValueError, LookupError, SyntaxError, OSError, Image.DecompressionBombError) as error:
         raise ImageError(f"{path}: cannot be read: {' '.join(str(error).split())}") from error
+
+
+def reduction(width: int, height: int) -> int:
+    """Return by how much the sides of a picture are divided, so that none exceeds `LONGEST_SIDE`."""
+    return -(-max(width, height) // LONGEST_SIDE)
 
 
 def _require_size(path: Path, width: int, height: int) -> None:

@@ -3,9 +3,10 @@
 The container is read once at the start, without decoding, for the times of all frames; after that any frame can be
 had, and frames in a row cost one decode each.
 
-What a file says about its colours is honoured: matrix and range through FFmpeg's converter (an untagged video is read
-as BT.601, as FFmpeg writes one), rotation and mirroring flags, alpha (over black). The converter is asked to round
-exactly: by default FFmpeg's is half an 8 bit step too dark.
+What a file says about its pictures is honoured: matrix and range through FFmpeg's converter (an untagged video is read
+as BT.601, as FFmpeg writes one), transfer and primaries (`colour`), rotation and mirroring flags, the shape of pixels,
+interlacing (one field of each frame is used), alpha (over black). The converter is asked to round exactly: by default
+FFmpeg's is half an 8 bit step too dark.
 
 A video whose rate varies by more than 1 % is read at its mean rate: frame n is the picture on show at n / fps.
 """
@@ -21,21 +22,27 @@ from typing import Any
 import av
 import numpy as np
 import numpy.typing as npt
+from av.filter import Graph
 from av.sidedata.sidedata import Type as SideData
-from av.video.reformatter import Interpolation
+from av.video.reformatter import ColorRange, Interpolation
 
+from smokelift.footage.colour import ENCODINGS, primaries_name, to_bt709
 from smokelift.footage.container import open_container
-from smokelift.footage.frame_source import DEFAULT_FPS, ClipError
-from smokelift.footage.images import Picture, Transfer, decode_integers
+from smokelift.footage.frame_source import DEFAULT_FPS, ClipError, DamagedFrameError
+from smokelift.footage.images import MOST_PIXELS, Picture, Transfer, area_average, decode_integers, reduction
 from smokelift.scene import LARGEST_PICTURE
 
-_EXACT_CONVERSION = int(
-    Interpolation.BICUBIC | Interpolation.ACCURATE_RND | Interpolation.FULL_CHR_H_INT | Interpolation.FULL_CHR_H_INP
-)
+_EXACT = int(Interpolation.ACCURATE_RND | Interpolation.FULL_CHR_H_INT | Interpolation.FULL_CHR_H_INP)
+_GROWING, _SHRINKING = int(Interpolation.BICUBIC) | _EXACT, int(Interpolation.AREA) | _EXACT
+
+SQUARE = 0.01
+"""Difference from 1 of the shape of pixels that is not worth another grid of pixels."""
 
 
 class Video:
     """One video stream with an index of the times of its frames.
+
+    Its attributes are those of `FrameSource`.
 
     ``_times`` are the frames' presentation times in the stream's time base, in order; ``_keys`` those where
     decoding can start; ``_shown`` maps a frame of the clip to one of them. Containers without presentation
@@ -53,6 +60,7 @@ class Video:
             raise ClipError(f"{path}: is a folder; for pictures give a pattern such as {path}/frame_####.png")
         if not path.is_file():
             raise ClipError(f"{path}: is a pipe or a device, which cannot be read twice; save it as a file")
+        self._failed = False  # whether decoding has
         self._start()
         self._times, self._keys, broken = self._index()
         if not self._times:
@@ -61,6 +69,7 @@ class Video:
         if broken:
             self._drop_undecodable_end()
             self.warning = f"{path}: is truncated; its first {len(self._times)} frames can be used"
+        self._varies, self._interlaced = False, False
         self.fps, self._shown = self._steady()
         self.count = len(self._shown)
 
@@ -77,12 +86,32 @@ class Video:
         if self._stream.codec_context is None:
             self._container.close()
             raise ClipError(f"{self._path}: holds video of a kind that cannot be decoded")
-        if max(self._stream.width, self._stream.height) > LARGEST_PICTURE:
+        width, height = self._stream.width, self._stream.height
+        if max(width, height) > LARGEST_PICTURE or width * height > MOST_PIXELS:
             self._container.close()
-            raise ClipError(f"{self._path}: has pictures wider or higher than {LARGEST_PICTURE} pixels")
-        self._stream.thread_type = "AUTO"
-        self._decoded: Iterator[av.VideoFrame] = self._container.decode(self._stream)
+            raise ClipError(
+                f"{self._path}: has pictures of {width} x {height} pixels; the largest that are read have "
+                f"{LARGEST_PICTURE} along a side and {MOST_PIXELS} in all"
+            )
+        # A decoder of several frames at once takes sound ones along when one fails.
+        self._stream.thread_type = "SLICE" if self._failed else "AUTO"
+        self._decoded = self._frames()
         self._next = 0  # index into _times of the frame that decoding on will give
+
+    def _frames(self) -> Iterator[av.VideoFrame]:
+        """Decode on from where the container stands, without what cannot be decoded."""
+        packets = self._container.demux(self._stream)
+        while True:
+            try:
+                packet = next(packets)
+            except (StopIteration, av.FFmpegError):
+                return
+            try:
+                frames = packet.decode()
+            except av.FFmpegError:
+                self._failed = True
+                continue
+            yield from frames
 
     def _index(self) -> tuple[list[int], list[int], bool]:
         """Return the times of all frames and of the key frames, and whether the file broke off."""
@@ -118,12 +147,7 @@ class Video:
     def _count(self) -> list[int]:
         """Return made-up times, by decoding everything, for a container that has none."""
         self._rewind()
-        count = 0
-        try:
-            for _ in self._decoded:
-                count += 1
-        except av.FFmpegError:
-            self.warning = f"{self._path}: is damaged; its first {count} frames can be used"
+        count = sum(1 for _ in self._decoded)
         self._rewind()
         return list(range(count))
 
@@ -155,16 +179,62 @@ class Video:
             steady = 1.0 / (mean * float(base))
             near = rate is not None and abs(float(rate) - steady) < 0.01 * steady
             return float(rate if near and rate is not None else steady), list(range(count))
+        self._varies = True
         shown = [bisect.bisect_right(self._times, self._times[0] + mean * n + 0.5) - 1 for n in range(count)]
         return float(Fraction(1) / (Fraction(mean) * base)), shown
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """How the pictures are read, as far as they have been."""
+        context, stream = self._stream.codec_context, self._stream
+        encoding, primaries = ENCODINGS.get(context.color_trc), primaries_name(context.color_primaries)
+        width, height = self._size()
+        told = [f"The frame rate varies: the clip is read at its mean, {self.fps:.4g} frames a second."] * self._varies
+        if encoding in ("hlg", "pq") and self._transfer is None:
+            told.append(f"Transfer {encoding.upper()}: diffuse white is brought to 1, highlights exceed it.")
+        if primaries is not None:
+            told.append(f"Primaries {primaries} are brought to BT.709.")
+        if (width, height) != (stream.width, stream.height):
+            shape = float(self._pixel_shape())
+            oblong = f", {shape:.3g} times as wide as high," if shape != 1 else ""
+            told.append(
+                f"Pictures of {stream.width} x {stream.height} pixels{oblong} are scaled to {width} x {height} square "
+                "ones."
+            )
+        if self._interlaced:
+            told.append("The clip is interlaced: one field of each frame is used, so its lines are half as fine.")
+        return tuple(told)
 
     def close(self) -> None:
         """Close the file."""
         self._container.close()
 
     def read(self, n: int) -> Picture:
-        """Return a frame, or raise ClipError if it is damaged."""
+        """Return a frame, or raise `DamagedFrameError`."""
         return self._picture(self._decode(self._shown[n]))
+
+    def damaged(self, first: int, last: int) -> tuple[int, ...]:
+        """Return which frames from one to another cannot be decoded."""
+        wanted = [self._times[self._shown[n]] for n in range(first, last + 1)]
+        if not self._keys:
+            return ()  # they were counted by decoding them
+        self._container.seek(wanted[0], stream=self._stream)
+        good = self._good_times(wanted[-1])
+        if not good.issuperset(wanted):  # as in `_decode`
+            self._rewind()
+            good |= self._good_times(wanted[-1])
+        self._rewind()
+        return tuple(first + n for n, time in enumerate(wanted) if time not in good)
+
+    def _good_times(self, last: int) -> set[int]:
+        """Times of the frames that can be decoded from where the container stands, up to one."""
+        good = set()
+        for frame in self._frames():
+            if frame.pts is not None and not frame.is_corrupt:
+                good.add(frame.pts)
+            if frame.pts is not None and frame.pts >= last:
+                break
+        return good
 
     def _decode(self, index: int) -> av.VideoFrame:
         """Return the decoded frame at an index into ``_times``."""
@@ -175,7 +245,7 @@ class Video:
         key_between = reached is not None and any(reached < key <= wanted for key in self._keys)
         if reached is None or wanted < reached or key_between:
             self._container.seek(wanted, stream=self._stream)
-            self._decoded = self._container.decode(self._stream)
+            self._decoded = self._frames()
         frame = self._forward_to(wanted)
         if frame is None:
             # A seek may land late (open groups of pictures); from the start nothing can be missed.
@@ -183,31 +253,36 @@ class Video:
             frame = self._forward_to(wanted)
         if frame is None:
             self._rewind()
-            raise ClipError(f"{self._path}: frame {index} is damaged and cannot be decoded")
+            raise DamagedFrameError(f"{self._path}: frame {index} is damaged and cannot be decoded")
         self._next = index + 1
         return frame
 
     def _forward_to(self, wanted: int) -> av.VideoFrame | None:
-        try:
-            for frame in self._decoded:
-                if frame.pts is not None and frame.pts >= wanted:
-                    return frame if frame.pts == wanted and not frame.is_corrupt else None
-        except av.FFmpegError:
-            pass
+        for frame in self._decoded:
+            if frame.pts is not None and frame.pts >= wanted:
+                return frame if frame.pts == wanted and not frame.is_corrupt else None
         return None
 
     def _decode_by_count(self, index: int) -> av.VideoFrame:
         if index < self._next:
             self._rewind()
-        try:
-            while True:
-                frame = next(self._decoded)
-                self._next += 1
-                if self._next == index + 1:
-                    return frame
-        except (StopIteration, av.FFmpegError) as error:
-            self._rewind()
-            raise ClipError(f"{self._path}: frame {index} is damaged and cannot be decoded") from error
+        for frame in self._decoded:
+            self._next += 1
+            if self._next == index + 1:
+                return frame
+        self._rewind()
+        raise DamagedFrameError(f"{self._path}: frame {index} is damaged and cannot be decoded")
+
+    def _pixel_shape(self) -> Fraction:
+        """Return how many times as wide as high a pixel is, as stored."""
+        shape = self._stream.sample_aspect_ratio
+        return Fraction(1) if not shape or abs(shape - 1) <= SQUARE else Fraction(shape)
+
+    def _size(self) -> tuple[int, int]:
+        """Return the width and the height of the pictures that are read, as stored: pixels are square."""
+        width, height = self._stream.width * self._pixel_shape(), self._stream.height
+        divisor = reduction(round(width), height)
+        return max(1, round(width / divisor)), max(1, round(height / divisor))
 
     def _picture(self, frame: av.VideoFrame) -> Picture:
         components = frame.format.components
@@ -219,8 +294,45 @@ class Video:
             raise ClipError(
                 f"{self._path}: changes its picture size from {size[0]} x {size[1]} to {frame.width} x {frame.height}"
             )
-        codes = frame.reformat(format=layout, interpolation=_EXACT_CONVERSION).to_ndarray()
-        return decode_integers(_upright(codes, frame), self._transfer)
+        width, height = self._size()
+        interlaced = bool(frame.interlaced_frame)
+        shown = self._field(frame) if interlaced else frame
+        way = _SHRINKING if width < size[0] else _GROWING
+        rows = shown.height if interlaced else height
+        codes: npt.NDArray[Any] = shown.reformat(width, rows, layout, interpolation=way).to_ndarray()
+        encoding = self._transfer or ENCODINGS.get(self._stream.codec_context.color_trc)
+        linear = decode_integers(codes, encoding, _white(frame))
+        if interlaced:
+            self._interlaced = True
+            linear = area_average(_between_lines(linear, frame.height), width, height)
+        return to_bt709(_upright(linear, frame), self._stream.codec_context.color_primaries)
+
+    def _field(self, frame: av.VideoFrame) -> av.VideoFrame:
+        """Return the even lines of a frame: their colours too are of one moment."""
+        graph = Graph()
+        graph.link_nodes(graph.add_buffer(self._stream), graph.add("field", "type=top"), graph.add("buffersink"))
+        graph.configure()
+        graph.vpush(frame)
+        field: av.VideoFrame = graph.vpull()
+        return field
+
+
+def _white(frame: av.VideoFrame) -> float:
+    """Return what FFmpeg's converter makes of white, as a share of the largest value: it only shifts wide codes up."""
+    bits = max(component.bits for component in frame.format.components)
+    if bits <= 8 or bits >= 16 or frame.format.is_rgb:
+        return 1.0
+    grey = len(frame.format.components) < 3  # read as of full range, whatever it says
+    limited = frame.color_range != ColorRange.JPEG and not grey
+    return 255 / 256 if limited else (2**bits - 1) * 2 ** (16 - bits) / 65535
+
+
+def _between_lines(even: Picture, rows: int) -> Picture:
+    """Return the whole picture of its even rows: each other row is the mean of its neighbours."""
+    picture = np.repeat(even, 2, axis=0)[:rows]
+    odd = picture[1:-1:2]
+    odd += 0.5 * (picture[2::2] - odd)
+    return picture
 
 
 def _upright(pixels: npt.NDArray[Any], frame: av.VideoFrame) -> npt.NDArray[Any]:

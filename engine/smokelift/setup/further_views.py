@@ -37,7 +37,7 @@ def open_view(number: int, clip: Clip, scene: CompleteScene) -> tuple[ShotView, 
     """
     view, name = scene.views[number], f"View {number + 1}"
     opened = _opened(view.clip, clip, scene)
-    notes = [opened.warning] if opened.warning else []
+    notes = [*opened.remarks()]
     if abs(opened.fps - clip.fps) > SAME_RATE * clip.fps:
         raise ValueError(
             f"{opened.path}: has {opened.fps:g} frames a second, the input {clip.fps:g}; all views need the same, so "

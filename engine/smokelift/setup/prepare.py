@@ -47,6 +47,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
         If the scene contradicts the clip or itself, or lacks what cannot be estimated.
     """
     _check(clip, scene)
+    remarks = clip.remarks()
     found = find_plates(clip, scene.camera, scene.background)
     plates = found.plates
     exposure = exposure_notes(clip, plates)
@@ -54,8 +55,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
     samples = sample_smoke(clip, plates)
     geometry = find_geometry(clip, scene, settings, plates, samples)
     camera, domain = geometry.camera, geometry.domain
-    notes = [clip.warning] if clip.warning else []
-    notes += [*found.notes, *exposure, *geometry.notes]
+    notes = [*remarks, *found.notes, *exposure, *geometry.notes]
     if settings.axis_depth is not None:
         SmokeAxis.given(settings.axis_depth, camera, domain)  # refuse early what cannot be
     medium = scene.medium

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
 from smokelift.density.borrowed_moments import unseen_sides
 from smokelift.density.turntable import Turntable
+from smokelift.footage.clip import Clip, numbered
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
 
@@ -46,6 +47,7 @@ def provenance(shot: Shot) -> tuple[Provenance, ...]:
     """Where the parts of a shot's densities and velocities come from, the best known first."""
     settings, cameras = shot.settings, len(shot.views)
     told = [
+        *_pictures(shot.clip),
         Provenance(
             "optical depth of every ray",
             "measured",
@@ -75,6 +77,15 @@ def provenance(shot: Shot) -> tuple[Provenance, ...]:
 def made_up(shot: Shot) -> tuple[str, ...]:
     """What of a result will be made up, a sentence each, to be said before a run."""
     return tuple(part.how for part in provenance(shot) if part.origin == "made up")
+
+
+def _pictures(clip: Clip) -> Iterator[Provenance]:
+    """What was done to the input's pictures, and which of them are not its own."""
+    if clip.notes:
+        yield Provenance("pictures", "measured", " ".join(clip.notes))
+    if clip.damaged:
+        how = "Those of {} missing or damaged; the last sound one stands in."
+        yield Provenance("some pictures", "assumed", how.format(numbered([n + 1 for n in clip.damaged])))
 
 
 def _assumed(settings: Settings, cameras: int) -> str:

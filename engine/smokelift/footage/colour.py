@@ -1,0 +1,75 @@
+"""How files encode light, by the code points of ITU-T H.273 that FFmpeg shows, and the way to linear BT.709.
+
+Linear light has diffuse white at 1, as an sRGB picture has: BT.2408 puts it at 75 % of the signal in HLG and at 203
+cd/m2 in PQ. Highlights exceed 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+Values = npt.NDArray[np.float32]
+Encoding = Literal["srgb", "linear", "hlg", "pq"]
+
+ENCODINGS: Mapping[int, Encoding] = {8: "linear", 16: "pq", 18: "hlg"}
+"""By their transfer characteristics; all others are read as sRGB, as screens show them."""
+
+_D65 = (0.3127, 0.3290)
+_BT709 = ((0.640, 0.330), (0.300, 0.600), (0.150, 0.060))
+_PRIMARIES = {
+    5: ("BT.601 (625 lines)", ((0.640, 0.330), (0.290, 0.600), (0.150, 0.060))),
+    6: ("BT.601 (525 lines)", ((0.630, 0.340), (0.310, 0.595), (0.155, 0.070))),
+    7: ("SMPTE 240M", ((0.630, 0.340), (0.310, 0.595), (0.155, 0.070))),
+    9: ("BT.2020", ((0.708, 0.292), (0.170, 0.797), (0.131, 0.046))),
+    12: ("Display P3", ((0.680, 0.320), (0.265, 0.690), (0.150, 0.060))),
+}
+"""Name, and chromaticities of red, green and blue, of what has a D65 white and is not BT.709."""
+
+_HLG = (0.17883277, 0.28466892, 0.55991073)
+_PQ = (2610 / 16384, 2523 / 4096 * 128, 3424 / 4096, 2413 / 4096 * 32, 2392 / 4096 * 32)
+_HLG_WHITE = 0.75
+_PQ_WHITE = 203 / 10_000
+
+
+def hlg_to_linear(signal: npt.ArrayLike) -> Values:
+    """Decode hybrid log-gamma (BT.2100, inverse OETF: light at the camera, not on a screen)."""
+    a, b, c = _HLG
+
+    def scene(values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        return np.where(values <= 0.5, values**2 / 3, (np.exp((np.maximum(values, 0.5) - c) / a) + b) / 12)
+
+    e = np.maximum(np.asarray(signal, np.float64), 0.0)
+    return np.asarray(scene(e) / scene(np.array(_HLG_WHITE)), np.float32)
+
+
+def pq_to_linear(signal: npt.ArrayLike) -> Values:
+    """Decode the perceptual quantiser (BT.2100 and SMPTE ST 2084, EOTF)."""
+    m1, m2, c1, c2, c3 = _PQ
+    e = np.maximum(np.asarray(signal, np.float64), 0.0) ** (1 / m2)
+    screen = (np.maximum(e - c1, 0.0) / (c2 - c3 * e)) ** (1 / m1)
+    return np.asarray(screen / _PQ_WHITE, np.float32)
+
+
+def primaries_name(primaries: int) -> str | None:
+    """Return the name of primaries that are converted, None of those that are taken for BT.709."""
+    return _PRIMARIES[primaries][0] if primaries in _PRIMARIES else None
+
+
+def to_bt709(linear: Values, primaries: int) -> Values:
+    """Bring linear colours [row, column, rgb] to BT.709; what it cannot show is clipped at 0."""
+    if primaries not in _PRIMARIES:
+        return linear
+    matrix = np.linalg.solve(_to_xyz(_BT709), _to_xyz(_PRIMARIES[primaries][1])).astype(np.float32)
+    converted: Values = np.maximum(linear @ matrix.T, np.float32(0.0))
+    return converted
+
+
+def _to_xyz(chromaticities: tuple[tuple[float, float], ...]) -> npt.NDArray[np.float64]:
+    """The matrix from RGB with a D65 white to CIE XYZ (SMPTE RP 177)."""
+    red, green, blue, white = (np.array([x / y, 1.0, (1 - x - y) / y]) for x, y in (*chromaticities, _D65))
+    columns = np.stack([red, green, blue], axis=1)
+    return np.asarray(columns * np.linalg.solve(columns, white))
