@@ -26,7 +26,7 @@ MOST = 8.0
 
 def choose_strength(
     frames: Sequence[CoarseFrame], settings: DensitySettings, tolerance: float
-) -> tuple[float, tuple[Choice[str], ...]]:
+) -> tuple[float, float, tuple[Choice[str], ...]]:
     """Choose the strength of the lights as a multiple of what is given.
 
     Parameters
@@ -42,6 +42,8 @@ def choose_strength(
     -------
     factor
         1 where the clip does not contradict the given lights.
+    error
+        What multiple scattering in light of that strength leaves (`held_out_error`).
     choices
         One where it does, else none.
     """
@@ -60,13 +62,13 @@ def choose_strength(
     # the weakest of those that are nearly as good as the best
     chosen = next(factor for factor, tried in errors.items() if tried <= min(errors.values()) + tolerance)
     if chosen == 1.0:
-        return 1.0, ()
+        return 1.0, errors[1.0], ()
     reason = (
         f"Light: {chosen:.2f} times as strong as given, since the smoke is brighter than the given light can make it; "
         f"held-out pixels differ by {errors[chosen]:.1%} of the smoke's contrast instead of {errors[1.0]:.1%}."
     )
     measured = {"factor": chosen, "error": errors[chosen], "error_as_given": errors[1.0]}
-    return chosen, (Choice("light strength", f"{chosen:.3g}", reason, measured, tolerance),)
+    return chosen, errors[chosen], (Choice("light strength", f"{chosen:.3g}", reason, measured, tolerance),)
 
 
 def scaled(scene: CompleteScene, factor: float) -> CompleteScene:

@@ -81,10 +81,13 @@ def choose_model(
         return Model(scene, replace(velocity, levels=velocity.grids), ())
     lit, directions = choose_directions(scene, frames, settings.density)
     strength: tuple[Choice[str], ...] = ()
+    error_of_multiple = None
     # what single scattering lacks would be taken for light that is missing
     if scene.scattering == "multiple" or (scene.scattering == "single" and tries_multiple(scene) and not by_hand):
         alike = [frame.in_light_of(lit).scattered_by("multiple") for frame in frames]
-        factor, strength = choose_strength(alike, settings.density, settings.selection.scattering_error)
+        factor, error_of_multiple, strength = choose_strength(
+            alike, settings.density, settings.selection.scattering_error
+        )
         scene, lit = scaled(scene, factor), scaled(lit, factor)
     frames = [frame.in_light_of(lit) for frame in frames]
     if by_hand:
@@ -92,7 +95,7 @@ def choose_model(
         scattered: Choice[str] = Choice("scattering", said, f"Scattering by hand: {said}.", by_hand=True)
     else:
         scattering, scattered = choose_scattering(
-            frames, scene.scattering, settings.density, settings.selection.scattering_error
+            frames, scene.scattering, settings.density, settings.selection.scattering_error, error_of_multiple
         )
         lit = replace(lit, scattering=scattering)
         if directions and scattering != scene.scattering:

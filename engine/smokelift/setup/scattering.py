@@ -39,7 +39,11 @@ _WORDS: Mapping[str, str] = {
 
 
 def choose_scattering(
-    frames: Sequence[CoarseFrame], richest: Scattering, settings: DensitySettings, tolerance: float
+    frames: Sequence[CoarseFrame],
+    richest: Scattering,
+    settings: DensitySettings,
+    tolerance: float,
+    error_of_multiple: float | None = None,
 ) -> tuple[Scattering, Choice[str]]:
     """Choose the model of scattering.
 
@@ -54,10 +58,18 @@ def choose_scattering(
         How to fit.
     tolerance
         Error, as a share of what the smoke changes in the picture, that a cheaper model may add.
+    error_of_multiple
+        `held_out_error` of multiple scattering, if it is known already.
     """
-    errors = {richest: held_out_error(frames, richest, richest, settings)}
+
+    def own_error(model: Scattering) -> float:
+        if model == "multiple" and error_of_multiple is not None:
+            return error_of_multiple
+        return held_out_error(frames, model, model, settings)
+
+    errors = {richest: own_error(richest)}
     if richest == "single" and tries_multiple(frames[0].scene):
-        errors["multiple"] = held_out_error(frames, "multiple", "multiple", settings)
+        errors["multiple"] = own_error("multiple")
         if errors["multiple"] < errors["single"] - tolerance:
             richest = "multiple"
     chosen = richest

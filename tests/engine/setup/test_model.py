@@ -30,7 +30,7 @@ from smokelift.scene import (
     completed,
     look_at_matrix,
 )
-from smokelift.setup import scattering
+from smokelift.setup import light_strength, scattering
 from smokelift.setup.choice import Choice
 from smokelift.setup.coarse import LONGEST, coarse_domain, coarse_frame
 from smokelift.setup.prepare import prepare_shot
@@ -110,11 +110,27 @@ def test_thick_white_smoke_scatters_light_many_times(white, plume, draft) -> Non
 def test_single_scattering_is_kept_where_both_meet_the_picture(plume, draft, monkeypatch) -> None:
     """Multiple scattering has to be clearly nearer: it finds half as dense a smoke for the same picture."""
     own = {"single": 0.030, "multiple": 0.026}
-    monkeypatch.setattr(scattering, "held_out_error", lambda _, model, judge, __: own[judge] if model == judge else 0.4)
+    for module in (scattering, light_strength):
+        monkeypatch.setattr(module, "held_out_error", lambda _, model, judge, __: own[judge] if model == judge else 0.4)
     choice = chosen(shot_of(plume.scene, draft), "scattering")
     assert choice.chosen == "single"
     own["single"] = 0.2
     assert chosen(shot_of(plume.scene, draft), "scattering").chosen == "multiple"
+
+
+def test_no_model_is_measured_twice(plume, draft, monkeypatch) -> None:
+    """What is known of multiple scattering from the light's strength decides on it too."""
+    measured = []
+
+    def counted(frames, model, judge, settings) -> float:
+        measured.append((frames[0].scene.lights, model, judge))
+        return held_out_error(frames, model, judge, settings)
+
+    held_out_error = scattering.held_out_error
+    for module in (scattering, light_strength):
+        monkeypatch.setattr(module, "held_out_error", counted)
+    shot_of(plume.scene, draft)
+    assert len(measured) == len(set(measured))
 
 
 def test_thin_smoke_needs_no_shadows(thin, draft) -> None:
