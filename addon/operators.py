@@ -30,6 +30,7 @@ class SMOKELIFT_OT_run(_NeedsClip, bpy.types.Operator):
 
     bl_idname = "smokelift.run"
     bl_label = "Make Smoke"
+    bl_options = {"UNDO"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         return _make_smoke(self, context)
@@ -40,6 +41,7 @@ class SMOKELIFT_OT_vary(_NeedsClip, bpy.types.Operator):
 
     bl_idname = "smokelift.vary"
     bl_label = "Another Variation"
+    bl_options = {"UNDO"}
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -67,6 +69,7 @@ def _make_smoke(operator: bpy.types.Operator, context: bpy.types.Context) -> set
     except (ShotError, TakeError) as error:
         operator.report({"ERROR"}, str(error))
         return {"CANCELLED"}
+    volume.smoke_object(context.scene)
     run.enqueue(context, context.scene, take)
     return {"FINISHED"}
 

@@ -117,6 +117,10 @@ def _draw_run(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     for row in jobs:
         _draw_job(layout, context, row)
     if volume.shown_take(scene) is not None:
+        data = scene.smokelift.volume.data
+        last = data.frame_start + data.frame_duration - 1
+        if not data.frame_start <= scene.frame_current <= last:
+            _label(layout, context, f"The smoke is seen in frames {data.frame_start} to {last}.", "INFO")
         known = volume.provenance_note(scene)
         if known:
             _label(layout, context, known, "INFO")

@@ -12,6 +12,8 @@ from bpy.props import (
     StringProperty,
 )
 
+from . import volume
+
 SEEDS = 2**31
 """Numbers of variations: as many as Blender's whole numbers have from 0."""
 
@@ -36,6 +38,10 @@ def _box_chosen(settings: "SmokeliftSettings", context: bpy.types.Context) -> No
     if settings.box is not None:
         settings.camera_mode = "SCENE"
     _changed(settings, context)
+
+
+def _speed_chosen(_settings: "SmokeliftSettings", _context: bpy.types.Context) -> None:
+    volume.keep_step()
 
 
 def _is_mesh(_settings: "SmokeliftSettings", obj: bpy.types.Object) -> bool:
@@ -194,10 +200,10 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
         update=_changed,
     )
     transfer: EnumProperty(
-        name="Pixels",
+        name="Transfer",
         description="Transfer function of the clip's pixels",
         items=[
-            ("AUTO", "Automatic", "sRGB, or linear for EXR"),
+            ("AUTO", "Clip's Color Space", "As the clip's color space in the Movie Clip Editor says"),
             ("srgb", "sRGB", "Ordinary video and pictures"),
             ("linear", "Linear", "Proportional to light"),
         ],
@@ -230,9 +236,10 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
         name="Speed",
         description="Speed of the smoke if clip and scene differ in frame rate",
         items=[
-            ("REAL", "Real Time", "As fast as in reality"),
             ("FRAMES", "Frame by Frame", "One frame of the clip in each frame of the scene, as Blender plays clips"),
+            ("REAL", "Real Time", "As fast as in reality"),
         ],
+        update=_speed_chosen,
     )
     device: EnumProperty(
         name="Device",

@@ -164,7 +164,6 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
         self._not_shown: dict[str, Job] = {}  # jobs whose newest frames the viewport does not show yet
         self._check: Job | None = None
         self._thumbnails = bpy.utils.previews.new()
-        self._playhead: dict[str, int] = {}
 
     def _end(self, context: bpy.types.Context) -> None:
         self._queue.kill()
@@ -228,10 +227,8 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
         created = 0
         if scene is not None:
             before = _datablocks()
-            obj = present(scene, take)
+            present(scene, take)
             created = _datablocks() - before
-            if obj is not None and not bpy.app.background:
-                self._follow(scene, obj, row)
         if not bpy.app.background:
             row.icon = self._thumbnail(take)
             if created or job.ended:
@@ -242,15 +239,6 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
             if job.outcome == "failed":
                 # later: Blender never removes a modal operator that opens a window from its first one
                 bpy.app.timers.register(functools.partial(_open_log, row.take))
-
-    def _follow(self, scene: bpy.types.Scene, obj: bpy.types.Object, row: bpy.types.PropertyGroup) -> None:
-        """Move the playhead to the newest frame until the user moves it."""
-        before = self._playhead.get(row.take)
-        if before is not None and scene.frame_current != before:
-            return
-        newest = obj.data.frame_start + obj.data.frame_duration - 1
-        scene.frame_set(newest)
-        self._playhead[row.take] = newest
 
     def _thumbnail(self, take: Take) -> int:
         """The icon of the take's thumbnail; 0 if there is none."""

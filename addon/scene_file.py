@@ -19,6 +19,9 @@ from .contract import FEWEST_VOXELS, IMAGE_SUFFIXES, LONGEST_SIDE, PANORAMA_SUFF
 from .paths import absolute
 
 LENS = ("fx", "fy", "cx", "cy")
+TRANSFERS = {"sRGB": "srgb", "Linear Rec.709": "linear", "scene_linear": "linear", "Non-Color": "linear"}
+"""The engine's name of the transfer function of a clip's pixels, by Blender's colour space."""
+
 CAMERA_SAMPLES = 9
 """Frames that decide whether the camera moves."""
 
@@ -113,9 +116,24 @@ def clip_table(scene: bpy.types.Scene) -> dict[str, Any]:
         table["fps"] = settings.fps
     elif clip.source == "SEQUENCE":
         table["fps"] = frame_rate(scene)
-    if settings.transfer != "AUTO":
-        table["transfer"] = settings.transfer
+    transfer = _transfer(clip) if settings.transfer == "AUTO" else settings.transfer
+    if transfer is not None:
+        table["transfer"] = transfer
     return table
+
+
+def _transfer(clip: bpy.types.MovieClip) -> str | None:
+    """The transfer function that the clip's colour space says; None for the one that its kind of file has."""
+    space = clip.colorspace_settings.name
+    if not space:  # the colour management of this Blender does not know it
+        return None
+    if space not in TRANSFERS:
+        raise ShotError(
+            f"The clip's color space is {space}, and only sRGB and Linear Rec.709 can be read: convert the clip, or "
+            "choose sRGB or Linear as its Transfer under Advanced."
+        )
+    usual = "linear" if clip_path(clip).suffix.lower() in PANORAMA_SUFFIXES else "srgb"
+    return None if TRANSFERS[space] == usual else TRANSFERS[space]
 
 
 def _frame_count(clip: bpy.types.MovieClip) -> int:

@@ -12,6 +12,7 @@ import bpy
 from mathutils import Matrix, Vector
 
 from .kept import set_unless_changed
+from .paths import relative
 from .take import Take
 
 NAME = "Smokelift"
@@ -109,6 +110,7 @@ def _set_world(scene: bpy.types.Scene, take: Take, tables: dict[str, Any]) -> No
     """A world that shows the camera the clean plate, and lights the smoke as the scene's own world does."""
     world = scene.world
     if world is None or not world.name.startswith(NAME):
+        _remove_unused_worlds()
         if world is None:
             world = bpy.data.worlds.new(NAME)
         else:
@@ -141,6 +143,13 @@ def _set_world(scene: bpy.types.Scene, take: Take, tables: dict[str, Any]) -> No
         _set_plate_frames(plate, scene.smokelift.clip, "matrices" in tables["camera"])
 
 
+def _remove_unused_worlds() -> None:
+    """Remove the worlds of earlier set-ups, which the artist took out of their scenes."""
+    for world in list(bpy.data.worlds):
+        if world.users == 0 and world.node_tree is not None and NAME in world.node_tree.nodes:
+            bpy.data.worlds.remove(world)
+
+
 def _set_plate(
     tree: bpy.types.NodeTree, shader: bpy.types.ShaderNode, take: Take, background: dict[str, Any]
 ) -> bpy.types.ShaderNode | None:
@@ -163,6 +172,8 @@ def _set_plate(
     path = path if path.is_absolute() else take.directory / path
     node = colour.links[0].from_node
     node.image = bpy.data.images.load(str(path), check_existing=True)
+    if node.image.filepath != relative(path):
+        node.image.filepath = relative(path)
     return node
 
 

@@ -140,6 +140,7 @@ def test_window(root, installed) -> None:
         assert seen["outcome"] == "done"
         assert seen["progress"][-1] == frames
         assert len(seen["progress"]) > 3, "the count did not move while the job ran"
+        assert set(seen["playhead"]) == {LAST}, "the playhead was moved"
         stages = ("closed", "idle", "running", "done")
         closed, idle, running, done = (load(pictures / f"{name}_{stage}.png") for stage in stages)
         for picture in (closed, idle, running, done):
@@ -154,6 +155,8 @@ def test_window(root, installed) -> None:
             assert change(idle, done, middle) > 1, "no smoke is to be seen"
     assert max(report["clip_editor"]["longest_gaps"]) < LONGEST_GAP
     assert report["volumes"] == 1, "the second run did not replace the first"
+    assert report["active"], "the smoke is not the active object"
+    assert report["moved_with_the_clip"] == 5
     assert report["variation"] == 1, "the second run is no other variation"
     assert change(load(pictures / "view_3d_done.png"), load(pictures / "rendered.png"), middle) > 10
 

@@ -305,6 +305,22 @@ def test_a_picture_sequence_has_the_scenes_rate(shot, tmp_path) -> None:
     assert (table["fps"], table["transfer"]) == (120.0, "linear")
 
 
+@pytest.mark.parametrize(("space", "transfer"), [("sRGB", None), ("Linear Rec.709", "linear"), ("Non-Color", "linear")])
+def test_the_clips_color_space_counts(shot, space, transfer) -> None:
+    """As the Movie Clip Editor has it."""
+    shot.smokelift.clip.colorspace_settings.name = space
+    assert shot_tables(shot)["clip"].get("transfer") == transfer
+
+
+def test_a_color_space_that_cannot_be_read_is_refused(shot) -> None:
+    """In one sentence; who knows better chooses the transfer."""
+    shot.smokelift.clip.colorspace_settings.name = "Filmic Log"
+    with pytest.raises(ShotError, match=r"color space is Filmic Log.*convert the clip.*Transfer"):
+        shot_tables(shot)
+    shot.smokelift.transfer = "srgb"
+    assert shot_tables(shot)["clip"]["transfer"] == "srgb"
+
+
 def test_paths_beside_the_blend(shot, tmp_path) -> None:
     """// is the .blend's folder."""
     for name in ("clip.mp4", "plate.png"):

@@ -21,7 +21,7 @@ from smokelift.output.images import write_image
 from smokelift.output.vdb import write_vdb
 from smokelift.output.video import write_video
 from smokelift.scene import Camera, Domain, Medium, Scene, scene_to_dict
-from tests.example_shot import EXAMPLE
+from tests.example_shot import EXAMPLE, add
 
 FRAMES = 6
 HALF_VOXEL_TOO_FAR = bpy.app.version < (5, 0, 0)
@@ -89,15 +89,15 @@ def test_part_of_a_clip_plays_where_the_clip_does(shot, tmp_path) -> None:
 )
 def test_in_real_time_at_another_frame_rate(shot, tmp_path, fps, wanted) -> None:
     """A second of the clip is a second of the scene."""
-    shot.render.fps = fps
+    shot.render.fps, shot.smokelift.speed = fps, "REAL"
     volume.show(shot, made(tmp_path))
     assert [plays(shot, frame) for frame in range(len(wanted))] == wanted
     assert shot.smokelift.volume.data.velocity_scale == 1.0
 
 
 def test_frame_by_frame_at_another_frame_rate(shot, tmp_path) -> None:
-    """As Blender plays the clip itself; motion blur follows what is seen."""
-    shot.render.fps, shot.smokelift.speed = 48, "FRAMES"
+    """As Blender plays the clip itself, unless told otherwise; motion blur follows what is seen."""
+    shot.render.fps = 48
     volume.show(shot, made(tmp_path))
     assert [plays(shot, frame) for frame in (0, 1, 6, 7)] == [None, 1, 6, None]
     assert shot.smokelift.volume.data.velocity_scale == pytest.approx(2.0)
@@ -114,7 +114,7 @@ def tracked(take: Take, **tables: dict) -> dict:
 
 def test_smoke_keeps_step_with_a_camera_that_moves(shot, tmp_path) -> None:
     """Blender plays clip and track frame by frame, whatever their rate."""
-    shot.render.fps = 48
+    shot.render.fps, shot.smokelift.speed = 48, "REAL"
     take = made(tmp_path)
     tracked(take)
     volume.show(shot, take)
@@ -149,14 +149,34 @@ def test_the_plate_of_a_moving_camera_plays_beside_the_clip(shot, tmp_path, kind
     assert places[0] == places[1]
 
 
-def test_changing_the_speed_leaves_no_driver(shot, tmp_path) -> None:
-    """What was right for one rate is not kept for another."""
-    take = made(tmp_path)
+def test_changing_the_speed_acts_at_once_and_leaves_no_driver(shot, tmp_path) -> None:
+    """What was right for one speed is not kept for another."""
     shot.render.fps = 48
-    volume.show(shot, take)
-    shot.render.fps = 24
-    volume.show(shot, take)
+    volume.show(shot, made(tmp_path))
+    shot.smokelift.speed = "REAL"
+    assert [plays(shot, frame) for frame in (1, 2, 3, 12, 13)] == [1, 1, 2, 6, None]
+    shot.smokelift.speed = "FRAMES"
     assert [plays(shot, frame) for frame in (1, 2, 6, 7)] == [1, 2, 6, None]
+
+
+def test_the_smoke_keeps_step_with_a_clip_that_is_moved(shot, tmp_path) -> None:
+    """Frames chosen for the next run move nothing; a start that the artist gave the Volume stays."""
+    take = made(tmp_path)
+    index = json.loads((take.directory / "sequence.json").read_text())
+    index["scene"]["clip"]["frames"] = [10, 15]
+    (take.directory / "sequence.json").write_text(json.dumps(index))
+    data = volume.show(shot, take).data
+    assert data.frame_start == 11
+    shot.smokelift.first = 3
+    shot.smokelift.clip.frame_start = 101
+    volume.keep_step()  # Blender calls it where there is a window
+    assert data.frame_start == 111
+    shot.smokelift.clip.frame_offset = 4
+    volume.keep_step()
+    assert data.frame_start == 107
+    data.frame_start = 500
+    volume.keep_step()
+    assert data.frame_start == 500
 
 
 def test_it_grows(shot, tmp_path) -> None:
@@ -170,6 +190,38 @@ def test_it_grows(shot, tmp_path) -> None:
         obj = volume.show(shot, take)
         seen.append(obj and (obj.name, obj.data.frame_duration))
     assert seen == [None, ("Smoke clip.mp4", 2), ("Smoke clip.mp4", 5)]
+
+
+# what is there beside it
+
+
+def test_new_smoke_is_selected_and_active(shot, tmp_path) -> None:
+    """Once: made anew, it leaves the artist's selection alone."""
+    sun = shot.objects["Sun"]
+    sun.select_set(True)
+    obj = volume.show(shot, made(tmp_path))
+    assert bpy.context.view_layer.objects.active == obj
+    assert [other for other in shot.objects if other.select_get()] == [obj]
+    bpy.context.view_layer.objects.active = sun
+    volume.show(shot, made(tmp_path, number=2))
+    assert bpy.context.view_layer.objects.active == sun
+
+
+@pytest.mark.parametrize("change", [None, "location", "name", "vertex", "camera"])
+def test_the_cube_of_a_new_file_does_not_hide_the_smoke(shot, tmp_path, change) -> None:
+    """Where the place of the smoke is guessed; a cube that somebody made something of stays."""
+    cube = add(shot, "Cube", bpy.data.meshes.new("Cube"))
+    corners = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
+    cube.data.from_pydata(corners, [], [(0, 1, 3, 2), (4, 6, 7, 5)])
+    shot.smokelift.camera_mode = "SCENE" if change == "camera" else "GUESS"
+    if change == "location":
+        cube.location.x = 3.0
+    elif change == "name":
+        cube.name = "Crate"
+    elif change == "vertex":
+        cube.data.vertices[0].co.x = -2.0
+    volume.show(shot, made(tmp_path))
+    assert cube.hide_render == cube.hide_viewport == (change is None)
 
 
 # where it is
@@ -338,7 +390,7 @@ def test_it_survives_saving_and_loading(shot, tmp_path) -> None:
     bpy.ops.wm.save_as_mainfile(filepath=str(home / "shot.blend"))
     settings = shot.smokelift
     settings.first, settings.last, settings.quality, settings.output = 3, 8, "fine", "//out"
-    shot.render.fps = 48
+    shot.render.fps, settings.speed = 48, "REAL"
     volume.show(shot, made(home / "out"))
     assert settings.volume.data.filepath == "//out/take_0001/smoke_0001.vdb"
     bpy.ops.wm.save_mainfile()
@@ -391,6 +443,23 @@ def test_a_stopped_run_is_found_again_under_its_own_name(shot, tmp_path) -> None
     volume.show(shot, take)
     shot = reopened(tmp_path / "shot")
     assert run.unfinished(shot) == take
+
+
+def test_setting_up_keeps_the_plate_by_a_relative_path_and_no_old_world(shot, tmp_path) -> None:
+    """The project can be moved; the artist who takes another world and sets up again finds one world of ours."""
+    plate = tmp_path / "plate.png"
+    write_image(plate, np.full((16, 16, 3), 0.2, np.float32))
+    shot = reopened(tmp_path / "shot")
+    take = made(tmp_path / "out")
+    index = tracked(take, background={"image": str(plate)})
+    volume.show(shot, take)
+    own = shot.world
+    for _ in range(3):
+        shot.world = own
+        shot_setup.set_up(shot, take, index)
+    (image,) = (image for image in bpy.data.images if image.name == "plate.png")
+    assert image.filepath == "//../plate.png"
+    assert sorted(world.name for world in bpy.data.worlds) == ["Smokelift", "World"]
 
 
 def test_nothing_of_the_session_is_saved(shot, tmp_path) -> None:

@@ -16,7 +16,7 @@ from pathlib import Path
 import bpy
 
 FOLDER = Path(sys.argv[-1])
-PATIENCE_SECONDS = 60.0
+PATIENCE_SECONDS = 400.0
 ENDED = ("done", "failed", "cancelled")
 
 report: dict[str, object] = {}

@@ -50,6 +50,14 @@ def story() -> Iterator[float]:
     report["clip_editor"] = yield from make_smoke(window, area, "clip_editor", "bpy.ops.smokelift.vary()")
     report["variation"] = window.scene.smokelift.seed
 
+    # the clip moved in time: Blender tells the add-on
+    start, clip = volume(window).data.frame_start, window.scene.smokelift.clip
+    clip.frame_start += 5
+    yield 1.0
+    report["moved_with_the_clip"] = volume(window).data.frame_start - start
+    clip.frame_start -= 5
+    yield 1.0
+
     # the scene made to look like the clip, and Cycles in the viewport
     area.type = "VIEW_3D"
     yield 1.0
@@ -61,12 +69,18 @@ def story() -> Iterator[float]:
     yield 8.0
     yield from picture("rendered")
     report["volumes"] = sum(obj.type == "VOLUME" for obj in window.scene.objects)
+    report["active"] = window.view_layer.objects.active == volume(window)
+
+
+def volume(window: bpy.types.Window) -> bpy.types.Object:
+    """The smoke."""
+    return next(obj for obj in window.scene.objects if obj.type == "VOLUME")
 
 
 def make_smoke(window: bpy.types.Window, area: bpy.types.Area, name: str, command: str) -> Iterator[float]:
     """Open the tab, press the button that runs a command, watch until the job has ended; returns what was seen."""
     sidebar = region(area, "UI")
-    seen = {"sidebar": place(window, sidebar), "progress": []}
+    seen = {"sidebar": place(window, sidebar), "progress": [], "playhead": [window.scene.frame_current]}
     yield from picture(f"{name}_closed")
     sidebar.active_panel_category = "Smokelift"
     area.tag_redraw()
@@ -94,6 +108,7 @@ def make_smoke(window: bpy.types.Window, area: bpy.types.Area, name: str, comman
     while job.outcome not in ENDED:
         if seen["progress"][-1:] != [job.done]:
             seen["progress"].append(job.done)
+            seen["playhead"].append(window.scene.frame_current)
             if not half_way and job.done >= job.total // 2 > 0:
                 half_way = shell(take(f"{name}_running"))
         yield 0.05
