@@ -1,9 +1,10 @@
 """The buttons of the tab."""
 
+from contextlib import suppress
 from pathlib import Path
 
 import bpy
-from bpy.props import StringProperty
+from bpy.props import BoolProperty, StringProperty
 from mathutils import Vector
 
 from . import run, shot_setup, volume
@@ -25,6 +26,49 @@ class _NeedsClip:
         return True
 
 
+class SMOKELIFT_OT_add(bpy.types.Operator):
+    """Add smoke that is made from a video or an image sequence"""
+
+    bl_idname = "smokelift.add"
+    bl_label = "Smoke from Video"
+    bl_options = {"REGISTER", "UNDO"}
+
+    filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
+    filter_movie: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
+    filter_image: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
+    filter_folder: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        try:
+            clip = bpy.data.movieclips.load(self.filepath, check_existing=True)
+        except RuntimeError:
+            self.report({"ERROR"}, f"{self.filepath} is no video and no picture that Blender can read: choose another.")
+            return {"CANCELLED"}
+        context.scene.smokelift.clip = clip
+        volume.smoke_object(context.scene)
+        if not bpy.app.background:
+            _open_tab(context)
+        return {"FINISHED"}
+
+
+def _open_tab(context: bpy.types.Context) -> None:
+    """Show the tab in the 3D View that the operator was called from."""
+    if context.area is None or context.area.type != "VIEW_3D":
+        return
+    context.space_data.show_region_ui = True
+    sidebar = next(region for region in context.area.regions if region.type == "UI")
+    with suppress(AttributeError, TypeError):  # a sidebar that was never open has no tabs yet
+        sidebar.active_panel_category = "Smokelift"
+
+
+def _draw_add(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    menu.layout.operator(SMOKELIFT_OT_add.bl_idname, icon="FILE_MOVIE")
+
+
 class SMOKELIFT_OT_run(_NeedsClip, bpy.types.Operator):
     """Turn the clip into a volume of smoke. Blender stays usable meanwhile"""
 
@@ -37,7 +81,7 @@ class SMOKELIFT_OT_run(_NeedsClip, bpy.types.Operator):
 
 
 class SMOKELIFT_OT_vary(_NeedsClip, bpy.types.Operator):
-    """Make the smoke anew with the next variation: it looks the same from the camera, and different from the side"""
+    """Make the smoke again with the next variation: it looks the same from the camera, and different from the side"""
 
     bl_idname = "smokelift.vary"
     bl_label = "Another Variation"
@@ -283,6 +327,7 @@ class SMOKELIFT_OT_remove_takes(_NeedsClip, bpy.types.Operator):
 
 
 _CLASSES = (
+    SMOKELIFT_OT_add,
     SMOKELIFT_OT_run,
     SMOKELIFT_OT_vary,
     SMOKELIFT_OT_resume,
@@ -295,4 +340,15 @@ _CLASSES = (
     SMOKELIFT_OT_remove_takes,
 )
 
-register, unregister = bpy.utils.register_classes_factory(_CLASSES)
+_register, _unregister = bpy.utils.register_classes_factory(_CLASSES)
+
+
+def register() -> None:
+    """Register the operators and what is in Blender's menus."""
+    _register()
+    bpy.types.VIEW3D_MT_volume_add.append(_draw_add)
+
+
+def unregister() -> None:
+    bpy.types.VIEW3D_MT_volume_add.remove(_draw_add)
+    _unregister()

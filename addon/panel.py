@@ -91,8 +91,8 @@ def _draw_cost(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         _label(layout, context, state.check_error, "ERROR")
     elif state.check_done:
         column = layout.column(align=True)
-        column.label(text=f"About {duration(state.seconds)}", icon="TIME")
-        column.label(text=f"{state.memory:.1f} GB of memory, up to {size(state.disk)} on disk", icon="BLANK1")
+        amounts = f"{state.memory:.1f} GB of memory, up to {size(state.disk)} on disk"
+        _label(column, context, f"About {duration(state.seconds)}, {amounts}", "TIME")
         if state.memory > state.memory_free:
             _label(column, context, f"Only {state.memory_free:.1f} GB are free: choose a lower quality.", "ERROR")
     else:
@@ -155,7 +155,7 @@ def _progress(row: bpy.types.PropertyGroup) -> str:
     if not row.total:
         return "Reading the clip"
     left = f", {duration(row.seconds_left)} left" if row.seconds_left >= 0.0 else ""
-    return f"Frame {row.done} of {row.total}{left}"
+    return f"{row.done} of {row.total}{left}"
 
 
 def duration(seconds: float) -> str:
@@ -224,7 +224,7 @@ class _Advanced:
             column.prop(settings, name)
         state = context.window_manager.smokelift
         if state.check_scene == context.scene.session_uid and state.notes:
-            layout.label(text="{} x {} x {} voxels. Assumptions and choices:".format(*state.resolution))
+            _label(layout, context, "{} x {} x {} voxels. Assumptions and choices:".format(*state.resolution))
             for note in state.notes.split("\n"):
                 _label(layout, context, note)
         layout.operator("smokelift.check", icon="VIEWZOOM")

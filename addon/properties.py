@@ -192,20 +192,20 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
         update=_changed,
     )
     fps: FloatProperty(
-        name="Captured At",
-        description="The camera's frame rate, for slow motion; 0 is the clip's frame rate",
+        name="Frame Rate",
+        description="Frame rate at which the clip was filmed, if it plays in slow motion; 0 is the clip's own",
         default=0.0,
         min=0.0,
         soft_max=1000.0,
         update=_changed,
     )
     transfer: EnumProperty(
-        name="Transfer",
-        description="Transfer function of the clip's pixels",
+        name="Color Space",
+        description="Color space of the clip",
         items=[
-            ("AUTO", "Clip's Color Space", "As the clip's color space in the Movie Clip Editor says"),
+            ("AUTO", "From the Clip", "As the clip's settings in the Movie Clip Editor say"),
             ("srgb", "sRGB", "Ordinary video and pictures"),
-            ("linear", "Linear", "Proportional to light"),
+            ("linear", "Linear Rec.709", "Proportional to light"),
         ],
         update=_changed,
     )
@@ -245,9 +245,9 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
         name="Device",
         description="Device that renders",
         items=[
-            ("auto", "Automatic", "The graphics card if it is usable"),
-            ("cpu", "Processor", "The processor only"),
-            ("gpu", "Graphics Card", "The graphics card, or fail"),
+            ("auto", "Automatic", "The GPU if it is usable"),
+            ("cpu", "CPU", "The CPU only"),
+            ("gpu", "GPU Compute", "The GPU, or fail"),
         ],
     )
     assumed_camera: PointerProperty(

@@ -130,7 +130,7 @@ def _transfer(clip: bpy.types.MovieClip) -> str | None:
     if space not in TRANSFERS:
         raise ShotError(
             f"The clip's color space is {space}, and only sRGB and Linear Rec.709 can be read: convert the clip, or "
-            "choose sRGB or Linear as its Transfer under Advanced."
+            "choose another Color Space under Advanced."
         )
     usual = "linear" if clip_path(clip).suffix.lower() in PANORAMA_SUFFIXES else "srgb"
     return None if TRANSFERS[space] == usual else TRANSFERS[space]

@@ -87,11 +87,11 @@ class Take:
             request = json.loads(self.request_file.read_text(encoding="utf-8"))
             options = [str(word) for word in request["options"]]
         except (OSError, ValueError, LookupError, TypeError, RecursionError) as error:
-            raise TakeError(f"{self.request_file} is missing or damaged: run the shot anew.") from error
+            raise TakeError(f"{self.request_file} is missing or damaged: make the smoke again.") from error
         for word in options:
             # the file may come with somebody else's project, and must not choose what is written where
             if word.startswith("-") and word.partition("=")[0] not in OPTIONS:
-                raise TakeError(f"{self.request_file} asks for {word!r}, which no shot does: run the shot anew.")
+                raise TakeError(f"{self.request_file} asks for {word!r}, which no shot does: make the smoke again.")
         files = ["--out", str(self.directory), "--thumbnail", str(self.thumbnail_file)]
         return ["reconstruct", str(self.scene_file), *files, "--resume", "--progress", "json", *options]
 

@@ -75,7 +75,7 @@ def test_a_damaged_request_is_said(tmp_path, damage) -> None:
     """With the file's name and what to do."""
     take = begun(tmp_path)
     take.request_file.write_text(damage)
-    with pytest.raises(TakeError, match=r"take_0001\.json is missing or damaged: run the shot anew"):
+    with pytest.raises(TakeError, match=r"take_0001\.json is missing or damaged: make the smoke again"):
         take.arguments()
 
 
@@ -84,7 +84,7 @@ def test_a_request_for_something_else_is_refused(tmp_path, words) -> None:
     """A project from elsewhere brings its takes along, and they must not write where they like."""
     take = begun(tmp_path)
     take.request_file.write_text(json.dumps({"options": ["--quality", "draft", *words]}))
-    with pytest.raises(TakeError, match=r"take_0001\.json asks for '-.*', which no shot does: run the shot anew"):
+    with pytest.raises(TakeError, match=r"take_0001\.json asks for '-.*', which no shot does: make the smoke again"):
         take.arguments()
 
 

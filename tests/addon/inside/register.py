@@ -12,6 +12,7 @@ from smokelift.footage.images import Transfer
 from smokelift.render.device import DeviceName
 from smokelift.scene import Medium
 from smokelift.setup.settings import QUALITIES, Settings
+from tests.example_shot import EXAMPLE
 
 
 def ours() -> set[str]:
@@ -77,3 +78,15 @@ def test_default_medium_is_the_engines(scene) -> None:
     assert [properties[name].default for name in names] == pytest.approx([getattr(Medium(), name) for name in names])
     for name in names:
         Medium(**{name: properties[name].hard_min}), Medium(**{name: properties[name].hard_max})
+
+
+def test_smoke_is_in_the_menu_for_volumes(scene, tmp_path) -> None:
+    """Where Blender's search looks; choosing a clip adds the smoke, and what is no clip is one sentence."""
+    menu = bpy.types.VIEW3D_MT_volume_add
+    assert any(draw.__module__.startswith("addon") for draw in menu.draw._draw_funcs)
+    assert bpy.ops.smokelift.add.get_rna_type().name == "Smoke from Video"
+    assert bpy.ops.smokelift.add(filepath=str(EXAMPLE / "clip.mp4")) == {"FINISHED"}
+    assert scene.smokelift.clip.name == "clip.mp4"
+    assert bpy.context.view_layer.objects.active == scene.smokelift.volume
+    with pytest.raises(RuntimeError, match=r"nothing\.mp4 is no video"):
+        bpy.ops.smokelift.add(filepath=str(tmp_path / "nothing.mp4"))

@@ -315,7 +315,7 @@ def test_the_clips_color_space_counts(shot, space, transfer) -> None:
 def test_a_color_space_that_cannot_be_read_is_refused(shot) -> None:
     """In one sentence; who knows better chooses the transfer."""
     shot.smokelift.clip.colorspace_settings.name = "Filmic Log"
-    with pytest.raises(ShotError, match=r"color space is Filmic Log.*convert the clip.*Transfer"):
+    with pytest.raises(ShotError, match=r"color space is Filmic Log.*convert the clip.*Advanced"):
         shot_tables(shot)
     shot.smokelift.transfer = "srgb"
     assert shot_tables(shot)["clip"]["transfer"] == "srgb"

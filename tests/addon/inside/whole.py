@@ -232,6 +232,21 @@ def test_a_failure_is_a_sentence_and_a_log(shot, kept, tmp_path) -> None:
     assert "is not a video" in bpy.data.texts["Smokelift Log"].as_string()
 
 
+def test_a_clip_without_smoke_is_not_done(scene, tmp_path) -> None:
+    """It fails, and the sentence says what to do in Blender."""
+    for number in (1, 2, 3):
+        write_image(tmp_path / f"wall_{number}.png", np.full((96, 64, 3), 0.2, np.float32))
+    settings = scene.smokelift
+    settings.clip = bpy.data.movieclips.load(str(tmp_path / "wall_1.png"))
+    settings.quality, settings.output = "draft", str(tmp_path / "out")
+    settings.plate_mode, settings.plate = "FILE", str(tmp_path / "wall_1.png")
+    assert bpy.ops.smokelift.run() == {"FINISHED"}
+    (row,) = bpy.context.window_manager.smokelift.jobs
+    assert row.outcome == "failed"
+    assert "No smoke found" in row.sentence
+    assert "Clean Plate in Blender" in row.sentence
+
+
 def test_a_look_ahead(shot, tmp_path) -> None:
     """Time, memory, disk, and what is assumed; an impossible shot says why."""
     bpy.ops.smokelift.check()

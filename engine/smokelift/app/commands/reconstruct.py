@@ -70,8 +70,8 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     if not any((sequence.figures(number).get("hull_share") or 0) > 0 for number in sequence.frames):
         raise ValueError(
             f"No smoke found: in no frame does a patch differ from the background by {2 * SMOKE_THRESHOLD:g} times the "
-            f"clip's noise, so all frames in {options.out} are empty. Give a clean plate with [background] in a scene "
-            "file, or check the one that is given."
+            f"clip's noise, so all frames in {options.out} are empty. Give a clean plate ([background] in a scene "
+            "file, Clean Plate in Blender), or check the one that is given."
         )
     seconds = time.monotonic() - began
     say.finish(

@@ -1,0 +1,74 @@
+"""The tab: what is in it, in Blender's words, at the width that Blender gives it."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import bpy
+import pytest
+
+from addon import panel
+
+WIDTH = 258
+"""Pixels of the sidebar in a new window."""
+
+LETTERS = 34
+"""Of a label without an icon, at most, at that width."""
+
+
+class Layout:
+    """Keeps the texts that are drawn, in place of Blender's layout."""
+
+    def __init__(self, texts: list[str]) -> None:
+        object.__setattr__(self, "texts", texts)
+
+    def __getattr__(self, _name: str) -> Any:
+        def draw(*_values: Any, text: str = "", icon: str = "NONE", **_settings: Any) -> Layout:
+            self.texts.append(text if icon == "NONE" else f"{text}    ")
+            return self
+
+        return draw
+
+    def __setattr__(self, _name: str, _value: Any) -> None:
+        """Blender's layout has settings; here they change nothing."""
+
+
+def drawn(scene: bpy.types.Scene, *panels: type) -> list[str]:
+    texts: list[str] = []
+    preferences = SimpleNamespace(system=SimpleNamespace(ui_scale=1.0))
+    context = SimpleNamespace(
+        scene=scene,
+        region=SimpleNamespace(width=WIDTH),
+        preferences=preferences,
+        window_manager=bpy.context.window_manager,
+    )
+    for kind in panels:
+        kind.draw(SimpleNamespace(layout=Layout(texts)), context)
+    return texts
+
+
+def test_no_line_is_cut_off(shot) -> None:
+    """The longest that there are, in a sidebar of the usual width."""
+    manager = bpy.context.window_manager
+    state = manager.smokelift
+    state.check_scene, state.check_done, state.notes = shot.session_uid, True, "Assumed. " * 20
+    state.resolution, state.seconds, state.disk = (144, 144, 144), 86000.0, 9999.0
+    state.memory, state.memory_free = 112.4, 11.8
+    for outcome in ("waiting", "running", "done", "failed"):
+        row = manager.smokelift.jobs.add()
+        row.scene_uid, row.outcome, row.sentence = shot.session_uid, outcome, "One word after the other. " * 5
+        row.done, row.total, row.seconds_left, row.warnings = 1250, 2500, 80000.0, "This is a warning. " * 5
+    texts = drawn(shot, panel.SMOKELIFT_PT_view, panel.SMOKELIFT_PT_view_advanced)
+    assert any("112.4 GB" in text for text in texts)
+    assert [text for text in texts if len(text) > LETTERS] == []
+
+
+@pytest.mark.parametrize("word", ["Captured At", "Pixels", "Processor", "Graphics Card", "Anew"])
+def test_words_are_blenders(scene, word) -> None:
+    """Frame rate, color space, CPU, GPU."""
+    settings = scene.smokelift.bl_rna.properties
+    names = [setting.name for setting in settings]
+    names += [item.name for setting in settings if setting.type == "ENUM" for item in setting.enum_items]
+    names += [getattr(bpy.ops.smokelift, name).get_rna_type().name for name in dir(bpy.ops.smokelift)]
+    assert not [name for name in names if word in name]
