@@ -29,6 +29,6 @@ def new_figure(results: dict[str, Any], width: float, height: float) -> Any:
     return figure
 
 
-def save(figure: Any, path: Any) -> None:
+def save(figure: Any, path: Any, dpi: int = 130) -> None:
     """Write a figure as PNG."""
-    figure.savefig(path, dpi=130, format="png")
+    figure.savefig(path, dpi=dpi, format="png")

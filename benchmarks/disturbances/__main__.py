@@ -1,0 +1,58 @@
+"""Measure what is not measured yet, and draw it.
+
+    python -m benchmarks.disturbances OUT SCENES/plume-3 SCENES/jet-3 ... [--only noise crf] [--methods default]
+
+OUT/stability.csv gets a row a disturbance, strength, scene and method; rows that are there stay as they are. OUT gets
+stability_views.png, stability_velocity.png and stability.md, with the table.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+from benchmarks.disturbances.known import Known
+from benchmarks.disturbances.report import Results, draw, table
+from benchmarks.disturbances.spoiled import MOMENTS
+from benchmarks.disturbances.table import DISTURBANCES
+from smokelift.render import device
+from smokelift.setup.settings import METHODS, MethodName
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Measure and draw."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.disturbances", description=__doc__)
+    parser.add_argument("out", type=Path)
+    parser.add_argument("scenes", type=Path, nargs="*", help="folders that benchmarks.truth.picture filled")
+    parser.add_argument("--only", nargs="+", choices=DISTURBANCES, default=list(DISTURBANCES), metavar="DISTURBANCE")
+    parser.add_argument("--methods", nargs="+", choices=METHODS, default=list(METHODS))
+    options = parser.parse_args(arguments)
+    options.out.mkdir(parents=True, exist_ok=True)
+    device.start("cpu")
+    results = Results(options.out / "stability.csv")
+    for folder in options.scenes:
+        known = Known.load(folder, MOMENTS)
+        asked = [
+            (name, strength, known.name, method)
+            for name in options.only
+            for method in options.methods
+            for strength in DISTURBANCES[name].strengths
+        ]
+        for key in sorted(asked, key=_rank):
+            if key not in results:
+                name, strength, _, method = key
+                results.add(key, DISTURBANCES[name].measure(known, strength, method))
+    (options.out / "stability.md").write_text(table(results) + "\n")
+    draw(results, "psnr_new", "new views, dB beside undisturbed", options.out / "stability_views.png")
+    draw(results, "velocity_error", "velocity error", options.out / "stability_velocity.png")
+
+
+def _rank(key: tuple[str, float, str, MethodName]) -> bool:
+    """What is measured first: the strengths that people meet, and what they are compared with."""
+    disturbance = DISTURBANCES[key[0]]
+    return key[1] not in (disturbance.undisturbed, *disturbance.met)
+
+
+if __name__ == "__main__":
+    main()

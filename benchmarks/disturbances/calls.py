@@ -1,0 +1,77 @@
+"""Single calls of the density fit and of the velocity, where a whole run would say no more."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from benchmarks.background.clips import filmed
+from benchmarks.disturbances.known import BLACK, FRONT, GRID, Known
+from benchmarks.disturbances.measure import Figures
+from benchmarks.disturbances.spoiled import FIRST, plain
+from smokelift import Settings
+from smokelift.density import ViewSet
+from smokelift.evaluation.frame_means import SMOKE, eight_bit_values
+from smokelift.evaluation.metrics import psnr, velocity_error
+from smokelift.evaluation.resampling import resampled
+from smokelift.evaluation.series import finite_mean
+from smokelift.pipeline import Method, compose
+from smokelift.render import scene_renderer
+from smokelift.setup.prepare import prepare_shot
+from smokelift.setup.settings import MethodName
+from smokelift.transport import Velocity, advect, project
+
+
+def motion(known: Known, voxels: float, method: MethodName) -> Figures:
+    """A density and the same one carried by its true flow, scaled to a mean way of so many voxels."""
+    density = known.density(FIRST)
+    smoke = density > SMOKE * density.max()
+    flow = _on_faces(known)
+    way = np.linalg.norm(flow.centres()[smoke], axis=-1).mean() / (known.fps * flow.voxel_size)
+    flow = flow.with_faces(np.float32(voxels / way) * component for component in flow.faces)
+    after = advect(density, flow, 1 / known.fps)
+    found = compose(_settings(method)).velocity_estimator.estimate(density, after, 1 / known.fps, flow.voxel_size)
+    counted = after > SMOKE * after.max()
+    return {"velocity_error": velocity_error(found.centres(), flow.centres(), counted)[0]}
+
+
+def scaled_density(known: Known, factor: float, method: MethodName) -> Figures:
+    """Two true densities, both times a factor: the motion between them is the same."""
+    before, after = (np.float32(factor) * known.density(moment) for moment in (FIRST, FIRST + 1))
+    estimator = compose(_settings(method)).velocity_estimator
+    found = estimator.estimate(before, after, 1 / known.fps, known.domain.voxel_size)
+    counted = (after > SMOKE * after.max()) & ~known.inlets[FIRST + 1]
+    return {"velocity_error": velocity_error(found.centres(), known.velocities[FIRST + 1], counted)[0]}
+
+
+def wrong_start(known: Known, factor: float, method: MethodName) -> Figures:
+    """The fit of one frame, started from the true density times a factor."""
+    take = plain(known.at([FIRST]))
+    clip = filmed(take.pictures, "clip")
+    shot = prepare_shot(clip, take.told, _settings(method))
+    composed: Method = compose(shot.settings)
+    views = ViewSet.of(shot.observe(0), shot.optics, 0)
+    depth = composed.depth_prior.of_clip(shot).estimate(views)
+    start = np.float32(factor) * resampled(known.densities[FIRST], GRID)
+    density = composed.density_fit.fit(views, depth, start).values
+    found: Figures = {}
+    for view, camera in known.cameras.items():
+        shown = scene_renderer(shot.scene, camera, BLACK).image(density)[..., :1]
+        found[f"psnr_{view}"] = psnr(eight_bit_values(shown), eight_bit_values(take.known.radiance[view][0][..., None]))
+    found["psnr_new"] = finite_mean(float(found[f"psnr_{view}"] or np.nan) for view in known.cameras if view != FRONT)
+    return found
+
+
+def _settings(method: MethodName) -> Settings:
+    return replace(Settings.preset(method=method), detail=0.0)
+
+
+def _on_faces(known: Known) -> Velocity:
+    """The true flow of the first moment on the faces of the small grid, without divergence."""
+    centres = np.pad(known.velocities[FIRST], [(1, 1), (1, 1), (1, 1), (0, 0)], mode="edge")
+    inside = slice(1, -1)
+    x = (centres[1:, inside, inside, 0] + centres[:-1, inside, inside, 0]) / 2
+    y = (centres[inside, 1:, inside, 1] + centres[inside, :-1, inside, 1]) / 2
+    z = (centres[inside, inside, 1:, 2] + centres[inside, inside, :-1, 2]) / 2
+    return project(Velocity((x, y, z), known.domain.voxel_size))

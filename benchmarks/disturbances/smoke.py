@@ -1,0 +1,134 @@
+"""Other smoke: the baked one made thicker, darker or forward scattering, and smoke that enters, leaves or splits.
+
+Its pictures are single scattering on the simulation's grid. The light is as strong as the exposure of the camera needs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from benchmarks.disturbances.known import FRONT, Known, Take
+from benchmarks.disturbances.spoiled import GREY, LENGTH, before_grey, plain, usual
+from smokelift.transport import Array
+
+BRIGHTEST = 0.6
+"""Linear radiance of the brightest pixel in front."""
+
+SLIDE, SPLIT = 1 / 8, 1 / 16
+"""Shares of the box's width that smoke slides in a frame, three voxels of the small grid, and that its halves do."""
+
+THICK = 0.5
+"""Density of a box that is full, relative to the smoke's largest."""
+
+
+def optical_depth(known: Known, depth: float) -> Take:
+    """Smoke of an optical depth along the thickest column that the camera looks along."""
+    part = usual(known)
+    _, _, z = part.densities.shape[1:]
+    voxel = (part.domain.max[2] - part.domain.min[2]) / z
+    now = part.medium.extinction * voxel * float(part.densities.sum(axis=2).max())
+    medium = replace(part.medium, extinction=part.medium.extinction * depth / now)
+    return plain(exposed(replace(part, scene=replace(part.scene, medium=medium))))
+
+
+def anisotropy(known: Known, mean_cosine: float) -> Take:
+    """Smoke that scatters forward (up to 1) or backward (down to -1)."""
+    part = usual(known)
+    medium = replace(part.medium, anisotropy=mean_cosine)
+    return plain(exposed(replace(part, scene=replace(part.scene, medium=medium))))
+
+
+def albedo(known: Known, share: float) -> Take:
+    """Smoke that scatters a share of the light that it stops, before a grey background, which is told."""
+    part = usual(known)
+    part = replace(part, scene=replace(part.scene, medium=replace(part.medium, albedo=share))).pictured()
+    return replace(before_grey(part, GREY), behind=GREY)
+
+
+def event(known: Known, number: float) -> Take:
+    """Smoke that does what `EVENTS` has under a number."""
+    return plain(exposed(list(EVENTS.values())[int(number)](usual(known))))
+
+
+def exposed(known: Known) -> Known:
+    """Return it pictured in a light that makes the brightest pixel in front as bright as `BRIGHTEST`."""
+    pictured = known.pictured()
+    gain = BRIGHTEST / float(pictured.radiance[FRONT].max())
+    return replace(
+        pictured,
+        scene=replace(known.scene, lights=(known.light.scaled(gain),)),
+        radiance={view: np.float32(gain) * pictures for view, pictures in pictured.radiance.items()},
+    )
+
+
+def _stands(known: Known) -> Known:
+    still = known.at([0] * LENGTH)
+    return replace(still, velocities=np.zeros_like(still.velocities), inlets=np.zeros_like(still.inlets))
+
+
+def _slides(first: int) -> Callable[[Known], Known]:
+    """Smoke that does not change slides along x, from where it is so many frames later."""
+
+    def slides(known: Known) -> Known:
+        still = _stands(known)
+        density = [_moved(each, (first + k) * SLIDE) for k, each in enumerate(still.densities)]
+        width = known.domain.max[0] - known.domain.min[0]
+        velocity = np.array([SLIDE * width * known.fps, 0, 0], np.float32)
+        return replace(still, densities=np.stack(density), velocities=still.velocities + velocity)
+
+    return slides
+
+
+def _splits(known: Known) -> Known:
+    still = _stands(known)
+    left = still.densities * (np.arange(still.densities.shape[1]) < still.densities.shape[1] // 2)[:, None, None]
+    parts = zip(left, still.densities - left, strict=True)
+    halves = [_moved(one, -k * SPLIT) + _moved(other, k * SPLIT) for k, (one, other) in enumerate(parts)]
+    return _unknown_flow(replace(still, densities=np.stack(halves)))
+
+
+def _fills(known: Known) -> Known:
+    share = np.linspace(0, 1, LENGTH, dtype=np.float32)[:, None, None, None]
+    full = np.float32(THICK * known.densities.max())
+    return _unknown_flow(replace(known, densities=np.maximum(known.densities, share * full)))
+
+
+def _fades(*shares: float) -> Callable[[Known], Known]:
+    """Smoke of which a share is there at each moment."""
+
+    def fades(known: Known) -> Known:
+        density = known.densities * np.array(shares, np.float32)[:, None, None, None]
+        return _unknown_flow(replace(known, densities=density))
+
+    return fades
+
+
+def _unknown_flow(known: Known) -> Known:
+    return replace(known, velocities=np.full_like(known.velocities, np.nan))
+
+
+def _moved(density: Array, share: float) -> Array:
+    """Return a density (x, y, z) moved along x by a share of the box; nothing comes in."""
+    voxels = round(share * len(density))
+    moved = np.roll(density, voxels, axis=0)
+    if voxels > 0:
+        moved[:voxels] = 0
+    elif voxels < 0:
+        moved[voxels:] = 0
+    return moved
+
+
+EVENTS: dict[str, Callable[[Known], Known]] = {
+    "flows": lambda known: known,
+    "stands still": _stands,
+    "slides in": _slides(-LENGTH),
+    "slides out": _slides(1),
+    "splits": _splits,
+    "fills the box": _fills,
+    "appears": _fades(0, 0, 1, 1, 1, 1),
+    "vanishes": _fades(1, 1, 0.5, 0.1, 0, 0),
+}
+"""What smoke may do, the first being what it does."""
