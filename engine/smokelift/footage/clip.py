@@ -206,7 +206,7 @@ class Clip:
     def changed(self, change: Callable[[int, Picture], Picture]) -> Clip:
         """Return the clip with each frame, by its number, replaced. The two share the open file."""
         last = self.first + len(self) - 1
-        return Clip(self.path, _Changed(self._source, self.first, change), self.fps, (self.first, last))
+        return Clip(self.path, _Changed(self, self._source, change), self.fps, (self.first, last))
 
     def close(self) -> None:
         """Close the file."""
@@ -222,10 +222,10 @@ class Clip:
 
 
 class _Changed:
-    """The frames of a source, each replaced; numbers count from a first one."""
+    """The frames of a clip's source, each replaced; numbers count from the clip's first one."""
 
-    def __init__(self, source: FrameSource, first: int, change: Callable[[int, Picture], Picture]) -> None:
-        self._source, self._first, self._change = source, first, change
+    def __init__(self, clip: Clip, source: FrameSource, change: Callable[[int, Picture], Picture]) -> None:
+        self._clip, self._source, self._change = clip, source, change
         self.count, self.fps, self.warning = source.count, source.fps, source.warning
         self.files = source.files
 
@@ -234,9 +234,12 @@ class _Changed:
         return self._source.notes
 
     def read(self, n: int) -> Picture:
-        return self._change(n - self._first, self._source.read(n))
+        return self._change(n - self._clip.first, self._source.read(n))
 
     def damaged(self, first: int, last: int) -> tuple[int, ...]:
+        clip = self._clip
+        if (first, last) == (clip.first, clip.first + len(clip) - 1):  # what the clip may know already
+            return tuple(clip.first + n for n in clip.damaged)
         return self._source.damaged(first, last)
 
     def close(self) -> None:

@@ -72,6 +72,7 @@ class Video:
         self._varies, self._interlaced = False, False
         self.fps, self._shown = self._steady()
         self.count = len(self._shown)
+        self._format = self._described()
 
     def _start(self) -> None:
         """Open the file at its beginning."""
@@ -186,6 +187,15 @@ class Video:
     @property
     def notes(self) -> tuple[str, ...]:
         """How the pictures are read, as far as they have been."""
+        if not self._interlaced:
+            return self._format
+        return (
+            *self._format,
+            "The clip is interlaced: one field of each frame is used, so its lines are half as fine.",
+        )
+
+    def _described(self) -> tuple[str, ...]:
+        """How the file's format is read."""
         context, stream = self._stream.codec_context, self._stream
         encoding, primaries = ENCODINGS.get(context.color_trc), primaries_name(context.color_primaries)
         width, height = self._size()
@@ -201,8 +211,6 @@ class Video:
                 f"Pictures of {stream.width} x {stream.height} pixels{oblong} are scaled to {width} x {height} square "
                 "ones."
             )
-        if self._interlaced:
-            told.append("The clip is interlaced: one field of each frame is used, so its lines are half as fine.")
         return tuple(told)
 
     def close(self) -> None:

@@ -291,7 +291,9 @@ def test_a_damaged_frame_is_as_one_that_a_camera_dropped(tmp_path: Path, broken:
         assert clip.damaged == tuple(broken)
         assert clip.remarks() == (f"{path}: frame {broken[0]} is missing or damaged; the last sound frame stands in.",)
         assert clip.part(4, 5).damaged == ()
-        assert codes_of(clip.changed(lambda n, picture: picture * (n == broken[0])), broken[0]) == 0
+        changed = clip.changed(lambda n, picture: picture * (n == broken[0]))
+        assert codes_of(changed, broken[0]) == 0
+    assert changed.damaged == tuple(broken)  # known after the file is closed
 
 
 def test_a_clip_that_is_mostly_damaged_is_refused(tmp_path: Path) -> None:
