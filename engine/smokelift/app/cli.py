@@ -72,7 +72,7 @@ def _run(options: argparse.Namespace) -> int:
                 raise KeyboardInterrupt from error
             raise
     except KeyboardInterrupt:
-        hint = _HINT if options.command == "reconstruct" else ""
+        hint = _HINT if hasattr(options, "resume") else ""
         say.fail(f"Cancelled.{hint}", CANCELLED)
         return CANCELLED
     except OutputError:

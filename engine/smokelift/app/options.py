@@ -8,7 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
+from smokelift.output.writer import check_directory, written_kinds
 from smokelift.scene import SCATTERINGS, ClipSource, Scene
+from smokelift.scene.checks import LARGEST
 from smokelift.setup.settings import METHODS, QUALITIES, Settings
 
 
@@ -55,6 +57,36 @@ def add_run_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--seed", type=int, default=0, metavar="N", help="which of the plausible smokes of the clip, from 0 (default)"
     )
+
+
+def add_directed_options(parser: argparse.ArgumentParser) -> None:
+    """Add a sequence, and where what becomes of it is written to."""
+    parser.add_argument("directory", type=named_path, help="of the sequence")
+    parser.add_argument("--out", type=named_path, required=True, help="directory for the new sequence")
+    parser.add_argument("--npz", action="store_true", help="write NumPy twins as well")
+    parser.add_argument("--resume", action="store_true", help="go on from the frames that are there")
+
+
+def require_new(options: argparse.Namespace) -> None:
+    """Check, before anything is spent, that the output of `add_directed_options` can be written to.
+
+    Raises
+    ------
+    ValueError
+        If it cannot, or is the sequence itself.
+    """
+    if options.out.resolve() == options.directory.resolve():
+        raise ValueError(f"{options.out}: is the sequence itself; choose another directory for --out.")
+    check_directory(options.out, resume=options.resume)
+    written_kinds(options.npz)
+
+
+def finite(text: str) -> float:
+    """Return the number that a word says."""
+    number = float(text)
+    if not abs(number) <= LARGEST:
+        raise argparse.ArgumentTypeError(f"{text}: expected a number from {-LARGEST:g} to {LARGEST:g}")
+    return number
 
 
 def settings_of(options: argparse.Namespace) -> Settings:

@@ -6,7 +6,7 @@ import errno
 import json
 import os
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from types import TracebackType
 from typing import Any, Literal, Protocol
@@ -75,6 +75,17 @@ def reporter(style: Style) -> Reporter:
     return _Json() if style == "json" else _Text()
 
 
+def say_frames(say: Reporter, written: Iterable[tuple[int, Mapping[str, Any]]], first: int, total: int) -> None:
+    """Say every frame of a sequence of so many while it is written, by number and figures."""
+    written = iter(written)
+    for number, figures in written:
+        say.start(total, number - first)
+        say.frame(number, figures)
+        break
+    for number, figures in written:
+        say.frame(number, figures)
+
+
 class _Text:
     def __init__(self) -> None:
         self._console = _Console(highlight=False)
@@ -114,7 +125,7 @@ class _Text:
             self._bar.start()
 
     def frame(self, number: int, figures: Mapping[str, Any]) -> None:
-        fit = f"fit {figures['psnr']:.1f} dB" if "psnr" in figures else "no smoke"
+        fit = f"fit {figures['psnr']:.1f} dB" if "psnr" in figures else figures.get("origin", "no smoke")
         with _output():
             self._bar.update(self._task, advance=1, fit=fit)
 

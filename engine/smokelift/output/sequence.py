@@ -15,7 +15,7 @@ from smokelift.output.vdb import read_vdb
 from smokelift.output.viewer import Viewer
 from smokelift.render import Image
 from smokelift.scene import Camera, CompleteScene, Scene, completed, scene_from_dict
-from smokelift.transport import Array, Velocity, face_shapes
+from smokelift.transport import Array, Velocity, face_shapes, on_faces
 
 
 @dataclass(frozen=True)
@@ -111,6 +111,39 @@ class Sequence:
         x, y, z = (arrays[name] for name in VELOCITY)
         return Velocity((x, y, z), self.scene.domain.voxel_size).centres()
 
+    def staggered_velocity(self, number: int) -> Velocity:
+        """Return the velocity of a frame in m/s on faces, with the walls of the scene.
+
+        It is the NumPy twin's; from an OpenVDB file it is the mean of the values at the centres beside a face, zero
+        further than two voxels from smoke and not free of divergence.
+
+        Raises
+        ------
+        SequenceError
+            If there is no such frame, or its file is missing or damaged.
+        """
+        arrays = self._read(number, *VELOCITY)
+        if "velocity" in arrays:
+            x, y, z = on_faces(arrays["velocity"])
+        else:
+            x, y, z = (arrays[name] for name in VELOCITY)
+        return Velocity((x, y, z), self.scene.domain.voxel_size, self.scene.closed)
+
+    def files(self, number: int) -> Mapping[str, Path]:
+        """Return the files of a frame by their kind, ``"vdb"`` or ``"npz"``.
+
+        Raises
+        ------
+        SequenceError
+            If there is no such frame, or a file is not the one that was written.
+        """
+        self._check(number)
+        paths = {kind: frame_path(self.directory, number, kind) for kind in ("vdb", "npz")}
+        there = {kind: path for kind, path in paths.items() if path.is_file()}
+        for path in there.values():
+            self._check_sum(path)
+        return there
+
     def render(self, number: int, camera: Camera | None = None) -> Image:
         """Render a frame as the scene's own camera sees it, or another.
 
@@ -151,6 +184,11 @@ class Sequence:
             span = f"it has {self.frames[0]} to {self.frames[-1]}" if self.frames else "it has none"
             raise SequenceError(f"{self.directory}: there is no frame {number}; {span}")
 
+    def _check_sum(self, path: Path) -> None:
+        written = self._checksums.get(path.name)
+        if written is not None and checksum([path]) != written:
+            raise SequenceError(f"{path}: is not the file that was written: it is damaged, or was changed since")
+
     def _read(self, number: int, *names: str) -> Mapping[str, Array]:
         """The arrays of these names from a NumPy twin, or else density and velocity at centres from OpenVDB."""
         self._check(number)
@@ -160,9 +198,7 @@ class Sequence:
         if not path.is_file():
             raise SequenceError(f"{path}: is missing")
         try:
-            written = self._checksums.get(path.name)
-            if written is not None and checksum([path]) != written:
-                raise SequenceError(f"{path}: is not the file that was written: it is damaged, or was changed since")
+            self._check_sum(path)
             if path is twin:
                 shapes = {"density": shape, **dict(zip(VELOCITY, face_shapes(shape), strict=True))}
                 return read_arrays(path, {name: shapes[name] for name in names})

@@ -9,6 +9,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+import shutil
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -19,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from smokelift.output.archive import VELOCITY, write_arrays
+from smokelift.output.atomic import atomic_path
 from smokelift.output.checksum import checksum
 from smokelift.output.images import write_image
 from smokelift.output.index import Index, SequenceError, difference, plain
@@ -149,6 +151,7 @@ class SequenceWriter:
         velocity_faces: tuple[npt.ArrayLike, npt.ArrayLike, npt.ArrayLike],
         figures: Mapping[str, Any] | None = None,
         extra: Mapping[str, npt.ArrayLike] | None = None,
+        ready: Mapping[str, Path] | None = None,
     ) -> None:
         """Write one frame and make it count.
 
@@ -164,6 +167,8 @@ class SequenceWriter:
             Numbers and text about the frame by name. Numbers that are not finite become null.
         extra
             Further arrays that the next frame depends on, for :attr:`state`.
+        ready
+            Files that hold this frame already, by their kind ``"vdb"`` or ``"npz"``: they are copied.
 
         Raises
         ------
@@ -184,8 +189,12 @@ class SequenceWriter:
         state = ResumeState(number, rho.copy(), (x, y, z), kept)
         try:
             paths = [frame_path(self.directory, number, kind) for kind in self._kinds]
-            for path in paths:
-                self._write_arrays(path, rho, faces)
+            for kind, path in zip(self._kinds, paths, strict=True):
+                if ready is not None and kind in ready:
+                    with atomic_path(path) as aside:
+                        shutil.copyfile(ready[kind], aside)
+                else:
+                    self._write_arrays(path, rho, faces)
             frames = {**self._index.frames, str(number): plain(figures or {})}
             checksums = {**self._index.checksums, **{path.name: checksum([path]) for path in paths}}
             self._index = replace(self._index, frames=frames, checksums=checksums)

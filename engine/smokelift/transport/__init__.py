@@ -9,6 +9,7 @@ from smokelift.transport.grid import (
     Velocity,
     at_centres,
     face_shapes,
+    on_faces,
     require_positive,
     require_same_shape,
 )
@@ -25,6 +26,7 @@ __all__ = [
     "at_centres",
     "divergence",
     "face_shapes",
+    "on_faces",
     "project",
     "require_positive",
     "require_same_shape",

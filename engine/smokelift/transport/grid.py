@@ -166,6 +166,16 @@ def at_centres(faces: Faces) -> Faces:
     return half * (x[1:] + x[:-1]), half * (y[:, 1:] + y[:, :-1]), half * (z[:, :, 1:] + z[:, :, :-1])
 
 
+def on_faces(centres: Array) -> Faces:
+    """Vectors at voxel centres, shape (nx, ny, nz, 3), on faces: the mean of both sides, on the box's sides the one."""
+    x, y, z = (
+        np.pad(centres[..., axis], [(1, 1) if d == axis else (0, 0) for d in range(3)], mode="edge")
+        for axis in range(3)
+    )
+    half = np.float32(0.5)
+    return half * (x[1:] + x[:-1]), half * (y[:, 1:] + y[:, :-1]), half * (z[:, :, 1:] + z[:, :, :-1])
+
+
 def _in_order(closed: Iterable[Side]) -> tuple[Side, ...]:
     names = set(closed)
     if unknown := names - set(SIDES):

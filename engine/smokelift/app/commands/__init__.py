@@ -3,8 +3,8 @@
 A module's `add_parser` adds the command with its options to the parser; the option ``run`` is what runs it.
 """
 
-from smokelift.app.commands import bench, chart, doctor, evaluate, inspect, preview, reconstruct, render
+from smokelift.app.commands import bench, chart, continue_, doctor, evaluate, inspect, preview, reconstruct, render
 
 COMMANDS = tuple(
-    module.add_parser for module in (reconstruct, inspect, render, preview, evaluate, chart, doctor, bench)
+    module.add_parser for module in (reconstruct, inspect, render, preview, evaluate, continue_, chart, doctor, bench)
 )

@@ -1,0 +1,1 @@
+"""Continued, retimed and looped smoke beside what really came."""

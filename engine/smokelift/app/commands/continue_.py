@@ -1,0 +1,104 @@
+"""``smokelift continue``: a sequence goes on after its clip, or differently from a frame of it on."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from typing import Any
+
+from smokelift.app.options import add_directed_options, finite, require_new
+from smokelift.app.progress import Reporter, say_frames
+from smokelift.direct import Ball, Box, Continuation, Fan, continue_sequence, open_source
+
+
+def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
+    """Add the command."""
+    parser = commands.add_parser(
+        "continue", parents=[common], help="what the smoke does after its clip, or in wind and around obstacles"
+    )
+    add_directed_options(parser)
+    parser.add_argument("--frames", type=int, required=True, metavar="N", help="frames to add")
+    parser.add_argument(
+        "--start", type=int, metavar="FRAME", help="the last frame that stays as it is (default: the last there is)"
+    )
+    parser.add_argument(
+        "--fade", type=int, default=0, metavar="N", help="let the smoke fade to nothing in the last N frames"
+    )
+    parser.add_argument(
+        "--wind",
+        type=finite,
+        nargs=3,
+        default=(0.0, 0.0, 0.0),
+        metavar=("X", "Y", "Z"),
+        help="wind that sets in, in m/s",
+    )
+    parser.add_argument(
+        "--fan",
+        type=finite,
+        nargs=7,
+        action="append",
+        default=[],
+        metavar=("X", "Y", "Z", "RADIUS", "VX", "VY", "VZ"),
+        help="a ball in which air is blown: centre and radius in metres, velocity in m/s; may be given again",
+    )
+    parser.add_argument(
+        "--ball",
+        type=finite,
+        nargs=4,
+        action="append",
+        default=[],
+        metavar=("X", "Y", "Z", "RADIUS"),
+        help="a round obstacle, in metres; may be given again",
+    )
+    parser.add_argument(
+        "--box",
+        type=finite,
+        nargs=6,
+        action="append",
+        default=[],
+        metavar=("X", "Y", "Z", "X2", "Y2", "Z2"),
+        help="an obstacle from one corner to the other, in metres; may be given again",
+    )
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace, say: Reporter) -> None:
+    """Continue the sequence, and say every frame."""
+    began = time.monotonic()
+    continuation = _continuation(options)
+    sequence = open_source(options.directory)
+    require_new(options)
+    start = sequence.frames[-1] if continuation.start is None else continuation.start
+    written = continue_sequence(sequence, options.out, continuation, npz=options.npz, resume=options.resume)
+    total = start - sequence.frames[0] + 1 + continuation.frames
+    say_frames(say, written, sequence.frames[0], total)
+    seconds = time.monotonic() - began
+    say.finish(
+        f"{total} frames in {options.out}, {continuation.frames} of them simulated ({seconds:.0f} s).",
+        {"directory": str(options.out), "frames": total, "seconds": round(seconds, 1)},
+    )
+
+
+def _continuation(options: argparse.Namespace) -> Continuation:
+    """What the options say."""
+    if options.frames < 1:
+        raise ValueError(f"--frames {options.frames}: there has to be 1 at least.")
+    if not 0 <= options.fade <= options.frames:
+        raise ValueError(f"--fade {options.fade}: expected 0 to the {options.frames} frames that are added.")
+    balls = [_ball("--ball", values) for values in options.ball]
+    boxes = [Box(*zip(*(sorted(ends) for ends in zip(v[:3], v[3:], strict=True)), strict=True)) for v in options.box]
+    return Continuation(
+        frames=options.frames,
+        start=options.start,
+        fade=options.fade,
+        wind=tuple(options.wind),
+        fans=tuple(Fan(_ball("--fan", values[:4]), tuple(values[4:])) for values in options.fan),
+        obstacles=(*balls, *boxes),
+    )
+
+
+def _ball(option: str, values: list[float]) -> Ball:
+    x, y, z, radius = values
+    if radius <= 0:
+        raise ValueError(f"{option}: the radius must be above 0 m, not {radius:g}.")
+    return Ball((x, y, z), radius)

@@ -1,0 +1,95 @@
+"""The pressure projection with faces whose velocity is given: solid obstacles, and what is known of a flow.
+
+Let P be the projection on the velocities without divergence and M the restriction to the given faces. Among the
+velocities u = P u that make |M (u - wanted)| least, the one nearest to P u0 is found by conjugate gradients on
+
+    P M P u = P M wanted,    from u = P u0.
+
+Every iteration is one direct Poisson solve, all iterates are without divergence, and each reduces |M (u - wanted)|.
+Forces on the given faces make up the difference from P u0: the immersed boundary projection of Taira and Colonius
+(2007), with faces in place of points.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import numpy.typing as npt
+
+from smokelift.transport import Array, Faces, StaggeredGrid, without_divergence
+
+Mask = npt.NDArray[np.bool_]
+FaceMasks = tuple[Mask, Mask, Mask]
+
+
+def without_divergence_given(
+    field: StaggeredGrid, given: FaceMasks, wanted: Faces, *, tolerance: float = 1e-3, limit: int = 60
+) -> StaggeredGrid:
+    """The nearest field without divergence that has the values wanted on the given faces.
+
+    Parameters
+    ----------
+    field
+        Any field.
+    given
+        Marks the faces.
+    wanted
+        Values there; others do not count. Where no field without divergence has them, the nearest are taken.
+    tolerance
+        Ends the iteration, relative to the first gradient.
+    limit
+        Iterations at most.
+    """
+    weights = [_half_on_sides(len(mask.shape), mask.shape[axis], axis) for axis, mask in enumerate(given)]
+
+    def projected(faces: list[Array]) -> list[Array]:
+        return list(without_divergence(field.with_faces(faces))[0].faces)
+
+    def product(a: list[Array], b: list[Array]) -> float:
+        return sum(float(np.vdot(w * p, q)) for w, p, q in zip(weights, a, b, strict=True))
+
+    def restricted(faces: list[Array]) -> list[Array]:
+        return [np.where(mask, values, np.float32(0)) for mask, values in zip(given, faces, strict=True)]
+
+    solution = projected(list(field.faces))
+    residual = projected(restricted([v - u for v, u in zip(wanted, solution, strict=True)]))
+    squared = product(residual, residual)
+    goal, search = tolerance**2 * squared, residual
+    for _ in range(limit):
+        if squared <= goal:
+            break
+        kept = restricted(search)
+        step = np.float32(squared / product(kept, kept))
+        solution = [u + step * s for u, s in zip(solution, search, strict=True)]
+        residual = [a - step * r for a, r in zip(residual, projected(kept), strict=True)]
+        before, squared = squared, product(residual, residual)
+        ratio = np.float32(squared / before)
+        search = [a + ratio * s for a, s in zip(residual, search, strict=True)]
+    return field.with_faces(solution)
+
+
+def faces_of(voxels: Mask) -> FaceMasks:
+    """The faces of marked voxels (nx, ny, nz), those on the sides of the box among them."""
+    x, y, z = (low | high for low, high in _beside(voxels))
+    return x, y, z
+
+
+def faces_between(voxels: Mask) -> FaceMasks:
+    """The faces with a marked voxel (nx, ny, nz) on one side and none on the other."""
+    x, y, z = (low ^ high for low, high in _beside(voxels))
+    return x, y, z
+
+
+def _beside(voxels: Mask) -> Iterator[tuple[Mask, Mask]]:
+    """Whether the voxels below and above the faces of each axis are marked."""
+    for axis in range(3):
+        below, above = (np.pad(voxels, [end if d == axis else (0, 0) for d in range(3)]) for end in ((1, 0), (0, 1)))
+        yield below, above
+
+
+def _half_on_sides(dimensions: int, count: int, axis: int) -> Array:
+    """Weights of the faces in the inner product of the projection: half on the sides of the box."""
+    along = np.ones(count, np.float32)
+    along[[0, -1]] = 0.5
+    return along.reshape([-1 if d == axis else 1 for d in range(dimensions)])

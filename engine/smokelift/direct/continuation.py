@@ -1,0 +1,105 @@
+"""What the smoke does after the last moment of its clip: a simulation that starts from it.
+
+A step of dt from density rho and velocity u to rho' and u', in the convention of a sequence, whose velocity has carried
+the moment before to this one:
+
+    u'   = Project(advect(u, u) + dt (b rho up) + wind), in inlets and fans with their own velocity
+    rho' = exp(-d dt) advect(rho, u'), in inlets with their own density
+
+Buoyancy b and dissipation d are those of the clip (`smokelift.direct.physics`), as is what enters
+(`smokelift.direct.inflow`). Advection keeps the mass. There is no viscosity, and MacCormack's correction keeps the
+eddies that the clip has.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from smokelift.direct.constraint import Mask
+from smokelift.direct.inflow import Inflow, find_inflow
+from smokelift.direct.moment import Moment
+from smokelift.direct.physics import Physics, fit_physics, lift
+from smokelift.direct.surroundings import Surroundings
+from smokelift.transport import Array, Velocity, advect
+
+TRACE = np.float32(1e-4)
+"""Share of the largest density below which nothing is seen. Interpolation spreads such traces over the whole box."""
+
+
+@dataclass(frozen=True, eq=False)
+class Simulation:
+    """The smoke of a clip, set free.
+
+    Attributes
+    ----------
+    physics
+        Fitted to the clip.
+    inflow
+        Of the clip.
+    surroundings
+        What the artist has placed.
+    dt
+        Time of a step in seconds.
+    """
+
+    physics: Physics
+    inflow: Inflow
+    surroundings: Surroundings
+    dt: float
+
+    def next(self, moment: Moment, step: int) -> Moment:
+        """Return the moment after one; the step that leads there is counted from 1 at the clip's last moment."""
+        entering = self.inflow.at(step)
+        moved = advect(moment.velocity, moment.velocity, self.dt)
+        velocity = self.surroundings.projected(moved.with_faces(self._driven(moved, moment, entering, step)))
+        density = advect(moment.density, velocity, self.dt, conserve=True)
+        density = self._tidied(density) * np.float32(math.exp(-self.physics.dissipation * self.dt))
+        return Moment(
+            np.where(self.inflow.voxels, entering.density, density),
+            Velocity(velocity.faces, velocity.voxel_size, velocity.closed),
+        )
+
+    def _driven(self, moved: Velocity, moment: Moment, entering: Moment, step: int) -> list[Array]:
+        """The velocity on faces after forces, inlets and fans, before the projection."""
+        rising = lift(moment.density, moved).faces
+        faces = []
+        for axis, gained in enumerate(self.surroundings.gain(step, self.dt)):
+            driven = moved.faces[axis] + np.float32(self.dt * self.physics.buoyancy) * rising[axis] + np.float32(gained)
+            for place, blown in self.surroundings.blown:
+                driven = np.where(place[axis], np.float32(blown[axis]), driven)
+            faces.append(np.where(self.inflow.faces[axis], entering.velocity.faces[axis], driven))
+        return faces
+
+    def _tidied(self, density: Array) -> Array:
+        """The same mass without traces, and without what interpolation lets into obstacles."""
+        kept = density > TRACE * density.max()
+        if self.surroundings.solid is not None:
+            kept &= ~self.surroundings.solid
+        tidied = np.where(kept, density, np.float32(0))
+        mass, left = (float(values.sum(dtype=np.float64)) for values in (density, tidied))
+        return tidied * np.float32(mass / left) if left > 0 else tidied
+
+
+def learnt_simulation(
+    moments: Sequence[Moment], dt: float, marked: Mask | None = None, surroundings: Surroundings | None = None
+) -> Simulation:
+    """The simulation that goes on as the moments of a clip do.
+
+    Parameters
+    ----------
+    moments
+        Consecutive ones, two at least.
+    dt
+        Time between them in seconds.
+    marked : (nx, ny, nz) bool, optional
+        Where smoke enters, if that is known.
+    surroundings
+        What is placed around the smoke.
+    """
+    around = surroundings or Surroundings()
+    inflow = find_inflow(moments, dt, marked, around.solid)
+    return Simulation(fit_physics(moments, dt, inflow.voxels), inflow, around, dt)

@@ -1,0 +1,182 @@
+"""Continues a sequence on disk."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from smokelift.direct.constraint import Mask, faces_of
+from smokelift.direct.continuation import learnt_simulation
+from smokelift.direct.moment import Moment, read_moment
+from smokelift.direct.surroundings import Ball, Box, Fan, Surroundings
+from smokelift.direct.writing import SHORTEST, Written, directed_writer, time_step
+from smokelift.output.sequence import Sequence
+from smokelift.output.writer import SequenceWriter
+from smokelift.scene import Domain
+from smokelift.scene.checks import Vector
+from smokelift.transport import Velocity, divergence
+
+LEARNT_FROM = 12
+"""Moments of the clip, at most, that physics and inflow are taken from: half a second, in which the source of a clip is
+steady, and long enough for a replay that is not seen as such."""
+
+
+@dataclass(frozen=True)
+class Continuation:
+    """How a sequence goes on.
+
+    Attributes
+    ----------
+    frames
+        Frames after `start`.
+    start
+        The last frame that stays as it is; None takes the last there is.
+    fade
+        Frames at the end in which the smoke fades to nothing.
+    wind
+        Velocity in m/s that all air gains after `start`.
+    fans, obstacles
+        What stands in the box after `start`.
+    """
+
+    frames: int
+    start: int | None = None
+    fade: int = 0
+    wind: Vector = (0.0, 0.0, 0.0)
+    fans: tuple[Fan, ...] = ()
+    obstacles: tuple[Ball | Box, ...] = ()
+
+
+def continue_sequence(
+    sequence: Sequence, out: str | Path, continuation: Continuation, *, npz: bool = False, resume: bool = False
+) -> Iterator[Written]:
+    """Write a sequence up to a frame, and then what a simulation makes of it.
+
+    Parameters
+    ----------
+    sequence
+        See `smokelift.direct.writing.open_source`.
+    out
+        Directory to write to.
+    continuation
+        How it goes on.
+    npz, resume
+        As in `smokelift.output.writer.SequenceWriter`.
+
+    Yields
+    ------
+    The number and the figures of every frame, which is written already.
+
+    Raises
+    ------
+    ValueError
+        If there is no such frame to start from, or too few before it, a fan or an obstacle is not in the box, or a file
+        cannot be read or written.
+    """
+    start = sequence.frames[-1] if continuation.start is None else continuation.start
+    kept = tuple(number for number in sequence.frames if number <= start)
+    if start not in sequence.frames or len(kept) < SHORTEST:
+        raise ValueError(
+            f"{sequence.directory}: cannot go on from frame {start}; choose one from "
+            f"{sequence.frames[SHORTEST - 1]} to {sequence.frames[-1]}."
+        )
+    around = _surroundings(continuation, sequence.scene.domain)
+    last = start + continuation.frames
+    told = {
+        "frames": continuation.frames,
+        "start": start,
+        "fade": continuation.fade,
+        "wind": continuation.wind,
+        "fans": [vars(fan.place) | {"velocity": fan.velocity} for fan in continuation.fans],
+        "obstacles": [vars(obstacle) for obstacle in continuation.obstacles],
+    }
+    how = (
+        f"Frames {start + 1} to {last} are a simulation that starts from frame {start}, with the buoyancy, the "
+        "dissipation and the inflow of the clip."
+    )
+    places = [float(number) for number in range(kept[0], last + 1)]
+    with directed_writer(sequence, out, "continue", told, how, places, npz=npz, resume=resume) as writer:
+        if writer.state is None and writer.finished:
+            return
+        yield from _copied(sequence, kept, writer)
+        yield from _simulated(sequence, kept, continuation, around, writer)
+
+
+def _copied(sequence: Sequence, numbers: tuple[int, ...], writer: SequenceWriter) -> Iterator[Written]:
+    for number in numbers:
+        if number not in writer.finished:
+            faces = sequence.staggered_velocity(number).faces
+            figures = {**sequence.figures(number), "origin": "clip"}
+            writer.write(number, sequence.density(number), faces, figures, ready=sequence.files(number))
+            yield number, {**figures, "seconds_density": 0.0, "seconds_velocity": 0.0}
+
+
+def _simulated(
+    sequence: Sequence, kept: tuple[int, ...], continuation: Continuation, around: Surroundings, writer: SequenceWriter
+) -> Iterator[Written]:
+    start, dt = kept[-1], time_step(sequence)
+    # the first frame has no velocity of its own
+    moments = [read_moment(sequence, number) for number in kept[1:][-LEARNT_FROM:]]
+    simulation = learnt_simulation(moments, dt, sequence.scene.inflow(), around)
+    moment, state = moments[-1], writer.state
+    if state is not None and state.number > start:
+        closed = sequence.scene.closed
+        velocity = Velocity(state.velocity, sequence.scene.domain.voxel_size, closed)
+        moment = Moment(np.asarray(state.extra["unfaded"], np.float32), velocity)
+    for step in range(1, continuation.frames + 1):
+        number = start + step
+        if number in writer.finished:
+            continue
+        began = time.perf_counter()
+        moment = simulation.next(moment, step)
+        shown = moment.density * np.float32(_share_left(step, continuation))
+        figures = {
+            "origin": "simulated",
+            "mass": float(shown.sum(dtype=np.float64)) * moment.velocity.voxel_size**3,
+            "divergence": _largest_divergence(moment.velocity, around.solid),
+            "buoyancy": simulation.physics.buoyancy,
+            "dissipation": simulation.physics.dissipation,
+            "seconds_density": 0.0,
+            "seconds_velocity": time.perf_counter() - began,
+        }
+        writer.write(number, shown, moment.velocity.faces, figures, {"unfaded": moment.density})
+        yield number, figures
+
+
+def _share_left(step: int, continuation: Continuation) -> float:
+    """The part of the smoke that is shown while it fades."""
+    return min(1.0, (continuation.frames - step) / continuation.fade) if continuation.fade else 1.0
+
+
+def _largest_divergence(velocity: Velocity, solid: Mask | None) -> float:
+    """The largest |div u| outside obstacles times voxel size over the largest |u|."""
+    largest = max(float(np.abs(component).max()) for component in velocity.faces)
+    left = np.abs(divergence(velocity))
+    if solid is not None:
+        left = left[~solid]
+    return float(left.max()) * velocity.voxel_size / largest if largest > 0 else 0.0
+
+
+def _surroundings(continuation: Continuation, domain: Domain) -> Surroundings:
+    blown = [(faces_of(_placed(fan.place, domain, "fan")), fan.velocity) for fan in continuation.fans]
+    solid = None
+    for obstacle in continuation.obstacles:
+        voxels = _placed(obstacle, domain, "obstacle")
+        solid = voxels if solid is None else solid | voxels
+    if solid is not None and solid.all():
+        raise ValueError("the obstacles fill the whole box; make them smaller.")
+    return Surroundings(continuation.wind, tuple(blown), solid)
+
+
+def _placed(thing: Ball | Box, domain: Domain, what: str) -> Mask:
+    """The voxels of a thing that has to be in the box."""
+    voxels = thing.voxels(domain)
+    if not voxels.any():
+        raise ValueError(
+            f"the {what} holds no voxel of the box from {domain.min} to {domain.max} m; move it in, or make it larger."
+        )
+    return voxels

@@ -1,0 +1,83 @@
+"""Where smoke enters in the last moments of a clip, and what enters after them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from scipy import ndimage
+
+from smokelift.direct.constraint import FaceMasks, Mask, faces_of
+from smokelift.direct.moment import Moment
+from smokelift.transport import advect
+from smokelift.velocity.sources import SourceDetection
+
+MARGIN = 1
+"""Voxels around an inlet that belong to it: its smoke is taken from the clip until it is outside."""
+
+
+@dataclass(frozen=True, eq=False)
+class Inflow:
+    """The inlets, and the moments of the clip that are replayed in them.
+
+    Forwards and backwards in turn, so that no frame jumps and the statistics stay those of the clip.
+
+    Attributes
+    ----------
+    voxels : (nx, ny, nz) bool
+        Those of all inlets.
+    moments
+        Of the clip, in their order.
+    """
+
+    voxels: Mask
+    moments: Sequence[Moment]
+
+    def at(self, step: int) -> Moment:
+        """The moment that is replayed so many steps after the last one."""
+        last = len(self.moments) - 1
+        return self.moments[abs(last - step % (2 * last))] if last else self.moments[0]
+
+    @cached_property
+    def faces(self) -> FaceMasks:
+        """The faces of the inlets' voxels."""
+        return faces_of(self.voxels)
+
+
+def find_inflow(moments: Sequence[Moment], dt: float, marked: Mask | None = None, solid: Mask | None = None) -> Inflow:
+    """Find the inlets of a clip from its last moments.
+
+    Parameters
+    ----------
+    moments
+        Two at least.
+    dt
+        Time between them in seconds.
+    marked : (nx, ny, nz) bool, optional
+        Inlets that are known; otherwise they are found from what the velocities do not explain.
+    solid : (nx, ny, nz) bool, optional
+        Obstacles, which close the inlets that they cover.
+    """
+    voxels = _found(moments, dt) if marked is None else marked
+    if voxels.any():
+        voxels = ndimage.binary_dilation(voxels, ndimage.generate_binary_structure(3, 3), MARGIN)
+    if solid is not None:
+        voxels = voxels & ~solid
+    return Inflow(voxels, moments)
+
+
+def _found(moments: Sequence[Moment], dt: float) -> Mask:
+    detection, means = SourceDetection(), None
+    smoke: Mask = np.zeros(moments[0].density.shape, bool)
+    for before, after in pairwise(moments):
+        carried = advect(before.density, after.velocity, dt)
+        densest = np.maximum(after.density, carried)
+        means = detection.means(after.density - carried, densest, 1.0, means)
+        smoke = densest > 0.01 * densest.max()
+    if means is None:
+        return smoke
+    entering: Mask = detection.weight(means, smoke) < 0.5
+    return entering

@@ -1,0 +1,70 @@
+"""One moment of moving smoke, and how it is read from a sequence."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from smokelift.direct.constraint import FaceMasks, without_divergence_given
+from smokelift.output.sequence import Sequence
+from smokelift.transport import Array, Velocity, divergence
+
+SOUND = 1e-3
+"""Divergence times voxel size over the largest speed, up to which a velocity counts as without divergence."""
+
+COMPLETION = 30
+"""Iterations in which a velocity that is known near smoke alone is completed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """One moment of moving smoke.
+
+    Attributes
+    ----------
+    density : (nx, ny, nz) float32
+    velocity
+        Without divergence, in m/s; it has carried the moment before to this one.
+    """
+
+    density: Array
+    velocity: Velocity
+
+
+def read_moment(sequence: Sequence, number: int) -> Moment:
+    """Read a frame of a sequence.
+
+    Raises
+    ------
+    SequenceError
+        If there is no such frame, or its file is missing or damaged.
+    """
+    velocity = replace(sequence.staggered_velocity(number), closed=sequence.scene.closed)
+    return Moment(sequence.density(number), completed(velocity))
+
+
+def completed(velocity: Velocity) -> Velocity:
+    """The velocity without divergence that is nearest to one that is known near smoke alone, and zero elsewhere.
+
+    Files keep the velocity near smoke. Cut off there it has divergence, and projecting that would slow the smoke down;
+    so the air around is set in motion instead. A velocity without divergence stays as it is.
+    """
+    largest = max(float(np.abs(component).max()) for component in velocity.faces)
+    if float(np.abs(divergence(velocity)).max()) * velocity.voxel_size <= SOUND * largest:
+        return velocity
+    found = without_divergence_given(velocity, _known(velocity), velocity.faces, limit=COMPLETION)
+    return velocity.with_faces(found.faces)
+
+
+def _known(velocity: Velocity) -> FaceMasks:
+    """The faces between voxels with a velocity."""
+    known = velocity.centres().any(axis=-1)
+    pairs = []
+    for axis in range(3):
+        ends = [(1, 1) if d == axis else (0, 0) for d in range(3)]
+        padded = np.pad(known, ends, mode="edge")
+        count = padded.shape[axis]
+        pairs.append(padded.take(range(count - 1), axis) & padded.take(range(1, count), axis))
+    x, y, z = pairs
+    return x, y, z

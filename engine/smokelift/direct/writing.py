@@ -1,0 +1,95 @@
+"""Writes what has become of a sequence as another sequence, which opens in Blender as any other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from smokelift.output.checksum import checksum
+from smokelift.output.layout import INDEX
+from smokelift.output.sequence import Sequence
+from smokelift.output.writer import SequenceWriter
+from smokelift.scene import Camera
+
+USUAL_FPS = 24.0
+"""Frames a second where the clip does not say."""
+
+SHORTEST = 4
+"""Frames that a sequence needs to be continued, retimed or looped."""
+
+Written = tuple[int, Mapping[str, Any]]
+"""Number and figures of a frame."""
+
+
+def open_source(directory: str | Path) -> Sequence:
+    """Open the sequence that is directed.
+
+    Raises
+    ------
+    ValueError
+        If there is none, or it has too few frames.
+    """
+    sequence = Sequence.open(directory)
+    if len(sequence.frames) < SHORTEST:
+        raise ValueError(
+            f"{directory}: has {len(sequence.frames)} frames; {SHORTEST} are needed to see how smoke moves."
+        )
+    return sequence
+
+
+def time_step(sequence: Sequence) -> float:
+    """Seconds from one frame of a sequence to the next."""
+    clip = sequence.scene.clip
+    return 1 / ((clip.fps if clip is not None else None) or USUAL_FPS)
+
+
+def directed_writer(
+    sequence: Sequence,
+    out: str | Path,
+    job: str,
+    settings: Mapping[str, Any],
+    how: str,
+    places: list[float],
+    *,
+    npz: bool,
+    resume: bool,
+) -> SequenceWriter:
+    """The writer of a sequence that is made from another.
+
+    Parameters
+    ----------
+    sequence
+        The other.
+    out
+        Directory to write to.
+    job, settings
+        What is done to it; kept in the settings under ``direct``.
+    how
+        The same as a sentence for the provenance.
+    places
+        For every frame that is written, the number of the frame of `sequence` whose camera it has; between frames the
+        nearest, beyond them the last.
+    npz, resume
+        As in `SequenceWriter`.
+    """
+    scene = replace(sequence.scene, camera=_camera_of(sequence.scene.camera, places))
+    return SequenceWriter(
+        out,
+        scene,
+        {**sequence.settings, "direct": {"job": job, **settings}},
+        choices=sequence.choices,
+        provenance=[*sequence.provenance, {"what": job, "origin": "made up", "how": how, "settings": {}}],
+        sources={"sequence": {INDEX: checksum([sequence.directory / INDEX])}},
+        npz=npz,
+        resume=resume,
+    )
+
+
+def _camera_of(camera: Camera, places: list[float]) -> Camera:
+    if not camera.moves:
+        return camera
+    last = len(camera.matrices) - 1
+    matrices = tuple(camera.matrices[min(max(round(place) - 1, 0), last)] for place in places)
+    return replace(camera, matrix=matrices[0], matrices=matrices)

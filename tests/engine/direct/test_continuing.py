@@ -1,0 +1,71 @@
+"""Sequences that go on: what is kept, what is added, and how a run is resumed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from smokelift.direct import Ball, Continuation, continue_sequence, open_source
+from smokelift.output.index import SequenceError
+from smokelift.output.sequence import Sequence
+from tests.engine.direct.rising import plume, write_plume
+
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory):
+    directory = tmp_path_factory.mktemp("source") / "smoke"
+    write_plume(directory)
+    return open_source(directory)
+
+
+def run(source, out, continuation, **options):
+    return [number for number, _ in continue_sequence(source, out, continuation, npz=True, **options)]
+
+
+def test_the_clip_stays_and_goes_on(source, tmp_path):
+    assert run(source, tmp_path / "out", Continuation(5)) == list(range(1, 16))
+    made = Sequence.open(tmp_path / "out")
+    assert made.complete
+    assert made.frames == tuple(range(1, 16))
+    for number in source.frames:
+        assert made.files(number)["npz"].read_bytes() == source.files(number)["npz"].read_bytes()
+    assert made.figures(3)["psnr"] == 30
+    # ours goes on as the simulation that made the clip did, although the inlet is only found
+    true = plume()[14].density
+    error = np.linalg.norm(made.density(15) - true) / np.linalg.norm(true)
+    held = np.linalg.norm(source.density(10) - true) / np.linalg.norm(true)
+    assert error < 0.5 * held
+    assert made.provenance[-1]["origin"] == "made up"
+    assert "Frames 11 to 15" in made.provenance[-1]["how"]
+
+
+def test_a_stopped_run_goes_on_to_the_same_result(source, tmp_path):
+    continuation = Continuation(5, start=8, fade=3, wind=(0.4, 0.0, 0.0), obstacles=(Ball((0, 0, 1.6), 0.3),))
+    run(source, tmp_path / "whole", continuation)
+    for number, _ in continue_sequence(source, tmp_path / "stopped", continuation, npz=True):
+        if number == 11:
+            break
+    run(source, tmp_path / "stopped", continuation, resume=True)
+    whole, stopped = (Sequence.open(tmp_path / name) for name in ("whole", "stopped"))
+    assert whole.frames == stopped.frames == tuple(range(1, 14))
+    for number in whole.frames:
+        np.testing.assert_array_equal(whole.density(number), stopped.density(number))
+    assert not whole.density(13).any()
+    with pytest.raises(SequenceError, match="begun differently"):
+        run(source, tmp_path / "stopped", Continuation(6, start=8), resume=True)
+
+
+def test_what_cannot_be_is_refused(source, tmp_path):
+    for continuation, reason in (
+        (Continuation(5, start=99), "from 4 to 10"),
+        (Continuation(5, start=2), "from 4 to 10"),
+        (Continuation(5, obstacles=(Ball((9, 0, 0), 0.5),)), "holds no voxel"),
+        (Continuation(5, obstacles=(Ball((0, 0, 0), 9),)), "whole box"),
+    ):
+        with pytest.raises(ValueError, match=reason):
+            run(source, tmp_path / "out", continuation)
+    assert not (tmp_path / "out").exists()
+    short = tmp_path / "short"
+    write_plume(short, 3)
+    with pytest.raises(ValueError, match="has 3 frames"):
+        open_source(short)

@@ -1,0 +1,52 @@
+"""Buoyancy, dissipation and inflow of smoke whose physics is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from smokelift.direct import Ball
+from smokelift.direct.inflow import Inflow, find_inflow
+from smokelift.direct.physics import fit_physics
+from tests.engine.direct.rising import DOMAIN, DT, PHYSICS, at_rest, blob, course, free, plume
+
+
+def test_physics_of_a_free_blob_is_found():
+    moments = course(free(), at_rest(blob()), 8)
+    found = fit_physics(moments, DT, np.zeros(DOMAIN.shape, bool))
+    assert found.buoyancy == pytest.approx(PHYSICS.buoyancy, rel=0.01)
+    assert found.dissipation == pytest.approx(PHYSICS.dissipation, rel=0.01)
+
+
+def test_smoke_without_motion_has_no_physics():
+    moments = [at_rest(blob())] * 4
+    found = fit_physics(moments, DT, np.zeros(DOMAIN.shape, bool))
+    assert (found.buoyancy, found.dissipation) == (0, 0)
+    empty = [at_rest(np.zeros(DOMAIN.shape, np.float32))] * 4
+    assert fit_physics(empty, DT, np.zeros(DOMAIN.shape, bool)).buoyancy == 0
+
+
+def test_the_inlet_of_a_plume_is_found():
+    found = find_inflow(plume(), DT).voxels
+    true = Ball((0.0, 0.0, 0.3), 0.3).voxels(DOMAIN)
+    assert (found & true).sum() > 0.3 * true.sum()
+    far = ~Ball((0.0, 0.0, 0.3), 0.7).voxels(DOMAIN)
+    assert not (found & far).any()
+
+
+def test_smoke_that_only_moves_has_no_inlet():
+    assert not find_inflow(course(free(), at_rest(blob()), 8), DT).voxels.any()
+
+
+def test_an_inlet_replays_its_moments_without_a_jump():
+    moments = plume()[:4]
+    inflow = Inflow(np.ones(DOMAIN.shape, bool), moments)
+    places = [moments.index(inflow.at(step)) for step in range(9)]
+    assert places == [3, 2, 1, 0, 1, 2, 3, 2, 1]
+    assert Inflow(inflow.voxels, moments[:1]).at(5) is moments[0]
+
+
+def test_an_obstacle_closes_the_inlet_that_it_covers():
+    everywhere = np.ones(DOMAIN.shape, bool)
+    solid = Ball((0, 0, 0), 5).voxels(DOMAIN)
+    assert not find_inflow(plume()[:2], DT, everywhere, solid).voxels.any()
