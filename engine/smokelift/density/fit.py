@@ -7,6 +7,7 @@ the cameras' pictures alone.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Protocol
@@ -73,8 +74,9 @@ class Density:
     figures
         ``loss`` (sum of squared differences over all cameras' pictures) and ``psnr`` (dB, peak 1) of the input's
         picture, in linear radiance, over the pixels that its smoke's voxels can change, all counted alike;
-        ``psnr_view_1``, ... of further views, each absent where its picture shows no smoke; ``iterations``;
-        ``hull_share``, the hull's share of the voxels.
+        ``psnr_view_1``, ... of further views, each absent where its picture shows no smoke; ``relative_error``, the
+        root mean square of the input's differences over that of what the smoke changes there: 1 if nothing is fitted,
+        however faint the smoke; ``iterations``; ``hull_share``, the hull's share of the voxels.
     smooth : (nx, ny, nz) float32, optional
         The depth prior's `DepthEstimate.smooth`.
     steady : (nx, ny, nz) float32, optional
@@ -234,9 +236,12 @@ def fit_figures(views: ViewSet, residuals: Sequence[Image], iterations: int) -> 
         if left.size:
             name = f"psnr_view_{number}" if number else "psnr"
             decibels[name] = float(-10 * np.log10(max(losses[-1] / left.size, 1e-12)))
+    front = views.views[0]
+    change = float(np.sum(np.square((front.image - front.plate.image)[front.counted], dtype=np.float64)))
     return {
         "loss": sum(losses),
         **decibels,
+        **({"relative_error": math.sqrt(losses[0] / change)} if change > 0 else {}),
         "iterations": float(iterations),
         "hull_share": float(views.hull.mean()),
     }

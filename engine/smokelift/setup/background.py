@@ -10,15 +10,23 @@ from smokelift.footage.background import given_plates
 from smokelift.footage.clip import Clip
 from smokelift.footage.evidence import evidence
 from smokelift.footage.exposure import gain_of, small
+from smokelift.footage.images import area_average
 from smokelift.footage.plate import Plate, Plates, known_plate
 from smokelift.footage.plate_estimation import estimate_plate, one_colour
 from smokelift.scene import Background, Camera
+from smokelift.setup.smoke import SmokeSamples
 
 BLACK = 0.001
 """Linear radiance below which a background is called black."""
 
 EXPOSURE_SAMPLES = 16
 """Frames whose exposure is looked at before a run."""
+
+UNKNOWN = 0.5
+"""Confidence of a plate below which what is behind the smoke is unknown there."""
+
+MOSTLY = 0.5
+"""Share of the smoke's pixels without a known background from which most of the smoke may be in the plate."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,13 +93,38 @@ def exposure_notes(clip: Clip, plates: Plates) -> tuple[str, ...]:
     )
 
 
+def unknown_share(plate: Plate, samples: SmokeSamples) -> float:
+    """Share of the pixels that show smoke, or may, whose background is unknown."""
+    rows, columns = samples.covered.shape
+    unknown = area_average(plate.confidence, columns, rows) < UNKNOWN
+    return float(unknown.sum() / max((unknown | samples.covered).sum(), 1))
+
+
+def smoke_in_plate(plates: Plates, samples: SmokeSamples) -> tuple[str, ...]:
+    """What is to be said of a background that may hold most of the smoke, a sentence; nothing of others."""
+    share = unknown_share(plates, samples) if isinstance(plates, Plate) else 0.0
+    if share < MOSTLY:
+        return ()
+    return (
+        f"The background may hold most of the smoke: {share:.0%} of where smoke is or may be is never free of it, so "
+        "what stays there all the time is missing from the result. Give a clean plate, or a color, in [background].",
+    )
+
+
 def _estimated(plate: Plate) -> str:
     """How a background was estimated."""
-    unknown = float(np.mean(plate.confidence < 0.5))
-    if unknown == 0 and np.ptp(plate.image.reshape(-1, 3), axis=0).max() == 0:
-        colour = ", ".join(f"{v:.2g}" for v in plate.image[0, 0])
-        black = plate.image[0, 0].max() < BLACK
-        return f"Background not given: it is {'black' if black else f'of one colour, {colour} (linear)'}."
+    unknown = float(np.mean(plate.confidence < UNKNOWN))
+    colour = np.median(plate.image.reshape(-1, 3), axis=0)
+    other = float((plate.image != colour).any(-1).mean())
+    if unknown == 0 and other < MOSTLY:
+        said = ", ".join(f"{v:.2g}" for v in colour)
+        found = f"Background not given: it is {'black' if colour.max() < BLACK else f'of one colour, {said} (linear)'}"
+        if other == 0:
+            return f"{found}."
+        return (
+            f"{found}, but for {other:.1%} of the picture that has other colours and never changes, as a nozzle, a "
+            "floor or a logo does. If that is smoke, give the color in [background]."
+        )
     if unknown == 0:
         return "Background estimated from the clip, which shows every part of it free of smoke."
     return (

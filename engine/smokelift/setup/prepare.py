@@ -15,7 +15,7 @@ from smokelift.footage.steady import steady
 from smokelift.footage.working_picture import CameraError, WorkingPicture, working_picture
 from smokelift.render import scene_optics
 from smokelift.scene import Background, Camera, CompleteScene, Domain, Medium, Scene
-from smokelift.setup.background import exposure_notes, find_plates
+from smokelift.setup.background import exposure_notes, find_plates, smoke_in_plate
 from smokelift.setup.further_views import disagreement, open_view
 from smokelift.setup.geometry import find_geometry
 from smokelift.setup.light import ambient_sun, richest_scattering
@@ -55,7 +55,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
     samples = sample_smoke(clip, plates)
     geometry = find_geometry(clip, scene, settings, plates, samples)
     camera, domain = geometry.camera, geometry.domain
-    notes = [*remarks, *found.notes, *exposure, *geometry.notes]
+    notes = [*remarks, *found.notes, *smoke_in_plate(plates, samples), *exposure, *geometry.notes]
     if settings.axis_depth is not None:
         SmokeAxis.given(settings.axis_depth, camera, domain)  # refuse early what cannot be
     medium = scene.medium

@@ -166,6 +166,24 @@ def test_no_smoke_at_all_is_said(plume, tmp_path, capsys) -> None:
     assert not any("psnr" in sequence.figures(n) for n in (1, 2))
 
 
+def test_frames_without_smoke_are_counted(plume, tmp_path, capsys) -> None:
+    """A run goes well all the same."""
+    nothing = np.zeros_like(plume.densities[0])
+    plume.write(tmp_path / "clip", [nothing, *plume.densities[:2]]).save(tmp_path / "scene.toml")
+    assert command("reconstruct", tmp_path / "scene.toml", "--out", tmp_path / "out", "--npz", *QUICK) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "1 of 3 frames show no smoke" in said
+    assert "Hardly any smoke was fitted" not in said
+
+
+def test_a_fit_of_nothing_is_said(shot, tmp_path, capsys) -> None:
+    """Smoke that only absorbs cannot show bright smoke before black."""
+    words = ("--npz", "--frames", "0:1", "--scattering", "absorption", *QUICK)
+    assert command("reconstruct", shot, "--out", tmp_path / "out", *words) == 0
+    assert "differs from the clip by 100% of what its smoke changes" in " ".join(capsys.readouterr().out.split())
+    assert Sequence.open(tmp_path / "out").figures(1)["relative_error"] == pytest.approx(1, abs=0.01)
+
+
 def test_resuming_what_is_complete_changes_nothing(finished, shot) -> None:
     """Done already is done."""
     before = {path.name: path.read_bytes() for path in finished.glob("smoke_*")}

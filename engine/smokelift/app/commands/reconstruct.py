@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 import itertools
 import time
+from collections.abc import Mapping
+from collections.abc import Sequence as Rows
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +27,9 @@ from smokelift.render import device
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.provenance import made_up
 from smokelift.setup.shot import Shot
+
+UNEXPLAINED = 0.7
+"""Root mean square of what a fit leaves, as a share of what the smoke changes: at 0.7 half of the change's energy."""
 
 
 def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
@@ -67,17 +72,37 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
                     _write_thumbnail(options.thumbnail, shot, frame)
                 say.frame(frame.number, frame.figures)
     sequence = Sequence.open(options.out)
-    if not any((sequence.figures(number).get("hull_share") or 0) > 0 for number in sequence.frames):
+    figures = [sequence.figures(number) for number in sequence.frames]
+    empty = sum(not (of_frame.get("hull_share") or 0) > 0 for of_frame in figures)
+    if empty == len(figures):
         raise ValueError(
             f"No smoke found: in no frame does a patch differ from the background by {2 * SMOKE_THRESHOLD:g} times the "
             f"clip's noise, so all frames in {options.out} are empty. Give a clean plate ([background] in a scene "
             "file, Clean Plate in Blender), or check the one that is given."
         )
+    for note in _shortcomings(figures, empty):
+        say.note(note)
     seconds = time.monotonic() - began
     say.finish(
         f"{len(sequence.frames)} frames in {options.out} ({seconds:.0f} s).",
         {"directory": str(options.out), "frames": len(sequence.frames), "seconds": round(seconds, 1)},
     )
+
+
+def _shortcomings(figures: Rows[Mapping[str, Any]], empty: int) -> list[str]:
+    """What the figures of a finished run say against it, a sentence each."""
+    said = []
+    if empty:
+        said.append(f"{empty} of {len(figures)} frames show no smoke and are empty.")
+    left = [of_frame["relative_error"] for of_frame in figures if of_frame.get("relative_error") is not None]
+    if left and (typical := float(np.median(left))) > UNEXPLAINED:
+        said.append(
+            f"Hardly any smoke was fitted: a typical frame still differs from the clip by {typical:.0%} of what its "
+            "smoke changes there, and its psnr is as high as it is because the smoke is faint. Give the "
+            "background, the light or the medium that the clip was filmed in in a scene file; `smokelift inspect` says "
+            "what was taken."
+        )
+    return said
 
 
 def _check_outputs(options: argparse.Namespace) -> None:
