@@ -4,7 +4,7 @@
 - ``velocity``: error against time of the velocity solver, and its error on known flows
 - ``pipeline``: seconds a frame and memory of whole runs
 - ``accuracy``: reconstructions beside known volumes and other views
-- ``stability``: damaged files and hostile values against the command line
+- ``stability``: damaged files, hostile values and failing systems against the command line
 - ``truth``, ``example``: make the scenes that are known, and the example clip
 
 ``python -m benchmarks renderer|velocity|pipeline`` runs the first three (so does ``smokelift bench``); the other

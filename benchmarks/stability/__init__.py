@@ -1,8 +1,10 @@
-"""A campaign against the command line: damaged files and hostile values, each in a process of its own.
+"""A campaign against the command line: damaged files, hostile values and failing systems, each in its own process.
 
 - ``shot``: a tiny shot, whose files are damaged
 - ``mutations``: how text, bytes, archives and tables are damaged
-- ``cases``: the classes of cases; a case is a folder and the words of a command
+- ``cases``: the classes of cases
+- ``environments``: what of the system fails: disk, folder, memory, threads, files, network, a signal
+- ``recovery``: a run whose system fails, and the run that goes on from it
 - ``forked``: one case after the other, each in a fork of a process that has loaded the engine
 - ``judge``: what a command may do, and what not
 

@@ -1,16 +1,22 @@
-"""The classes of cases: what is damaged, and which command reads it."""
+"""The classes of cases: what is damaged and which command reads it, and what of the system fails."""
 
 from __future__ import annotations
 
 import json
 import shutil
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
+from benchmarks.stability.environments import ENVIRONMENTS
+from benchmarks.stability.forked import Ended, Limits, run
+from benchmarks.stability.judge import files_of, verdict
 from benchmarks.stability.mutations import damaged_bytes, damaged_json, damaged_text, extreme_array
+from benchmarks.stability.recovery import recovered
 from benchmarks.stability.shot import TinyShot
+from smokelift.app.cli import main
 
 INSPECT = ("inspect", "scene.toml", "--quality", "draft", "--device", "cpu")
 RENDER = ("render", "out", "--frame", "2", "--out", "new.png", "--device", "cpu")
@@ -83,16 +89,50 @@ def state(shot: TinyShot, folder: Path, random: Damage) -> tuple[str, ...]:
     return RESUME
 
 
-CLASSES: Mapping[str, tuple[Prepare, str]] = {
-    "scene file": (scene, "new"),
-    "clip": (clip, "new"),
-    "picture": (picture, "new"),
-    "sequence.json": (index, "new"),
+DAMAGED: Mapping[str, tuple[Prepare, str]] = {
     "NumPy twin": (twin, "new"),
     "OpenVDB": (vdb, "new"),
+    "clip": (clip, "new"),
+    "picture": (picture, "new"),
     "resume.npz": (state, "out/"),
+    "scene file": (scene, "new"),
+    "sequence.json": (index, "new"),
 }
-"""Of each class how a case is made, and how the names begin that its command may write."""
+"""Of each class of damaged files how a case is made, and how the names begin that its command may write."""
+
+
+def damaged(prepare: Prepare, out: str, shot: TinyShot, place: Path, random: Damage) -> tuple[Ended, str]:
+    """Run a command on damaged files.
+
+    Parameters
+    ----------
+    prepare, out
+        Of a class.
+    shot
+        What is damaged.
+    place
+        A folder to be made.
+    random
+        What decides how; without it the files stay sound.
+
+    Returns
+    -------
+    ended
+        How the command ended.
+    wrong
+        In a word what is wrong with that; "" if nothing is.
+    """
+    words = prepare(shot, place, random)
+    before = files_of(place)
+    ended = run(main, words, place, Limits())
+    return ended, verdict(ended, before, files_of(place), out)
+
+
+CLASSES: Mapping[str, Callable[[TinyShot, Path, Damage], tuple[Ended, str]]] = {
+    **{name: partial(damaged, *damage) for name, damage in DAMAGED.items()},
+    **{name: partial(recovered, environment) for name, environment in ENVIRONMENTS.items()},
+}
+"""Each class by what runs one case of it. New ones go to the end: a class's place decides how its cases are drawn."""
 
 
 def _damage(path: Path, random: Damage) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import faulthandler
+import gc
 import os
 import resource
 import signal
@@ -36,7 +37,17 @@ class Ended:
     hung: bool
 
 
-def run(command: Callable[[Sequence[str]], int], words: Sequence[str], folder: Path, limits: Limits) -> Ended:
+def nothing() -> None:
+    """Do nothing."""
+
+
+def run(
+    command: Callable[[Sequence[str]], int],
+    words: Sequence[str],
+    folder: Path,
+    limits: Limits,
+    begin: Callable[[], None] = nothing,
+) -> Ended:
     """Run a command in a fork of this process.
 
     Parameters
@@ -49,11 +60,14 @@ def run(command: Callable[[Sequence[str]], int], words: Sequence[str], folder: P
         Working directory; standard output and error are kept beside it.
     limits
         A command that takes more is stopped.
+    begin
+        Done in the fork before the command.
     """
     spoken = [folder.with_name(f"{folder.name}.{name}") for name in ("out", "err")]
     child = os.fork()
     if child == 0:
         status = CRASHED
+        gc.freeze()  # what the parent left to its collector may wait for threads, which a fork has not
         try:
             for number, path in enumerate(spoken, 1):
                 os.dup2(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), number)
@@ -63,6 +77,7 @@ def run(command: Callable[[Sequence[str]], int], words: Sequence[str], folder: P
             resource.setrlimit(resource.RLIMIT_AS, (limits.memory, limits.memory))
             resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
             os.chdir(folder)
+            begin()
             status = command(words)
         except SystemExit as leaving:
             status = leaving.code if isinstance(leaving.code, int) else CRASHED

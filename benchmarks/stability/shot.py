@@ -24,20 +24,22 @@ class TinyShot:
     ----------
     video, pictures
         ``scene.toml`` with ``clip.mp4``; with ``frame_0000.png`` and so on and ``plate.exr``.
-    finished, begun
-        A sequence with NumPy twins in ``out``, beside the scene file and the clip; the second has its first two frames.
+    finished, filmed, begun
+        A sequence with NumPy twins in ``out``, beside the scene file and the clip: of the pictures; of the video; of
+        the pictures, with its first two frames.
     """
 
     video: Path
     pictures: Path
     finished: Path
+    filmed: Path
     begun: Path
 
 
 def tiny_shot(folder: Path) -> TinyShot:
     """Make the shot in a folder."""
     folder = folder.absolute()
-    shot = TinyShot(*(folder / name for name in ("video", "pictures", "finished", "begun")))
+    shot = TinyShot(*(folder / name for name in ("video", "pictures", "finished", "filmed", "begun")))
     scene = Scene(
         camera=Camera.look_at((0, -4, 0.8), (0, 0, 0.8), fov_y_degrees=27, size=(24, 32)),
         domain=Domain((-0.6, -0.6, 0), (0.6, 0.6, 1.6), (12, 12, 16)),
@@ -50,9 +52,9 @@ def tiny_shot(folder: Path) -> TinyShot:
         for n in range(FRAMES)
     ]
     images = [render(density, replace(scene, background=Background(color=(0, 0, 0)))) for density in densities]
-    for place in (shot.video, shot.pictures, shot.finished, shot.begun):
+    for place in (shot.video, shot.pictures, shot.finished, shot.filmed, shot.begun):
         place.mkdir(parents=True)
-        if place == shot.video:
+        if place in (shot.video, shot.filmed):
             write_video(place / "clip.mp4", images, 24)
             known = replace(scene, clip=ClipSource(place / "clip.mp4"), background=Background(color=(0, 0, 0)))
         else:
@@ -62,7 +64,7 @@ def tiny_shot(folder: Path) -> TinyShot:
             clip = ClipSource(place / "frame_####.png", fps=24.0)
             known = replace(scene, clip=clip, background=Background(image=place / "plate.exr"))
         known.save(place / "scene.toml")
-        if place in (shot.finished, shot.begun):
+        if place in (shot.finished, shot.filmed, shot.begun):
             assert known.clip is not None
             with Clip.open(known.clip) as opened:
                 frames = reconstruct(opened, known, Settings.preset("draft"), place / "out", npz=True)

@@ -1,18 +1,26 @@
-"""A short campaign of damaged files against the command line, and that the campaign itself sees what it must."""
+"""A short campaign of damaged files and failing systems, and that the campaign itself sees what it must."""
 
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import sys
+import tempfile
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 
+import numpy as np
 import pytest
 
 from benchmarks.stability.__main__ import failures, main
-from benchmarks.stability.cases import CLASSES
+from benchmarks.stability.cases import DAMAGED
+from benchmarks.stability.environments import ENVIRONMENTS, Failure, lacking
 from benchmarks.stability.forked import Ended, Limits, run
 from benchmarks.stability.judge import verdict
+from benchmarks.stability.recovery import recovered
 from benchmarks.stability.shot import TinyShot, tiny_shot
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="needs fork")
@@ -31,7 +39,16 @@ def shot(tmp_path_factory) -> TinyShot:
     return tiny_shot(tmp_path_factory.mktemp("stability"))
 
 
-@pytest.mark.parametrize("name", CLASSES)
+@pytest.fixture
+def open_folder() -> Iterator[Path]:
+    """A folder that every user can reach."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        folder.chmod(0o755)
+        yield folder
+
+
+@pytest.mark.parametrize("name", DAMAGED)
 def test_damaged_files_end_in_one_line(shot, tmp_path, name) -> None:
     statuses, failed = failures(shot, name, 3, tmp_path)
     assert failed == []
@@ -41,6 +58,41 @@ def test_damaged_files_end_in_one_line(shot, tmp_path, name) -> None:
 @pytest.mark.parametrize(("name", "number"), [(name, n) for name, numbers in FOUND.items() for n in numbers])
 def test_what_failed_once_fails_no_more(shot, tmp_path, name, number) -> None:
     assert failures(shot, name, 1, tmp_path, first=number)[1] == []
+
+
+@pytest.mark.parametrize("name", ENVIRONMENTS)
+def test_a_run_goes_on_when_the_system_is_well_again(shot, open_folder, name) -> None:
+    """To the bits of a run in one go; nothing that was said to be done is lost."""
+    if reason := lacking(name, open_folder):
+        pytest.skip(reason)
+    cases = 5 if name == "killed" else 1
+    statuses, failed = failures(shot, name, cases, open_folder)
+    assert failed == []
+    assert sum(statuses.values()) == cases
+
+
+def losing(name, tell):
+    """An environment in which a run loses a file that it has written, or more."""
+
+    @contextmanager
+    def environment(out, random):
+        yield Failure(mend=lambda: tell(out / name))
+
+    return environment
+
+
+@pytest.mark.parametrize(
+    ("name", "tell", "wrong"),
+    [
+        ("smoke_0002.npz", lambda path: path.write_bytes(b""), "damaged"),
+        ("smoke_0002.npz", lambda path: shutil.copy(path.with_name("smoke_0001.npz"), path), "damaged"),
+        (".", lambda path: shutil.rmtree(path), "lost"),
+        ("notes.txt", lambda path: path.write_text("mine"), "cannot go on"),
+        ("../notes.txt", lambda path: path.write_text("mine"), "other files"),
+    ],
+)
+def test_what_is_lost_is_seen(shot, tmp_path, name, tell, wrong) -> None:
+    assert recovered(losing(name, tell), shot, tmp_path / "case", np.random.default_rng(1))[1].startswith(wrong)
 
 
 def fails(words):
