@@ -2,6 +2,9 @@
 
 bpy is one per process and a crash of it ends the process; so it stays out of this one. A single file, or a test of
 it, is run like any other: ``pytest tests/addon/inside/volume.py -k velocity``.
+
+Those that reconstruct whole clips are left to ``make test-blender``, which runs every file in every bpy: they take as
+long as a third of all other tests.
 """
 
 from __future__ import annotations
@@ -14,7 +17,8 @@ from pathlib import Path
 import pytest
 
 INSIDE = Path(__file__).parent / "inside"
-FILES = sorted(path.name for path in INSIDE.glob("*.py") if path.name != "conftest.py")
+LONG = ("batch.py", "whole.py")
+FILES = sorted({path.name for path in INSIDE.glob("*.py")} - {"conftest.py", *LONG})
 SECONDS = 600
 
 
