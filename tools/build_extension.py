@@ -145,6 +145,7 @@ def build(engine_wheels: Sequence[Path], out: Path) -> list[Path]:
             gather(platform, engines[platform.name], pins(), wheels)
     stage_add_on(manifest, [platform.name for platform in PLATFORMS if platform.name in engines])
 
+    print("Zipping, and checking the zip as Blender does.", flush=True)
     out.mkdir(parents=True, exist_ok=True)
     for old in out.glob(f"{manifest['id']}-*.zip"):
         old.unlink()
@@ -200,6 +201,7 @@ def gather(platform: Platform, engines: Mapping[str, Path], lines: Sequence[str]
         If a wheel cannot be had, or they do not fit each other.
     """
     for python in PYTHONS:
+        print(f"Gathering the wheels for {platform.name} and Python {python}.", flush=True)
         aside = STAGE / "downloads" / f"{platform.name}-{python}"
         aside.mkdir(parents=True)
         wanted = aside / "requirements.txt"

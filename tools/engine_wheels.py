@@ -2,6 +2,9 @@
 
 A wheel is tied to one version of Python, and on Linux to the C library that it was linked to. So there it is compiled
 by Zig, which brings older libraries along: the wheel then runs wherever Blender itself does.
+
+What a build needs is installed once for each Python and stays in build/portable, as do the compiled files: what has not
+changed is not compiled again.
 """
 
 from __future__ import annotations
@@ -13,6 +16,7 @@ import platform
 import subprocess
 import sys
 import tempfile
+import tomllib
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -47,7 +51,8 @@ def main() -> int:
                 file=sys.stderr,
             )
             return 2
-        build(python, out)
+        print(f"Building the engine's wheel for Python {version} (build/portable keeps what is compiled).", flush=True)
+        build(build_environment(python, ROOT / "build" / "portable" / f"python{version}"), out)
     return 0
 
 
@@ -66,26 +71,60 @@ def _fits(python: str, version: str) -> bool:
         return False
 
 
-def build(python: str, out: Path) -> None:
-    """Build one wheel into a folder.
+def build_environment(python: str, folder: Path) -> Path:
+    """An environment with what a build needs, installed once.
+
+    pip's own is new for every build, in a folder of another name, and so everything would be compiled again.
 
     Parameters
     ----------
     python
         The interpreter that it is for.
+    folder
+        Where it is, or will be.
+
+    Returns
+    -------
+    Its folder of programs.
+    """
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    wanted = [
+        *project["build-system"]["requires"],
+        f"cmake{project['tool']['scikit-build']['cmake']['version']}",
+        "ninja",
+    ]
+    programs = folder / ("Scripts" if sys.platform == "win32" else "bin")
+    stamp = folder / "wanted"
+    if not stamp.is_file() or stamp.read_text() != "\n".join([python, *wanted]):
+        print(f"Installing what the build needs: {', '.join(wanted)}.", flush=True)
+        subprocess.run([python, "-m", "venv", "--clear", str(folder)], check=True)
+        pip = [str(programs / "python"), "-m", "pip", "--disable-pip-version-check", "install", "--quiet"]
+        subprocess.run([*pip, *wanted], check=True)
+        stamp.write_text("\n".join([python, *wanted]))
+    return programs
+
+
+def build(programs: Path, out: Path) -> None:
+    """Build one wheel into a folder.
+
+    Parameters
+    ----------
+    programs
+        Folder of programs of the environment that builds it.
     out
         The folder.
     """
     portable = platform.system() == "Linux" and platform.machine() == "x86_64"
-    environment = dict(os.environ)
+    environment = os.environ | {"PATH": os.pathsep.join([str(programs), os.environ["PATH"]])}
     if portable:
         environment["CXX"] = f"{_zig()} c++ -target x86_64-linux-gnu.{GLIBC}"
     elif platform.system() == "Darwin":
         environment["MACOSX_DEPLOYMENT_TARGET"] = "11.0"  # Blender's own
     with tempfile.TemporaryDirectory() as folder:
         # a build folder of its own: the one of `make` was made by another compiler
-        wheel = ["wheel", "--quiet", "--no-deps", "-w", folder, "-Cbuild-dir=build/portable/{wheel_tag}", str(ROOT)]
-        pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "--python", python]
+        wheel = ["wheel", "--quiet", "--no-deps", "--no-build-isolation", "-w", folder]
+        wheel += ["-Cbuild-dir=build/portable/{wheel_tag}", str(ROOT)]
+        pip = [str(programs / "python"), "-m", "pip", "--disable-pip-version-check"]
         subprocess.run([*pip, *wheel], env=environment, cwd=ROOT, check=True)
         (built,) = Path(folder).glob("*.whl")
         if portable:
