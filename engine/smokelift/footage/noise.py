@@ -35,6 +35,10 @@ SMOKE_TO_NOISE = 3.0
 """Deviation over time, in units of the stillest tenth's, above which it is smoke and not noise
 (docs/experiments/background.md)."""
 
+CLIPPED_MEAN = 1.1
+"""Mean of normal noise whose negative half is clipped, at most, in median differences of two of its values: it is 1.02
+of them, and rounding adds some."""
+
 _FIXED_POINT = 8192
 """Steps of a stored sample in one unit of sRGB: 16 bits hold values up to 8."""
 
@@ -152,6 +156,27 @@ def temporal_noise(deviations: Picture, blocks: Picture) -> Noise:
     white = np.maximum(single**2 - shared**2, 0) * pixels / (pixels - 1)
     lasting = np.sqrt(np.maximum(single**2 - white, 0))
     return Noise(np.sqrt(white).astype(np.float32), np.maximum(lasting, EIGHT_BIT_STEP).astype(np.float32))
+
+
+def clipped_black(deviations: Picture, blocks: Picture) -> Picture:
+    """Return how bright a noisy black is on the mean, since noise below black is clipped, in sRGB values.
+
+    It is the median deviation of the block means, as far as noise explains it: a background that is told wrong, or
+    smoke that fills the picture, deviates more. 0 for what is less than a step of 8 bit video.
+
+    Parameters
+    ----------
+    deviations, blocks
+        As `temporal_noise` takes them.
+
+    Returns
+    -------
+    (3,) float32
+    """
+    apart = np.abs(deviations[:, :, 1:] - deviations[:, :, :-1])
+    explained = CLIPPED_MEAN * np.median(apart, axis=(0, 1, 2)) if apart.size else 0
+    offset = np.minimum(np.median(blocks, axis=(0, 1, 2)), explained)
+    return np.where(offset < EIGHT_BIT_STEP, 0, offset).astype(np.float32)
 
 
 def over_time(deviations: Picture) -> Picture:

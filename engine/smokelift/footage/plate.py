@@ -10,8 +10,16 @@ import numpy.typing as npt
 
 from smokelift.footage.clip import Clip
 from smokelift.footage.exposure import gain_of, small
-from smokelift.footage.images import Picture, area_average, linear_to_srgb
-from smokelift.footage.noise import NOISE_STRIDE, Noise, block_means, lasting_noise, linear_per_srgb, temporal_noise
+from smokelift.footage.images import Picture, area_average, linear_to_srgb, srgb_to_linear
+from smokelift.footage.noise import (
+    NOISE_STRIDE,
+    Noise,
+    block_means,
+    clipped_black,
+    lasting_noise,
+    linear_per_srgb,
+    temporal_noise,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,6 +112,8 @@ Plates = Plate | ChangingPlate
 def known_plate(background: npt.ArrayLike, clip: Clip, sample_count: int = 32) -> Plate:
     """Return the plate of a background that is known, with the clip's noise.
 
+    Noise that is clipped at black makes a black background brighter on the mean: the plate is as bright.
+
     Parameters
     ----------
     background
@@ -128,8 +138,13 @@ def known_plate(background: npt.ArrayLike, clip: Clip, sample_count: int = 32) -
         raise ValueError(f"a background must be a finite colour or RGB picture, not of shape {linear.shape}")
     image = area_average(linear, width, height)
     confidence = np.ones((height, width), np.float32)
-    silent = Plate(image, confidence, lasting_noise(0.0))
-    return Plate(image, confidence, _noise_before(silent, clip, sample_count))
+    deviations, blocks = _deviations(Plate(image, confidence, lasting_noise(0.0)), clip, sample_count)
+    told = linear_to_srgb(image)
+    raised = np.maximum(told, clipped_black(deviations, blocks)) - told
+    if raised.any():
+        image = srgb_to_linear(told + raised)
+        deviations, blocks = deviations - raised[::NOISE_STRIDE, ::NOISE_STRIDE], blocks - block_means(raised[None])
+    return Plate(image, confidence, temporal_noise(deviations, blocks))
 
 
 def changing_plate(plates: Clip, clip: Clip, sample_count: int = 32) -> ChangingPlate:
@@ -158,11 +173,11 @@ def changing_plate(plates: Clip, clip: Clip, sample_count: int = 32) -> Changing
             "picture for every frame of the clip, or a color, in [background]."
         )
     silent = ChangingPlate(plates, clip.first, clip.size, lasting_noise(0.0))
-    return replace(silent, noise=_noise_before(silent, clip, sample_count))
+    return replace(silent, noise=temporal_noise(*_deviations(silent, clip, sample_count)))
 
 
-def _noise_before(plates: Plates, clip: Clip, count: int) -> Noise:
-    """The noise of a clip before backgrounds that are known."""
+def _deviations(plates: Plates, clip: Clip, count: int) -> tuple[Picture, Picture]:
+    """How a clip differs from backgrounds that are known, as `temporal_noise` takes it: single pixels, block means."""
     single, blocks = [], []
     for number in clip.spread(count):
         behind, frame = plates.at(number).image, clip.frame(number)
@@ -170,7 +185,7 @@ def _noise_before(plates: Plates, clip: Clip, count: int) -> Noise:
         deviation = linear_to_srgb(frame / gains) - linear_to_srgb(behind)
         single.append(deviation[::NOISE_STRIDE, ::NOISE_STRIDE])
         blocks.append(block_means(deviation[None])[0])
-    return temporal_noise(np.stack(single), np.stack(blocks))
+    return np.stack(single), np.stack(blocks)
 
 
 def noise_at(picture: npt.ArrayLike, plate: Plate) -> Picture:

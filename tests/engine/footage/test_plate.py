@@ -71,3 +71,22 @@ def test_plates_are_counted_as_the_clips_file(tmp_path: Path) -> None:
     few = Clip.open(tmp_path / "plate" / "frame_###.png", fps=24, frames=(0, 12))
     with pytest.raises(ValueError, match="has 13 of the frames 0 to 15 that are needed"):
         changing_plate(few, late)
+
+
+@pytest.mark.parametrize("codes", [13.0, 25.0, 51.0])
+def test_smoke_is_found_before_a_noisy_black(tmp_path: Path, codes: float) -> None:
+    """Noise that is clipped at black raises its mean, which is neither smoke nor a lack of certainty."""
+    clip = film(tmp_path, np.zeros((HEIGHT, WIDTH, 3), np.float32), puff, 0.5, codes)
+    plate = known_plate((0.0, 0.0, 0.0), clip)
+    np.testing.assert_allclose(codes_apart(plate.image, np.zeros_like(plate.image)), 0.4 * codes, rtol=0.1)
+    assert plate.noise.lasting.max() * 255 < 0.15 * codes
+    for n in (8, 12):
+        mask = matte(clip.frame(n), plate).mask
+        assert mask[puff(n) > 0.5].mean() > 0.95
+        assert mask[puff(n) == 0.0].mean() < 0.1
+
+
+def test_a_background_that_is_told_wrong_stays_as_it_is_told(tmp_path: Path) -> None:
+    grey = np.full((HEIGHT, WIDTH, 3), 0.02, np.float32)
+    plate = known_plate((0.0, 0.0, 0.0), film(tmp_path, grey, puff, 0.5, 1.0))
+    assert codes_apart(plate.image, np.zeros_like(grey)).max() < 2
