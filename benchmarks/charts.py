@@ -16,7 +16,7 @@ def require_matplotlib() -> None:
     try:
         import matplotlib  # noqa: F401
     except ImportError:
-        raise ValueError("--chart needs matplotlib: pip install matplotlib.") from None
+        raise ValueError("charts need matplotlib: pip install matplotlib.") from None
 
 
 def new_figure(results: dict[str, Any], width: float, height: float) -> Any:

@@ -68,20 +68,17 @@ class Results:
 
     def refusal(self, key: Key) -> str:
         """Return the sentence that a run ended with; empty if it did not."""
-        return self._rows[_stored(key)]["refused"]
+        return self._rows.get(_stored(key), {}).get("refused", "")
 
     def scenes(self, name: str, method: str) -> list[str]:
-        """Return the scenes on which a method was measured at every strength of a disturbance, and so was the default.
-
-        The default's undisturbed figures are what all others are compared with.
-        """
-        strengths, methods = DISTURBANCES[name].strengths, {method, METHODS[0]}
-        scenes = dict.fromkeys(scene for _, _, scene, _ in self._rows)
-        return [scene for scene in scenes if all((name, x, scene, m) in self for x in strengths for m in methods)]
+        """Return the scenes on which a method was measured under a disturbance, and the default undisturbed."""
+        rest = DISTURBANCES[name].undisturbed
+        measured = dict.fromkeys(scene for n, _, scene, m in self._rows if (n, m) == (name, method))
+        return [scene for scene in measured if (name, rest, scene, METHODS[0]) in self]
 
     def value(self, key: Key, figure: str) -> float:
-        """Return a figure; NaN if there is none."""
-        return float(self._rows[_stored(key)][figure] or math.nan)
+        """Return a figure; NaN if it was not measured."""
+        return float(self._rows.get(_stored(key), {}).get(figure) or math.nan)
 
     def values(self, name: str, strength: float, method: str, figure: str) -> Floats:
         """Return a figure of every scene."""
@@ -127,9 +124,8 @@ def losing(strengths: Sequence[float], changes: Sequence[float], undisturbed: fl
 
 
 def mean(values: Floats) -> float:
-    """Return the mean of what is not NaN; NaN where nothing is."""
-    known = values[~np.isnan(values)]
-    return float(known.mean()) if known.size else math.nan
+    """Return the mean; NaN without any value, or if one was not measured: other scenes are other smoke."""
+    return float(values.mean()) if values.size else math.nan
 
 
 def curve(results: Results, name: str, method: str, figure: str) -> list[float]:
@@ -168,7 +164,8 @@ def _panel(plot: Any, results: Results, name: str, curves: dict[str, list[float]
     at = range(len(disturbance.strengths)) if disturbance.labels else disturbance.strengths
     for method, values in curves.items():
         style = {"color": COLOURS[method], "marker": "o", "markersize": 3}
-        plot.plot(at, values, "" if disturbance.labels else "-", label=NAMES[method], **style)
+        points = [(x, value) for x, value in zip(at, values, strict=True) if not math.isnan(value)]
+        plot.plot(*zip(*points, strict=True), "" if disturbance.labels else "-", label=NAMES[method], **style)
         refused = [x for x, s in zip(at, disturbance.strengths, strict=True) if _refused(results, name, s, method)]
         plot.plot(refused, [0.03] * len(refused), "x", color=COLOURS[method], transform=plot.get_xaxis_transform())
     if disturbance.logarithmic:
@@ -208,7 +205,7 @@ def table(results: Results) -> str:
         line = [f"{disturbance.title}, {disturbance.unit}", _span(disturbance), lost]
         for method in METHODS:
             met = [results.changes(name, strength, method) for strength in disturbance.met]
-            line.append("; ".join(f"{mean(c):+.1f} ({np.nanmin(c):+.1f})" for c in met if c.size))
+            line.append("; ".join(f"{mean(c):+.1f} ({c.min():+.1f})" for c in met if not math.isnan(mean(c))))
         lines.append(line)
     head = ["disturbance", "strengths", "1 dB lost from", "where people meet it", "the paper's method there"]
     return tables.markdown(head, lines)

@@ -139,7 +139,7 @@ def test_gpu_that_is_not_there(monkeypatch, capsys):
 
 def test_chart_without_matplotlib_is_refused(monkeypatch, capsys):
     def refuse() -> None:
-        raise ValueError("--chart needs matplotlib: pip install matplotlib.")
+        raise ValueError("charts need matplotlib: pip install matplotlib.")
 
     monkeypatch.setattr(charts, "require_matplotlib", refuse)
     assert bench("--chart", "chart.png") == 2
