@@ -40,7 +40,7 @@ def add_run_options(parser: argparse.ArgumentParser) -> None:
         default="auto",
         help="how light is scattered; auto measures which is needed",
     )
-    parser.add_argument("--frames", type=_frame_range, metavar="A:B", help="first and last frame, from 0")
+    parser.add_argument("--frames", type=frame_range, metavar="A:B", help="first and last frame, from 0")
     parser.add_argument(
         "--axis-depth",
         type=float,
@@ -143,7 +143,8 @@ def _resolution(text: str) -> tuple[int, int, int] | Literal["auto"]:
     return x, y, z
 
 
-def _frame_range(text: str) -> tuple[int, int]:
+def frame_range(text: str) -> tuple[int, int]:
+    """Return the first and the last frame that a word says."""
     try:
         first, last = (int(part) for part in text.split(":"))
     except ValueError:

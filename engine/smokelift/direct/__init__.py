@@ -2,7 +2,9 @@
 
 from smokelift.direct.continuation import Simulation, learnt_simulation
 from smokelift.direct.continuing import Continuation, continue_sequence
+from smokelift.direct.looping import loop_length, loop_sequence, usual_overlap
 from smokelift.direct.moment import Moment, completed, read_moment
+from smokelift.direct.retiming import paced, retime_sequence
 from smokelift.direct.surroundings import Ball, Box, Fan
 from smokelift.direct.writing import open_source
 
@@ -16,6 +18,11 @@ __all__ = [
     "completed",
     "continue_sequence",
     "learnt_simulation",
+    "loop_length",
+    "loop_sequence",
     "open_source",
+    "paced",
     "read_moment",
+    "retime_sequence",
+    "usual_overlap",
 ]

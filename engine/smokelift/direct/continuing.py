@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,12 +13,12 @@ from smokelift.direct.constraint import Mask, faces_of
 from smokelift.direct.continuation import learnt_simulation
 from smokelift.direct.moment import Moment, read_moment
 from smokelift.direct.surroundings import Ball, Box, Fan, Surroundings
-from smokelift.direct.writing import SHORTEST, Written, directed_writer, time_step
+from smokelift.direct.writing import SHORTEST, Written, directed_writer, simulated_figures, time_step
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
 from smokelift.scene import Domain
 from smokelift.scene.checks import Vector
-from smokelift.transport import Velocity, divergence
+from smokelift.transport import Velocity
 
 LEARNT_FROM = 12
 """Moments of the clip, at most, that physics and inflow are taken from: half a second, in which the source of a clip is
@@ -134,15 +134,9 @@ def _simulated(
         began = time.perf_counter()
         moment = simulation.next(moment, step)
         shown = moment.density * np.float32(_share_left(step, continuation))
-        figures = {
-            "origin": "simulated",
-            "mass": float(shown.sum(dtype=np.float64)) * moment.velocity.voxel_size**3,
-            "divergence": _largest_divergence(moment.velocity, around.solid),
-            "buoyancy": simulation.physics.buoyancy,
-            "dissipation": simulation.physics.dissipation,
-            "seconds_density": 0.0,
-            "seconds_velocity": time.perf_counter() - began,
-        }
+        figures = simulated_figures(
+            replace(moment, density=shown), began, "simulated", vars(simulation.physics), around.solid
+        )
         writer.write(number, shown, moment.velocity.faces, figures, {"unfaded": moment.density})
         yield number, figures
 
@@ -150,15 +144,6 @@ def _simulated(
 def _share_left(step: int, continuation: Continuation) -> float:
     """The part of the smoke that is shown while it fades."""
     return min(1.0, (continuation.frames - step) / continuation.fade) if continuation.fade else 1.0
-
-
-def _largest_divergence(velocity: Velocity, solid: Mask | None) -> float:
-    """The largest |div u| outside obstacles times voxel size over the largest |u|."""
-    largest = max(float(np.abs(component).max()) for component in velocity.faces)
-    left = np.abs(divergence(velocity))
-    if solid is not None:
-        left = left[~solid]
-    return float(left.max()) * velocity.voxel_size / largest if largest > 0 else 0.0
 
 
 def _surroundings(continuation: Continuation, domain: Domain) -> Surroundings:

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from smokelift.direct.constraint import Mask
+from smokelift.direct.moment import Moment
 from smokelift.output.checksum import checksum
 from smokelift.output.layout import INDEX
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
 from smokelift.scene import Camera
+from smokelift.transport import Velocity, divergence
 
 USUAL_FPS = 24.0
 """Frames a second where the clip does not say."""
@@ -85,6 +91,43 @@ def directed_writer(
         npz=npz,
         resume=resume,
     )
+
+
+def simulated_figures(
+    moment: Moment, began: float, origin: str, further: Mapping[str, float], solid: Mask | None = None
+) -> dict[str, Any]:
+    """The figures of a frame that no picture shows.
+
+    Parameters
+    ----------
+    moment
+        The frame.
+    began
+        `time.perf_counter` when work on it began.
+    origin
+        In a word.
+    further
+        Further figures.
+    solid : (nx, ny, nz) bool, optional
+        Obstacles, inside which nothing counts.
+    """
+    return {
+        "origin": origin,
+        "mass": float(moment.density.sum(dtype=np.float64)) * moment.velocity.voxel_size**3,
+        "divergence": _largest_divergence(moment.velocity, solid),
+        **further,
+        "seconds_density": 0.0,
+        "seconds_velocity": time.perf_counter() - began,
+    }
+
+
+def _largest_divergence(velocity: Velocity, solid: Mask | None) -> float:
+    """The largest |div u| outside obstacles times voxel size over the largest |u|."""
+    largest = max(float(np.abs(component).max()) for component in velocity.faces)
+    left = np.abs(divergence(velocity))
+    if solid is not None:
+        left = left[~solid]
+    return float(left.max()) * velocity.voxel_size / largest if largest > 0 else 0.0
 
 
 def _camera_of(camera: Camera, places: list[float]) -> Camera:

@@ -3,8 +3,20 @@
 A module's `add_parser` adds the command with its options to the parser; the option ``run`` is what runs it.
 """
 
-from smokelift.app.commands import bench, chart, continue_, doctor, evaluate, inspect, preview, reconstruct, render
-
-COMMANDS = tuple(
-    module.add_parser for module in (reconstruct, inspect, render, preview, evaluate, continue_, chart, doctor, bench)
+from smokelift.app.commands import (
+    bench,
+    chart,
+    continue_,
+    doctor,
+    evaluate,
+    inspect,
+    loop,
+    preview,
+    reconstruct,
+    render,
+    retime,
 )
+
+MODULES = reconstruct, inspect, render, preview, evaluate, continue_, retime, loop, chart, doctor, bench
+
+COMMANDS = tuple(module.add_parser for module in MODULES)
