@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ Table = dict[str, Any]
 _LIGHT_NAMES = {kind: name for name, kind in LIGHT_TYPES.items()}
 
 
-def write_file(parts: Mapping[str, Any], path: Path) -> None:
+def write_file(parts: Mapping[str, Any], path: Path, comments: Sequence[str] = ()) -> None:
     """Write a scene file, whole or not at all; paths below its folder become relative to it.
 
     Parameters
@@ -26,8 +26,10 @@ def write_file(parts: Mapping[str, Any], path: Path) -> None:
         The fields of a scene by name.
     path
         The file.
+    comments
+        Lines at its top.
     """
-    text = tomli_w.dumps(to_tables(parts, path.absolute().parent))
+    text = "".join(f"# {line}\n" for line in comments) + tomli_w.dumps(to_tables(parts, path.absolute().parent))
     aside = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
         aside.write_text(text, encoding="utf-8")

@@ -82,15 +82,17 @@ def find_plates(clip: Clip, camera: Camera | None, background: Background | None
     return FoundPlates(known_plate(colour, clip), Background(color=colour), (note,))
 
 
-def exposure_notes(clip: Clip, plates: Plates) -> tuple[str, ...]:
-    """What is to be said of a clip whose exposure changes, a sentence; nothing of others."""
+def exposure_change(clip: Clip, plates: Plates) -> float:
+    """Return by which share the exposure of a clip differs from its background's at most; 0 if it never does."""
     gains = [gain_of(small(clip.frame(n)), small(plates.at(n).image)) for n in clip.spread(EXPOSURE_SAMPLES)]
-    most = float(np.abs(np.log(gains)).max())
-    if most == 0:
+    return float(np.expm1(np.abs(np.log(gains)).max()))
+
+
+def exposure_notes(change: float) -> tuple[str, ...]:
+    """What is to be said of a clip whose exposure changes by a share, a sentence; nothing of others."""
+    if change == 0:
         return ()
-    return (
-        f"The exposure of the clip changes by up to {np.expm1(most):.0%}: every frame is brought to the background's.",
-    )
+    return (f"The exposure of the clip changes by up to {change:.0%}: every frame is brought to the background's.",)
 
 
 def unknown_share(plate: Plate, samples: SmokeSamples) -> float:

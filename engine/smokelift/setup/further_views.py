@@ -12,7 +12,7 @@ from smokelift.footage.clip import Clip, is_video
 from smokelift.footage.steady import steady
 from smokelift.footage.working_picture import CameraError, working_picture
 from smokelift.scene import ClipSource, CompleteScene
-from smokelift.setup.background import exposure_notes, find_plates
+from smokelift.setup.background import exposure_change, exposure_notes, find_plates
 from smokelift.setup.geometry import fitting
 from smokelift.setup.shot import Shot, ShotView
 
@@ -55,7 +55,7 @@ def open_view(number: int, clip: Clip, scene: CompleteScene) -> tuple[ShotView, 
     axes = [np.array(each.matrix)[:3, 2] for each in (scene.camera, camera)]
     angle = np.degrees(np.arccos(np.clip(axes[0] @ axes[1], -1, 1)))
     frames = f"frames {opened.first} to {opened.first + len(opened) - 1}"
-    said = [*found.notes, *exposure_notes(opened, found.plates)]
+    said = [*found.notes, *exposure_notes(exposure_change(opened, found.plates))]
     notes.append(" ".join([f"{name}: {opened.path.name}, {angle:.0f} degrees from the input, {frames}.", *said]))
     return ShotView(steady(opened, found.plates), camera, found.plates, working), notes
 

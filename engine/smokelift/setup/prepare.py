@@ -15,7 +15,7 @@ from smokelift.footage.steady import steady
 from smokelift.footage.working_picture import CameraError, WorkingPicture, working_picture
 from smokelift.render import scene_optics
 from smokelift.scene import Background, Camera, CompleteScene, Domain, Medium, Scene
-from smokelift.setup.background import exposure_notes, find_plates, smoke_in_plate
+from smokelift.setup.background import exposure_change, exposure_notes, find_plates, smoke_in_plate
 from smokelift.setup.further_views import disagreement, open_view
 from smokelift.setup.geometry import find_geometry
 from smokelift.setup.light import ambient_sun, richest_scattering
@@ -50,12 +50,13 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
     remarks = clip.remarks()
     found = find_plates(clip, scene.camera, scene.background)
     plates = found.plates
-    exposure = exposure_notes(clip, plates)
+    exposure = exposure_change(clip, plates)
     clip = steady(clip, plates)
     samples = sample_smoke(clip, plates)
     geometry = find_geometry(clip, scene, settings, plates, samples)
     camera, domain = geometry.camera, geometry.domain
-    notes = [*remarks, *found.notes, *smoke_in_plate(plates, samples), *exposure, *geometry.notes]
+    doubts = smoke_in_plate(plates, samples)
+    notes = [*remarks, *found.notes, *doubts, *exposure_notes(exposure), *geometry.notes]
     if settings.axis_depth is not None:
         SmokeAxis.given(settings.axis_depth, camera, domain)  # refuse early what cannot be
     medium = scene.medium
@@ -104,6 +105,8 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
         estimated_background=plates.image if found.background is None and isinstance(plates, Plate) else None,
         notes=tuple(notes),
         choices=choices,
+        exposure=exposure,
+        smoky=samples.smoky,
         place=None,
     )
     return replace(shot, notes=(*notes, *disagreement(shot))) if scene.views else placed(shot)

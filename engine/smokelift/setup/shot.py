@@ -76,6 +76,10 @@ class Shot:
         What was assumed or estimated, a sentence each.
     choices
         What was chosen by measurement or by hand, with the figures that decided it.
+    exposure
+        Largest relative change of exposure, which is evened out; 0 where it is steady.
+    smoky
+        Numbers of the frames, of those looked at, that show smoke, those with the most first.
     place
         Where in depth the smoke was found to stand; None where it is told, seen by several cameras or by a moving one.
     """
@@ -87,6 +91,8 @@ class Shot:
     estimated_background: Image | None
     notes: tuple[str, ...]
     choices: tuple[Choice[Any], ...]
+    exposure: float
+    smoky: tuple[int, ...]
     place: AxisEstimate | None
 
     @property

@@ -5,10 +5,14 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 
-from command_line import QUICK, command, events
+import numpy as np
+import pytest
+from command_line import QUICK, command, events, refused
 
+from smokelift.footage.images import read_image
+from smokelift.output.images import write_image
 from smokelift.output.sequence import Sequence
-from smokelift.scene import Inlet
+from smokelift.scene import Inlet, Scene
 
 
 def test_inspect_says_how_smoke_gets_in_and_out(plume, tmp_path, capsys) -> None:
@@ -51,3 +55,77 @@ def test_an_inlet_outside_the_box(plume, tmp_path, capsys) -> None:
     path.write_text(path.read_text() + "\n[[inlet]]\ncentre = [9, 0, 0]\nradius = 1\n")
     assert command("inspect", path, *QUICK) == 2
     assert "[[inlet]] is outside the domain" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("kind", [".png", ".html"])
+def test_a_page_shows_what_is_known(plume, tmp_path, capsys, kind) -> None:
+    """What cannot be told is called undetermined, what is given is called given."""
+    page = tmp_path / f"page{kind}"
+    assert command("inspect", plume.scene.clip.path, "--page", page, "--progress", "json", *QUICK) == 0
+    done = events(capsys.readouterr().out)[-1]
+    assert done["files"] == [str(page)]
+    known = {fact["what"]: fact for fact in done["facts"]}
+    for what in ("camera", "scale", "medium", "light"):
+        assert known[what]["origin"] == "undetermined"
+    assert known["background"]["origin"] == known["box"]["origin"] == "estimated"
+    assert known["scattering"]["origin"] == known["grid"]["origin"] == known["noise"]["origin"] == "measured"
+    assert page.stat().st_size > 5000
+
+
+def test_what_is_given_is_called_given(shot, capsys) -> None:
+    """Camera, box, medium, light and background of a scene file."""
+    assert command("inspect", shot, "--progress", "json", *QUICK) == 0
+    known = {fact["what"]: fact["origin"] for fact in events(capsys.readouterr().out)[-1]["facts"]}
+    assert {known[what] for what in ("camera", "scale", "box", "medium", "light")} == {"given"}
+
+
+def test_a_page_of_a_moving_camera_has_its_path(tracked, tmp_path) -> None:
+    """Where the box goes in the picture."""
+    tracked.save(tmp_path / "scene.toml")
+    assert command("inspect", tmp_path / "scene.toml", "--page", tmp_path / "page.html", *QUICK) == 0
+    assert "path of the box" in (tmp_path / "page.html").read_text(encoding="utf-8")
+
+
+def test_a_clip_without_smoke_has_a_page(plume, tmp_path) -> None:
+    """And nothing goes wrong."""
+    plume.write(tmp_path / "clip", [np.zeros_like(plume.densities[0])] * 2)
+    clip = tmp_path / "clip" / "frame_####.png"
+    assert command("inspect", clip, "--page", tmp_path / "page.png", *QUICK) == 0
+
+
+def test_a_scene_of_all_estimates_gives_the_same_smoke(plume, tmp_path, capsys) -> None:
+    """Written, read and run, it differs by no more than noise from the run that estimates for itself."""
+    clip, scene = plume.scene.clip.path, tmp_path / "scene.toml"
+    words = ("--frames", "0:2", "--detail", "0", *QUICK)
+    assert command("inspect", clip, "--write", scene, *words) == 0
+    assert "# light: from everywhere" in scene.read_text(encoding="utf-8")
+    for name, source in (("own", clip), ("written", scene)):
+        assert command("reconstruct", source, "--out", tmp_path / name, "--npz", *words) == 0
+    own, written = (Sequence.open(tmp_path / name) for name in ("own", "written"))
+    assert written.scene.domain == own.scene.domain
+    assert written.scene.lights == own.scene.lights
+    for number in (1, 2, 3):
+        first, second = own.density(number), written.density(number)
+        assert np.linalg.norm(second - first) < 0.02 * np.linalg.norm(first)
+    assert "is there already; nothing was overwritten" in refused(capsys, "inspect", clip, "--write", scene, *words)
+
+
+def test_a_background_that_is_a_picture_is_written_beside_the_scene(plume, tmp_path) -> None:
+    """As it was estimated, not rounded."""
+    wall = np.random.default_rng(0).uniform(0.1, 0.3, (56, 40, 3)).astype(np.float32)
+    rows, columns = np.mgrid[:56, :40]
+    (tmp_path / "clip").mkdir()
+    for n in range(16):
+        smoke = 0.7 * np.clip(1.5 - np.hypot(rows - 56 + 4 * n, columns - 20) / 7, 0, 1)[..., None]
+        write_image(tmp_path / "clip" / f"frame_{n:04d}.png", wall * (1 - smoke) + 0.8 * smoke)
+    assert command("inspect", tmp_path / "clip" / "frame_####.png", "--write", tmp_path / "scene.toml", *QUICK) == 0
+    background = Scene.load(tmp_path / "scene.toml").background
+    assert background is not None
+    assert background.image == tmp_path / "scene_background.exr"
+    np.testing.assert_allclose(read_image(background.image), wall, atol=0.03)
+
+
+def test_pages_of_other_kinds_are_refused(shot, tmp_path, capsys) -> None:
+    """Before the clip is looked at."""
+    assert ".png or .html" in refused(capsys, "inspect", shot, "--page", tmp_path / "page.pdf")
+    assert "does not exist" in refused(capsys, "inspect", shot, "--write", tmp_path / "none" / "scene.toml")

@@ -1,0 +1,63 @@
+"""A page of pictures and of what is known about them."""
+
+from __future__ import annotations
+
+import base64
+import io
+import re
+
+import numpy as np
+from PIL import Image
+
+from smokelift.output.page import COLUMNS, TILE, Fact, Page, Panel, fitted, write_page
+
+RED = np.zeros((50, 80, 3), np.uint8) + np.uint8([200, 10, 10])
+PAGE = Page(
+    "clip <1>.mp4",
+    [Panel(f"panel {n}", RED) for n in range(COLUMNS + 1)],
+    [
+        Fact("light", "from everywhere", "undetermined", "Give [[lights]] & all is well. " * 20),
+        Fact("grid", "8 x 8", "given"),
+    ],
+    ["A last word."],
+)
+
+
+def test_a_page_as_html_needs_no_other_file(tmp_path) -> None:
+    """Every picture is in it, and what would be markup is text."""
+    write_page(tmp_path / "page.html", PAGE)
+    text = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "clip &lt;1&gt;.mp4" in text
+    assert '<td class="undetermined">' in text
+    assert "&amp; all is well" in text
+    pictures = re.findall(r'src="([^"]*)"', text)
+    assert len(pictures) == len(PAGE.panels)
+    for address in pictures:
+        kind, data = address.split(",")
+        assert kind == "data:image/png;base64"
+        with Image.open(io.BytesIO(base64.b64decode(data))) as picture:
+            np.testing.assert_array_equal(np.asarray(picture), RED)
+
+
+def test_a_page_as_a_picture_shows_every_panel_and_line(tmp_path) -> None:
+    """In rows; a long sentence is broken into lines inside the picture."""
+    write_page(tmp_path / "page.png", PAGE)
+    with Image.open(tmp_path / "page.png") as picture:
+        page = np.asarray(picture).astype(int)
+    red = (page[..., 0] > 150) & (page[..., 1] < 50)
+    assert red.sum() == len(PAGE.panels) * RED.shape[0] * RED.shape[1]
+    orange = (page[..., 0] > 200) & (page[..., 2] < 120) & ~red
+    assert orange.any()  # what is undetermined stands out
+    ink = np.abs(page - page[-1, -1]).max(-1) > 60
+    assert not ink[:, -4:].any()
+    below = ink[np.flatnonzero(red.any(1))[-1] + 1 :]
+    assert 5 < np.sum(np.diff(below.any(1).astype(int)) == 1) < 40
+
+
+def test_pictures_fit_into_their_places() -> None:
+    """Whatever their shape."""
+    for size in ((1920, 1080), (10, 4000), (4000, 10), (3, 2)):
+        width, height = fitted(*size)
+        assert 1 <= width <= TILE[0]
+        assert 1 <= height <= TILE[1]
+        assert width == TILE[0] or height == TILE[1]
