@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from smokelift.footage.images import Picture, area_average
+from smokelift.footage.seen import median_of_seen
 
 LONGEST = 160
 """Pixels along the longer side of the pictures that are compared: noise is averaged out, and there are thousands."""
@@ -61,10 +62,13 @@ def small(picture: Picture) -> Picture:
 
 
 def sample_gains(samples: npt.NDArray[np.float32]) -> Picture:
-    """Return the gains (frames, 3) of small linear pictures (frames, rows, columns, 3) against their median."""
+    """Return the gains (frames, 3) of small linear pictures (frames, rows, columns, 3) against their median.
+
+    What a picture does not show is not a number.
+    """
     gains = np.ones((len(samples), 3), np.float32)
     for _ in range(3):  # the median of unsteady frames is less certain than that of steady ones
-        reference = np.median(samples / gains[:, None, None], axis=0)
+        reference = median_of_seen(samples / gains[:, None, None])
         gains = np.stack([gain_of(sample, reference) for sample in samples])
     return gains
 

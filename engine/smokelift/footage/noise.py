@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import Picture, linear_to_srgb, srgb_to_linear
+from smokelift.footage.seen import quantile_of_seen
 
 EIGHT_BIT_STEP = np.float32(1 / 255)
 """One step of 8 bit video, in sRGB values: the least noise that a clip is taken to have, since codecs shift whole
@@ -102,12 +103,16 @@ def sample_frames(clip: Clip, count: int) -> npt.NDArray[np.uint16]:
         If a frame cannot be read.
     """
     width, height = clip.size
-    most = max(3, _SAMPLE_BYTES // (width * height * 6))
-    numbers = clip.spread(min(count, most))
+    numbers = clip.spread(sampled_count(count, width, height))
     samples = np.empty((len(numbers), height, width, 3), np.uint16)
     for sample, number in zip(samples, numbers, strict=True):
         sample[...] = encode_sample(clip.frame(number))
     return samples
+
+
+def sampled_count(count: int, width: int, height: int) -> int:
+    """Return how many pictures of a size are stored of so many that are asked for."""
+    return min(count, max(3, _SAMPLE_BYTES // (width * height * 6)))
 
 
 def encode_sample(linear: Picture) -> npt.NDArray[np.uint16]:
@@ -181,7 +186,7 @@ def clipped_black(deviations: Picture, blocks: Picture) -> Picture:
 
 def over_time(deviations: Picture) -> Picture:
     """Return the standard deviation over time, the first axis, of all but a flash."""
-    width: Picture = np.quantile(np.abs(deviations), STEADY_SHARE, axis=0) / np.float32(STEADY_WIDTH)
+    width: Picture = quantile_of_seen(np.abs(deviations), STEADY_SHARE) / np.float32(STEADY_WIDTH)
     return width
 
 
@@ -204,6 +209,7 @@ def drift(deviations: Picture) -> float:
 def _of_clear(deviations: Picture) -> Picture:
     """The noise of each pixel without smoke, (n,)."""
     each = over_time(deviations)
+    each = each[np.isfinite(each)]
     stillest = max(float(np.quantile(each, 0.1)), float(EIGHT_BIT_STEP))
     clear: Picture = each[each <= SMOKE_TO_NOISE * stillest]
     return clear

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -105,8 +106,14 @@ class ChangingPlate:
         return replace(self, cuts=(*self.cuts, (cut, pixels)))
 
 
-Plates = Plate | ChangingPlate
-"""The background of every frame of a clip: ``plates.at(frame)`` is the plate of one."""
+class Plates(Protocol):
+    """The background of every frame of a clip."""
+
+    def at(self, frame: int) -> Plate:
+        """Return the plate of a frame, counted from 0."""
+
+    def through(self, cut: Callable[[Picture], Picture], pixels: float = 1.0) -> Plates:
+        """Return the plates of a part of the picture, or of a smaller one; see `Plate.through`."""
 
 
 def known_plate(background: npt.ArrayLike, clip: Clip, sample_count: int = 32) -> Plate:
@@ -173,7 +180,12 @@ def changing_plate(plates: Clip, clip: Clip, sample_count: int = 32) -> Changing
             "picture for every frame of the clip, or a color, in [background]."
         )
     silent = ChangingPlate(plates, clip.first, clip.size, lasting_noise(0.0))
-    return replace(silent, noise=temporal_noise(*_deviations(silent, clip, sample_count)))
+    return replace(silent, noise=noise_before(silent, clip, sample_count))
+
+
+def noise_before(plates: Plates, clip: Clip, sample_count: int = 32) -> Noise:
+    """Return the noise of a clip before backgrounds that are known, from so many of its frames."""
+    return temporal_noise(*_deviations(plates, clip, sample_count))
 
 
 def _deviations(plates: Plates, clip: Clip, count: int) -> tuple[Picture, Picture]:

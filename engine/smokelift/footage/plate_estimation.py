@@ -46,12 +46,17 @@ from smokelift.footage.noise import (
     temporal_noise,
 )
 from smokelift.footage.plate import Plate
+from smokelift.footage.seen import at_rank, count_of_seen, median_of_seen
 
 STRIDE = 4
 """Pixels from one row or column to the next where it is measured what the smoke is like."""
 
 MOST = 0.8
 """Share of a pixel's samples that have one value which is then its background for certain."""
+
+LEAST_SEEN = 1 / 8
+"""Share of the samples that have to show a pixel of which all of them are alike, for that to be its background: 4 of
+32. While a camera turns, others show it for a moment only."""
 
 ONE_SIDED = 0.9
 """Share of the changes by smoke to one side from which on it only brightens, or darkens, and the rest is noise."""
@@ -130,13 +135,45 @@ def estimate_plate(clip: Clip, sample_count: int = 32) -> Plate:
         If a frame cannot be read.
     """
     samples = steady_samples(clip, sample_count)
-    noise = _noise(samples)
+    noise = clip_noise(samples)
+    plate = backdrop_plate(samples, noise)
+    return plate or estimated_plate(samples, noise)
+
+
+def estimated_plate(samples: npt.NDArray[np.uint16], noise: Noise) -> Plate:
+    """Return the plate of a background of more than one colour, from `steady_samples`."""
+    image, known = clear_picture(samples)
+    return Plate(image, known.astype(np.float32), noise)
+
+
+def backdrop_plate(samples: npt.NDArray[np.uint16], noise: Noise) -> Plate | None:
+    """Return the plate of a background of one colour, or None if it has more; of `steady_samples`."""
     backdrop = _backdrop(samples, noise)
-    if backdrop is not None:
-        return Plate(backdrop, np.ones(backdrop.shape[:2], np.float32), noise)
+    return None if backdrop is None else Plate(backdrop, np.ones(backdrop.shape[:2], np.float32), noise)
+
+
+def clear_picture(
+    samples: npt.NDArray[np.uint16], seen: npt.NDArray[np.bool_] | None = None
+) -> tuple[Picture, npt.NDArray[np.bool_]]:
+    """Return the background of samples, linear (rows, columns, 3), and which pixels of it are known (rows, columns).
+
+    Parameters
+    ----------
+    samples : (frames, rows, columns, 3)
+        Of one exposure, as of `steady_samples`.
+    seen : (frames, rows, columns) bool, optional
+        Which pixels each of them shows; without it all.
+    """
     grey = np.stack([_smooth_grey(sample) for sample in samples])
-    coarse = decode_samples(grey[:, ::STRIDE, ::STRIDE])
-    window = max(WINDOW * clear_deviation(coarse - np.median(coarse, axis=0)), LEAST_WINDOW)
+
+    def shown(*where: slice) -> Picture:
+        values = decode_samples(grey[:, *where])
+        if seen is not None:
+            values[~seen[:, *where]] = np.nan
+        return values
+
+    coarse = shown(np.s_[::STRIDE], np.s_[::STRIDE])
+    window = max(WINDOW * clear_deviation(coarse - median_of_seen(coarse)), LEAST_WINDOW)
     smoke = _smoke(coarse, window)
     brightens = np.repeat(np.repeat(smoke.brightens, STRIDE, 0), STRIDE, 1)[: grey.shape[1], : grey.shape[2]]
     height, width = samples.shape[1:3]
@@ -144,14 +181,20 @@ def estimate_plate(clip: Clip, sample_count: int = 32) -> Plate:
     known, calm = np.empty((height, width), np.bool_), np.empty((height, width), np.bool_)
     for row in range(0, height, 64):  # in bands, for the sake of memory
         band = slice(row, row + 64)
-        away = np.where(brightens[band], decode_samples(grey[:, band]), -decode_samples(grey[:, band]))
+        values = shown(band)
+        away = np.where(brightens[band], values, -values)
         image[band], known[band], calm[band] = _clear_value(samples[:, band], away, window, smoke.likeness)
     known = _in_one_piece(known)
     if not known.all():
         # what changes by drift at most and looks like its surroundings is no smoke
         unlike = np.abs((linear_to_srgb(image) - _filled(linear_to_srgb(image), known.astype(np.float32))).mean(-1))
         known = _in_one_piece(known | (calm & (unlike <= LIKE_SURROUNDINGS)))
-    return Plate(_completed(image, known, samples, smoke.brightness, brightens), known.astype(np.float32), noise)
+    mean = _mean(samples, seen)
+    if seen is not None and not seen.any(0).all():
+        never = ~seen.any(0)
+        mean[never] = _filled(linear_to_srgb(image), known.astype(np.float32))[never]
+        image[never] = srgb_to_linear(mean[never])
+    return _completed(image, known, mean, smoke.brightness, brightens), known
 
 
 def one_colour(plate: Plate) -> tuple[float, float, float] | None:
@@ -165,7 +208,7 @@ def one_colour(plate: Plate) -> tuple[float, float, float] | None:
     return None if (differs & known).any() else (red, green, blue)
 
 
-def steady_samples(clip: Clip, count: int) -> npt.NDArray[np.uint16]:
+def steady_samples(clip: Clip, count: int = 32) -> npt.NDArray[np.uint16]:
     """Return frames spread over a clip, all of one exposure; as `sample_frames`."""
     samples = sample_frames(clip, count)
     gains = sample_gains(np.stack([small(linear_samples(sample)) for sample in samples]))
@@ -175,8 +218,8 @@ def steady_samples(clip: Clip, count: int) -> npt.NDArray[np.uint16]:
     return samples
 
 
-def _noise(samples: npt.NDArray[np.uint16]) -> Noise:
-    """The noise of a clip before a background that is not known yet."""
+def clip_noise(samples: npt.NDArray[np.uint16]) -> Noise:
+    """Return the noise of `steady_samples` before a background that is not known yet."""
     single = decode_samples(samples[:, ::NOISE_STRIDE, ::NOISE_STRIDE])
     blocks = np.concatenate([block_means(decode_samples(sample[None])) for sample in samples])
     single, blocks = (each - np.median(each, axis=0) for each in (single, blocks))
@@ -215,6 +258,15 @@ def _backdrop(samples: npt.NDArray[np.uint16], noise: Noise) -> Picture | None:
     return whole
 
 
+def _mean(samples: npt.NDArray[np.uint16], seen: npt.NDArray[np.bool_] | None) -> Picture:
+    """The mean of samples in sRGB values, as far as they are seen."""
+    if seen is None:
+        whole: Picture = np.mean([decode_samples(sample) for sample in samples], axis=0, dtype=np.float32)
+        return whole
+    total = sum(decode_samples(sample) * shown[..., None] for sample, shown in zip(samples, seen, strict=True))
+    return np.asarray(total / np.maximum(seen.sum(0), 1)[..., None], np.float32)
+
+
 def _smooth_grey(sample: npt.NDArray[np.uint16]) -> npt.NDArray[np.uint16]:
     """The grey of a sample, so smooth that most of its noise is gone."""
     smooth: Picture = ndimage.gaussian_filter(sample.mean(-1, dtype=np.float32), SMOOTHING)
@@ -227,14 +279,15 @@ def _smoke(grey: Picture, window: float) -> _Smoke:
     values = grey.reshape(len(grey), -1)
     ordered = np.sort(values, axis=0)
     counts = _supports(ordered, window)
-    background = np.take_along_axis(ordered, counts.argmax(0)[None], 0)[0] + np.float32(0.5 * window)
+    number = count_of_seen(values)
+    background = np.nan_to_num(at_rank(ordered, counts.argmax(0))) + np.float32(0.5 * window)
     away = values - background
     smoky = np.abs(away) > window
     pairs = smoky[1:] & smoky[:-1]
     alike = np.abs(np.diff(values, axis=0)) <= window
     likeness = float(alike[pairs].mean()) if pairs.any() else 0.5
     # what most samples agree on is the background for certain
-    certain = counts.max(0) > MOST * len(values)
+    certain = (counts.max(0) > MOST * number) & (number >= LEAST_SEEN * len(values))
     change = np.where(smoky & certain, away, 0.0)
     if not change.any():
         return _Smoke(likeness, 1.0, np.ones(shape, np.bool_))
@@ -274,9 +327,11 @@ def _clear_value(
     Where it is not certain it is the least smoky value. That of a pixel that drifts is its middle one. ``away`` is the
     grey value of the samples, with its sign turned where smoke darkens: the less, the clearer.
     """
-    alike, pairs = (np.abs(np.diff(away, axis=0)) <= window).sum(0), max(len(away) - 1, 0)
-    ordered = np.sort(away, axis=0)
-    lowest, highest = ordered[min(1, len(away) - 1)], ordered[max(len(away) - 2, 0)]  # one sample may be astray
+    unseen, number = np.isnan(away), count_of_seen(away)
+    alike, pairs = (np.abs(np.diff(away, axis=0)) <= window).sum(0), (~unseen[1:] & ~unseen[:-1]).sum(0)
+    ordered, last = np.sort(away, axis=0), np.maximum(number - 1, 0)
+    # one sample may be astray
+    lowest, highest = at_rank(ordered, np.minimum(1, last)), at_rank(ordered, np.maximum(last - 1, 0))
     calm = highest - lowest <= window + DRIFT
     best = np.full(away.shape[1:], np.inf, np.float32)
     for sample in away:
@@ -284,16 +339,16 @@ def _clear_value(
         stays = (inside[1:] & inside[:-1]).sum(0)
         share = (alike - stays + PRIOR_PAIRS * likeness) / (pairs - stays + PRIOR_PAIRS)
         certain = stays * np.log(np.clip(share, 1e-6, 1 - 1e-6)) < np.log(FALSE_ALARM)
-        certain |= inside.all(0)
+        certain |= (inside | unseen).all(0) & (number >= LEAST_SEEN * len(away))
         best = np.where(certain & (sample < best), sample, best)
     known = np.isfinite(best)
     centre = np.where(known, best, lowest) + np.float32(0.5 * window)
-    centre = np.where(calm, ordered[len(away) // 2], centre)
+    centre = np.where(calm, at_rank(ordered, np.minimum(number // 2, last)), centre)
     for _ in range(3):  # the window starts at a sample; mean shift settles it around the mean of its samples
         inside = np.abs(away - centre) <= 0.5 * window * 1.001
-        number = np.maximum(inside.sum(axis=0), 1)
-        centre = (away * inside).sum(axis=0) / number
-    value = np.einsum("tyxc,tyx->yxc", linear_samples(samples), inside.astype(np.float32)) / number[..., None]
+        within = np.maximum(inside.sum(axis=0), 1)
+        centre = np.where(inside, away, 0).sum(axis=0) / within
+    value = np.einsum("tyxc,tyx->yxc", linear_samples(samples), inside.astype(np.float32)) / within[..., None]
     return value.astype(np.float32), known, calm
 
 
@@ -310,11 +365,11 @@ def _in_one_piece(known: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
 def _completed(
     image: Picture,
     known: npt.NDArray[np.bool_],
-    samples: npt.NDArray[np.uint16],
+    mean: Picture,
     brightness: float,
     brightens: npt.NDArray[np.bool_],
 ) -> Picture:
-    """Return a linear plate with what is unknown filled in.
+    """Return a linear plate with what is unknown filled in; ``mean`` is that of the samples in sRGB values.
 
     Smoke of transmittance T and brightness J shows J + T (B - J) of a background B. The mean over time has T from its
     coarse part and that of the surroundings, and so what of its detail is the background's.
@@ -322,7 +377,6 @@ def _completed(
     if known.all():
         return image
     smooth = _filled(linear_to_srgb(image), known.astype(np.float32))
-    mean = np.mean([decode_samples(sample) for sample in samples], axis=0, dtype=np.float32)
     coarse = ndimage.gaussian_filter(mean, (DETAIL, DETAIL, 0))
     contrast = smooth.mean(-1) - brightness
     seen = (coarse.mean(-1) - brightness) / np.where(np.abs(contrast) > 0.02, contrast, np.inf)

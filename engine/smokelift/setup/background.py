@@ -6,13 +6,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from smokelift.footage.alignment import Lens
 from smokelift.footage.background import given_plates
 from smokelift.footage.clip import Clip
 from smokelift.footage.evidence import evidence
 from smokelift.footage.exposure import gain_of, small
 from smokelift.footage.images import area_average
+from smokelift.footage.panorama import estimate_panorama
 from smokelift.footage.plate import Plate, Plates, known_plate
-from smokelift.footage.plate_estimation import estimate_plate, one_colour
+from smokelift.footage.plate_estimation import (
+    ONE_COLOUR_NOISE,
+    backdrop_plate,
+    clip_noise,
+    estimate_plate,
+    estimated_plate,
+    one_colour,
+    steady_samples,
+)
+from smokelift.footage.turning import Turns, find_turns
 from smokelift.scene import Background, Camera
 from smokelift.setup.smoke import SmokeSamples
 
@@ -41,14 +52,19 @@ class FoundPlates:
         What the scene says of it, with what was found out; None where it is a picture that was estimated.
     notes
         What was assumed or estimated, a sentence each.
+    turns
+        Of the camera, if it was found to turn.
     """
 
     plates: Plates
     background: Background | None
     notes: tuple[str, ...] = ()
+    turns: Turns | None = None
 
 
-def find_plates(clip: Clip, camera: Camera | None, background: Background | None) -> FoundPlates:
+def find_plates(
+    clip: Clip, camera: Camera | None, background: Background | None, lens: Lens | None = None
+) -> FoundPlates:
     """Find what stands behind the smoke.
 
     Parameters
@@ -59,19 +75,21 @@ def find_plates(clip: Clip, camera: Camera | None, background: Background | None
         If it is known; one that moves allows no estimate but that of one colour.
     background
         What the scene says.
+    lens
+        Of the clip; without it the camera is taken to stand still unless it is known to move.
 
     Raises
     ------
     ValueError
-        If a camera moves before a background of more than one colour that is not given.
+        If a camera moves before a background of more than one colour that is not given, or turns too far.
     """
     moves = camera is not None and camera.moves
     given = given_plates(background, camera, clip)
     if given is not None:
         return FoundPlates(given, background)
-    plate = estimate_plate(clip if moves else evidence(clip))
     if not moves:
-        return FoundPlates(plate, None, (_estimated(plate),))
+        return _estimated(clip, lens)
+    plate = estimate_plate(clip)
     colour = one_colour(plate)
     if colour is None:
         raise ValueError(
@@ -113,7 +131,28 @@ def smoke_in_plate(plates: Plates, samples: SmokeSamples) -> tuple[str, ...]:
     )
 
 
-def _estimated(plate: Plate) -> str:
+def _estimated(clip: Clip, lens: Lens | None) -> FoundPlates:
+    """The background of a clip whose camera stands still or, with a lens, turns."""
+    samples = steady_samples(evidence(clip))
+    noise = clip_noise(samples)
+    backdrop = backdrop_plate(samples, noise)
+    # one colour has nothing to hold on to, and is the same wherever the camera looks; in noise, texture may pass by
+    plain = backdrop is not None and noise.total.max() <= ONE_COLOUR_NOISE
+    turns = None if plain or lens is None else find_turns(clip, lens)
+    if turns is None:
+        plate = backdrop or estimated_plate(samples, noise)
+        return FoundPlates(plate, None, (_found(plate),))
+    panorama = estimate_panorama(clip, turns)
+    parts = [panorama.at(number) for number in clip.spread(EXPOSURE_SAMPLES)]
+    unknown = float(np.mean([part.confidence < UNKNOWN for part in parts]))
+    moved = (
+        f"The camera moves, by up to {turns.farthest:.0f} pixels: it is steadied against the background, as a camera "
+        "that turns in its place, and has a matrix for every frame."
+    )
+    return FoundPlates(panorama, None, (moved, _how(unknown)), turns)
+
+
+def _found(plate: Plate) -> str:
     """How a background was estimated."""
     unknown = float(np.mean(plate.confidence < UNKNOWN))
     colour = np.median(plate.image.reshape(-1, 3), axis=0)
@@ -127,6 +166,11 @@ def _estimated(plate: Plate) -> str:
             f"{found}, but for {other:.1%} of the picture that has other colours and never changes, as a nozzle, a "
             "floor or a logo does. If that is smoke, give the color in [background]."
         )
+    return _how(unknown)
+
+
+def _how(unknown: float) -> str:
+    """How well a background of more than one colour is known, from the share of the pictures where it is not."""
     if unknown == 0:
         return "Background estimated from the clip, which shows every part of it free of smoke."
     return (

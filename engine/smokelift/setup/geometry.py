@@ -8,8 +8,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from smokelift.footage.alignment import Lens
 from smokelift.footage.clip import Clip
 from smokelift.footage.plate import Plates
+from smokelift.footage.turning import Turns
 from smokelift.footage.working_picture import CameraError, working_picture
 from smokelift.scene import Camera, Domain, Scene, as_matrix
 from smokelift.scene.projection import voxel_width
@@ -61,8 +63,10 @@ class Geometry:
     notes: tuple[str, ...] = ()
 
 
-def find_geometry(clip: Clip, scene: Scene, settings: Settings, plates: Plates, samples: SmokeSamples) -> Geometry:
-    """Complete camera and domain.
+def find_geometry(
+    clip: Clip, scene: Scene, settings: Settings, plates: Plates, samples: SmokeSamples, turns: Turns | None = None
+) -> Geometry:
+    """Complete camera and domain; a camera that was found to turn gets a matrix for every frame.
 
     Raises
     ------
@@ -71,7 +75,7 @@ def find_geometry(clip: Clip, scene: Scene, settings: Settings, plates: Plates, 
     """
     tolerance = settings.selection.lost_detail
     if scene.camera is not None:
-        camera = fitting(scene.camera, clip)
+        camera = _turning(fitting(scene.camera, clip), turns)
         if scene.domain is None:
             raise ValueError("The scene gives a camera but no box in [domain]; give the one that holds the smoke.")
         if settings.resolution == "auto":
@@ -88,6 +92,7 @@ def find_geometry(clip: Clip, scene: Scene, settings: Settings, plates: Plates, 
             "The scene marks an [[inlet]] but gives no [camera] and [domain]; give both to say where it is."
         )
     camera, grids = _uncalibrated(clip, samples, settings)
+    camera = _turning(camera, turns)
     if isinstance(settings.resolution, tuple):
         domain, choice = grids[-1], _resolution_by_hand(grids[-1])
     elif settings.selection.measure:
@@ -101,6 +106,28 @@ def find_geometry(clip: Clip, scene: Scene, settings: Settings, plates: Plates, 
         f"Domain around the smoke: {size} m, {' x '.join(map(str, domain.resolution))} voxels.",
     )
     return Geometry(camera, domain, choice, notes)
+
+
+def clip_lens(camera: Camera | None, clip: Clip) -> Lens | None:
+    """Return the lens of a clip from its camera, or the usual one; None if the camera has none, or moves as it says.
+
+    Raises
+    ------
+    ValueError
+        If the camera's picture has another shape than the clip's.
+    """
+    if camera is None:
+        width, height = clip.size
+        focal = LENS * max(width, height)
+        return Lens(clip.size, (focal, focal), (width / 2, height / 2))
+    if camera.type != "perspective" or camera.moves:
+        return None
+    camera = fitting(camera, clip)
+    return Lens(camera.size, (camera.fx, camera.fy), (camera.cx, camera.cy))
+
+
+def _turning(camera: Camera, turns: Turns | None) -> Camera:
+    return camera if turns is None else turns.carried(camera)
 
 
 def fitting(camera: Camera, clip: Clip) -> Camera:
@@ -135,7 +162,7 @@ def _uncalibrated(clip: Clip, samples: SmokeSamples, settings: Settings) -> tupl
     distance = focal * metres
     matrix = np.array([[1, 0, 0, 0], [0, 0, -1, -distance], [0, 1, 0, PICTURE_HEIGHT / 2], [0, 0, 0, 1]], np.float64)
     camera = Camera("perspective", as_matrix(matrix), (width, height), focal, focal, width / 2, height / 2)
-    left, right, top, bottom = _covered(samples, width, height)
+    left, right, top, bottom = _covered(samples)
     across = max(right - left, NARROWEST * (bottom - top)) * metres
     up = max(bottom - top, NARROWEST * (right - left)) * metres
     # the far side of the box has to fill the picture too
@@ -161,7 +188,7 @@ def _uncalibrated(clip: Clip, samples: SmokeSamples, settings: Settings) -> tupl
     return camera, tuple(grids)
 
 
-def _covered(samples: SmokeSamples, width: int, height: int) -> tuple[float, float, float, float]:
+def _covered(samples: SmokeSamples) -> tuple[float, float, float, float]:
     """Left, right, top and bottom of the smoke in the full picture, in pixels, with a margin."""
     rows, columns = np.nonzero(samples.covered)
     if rows.size == 0:  # no smoke: any box will do
@@ -169,10 +196,12 @@ def _covered(samples: SmokeSamples, width: int, height: int) -> tuple[float, flo
     # a hundredth of the smoke's pixels on each side may be noise or the last wisps
     left, right = np.percentile(columns, [1, 99]) + np.array([0, 1])
     top, bottom = np.percentile(rows, [1, 99]) + np.array([0, 1])
-    left, right, top, bottom = (float(v) * samples.scale for v in (left, right, top, bottom))
+    first_x, first_y, last_x, last_y = samples.bounds
+    left, right = (float(v) * samples.scale + first_x for v in (left, right))
+    top, bottom = (float(v) * samples.scale + first_y for v in (top, bottom))
     margin = MARGIN * max(right - left, bottom - top)
-    left, right = max(left - margin, 0.0), min(right + margin, float(width))
-    return left, right, max(top - margin, 0.0), min(bottom + margin, float(height))
+    left, right = max(left - margin, first_x), min(right + margin, last_x)
+    return left, right, max(top - margin, first_y), min(bottom + margin, last_y)
 
 
 def _same_shape(domain: Domain, most: int) -> tuple[Domain, ...]:

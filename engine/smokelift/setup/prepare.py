@@ -17,7 +17,7 @@ from smokelift.render import scene_optics
 from smokelift.scene import Background, Camera, CompleteScene, Domain, Medium, Scene
 from smokelift.setup.background import exposure_change, exposure_notes, find_plates, smoke_in_plate
 from smokelift.setup.further_views import disagreement, open_view
-from smokelift.setup.geometry import find_geometry
+from smokelift.setup.geometry import clip_lens, find_geometry
 from smokelift.setup.light import ambient_sun, richest_scattering
 from smokelift.setup.model import choose_model
 from smokelift.setup.place import placed
@@ -48,12 +48,14 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
     """
     _check(clip, scene)
     remarks = clip.remarks()
-    found = find_plates(clip, scene.camera, scene.background)
+    # cameras that belong together are measured, and stand where they are said to
+    lens = None if scene.views else clip_lens(scene.camera, clip)
+    found = find_plates(clip, scene.camera, scene.background, lens)
     plates = found.plates
     exposure = exposure_change(clip, plates)
     clip = steady(clip, plates)
-    samples = sample_smoke(clip, plates)
-    geometry = find_geometry(clip, scene, settings, plates, samples)
+    samples = sample_smoke(clip, plates, found.turns)
+    geometry = find_geometry(clip, scene, settings, plates, samples, found.turns)
     camera, domain = geometry.camera, geometry.domain
     doubts = smoke_in_plate(plates, samples)
     notes = [*remarks, *found.notes, *doubts, *exposure_notes(exposure), *geometry.notes]

@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import area_average
 from smokelift.footage.matte import matte
+from smokelift.footage.panorama import WidePicture
 from smokelift.footage.plate import Plates
+from smokelift.footage.turning import Turns
 
 SAMPLES = 16
 """Frames that are looked at."""
@@ -27,8 +29,10 @@ class SmokeSamples:
     ----------
     scale
         Full pixels to a reduced one.
+    bounds
+        Left, top, right and bottom of ``covered`` in pixels of the camera's full picture.
     covered : (rows, columns) bool
-        Pixels with smoke in at least one sample.
+        Pixels with smoke in at least one sample; of a camera that turns as its mean pose would see them.
     colours : (n, 3)
         Radiance of all smoke pixels.
     behind : (n, 3)
@@ -38,28 +42,35 @@ class SmokeSamples:
     """
 
     scale: float
+    bounds: tuple[float, float, float, float]
     covered: NDArray[np.bool_]
     colours: NDArray[np.float32]
     behind: NDArray[np.float32]
     smoky: tuple[int, ...]
 
 
-def sample_smoke(clip: Clip, plates: Plates) -> SmokeSamples:
-    """Find the smoke in frames spread over a clip."""
+def sample_smoke(clip: Clip, plates: Plates, turns: Turns | None = None) -> SmokeSamples:
+    """Find the smoke in frames spread over a clip, whose camera may turn."""
     width, height = clip.size
     scale = max(1.0, max(width, height) / LONGEST_SIDE)
     columns, rows = max(1, round(width / scale)), max(1, round(height / scale))
-    covered = np.zeros((rows, columns), np.bool_)
+    wide = None if turns is None else WidePicture.around(turns).resized(columns, rows)
+    covered = np.zeros((rows, columns) if wide is None else wide.size[::-1], np.bool_)
     colours, behind = [], []
     amounts: dict[int, int] = {}
     for number in clip.spread(SAMPLES):
         plate = plates.at(number).through(lambda whole: area_average(whole, columns, rows), scale**2)
         picture = area_average(clip.frame(number), columns, rows)
         mask = matte(picture, plate).mask
-        covered |= mask
+        covered |= mask if wide is None else wide.spread_out(mask.astype(np.float32), number) > 0.5
         colours.append(picture[mask])
         behind.append(plate.image[mask])
         if mask.any():
             amounts[number] = int(mask.sum())
     smoky = tuple(sorted(amounts, key=lambda number: -amounts[number]))
-    return SmokeSamples(scale, covered, np.concatenate(colours), np.concatenate(behind), smoky)
+    bounds = (0.0, 0.0, float(width), float(height))
+    if wide is not None:
+        corners = (wide.left, wide.top, wide.left + wide.size[0], wide.top + wide.size[1])
+        left, top, right, bottom = (scale * corner for corner in corners)
+        bounds = (left, top, right, bottom)
+    return SmokeSamples(scale, bounds, covered, np.concatenate(colours), np.concatenate(behind), smoky)

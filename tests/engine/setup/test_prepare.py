@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from smokelift.footage.clip import Clip
 from smokelift.output.images import write_image
@@ -420,3 +421,24 @@ def test_a_further_view_beside_the_box_is_refused(two_views, draft) -> None:
     away = look_at_matrix((0, -4, 0.8), (0, -9, 0.8), (0, 0, 1))
     with pytest.raises(SceneError, match="does not see the domain"):
         replace(two_views, views=(replace(view, camera=replace(view.camera, matrix=away)),))
+
+
+def test_a_camera_that_shakes_is_steadied(draft, tmp_path) -> None:
+    """The volume stands still: the camera turns in its place, a matrix for every frame, and smoke alone is smoke."""
+    random = np.random.default_rng(0)
+    wall = ndimage.gaussian_filter(random.standard_normal((140, 180)), 1.5)
+    wall = 0.3 + 0.1 * wall / wall.std()
+    rows, columns = np.mgrid[:140, :180]
+    offsets = random.integers(-4, 5, (8, 2)) + 8
+    for n, (down, right) in enumerate(offsets):
+        smoke = 0.8 * np.exp(-((rows - 95 + 6 * n) ** 2 + (columns - 90) ** 2) / 200)
+        seen = (wall * (1 - smoke) + 0.9 * smoke)[down : down + 120, right : right + 160]
+        write_image(tmp_path / f"shaken_{n}.png", np.repeat(np.clip(seen, 0, 1)[..., None], 3, 2).astype(np.float32))
+    shot = shot_of(Scene(clip=ClipSource(tmp_path / "shaken_#.png", fps=24), scattering="absorption"), draft)
+    camera = shot.scene.camera
+    assert len(camera.matrices) == len(shot.clip)
+    assert {tuple(row[3] for row in matrix) for matrix in camera.matrices} == {tuple(row[3] for row in camera.matrix)}
+    where = np.array([project(camera.at(n), np.array([shot.scene.domain.centre]))[0][0] for n in range(8)])
+    np.testing.assert_allclose(where - where.mean(0), (offsets.mean(0) - offsets)[:, ::-1], atol=0.3)
+    assert any(note.startswith("The camera moves, by up to") for note in shot.notes)
+    assert shot.estimated_background is None

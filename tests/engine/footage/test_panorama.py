@@ -1,0 +1,63 @@
+"""The background behind a camera that turns."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from films import codes_apart
+from scipy.spatial.transform import Rotation
+from turning_camera import LENS, clip_of, pan, pictures, shake, wall
+
+from smokelift.footage.matte import matte
+from smokelift.footage.panorama import WidePicture, estimate_panorama, warped
+from smokelift.footage.turning import Turns
+
+
+@pytest.mark.parametrize("turns", [shake(3), pan(60)], ids=["shake", "pan"])
+def test_every_frame_has_its_background(turns: Rotation) -> None:
+    """Where it is known it is right, and the matte before it is the smoke's."""
+    frames, clear = pictures(wall(), turns, smoke=0.9)
+    plates = estimate_panorama(clip_of(frames), Turns(LENS, turns))
+    for number in (0, 5, 11):
+        plate = plates.at(number)
+        assert plate.image.shape == frames[number].shape
+        known = plate.confidence > 0.5
+        assert known.mean() > 0.5
+        assert np.percentile(codes_apart(plate.image, clear[number])[known], 90) < 6
+        smoke = codes_apart(frames[number], clear[number])
+        found = matte(frames[number], plate).mask
+        assert found[smoke > 60].mean() > 0.5
+        assert found[smoke < 10].mean() < 0.3
+
+
+def test_a_part_has_the_parts_plate() -> None:
+    turns = shake(3)
+    frames, _ = pictures(wall(), turns)
+    plates = estimate_panorama(clip_of(frames), Turns(LENS, turns))
+    part = plates.through(lambda whole: whole[10:50, 20:90], 1.0).at(3)
+    np.testing.assert_array_equal(part.image, plates.at(3).image[10:50, 20:90])
+
+
+def test_exposure_does_not_show_in_it() -> None:
+    """A frame that is brighter by a third is brought to the others."""
+    turns = shake(3)
+    frames, clear = pictures(wall(), turns)
+    frames[4] *= 1.33
+    plates = estimate_panorama(clip_of(frames), Turns(LENS, turns))
+    assert np.percentile(codes_apart(plates.at(4).image, clear[4]), 90) < 6
+
+
+def test_a_homography_of_whole_pixels_copies() -> None:
+    """Pixel centres are at half integers."""
+    picture = np.random.default_rng(0).random((20, 30, 3)).astype(np.float32)
+    moved = warped(picture, np.array([[1.0, 0, 3], [0, 1, 2], [0, 0, 1]]), (30, 20))
+    np.testing.assert_allclose(moved[:18, :27], picture[2:, 3:], atol=1e-6)
+    assert not moved[18:].any()
+
+
+@pytest.mark.parametrize("degrees", [70, 150])
+def test_a_camera_that_looks_around_is_refused(degrees: float) -> None:
+    """No flat picture shows all that it sees."""
+    around = Rotation.from_euler("y", [[-degrees], [0], [degrees]], degrees=True)
+    with pytest.raises(ValueError, match="track it in Blender"):
+        WidePicture.around(Turns(LENS, around))

@@ -1,0 +1,53 @@
+"""Whether the camera of a clip turned, and how."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from turning_camera import COUNT, LENS, clip_of, off, pan, pictures, shake, wall
+
+from smokelift.footage.turning import Turns, find_turns
+from smokelift.scene import Camera
+from smokelift.scene.projection import project
+
+
+@pytest.mark.parametrize("turns", [shake(3), pan(60)], ids=["shake", "pan"])
+def test_turns_are_found_behind_smoke(turns: Rotation) -> None:
+    """To a tenth of a pixel in every corner of every frame."""
+    frames, _ = pictures(wall(), turns, smoke=0.9)
+    found = find_turns(clip_of(frames), LENS)
+    assert found is not None
+    assert off(found.rotations, turns) < 0.1
+    assert found.farthest == pytest.approx(Turns(LENS, turns).farthest, abs=0.1)
+
+
+@pytest.mark.parametrize(("smoke", "noise"), [(0.0, 1.0), (1.0, 1.0), (1.0, 12.0)])
+def test_a_still_camera_stays_still(smoke: float, noise: float) -> None:
+    """However the smoke moves before it, and however noisy it is."""
+    frames, _ = pictures(wall(), Rotation.identity(COUNT), smoke, noise)
+    assert find_turns(clip_of(frames), LENS) is None
+
+
+def test_smoke_before_one_colour_is_no_camera() -> None:
+    """Its texture is all there is, and rises."""
+    frames, _ = pictures(np.full_like(wall(), 0.02), shake(3), smoke=1.0)
+    assert find_turns(clip_of(frames), LENS) is None
+
+
+def test_one_frame_shows_no_motion() -> None:
+    frames, _ = pictures(wall(), Rotation.identity(1))
+    assert find_turns(clip_of(frames), LENS) is None
+
+
+def test_a_camera_carries_the_turns() -> None:
+    """A point of the world lies where its direction does in each frame."""
+    turns = Turns(LENS, shake(10))
+    mean = Camera.look_at((1, -4, 1), (0, 0, 0.8), fov_y_degrees=2 * np.degrees(np.arctan(0.3)), size=LENS.size)
+    moving = turns.carried(mean)
+    assert moving.matrix == moving.matrices[0]
+    point = np.array([[0.1, 0.2, 0.6]])
+    where, _ = project(mean, point)
+    for frame, turn in enumerate(turns.rotations):
+        seen, _ = project(moving.at(frame), point)
+        np.testing.assert_allclose(LENS.pixels(turn.apply(LENS.rays(seen))), where, atol=1e-6)
