@@ -92,6 +92,7 @@ class Frames:
     """Frames in memory; a `smokelift.footage.frame_source.FrameSource`."""
 
     warning: str | None = None
+    lens: float | None = None
     fps = FPS
     files: tuple[Path, ...] = ()
     notes: tuple[str, ...] = ()

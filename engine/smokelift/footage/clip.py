@@ -40,12 +40,15 @@ class Clip:
         Number in the file of the clip's frame 0 (not 0 if a range was asked for).
     warning
         A sentence about a defect (a truncated file, say), else None.
+    lens
+        Focal length in millimetres on 35 mm film, if the file says it.
     """
 
     def __init__(self, path: Path, source: FrameSource, fps: float | None, frames: tuple[int, int] | None) -> None:
         self.path = path
         self.fps = source.fps if fps is None else float(fps)
         self.warning = source.warning
+        self.lens = source.lens
         self._source = source
         first, last = (0, source.count - 1) if frames is None else frames
         if not 0 <= first <= last < source.count:
@@ -227,7 +230,7 @@ class _Changed:
     def __init__(self, clip: Clip, source: FrameSource, change: Callable[[int, Picture], Picture]) -> None:
         self._clip, self._source, self._change = clip, source, change
         self.count, self.fps, self.warning = source.count, source.fps, source.warning
-        self.files = source.files
+        self.files, self.lens = source.files, clip.lens
 
     @property
     def notes(self) -> tuple[str, ...]:

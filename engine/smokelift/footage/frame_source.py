@@ -32,12 +32,15 @@ class FrameSource(Protocol):
         A sentence about a defect, else None.
     files
         The video, or a picture a frame.
+    lens
+        Focal length in millimetres on 35 mm film, if the file says it.
     """
 
     count: int
     fps: float
     warning: str | None
     files: tuple[Path, ...]
+    lens: float | None
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from smokelift.footage import lens
 from smokelift.footage.frame_source import DEFAULT_FPS, ClipError, DamagedFrameError
 from smokelift.footage.images import READABLE, ImageError, Picture, Transfer, area_average, read_image, reduction
 
@@ -36,6 +37,7 @@ class ImageSequence:
         self.warning = None
         if fps is None and self.count > 1:
             self.warning = f"{path}: pictures carry no frame rate; {DEFAULT_FPS:g} frames a second are taken"
+        self.lens = lens.of_picture(self.files[0])
         self._shape: tuple[int, ...] | None = None
 
     @staticmethod

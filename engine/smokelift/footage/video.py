@@ -26,6 +26,7 @@ from av.filter import Graph
 from av.sidedata.sidedata import Type as SideData
 from av.video.reformatter import ColorRange, Interpolation
 
+from smokelift.footage import lens
 from smokelift.footage.colour import ENCODINGS, primaries_name, to_bt709
 from smokelift.footage.container import open_container
 from smokelift.footage.frame_source import DEFAULT_FPS, ClipError, DamagedFrameError
@@ -73,6 +74,7 @@ class Video:
         self.fps, self._shown = self._steady()
         self.count = len(self._shown)
         self._format = self._described()
+        self.lens = lens.of_tags({**self._container.metadata, **self._stream.metadata})
 
     def _start(self) -> None:
         """Open the file at its beginning."""
@@ -88,11 +90,11 @@ class Video:
             self._container.close()
             raise ClipError(f"{self._path}: holds video of a kind that cannot be decoded")
         width, height = self._stream.width, self._stream.height
-        if max(width, height) > LARGEST_PICTURE or width * height > MOST_PIXELS:
+        if max(width, height) > LARGEST_PICTURE or not 0 < width * height <= MOST_PIXELS:
             self._container.close()
             raise ClipError(
-                f"{self._path}: has pictures of {width} x {height} pixels; the largest that are read have "
-                f"{LARGEST_PICTURE} along a side and {MOST_PIXELS} in all"
+                f"{self._path}: has pictures of {width} x {height} pixels; those that are read have 1 to "
+                f"{LARGEST_PICTURE} along a side and at most {MOST_PIXELS} in all"
             )
         # A decoder of several frames at once takes sound ones along when one fails.
         self._stream.thread_type = "SLICE" if self._failed else "AUTO"

@@ -10,6 +10,7 @@ import numpy as np
 
 from smokelift.footage.alignment import Lens
 from smokelift.footage.clip import Clip
+from smokelift.footage.lens import FILM_DIAGONAL
 from smokelift.footage.plate import Plates
 from smokelift.footage.turning import Turns
 from smokelift.footage.working_picture import CameraError, working_picture
@@ -26,7 +27,8 @@ PICTURE_HEIGHT = 2.0
 """Metres that an uncalibrated picture is taken to be high where the smoke is: the size of a person."""
 
 LENS = 50 / 36
-"""Focal length over the longer side of the picture of an uncalibrated camera: Blender's default lens."""
+"""Focal length over the longer side of the picture of an uncalibrated camera whose file says none: Blender's default
+lens."""
 
 MARGIN = 0.06
 """Margin on each side of a guessed box, as a fraction of its longer side."""
@@ -100,9 +102,9 @@ def find_geometry(
     else:
         domain, choice = grids[-1], None
     size = " x ".join(f"{high - low:.2f}" for low, high in zip(domain.min, domain.max, strict=True))
+    lens = "a level 50 mm lens on 36 mm film" if clip.lens is None else f"level, {clip.lens:g} mm as the file says"
     notes = (
-        "Camera not given: a level 50 mm lens on 36 mm film, the picture taken to be "
-        f"{PICTURE_HEIGHT:g} m high where the smoke is.",
+        f"Camera not given: {lens}, the picture taken to be {PICTURE_HEIGHT:g} m high where the smoke is.",
         f"Domain around the smoke: {size} m, {' x '.join(map(str, domain.resolution))} voxels.",
     )
     return Geometry(camera, domain, choice, notes)
@@ -157,7 +159,7 @@ def _uncalibrated(clip: Clip, samples: SmokeSamples, settings: Settings) -> tupl
     The box comes with every number of voxels that may be chosen, the fewest first.
     """
     width, height = clip.size
-    focal = LENS * max(width, height)
+    focal = LENS * max(width, height) if clip.lens is None else clip.lens / FILM_DIAGONAL * math.hypot(width, height)
     metres = PICTURE_HEIGHT / height
     distance = focal * metres
     matrix = np.array([[1, 0, 0, 0], [0, 0, -1, -distance], [0, 1, 0, PICTURE_HEIGHT / 2], [0, 0, 0, 1]], np.float64)

@@ -53,6 +53,16 @@ def guessed(passing, draft) -> Shot:
     return shot_of(bare(passing), draft)
 
 
+def test_the_focal_length_that_the_file_gives_is_taken(passing, draft) -> None:
+    """Of the diagonal of 35 mm film."""
+    with Clip.open(passing.clip) as clip:
+        clip.lens = 26.0
+        shot = prepare_shot(clip, bare(passing), replace(draft, resolution=(12, 12, 16)))
+    width, height = clip.size
+    assert shot.scene.camera.fx == pytest.approx(26 * np.hypot(width, height) / np.hypot(36, 24))
+    assert any("level, 26 mm as the file says" in note for note in shot.notes)
+
+
 def test_a_complete_scene_stays_as_it_is(plume, draft) -> None:
     """Everything given: nothing is assumed, nothing noted, nothing changed."""
     shot = shot_of(plume.scene, draft)
