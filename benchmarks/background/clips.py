@@ -93,6 +93,7 @@ class Frames:
 
     warning: str | None = None
     lens: float | None = None
+    backdrop: float | None = None
     fps = FPS
     files: tuple[Path, ...] = ()
     notes: tuple[str, ...] = ()

@@ -36,15 +36,15 @@ def film(width: int = 96, height: int = 64, frames: int = FRAMES) -> Pictures:
     return np.asarray(np.stack(shown), np.float32)
 
 
-def smoke(width: int = 96, height: int = 64, frames: int = FRAMES) -> npt.NDArray[np.float32]:
-    """Straight sRGB values and opacity, (frames, rows, columns, 4), of dark smoke alone."""
+def smoke(grey: float = 0.35, width: int = 96, height: int = 64, frames: int = FRAMES) -> npt.NDArray[np.float32]:
+    """Straight sRGB values and opacity, (frames, rows, columns, 4), of smoke alone."""
     y, x = np.mgrid[:height, :width] + 0.5
     shown = []
     for n in range(frames):
         share = (n + 0.5) / frames
         distance = np.hypot((x - width / 2) / (0.16 * width), (y - height * (0.9 - 0.6 * share)) / (0.2 * height))
         opacity = 0.8 * np.clip(1.3 - distance, 0, 1)
-        shown.append(np.dstack([np.full((height, width, 3), 0.4), opacity]))
+        shown.append(np.dstack([np.full((height, width, 3), grey), opacity]))
     return np.asarray(np.stack(shown), np.float32)
 
 

@@ -14,7 +14,7 @@ import numpy.typing as npt
 import OpenEXR
 from PIL import Image
 
-from benchmarks.file_kinds.film import FRAMES, eight_bits, encode, film, smoke, wide
+from benchmarks.file_kinds.film import FPS, FRAMES, eight_bits, encode, film, smoke, wide
 from benchmarks.file_kinds.judge import Kind
 from benchmarks.stability.mutations import damaged_bytes
 from smokelift.footage.images import linear_to_srgb, srgb_to_linear
@@ -43,7 +43,8 @@ def _video(name: str = "a.mp4", slack: float = 1.0, **how: Any) -> Make:
     """The film in a video file."""
 
     def make(folder: Path) -> Kind:
-        return Kind(encode(folder / name, eight_bits(film()), **how), film(), slack)
+        path = encode(folder / name, eight_bits(film()), **how)
+        return Kind(path, film(), slack, fps=float(how.get("rate", FPS)))
 
     return make
 
@@ -187,10 +188,10 @@ def _colours() -> dict[str, Make]:
 
         return make
 
-    def grey(pixels: str, codec: str = "ffv1") -> Make:
+    def grey(pixels: str) -> Make:
         def make(folder: Path) -> Kind:
             one = film()[..., 1]
-            path = encode(folder / "a.mkv", eight_bits(one), codec, pixels, given="gray")
+            path = encode(folder / "a.mkv", eight_bits(one), "ffv1", pixels, given="gray")
             return Kind(path, np.repeat(one[..., None], 3, -1), 1.5)
 
         return make
@@ -215,43 +216,61 @@ def _colours() -> dict[str, Make]:
         "grey, 8 bit": grey("gray"),
         "grey, 10 bit": grey("gray10le"),
         "grey, 16 bit": grey("gray16le"),
-        "grey H.264": grey("gray", "libx264"),
         "palette (GIF)": _video("a.gif", 12.0, codec="gif", pixels="rgb8", rate=25),
     }
 
 
-def _over_black(straight: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
-    return np.asarray(linear_to_srgb(srgb_to_linear(straight[..., :3]) * straight[..., 3:]))
+def _shown(straight: npt.NDArray[np.float32], behind: float) -> npt.NDArray[np.float32]:
+    alpha = straight[..., 3:]
+    return np.asarray(linear_to_srgb(srgb_to_linear(straight[..., :3]) * alpha + (1 - alpha) * behind), np.float32)
 
 
 def _alphas() -> dict[str, Make]:
-    def made(name: str, codec: str, pixels: str, slack: float = 1.0, **how: Any) -> Make:
+    def made(name: str, codec: str, pixels: str, slack: float = 1.0, grey: float = 0.35, **how: Any) -> Make:
         def make(folder: Path) -> Kind:
-            path = encode(folder / name, eight_bits(smoke()), codec, pixels, given="rgba", **how)
-            return Kind(path, _over_black(smoke()), slack)
+            path = encode(folder / name, eight_bits(smoke(grey)), codec, pixels, given="rgba", **how)
+            return Kind(path, _shown(smoke(grey), float(grey < 0.5)), slack)
+
+        return make
+
+    def premultiplied(grey: float) -> Make:
+        """Multiplied in linear light."""
+
+        def make(folder: Path) -> Kind:
+            stored = np.concatenate([_shown(smoke(grey), 0), smoke(grey)[..., 3:]], -1)
+            path = encode(folder / "a.mov", eight_bits(stored), "png", "rgba", given="rgba")
+            return Kind(path, _shown(smoke(grey), float(grey < 0.5)), 1.5)
 
         return make
 
     def pictures(folder: Path) -> Kind:
         for n, picture in enumerate(eight_bits(smoke())):
             Image.fromarray(picture).save(folder / f"smoke_{n:03d}.png")
-        return Kind(folder / "smoke_###.png", _over_black(smoke()))
+        return Kind(folder / "smoke_###.png", _shown(smoke(), 1))
 
     def exr(folder: Path) -> Kind:
         header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
         for n, picture in enumerate(smoke()):
             rgb = srgb_to_linear(picture[..., :3]) * picture[..., 3:]
             OpenEXR.File(header, {"RGBA": np.dstack([rgb, picture[..., 3]])}).write(str(folder / f"a{n}.exr"))
-        return Kind(folder / "a#.exr", _over_black(smoke()))
+        return Kind(folder / "a#.exr", _shown(smoke(), 1))
+
+    def opaque(folder: Path) -> Kind:
+        stored = np.concatenate([film(), np.ones_like(film()[..., :1])], -1)
+        return Kind(encode(folder / "a.mov", eight_bits(stored), "png", "rgba", given="rgba"), film())
 
     return {
         "straight, Animation": made("a.mov", "qtrle", "argb"),
-        "straight, PNG in QuickTime": made("a.mov", "png", "rgba"),
+        "straight, bright smoke": made("a.mov", "qtrle", "argb", grey=0.8),
         "straight, ProRes 4444": made("a.mov", "prores_ks", "yuva444p10le", 2.0),
         "straight, FFV1 4:2:0": made("a.mkv", "ffv1", "yuva420p", 1.5),
         "straight, PNG pictures": pictures,
+        "premultiplied, dark smoke": premultiplied(0.35),
+        "premultiplied, bright smoke": premultiplied(0.8),
         "premultiplied, EXR pictures": exr,
         "VP9 in WebM": made("a.webm", "libvpx-vp9", "yuva420p", 2.0, options={"lossless": "1"}),
+        "VP8 in WebM": made("a.webm", "libvpx", "yuva420p", 4.0, options={"crf": "4", "b": "8M", "auto-alt-ref": "0"}),
+        "opaque": opaque,
     }
 
 
@@ -365,7 +384,7 @@ def _pictures() -> dict[str, Make]:
         "PNG, 8 bit": saved(".png"),
         "PNG, 16 bit": sixteen,
         "PNG, grey": saved(".png", "L", 1.5),
-        "PNG, palette": saved(".png", "P", 8.0),
+        "PNG, palette": saved(".png", "P", 18.0),
         "JPEG": saved(".jpg", slack=2.0, quality=98, subsampling=0),
         "JPEG, CMYK": saved(".jpg", "CMYK", 2.5, quality=98),
         "JPEG, turned by EXIF": exif,

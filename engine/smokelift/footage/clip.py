@@ -42,6 +42,8 @@ class Clip:
         A sentence about a defect (a truncated file, say), else None.
     lens
         Focal length in millimetres on 35 mm film, if the file says it.
+    backdrop
+        Linear grey that is shown behind pictures with an alpha channel; None behind opaque ones.
     """
 
     def __init__(self, path: Path, source: FrameSource, fps: float | None, frames: tuple[int, int] | None) -> None:
@@ -49,6 +51,7 @@ class Clip:
         self.fps = source.fps if fps is None else float(fps)
         self.warning = source.warning
         self.lens = source.lens
+        self.backdrop = source.backdrop
         self._source = source
         first, last = (0, source.count - 1) if frames is None else frames
         if not 0 <= first <= last < source.count:
@@ -230,7 +233,7 @@ class _Changed:
     def __init__(self, clip: Clip, source: FrameSource, change: Callable[[int, Picture], Picture]) -> None:
         self._clip, self._source, self._change = clip, source, change
         self.count, self.fps, self.warning = source.count, source.fps, source.warning
-        self.files, self.lens = source.files, clip.lens
+        self.files, self.lens, self.backdrop = source.files, clip.lens, clip.backdrop
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -34,6 +34,8 @@ class FrameSource(Protocol):
         The video, or a picture a frame.
     lens
         Focal length in millimetres on 35 mm film, if the file says it.
+    backdrop
+        Linear grey that is shown behind pictures with an alpha channel; None behind opaque ones.
     """
 
     count: int
@@ -41,6 +43,7 @@ class FrameSource(Protocol):
     warning: str | None
     files: tuple[Path, ...]
     lens: float | None
+    backdrop: float | None
 
     @property
     def notes(self) -> tuple[str, ...]:

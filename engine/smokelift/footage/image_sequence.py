@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 from smokelift.footage import lens
 from smokelift.footage.frame_source import DEFAULT_FPS, ClipError, DamagedFrameError
-from smokelift.footage.images import READABLE, ImageError, Picture, Transfer, area_average, read_image, reduction
+from smokelift.footage.images import READABLE, ImageError, Picture, Transfer, area_average, read_layer, reduction
+from smokelift.footage.layer import Layer, backdrop_of, sample_numbers
 
 
 class ImageSequence:
@@ -39,6 +42,7 @@ class ImageSequence:
             self.warning = f"{path}: pictures carry no frame rate; {DEFAULT_FPS:g} frames a second are taken"
         self.lens = lens.of_picture(self.files[0])
         self._shape: tuple[int, ...] | None = None
+        self.backdrop = backdrop_of(self._samples())
 
     @staticmethod
     def reads(path: Path) -> bool:
@@ -56,10 +60,7 @@ class ImageSequence:
 
     def read(self, n: int) -> Picture:
         """Return a picture, or raise ClipError if it is damaged or of another size than the first."""
-        try:
-            image = read_image(self.files[n], self._transfer)
-        except ImageError as error:
-            raise DamagedFrameError(str(error)) from error
+        image = self._layer(n).before(self.backdrop)
         self._shape = self._shape or image.shape
         if image.shape != self._shape:
             raise ClipError(
@@ -69,6 +70,21 @@ class ImageSequence:
         height, width = image.shape[:2]
         divisor = reduction(width, height)
         return image if divisor == 1 else area_average(image, round(width / divisor), round(height / divisor))
+
+    def _layer(self, n: int) -> Layer:
+        try:
+            return Layer(*read_layer(self.files[n], self._transfer))
+        except ImageError as error:
+            raise DamagedFrameError(str(error)) from error
+
+    def _samples(self) -> Iterator[Layer]:
+        """Some pictures; the first alone if that has no alpha channel."""
+        for n in sample_numbers(self.count):
+            with suppress(DamagedFrameError):
+                layer = self._layer(n)
+                yield layer
+                if layer.alpha is None:
+                    return
 
     def damaged(self, first: int, last: int) -> tuple[int, ...]:
         """Return which pictures from one to another are missing or cannot be read."""

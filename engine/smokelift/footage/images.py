@@ -66,7 +66,10 @@ _DECODERS: Mapping[Encoding, Callable[[npt.ArrayLike], Picture]] = {
 
 
 def decode_integers(
-    codes: npt.NDArray[np.uint8] | npt.NDArray[np.uint16], encoding: Encoding | None = None, white: float = 1.0
+    codes: npt.NDArray[np.uint8] | npt.NDArray[np.uint16],
+    encoding: Encoding | None = None,
+    white: float = 1.0,
+    premultiplied: bool = False,
 ) -> Picture:
     """Return integer pixels [row, column, rgb or rgba] as linear RGB, alpha over black.
 
@@ -78,14 +81,24 @@ def decode_integers(
         How they encode light; None is ``"srgb"``.
     white
         Share of the largest value that stands for white, and for opaque.
+    premultiplied
+        Whether colours are over black as they are stored.
     """
     top = np.iinfo(codes.dtype).max
     steps = np.arange(top + 1, dtype=np.float32) / np.float32(top * white)
     table = steps if encoding == "linear" else _DECODERS[encoding or "srgb"](steps)
     linear: Picture = table[codes[..., :3]]
-    if codes.shape[-1] == 4:
-        linear *= np.minimum(steps, np.float32(1.0))[codes[..., 3:]]
+    alpha = decode_alpha(codes, white)
+    if alpha is not None and not premultiplied:
+        linear *= alpha[..., None]
     return linear
+
+
+def decode_alpha(codes: npt.NDArray[np.uint8] | npt.NDArray[np.uint16], white: float = 1.0) -> Picture | None:
+    """Return the alpha of integer pixels [row, column, rgb or rgba] from 0 to 1; None if they have none."""
+    if codes.shape[-1] < 4:
+        return None
+    return np.minimum(codes[..., 3] / np.float32(np.iinfo(codes.dtype).max * white), np.float32(1.0))
 
 
 def read_image(path: str | Path, transfer: Transfer | None = None) -> Picture:
@@ -107,6 +120,11 @@ def read_image(path: str | Path, transfer: Transfer | None = None) -> Picture:
     ImageError
         With the path, if there is no such file or it is damaged or of another kind.
     """
+    return read_layer(path, transfer)[0]
+
+
+def read_layer(path: str | Path, transfer: Transfer | None = None) -> tuple[Picture, Picture | None]:
+    """Read a file as `read_image` does, and its alpha (height, width) from 0 to 1 if it has that channel."""
     path = Path(path)
     suffix = path.suffix.lower()
     if suffix not in READABLE:
@@ -115,9 +133,10 @@ def read_image(path: str | Path, transfer: Transfer | None = None) -> Picture:
         raise ImageError(f"{path}: no such file")
     try:
         if suffix in (".exr", ".hdr"):
-            values = _read_exr(path) if suffix == ".exr" else _read_radiance(path)
-            return srgb_to_linear(values) if transfer == "srgb" else values
-        return decode_integers(_read_integers(path), transfer)
+            values, alpha = _read_exr(path) if suffix == ".exr" else (_read_radiance(path), None)
+            return srgb_to_linear(values) if transfer == "srgb" else values, alpha
+        codes = _read_integers(path)
+        return decode_integers(codes, transfer), decode_alpha(codes)
     except ImageError:
         raise
     # Three libraries, each with its own exceptions; to the caller they all say the same.
@@ -178,7 +197,7 @@ def _silent() -> Iterator[None]:
         os.close(kept)
 
 
-def _read_exr(path: Path) -> Picture:
+def _read_exr(path: Path) -> tuple[Picture, Picture | None]:
     with _silent():
         headers = OpenEXR.File(str(path), header_only=True).parts
     for part in headers:
@@ -193,14 +212,17 @@ def _read_exr(path: Path) -> Picture:
     left, top = (int(v) for v in part.header["displayWindow"][0])
     right, bottom = (int(v) for v in part.header["displayWindow"][1])
     x0, y0 = (int(v) for v in part.header["dataWindow"][0])
-    image = np.zeros((bottom - top + 1, right - left + 1, 3), np.float32)
+    image = np.zeros((bottom - top + 1, right - left + 1, 4), np.float32)
     rows, columns = slice(max(0, y0 - top), None), slice(max(0, x0 - left), None)
-    for channel, name in enumerate(_exr_channels(path, tuple(part.channels))):
+    colours = _exr_channels(path, tuple(part.channels))
+    opacity = [f"{colours[0][:-1]}A"] if f"{colours[0][:-1]}A" in part.channels else []
+    for channel, name in enumerate((*colours, *opacity)):
         pixels = part.channels[name].pixels[max(0, top - y0) :, max(0, left - x0) :]
         target = image[rows, columns, channel]
         height, width = min(target.shape[0], pixels.shape[0]), min(target.shape[1], pixels.shape[1])
         target[:height, :width] = pixels[:height, :width]
-    return image
+    alpha = np.clip(image[..., 3], 0.0, 1.0) if opacity else None
+    return np.ascontiguousarray(image[..., :3]), alpha
 
 
 def _exr_channels(path: Path, names: tuple[str, ...]) -> tuple[str, str, str]:

@@ -5,7 +5,7 @@ had, and frames in a row cost one decode each.
 
 What a file says about its pictures is honoured: matrix and range through FFmpeg's converter (an untagged video is read
 as BT.601, as FFmpeg writes one), transfer and primaries (`colour`), rotation and mirroring flags, the shape of pixels,
-interlacing (one field of each frame is used), alpha (over black). The converter is asked to round exactly: by default
+interlacing (one field of each frame is used), alpha (`layer`). The converter is asked to round exactly: by default
 FFmpeg's is half an 8 bit step too dark.
 
 A video whose rate varies by more than 1 % is read at its mean rate: frame n is the picture on show at n / fps.
@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import bisect
 from collections.abc import Iterator
+from contextlib import suppress
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -30,11 +31,27 @@ from smokelift.footage import lens
 from smokelift.footage.colour import ENCODINGS, primaries_name, to_bt709
 from smokelift.footage.container import open_container
 from smokelift.footage.frame_source import DEFAULT_FPS, ClipError, DamagedFrameError
-from smokelift.footage.images import MOST_PIXELS, Picture, Transfer, area_average, decode_integers, reduction
+from smokelift.footage.images import (
+    MOST_PIXELS,
+    Picture,
+    Transfer,
+    area_average,
+    decode_alpha,
+    decode_integers,
+    reduction,
+    srgb_to_linear,
+)
+from smokelift.footage.layer import Layer, backdrop_of, sample_numbers
 from smokelift.scene import LARGEST_PICTURE
 
 _EXACT = int(Interpolation.ACCURATE_RND | Interpolation.FULL_CHR_H_INT | Interpolation.FULL_CHR_H_INP)
+_ALPHA_DECODERS = {"vp8": "libvpx", "vp9": "libvpx-vp9"}
+"""FFmpeg's own decoders of these leave the alpha channel out."""
+
 _GROWING, _SHRINKING = int(Interpolation.BICUBIC) | _EXACT, int(Interpolation.AREA) | _EXACT
+
+BEYOND_ALPHA = 0.02
+"""Share of white by which colours may exceed alpha through rounding and compression."""
 
 SQUARE = 0.01
 """Difference from 1 of the shape of pixels that is not worth another grid of pixels."""
@@ -73,6 +90,8 @@ class Video:
         self._varies, self._interlaced = False, False
         self.fps, self._shown = self._steady()
         self.count = len(self._shown)
+        self._premultiplied = False
+        self.backdrop = self._matted()
         self._format = self._described()
         self.lens = lens.of_tags({**self._container.metadata, **self._stream.metadata})
 
@@ -98,6 +117,10 @@ class Video:
             )
         # A decoder of several frames at once takes sound ones along when one fails.
         self._stream.thread_type = "SLICE" if self._failed else "AUTO"
+        decoder = _ALPHA_DECODERS.get(self._stream.codec_context.name)
+        self._decoder: Any = self._stream.codec_context
+        if decoder is not None and self._stream.metadata.get("alpha_mode") == "1":
+            self._decoder = av.CodecContext.create(av.Codec(decoder, "r"), "r")
         self._decoded = self._frames()
         self._next = 0  # index into _times of the frame that decoding on will give
 
@@ -110,7 +133,7 @@ class Video:
             except (StopIteration, av.FFmpegError):
                 return
             try:
-                frames = packet.decode()
+                frames = self._decoder.decode(packet)
             except av.FFmpegError:
                 self._failed = True
                 continue
@@ -221,7 +244,7 @@ class Video:
 
     def read(self, n: int) -> Picture:
         """Return a frame, or raise `DamagedFrameError`."""
-        return self._picture(self._decode(self._shown[n]))
+        return self._layer(self._decode(self._shown[n])).before(self.backdrop)
 
     def damaged(self, first: int, last: int) -> tuple[int, ...]:
         """Return which frames from one to another cannot be decoded."""
@@ -294,7 +317,22 @@ class Video:
         divisor = reduction(round(width), height)
         return max(1, round(width / divisor)), max(1, round(height / divisor))
 
-    def _picture(self, frame: av.VideoFrame) -> Picture:
+    def _matted(self) -> float | None:
+        """Find out how alpha is meant, if there is any: colours beyond it are not multiplied by it."""
+        layers = []
+        for n in sample_numbers(self.count):
+            with suppress(DamagedFrameError):
+                frame = self._decode(self._shown[n])
+                if not any(component.is_alpha for component in frame.format.components):
+                    return None
+                codes: npt.NDArray[Any] = frame.reformat(format="rgba").to_ndarray()
+                # white that is multiplied by alpha in linear light is the brightest that there may be
+                limit = codes[..., 3:] / np.float32(255) + np.float32(BEYOND_ALPHA)
+                layers.append((frame, bool((srgb_to_linear(codes[..., :3] / np.float32(255)) <= limit).all())))
+        self._premultiplied = bool(layers) and all(within for _, within in layers)
+        return backdrop_of(self._layer(frame) for frame, _ in layers)
+
+    def _layer(self, frame: av.VideoFrame) -> Layer:
         components = frame.format.components
         wide = max(component.bits for component in components) > 8
         alpha = any(component.is_alpha for component in components)
@@ -311,11 +349,15 @@ class Video:
         rows = shown.height if interlaced else height
         codes: npt.NDArray[Any] = shown.reformat(width, rows, layout, interpolation=way).to_ndarray()
         encoding = self._transfer or ENCODINGS.get(self._stream.codec_context.color_trc)
-        linear = decode_integers(codes, encoding, _white(frame))
+        white = _white(frame)
+        linear, opacity = decode_integers(codes, encoding, white, self._premultiplied), decode_alpha(codes, white)
         if interlaced:
             self._interlaced = True
             linear = area_average(_between_lines(linear, frame.height), width, height)
-        return to_bt709(_upright(linear, frame), self._stream.codec_context.color_primaries)
+            if opacity is not None:
+                opacity = area_average(_between_lines(opacity, frame.height), width, height)
+        picture = to_bt709(_upright(linear, frame), self._stream.codec_context.color_primaries)
+        return Layer(picture, None if opacity is None else _upright(opacity, frame))
 
     def _field(self, frame: av.VideoFrame) -> av.VideoFrame:
         """Return the even lines of a frame: their colours too are of one moment."""

@@ -84,6 +84,12 @@ def find_plates(
         If a camera moves before a background of more than one colour that is not given, or turns too far.
     """
     moves = camera is not None and camera.moves
+    if clip.backdrop is not None:
+        grey = (clip.backdrop,) * 3
+        name = "white" if clip.backdrop else "black"
+        note = f"The clip has an alpha channel, which is the matte: the smoke is shown before {name}."
+        unused = ("[background] is not used.",) if background is not None else ()
+        return FoundPlates(known_plate(grey, clip), Background(color=grey), (note, *unused))
     given = given_plates(background, camera, clip)
     if given is not None:
         return FoundPlates(given, background)

@@ -1,0 +1,52 @@
+"""Alpha channels: what is behind the smoke is one colour that is known."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from smokelift.footage.clip import Clip
+from smokelift.footage.images import srgb_to_linear
+from smokelift.footage.layer import Layer, backdrop_of
+from smokelift.scene import Background
+from smokelift.setup.background import find_plates
+
+
+def layer(grey: float, alpha: float | None) -> Layer:
+    """Smoke of a linear grey over the left half."""
+    picture, opacity = np.zeros((4, 6, 3), np.float32), np.zeros((4, 6), np.float32)
+    picture[:, :3], opacity[:, :3] = grey * (1.0 if alpha is None else alpha), alpha or 0.0
+    return Layer(picture, None if alpha is None else opacity)
+
+
+@pytest.mark.parametrize(("grey", "backdrop"), [(0.05, 1.0), (0.9, 0.0)])
+def test_dark_smoke_stands_before_white_and_bright_smoke_before_black(grey: float, backdrop: float) -> None:
+    clip = [layer(grey, 0.0), layer(grey, 0.5)]
+    assert backdrop_of(clip) == backdrop
+    shown = clip[1].before(backdrop)
+    np.testing.assert_allclose(shown[0, [0, 5]], [[0.5 * grey + 0.5 * backdrop] * 3, [backdrop] * 3], rtol=1e-6)
+
+
+def test_opaque_pictures_have_no_backdrop() -> None:
+    assert backdrop_of([layer(0.5, None)]) is None
+    assert backdrop_of([Layer(np.ones((2, 2, 3), np.float32), np.ones((2, 2), np.float32))]) is None
+
+
+def test_the_backdrop_is_the_background_and_nothing_is_estimated(tmp_path: Path) -> None:
+    for n in range(4):
+        codes = np.full((24, 32, 4), 40, np.uint8)
+        codes[..., 3] = 0
+        codes[20 - 4 * n :, 10:20, 3] = 128
+        Image.fromarray(codes).save(tmp_path / f"a{n}.png")
+    with Clip.open(tmp_path / "a#.png", fps=24) as clip:
+        half = 128 / 255
+        np.testing.assert_allclose(clip.frame(3)[20, 15], srgb_to_linear(40 / 255) * half + 1 - half, rtol=1e-5)
+        for given in (None, Background(color=(0.0, 0.0, 0.0))):
+            found = find_plates(clip, None, given)
+            assert found.background == Background(color=(1.0, 1.0, 1.0))
+            assert (found.plates.at(2).image == 1).all()
+            assert "alpha channel, which is the matte" in found.notes[0]
+            assert (len(found.notes) == 2) == (given is not None)
