@@ -216,7 +216,7 @@ def _colours() -> dict[str, Make]:
         "grey, 8 bit": grey("gray"),
         "grey, 10 bit": grey("gray10le"),
         "grey, 16 bit": grey("gray16le"),
-        "palette (GIF)": _video("a.gif", 12.0, codec="gif", pixels="rgb8", rate=25),
+        "palette (GIF)": _video("a.gif", 16.0, codec="gif", pixels="rgb8", rate=25),
     }
 
 

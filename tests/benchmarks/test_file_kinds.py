@@ -30,6 +30,7 @@ SOUND = (
     "alpha: straight, ProRes 4444",
     "alpha: premultiplied, EXR pictures",
     "container and codec: MPEG-2",
+    "name: `50% #1 smoke.mp4`",
     "pictures: PNG, 16 bit",
     "pictures: JPEG, turned by EXIF",
     "pictures: a hole and an empty file",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from smokelift.footage.clip import Clip, is_video
+from smokelift.footage.image_sequence import is_pattern
 from smokelift.footage.images import Picture, area_average, linear_to_srgb, read_image
 from smokelift.footage.plate import Plates, changing_plate, known_plate
 from smokelift.scene import Background, Camera, CompleteScene, Scene, shared_part
@@ -33,7 +34,7 @@ def open_plates(background: Background | None, camera: Camera | None) -> Clip | 
     """
     image = None if background is None else background.image
     moves = camera is not None and camera.moves
-    if image is None or not (moves or "#" in image.name or is_video(image)):
+    if image is None or not (moves or is_pattern(image) or is_video(image)):
         return None
     return Clip.open(image)
 

@@ -47,7 +47,7 @@ class ImageSequence:
     @staticmethod
     def reads(path: Path) -> bool:
         """Return whether a path, to judge by its name, is that of one or more pictures."""
-        return "#" in path.name or path.suffix.lower() in READABLE
+        return is_pattern(path) or path.suffix.lower() in READABLE
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -101,12 +101,15 @@ class ImageSequence:
         """Nothing is held open."""
 
 
+def is_pattern(path: Path) -> bool:
+    """Return whether a path stands for numbered pictures: its last row of # for the number, unless it is a file."""
+    return "#" in path.name and not path.is_file()
+
+
 def _numbered(path: Path) -> list[Path]:
     """Return the pictures of a sequence in order, or raise ClipError if most are missing."""
-    hashes = re.fullmatch(r"([^#]*)(#+)([^#]*)", path.name)
+    hashes = re.fullmatch(r"(.*?)(#+)([^#]*)", path.name) if is_pattern(path) else None
     digits = re.fullmatch(r"(.*?)(\d+)(\.[^.]+)", path.name)
-    if "#" in path.name and hashes is None:
-        raise ClipError(f"{path}: a pattern has one row of # for the number, as in frame_####.png")
     named = hashes or digits
     if named is None or (hashes is None and not path.is_file()):
         if not path.is_file():
