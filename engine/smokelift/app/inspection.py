@@ -21,7 +21,7 @@ from smokelift.scene import SHADOWED, Background, Camera, DirectionalLight, Doma
 from smokelift.scene.projection import project
 from smokelift.setup.background import BLACK, UNKNOWN
 from smokelift.setup.choice import Choice
-from smokelift.setup.prepare import OPTICAL_DEPTH_AT_ONE
+from smokelift.setup.geometry import PICTURE_HEIGHT
 from smokelift.setup.shot import Shot
 
 Tile = NDArray[np.uint8]
@@ -66,8 +66,9 @@ def inspection(shot: Shot, given: Scene, known: Sequence[Fact], notes: Iterable[
     camera = shot.scene.camera.at(number).resized(columns, rows)
     unknown = plate.confidence < UNKNOWN
     path = _path(shot, camera, picture)
+    lit = " and the light" if _light_starts(shot, shot.scene.domain) else ""
     panels = [
-        Panel(f"frame {number} with the box and the light", _with_box(shot, camera, picture)),
+        Panel(f"frame {number} with the box{lit}", _with_box(shot, camera, picture)),
         Panel("background", eight_bit(plate.image)),
         Panel(f"smoke of frame {number}: {seen.mask.mean():.1%} of the picture", _matte_picture(seen)),
         Panel(f"unknown background: {unknown.mean():.1%} of the picture", _unknown_picture(plate, unknown)),
@@ -87,7 +88,8 @@ def facts(shot: Shot, given: Scene, cost: Cost) -> tuple[Fact, ...]:
     calibrated = given.camera is not None
     medium = scene.medium
     thick = f"extinction {medium.extinction:.3g} 1/m at density 1, albedo {medium.albedo:.3g}"
-    usual = f"Usual smoke is taken: density 1 has an optical depth of {OPTICAL_DEPTH_AT_ONE:g} across the box."
+    taken = f"The picture is taken to be {PICTURE_HEIGHT:g} m high where the smoke is."
+    around = "around the smoke of the whole clip"
     exposure = f"changes by up to {shot.exposure:.0%}, evened out" if shot.exposure > 0 else "steady"
     spent = f"about {cost.seconds:.0f} s, {cost.memory / 2**30:.1f} GiB of memory, {cost.disk / 1e6:.0f} MB on disk"
     return (
@@ -98,12 +100,12 @@ def facts(shot: Shot, given: Scene, cost: Cost) -> tuple[Fact, ...]:
             "camera",
             f"{scene.camera.type}, {'moves' if scene.camera.moves else 'stands still'}",
             calibrated,
-            "A level 50 mm lens on 36 mm film is taken. Give [camera] and [domain].",
+            _said(shot, "Camera"),
         ),
-        _known("scale", f"box of {size} m", calibrated, "The picture is taken to be 2 m high where the smoke is."),
-        Fact("box", *(("as given", "given") if calibrated else ("around the smoke of the whole clip", "estimated"))),
+        _known("scale", f"box of {size} m", calibrated, f"{taken} Give [camera] and [domain] in metres."),
+        Fact("box", "as given", "given") if calibrated else Fact("box", around, "estimated", _said(shot, "Domain")),
         _chosen(shot, "resolution", "grid", " x ".join(map(str, domain.resolution)), calibrated),
-        _known("medium", thick, given.medium is not None, usual),
+        _known("medium", thick, given.medium is not None, _said(shot, "Medium")),
         _light(shot, given),
         _chosen(shot, "scattering", "scattering", scene.scattering, given.scattering is not None),
         _chosen(shot, "axis depth", "place in depth", _depth(shot), shot.settings.axis_depth is not None),
@@ -144,6 +146,11 @@ def write_scene(path: Path, shot: Shot, known: Sequence[Fact]) -> tuple[Path, ..
     return files
 
 
+def _said(shot: Shot, about: str) -> str:
+    """The sentence that is said about a part of a scene that is not given."""
+    return next((note for note in shot.notes if note.startswith(about)), "")
+
+
 def _known(what: str, value: str, is_given: bool, otherwise: str) -> Fact:
     """The line of what a user gives, or nothing determines."""
     return Fact(what, value, "given") if is_given else Fact(what, value, UNDETERMINED, otherwise)
@@ -157,8 +164,12 @@ def _background(shot: Shot, given: Scene, plate: Plate) -> Fact:
     value = "a picture"
     if (plate.image == colour).all():
         value = "black" if colour.max() < BLACK else f"one colour, {', '.join(f'{v:.2g}' for v in colour)} (linear)"
-    how = next((note for note in shot.notes if note.startswith("Background")), "")
-    return Fact("background", f"{value}, {unknown:.0%} of it unknown" if unknown else value, "estimated", how)
+    return Fact(
+        "background",
+        f"{value}, {unknown:.0%} of it unknown" if unknown else value,
+        "estimated",
+        _said(shot, "Background"),
+    )
 
 
 def _noise(plate: Plate) -> Fact:
@@ -177,15 +188,15 @@ def _light(shot: Shot, given: Scene) -> Fact:
     if strength is not None:
         return Fact("light", f"{strength.chosen} times as strong as given", "measured", strength.reason)
     colour = ", ".join(f"{v:.2g}" for v in shot.optics.unshadowed_source())
-    how = "Its direction; its strength and colour are those of the thickest smoke. Give [[lights]]."
-    return Fact("light", f"from everywhere, smoke of radiance {colour}", UNDETERMINED, how)
+    return Fact("light", f"from everywhere, smoke of radiance {colour}", UNDETERMINED, _said(shot, "Light"))
 
 
 def _depth(shot: Shot) -> str:
     if shot.settings.axis_depth is not None:
         return f"{shot.settings.axis_depth:.2f} m behind the middle of the box"
     if shot.place is not None:
-        return f"{shot.place.depth:.2f} m behind the middle of the box, give or take {shot.place.deviation:.2f} m"
+        depth = round(shot.place.depth, 2) + 0.0  # no minus before zero
+        return f"{depth:.2f} m behind the middle of the box, give or take {shot.place.deviation:.2f} m"
     return "as the cameras show it" if len(shot.views) > 1 or shot.moves else "the middle of the box"
 
 
