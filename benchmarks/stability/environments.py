@@ -13,7 +13,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -32,6 +32,8 @@ ORDINARY_USER = 54321
 """A number that no user has, so that all of its processes are ours."""
 
 _CLONE_NEWNET = 0x40000000
+
+_BALLAST: list[bytes] = []
 
 
 @dataclass(frozen=True)
@@ -109,15 +111,9 @@ def moved_away(out: Path, random: np.random.Generator) -> Iterator[Failure]:
 
 @contextmanager
 def small_memory(out: Path, random: np.random.Generator) -> Iterator[Failure]:
-    """The process may take some megabytes more than it has."""
-
-    def begin() -> None:
-        pages = int(Path("/proc/self/statm").read_text().split()[0])
-        most = pages * resource.getpagesize() + more
-        resource.setrlimit(resource.RLIMIT_AS, (most, most))
-
-    more = int(2 ** random.uniform(12, 28))
-    yield Failure(begin)
+    """There are some megabytes left."""
+    left = int(2 ** random.uniform(18, 26))
+    yield Failure(lambda: _fill_memory(left))
 
 
 @contextmanager
@@ -238,6 +234,19 @@ def _become_ordinary() -> None:
         os.setgroups([])
         os.setgid(ORDINARY_USER)
         os.setuid(ORDINARY_USER)
+
+
+def _fill_memory(left: int) -> None:
+    """Take all memory but so many bytes, also what the heap has and does not use."""
+    pages = int(Path("/proc/self/statm").read_text().split()[0])
+    most = pages * resource.getpagesize() + left
+    resource.setrlimit(resource.RLIMIT_AS, (most, most))
+    kept_free = bytearray(left)
+    for size in (2**20, 2**16, 2**12):
+        with suppress(MemoryError):
+            while True:
+                _BALLAST.append(bytes(size))
+    del kept_free
 
 
 def _leave_network() -> None:

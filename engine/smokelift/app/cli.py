@@ -16,7 +16,7 @@ from types import FrameType
 from typing import NoReturn
 
 from smokelift.app.commands import COMMANDS
-from smokelift.app.progress import OutputError, printable, reporter
+from smokelift.app.progress import OutputError, one_line, reporter
 from smokelift.output.vdb import VdbUnavailable
 from smokelift.render import DeviceError
 
@@ -29,7 +29,7 @@ class _Parser(argparse.ArgumentParser):
     """Says what is wrong with a word without obeying the control characters in it."""
 
     def error(self, message: str) -> NoReturn:
-        super().error(printable(message))
+        super().error(one_line(message))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -30,6 +30,11 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text)
 
 
+def one_line(text: str) -> str:
+    """Return a text, which may name a path with a line break in it, as a single printable line."""
+    return printable(text).replace("\n", r"\n")
+
+
 class _Console(Console):
     """Tells of a closed pipe where Rich would leave with status 1."""
 
@@ -135,7 +140,7 @@ class _Text:
 
     def fail(self, text: str, status: int) -> None:
         self._stop()
-        self._errors.print(printable(text), markup=False, soft_wrap=True)
+        self._errors.print(one_line(text), markup=False, soft_wrap=True)
 
 
 class _Json:

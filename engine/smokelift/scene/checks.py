@@ -36,8 +36,13 @@ def shown(value: object) -> str:
     """Return a value as a scene file would have it, cut to a readable length."""
     if isinstance(value, bool):
         return str(value).lower()
-    text = f'"{value}"' if isinstance(value, str) else repr(value).replace("(", "[").replace(")", "]")
+    text = f'"{_spelt_out(value)}"' if isinstance(value, str) else repr(value).replace("(", "[").replace(")", "]")
     return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _spelt_out(text: str) -> str:
+    """The text with line breaks and the like as their codes, so that a message stays one line."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 def unexpected(value: object, key: str, expected: str, table: str = "") -> SceneError:

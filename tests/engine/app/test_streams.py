@@ -50,6 +50,10 @@ def test_letters_that_the_encoding_lacks_are_spelt_out() -> None:
     assert (status, lines) == (2, [r"r\xe4uchern.toml: cannot be read: No such file or directory"])
 
 
+def test_a_line_break_in_a_path_is_spelt_out(capsys) -> None:
+    assert refused(capsys, "inspect", "a\nb.toml") == r"a\nb.toml: cannot be read: No such file or directory"
+
+
 def test_a_path_that_is_no_text_is_refused() -> None:
     status, lines = ended(*MISSING, b"--frames", b"0:1", b"\xff\xfe.toml")
     assert status == 2

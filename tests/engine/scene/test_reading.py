@@ -111,9 +111,10 @@ def test_a_file_may_hold_any_one_table(tmp_path: Path) -> None:
         (
             "albedo = 0.5",
             "albeda = 0.5",
-            'line 22: [medium] there is no key "albeda" here; known are extinction',
+            'line 21: [medium] there is no key "albeda" here; known are extinction',
         ),
         ("[medium]", "[medim]", 'line 21: there is no table "medim" here; known are clip, camera'),
+        ("albedo = 0.5", '"al\\nbedo" = 0.5', 'line 21: [medium] there is no key "al\\nbedo" here; known are'),
         ("fps = 24", "fps = 0", "line 4: [clip] fps must be a number above 0, not 0"),
         ("[0, 10]", "[3, 2]", "line 5: [clip] frames must be [first, last]"),
         ("[0, 10]", "[0, 1.5]", "line 5: [clip] frames must be"),

@@ -1,0 +1,179 @@
+"""Every reader of a user's files: whatever these hold, there is a value or the one error that the reader promises."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import tomli_w
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as st_numpy
+
+from benchmarks.stability.readers import READERS, Reader
+from smokelift.footage.clip import Clip, ClipError
+from smokelift.output.checksum import checksum
+
+TRIES = settings(
+    max_examples=60, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+FAST = settings(TRIES, max_examples=150)
+
+NUMBERS = st.one_of(
+    st.integers(), st.floats(), st.sampled_from([0, -1, 2**31, 10**400, 1e-45, 1e38, 1e300, -0.0, 10**9, 1e-9])
+)
+ANYTHING = st.recursive(
+    NUMBERS | st.booleans() | st.text(max_size=5) | st.sampled_from(["/dev/zero", "http://a/b.mp4", "..", "#", "\0"]),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=4), inner, max_size=3),
+    max_leaves=8,
+)
+
+
+def ends_well(reader: Reader, path: Path) -> None:
+    """Read a file; fails unless that gives a value, or the promised error in one line."""
+    try:
+        reader.read(path)
+    except reader.error as error:
+        assert str(error)
+        assert "\n" not in str(error)
+
+
+@st.composite
+def changed_bytes(draw: st.DrawFn, content: bytes) -> bytes:
+    """A file in which a few stretches of bytes are replaced by others, longer or shorter."""
+    data = content
+    for _ in range(draw(st.integers(1, 4))):
+        place = draw(st.integers(0, len(data)))
+        end = draw(st.integers(place, min(place + 8, len(data)))) if draw(st.booleans()) else len(data)
+        data = data[:place] + draw(st.binary(max_size=8)) + data[end:]
+    return data
+
+
+@st.composite
+def changed_values(draw: st.DrawFn, tables: dict[str, Any]) -> Any:
+    """Nested tables in which a few values are replaced, taken out or added, wherever they stand."""
+    data = json.loads(json.dumps(tables))
+    for _ in range(draw(st.integers(1, 3))):
+        holder = data
+        while True:
+            keys = sorted(holder) if isinstance(holder, dict) else range(len(holder))
+            if not keys:
+                break
+            key = draw(st.sampled_from(list(keys)))
+            if not isinstance(holder[key], dict | list) or draw(st.booleans()):
+                if draw(st.integers(0, 4)):
+                    holder[key] = draw(ANYTHING)
+                else:
+                    del holder[key]
+                break
+            holder = holder[key]
+        if isinstance(holder, dict) and draw(st.integers(0, 4)) == 0:
+            holder[draw(st.text(max_size=4))] = draw(ANYTHING)
+    return data
+
+
+@pytest.fixture(scope="module", params=READERS)
+def reader(request: pytest.FixtureRequest) -> Reader:
+    return READERS[request.param]
+
+
+@pytest.fixture(scope="module")
+def sound(reader: Reader, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A sound file."""
+    path = tmp_path_factory.mktemp("sound") / reader.name
+    reader.write(path)
+    return path
+
+
+def test_a_sound_file_is_read(reader: Reader, sound: Path) -> None:
+    assert reader.read(sound) is not None
+
+
+@TRIES
+@given(data=st.data())
+def test_changed_bytes_end_well(reader: Reader, sound: Path, tmp_path: Path, data: st.DataObject) -> None:
+    path = tmp_path / reader.name
+    path.write_bytes(data.draw(changed_bytes(sound.read_bytes())))
+    ends_well(reader, path)
+
+
+@TRIES
+@given(content=st.binary(max_size=64))
+def test_any_bytes_end_well(reader: Reader, tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / reader.name
+    path.write_bytes(content)
+    ends_well(reader, path)
+
+
+def written(name: str, folder: Path) -> Path:
+    READERS[name].write(folder / READERS[name].name)
+    return folder / READERS[name].name
+
+
+@FAST
+@given(data=st.data())
+def test_changed_tables_of_a_scene_end_well(tmp_path: Path, data: st.DataObject) -> None:
+    path = written("scene", tmp_path)
+    tables = data.draw(changed_values(tomllib.loads(path.read_text())))
+    path.write_text(tomli_w.dumps(tables))
+    ends_well(READERS["scene"], path)
+
+
+@FAST
+@given(data=st.data())
+def test_changed_values_of_an_index_end_well(tmp_path: Path, data: st.DataObject) -> None:
+    path = written("index", tmp_path)
+    path.write_text(json.dumps(data.draw(changed_values(json.loads(path.read_text())))))
+    ends_well(READERS["index"], path)
+
+
+@pytest.mark.parametrize("name", ["state", "twin", "truth"])
+@TRIES
+@given(data=st.data())
+def test_other_arrays_end_well(tmp_path: Path, name: str, data: st.DataObject) -> None:
+    """Of any type and shape, in place of one or more, or missing."""
+    path = written(name, tmp_path)
+    with np.load(path) as file:
+        arrays = dict(file)
+    changed = data.draw(st.lists(st.sampled_from(sorted(arrays)), min_size=1, max_size=2))
+    for each in changed:
+        kinds = st.just(arrays[each].dtype) | st_numpy.scalar_dtypes() | st_numpy.unicode_string_dtypes(max_len=4)
+        shapes = st.just(arrays[each].shape) | st_numpy.array_shapes(min_dims=0, max_dims=4, min_side=0, max_side=4)
+        arrays[each] = data.draw(st_numpy.arrays(data.draw(kinds), data.draw(shapes)))
+    if data.draw(st.integers(0, 5)) == 0:
+        del arrays[changed[0]]
+    np.savez(path, **arrays)
+    ends_well(READERS[name], path)
+
+
+@TRIES
+@given(
+    pattern=st.text("#%[]*?01ab._-", min_size=1, max_size=8),
+    names=st.lists(st.text("01ab._-", min_size=1, max_size=6), max_size=4),
+)
+def test_any_name_of_a_clip_ends_well(tmp_path: Path, pattern: str, names: list[str]) -> None:
+    """Among files of any names."""
+    for name in names:
+        with suppress(IsADirectoryError):  # "." and ".."
+            (tmp_path / f"{name}.png").write_bytes(b"no picture")
+    with pytest.raises(ClipError) as caught:
+        Clip.open(tmp_path / f"{pattern}.png")
+    assert "\n" not in str(caught.value)
+
+
+@TRIES
+@given(content=st.binary(max_size=200), place=st.integers(0, 199), byte=st.integers(1, 255))
+def test_a_checksum_sees_every_byte(tmp_path: Path, content: bytes, place: int, byte: int) -> None:
+    file = tmp_path / "file"
+    file.write_bytes(content)
+    before = checksum([file])
+    assert checksum([file]) == before
+    changed = bytearray(content or b"\0")
+    changed[place % len(changed)] ^= byte
+    file.write_bytes(changed)
+    assert checksum([file]) != before
