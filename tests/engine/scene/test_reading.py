@@ -111,7 +111,7 @@ def test_a_file_may_hold_any_one_table(tmp_path: Path) -> None:
         (
             "albedo = 0.5",
             "albeda = 0.5",
-            'line 21: [medium] there is no key "albeda" here; known are extinction',
+            'line 22: [medium] there is no key "albeda" here; known are extinction',
         ),
         ("[medium]", "[medim]", 'line 21: there is no table "medim" here; known are clip, camera'),
         ("albedo = 0.5", '"al\\nbedo" = 0.5', 'line 21: [medium] there is no key "al\\nbedo" here; known are'),
