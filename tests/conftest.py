@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 from collections.abc import Iterator
 
@@ -14,3 +15,14 @@ def own_signals() -> Iterator[None]:
     before = signal.getsignal(signal.SIGTERM)
     yield
     signal.signal(signal.SIGTERM, before)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def threads_of_a_worker() -> int:
+    """Threads of a call of the compiled core; 0 is one a core. Workers side by side would wait for each other's."""
+    if "PYTEST_XDIST_WORKER" not in os.environ:
+        return 0
+    from smokelift import _core
+
+    _core.set_threads(1)
+    return 1

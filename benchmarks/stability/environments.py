@@ -239,7 +239,7 @@ def _become_ordinary() -> None:
 def _fill_memory(left: int) -> None:
     """Take all memory but so many bytes, also what the heap has and does not use."""
     pages = int(Path("/proc/self/statm").read_text().split()[0])
-    most = pages * resource.getpagesize() + left
+    most = pages * resource.getpagesize() + left + 2**20  # an array is a little larger than what it holds
     resource.setrlimit(resource.RLIMIT_AS, (most, most))
     kept_free = bytearray(left)
     for size in (2**20, 2**16, 2**12):

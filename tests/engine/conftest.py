@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -32,16 +31,6 @@ from smokelift.setup.settings import Settings
 def on_the_processor() -> None:
     """One device for all tests of a process, whatever their order and whatever GPU is there."""
     device.start("cpu")
-
-
-THREADS = 1 if "PYTEST_XDIST_WORKER" in os.environ else 0
-"""Of a call of the compiled core; 0 takes every core."""
-
-
-@pytest.fixture(scope="session", autouse=True)
-def one_thread_a_worker() -> None:
-    """Workers that run tests side by side use a core each; more threads would wait for each other."""
-    _core.set_threads(THREADS)
 
 
 FRAMES = 5
@@ -143,7 +132,7 @@ def draft() -> Settings:
 
 
 @pytest.fixture
-def set_threads() -> Iterator[Callable[[int], None]]:
+def set_threads(threads_of_a_worker: int) -> Iterator[Callable[[int], None]]:
     """Compute with a number of threads for the rest of a test."""
     yield _core.set_threads
-    _core.set_threads(THREADS)
+    _core.set_threads(threads_of_a_worker)

@@ -7,11 +7,12 @@ PNG colours are multiplied by it in linear light.
 
 from __future__ import annotations
 
+import io
 import os
 import re
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from typing import Any, Literal
 
@@ -185,13 +186,14 @@ def _read_integers(path: Path) -> npt.NDArray[Any]:
 
 @contextmanager
 def _silent() -> Iterator[None]:
-    """Keep what OpenEXR writes to standard error by itself from it: the error that follows says it."""
+    """Keep what OpenEXR prints, and writes to standard error by itself, from both: the error that follows says it."""
     sys.stderr.flush()
     kept = os.dup(2)
     with Path(os.devnull).open("wb") as nowhere:
         os.dup2(nowhere.fileno(), 2)
     try:
-        yield
+        with redirect_stdout(io.StringIO()):
+            yield
     finally:
         os.dup2(kept, 2)
         os.close(kept)

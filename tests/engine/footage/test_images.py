@@ -223,3 +223,14 @@ def test_radiance_picture(tmp_path):
     path = tmp_path / "map.hdr"
     path.write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 1\n" + bytes([128, 64, 32, 129, 0, 0, 0, 0]))
     np.testing.assert_allclose(read_image(path), [[[1.0, 0.5, 0.25]], [[0, 0, 0]]], rtol=0.01)
+
+
+def test_a_damaged_exr_leaves_the_standard_streams_alone(tmp_path, capfd) -> None:
+    """OpenEXR writes of pixels that it cannot decode to standard output, where the command line writes its events."""
+    path = tmp_path / "damaged.exr"
+    write_image(path, colours())
+    content = path.read_bytes()
+    path.write_bytes(content.replace(b"B\0\x01\0\0\0", b"B\0\0\0\0\0", 1))
+    with pytest.raises(ImageError, match="cannot be read"):
+        read_image(path)
+    assert capfd.readouterr() == ("", "")
