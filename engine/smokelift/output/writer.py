@@ -119,9 +119,9 @@ class SequenceWriter:
             raise SequenceError(f"{self.directory}: cannot be written to: {error.strerror}") from error
         try:
             self._take_over()
+            self._index.write(self.directory)  # first: without it a run that goes on takes all else for another's
             if self._background is not None:
                 write_image(self.directory / BACKGROUND, self._background)
-            self._index.write(self.directory)
         except OSError as error:
             self._lock.release()
             raise self._failed(INDEX, error) from error
@@ -216,6 +216,7 @@ class SequenceWriter:
         """Judge what is in the directory, and read what can be gone on from."""
         there = _begun(self.directory, self._resume)
         if there is None:
+            self._clear(INDEX)  # nothing else is written before it
             return
         for part in ("scene", "settings", "sources", "versions"):
             before, now = (getattr(index, part) for index in (there, self._index))
@@ -226,8 +227,7 @@ class SequenceWriter:
                     f"{self.directory}: was begun differently and cannot be resumed: {changed}; choose another "
                     "directory"
                 )
-        for leftover in self.directory.glob(".*.tmp"):
-            leftover.unlink(missing_ok=True)
+        self._clear("*")
         frames = there.frames
         if not there.complete:
             self.state = self._last_state()
@@ -237,6 +237,11 @@ class SequenceWriter:
         checksums = {name: digits for name, digits in there.checksums.items() if name in kept}
         self._index = replace(self._index, frames=frames, checksums=checksums, complete=there.complete)
         self._check_files()
+
+    def _clear(self, name: str) -> None:
+        """Delete what a killed run has left of a file that it had not finished."""
+        for leftover in self.directory.glob(f".{name}.*.tmp"):
+            leftover.unlink(missing_ok=True)
 
     def _last_state(self) -> ResumeState | None:
         try:

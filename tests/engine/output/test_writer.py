@@ -37,6 +37,29 @@ def cut_off(directory: Path, numbers: Iterable[int], *, npz: bool = True, **opti
         raise CutOffError
 
 
+@pytest.mark.parametrize("renames", [0, 1])
+def test_a_run_that_ends_before_its_first_frame_goes_on(tmp_path: Path, no_vdb: None, monkeypatch, renames) -> None:
+    """Before the index or the background has its name, and without a chance to clear up."""
+    out, background = tmp_path / "out", np.full((48, 32, 3), 0.2, np.float32)
+    rename, left = Path.replace, renames
+
+    def counted(path: Path, target: Path) -> Path:
+        nonlocal left
+        left -= 1
+        if left < 0:
+            raise CutOffError
+        return rename(path, target)
+
+    with monkeypatch.context() as patched, pytest.raises(CutOffError):
+        patched.setattr(Path, "replace", counted)
+        patched.setattr(Path, "unlink", lambda path, missing_ok=False: None)
+        write(out, [1], background=background)
+    (leftover,) = out.glob(".*.tmp")
+    leftover.rename(str(leftover).replace(str(os.getpid()), "77"))  # the process that goes on is another
+    write(out, [1], background=background, resume=True)
+    assert names(out) == ["background.exr", "sequence.json", "smoke_0001.npz"]
+
+
 def test_choices_are_kept_and_not_compared(tmp_path: Path, no_vdb: None) -> None:
     """They say why; a run goes on although a figure changed. Sequences of before there were any open."""
     cut_off(tmp_path, [1], choices=[{"what": "scattering", "measured": {"error": math.nan}}])
