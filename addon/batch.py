@@ -24,7 +24,7 @@ POLL_SECONDS = 0.05
 
 
 def main(words: Sequence[str]) -> int:
-    """Make the scene's smoke; returns the exit status."""
+    """Make a smoke of the scene; returns the exit status."""
     from . import run
     from .contract import BAD_INPUT, CANCELLED, DONE
     from .job import EngineMissingError, Job, engine_command
@@ -36,9 +36,9 @@ def main(words: Sequence[str]) -> int:
     except SystemExit as leaving:
         return int(leaving.code or 0)
     try:
-        scene = _scene(choices)
-        take = run.unfinished(scene) if choices.resume else None
-        take = take or run.write_take(scene)
+        smoke = _smoke(choices)
+        take = run.unfinished(smoke) if choices.resume else None
+        take = take or run.write_take(smoke)
         job = Job(engine_command(take.arguments()), take.log_file)
     except (ShotError, TakeError, EngineMissingError) as error:
         print(f"smokelift: {error}", file=sys.stderr, flush=True)
@@ -47,14 +47,14 @@ def main(words: Sequence[str]) -> int:
     if job.outcome != "done":
         print(f"smokelift: {job.sentence}", file=sys.stderr, flush=True)
         return CANCELLED if job.outcome == "cancelled" else (job.status or 1)
-    run.present(scene, take)
+    run.present(smoke, take)
     print(job.sentence, flush=True)
     if choices.set_up:
         bpy.ops.smokelift.set_up()
     if choices.save:
         bpy.ops.wm.save_mainfile()
     if choices.render:
-        _render(scene, choices.render)
+        _render(smoke, choices.render)
     return DONE
 
 
@@ -81,12 +81,25 @@ def _wait(job: Any) -> None:
         signal.signal(signal.SIGTERM, before)
 
 
-def _scene(choices: argparse.Namespace) -> bpy.types.Scene:
-    """The scene, with its settings overridden by the options."""
+def _smoke(choices: argparse.Namespace) -> bpy.types.Object:
+    """The smoke, with its settings overridden by the options; it is active then."""
     from .scene_file import ShotError, use_frames
+    from .smoke import activate, active_smoke, migrate, new_smoke, smokes
 
+    migrate()  # the file may have been opened before the add-on was registered
     scene = bpy.context.scene
-    settings = scene.smokelift
+    smoke = active_smoke(scene)
+    if choices.smoke:
+        smoke = next((obj for obj in smokes(scene) if obj.name == choices.smoke), None)
+        if smoke is None:
+            known = ", ".join(obj.name for obj in smokes(scene)) or "none"
+            raise ShotError(f"The scene has no smoke of the name {choices.smoke}: it has {known}.")
+    elif smoke is None:
+        if not choices.clip:
+            raise ShotError("The scene has no clip for Smokelift: give one with --clip.")
+        smoke = new_smoke(scene)
+    activate(smoke, scene)
+    settings = smoke.smokelift
     if choices.clip:
         try:
             settings.clip = bpy.data.movieclips.load(str(choices.clip.absolute()))
@@ -105,25 +118,27 @@ def _scene(choices: argparse.Namespace) -> bpy.types.Scene:
     if settings.clip is None:
         raise ShotError("The scene has no clip for Smokelift: give one with --clip.")
     if choices.frames:
-        use_frames(scene, *choices.frames)
-    return scene
+        use_frames(smoke, *choices.frames)
+    return smoke
 
 
-def _render(scene: bpy.types.Scene, path: Path) -> None:
+def _render(smoke: bpy.types.Object, path: Path) -> None:
     """Render all frames of the smoke if the name has #### for their numbers, else the current frame."""
+    scene = bpy.context.scene
     scene.render.filepath = str(path.absolute())
     if "#" not in path.name:
         bpy.ops.render.render(write_still=True)
         return
-    data = scene.smokelift.volume.data
+    data = smoke.data
     scene.frame_start, scene.frame_end = data.frame_start, data.frame_start + data.frame_duration - 1
     bpy.ops.render.render(animation=True)
 
 
 def _parser() -> argparse.ArgumentParser:
-    known = bpy.context.scene.smokelift.bl_rna.properties
+    known = bpy.types.Object.bl_rna.properties["smokelift"].fixed_type.properties
     parser = argparse.ArgumentParser(prog="smokelift", description="Turn the scene's clip into a volume of smoke.")
-    parser.add_argument("--clip", type=Path, help="clip in place of the scene's")
+    parser.add_argument("--smoke", metavar="NAME", help="smoke to make, if the scene has several; else the active one")
+    parser.add_argument("--clip", type=Path, help="clip in place of the smoke's")
     parser.add_argument("--frames", type=_frames, metavar="A:B", help="first and last frame of the clip, from 0")
     parser.add_argument("--quality", choices=known["quality"].enum_items.keys())
     parser.add_argument(

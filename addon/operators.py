@@ -10,6 +10,7 @@ from mathutils import Vector
 from . import run, shot_setup, volume
 from .properties import SEEDS
 from .scene_file import ShotError, box_of
+from .smoke import activate, active_smoke, hide_default_cube, new_smoke, smokes
 from .take import Take, TakeError, takes
 
 LOG_TEXT = "Smokelift Log"
@@ -20,7 +21,8 @@ BOX_SHARE = 0.9
 class _NeedsClip:
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if context.scene.smokelift.clip is None:
+        smoke = active_smoke(context.scene)
+        if smoke is None or smoke.smokelift.clip is None:
             cls.poll_message_set("Choose a clip first")
             return False
         return True
@@ -48,8 +50,7 @@ class SMOKELIFT_OT_add(bpy.types.Operator):
         except RuntimeError:
             self.report({"ERROR"}, f"{self.filepath} is no video and no picture that Blender can read: choose another.")
             return {"CANCELLED"}
-        context.scene.smokelift.clip = clip
-        volume.smoke_object(context.scene)
+        new_smoke(context.scene, clip)
         if not bpy.app.background:
             _open_tab(context)
         return {"FINISHED"}
@@ -91,13 +92,13 @@ class SMOKELIFT_OT_vary(_NeedsClip, bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         if not super().poll(context):
             return False
-        if context.scene.smokelift.detail == 0.0:
+        if active_smoke(context.scene).smokelift.detail == 0.0:
             cls.poll_message_set("Without detail in depth there is only one smoke: raise Depth Detail first")
             return False
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        settings = context.scene.smokelift
+        settings = active_smoke(context.scene).smokelift
         before = settings.seed
         settings.seed = (before + 1) % SEEDS
         outcome = _make_smoke(self, context)
@@ -108,13 +109,15 @@ class SMOKELIFT_OT_vary(_NeedsClip, bpy.types.Operator):
 
 def _make_smoke(operator: bpy.types.Operator, context: bpy.types.Context) -> set[str]:
     """Write a take and queue it; the operator reports what is in the way."""
+    smoke = active_smoke(context.scene)
     try:
-        take = run.write_take(context.scene)
+        take = run.write_take(smoke)
     except (ShotError, TakeError) as error:
         operator.report({"ERROR"}, str(error))
         return {"CANCELLED"}
-    volume.smoke_object(context.scene)
-    run.enqueue(context, context.scene, take)
+    if smoke.smokelift.camera_mode == "GUESS":
+        hide_default_cube(context.scene)
+    run.enqueue(context, smoke, take)
     return {"FINISHED"}
 
 
@@ -125,11 +128,12 @@ class SMOKELIFT_OT_resume(_NeedsClip, bpy.types.Operator):
     bl_label = "Resume"
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        take = run.unfinished(context.scene)
+        smoke = active_smoke(context.scene)
+        take = run.unfinished(smoke)
         if take is None or run.busy(context.window_manager, take):
             self.report({"ERROR"}, "No stopped run to resume: press Make Smoke.")
             return {"CANCELLED"}
-        run.enqueue(context, context.scene, take)
+        run.enqueue(context, smoke, take)
         return {"FINISHED"}
 
 
@@ -165,7 +169,7 @@ class SMOKELIFT_OT_check(_NeedsClip, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         state = context.window_manager.smokelift
-        state.check_scene = context.scene.session_uid
+        state.check_smoke = active_smoke(context.scene).session_uid
         state.check_ticks = run.CHECK_TICKS
         run.work(context)
         return {"FINISHED"}
@@ -180,19 +184,22 @@ class SMOKELIFT_OT_make_box(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
+        if active_smoke(context.scene) is None:
+            cls.poll_message_set("Add smoke first")
+            return False
         if context.scene.camera is None:
             cls.poll_message_set("The scene has no camera: add one where the clip was filmed from")
             return False
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        scene = context.scene
+        scene, smoke = context.scene, active_smoke(context.scene)
         low, high = framed_box(scene)
-        box = box_of(scene)
+        box = box_of(smoke)
         if box is None:
             box = _new_box()
             scene.collection.objects.link(box)
-            scene.smokelift.box = box
+            smoke.smokelift.box = box
         box.parent = None
         box.rotation_euler = (0.0, 0.0, 0.0)
         box.location = (low + high) / 2
@@ -240,7 +247,7 @@ class SMOKELIFT_OT_match_clip(_NeedsClip, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        shot_setup.match_clip(context.scene)
+        shot_setup.match_clip(active_smoke(context.scene))
         return {"FINISHED"}
 
 
@@ -257,22 +264,25 @@ class SMOKELIFT_OT_set_up(_NeedsClip, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if volume.shown_take(context.scene) is None:
+        if not super().poll(context):
+            return False
+        if volume.shown_take(active_smoke(context.scene)) is None:
             cls.poll_message_set("Make smoke first")
             return False
-        return super().poll(context)
+        return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        take = volume.shown_take(context.scene)
+        smoke = active_smoke(context.scene)
+        take = volume.shown_take(smoke)
         index = take.index()
         if index is None:
             self.report({"ERROR"}, f"The files of the smoke in {take.directory} are missing: make it again.")
             return {"CANCELLED"}
-        if context.scene.smokelift.camera_mode == "SCENE" and context.scene.camera is None:
+        if smoke.smokelift.camera_mode == "SCENE" and context.scene.camera is None:
             self.report({"ERROR"}, "The scene has no camera: choose the one that the smoke was made for.")
             return {"CANCELLED"}
-        shot_setup.set_up(context.scene, take, index)
-        volume.show(context.scene, take)  # the frame rate may have changed
+        shot_setup.set_up(smoke, take, index)
+        volume.show(smoke, take)  # the frame rate may have changed
         return {"FINISHED"}
 
 
@@ -307,6 +317,93 @@ def _text_editor(context: bpy.types.Context) -> bpy.types.Space:
     return found.spaces.active
 
 
+class SMOKELIFT_OT_show_smoke(bpy.types.Operator):
+    """Select this smoke, and show its settings in the tab"""
+
+    bl_idname = "smokelift.show_smoke"
+    bl_label = "Select Smoke"
+    bl_options = {"REGISTER", "UNDO"}
+
+    smoke: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        found = next((obj for obj in smokes(context.scene) if obj.name == self.smoke), None)
+        if found is None:
+            self.report({"ERROR"}, f"The scene has no smoke of the name {self.smoke}.")
+            return {"CANCELLED"}
+        activate(found, context.scene)
+        return {"FINISHED"}
+
+
+class SMOKELIFT_OT_show_take(_NeedsClip, bpy.types.Operator):
+    """Show this result in the smoke. Its place and its material stay as they are"""
+
+    bl_idname = "smokelift.show_take"
+    bl_label = "Show Result"
+    bl_options = {"REGISTER", "UNDO"}
+
+    take: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        take = Take(Path(self.take))
+        if not take.frames():
+            self.report({"ERROR"}, f"There is no finished frame in {take.directory}.")
+            return {"CANCELLED"}
+        run.present(active_smoke(context.scene), take)
+        return {"FINISHED"}
+
+
+class SMOKELIFT_OT_name_take(bpy.types.Operator):
+    """Give this result a name"""
+
+    bl_idname = "smokelift.name_take"
+    bl_label = "Name Result"
+
+    take: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
+    title: StringProperty(name="Name", options={"SKIP_SAVE"})
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        self.title = Take(Path(self.take)).title()
+        return context.window_manager.invoke_props_dialog(self)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        try:
+            Take(Path(self.take)).give_title(self.title)
+        except TakeError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        run.redraw(context.window_manager)
+        return {"FINISHED"}
+
+
+class SMOKELIFT_OT_remove_take(bpy.types.Operator):
+    """Delete the files of this result"""
+
+    bl_idname = "smokelift.remove_take"
+    bl_label = "Delete Result?"
+
+    take: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        return context.window_manager.invoke_confirm(self, event)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        take = Take(Path(self.take))
+        if take.directory.resolve() in _in_use(context):
+            self.report({"ERROR"}, "A Volume shows this result, or a run writes it: show another one first.")
+            return {"CANCELLED"}
+        take.remove()
+        return {"FINISHED"}
+
+
+def _in_use(context: bpy.types.Context) -> set[Path]:
+    """Directories of the takes that Volumes of this file show or that runs write; a link may lead to the same one."""
+    shown = {take.directory for data in bpy.data.volumes if (take := volume.take_of(data)) is not None}
+    rows = context.window_manager.smokelift.jobs
+    queued = {Path(row.take) for row in rows if row.outcome not in run.ENDED}
+    return {directory.resolve() for directory in shown | queued}
+
+
 class SMOKELIFT_OT_remove_takes(_NeedsClip, bpy.types.Operator):
     """Delete the files of all results in the output folder except those that a Volume of this file shows"""
 
@@ -317,10 +414,8 @@ class SMOKELIFT_OT_remove_takes(_NeedsClip, bpy.types.Operator):
         return context.window_manager.invoke_confirm(self, event)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        shown = {volume.take_of(data).directory for data in bpy.data.volumes if data.filepath}
-        queued = {Path(row.take) for row in context.window_manager.smokelift.jobs}
-        kept = {directory.resolve() for directory in shown | queued}  # a link may lead to the same folder
-        for take in takes(run.output_folder(context.scene)):
+        kept = _in_use(context)
+        for take in takes(run.output_folder(active_smoke(context.scene))):
             if take.directory.resolve() not in kept:
                 take.remove()
         return {"FINISHED"}
@@ -337,6 +432,10 @@ _CLASSES = (
     SMOKELIFT_OT_match_clip,
     SMOKELIFT_OT_set_up,
     SMOKELIFT_OT_open_log,
+    SMOKELIFT_OT_show_smoke,
+    SMOKELIFT_OT_show_take,
+    SMOKELIFT_OT_name_take,
+    SMOKELIFT_OT_remove_take,
     SMOKELIFT_OT_remove_takes,
 )
 

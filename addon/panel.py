@@ -6,6 +6,7 @@ import bpy
 
 from . import run, volume
 from .scene_file import box_of, clip_path, frame_rate
+from .smoke import active_smoke, migrate_soon, smokes
 from .take import takes
 
 POINTS_A_LETTER = 6.5
@@ -21,31 +22,43 @@ class _Main:
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
-        settings = context.scene.smokelift
+        smoke = active_smoke(context.scene)
+        _draw_smokes(layout, context, smoke)
+        if smoke is None:
+            migrate_soon(context.scene)
+            _label(layout, context, "Choose a video or an image sequence of smoke. If its camera moves, track it.")
+            return
+        settings = smoke.smokelift
         layout.template_ID(settings, "clip", open="clip.open")
         if settings.clip is None:
-            _label(
-                layout,
-                context,
-                "Choose a video or a picture sequence of smoke. If its camera moves, track it first.",
-            )
             return
-        _draw_clip(layout, context)
-        _draw_shot(layout, context)
+        _draw_clip(layout, context, smoke)
+        _draw_shot(layout, context, smoke)
         column = layout.column()
         column.prop(settings, "quality")
         column.prop(settings, "detail")
         row = column.row()
         row.active = settings.detail > 0.0
         row.prop(settings, "seed")
-        _draw_cost(column, context)
-        layout.prop(settings, "output", placeholder=str(run.output_folder(context.scene)))
-        _draw_run(layout, context)
+        _draw_cost(column, context, smoke)
+        layout.prop(settings, "output", placeholder=str(run.output_folder(smoke)))
+        _draw_run(layout, context, smoke)
 
 
-def _draw_clip(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    scene = context.scene
-    settings, clip = scene.smokelift, scene.smokelift.clip
+def _draw_smokes(layout: bpy.types.UILayout, context: bpy.types.Context, active: bpy.types.Object | None) -> None:
+    """The smokes of the scene if there are several, and the button that adds one."""
+    column = layout.column(align=True)
+    found = smokes(context.scene)
+    if len(found) > 1:
+        for smoke in found:
+            row = column.operator("smokelift.show_smoke", text=smoke.name, icon="VOLUME_DATA", depress=smoke == active)
+            row.smoke = smoke.name
+    column.operator("smokelift.add", icon="ADD")
+
+
+def _draw_clip(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
+    scene, settings = context.scene, smoke.smokelift
+    clip = settings.clip
     if not clip_path(clip).is_file():
         _label(layout, context, f"{clip_path(clip)} is not there: choose the clip again.", "ERROR")
     row = layout.row(align=True)
@@ -65,25 +78,25 @@ def _draw_clip(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         column.operator("smokelift.match_clip")
 
 
-def _draw_shot(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    settings = context.scene.smokelift
+def _draw_shot(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
+    settings = smoke.smokelift
     layout.prop(settings, "plate_mode")
     if settings.plate_mode == "FILE":
         layout.prop(settings, "plate", text=" ")
     layout.prop(settings, "camera_mode")
     if settings.camera_mode == "SCENE":
         layout.prop(settings, "box")
-        known = box_of(context.scene) is not None
+        known = box_of(smoke) is not None
         layout.operator("smokelift.make_box", text="Frame Box" if known else "Make Box", icon="MESH_CUBE")
         layout.prop(settings, "inlet")
     layout.prop(settings, "floor")
     layout.prop(settings, "light_mode")
 
 
-def _draw_cost(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+def _draw_cost(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     """The estimated cost; the first drawing of the tab starts the estimate."""
     state = context.window_manager.smokelift
-    if state.check_scene != context.scene.session_uid:
+    if state.check_smoke != smoke.session_uid:
         layout.operator("smokelift.check", icon="VIEWZOOM")
         run.check_soon(context)
         return
@@ -99,14 +112,13 @@ def _draw_cost(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         layout.label(text="Reading the clip", icon="TIME")
 
 
-def _draw_run(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    scene = context.scene
+def _draw_run(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
     jobs = context.window_manager.smokelift.jobs
-    own = [row for row in jobs if row.scene_uid == scene.session_uid]
+    own = [row for row in jobs if row.smoke_uid == smoke.session_uid]
     column = layout.column()
     column.scale_y = 1.5
     if all(row.outcome in run.ENDED for row in own):
-        begun = run.unfinished(scene)
+        begun = run.unfinished(smoke)
         if begun is not None and begun.frames():
             column.operator("smokelift.resume", text=f"Resume after Frame {begun.frames()}", icon="FILE_REFRESH")
             column.operator("smokelift.run", text="Start Again", icon="PLAY")
@@ -115,24 +127,26 @@ def _draw_run(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     else:
         column.operator("smokelift.run", text="Make Another After This", icon="PLAY")
     for row in jobs:
-        _draw_job(layout, context, row)
-    if volume.shown_take(scene) is not None:
-        data = scene.smokelift.volume.data
+        _draw_job(layout, context, smoke, row)
+    if volume.shown_take(smoke) is not None:
+        data = smoke.data
         last = data.frame_start + data.frame_duration - 1
-        if not data.frame_start <= scene.frame_current <= last:
+        if not data.frame_start <= context.scene.frame_current <= last:
             _label(layout, context, f"The smoke is seen in frames {data.frame_start} to {last}.", "INFO")
-        known = volume.provenance_note(scene)
+        known = volume.provenance_note(smoke)
         if known:
             _label(layout, context, known, "INFO")
         layout.operator("smokelift.vary", icon="MOD_NOISE")
         layout.operator("smokelift.set_up", icon="CAMERA_DATA")
 
 
-def _draw_job(layout: bpy.types.UILayout, context: bpy.types.Context, row: bpy.types.PropertyGroup) -> None:
+def _draw_job(
+    layout: bpy.types.UILayout, context: bpy.types.Context, shown: bpy.types.Object, row: bpy.types.PropertyGroup
+) -> None:
     box = layout.box()
-    scene = run.find_scene(row)
-    if scene is not None and scene != context.scene:
-        box.label(text=scene.name, icon="SCENE_DATA")
+    smoke = run.find_smoke(row.smoke_uid)
+    if smoke is not None and smoke != shown:
+        box.label(text=smoke.name, icon="VOLUME_DATA")
     if row.outcome == "waiting":
         box.label(text="Waits for the run before it", icon="SORTTIME")
     elif row.outcome == "running":
@@ -201,13 +215,15 @@ class _Advanced:
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return context.scene.smokelift.clip is not None
+        smoke = active_smoke(context.scene)
+        return smoke is not None and smoke.smokelift.clip is not None
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
-        settings = context.scene.smokelift
+        smoke = active_smoke(context.scene)
+        settings = smoke.smokelift
         row = layout.row()
         row.active = settings.camera_mode == "SCENE"
         row.prop(settings, "longest_side")
@@ -223,15 +239,52 @@ class _Advanced:
         for name in ("extinction", "albedo", "anisotropy"):
             column.prop(settings, name)
         state = context.window_manager.smokelift
-        if state.check_scene == context.scene.session_uid and state.notes:
+        if state.check_smoke == smoke.session_uid and state.notes:
             _label(layout, context, "{} x {} x {} voxels. Assumptions and choices:".format(*state.resolution))
             for note in state.notes.split("\n"):
                 _label(layout, context, note)
         layout.operator("smokelift.check", icon="VIEWZOOM")
-        earlier = len(takes(run.output_folder(context.scene)))
+
+
+class _Results:
+    bl_label = "Results"
+    bl_category = "Smokelift"
+    bl_region_type = "UI"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _Advanced.poll(context)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        smoke = active_smoke(context.scene)
+        shown = volume.shown_take(smoke)
+        found = takes(run.output_folder(smoke))
+        column = layout.column(align=True)
+        for take in found:
+            row = column.row(align=True)
+            text = f"{take.title()}, {take.frames()} fr., {size(take.size())}"
+            row.operator("smokelift.show_take", text=text, depress=take == shown).take = str(take.directory)
+            row.operator("smokelift.name_take", text="", icon="GREASEPENCIL").take = str(take.directory)
+            row.operator("smokelift.remove_take", text="", icon="TRASH").take = str(take.directory)
         row = layout.row()
-        row.active = earlier > 1
-        row.operator("smokelift.remove_takes", text=f"Delete Earlier Results ({max(0, earlier - 1)})", icon="TRASH")
+        row.active = len(found) > 1
+        row.operator("smokelift.remove_takes", text=f"Delete Earlier Results ({max(0, len(found) - 1)})", icon="TRASH")
+
+
+class SMOKELIFT_PT_view_results(_Results, bpy.types.Panel):
+    """In the 3D View."""
+
+    bl_space_type = "VIEW_3D"
+    bl_parent_id = "SMOKELIFT_PT_view"
+
+
+class SMOKELIFT_PT_clip_results(_Results, bpy.types.Panel):
+    """In the Movie Clip Editor."""
+
+    bl_space_type = "CLIP_EDITOR"
+    bl_parent_id = "SMOKELIFT_PT_clip"
 
 
 class SMOKELIFT_PT_view_advanced(_Advanced, bpy.types.Panel):
@@ -248,6 +301,13 @@ class SMOKELIFT_PT_clip_advanced(_Advanced, bpy.types.Panel):
     bl_parent_id = "SMOKELIFT_PT_clip"
 
 
-_CLASSES = (SMOKELIFT_PT_view, SMOKELIFT_PT_clip, SMOKELIFT_PT_view_advanced, SMOKELIFT_PT_clip_advanced)
+_CLASSES = (
+    SMOKELIFT_PT_view,
+    SMOKELIFT_PT_clip,
+    SMOKELIFT_PT_view_results,
+    SMOKELIFT_PT_clip_results,
+    SMOKELIFT_PT_view_advanced,
+    SMOKELIFT_PT_clip_advanced,
+)
 
 register, unregister = bpy.utils.register_classes_factory(_CLASSES)

@@ -1,4 +1,7 @@
-"""Settings of a shot, saved with its scene, and the state of this session, on the window manager."""
+"""Settings of a smoke, saved with its object, and the state of this session, on the window manager."""
+
+import itertools
+from pathlib import Path
 
 import bpy
 from bpy.props import (
@@ -28,9 +31,14 @@ def _changed(_settings: "SmokeliftSettings", context: bpy.types.Context) -> None
 
 
 def _clip_chosen(settings: "SmokeliftSettings", context: bpy.types.Context) -> None:
-    """Use all frames of a new clip."""
-    if settings.clip is not None:
-        settings.first, settings.last = 1, max(1, settings.clip.frame_duration)
+    """Use all frames of a new clip, and a folder that no other smoke has."""
+    if settings.clip is None:
+        return
+    settings.first, settings.last = 1, max(1, settings.clip.frame_duration)
+    taken = {obj.smokelift.folder for obj in bpy.data.objects if obj != settings.id_data and obj.smokelift.is_smoke}
+    stem = bpy.path.clean_name(Path(settings.clip.filepath).stem)
+    names = itertools.chain([stem], (f"{stem}_{number}" for number in itertools.count(2)))
+    settings.folder = next(name for name in names if name not in taken)
 
 
 def _box_chosen(settings: "SmokeliftSettings", context: bpy.types.Context) -> None:
@@ -53,7 +61,10 @@ def _is_empty(_settings: "SmokeliftSettings", obj: bpy.types.Object) -> bool:
 
 
 class SmokeliftSettings(bpy.types.PropertyGroup):
-    """Settings of one scene's shot."""
+    """Settings of one smoke, on its Volume object."""
+
+    is_smoke: BoolProperty(name="Smoke", description="The object is made from a clip", options={"HIDDEN"})
+    folder: StringProperty(name="Folder", description="Name of the folder for the results", options={"HIDDEN"})
 
     clip: PointerProperty(
         name="Clip",
@@ -255,13 +266,21 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
         description="Camera object that stands where the clip was assumed to be filmed from",
         type=bpy.types.Object,
     )
-    volume: PointerProperty(name="Result", description="Volume object that shows the smoke", type=bpy.types.Object)
+
+
+class SmokeliftSceneSettings(bpy.types.PropertyGroup):
+    """The settings of a scene's only smoke, as version 1.0 saved them; `smoke.migrate` reads them."""
+
+    __annotations__ = {
+        **SmokeliftSettings.__annotations__,
+        "volume": PointerProperty(name="Result", description="Volume object of the smoke", type=bpy.types.Object),
+    }
 
 
 class SmokeliftJob(bpy.types.PropertyGroup):
     """One run in the panel."""
 
-    scene_uid: IntProperty()
+    smoke_uid: IntProperty()
     take: StringProperty()
     outcome: StringProperty(default="waiting")
     done: IntProperty()
@@ -277,7 +296,7 @@ class SmokeliftState(bpy.types.PropertyGroup):
     """This session's runs, and the estimate of the next one; never saved."""
 
     jobs: CollectionProperty(type=SmokeliftJob)
-    check_scene: IntProperty()
+    check_smoke: IntProperty()
     check_ticks: IntProperty()
     check_done: BoolProperty()
     check_error: StringProperty()
@@ -289,18 +308,20 @@ class SmokeliftState(bpy.types.PropertyGroup):
     disk: FloatProperty(description="MB")
 
 
-_CLASSES = (SmokeliftSettings, SmokeliftJob, SmokeliftState)
+_CLASSES = (SmokeliftSettings, SmokeliftSceneSettings, SmokeliftJob, SmokeliftState)
 
 
 def register() -> None:
     for cls in _CLASSES:
         bpy.utils.register_class(cls)
-    bpy.types.Scene.smokelift = PointerProperty(type=SmokeliftSettings)
+    bpy.types.Object.smokelift = PointerProperty(type=SmokeliftSettings)
+    bpy.types.Scene.smokelift = PointerProperty(type=SmokeliftSceneSettings)
     bpy.types.WindowManager.smokelift = PointerProperty(type=SmokeliftState)
 
 
 def unregister() -> None:
     del bpy.types.WindowManager.smokelift
     del bpy.types.Scene.smokelift
+    del bpy.types.Object.smokelift
     for cls in reversed(_CLASSES):
         bpy.utils.unregister_class(cls)

@@ -10,6 +10,7 @@ import bpy.utils.previews
 from . import scene_file, shot_setup, volume
 from .job import ENDED, EngineMissingError, Job, Queue, engine_command
 from .paths import absolute
+from .smoke import active_smoke, smokes
 from .take import Take, TakeError, new_take, takes
 
 TICK_SECONDS = 0.1
@@ -17,18 +18,17 @@ CHECK_TICKS = 4
 """Ticks without a change of settings before the engine checks the shot."""
 
 
-def output_folder(scene: bpy.types.Scene) -> Path:
-    """The folder of a scene's takes: the chosen one, else beside the .blend, else beside the clip."""
-    settings = scene.smokelift
+def output_folder(smoke: bpy.types.Object) -> Path:
+    """The folder of a smoke's takes: the chosen one, else beside the .blend, else beside the clip."""
+    settings = smoke.smokelift
     if settings.output:
         return absolute(settings.output)
-    name = bpy.path.clean_name(Path(settings.clip.filepath).stem)
     if bpy.data.filepath:
-        return Path(bpy.data.filepath).parent / "smokelift" / name
-    return scene_file.clip_path(settings.clip).parent / f"{name}_smokelift"
+        return Path(bpy.data.filepath).parent / "smokelift" / settings.folder
+    return scene_file.clip_path(settings.clip).parent / f"{settings.folder}_smokelift"
 
 
-def write_take(scene: bpy.types.Scene) -> Take:
+def write_take(smoke: bpy.types.Object) -> Take:
     """Write the files of a new take.
 
     Raises
@@ -36,38 +36,37 @@ def write_take(scene: bpy.types.Scene) -> Take:
     ShotError, TakeError
         If the shot is unusable, or the folder cannot be written to.
     """
-    tables = scene_file.shot_tables(scene)
-    take = new_take(output_folder(scene))
-    take.write(tables, scene_file.options(scene))
+    tables = scene_file.shot_tables(smoke)
+    take = new_take(output_folder(smoke))
+    take.write(tables, scene_file.options(smoke))
     return take
 
 
-def unfinished(scene: bpy.types.Scene) -> Take | None:
+def unfinished(smoke: bpy.types.Object) -> Take | None:
     """The take that can be resumed: the one on show, else the newest."""
-    if scene.smokelift.clip is None:
+    if smoke.smokelift.clip is None:
         return None
-    newest = takes(output_folder(scene))[-1:]
-    candidates = [take for take in (volume.shown_take(scene), *newest) if take is not None]
+    newest = takes(output_folder(smoke))[-1:]
+    candidates = [take for take in (volume.shown_take(smoke), *newest) if take is not None]
     return next((take for take in candidates if take.resumable()), None)
 
 
-def enqueue(context: bpy.types.Context, scene: bpy.types.Scene, take: Take) -> None:
+def enqueue(context: bpy.types.Context, smoke: bpy.types.Object, take: Take) -> None:
     """Append a take to the queue; without a window, wait for its end."""
     jobs = context.window_manager.smokelift.jobs
     for place in reversed(range(len(jobs))):
-        if jobs[place].outcome in ENDED and jobs[place].scene_uid == scene.session_uid:
+        if jobs[place].outcome in ENDED and jobs[place].smoke_uid == smoke.session_uid:
             jobs.remove(place)
     row = jobs.add()
-    row.take, row.scene_uid = str(take.directory), scene.session_uid
+    row.take, row.smoke_uid = str(take.directory), smoke.session_uid
     work(context)
 
 
-def present(scene: bpy.types.Scene, take: Take) -> bpy.types.Object | None:
+def present(smoke: bpy.types.Object, take: Take) -> None:
     """Show a take's finished frames, and the camera that the engine assumed if it did."""
-    obj, index = volume.show(scene, take), take.index()
-    if obj is not None and index is not None:
-        shot_setup.assumed_camera(scene, index)
-    return obj
+    index = take.index()
+    if volume.show(smoke, take) and index is not None:
+        shot_setup.assumed_camera(smoke, index)
 
 
 def busy(manager: bpy.types.WindowManager, take: Take) -> bool:
@@ -101,10 +100,11 @@ def _works(operator: bpy.types.Operator) -> bool:
 
 
 def check_soon(context: bpy.types.Context) -> None:
-    """Check the shot unless a shot of this file was checked. Drawing code may call this."""
+    """Check the active smoke unless it was checked. Drawing code may call this."""
     state, first = context.window_manager.smokelift, context.window_manager.windows[0]
-    checked = any(scene.session_uid == state.check_scene for scene in bpy.data.scenes)
-    if not checked and context.window == first and not bpy.app.timers.is_registered(_check):
+    smoke = active_smoke(context.scene)
+    known = smoke is None or smoke.session_uid == state.check_smoke
+    if not known and context.window == first and not bpy.app.timers.is_registered(_check):
         bpy.app.timers.register(_check)  # drawing code may not change data
 
 
@@ -184,6 +184,8 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
         for name, row in rows.items():
             if row.outcome == "waiting" and name not in self._jobs:
                 self._start(name, row)
+            if name in self._jobs and find_smoke(row.smoke_uid) is None:
+                row.cancel = True  # it has nowhere to go; undo brings the smoke back, and Resume goes on
             if row.cancel and name in self._jobs:
                 self._jobs[name].cancel()
         changed = self._queue.poll()
@@ -223,15 +225,15 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
     def _show(self, row: bpy.types.PropertyGroup, job: Job) -> None:
         """Show a job's frames in the viewport, and its end."""
         take = Take(Path(row.take))
-        scene = find_scene(row)
+        smoke = find_smoke(row.smoke_uid)
         created = 0
-        if scene is not None:
+        if smoke is not None:
             before = _datablocks()
-            present(scene, take)
+            present(smoke, take)
             created = _datablocks() - before
         if not bpy.app.background:
             row.icon = self._thumbnail(take)
-            if created or job.ended:
+            if smoke is not None and (created or job.ended):  # where it was deleted, one undo brings it back
                 # an undo to a step before new objects leaves Blender with dangling pointers
                 bpy.ops.ed.undo_push(message="Make Smoke")
             if job.ended:
@@ -283,15 +285,15 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
         if self._check is not None:
             self._check.kill()
             self._check = None
-        scene = next((s for s in bpy.data.scenes if s.session_uid == state.check_scene), None)
+        smoke = find_smoke(state.check_smoke)
         state.check_done, state.check_error = False, ""
-        if scene is None:
+        if smoke is None:
             return
         folder = Path(bpy.app.tempdir)
         try:
             take = Take(folder / "smokelift_check")
-            take.write(scene_file.shot_tables(scene, quick=True), scene_file.options(scene))
-            words = ["inspect", str(take.scene_file), "--progress", "json", *scene_file.options(scene)]
+            take.write(scene_file.shot_tables(smoke, quick=True), scene_file.options(smoke))
+            words = ["inspect", str(take.scene_file), "--progress", "json", *scene_file.options(smoke)]
             self._check = Job(engine_command(words), take.log_file)
         except (scene_file.ShotError, TakeError, EngineMissingError) as error:
             state.check_error = str(error)
@@ -299,9 +301,9 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
         self._check.start()
 
 
-def find_scene(row: bpy.types.PropertyGroup) -> bpy.types.Scene | None:
-    """The scene of a job, also after a new name; None if it was deleted."""
-    return next((scene for scene in bpy.data.scenes if scene.session_uid == row.scene_uid), None)
+def find_smoke(uid: int) -> bpy.types.Object | None:
+    """A smoke by its number of this session, also after a new name; None if it was deleted."""
+    return next((obj for scene in bpy.data.scenes for obj in smokes(scene) if obj.session_uid == uid), None)
 
 
 def _datablocks() -> int:

@@ -17,6 +17,7 @@ from mathutils import Matrix, Vector
 
 from .contract import FEWEST_VOXELS, IMAGE_SUFFIXES, LONGEST_SIDE, PANORAMA_SUFFIXES
 from .paths import absolute
+from .smoke import scene_of
 
 LENS = ("fx", "fy", "cx", "cy")
 TRANSFERS = {"sRGB": "srgb", "Linear Rec.709": "linear", "scene_linear": "linear", "Non-Color": "linear"}
@@ -30,13 +31,13 @@ class ShotError(ValueError):
     """A shot that the engine cannot run; says in one sentence what to do."""
 
 
-def shot_tables(scene: bpy.types.Scene, quick: bool = False) -> dict[str, Any]:
+def shot_tables(smoke: bpy.types.Object, quick: bool = False) -> dict[str, Any]:
     """The tables of a scene file.
 
     Parameters
     ----------
-    scene
-        Its Smokelift settings decide what is used.
+    smoke
+        Its settings decide what is used of its scene.
     quick
         Read the camera in the current frame only.
 
@@ -45,17 +46,17 @@ def shot_tables(scene: bpy.types.Scene, quick: bool = False) -> dict[str, Any]:
     ShotError
         If something is missing or unusable.
     """
-    settings = scene.smokelift
-    tables: dict[str, Any] = {"clip": clip_table(scene)}
-    with _at_frame(scene, scene.frame_current if quick else start_frame(scene)) as depsgraph:
+    settings, scene = smoke.smokelift, scene_of(smoke)
+    tables: dict[str, Any] = {"clip": clip_table(smoke)}
+    with _at_frame(scene, scene.frame_current if quick else start_frame(settings)) as depsgraph:
         rotation = Matrix.Identity(3)
         if settings.camera_mode == "SCENE":
-            box = box_of(scene)
+            box = box_of(smoke)
             if box is None:
-                raise ShotError("The scene has no box: press Make Box, and move it so that it holds the smoke.")
+                raise ShotError("The smoke has no box: press Make Box, and move it so that it holds the smoke.")
             rotation = box.matrix_world.to_quaternion().to_matrix()
             tables["domain"] = domain_table(box, rotation, settings)
-            tables["camera"] = _camera_over_frames(scene, rotation, box_corners(box), quick)
+            tables["camera"] = _camera_over_frames(smoke, rotation, box_corners(box), quick)
             inlet = _in_scene(scene, settings.inlet)
             if inlet is not None:
                 tables["inlet"] = [inlet_table(inlet.evaluated_get(depsgraph), rotation, tables["domain"])]
@@ -74,9 +75,9 @@ def shot_tables(scene: bpy.types.Scene, quick: bool = False) -> dict[str, Any]:
     return tables
 
 
-def options(scene: bpy.types.Scene) -> list[str]:
+def options(smoke: bpy.types.Object) -> list[str]:
     """The engine's options that the scene file does not hold."""
-    settings = scene.smokelift
+    settings = smoke.smokelift
     words = ["--quality", settings.quality, "--device", settings.device]
     words += [f"--detail={settings.detail:g}", f"--seed={settings.seed}"]
     if settings.camera_mode == "SCENE" and not settings.longest_side:
@@ -86,10 +87,10 @@ def options(scene: bpy.types.Scene) -> list[str]:
     return words
 
 
-def engine_to_world(scene: bpy.types.Scene) -> Matrix:
+def engine_to_world(smoke: bpy.types.Object) -> Matrix:
     """The matrix (4x4) from the engine's world to Blender's."""
-    settings = scene.smokelift
-    box = box_of(scene) if settings.camera_mode == "SCENE" else None
+    settings = smoke.smokelift
+    box = box_of(smoke) if settings.camera_mode == "SCENE" else None
     return Matrix.Identity(4) if box is None else box.matrix_world.to_quaternion().to_matrix().to_4x4()
 
 
@@ -101,9 +102,9 @@ def clip_path(clip: bpy.types.MovieClip) -> Path:
     return absolute(clip.filepath, clip.library)
 
 
-def clip_table(scene: bpy.types.Scene) -> dict[str, Any]:
+def clip_table(smoke: bpy.types.Object) -> dict[str, Any]:
     """The clip and its used frames, counted from 0."""
-    settings = scene.smokelift
+    settings = smoke.smokelift
     clip = settings.clip
     if clip is None:
         raise ShotError("Choose a clip first.")
@@ -115,7 +116,7 @@ def clip_table(scene: bpy.types.Scene) -> dict[str, Any]:
     if settings.fps > 0.0:
         table["fps"] = settings.fps
     elif clip.source == "SEQUENCE":
-        table["fps"] = frame_rate(scene)
+        table["fps"] = frame_rate(scene_of(smoke))
     transfer = _transfer(clip) if settings.transfer == "AUTO" else settings.transfer
     if transfer is not None:
         table["transfer"] = transfer
@@ -145,7 +146,7 @@ def _frame_count(clip: bpy.types.MovieClip) -> int:
     return clip.frame_duration
 
 
-def use_frames(scene: bpy.types.Scene, first: int, last: int) -> None:
+def use_frames(smoke: bpy.types.Object, first: int, last: int) -> None:
     """Use some frames of the clip's file, counted from 0 as the engine counts them.
 
     Raises
@@ -153,7 +154,7 @@ def use_frames(scene: bpy.types.Scene, first: int, last: int) -> None:
     ShotError
         If the clip does not have them.
     """
-    settings = scene.smokelift
+    settings = smoke.smokelift
     lowest = settings.clip.frame_offset
     highest = lowest + _frame_count(settings.clip) - 1
     if not lowest <= first <= last <= highest:
@@ -166,9 +167,8 @@ def frame_rate(scene: bpy.types.Scene) -> float:
     return scene.render.fps / scene.render.fps_base
 
 
-def start_frame(scene: bpy.types.Scene) -> int:
+def start_frame(settings: bpy.types.PropertyGroup) -> int:
     """The scene's frame that shows the first used frame of the clip."""
-    settings = scene.smokelift
     return settings.clip.frame_start + settings.first - 1
 
 
@@ -185,21 +185,21 @@ def _existing(path: str, what: str) -> str:
 
 
 def camera_table(
-    scene: bpy.types.Scene, camera: bpy.types.Object, depsgraph: bpy.types.Depsgraph, rotation: Matrix
+    smoke: bpy.types.Object, camera: bpy.types.Object, depsgraph: bpy.types.Depsgraph, rotation: Matrix
 ) -> dict[str, Any]:
     """The camera as a pinhole (or orthographic) camera of the clip's size.
 
     Parameters
     ----------
-    scene
-        Gives the clip and the pixel aspect.
+    smoke
+        Gives the clip, and its scene the pixel aspect.
     camera, depsgraph
         Evaluated in the frame that counts.
     rotation
         From the engine's axes to Blender's (3x3).
     """
-    width, height = scene.smokelift.clip.size
-    render = scene.render
+    width, height = smoke.smokelift.clip.size
+    render = scene_of(smoke).render
     if camera.data.type not in ("PERSP", "ORTHO"):
         raise ShotError("The camera is panoramic: choose Perspective or Orthographic in its lens settings.")
     if not math.isclose(render.resolution_x * height, render.resolution_y * width, rel_tol=0.005):
@@ -239,20 +239,23 @@ def _camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> bpy.types
     return scene.camera.evaluated_get(depsgraph)
 
 
-def _camera_over_frames(scene: bpy.types.Scene, rotation: Matrix, corners: list[Vector], quick: bool) -> dict[str, Any]:
+def _camera_over_frames(
+    smoke: bpy.types.Object, rotation: Matrix, corners: list[Vector], quick: bool
+) -> dict[str, Any]:
     """The camera's table: one matrix, or one for every used frame if the camera moves.
 
     Each frame costs an evaluation of the whole scene, so a few frames decide whether the camera moves; ``quick`` reads
     the current one only. The corners are those of the box, in Blender's world.
     """
-    start, length = start_frame(scene), scene.smokelift.last - scene.smokelift.first
+    settings, scene = smoke.smokelift, scene_of(smoke)
+    start, length = start_frame(settings), settings.last - settings.first
     frames = [start + round(step * length / (CAMERA_SAMPLES - 1)) for step in range(CAMERA_SAMPLES)]
-    samples = _sample_camera(scene, [scene.frame_current] if quick else sorted(set(frames)), rotation, corners)
+    samples = _sample_camera(smoke, [scene.frame_current] if quick else sorted(set(frames)), rotation, corners)
     first = samples[0][0]
     size = max((a - b).length for a in corners for b in corners)
     moves = any(_moved(table["matrix"], first["matrix"], size) for table, _ in samples)
     if moves:
-        samples = _sample_camera(scene, list(range(start, start + length + 1)), rotation, corners)
+        samples = _sample_camera(smoke, list(range(start, start + length + 1)), rotation, corners)
     if any(abs(table[key] - first[key]) > 1e-4 * max(table["size"]) for table, _ in samples for key in LENS):
         raise ShotError(
             "The camera zooms during the clip, and only footage with one focal length can be used: choose frames in "
@@ -267,16 +270,16 @@ def _camera_over_frames(scene: bpy.types.Scene, rotation: Matrix, corners: list[
 
 
 def _sample_camera(
-    scene: bpy.types.Scene, frames: list[int], rotation: Matrix, corners: list[Vector]
+    smoke: bpy.types.Object, frames: list[int], rotation: Matrix, corners: list[Vector]
 ) -> list[tuple[dict[str, Any], bool]]:
     """The camera's table in each frame, and whether the box is in its picture."""
-    samples = []
+    samples, scene = [], scene_of(smoke)
     with _at_frame(scene, frames[0]) as depsgraph:
         for frame in frames:
             if frame != scene.frame_current:
                 scene.frame_set(frame)
             camera = _camera(scene, depsgraph)
-            samples.append((camera_table(scene, camera, depsgraph, rotation), _in_picture(scene, camera, corners)))
+            samples.append((camera_table(smoke, camera, depsgraph, rotation), _in_picture(scene, camera, corners)))
     return samples
 
 
@@ -312,9 +315,9 @@ def _in_picture(scene: bpy.types.Scene, camera: bpy.types.Object, corners: list[
 # box
 
 
-def box_of(scene: bpy.types.Scene) -> bpy.types.Object | None:
+def box_of(smoke: bpy.types.Object) -> bpy.types.Object | None:
     """The box that holds the smoke."""
-    return _in_scene(scene, scene.smokelift.box)
+    return _in_scene(scene_of(smoke), smoke.smokelift.box)
 
 
 def _in_scene(scene: bpy.types.Scene, obj: bpy.types.Object | None) -> bpy.types.Object | None:

@@ -13,6 +13,7 @@ from mathutils import Matrix, Vector
 
 from .kept import set_unless_changed
 from .paths import relative
+from .smoke import GUESSED_CAMERA, scene_of
 from .take import Take
 
 NAME = "Smokelift"
@@ -20,9 +21,9 @@ SENSOR_WIDTH = 36.0
 """Millimetres; Blender's default."""
 
 
-def match_clip(scene: bpy.types.Scene) -> None:
-    """Give the scene the clip's size, frame rate and length."""
-    clip = scene.smokelift.clip
+def match_clip(smoke: bpy.types.Object) -> None:
+    """Give the smoke's scene the clip's size, frame rate and length."""
+    clip, scene = smoke.smokelift.clip, scene_of(smoke)
     render = scene.render
     render.resolution_x, render.resolution_y = clip.size
     if clip.source == "MOVIE" and clip.fps > 0.0:
@@ -32,41 +33,41 @@ def match_clip(scene: bpy.types.Scene) -> None:
     scene.frame_end = clip.frame_start + clip.frame_duration - 1
 
 
-def set_up(scene: bpy.types.Scene, take: Take, index: dict[str, Any]) -> None:
+def set_up(smoke: bpy.types.Object, take: Take, index: dict[str, Any]) -> None:
     """Make a Cycles render from the camera match the clip.
 
     Parameters
     ----------
-    scene
-        Shows the smoke already.
+    smoke
+        Shows its take already.
     take, index
         The take on show, and its `sequence.json`.
     """
-    match_clip(scene)
-    scene.camera = assumed_camera(scene, index) or scene.camera
-    _add_background_clip(scene.camera.data, scene.smokelift.clip)
-    if scene.smokelift.light_mode == "ESTIMATE":
+    settings, scene = smoke.smokelift, scene_of(smoke)
+    match_clip(smoke)
+    scene.camera = assumed_camera(smoke, index) or scene.camera
+    _add_background_clip(scene.camera.data, settings.clip)
+    if settings.light_mode == "ESTIMATE":
         _estimated_sun(scene, index)
-    _set_world(scene, take, index["scene"])
+    _set_world(scene, settings.clip, take, index["scene"])
     scene.render.engine = "CYCLES"
     scene.view_settings.view_transform = "Standard"
     scene.view_settings.look = "None"
     scene.view_settings.exposure, scene.view_settings.gamma = 0.0, 1.0
 
 
-def assumed_camera(scene: bpy.types.Scene, index: dict[str, Any]) -> bpy.types.Object | None:
+def assumed_camera(smoke: bpy.types.Object, index: dict[str, Any]) -> bpy.types.Object | None:
     """The camera that the engine assumed, made or moved; None if the engine used the scene's own.
 
     Its place and its lens stay where the artist changed them.
     """
-    settings = scene.smokelift
+    settings, scene = smoke.smokelift, scene_of(smoke)
     if settings.camera_mode != "GUESS":
         return None
     table = index["scene"]["camera"]
-    name = f"{NAME} Camera"
-    camera = settings.assumed_camera or scene.objects.get(name)
+    camera = settings.assumed_camera
     if camera is None or camera.type != "CAMERA" or camera.name not in scene.objects:
-        camera = bpy.data.objects.new(name, bpy.data.cameras.new(name))
+        camera = bpy.data.objects.new(GUESSED_CAMERA, bpy.data.cameras.new(GUESSED_CAMERA))
         camera.data.sensor_fit, camera.data.sensor_width = "AUTO", SENSOR_WIDTH
         scene.collection.objects.link(camera)
     settings.assumed_camera = camera
@@ -106,7 +107,7 @@ def _estimated_sun(scene: bpy.types.Scene, index: dict[str, Any]) -> None:
     sun.rotation_euler = Vector(table["direction"]).to_track_quat("-Z", "Y").to_euler()
 
 
-def _set_world(scene: bpy.types.Scene, take: Take, tables: dict[str, Any]) -> None:
+def _set_world(scene: bpy.types.Scene, clip: bpy.types.MovieClip, take: Take, tables: dict[str, Any]) -> None:
     """A world that shows the camera the clean plate, and lights the smoke as the scene's own world does."""
     world = scene.world
     if world is None or not world.name.startswith(NAME):
@@ -140,7 +141,7 @@ def _set_world(scene: bpy.types.Scene, take: Take, tables: dict[str, Any]) -> No
     background = mix.inputs[2].links[0].from_node
     plate = _set_plate(world.node_tree, background, take, tables.get("background") or {})
     if plate is not None:
-        _set_plate_frames(plate, scene.smokelift.clip, "matrices" in tables["camera"])
+        _set_plate_frames(plate, clip, "matrices" in tables["camera"])
 
 
 def _remove_unused_worlds() -> None:

@@ -12,6 +12,7 @@ Every take has the next free number, so no run overwrites another:
 from __future__ import annotations
 
 import json
+import os
 import re
 import shutil
 from collections.abc import Mapping, Sequence
@@ -116,6 +117,36 @@ class Take:
     def resumable(self) -> bool:
         """Whether its run can go on: it started and is not complete."""
         return self.scene_file.is_file() and self.request_file.is_file() and not self.complete()
+
+    def title(self) -> str:
+        """The name that the artist gave it, or its number."""
+        try:
+            given = str(json.loads(self.request_file.read_text(encoding="utf-8")).get("title", ""))
+        except (OSError, ValueError, AttributeError, RecursionError):
+            given = ""
+        return given or f"Take {int(self.directory.name.rpartition('_')[2])}"
+
+    def give_title(self, title: str) -> None:
+        """Give it a name.
+
+        Raises
+        ------
+        TakeError
+            If its files are missing or damaged, or the name cannot be written.
+        """
+        try:
+            request = json.loads(self.request_file.read_text(encoding="utf-8"))
+            self.request_file.write_text(json.dumps({**request, "title": title}) + "\n", encoding="utf-8")
+        except (OSError, ValueError, TypeError, RecursionError) as error:
+            raise TakeError(f"{self.request_file} cannot be changed, so the result keeps its name.") from error
+
+    def size(self) -> float:
+        """Size of its sequence on the disk (MB)."""
+        try:
+            with os.scandir(self.directory) as files:
+                return sum(file.stat().st_size for file in files) / 1e6
+        except OSError:
+            return 0.0
 
     def remove(self) -> None:
         """Delete all its files."""

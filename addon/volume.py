@@ -1,16 +1,18 @@
 """The result: a Volume object that plays the sequence, with a material of the smoke's optical properties."""
 
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import bpy
 from bpy.app.handlers import persistent
-from mathutils import Matrix, Vector
+from mathutils import Vector
 
 from .contract import FRAME_FILE, MADE_UP
 from .kept import set_unless_changed
 from .paths import absolute, relative
 from .scene_file import engine_to_world, frame_rate
+from .smoke import scene_of, smokes
 from .take import Take
 
 SHADER = "Smokelift"
@@ -20,47 +22,41 @@ PROVENANCE = "smokelift_provenance"
 """Custom property of the Volume that says what of the smoke is measured, also where its files are not at hand."""
 
 
-def show(scene: bpy.types.Scene, take: Take) -> bpy.types.Object | None:
-    """Show a take's finished frames in the scene's Volume object, which is made if there is none.
-
-    What the artist changed of its place and material stays.
+def show(smoke: bpy.types.Object, take: Take) -> bpy.types.Object | None:
+    """Show a take's finished frames in a smoke. What the artist changed of its place and material stays.
 
     Returns
     -------
-    The Volume object, or None while no frame is finished.
+    The smoke, or None while no frame is finished.
     """
     index = take.index()
     if not index or not index["frames"]:
         return None
-    obj = smoke_object(scene)
-    if shown_take(scene) != take:
-        obj.delta_location = (0.0, 0.0, 0.0)
-        set_unless_changed(obj, "place", obj, "matrix_basis", engine_to_world(scene))
-    _correct_position(obj, index["scene"]["domain"])
-    _set_file(obj.data, take, index)
-    _set_time(obj.data, scene, index)
-    _set_material(obj.data, index["scene"]["medium"])
-    obj.data[PROVENANCE] = _provenance(index.get("provenance", []))
-    return obj
+    if shown_take(smoke) != take:
+        smoke.delta_location = (0.0, 0.0, 0.0)
+        set_unless_changed(smoke, "place", smoke, "matrix_basis", engine_to_world(smoke))
+    _correct_position(smoke, index["scene"]["domain"])
+    _set_file(smoke.data, take, index)
+    _set_time(smoke, scene_of(smoke), index)
+    _set_material(smoke.data, index["scene"]["medium"])
+    smoke.data[PROVENANCE] = _provenance(index.get("provenance", []))
+    return smoke
 
 
-def shown_take(scene: bpy.types.Scene) -> Take | None:
-    """The take on show in the scene."""
-    obj = scene.smokelift.volume
-    if obj is None or obj.type != "VOLUME" or not obj.data.filepath:
-        return None
-    return take_of(obj.data)
+def shown_take(smoke: bpy.types.Object) -> Take | None:
+    """The take that a smoke shows."""
+    return take_of(smoke.data)
 
 
-def take_of(volume: bpy.types.Volume) -> Take:
-    """The take that a Volume with a file plays."""
-    return Take(absolute(volume.filepath, volume.library).parent)
+def take_of(volume: bpy.types.Volume) -> Take | None:
+    """The take that a Volume plays; None for one without a file, whose empty path saving turns into ``//``."""
+    path = absolute(volume.filepath, volume.library)
+    return Take(path.parent) if path.suffix == ".vdb" else None
 
 
-def provenance_note(scene: bpy.types.Scene) -> str:
-    """What of the smoke on show is measured and what is not, as a line for the panel; empty if that is unknown."""
-    obj = scene.smokelift.volume
-    return "" if obj is None or obj.type != "VOLUME" else obj.data.get(PROVENANCE, "")
+def provenance_note(smoke: bpy.types.Object) -> str:
+    """What of a smoke is measured and what is not, as a line for the panel; empty if that is unknown."""
+    return smoke.data.get(PROVENANCE, "")
 
 
 def _provenance(parts: list[dict[str, Any]]) -> str:
@@ -73,52 +69,21 @@ def _provenance(parts: list[dict[str, Any]]) -> str:
     return "The camera's view is measured. Nothing is made up: the depth is smooth."
 
 
-def smoke_object(scene: bpy.types.Scene) -> bpy.types.Object:
-    """The scene's Volume object; if there is none, a new one, selected and active."""
-    obj = scene.smokelift.volume
-    if obj is None or obj.type != "VOLUME" or obj.name not in scene.objects:
-        name = f"Smoke {scene.smokelift.clip.name}" if scene.smokelift.clip else "Smoke"
-        obj = bpy.data.objects.new(name, bpy.data.volumes.new(name))
-        scene.collection.objects.link(obj)
-        scene.smokelift.volume = obj
-        _select(obj, scene)
-        if scene.smokelift.camera_mode == "GUESS":
-            _hide_default_cube(scene)
-    return obj
-
-
-def _select(obj: bpy.types.Object, scene: bpy.types.Scene) -> None:
-    """Select and activate an object, unless the artist works inside another."""
-    layer = bpy.context.view_layer if bpy.context.scene == scene else scene.view_layers[0]
-    active = layer.objects.active
-    if active is not None and active.mode != "OBJECT":
-        return
-    for other in layer.objects.selected:
-        other.select_set(False, view_layer=layer)
-    obj.select_set(True, view_layer=layer)
-    layer.objects.active = obj
-
-
-def _hide_default_cube(scene: bpy.types.Scene) -> None:
-    """Hide the cube of a new file, which stands where smoke is put if nothing is known of its place."""
-    cube = scene.objects.get("Cube")
-    if cube is None or cube.type != "MESH" or cube.matrix_basis != Matrix.Identity(4):
-        return
-    if cube.parent or cube.children or cube.modifiers or cube.constraints or cube.animation_data:
-        return
-    places = {tuple(vertex.co) for vertex in cube.data.vertices}
-    if places == {(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)}:
-        cube.hide_viewport = cube.hide_render = True
-
-
 @persistent
 def correct_positions(_file: str = "") -> None:
-    """Correct the smoke of every scene, since another version of Blender may have saved the file."""
+    """Correct all smokes, since another version of Blender may have saved the file."""
+    for _, smoke, index in _shown():
+        _correct_position(smoke, index["scene"]["domain"])
+
+
+def _shown() -> Iterator[tuple[bpy.types.Scene, bpy.types.Object, dict[str, Any]]]:
+    """Every smoke of every scene whose take has finished frames, with its `sequence.json`."""
     for scene in bpy.data.scenes:
-        take = shown_take(scene)
-        index = take.index() if take is not None else None
-        if index is not None:
-            _correct_position(scene.smokelift.volume, index["scene"]["domain"])
+        for smoke in smokes(scene):
+            take = shown_take(smoke)
+            index = take.index() if take is not None else None
+            if index and index["frames"]:
+                yield scene, smoke, index
 
 
 def _correct_position(obj: bpy.types.Object, domain: dict[str, Any]) -> None:
@@ -129,12 +94,9 @@ def _correct_position(obj: bpy.types.Object, domain: dict[str, Any]) -> None:
 
 
 def keep_step() -> None:
-    """Play the smoke of every scene in step with its clip, after either got another time or rate."""
-    for scene in bpy.data.scenes:
-        take = shown_take(scene)
-        index = take.index() if take is not None else None
-        if index and index["frames"]:
-            _set_time(scene.smokelift.volume.data, scene, index)
+    """Play all smokes in step with their clips, after a clip or a scene got another time or rate."""
+    for scene, smoke, index in _shown():
+        _set_time(smoke, scene, index)
 
 
 def _numbers(index: dict[str, Any]) -> list[int]:
@@ -156,16 +118,17 @@ def _set_file(volume: bpy.types.Volume, take: Take, index: dict[str, Any]) -> No
     set_unless_changed(volume, "density", volume.display, "density", index["scene"]["medium"]["extinction"])
 
 
-def _set_time(volume: bpy.types.Volume, scene: bpy.types.Scene, index: dict[str, Any]) -> None:
-    """Make a Volume play when the clip does."""
+def _set_time(smoke: bpy.types.Object, scene: bpy.types.Scene, index: dict[str, Any]) -> None:
+    """Make a smoke play when its clip does."""
+    volume, settings = smoke.data, smoke.smokelift
     numbers = _numbers(index)
     clip_rate, scene_rate = index["scene"]["clip"]["fps"], frame_rate(scene)
     ratio = scene_rate / clip_rate
     # the smoke keeps step with a moving camera, which has one matrix for each frame of the clip
     tracked = "matrices" in index["scene"].get("camera", {})
-    real = scene.smokelift.speed == "REAL" and not tracked and not math.isclose(ratio, 1.0, rel_tol=1e-3)
-    clip = scene.smokelift.clip
-    before = _frames_before(scene, index)
+    real = settings.speed == "REAL" and not tracked and not math.isclose(ratio, 1.0, rel_tol=1e-3)
+    clip = settings.clip
+    before = _frames_before(settings, index)
     start = (clip.frame_start if clip else 1) + (round(before * ratio) if real else before)
     set_unless_changed(volume, "start", volume, "frame_start", start)
     volume.frame_offset = numbers[0] - 1
@@ -180,9 +143,8 @@ def _set_time(volume: bpy.types.Volume, scene: bpy.types.Scene, index: dict[str,
     volume.velocity_scale = 1.0 if real else ratio
 
 
-def _frames_before(scene: bpy.types.Scene, index: dict[str, Any]) -> int:
+def _frames_before(settings: bpy.types.PropertyGroup, index: dict[str, Any]) -> int:
     """Number of the clip's frames before the take's first, which settings for the next take do not change."""
-    settings = scene.smokelift
     frames = index["scene"]["clip"].get("frames")
     return settings.first - 1 if frames is None or settings.clip is None else frames[0] - settings.clip.frame_offset
 

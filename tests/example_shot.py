@@ -32,7 +32,7 @@ def set_up_example(scene: bpy.types.Scene, folder: Path = EXAMPLE) -> bpy.types.
     sun = add(scene, "Sun", bpy.data.lights.new("Sun", "SUN"))
     sun.data.energy = 18.0
     sun.rotation_euler = Vector((0.57, 0.46, -0.68)).to_track_quat("-Z", "Y").to_euler()
-    settings = scene.smokelift
+    settings = smoke(scene).smokelift
     settings.clip = bpy.data.movieclips.load(str(folder / "clip.mp4"))
     settings.box = add_box(scene, (-1.0, -1.0, 0.0), (1.0, 1.0, 3.0))
     settings.plate_mode, settings.plate = "FILE", str(folder / "plate.png")
@@ -40,6 +40,16 @@ def set_up_example(scene: bpy.types.Scene, folder: Path = EXAMPLE) -> bpy.types.
     settings.quality = "draft"
     scene.render.resolution_x, scene.render.resolution_y = 256, 384
     return scene
+
+
+def smoke(scene: bpy.types.Scene) -> bpy.types.Object:
+    """The smoke of a scene; if there is none, a new one."""
+    for obj in scene.objects:
+        if obj.type == "VOLUME" and obj.smokelift.is_smoke:
+            return obj
+    obj = add(scene, "Smoke", bpy.data.volumes.new("Smoke"))
+    obj.smokelift.is_smoke = True
+    return obj
 
 
 def add(scene: bpy.types.Scene, name: str, data: Any) -> bpy.types.Object:

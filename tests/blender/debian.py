@@ -155,7 +155,6 @@ def test_window(root, installed) -> None:
             assert change(idle, done, middle) > 1, "no smoke is to be seen"
     assert max(report["clip_editor"]["longest_gaps"]) < LONGEST_GAP
     assert report["volumes"] == 1, "the second run did not replace the first"
-    assert report["active"], "the smoke is not the active object"
     assert report["moved_with_the_clip"] == 5
     assert report["variation"] == 1, "the second run is no other variation"
     assert change(load(pictures / "view_3d_done.png"), load(pictures / "rendered.png"), middle) > 10
@@ -168,10 +167,11 @@ def test_trouble_at_the_window(root, installed) -> None:
     first = LAST - 23  # so many that none of the runs ends before the artist is done with it
     report = story(root, installed, "drive_trouble.py", pictures, (blend, first, LAST, 32))
     frames = LAST - first + 1
-    for name in ("undo", "delete_and_rename", "save_elsewhere", "resumed", "enabled"):
+    for name in ("undo", "rename", "restored", "save_elsewhere", "resumed", "enabled"):
         seen = report[name]
         assert (seen["outcomes"], seen["volumes"], seen["frames"]) == (["done"], 1, frames), name
         assert seen["file"], f"{name}: the smoke's files are not found"
+    assert (report["deleted"]["outcomes"], report["deleted"]["volumes"]) == (["cancelled"], 0)
     assert report["stopped"]["outcomes"] == ["cancelled"]
     assert 2 <= report["stopped"]["frames"] < frames
     assert report["queue"]["outcomes"] == ["done", "cancelled", "done"]

@@ -27,7 +27,7 @@ def main() -> None:
     """Write them."""
     panels = [Image.open(SEEN / f"view_3d_{stage}.png").convert("RGB").crop(SIDEBAR) for stage in STAGES]
     save("blender_panel.png", beside(panels))
-    window = Image.open(SEEN / "view_3d_running.png").convert("RGB")
+    window = Image.open(SEEN / "view_3d_done.png").convert("RGB")
     save("blender_window.png", window.resize((1200, 750), Image.Resampling.LANCZOS))
     renders = [Image.open(MADE / name).convert("RGB") for name in ("as_filmed.png", "from_left.png", "elsewhere.png")]
     with Clip.open(ROOT / "examples" / "plume" / "clip.mp4") as clip:

@@ -15,7 +15,7 @@ from addon import batch, volume
 from addon.take import Take
 from conftest import quietly
 from smokelift.output.sequence import Sequence
-from tests.example_shot import EXAMPLE
+from tests.example_shot import EXAMPLE, smoke
 
 SCRIPT = Path(batch.__file__)
 # what ``blender -b FILE -P batch.py -- ...`` does, where there is no blender but its module
@@ -29,7 +29,7 @@ runpy.run_path(sys.argv[2], run_name="__main__")
 @pytest.fixture
 def saved(shot, tmp_path) -> Path:
     """The shot as a file, small and short."""
-    settings = shot.smokelift
+    settings = smoke(shot).smokelift
     settings.first, settings.last, settings.longest_side = 27, 30, 32
     shot.render.resolution_percentage, shot.cycles.samples, shot.cycles.use_denoising = 25, 1, False
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
@@ -56,11 +56,11 @@ def test_a_shot_from_the_command_line(saved, tmp_path) -> None:
     assert take.complete()
     quietly(lambda: bpy.ops.wm.open_mainfile(filepath=str(saved)))
     scene = bpy.context.scene
-    assert volume.shown_take(scene) == take
-    assert scene.smokelift.volume.data.frame_duration == 4
+    assert volume.shown_take(smoke(scene)) == take
+    assert smoke(scene).data.frame_duration == 4
     assert scene.render.engine == "CYCLES"
     assert (tmp_path / "still.png").is_file()
-    scene.smokelift.output = str(tmp_path / "panel")
+    smoke(scene).smokelift.output = str(tmp_path / "panel")
     bpy.ops.smokelift.run()
     ours, theirs = Sequence.open(take.directory), Sequence.open(tmp_path / "panel" / "take_0001")
     assert ours.scene == theirs.scene
@@ -127,7 +127,7 @@ def test_the_command_wants_its_verb(shot, capsys) -> None:
 def test_an_engine_that_fails(shot, tmp_path, capsys) -> None:
     """Its own status, and its own words."""
     (tmp_path / "clip.mp4").write_bytes((EXAMPLE / "clip.mp4").read_bytes())
-    shot.smokelift.clip = bpy.data.movieclips.load(str(tmp_path / "clip.mp4"))
+    smoke(shot).smokelift.clip = bpy.data.movieclips.load(str(tmp_path / "clip.mp4"))
     (tmp_path / "clip.mp4").write_text("not a video " * 100)
     assert batch.main([]) == 2
     assert "is not a video" in capsys.readouterr().err

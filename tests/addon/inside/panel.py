@@ -9,6 +9,7 @@ import bpy
 import pytest
 
 from addon import panel
+from tests.example_shot import smoke
 
 WIDTH = 258
 """Pixels of the sidebar in a new window."""
@@ -52,12 +53,12 @@ def test_no_line_is_cut_off(shot) -> None:
     """The longest that there are, in a sidebar of the usual width."""
     manager = bpy.context.window_manager
     state = manager.smokelift
-    state.check_scene, state.check_done, state.notes = shot.session_uid, True, "Assumed. " * 20
+    state.check_smoke, state.check_done, state.notes = smoke(shot).session_uid, True, "Assumed. " * 20
     state.resolution, state.seconds, state.disk = (144, 144, 144), 86000.0, 9999.0
     state.memory, state.memory_free = 112.4, 11.8
     for outcome in ("waiting", "running", "done", "failed"):
         row = manager.smokelift.jobs.add()
-        row.scene_uid, row.outcome, row.sentence = shot.session_uid, outcome, "One word after the other. " * 5
+        row.smoke_uid, row.outcome, row.sentence = smoke(shot).session_uid, outcome, "One word after the other. " * 5
         row.done, row.total, row.seconds_left, row.warnings = 1250, 2500, 80000.0, "This is a warning. " * 5
     texts = drawn(shot, panel.SMOKELIFT_PT_view, panel.SMOKELIFT_PT_view_advanced)
     assert any("112.4 GB" in text for text in texts)
@@ -67,7 +68,7 @@ def test_no_line_is_cut_off(shot) -> None:
 @pytest.mark.parametrize("word", ["Captured At", "Pixels", "Processor", "Graphics Card", "Anew"])
 def test_words_are_blenders(scene, word) -> None:
     """Frame rate, color space, CPU, GPU."""
-    settings = scene.smokelift.bl_rna.properties
+    settings = smoke(scene).smokelift.bl_rna.properties
     names = [setting.name for setting in settings]
     names += [item.name for setting in settings if setting.type == "ENUM" for item in setting.enum_items]
     names += [getattr(bpy.ops.smokelift, name).get_rna_type().name for name in dir(bpy.ops.smokelift)]

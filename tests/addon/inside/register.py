@@ -12,7 +12,7 @@ from smokelift.footage.images import Transfer
 from smokelift.render.device import DeviceName
 from smokelift.scene import Medium
 from smokelift.setup.settings import QUALITIES, Settings
-from tests.example_shot import EXAMPLE
+from tests.example_shot import EXAMPLE, smoke
 
 
 def ours() -> set[str]:
@@ -31,7 +31,7 @@ def handlers() -> int:
 
 def test_nothing_is_left() -> None:
     """No class, operator, property or handler; and it can be done again."""
-    assert {"Scene.smokelift", "ops.run", "SMOKELIFT_PT_view"} <= ours()
+    assert {"Object.smokelift", "ops.run", "SMOKELIFT_PT_view"} <= ours()
     during = handlers()
     addon.unregister()
     assert ours() == set()
@@ -45,7 +45,7 @@ def test_names_follow_blenders_rules() -> None:
     for name in dir(bpy.ops.smokelift):
         kind = getattr(bpy.ops.smokelift, name).get_rna_type()
         assert kind.description, name
-    for setting in bpy.types.Scene.bl_rna.properties["smokelift"].fixed_type.properties:
+    for setting in bpy.types.Object.bl_rna.properties["smokelift"].fixed_type.properties:
         if setting.identifier not in ("rna_type", "name"):
             assert setting.name and setting.description, setting.identifier
             assert not setting.description.endswith("."), setting.identifier  # Blender adds it
@@ -57,12 +57,12 @@ def test_names_follow_blenders_rules() -> None:
 )
 def test_choices_are_the_engines(scene, name, expected) -> None:
     """In the engine's order."""
-    assert tuple(scene.smokelift.bl_rna.properties[name].enum_items.keys()) == expected
+    assert tuple(smoke(scene).smokelift.bl_rna.properties[name].enum_items.keys()) == expected
 
 
 def test_what_is_made_up_is_the_engines_by_default(scene) -> None:
     """And the panel's limits are within the engine's."""
-    properties = scene.smokelift.bl_rna.properties
+    properties = smoke(scene).smokelift.bl_rna.properties
     for name in ("detail", "seed"):
         setting = properties[name]
         assert setting.default == getattr(Settings.preset(), name)
@@ -74,7 +74,7 @@ def test_what_is_made_up_is_the_engines_by_default(scene) -> None:
 def test_default_medium_is_the_engines(scene) -> None:
     """And its limits are within the engine's."""
     names = ("extinction", "albedo", "anisotropy")
-    properties = scene.smokelift.bl_rna.properties
+    properties = smoke(scene).smokelift.bl_rna.properties
     assert [properties[name].default for name in names] == pytest.approx([getattr(Medium(), name) for name in names])
     for name in names:
         Medium(**{name: properties[name].hard_min}), Medium(**{name: properties[name].hard_max})
@@ -86,7 +86,7 @@ def test_smoke_is_in_the_menu_for_volumes(scene, tmp_path) -> None:
     assert any(draw.__module__.startswith("addon") for draw in menu.draw._draw_funcs)
     assert bpy.ops.smokelift.add.get_rna_type().name == "Smoke from Video"
     assert bpy.ops.smokelift.add(filepath=str(EXAMPLE / "clip.mp4")) == {"FINISHED"}
-    assert scene.smokelift.clip.name == "clip.mp4"
-    assert bpy.context.view_layer.objects.active == scene.smokelift.volume
+    assert smoke(scene).smokelift.clip.name == "clip.mp4"
+    assert bpy.context.view_layer.objects.active == smoke(scene)
     with pytest.raises(RuntimeError, match=r"nothing\.mp4 is no video"):
         bpy.ops.smokelift.add(filepath=str(tmp_path / "nothing.mp4"))

@@ -16,7 +16,7 @@ from addon.scene_file import ShotError, shot_tables, use_frames
 from addon.take import Take
 from smokelift.scene import Scene
 from smokelift.scene.projection import project
-from tests.example_shot import EXAMPLE, add
+from tests.example_shot import EXAMPLE, add, smoke
 
 CORNERS = [(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (0.0, 3.0)]
 
@@ -24,12 +24,12 @@ CORNERS = [(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (0.0, 3.
 def engines(scene: bpy.types.Scene, folder: Path) -> Scene:
     """The scene as the engine reads it, through a file."""
     take = Take(folder / "take_0001")
-    take.write(shot_tables(scene), [])
+    take.write(shot_tables(smoke(scene)), [])
     return Scene.load(take.scene_file)
 
 
 def load_clip(scene: bpy.types.Scene, path: Path) -> None:
-    scene.smokelift.clip = bpy.data.movieclips.load(str(path))
+    smoke(scene).smokelift.clip = bpy.data.movieclips.load(str(path))
 
 
 @pytest.fixture
@@ -42,7 +42,7 @@ def picture(shot, tmp_path):
         image.save()
         load_clip(shot, tmp_path / "picture.png")
         shot.render.resolution_x, shot.render.resolution_y = width, height
-        shot.smokelift.plate_mode = "ESTIMATE"
+        smoke(shot).smokelift.plate_mode = "ESTIMATE"
         return shot
 
     return of_size
@@ -104,7 +104,7 @@ def agree(scene: bpy.types.Scene, folder: Path) -> None:
     camera = engines(scene, folder).camera
     points = np.array([*CORNERS, (0.1, 0.2, 1.1), (-0.4, 0.3, 2.0)])
     found, _ = project(camera, points)
-    width, height = scene.smokelift.clip.size
+    width, height = smoke(scene).smokelift.clip.size
     assert camera.size == (width, height)
     seen = [world_to_camera_view(scene, scene.camera, Vector(point)) for point in points]
     wanted = np.array([(place.x * width, (1.0 - place.y) * height) for place in seen])
@@ -117,9 +117,9 @@ def test_the_camera_of_the_clips_first_frame(shot) -> None:
     shot.camera.keyframe_insert("location", frame=1)
     shot.camera.location = (0.0, -7.0, 1.5)
     shot.camera.keyframe_insert("location", frame=20)
-    shot.smokelift.first = 25
+    smoke(shot).smokelift.first = 25
     shot.frame_set(3)
-    assert shot_tables(shot)["camera"]["matrix"][1][3] == pytest.approx(-7.0)
+    assert shot_tables(smoke(shot))["camera"]["matrix"][1][3] == pytest.approx(-7.0)
     assert shot.frame_current == 3
 
 
@@ -129,7 +129,7 @@ def test_the_camera_of_the_clips_first_frame(shot) -> None:
 def refusal(scene: bpy.types.Scene) -> str:
     """The sentence with which a shot is refused."""
     with pytest.raises(ShotError) as caught:
-        shot_tables(scene)
+        shot_tables(smoke(scene))
     text = str(caught.value)
     assert text.endswith(".")
     return text
@@ -150,8 +150,8 @@ def test_a_camera_that_moves_before_and_after(shot) -> None:
     for frame, x in ((1, 1.0), (10, 0.0), (20, 0.0), (30, 1.0)):
         shot.camera.location.x = x
         shot.camera.keyframe_insert("location", frame=frame)
-    shot.smokelift.first, shot.smokelift.last = 10, 20
-    assert "matrices" not in shot_tables(shot)["camera"]
+    smoke(shot).smokelift.first, smoke(shot).smokelift.last = 10, 20
+    assert "matrices" not in shot_tables(smoke(shot))["camera"]
 
 
 # a camera that moves
@@ -169,15 +169,15 @@ def tracked(shot) -> bpy.types.Scene:
     look.target = add(shot, "Target", None)
     look.target.location = (0.0, 0.0, 1.5)
     look.track_axis, look.up_axis = "TRACK_NEGATIVE_Z", "UP_Y"
-    shot.smokelift.plate_mode = "ESTIMATE"
-    shot.smokelift.first, shot.smokelift.last = 11, 30
+    smoke(shot).smokelift.plate_mode = "ESTIMATE"
+    smoke(shot).smokelift.first, smoke(shot).smokelift.last = 11, 30
     return shot
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.5])
 def test_a_camera_that_moves_has_a_matrix_for_every_frame(tracked, tmp_path, angle) -> None:
     """Blender's own evaluated ones, in the box's axes; the playhead stays."""
-    tracked.smokelift.box.rotation_euler = (0.0, 0.0, angle)
+    smoke(tracked).smokelift.box.rotation_euler = (0.0, 0.0, angle)
     tracked.frame_set(7, subframe=0.5)
     camera = engines(tracked, tmp_path).camera
     assert (tracked.frame_current, tracked.frame_subframe) == (7, 0.5)
@@ -185,7 +185,9 @@ def test_a_camera_that_moves_has_a_matrix_for_every_frame(tracked, tmp_path, ang
     for index, frame in enumerate(range(11, 31)):
         tracked.frame_set(frame)
         depsgraph = bpy.context.evaluated_depsgraph_get()
-        wanted = module.engine_to_world(tracked).inverted() @ tracked.camera.evaluated_get(depsgraph).matrix_world
+        wanted = (
+            module.engine_to_world(smoke(tracked)).inverted() @ tracked.camera.evaluated_get(depsgraph).matrix_world
+        )
         np.testing.assert_allclose(camera.matrices[index], wanted, atol=1e-5)
 
 
@@ -204,7 +206,7 @@ def test_points_fall_where_blender_sees_them_in_every_frame(tracked, tmp_path) -
 def test_a_quick_look_takes_the_camera_as_it_is(tracked) -> None:
     """Other frames are not visited while somebody works in the window."""
     tracked.frame_set(40)
-    assert "matrices" not in shot_tables(tracked, quick=True)["camera"]
+    assert "matrices" not in shot_tables(smoke(tracked), quick=True)["camera"]
 
 
 def test_a_moving_camera_that_misses_the_box_at_times(tracked) -> None:
@@ -213,21 +215,21 @@ def test_a_moving_camera_that_misses_the_box_at_times(tracked) -> None:
     for frame, y in ((10, -90.0), (20, -90.0), (21, 0.0)):
         target.location.y = y
         target.keyframe_insert("location", frame=frame)
-    assert len(shot_tables(tracked)["camera"]["matrices"]) == 20
-    tracked.smokelift.last = 20
+    assert len(shot_tables(smoke(tracked))["camera"]["matrices"]) == 20
+    smoke(tracked).smokelift.last = 20
     assert "not in the camera's picture" in refusal(tracked)
 
 
 def test_one_picture_is_no_clean_plate_of_a_moving_camera(tracked, tmp_path) -> None:
     """A sequence is, by its first picture, or a video."""
-    settings = tracked.smokelift
+    settings = smoke(tracked).smokelift
     settings.plate_mode = "FILE"
     assert "one picture cannot" in refusal(tracked)
     first = tmp_path / "plate_0001.png"
     first.write_bytes((EXAMPLE / "plate.png").read_bytes())
     for plate in (first, EXAMPLE / "clip.mp4"):
         settings.plate = str(plate)
-        assert shot_tables(tracked)["background"] == {"image": str(plate)}
+        assert shot_tables(smoke(tracked))["background"] == {"image": str(plate)}
 
 
 @pytest.mark.parametrize(
@@ -236,17 +238,20 @@ def test_one_picture_is_no_clean_plate_of_a_moving_camera(tracked, tmp_path) -> 
         (lambda s: setattr(s, "camera", None), "no camera"),
         (lambda s: setattr(s.camera.data, "type", "PANO"), "panoramic"),
         (lambda s: setattr(s.render, "resolution_x", 1920), "Match Scene to Clip"),
-        (lambda s: setattr(s.smokelift, "clip", None), "Choose a clip"),
-        (lambda s: setattr(s.smokelift, "last", 49), "frames 1 to 48"),
-        (lambda s: setattr(s.smokelift, "first", 30) or setattr(s.smokelift, "last", 20), "Frames 30 to 20"),
-        (lambda s: setattr(s.smokelift, "plate", ""), "Choose the clean plate"),
-        (lambda s: setattr(s.smokelift, "plate", "//none.png"), "none.png is not there"),
-        (lambda s: setattr(s.smokelift, "box", None), "Make Box"),
-        (lambda s: setattr(s.smokelift.box, "scale", (1.0, 0.0, 1.0)), "flat"),
-        (lambda s: setattr(s.smokelift.box, "location", (30.0, 0.0, 1.5)), "not in the camera's picture"),
-        (lambda s: setattr(s.smokelift.box, "location", (0.0, -30.0, 1.5)), "not in the camera's picture"),
+        (lambda s: setattr(smoke(s).smokelift, "clip", None), "Choose a clip"),
+        (lambda s: setattr(smoke(s).smokelift, "last", 49), "frames 1 to 48"),
+        (
+            lambda s: setattr(smoke(s).smokelift, "first", 30) or setattr(smoke(s).smokelift, "last", 20),
+            "Frames 30 to 20",
+        ),
+        (lambda s: setattr(smoke(s).smokelift, "plate", ""), "Choose the clean plate"),
+        (lambda s: setattr(smoke(s).smokelift, "plate", "//none.png"), "none.png is not there"),
+        (lambda s: setattr(smoke(s).smokelift, "box", None), "Make Box"),
+        (lambda s: setattr(smoke(s).smokelift.box, "scale", (1.0, 0.0, 1.0)), "flat"),
+        (lambda s: setattr(smoke(s).smokelift.box, "location", (30.0, 0.0, 1.5)), "not in the camera's picture"),
+        (lambda s: setattr(smoke(s).smokelift.box, "location", (0.0, -30.0, 1.5)), "not in the camera's picture"),
         (lambda s: setattr(s.camera, "scale", (1.0, 1.0, -1.0)), "mirrored"),
-        (lambda s: setattr(s.smokelift.clip, "filepath", "//moved.mp4"), "moved.mp4 is not there"),
+        (lambda s: setattr(smoke(s).smokelift.clip, "filepath", "//moved.mp4"), "moved.mp4 is not there"),
         (lambda s: bpy.data.objects.remove(bpy.data.objects["Sun"]), "no sun"),
         (lambda s: setattr(add_inlet(s), "location", (0.0, 0.0, -2.0)), "inlet is outside the box"),
         (lambda s: setattr(add_inlet(s), "scale", (0.0, 0.0, 0.0)), "inlet has no size"),
@@ -254,7 +259,7 @@ def test_one_picture_is_no_clean_plate_of_a_moving_camera(tracked, tmp_path) -> 
 )
 def test_what_is_missing_is_said(shot, spoil, words) -> None:
     """One sentence each, that says what to do."""
-    shot_tables(shot)
+    shot_tables(smoke(shot))
     spoil(shot)
     assert words in refusal(shot)
 
@@ -264,29 +269,29 @@ def test_what_is_missing_is_said(shot, spoil, words) -> None:
 
 def test_frames_are_counted_from_nought(shot) -> None:
     """Blender counts from one."""
-    shot.smokelift.first, shot.smokelift.last = 5, 9
-    table = shot_tables(shot)["clip"]
+    smoke(shot).smokelift.first, smoke(shot).smokelift.last = 5, 9
+    table = shot_tables(smoke(shot))["clip"]
     assert table == {"path": str(EXAMPLE / "clip.mp4"), "frames": [4, 8]}
 
 
 @pytest.mark.parametrize("offset", [0, 2])
 def test_frames_for_the_command_line_are_those_of_the_scene_file(shot, offset) -> None:
     """Counted from 0 in the file, wherever Blender starts to play it."""
-    shot.smokelift.clip.frame_offset = offset
-    use_frames(shot, 3, 9)
-    assert (shot.smokelift.first, shot.smokelift.last) == (4 - offset, 10 - offset)
-    assert shot_tables(shot)["clip"]["frames"] == [3, 9]
+    smoke(shot).smokelift.clip.frame_offset = offset
+    use_frames(smoke(shot), 3, 9)
+    assert (smoke(shot).smokelift.first, smoke(shot).smokelift.last) == (4 - offset, 10 - offset)
+    assert shot_tables(smoke(shot))["clip"]["frames"] == [3, 9]
     with pytest.raises(ShotError, match=f"it has frames {offset} to {47 + offset}, from 0"):
-        use_frames(shot, offset - 1, 9)
+        use_frames(smoke(shot), offset - 1, 9)
 
 
 def test_a_new_clip_is_used_whole(shot, tmp_path) -> None:
     """Its length is known at once."""
-    shot.smokelift.first, shot.smokelift.last = 5, 9
+    smoke(shot).smokelift.first, smoke(shot).smokelift.last = 5, 9
     load_clip(shot, EXAMPLE / "plate.png")
-    assert (shot.smokelift.first, shot.smokelift.last) == (1, 1)
+    assert (smoke(shot).smokelift.first, smoke(shot).smokelift.last) == (1, 1)
     load_clip(shot, EXAMPLE / "clip.mp4")
-    assert (shot.smokelift.first, shot.smokelift.last) == (1, 48)
+    assert (smoke(shot).smokelift.first, smoke(shot).smokelift.last) == (1, 48)
 
 
 def test_a_picture_sequence_has_the_scenes_rate(shot, tmp_path) -> None:
@@ -295,30 +300,30 @@ def test_a_picture_sequence_has_the_scenes_rate(shot, tmp_path) -> None:
         (tmp_path / f"smoke_{number:03d}.png").write_bytes((EXAMPLE / "plate.png").read_bytes())
     load_clip(shot, tmp_path / "smoke_007.png")
     shot.render.fps, shot.render.fps_base = 30, 1.001
-    table = shot_tables(shot)["clip"]
+    table = shot_tables(smoke(shot))["clip"]
     assert table["frames"] == [0, 4]
     assert table["path"].endswith("smoke_007.png")
     assert table["fps"] == pytest.approx(30 / 1.001)
-    shot.smokelift.fps = 120.0
-    shot.smokelift.transfer = "linear"
-    table = shot_tables(shot)["clip"]
+    smoke(shot).smokelift.fps = 120.0
+    smoke(shot).smokelift.transfer = "linear"
+    table = shot_tables(smoke(shot))["clip"]
     assert (table["fps"], table["transfer"]) == (120.0, "linear")
 
 
 @pytest.mark.parametrize(("space", "transfer"), [("sRGB", None), ("Linear Rec.709", "linear"), ("Non-Color", "linear")])
 def test_the_clips_color_space_counts(shot, space, transfer) -> None:
     """As the Movie Clip Editor has it."""
-    shot.smokelift.clip.colorspace_settings.name = space
-    assert shot_tables(shot)["clip"].get("transfer") == transfer
+    smoke(shot).smokelift.clip.colorspace_settings.name = space
+    assert shot_tables(smoke(shot))["clip"].get("transfer") == transfer
 
 
 def test_a_color_space_that_cannot_be_read_is_refused(shot) -> None:
     """In one sentence; who knows better chooses the transfer."""
-    shot.smokelift.clip.colorspace_settings.name = "Filmic Log"
+    smoke(shot).smokelift.clip.colorspace_settings.name = "Filmic Log"
     with pytest.raises(ShotError, match=r"color space is Filmic Log.*convert the clip.*Advanced"):
-        shot_tables(shot)
-    shot.smokelift.transfer = "srgb"
-    assert shot_tables(shot)["clip"]["transfer"] == "srgb"
+        shot_tables(smoke(shot))
+    smoke(shot).smokelift.transfer = "srgb"
+    assert shot_tables(smoke(shot))["clip"]["transfer"] == "srgb"
 
 
 def test_paths_beside_the_blend(shot, tmp_path) -> None:
@@ -326,16 +331,16 @@ def test_paths_beside_the_blend(shot, tmp_path) -> None:
     for name in ("clip.mp4", "plate.png"):
         (tmp_path / name).write_bytes((EXAMPLE / name).read_bytes())
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
-    shot.smokelift.clip.filepath, shot.smokelift.plate = "//clip.mp4", "//plate.png"
-    tables = shot_tables(shot)
+    smoke(shot).smokelift.clip.filepath, smoke(shot).smokelift.plate = "//clip.mp4", "//plate.png"
+    tables = shot_tables(smoke(shot))
     assert tables["clip"]["path"] == str(tmp_path / "clip.mp4")
     assert tables["background"]["image"] == str(tmp_path / "plate.png")
 
 
 def test_guessing_leaves_camera_and_box_to_the_engine(shot, tmp_path) -> None:
     """Then none is needed."""
-    shot.smokelift.camera_mode, shot.camera, shot.smokelift.box = "GUESS", None, None
-    tables = shot_tables(shot)
+    smoke(shot).smokelift.camera_mode, shot.camera, smoke(shot).smokelift.box = "GUESS", None, None
+    tables = shot_tables(smoke(shot))
     assert "camera" not in tables
     assert "domain" not in tables
     assert engines(shot, tmp_path).camera is None
@@ -347,7 +352,7 @@ def test_guessing_leaves_camera_and_box_to_the_engine(shot, tmp_path) -> None:
 @pytest.mark.parametrize(("quality", "longest"), [("draft", 64), ("balanced", 96), ("fine", 144)])
 def test_the_box_becomes_cubes(shot, tmp_path, quality, longest) -> None:
     """As many as the engine would choose; the box holds all of the user's, and keeps its floor."""
-    shot.smokelift.quality = quality
+    smoke(shot).smokelift.quality = quality
     domain = engines(shot, tmp_path).domain
     assert max(domain.resolution) == longest
     assert all(low <= -1.0 + 1e-6 for low in domain.min[:2])
@@ -365,26 +370,26 @@ def test_the_engine_has_the_same_qualities() -> None:
 
 def test_a_resolution_of_ones_own(shot, tmp_path) -> None:
     """Along the longest side."""
-    shot.smokelift.longest_side = 40
+    smoke(shot).smokelift.longest_side = 40
     assert engines(shot, tmp_path).domain.resolution == (28, 28, 40)
 
 
 def test_a_resolution_that_is_left_open_is_measured(shot) -> None:
     """In the scene's box; a box that is guessed always is, and a number of one's own never."""
-    assert module.options(shot)[-2:] == ["--resolution", "auto"]
-    shot.smokelift.longest_side = 40
-    assert "--resolution" not in module.options(shot)
-    shot.smokelift.longest_side, shot.smokelift.camera_mode = 0, "GUESS"
-    assert "--resolution" not in module.options(shot)
+    assert module.options(smoke(shot))[-2:] == ["--resolution", "auto"]
+    smoke(shot).smokelift.longest_side = 40
+    assert "--resolution" not in module.options(smoke(shot))
+    smoke(shot).smokelift.longest_side, smoke(shot).smokelift.camera_mode = 0, "GUESS"
+    assert "--resolution" not in module.options(smoke(shot))
 
 
 def test_a_turned_box_turns_everything_else(shot, tmp_path) -> None:
     """The engine sees the same picture: points of the box, in its own axes, fall where Blender sees them."""
-    box = shot.smokelift.box
+    box = smoke(shot).smokelift.box
     box.rotation_euler = (0.2, -0.1, 0.5)
     bpy.context.view_layer.update()
     found = engines(shot, tmp_path)
-    world = module.engine_to_world(shot)
+    world = module.engine_to_world(smoke(shot))
     corners = np.array([world.inverted() @ corner for corner in module.box_corners(box)])
     low, high = corners.min(0), corners.max(0)
     assert (np.array(found.domain.min) <= low + 1e-5).all()
@@ -398,7 +403,7 @@ def test_a_turned_box_turns_everything_else(shot, tmp_path) -> None:
 
 def add_inlet(scene: bpy.types.Scene) -> bpy.types.Object:
     """An Empty in the smoke, drawn 0.2 m large."""
-    inlet = scene.smokelift.inlet = add(scene, "Inlet", None)
+    inlet = smoke(scene).smokelift.inlet = add(scene, "Inlet", None)
     inlet.location, inlet.empty_display_size = (0.1, -0.2, 0.3), 0.2
     return inlet
 
@@ -406,11 +411,11 @@ def add_inlet(scene: bpy.types.Scene) -> bpy.types.Object:
 def test_a_floor(shot, tmp_path) -> None:
     """Of the box that is given, and of one that is found, even where the scene's lights are used."""
     assert engines(shot, tmp_path).closed == ()
-    shot.smokelift.floor = True
+    smoke(shot).smokelift.floor = True
     assert engines(shot, tmp_path).closed == ("z-",)
-    shot.smokelift.camera_mode = "GUESS"
+    smoke(shot).smokelift.camera_mode = "GUESS"
     add(shot, "Lamp", bpy.data.lights.new("Lamp", "POINT"))
-    assert shot_tables(shot)["domain"] == {"closed": ["z-"]}
+    assert shot_tables(smoke(shot))["domain"] == {"closed": ["z-"]}
     found = engines(shot, tmp_path)
     assert (found.domain, found.closed) == (None, ("z-",))
 
@@ -420,37 +425,37 @@ def test_an_inlet(shot, tmp_path) -> None:
     assert engines(shot, tmp_path).inlets == ()
     inlet = add_inlet(shot)
     inlet.scale = (1.0, 1.0, 1.5)
-    shot.smokelift.box.rotation_euler = (0.2, -0.1, 0.5)
+    smoke(shot).smokelift.box.rotation_euler = (0.2, -0.1, 0.5)
     bpy.context.view_layer.update()
     (found,) = engines(shot, tmp_path).inlets
     assert found.radius == pytest.approx(0.3)
-    assert list(module.engine_to_world(shot) @ Vector(found.centre)) == pytest.approx([0.1, -0.2, 0.3], abs=1e-6)
+    assert list(module.engine_to_world(smoke(shot)) @ Vector(found.centre)) == pytest.approx([0.1, -0.2, 0.3], abs=1e-6)
     bpy.data.objects.remove(inlet)
     assert engines(shot, tmp_path).inlets == ()
 
 
 def test_a_known_depth(shot) -> None:
     """Said to the engine if it is known, in one word even where it is negative; zero is a depth as well."""
-    shot.smokelift.axis_depth = -0.25
-    assert not any(word.startswith("--axis-depth") for word in module.options(shot))
-    shot.smokelift.use_axis_depth = True
-    assert "--axis-depth=-0.25" in module.options(shot)
-    shot.smokelift.axis_depth = 0.0
-    assert "--axis-depth=0" in module.options(shot)
+    smoke(shot).smokelift.axis_depth = -0.25
+    assert not any(word.startswith("--axis-depth") for word in module.options(smoke(shot)))
+    smoke(shot).smokelift.use_axis_depth = True
+    assert "--axis-depth=-0.25" in module.options(smoke(shot))
+    smoke(shot).smokelift.axis_depth = 0.0
+    assert "--axis-depth=0" in module.options(smoke(shot))
 
 
 def test_depth_detail_and_variation(shot) -> None:
     """Said to the engine always, as they are shown: the slider's 0.3 is not 0.30000001."""
-    assert {"--detail=1", "--seed=0"} <= set(module.options(shot))
-    shot.smokelift.detail, shot.smokelift.seed = 0.3, 12
-    assert {"--detail=0.3", "--seed=12"} <= set(module.options(shot))
+    assert {"--detail=1", "--seed=0"} <= set(module.options(smoke(shot)))
+    smoke(shot).smokelift.detail, smoke(shot).smokelift.seed = 0.3, 12
+    assert {"--detail=0.3", "--seed=12"} <= set(module.options(smoke(shot)))
 
 
 def test_an_inlet_needs_a_box_of_its_own(shot) -> None:
     """In a box that is found it would stand anywhere."""
     add_inlet(shot)
-    shot.smokelift.camera_mode = "GUESS"
-    assert "inlet" not in shot_tables(shot)
+    smoke(shot).smokelift.camera_mode = "GUESS"
+    assert "inlet" not in shot_tables(smoke(shot))
 
 
 # lights
@@ -458,7 +463,7 @@ def test_an_inlet_needs_a_box_of_its_own(shot) -> None:
 
 def lights(scene: bpy.types.Scene) -> list[dict]:
     bpy.context.view_layer.update()
-    return shot_tables(scene)["lights"]
+    return shot_tables(smoke(scene))["lights"]
 
 
 def test_a_sun(shot) -> None:
@@ -531,9 +536,9 @@ def test_a_world_picture_that_is_turned(shot, panorama) -> None:
     assert lights(shot)[-1]["rotation_degrees"] == pytest.approx(30.0)
     mapping.vector_type = "TEXTURE"
     assert lights(shot)[-1]["rotation_degrees"] == pytest.approx(-30.0)
-    shot.smokelift.box.rotation_euler[2] = math.radians(10.0)
+    smoke(shot).smokelift.box.rotation_euler[2] = math.radians(10.0)
     assert lights(shot)[-1]["rotation_degrees"] == pytest.approx(-20.0)
-    shot.smokelift.box.rotation_euler[0] = math.radians(10.0)
+    smoke(shot).smokelift.box.rotation_euler[0] = math.radians(10.0)
     bpy.context.view_layer.update()
     assert "tilted" in refusal(shot)
 
@@ -555,7 +560,7 @@ def test_world_pictures_that_cannot_be_used(shot, panorama) -> None:
 def test_a_medium_of_ones_own(shot, tmp_path) -> None:
     """Only if asked for."""
     assert engines(shot, tmp_path).medium is None
-    settings = shot.smokelift
+    settings = smoke(shot).smokelift
     settings.use_medium, settings.extinction, settings.albedo, settings.anisotropy = True, 7.0, 0.5, -0.25
     medium = engines(shot, tmp_path).medium
     assert (medium.extinction, medium.albedo, medium.anisotropy) == (7.0, 0.5, -0.25)

@@ -21,7 +21,7 @@ from smokelift.output.images import write_image
 from smokelift.output.vdb import write_vdb
 from smokelift.output.video import write_video
 from smokelift.scene import Camera, Domain, Medium, Scene, scene_to_dict
-from tests.example_shot import EXAMPLE, add
+from tests.example_shot import EXAMPLE, smoke
 
 FRAMES = 6
 HALF_VOXEL_TOO_FAR = bpy.app.version < (5, 0, 0)
@@ -47,7 +47,7 @@ def made(folder: Path, frames: int = FRAMES, fps: float = 24.0, medium: Medium |
 def evaluated(scene: bpy.types.Scene, frame: int) -> bpy.types.Object:
     """The smoke as it is seen in a frame, its grids loaded."""
     scene.frame_set(frame)
-    obj = scene.smokelift.volume.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    obj = smoke(scene).evaluated_get(bpy.context.evaluated_depsgraph_get())
     obj.data.grids.load()
     return obj
 
@@ -65,17 +65,17 @@ def plays(scene: bpy.types.Scene, frame: int) -> int | None:
 
 def test_every_frame_has_its_file_and_nothing_plays_before_or_after(shot, tmp_path) -> None:
     """One file a frame where the rates agree."""
-    volume.show(shot, made(tmp_path))
+    volume.show(smoke(shot), made(tmp_path))
     assert [plays(shot, frame) for frame in range(0, 9)] == [None, 1, 2, 3, 4, 5, 6, None, None]
-    data = shot.smokelift.volume.data
+    data = smoke(shot).data
     assert (data.frame_start, data.frame_duration, data.frame_offset) == (1, FRAMES, 0)
     assert data.animation_data is None or not data.animation_data.drivers
 
 
 def test_part_of_a_clip_plays_where_the_clip_does(shot, tmp_path) -> None:
     """Also if the clip starts late."""
-    shot.smokelift.first, shot.smokelift.clip.frame_start = 11, 101
-    volume.show(shot, made(tmp_path))
+    smoke(shot).smokelift.first, smoke(shot).smokelift.clip.frame_start = 11, 101
+    volume.show(smoke(shot), made(tmp_path))
     assert [plays(shot, frame) for frame in (110, 111, 116, 117)] == [None, 1, 6, None]
 
 
@@ -89,18 +89,18 @@ def test_part_of_a_clip_plays_where_the_clip_does(shot, tmp_path) -> None:
 )
 def test_in_real_time_at_another_frame_rate(shot, tmp_path, fps, wanted) -> None:
     """A second of the clip is a second of the scene."""
-    shot.render.fps, shot.smokelift.speed = fps, "REAL"
-    volume.show(shot, made(tmp_path))
+    shot.render.fps, smoke(shot).smokelift.speed = fps, "REAL"
+    volume.show(smoke(shot), made(tmp_path))
     assert [plays(shot, frame) for frame in range(len(wanted))] == wanted
-    assert shot.smokelift.volume.data.velocity_scale == 1.0
+    assert smoke(shot).data.velocity_scale == 1.0
 
 
 def test_frame_by_frame_at_another_frame_rate(shot, tmp_path) -> None:
     """As Blender plays the clip itself, unless told otherwise; motion blur follows what is seen."""
     shot.render.fps = 48
-    volume.show(shot, made(tmp_path))
+    volume.show(smoke(shot), made(tmp_path))
     assert [plays(shot, frame) for frame in (0, 1, 6, 7)] == [None, 1, 6, None]
-    assert shot.smokelift.volume.data.velocity_scale == pytest.approx(2.0)
+    assert smoke(shot).data.velocity_scale == pytest.approx(2.0)
 
 
 def tracked(take: Take, **tables: dict) -> dict:
@@ -114,12 +114,12 @@ def tracked(take: Take, **tables: dict) -> dict:
 
 def test_smoke_keeps_step_with_a_camera_that_moves(shot, tmp_path) -> None:
     """Blender plays clip and track frame by frame, whatever their rate."""
-    shot.render.fps, shot.smokelift.speed = 48, "REAL"
+    shot.render.fps, smoke(shot).smokelift.speed = 48, "REAL"
     take = made(tmp_path)
     tracked(take)
-    volume.show(shot, take)
+    volume.show(smoke(shot), take)
     assert [plays(shot, frame) for frame in range(0, 9)] == [None, 1, 2, 3, 4, 5, 6, None, None]
-    assert shot.smokelift.volume.data.velocity_scale == pytest.approx(2.0)
+    assert smoke(shot).data.velocity_scale == pytest.approx(2.0)
 
 
 @pytest.mark.parametrize("kind", ["pictures", "video"])
@@ -135,10 +135,10 @@ def test_the_plate_of_a_moving_camera_plays_beside_the_clip(shot, tmp_path, kind
             write_image(tmp_path / f"plate_{number:04d}.png", plate)
     take = made(tmp_path)
     index = tracked(take, background={"image": str(path)})
-    obj = volume.show(shot, take)
+    obj = volume.show(smoke(shot), take)
     places = []
     for _ in range(2):
-        shot_setup.set_up(shot, take, index)
+        shot_setup.set_up(smoke(shot), take, index)
     shot.render.resolution_x, shot.render.resolution_y = 16, 24
     shot.cycles.samples, shot.cycles.use_denoising = 1, False
     for frame in (2, 5):
@@ -152,10 +152,10 @@ def test_the_plate_of_a_moving_camera_plays_beside_the_clip(shot, tmp_path, kind
 def test_changing_the_speed_acts_at_once_and_leaves_no_driver(shot, tmp_path) -> None:
     """What was right for one speed is not kept for another."""
     shot.render.fps = 48
-    volume.show(shot, made(tmp_path))
-    shot.smokelift.speed = "REAL"
+    volume.show(smoke(shot), made(tmp_path))
+    smoke(shot).smokelift.speed = "REAL"
     assert [plays(shot, frame) for frame in (1, 2, 3, 12, 13)] == [1, 1, 2, 6, None]
-    shot.smokelift.speed = "FRAMES"
+    smoke(shot).smokelift.speed = "FRAMES"
     assert [plays(shot, frame) for frame in (1, 2, 6, 7)] == [1, 2, 6, None]
 
 
@@ -165,13 +165,13 @@ def test_the_smoke_keeps_step_with_a_clip_that_is_moved(shot, tmp_path) -> None:
     index = json.loads((take.directory / "sequence.json").read_text())
     index["scene"]["clip"]["frames"] = [10, 15]
     (take.directory / "sequence.json").write_text(json.dumps(index))
-    data = volume.show(shot, take).data
+    data = volume.show(smoke(shot), take).data
     assert data.frame_start == 11
-    shot.smokelift.first = 3
-    shot.smokelift.clip.frame_start = 101
+    smoke(shot).smokelift.first = 3
+    smoke(shot).smokelift.clip.frame_start = 101
     volume.keep_step()  # Blender calls it where there is a window
     assert data.frame_start == 111
-    shot.smokelift.clip.frame_offset = 4
+    smoke(shot).smokelift.clip.frame_offset = 4
     volume.keep_step()
     assert data.frame_start == 107
     data.frame_start = 500
@@ -187,41 +187,9 @@ def test_it_grows(shot, tmp_path) -> None:
     for count in (0, 2, 5):
         some = {**whole, "complete": False, "frames": {str(n): {} for n in range(1, count + 1)}}
         (take.directory / "sequence.json").write_text(json.dumps(some))
-        obj = volume.show(shot, take)
+        obj = volume.show(smoke(shot), take)
         seen.append(obj and (obj.name, obj.data.frame_duration))
-    assert seen == [None, ("Smoke clip.mp4", 2), ("Smoke clip.mp4", 5)]
-
-
-# what is there beside it
-
-
-def test_new_smoke_is_selected_and_active(shot, tmp_path) -> None:
-    """Once: made anew, it leaves the artist's selection alone."""
-    sun = shot.objects["Sun"]
-    sun.select_set(True)
-    obj = volume.show(shot, made(tmp_path))
-    assert bpy.context.view_layer.objects.active == obj
-    assert [other for other in shot.objects if other.select_get()] == [obj]
-    bpy.context.view_layer.objects.active = sun
-    volume.show(shot, made(tmp_path, number=2))
-    assert bpy.context.view_layer.objects.active == sun
-
-
-@pytest.mark.parametrize("change", [None, "location", "name", "vertex", "camera"])
-def test_the_cube_of_a_new_file_does_not_hide_the_smoke(shot, tmp_path, change) -> None:
-    """Where the place of the smoke is guessed; a cube that somebody made something of stays."""
-    cube = add(shot, "Cube", bpy.data.meshes.new("Cube"))
-    corners = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
-    cube.data.from_pydata(corners, [], [(0, 1, 3, 2), (4, 6, 7, 5)])
-    shot.smokelift.camera_mode = "SCENE" if change == "camera" else "GUESS"
-    if change == "location":
-        cube.location.x = 3.0
-    elif change == "name":
-        cube.name = "Crate"
-    elif change == "vertex":
-        cube.data.vertices[0].co.x = -2.0
-    volume.show(shot, made(tmp_path))
-    assert cube.hide_render == cube.hide_viewport == (change is None)
+    assert seen == [None, ("Smoke", 2), ("Smoke", 5)]
 
 
 # where it is
@@ -230,7 +198,7 @@ def test_the_cube_of_a_new_file_does_not_hide_the_smoke(shot, tmp_path, change) 
 def test_grids_and_their_place(shot, tmp_path) -> None:
     """Density and velocity, in the engine's voxels: the smoke is where the engine has it."""
     take = made(tmp_path)
-    volume.show(shot, take)
+    volume.show(smoke(shot), take)
     obj = evaluated(shot, 3)
     grids = {grid.name: grid for grid in obj.data.grids}
     assert {name: grid.data_type for name, grid in grids.items()} == {"density": "FLOAT", "velocity": "VECTOR_FLOAT"}
@@ -249,13 +217,13 @@ def test_grids_and_their_place(shot, tmp_path) -> None:
 
 def test_a_turned_box_turns_the_smoke(shot, tmp_path) -> None:
     """With the box's rotation, about the world's origin, as its scene was given."""
-    shot.smokelift.box.rotation_euler = (0.1, 0.2, 0.7)
+    smoke(shot).smokelift.box.rotation_euler = (0.1, 0.2, 0.7)
     bpy.context.view_layer.update()
-    obj = volume.show(shot, made(tmp_path))
+    obj = volume.show(smoke(shot), made(tmp_path))
     bpy.context.view_layer.update()
-    turn = obj.matrix_world.to_quaternion().rotation_difference(shot.smokelift.box.matrix_world.to_quaternion())
+    turn = obj.matrix_world.to_quaternion().rotation_difference(smoke(shot).smokelift.box.matrix_world.to_quaternion())
     assert turn.angle == pytest.approx(0.0, abs=1e-5)
-    assert len(box_corners(shot.smokelift.box)) == 8
+    assert len(box_corners(smoke(shot).smokelift.box)) == 8
     shift = obj.matrix_world.to_3x3().inverted() @ obj.matrix_world.translation
     assert list(shift) == pytest.approx([-0.0625] * 3 if HALF_VOXEL_TOO_FAR else [0.0] * 3, abs=1e-6)
 
@@ -263,22 +231,22 @@ def test_a_turned_box_turns_the_smoke(shot, tmp_path) -> None:
 def test_smoke_that_was_moved_stays_where_it_was_put(shot, tmp_path) -> None:
     """While it grows, and when it is made anew: also if the box was rotated meanwhile."""
     first = made(tmp_path)
-    obj = volume.show(shot, first)
+    obj = volume.show(smoke(shot), first)
     obj.location.x, obj.rotation_euler.z, obj.scale = obj.location.x + 5.0, 0.5, (2.0, 2.0, 2.0)
-    volume.show(shot, first)
-    shot.smokelift.box.rotation_euler.z = 0.7
+    volume.show(smoke(shot), first)
+    smoke(shot).smokelift.box.rotation_euler.z = 0.7
     bpy.context.view_layer.update()
-    volume.show(shot, made(tmp_path, number=2))
+    volume.show(smoke(shot), made(tmp_path, number=2))
     assert obj.location.x == pytest.approx(5.0)
     assert (obj.rotation_euler.z, obj.scale.x) == pytest.approx((0.5, 2.0))
 
 
 def test_smoke_that_was_not_moved_follows_the_box(shot, tmp_path) -> None:
     """Another take, in a box that was rotated meanwhile."""
-    obj = volume.show(shot, made(tmp_path))
-    shot.smokelift.box.rotation_euler.z = 0.7
+    obj = volume.show(smoke(shot), made(tmp_path))
+    smoke(shot).smokelift.box.rotation_euler.z = 0.7
     bpy.context.view_layer.update()
-    volume.show(shot, made(tmp_path, number=2))
+    volume.show(smoke(shot), made(tmp_path, number=2))
     assert obj.rotation_euler.z == pytest.approx(0.7)
 
 
@@ -287,7 +255,7 @@ def test_smoke_that_was_not_moved_follows_the_box(shot, tmp_path) -> None:
 
 def test_the_material_is_the_mediums(shot, tmp_path) -> None:
     """Extinction, albedo and anisotropy that were fitted; clipping and velocity as the files need them."""
-    obj = volume.show(shot, made(tmp_path))
+    obj = volume.show(smoke(shot), made(tmp_path))
     (material,) = obj.data.materials
     output = next(node for node in material.node_tree.nodes if node.type == "OUTPUT_MATERIAL")
     shader = output.inputs["Volume"].links[0].from_node
@@ -319,22 +287,22 @@ def test_the_material_is_the_mediums(shot, tmp_path) -> None:
 )
 def test_what_is_made_up_is_said(shot, tmp_path, parts, said) -> None:
     """In the panel, and with the Volume wherever it goes; nothing where the engine did not say."""
-    assert volume.provenance_note(shot) == ""
+    assert volume.provenance_note(smoke(shot)) == ""
     take = made(tmp_path)
     file = take.directory / "sequence.json"
     file.write_text(json.dumps({**json.loads(file.read_text()), "provenance": parts}))
-    volume.show(shot, take)
-    assert volume.provenance_note(shot) == said
-    assert shot.smokelift.volume.data[volume.PROVENANCE] == said
-    volume.show(shot, made(tmp_path, number=2))
-    assert volume.provenance_note(shot) == ""
+    volume.show(smoke(shot), take)
+    assert volume.provenance_note(smoke(shot)) == said
+    assert smoke(shot).data[volume.PROVENANCE] == said
+    volume.show(smoke(shot), made(tmp_path, number=2))
+    assert volume.provenance_note(smoke(shot)) == ""
 
 
 def test_running_again_replaces(shot, tmp_path) -> None:
     """One object, one volume, one material, with the new values."""
-    volume.show(shot, made(tmp_path))
+    volume.show(smoke(shot), made(tmp_path))
     before = [len(kind) for kind in (bpy.data.objects, bpy.data.volumes, bpy.data.materials)]
-    obj = volume.show(shot, made(tmp_path, frames=3, medium=Medium(9.0, 0.5), number=2))
+    obj = volume.show(smoke(shot), made(tmp_path, frames=3, medium=Medium(9.0, 0.5), number=2))
     assert [len(kind) for kind in (bpy.data.objects, bpy.data.volumes, bpy.data.materials)] == before
     assert "take_0002" in obj.data.filepath
     assert obj.data.frame_duration == 3
@@ -344,11 +312,11 @@ def test_running_again_replaces(shot, tmp_path) -> None:
 
 def test_a_material_that_was_changed_stays(shot, tmp_path) -> None:
     """What was changed of it and of the view, when the smoke is made anew; the rest is the new medium's."""
-    obj = volume.show(shot, made(tmp_path))
+    obj = volume.show(smoke(shot), made(tmp_path))
     inputs = obj.data.materials[0].node_tree.nodes[volume.SHADER].inputs
     inputs["Density"].default_value, inputs["Color"].default_value = 12.0, (1.0, 0.5, 0.2, 1.0)
     obj.data.display.density = 1.5
-    volume.show(shot, made(tmp_path, medium=Medium(9.0, 0.5, -0.2), number=2))
+    volume.show(smoke(shot), made(tmp_path, medium=Medium(9.0, 0.5, -0.2), number=2))
     assert inputs["Density"].default_value == 12.0
     assert list(inputs["Color"].default_value) == pytest.approx([1.0, 0.5, 0.2, 1.0])
     assert inputs["Anisotropy"].default_value == pytest.approx(-0.2)
@@ -357,27 +325,11 @@ def test_a_material_that_was_changed_stays(shot, tmp_path) -> None:
 
 def test_a_material_of_the_users_own_is_left_alone(shot, tmp_path) -> None:
     """And so is what was added to ours."""
-    obj = volume.show(shot, made(tmp_path))
+    obj = volume.show(smoke(shot), made(tmp_path))
     own = bpy.data.materials.new("Own")
     obj.data.materials[0] = own
-    volume.show(shot, made(tmp_path, number=2))
+    volume.show(smoke(shot), made(tmp_path, number=2))
     assert obj.data.materials[0] == own
-
-
-def test_smoke_that_was_deleted_is_made_again(shot, tmp_path) -> None:
-    """Nothing refers to what is gone."""
-    obj = volume.show(shot, made(tmp_path))
-    bpy.data.objects.remove(obj)
-    assert shot.smokelift.volume is None
-    assert volume.show(shot, made(tmp_path, number=2)).name in shot.objects
-
-
-def test_smoke_that_was_unlinked_is_made_again(shot, tmp_path) -> None:
-    """As the Delete key does it."""
-    obj = volume.show(shot, made(tmp_path))
-    shot.collection.objects.unlink(obj)
-    again = volume.show(shot, made(tmp_path, number=2))
-    assert again.name in shot.objects
 
 
 # saving
@@ -388,23 +340,23 @@ def test_it_survives_saving_and_loading(shot, tmp_path) -> None:
     home = tmp_path / "home"
     home.mkdir()
     bpy.ops.wm.save_as_mainfile(filepath=str(home / "shot.blend"))
-    settings = shot.smokelift
+    settings = smoke(shot).smokelift
     settings.first, settings.last, settings.quality, settings.output = 3, 8, "fine", "//out"
     shot.render.fps, settings.speed = 48, "REAL"
-    volume.show(shot, made(home / "out"))
-    assert settings.volume.data.filepath == "//out/take_0001/smoke_0001.vdb"
+    volume.show(smoke(shot), made(home / "out"))
+    assert smoke(shot).data.filepath == "//out/take_0001/smoke_0001.vdb"
     bpy.ops.wm.save_mainfile()
     moved = home.rename(tmp_path / "moved")
     quietly(lambda: bpy.ops.wm.open_mainfile(filepath=str(moved / "shot.blend")))
     scene = bpy.context.scene
-    settings = scene.smokelift
+    settings = smoke(scene).smokelift
     assert (settings.first, settings.last, settings.quality, settings.output) == (3, 8, "fine", "//out")
     assert settings.clip.name == "clip.mp4"
     assert settings.box.name == "Box"
-    assert volume.shown_take(scene) == Take(moved / "out" / "take_0001")
+    assert volume.shown_take(smoke(scene)) == Take(moved / "out" / "take_0001")
     assert plays(scene, 5) == 1
     assert plays(scene, 7) == 2
-    assert settings.volume.data.materials[0].node_tree.nodes[volume.SHADER].inputs["Density"].default_value == 4.0
+    assert smoke(scene).data.materials[0].node_tree.nodes[volume.SHADER].inputs["Density"].default_value == 4.0
 
 
 def reopened(folder: Path) -> bpy.types.Scene:
@@ -419,19 +371,28 @@ def reopened(folder: Path) -> bpy.types.Scene:
 def test_deleting_earlier_results_spares_what_is_on_show(shot, tmp_path, saved_first) -> None:
     """Whichever Volume of the file shows it, and however Blender writes the way to an output beside its folder."""
     output = tmp_path / "elsewhere"
-    shot.smokelift.output = str(output)
+    smoke(shot).smokelift.output = str(output)
     if saved_first:
         shot = reopened(tmp_path / "shot")
     for number in (1, 2, 3):
         made(output, number=number)
-    copy = volume.show(shot, Take(output / "take_0002")).copy()
+    copy = volume.show(smoke(shot), Take(output / "take_0002")).copy()
     copy.data = copy.data.copy()
     shot.collection.objects.link(copy)
-    volume.show(shot, Take(output / "take_0003"))
+    volume.show(smoke(shot), Take(output / "take_0003"))
     shot = reopened(tmp_path / "later")
     assert bpy.ops.smokelift.remove_takes() == {"FINISHED"}
     assert sorted(path.name for path in output.iterdir()) == ["take_0002", "take_0003"]
     assert plays(shot, 3) == 3
+
+
+def test_smoke_without_a_result_is_saved_and_shows_no_take(shot, tmp_path) -> None:
+    """Blender saves its empty path as that of a folder."""
+    obj = smoke(shot)
+    assert volume.shown_take(obj) is None
+    shot = reopened(tmp_path / "shot")
+    assert volume.shown_take(smoke(shot)) is None
+    assert bpy.ops.smokelift.remove_takes() == {"FINISHED"}
 
 
 def test_a_stopped_run_is_found_again_under_its_own_name(shot, tmp_path) -> None:
@@ -440,9 +401,9 @@ def test_a_stopped_run_is_found_again_under_its_own_name(shot, tmp_path) -> None
     index = json.loads((take.directory / "sequence.json").read_text())
     (take.directory / "sequence.json").write_text(json.dumps({**index, "complete": False}))
     take.write({}, [])
-    volume.show(shot, take)
+    volume.show(smoke(shot), take)
     shot = reopened(tmp_path / "shot")
-    assert run.unfinished(shot) == take
+    assert run.unfinished(smoke(shot)) == take
 
 
 def test_setting_up_keeps_the_plate_by_a_relative_path_and_no_old_world(shot, tmp_path) -> None:
@@ -452,11 +413,11 @@ def test_setting_up_keeps_the_plate_by_a_relative_path_and_no_old_world(shot, tm
     shot = reopened(tmp_path / "shot")
     take = made(tmp_path / "out")
     index = tracked(take, background={"image": str(plate)})
-    volume.show(shot, take)
+    volume.show(smoke(shot), take)
     own = shot.world
     for _ in range(3):
         shot.world = own
-        shot_setup.set_up(shot, take, index)
+        shot_setup.set_up(smoke(shot), take, index)
     (image,) = (image for image in bpy.data.images if image.name == "plate.png")
     assert image.filepath == "//../plate.png"
     assert sorted(world.name for world in bpy.data.worlds) == ["Smokelift", "World"]
@@ -480,7 +441,7 @@ def test_a_guessed_camera_is_made(shot, tmp_path, size) -> None:
     from bpy_extras.object_utils import world_to_camera_view
 
     own = shot.camera
-    shot.smokelift.camera_mode = "GUESS"
+    smoke(shot).smokelift.camera_mode = "GUESS"
     shot.render.resolution_x, shot.render.resolution_y = size
     camera = Camera.look_at((0.0, -5.0, 1.0), (0.0, 0.0, 1.0), fov_y_degrees=30.0, size=size)
     take = made(tmp_path)
@@ -488,7 +449,7 @@ def test_a_guessed_camera_is_made(shot, tmp_path, size) -> None:
     index["scene"]["camera"] = scene_to_dict(Scene(camera=camera))["camera"]
     (take.directory / "sequence.json").write_text(json.dumps(index))
     for _ in range(2):
-        run.present(shot, take)
+        run.present(smoke(shot), take)
     assert shot.camera == own
     (obj,) = (obj for obj in shot.objects if obj.type == "CAMERA" and obj != own)
     bpy.context.view_layer.update()
@@ -498,30 +459,30 @@ def test_a_guessed_camera_is_made(shot, tmp_path, size) -> None:
     assert (place.x * size[0], (1 - place.y) * size[1]) == pytest.approx((column, row), abs=1e-3)
     assert math.isclose(obj.data.lens, camera.fx * 36 / max(size), rel_tol=1e-5)
     shot.camera = None
-    run.present(shot, take)
+    run.present(smoke(shot), take)
     assert shot.camera == obj
     assert replace(camera, size=size) == camera
 
 
 def test_a_guessed_camera_that_was_changed_stays(shot, tmp_path) -> None:
     """Under any name: its place and its lens, each on its own."""
-    shot.smokelift.camera_mode = "GUESS"
+    smoke(shot).smokelift.camera_mode = "GUESS"
     takes = [made(tmp_path, number=number) for number in (1, 2)]
     for take, distance in zip(takes, (5.0, 8.0), strict=True):
         index = json.loads((take.directory / "sequence.json").read_text())
         camera = Camera.look_at((0.0, -distance, 1.0), (0.0, 0.0, 1.0), fov_y_degrees=6 * distance, size=(256, 384))
         index["scene"]["camera"] = scene_to_dict(Scene(camera=camera))["camera"]
         (take.directory / "sequence.json").write_text(json.dumps(index))
-    run.present(shot, takes[0])
+    run.present(smoke(shot), takes[0])
     (obj,) = (obj for obj in shot.objects if obj.type == "CAMERA" and obj != shot.camera)
     obj.name, obj.location.y = "Mine", -6.0
-    run.present(shot, takes[0])
+    run.present(smoke(shot), takes[0])
     assert obj.location.y == -6.0
-    run.present(shot, takes[1])
+    run.present(smoke(shot), takes[1])
     assert len([obj for obj in shot.objects if obj.type == "CAMERA"]) == 2
     assert obj.location.y == -6.0
     lens = obj.data.lens
     assert lens == pytest.approx(18.0 / math.tan(math.radians(24.0)), rel=1e-4), "the lens was not changed by hand"
     obj.data.lens = 85.0
-    run.present(shot, takes[0])
+    run.present(smoke(shot), takes[0])
     assert obj.data.lens == 85.0

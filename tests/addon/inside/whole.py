@@ -13,8 +13,9 @@ import pytest
 import smokelift
 from addon import run, volume
 from addon.scene_file import point_intensity, shot_tables, sun_irradiance
+from addon.smoke import activate, smokes
 from addon.take import Take, takes
-from conftest import rendered
+from conftest import quietly, rendered
 from smokelift.density.hull import voxel_centres
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import area_average, linear_to_srgb
@@ -22,7 +23,7 @@ from smokelift.output.images import write_image
 from smokelift.output.sequence import Sequence
 from smokelift.scene import Scene, scene_from_dict
 from smokelift.setup.settings import Settings
-from tests.example_shot import EXAMPLE, add
+from tests.example_shot import EXAMPLE, add, smoke
 
 FIRST, LAST = 27, 30
 LONGEST = 40
@@ -41,7 +42,7 @@ def filmed(number: int, width: int, height: int) -> np.ndarray:
 
 def choose(scene: bpy.types.Scene, folder: Path) -> None:
     """Few frames, few voxels, and where they go."""
-    settings = scene.smokelift
+    settings = smoke(scene).smokelift
     settings.first, settings.last, settings.longest_side = FIRST, LAST, LONGEST
     settings.output = str(folder)
 
@@ -67,7 +68,7 @@ def made(scene: bpy.types.Scene, folder: Path, kept: Path) -> Take:
     shutil.copytree(kept, folder)
     choose(scene, folder)
     take = Take(folder / "take_0001")
-    run.present(scene, take)
+    run.present(smoke(scene), take)
     return take
 
 
@@ -80,9 +81,9 @@ def look_alike(scene: bpy.types.Scene, folder: Path) -> tuple[float, float]:
     found = rendered(scene, folder / "render.png")
     height, width = found.shape[:2]
     wanted, plate = filmed(LAST, width, height), filmed(1, width, height)
-    smoke = np.abs(wanted - plate).max(-1) > 0.05
-    assert smoke.mean() > 0.05
-    return psnr(found, wanted), psnr(found[smoke], wanted[smoke])
+    within = np.abs(wanted - plate).max(-1) > 0.05
+    assert within.mean() > 0.05
+    return psnr(found, wanted), psnr(found[within], wanted[within])
 
 
 def test_everything_known(shot, kept, tmp_path) -> None:
@@ -93,49 +94,49 @@ def test_everything_known(shot, kept, tmp_path) -> None:
     assert (row.outcome, row.done, row.total) == ("done", 4, 4)
     sequence = Sequence.open(kept / "take_0001")
     assert sequence.complete
-    data = shot.smokelift.volume.data
+    data = smoke(shot).data
     assert (data.frame_start, data.frame_duration) == (FIRST, 4)
     shader = data.materials[0].node_tree.nodes[volume.SHADER]
     assert shader.inputs["Density"].default_value == pytest.approx(sequence.scene.medium.extinction)
-    whole, smoke = look_alike(shot, tmp_path)
+    whole, within = look_alike(shot, tmp_path)
     assert whole > WANTED_DB + 5
-    assert smoke > WANTED_DB
+    assert within > WANTED_DB
 
 
 def test_light_and_background_from_the_clip(shot, tmp_path) -> None:
     """The light that was estimated is made, the background that was estimated is shown."""
-    shot.smokelift.light_mode, shot.smokelift.plate_mode = "ESTIMATE", "ESTIMATE"
+    smoke(shot).smokelift.light_mode, smoke(shot).smokelift.plate_mode = "ESTIMATE", "ESTIMATE"
     bpy.data.objects.remove(bpy.data.objects["Sun"])
     make(shot, tmp_path / "out")
-    whole, smoke = look_alike(shot, tmp_path)
+    whole, within = look_alike(shot, tmp_path)
     assert whole > WANTED_DB + 2
-    assert smoke > WANTED_DB - 3  # four frames of a standing plume say little about what is behind it
+    assert within > WANTED_DB - 3  # four frames of a standing plume say little about what is behind it
 
 
 def test_nothing_known_but_the_clip(scene, tmp_path) -> None:
     """An empty scene and a clip."""
-    scene.smokelift.clip = bpy.data.movieclips.load(str(EXAMPLE / "clip.mp4"))
-    scene.smokelift.plate_mode, scene.smokelift.plate = "FILE", str(EXAMPLE / "plate.png")
-    scene.smokelift.quality = "draft"
+    smoke(scene).smokelift.clip = bpy.data.movieclips.load(str(EXAMPLE / "clip.mp4"))
+    smoke(scene).smokelift.plate_mode, smoke(scene).smokelift.plate = "FILE", str(EXAMPLE / "plate.png")
+    smoke(scene).smokelift.quality = "draft"
     row = make(scene, tmp_path / "out")
     assert row.outcome == "done"
     assert "Camera not given" in Take(Path(row.take)).log_file.read_text()
     assert not row.warnings
-    whole, smoke = look_alike(scene, tmp_path)
+    whole, within = look_alike(scene, tmp_path)
     assert (scene.render.resolution_x, scene.render.resolution_y) == (256, 384)
     assert whole > WANTED_DB + 5
-    assert smoke > WANTED_DB
+    assert within > WANTED_DB
     assert scene.camera.name == "Smokelift Camera"
 
 
 def test_a_camera_that_moves(shot, tmp_path) -> None:
     """A blob filmed while the camera goes by: it stands still where it was, and a render looks like the clip."""
-    settings, camera = shot.smokelift, shot.camera
+    settings, camera = smoke(shot).smokelift, shot.camera
     for frame, x in ((1, -0.4), (4, 0.4)):
         camera.location.x = x
         camera.keyframe_insert("location", frame=frame)
     settings.first, settings.last, settings.longest_side, settings.plate_mode = 1, 4, LONGEST, "ESTIMATE"
-    known = scene_from_dict({**shot_tables(shot), "medium": {"extinction": 3.0}})
+    known = scene_from_dict({**shot_tables(smoke(shot)), "medium": {"extinction": 3.0}})
     points = voxel_centres(known.domain)
     centre = np.array([0.2, -0.1, 1.3])
     blob = np.maximum(np.exp(-np.sum((points - centre) ** 2, -1) / 0.3**2) - 0.05, 0).astype(np.float32)
@@ -163,7 +164,7 @@ def test_a_camera_that_moves(shot, tmp_path) -> None:
 def test_setting_up_twice_changes_nothing(shot, kept, tmp_path) -> None:
     """No second world, light or background."""
     made(shot, tmp_path / "out", kept)
-    shot.smokelift.light_mode = "ESTIMATE"
+    smoke(shot).smokelift.light_mode = "ESTIMATE"
 
     def census() -> list[int]:
         kinds = (bpy.data.worlds, bpy.data.lights, bpy.data.objects, bpy.data.images, bpy.data.cameras)
@@ -183,12 +184,12 @@ def test_setting_up_twice_changes_nothing(shot, kept, tmp_path) -> None:
 def test_running_twice_makes_a_second_take_and_one_smoke(shot, kept, tmp_path) -> None:
     """The first take's files stay until they are asked to go."""
     made(shot, tmp_path / "out", kept)
-    first = shot.smokelift.volume
+    first = smoke(shot)
     row = make(shot, tmp_path / "out")
     assert row.take.endswith("take_0002")
-    assert shot.smokelift.volume == first
+    assert smoke(shot) == first
     assert [obj for obj in shot.objects if obj.type == "VOLUME"] == [first]
-    assert volume.shown_take(shot) == Take(tmp_path / "out" / "take_0002")
+    assert volume.shown_take(smoke(shot)) == Take(tmp_path / "out" / "take_0002")
     assert Take(tmp_path / "out" / "take_0001").complete()
     assert bpy.ops.smokelift.remove_takes() == {"FINISHED"}
     assert not (tmp_path / "out" / "take_0001").exists()
@@ -198,36 +199,36 @@ def test_running_twice_makes_a_second_take_and_one_smoke(shot, kept, tmp_path) -
 def test_another_variation(shot, kept, tmp_path) -> None:
     """A second take with the next seed takes the place of the first, and the panel says which it is."""
     made(shot, tmp_path / "out", kept)
-    assert "made up: variation 0" in volume.provenance_note(shot)
+    assert "made up: variation 0" in volume.provenance_note(smoke(shot))
     assert bpy.ops.smokelift.vary() == {"FINISHED"}
     (row,) = bpy.context.window_manager.smokelift.jobs
-    assert (row.outcome, shot.smokelift.seed) == ("done", 1)
+    assert (row.outcome, smoke(shot).smokelift.seed) == ("done", 1)
     assert row.take.endswith("take_0002")
     assert Sequence.open(row.take).settings["seed"] == 1
-    assert "made up: variation 1" in volume.provenance_note(shot)
+    assert "made up: variation 1" in volume.provenance_note(smoke(shot))
 
 
 def test_another_variation_needs_something_to_vary(shot, tmp_path) -> None:
     """Without detail the button is off; a shot that cannot be run keeps its variation."""
-    shot.smokelift.detail = 0.0
+    smoke(shot).smokelift.detail = 0.0
     assert not bpy.ops.smokelift.vary.poll()
-    shot.smokelift.detail, shot.smokelift.seed = 0.5, 7
-    shot.smokelift.first = 999
+    smoke(shot).smokelift.detail, smoke(shot).smokelift.seed = 0.5, 7
+    smoke(shot).smokelift.first = 999
     with pytest.raises(RuntimeError, match="Frames 999 to"):
         bpy.ops.smokelift.vary()
-    assert shot.smokelift.seed == 7
+    assert smoke(shot).smokelift.seed == 7
 
 
 def test_a_failure_is_a_sentence_and_a_log(shot, kept, tmp_path) -> None:
     """And leaves the smoke that was there."""
     made(shot, tmp_path / "out", kept)
     (tmp_path / "clip.mp4").write_bytes((EXAMPLE / "clip.mp4").read_bytes())
-    shot.smokelift.clip = bpy.data.movieclips.load(str(tmp_path / "clip.mp4"))
+    smoke(shot).smokelift.clip = bpy.data.movieclips.load(str(tmp_path / "clip.mp4"))
     (tmp_path / "clip.mp4").write_text("not a video " * 100)
     row = make(shot, tmp_path / "out")
     assert row.outcome == "failed"
     assert "is not a video" in row.sentence
-    assert volume.shown_take(shot) == Take(tmp_path / "out" / "take_0001")
+    assert volume.shown_take(smoke(shot)) == Take(tmp_path / "out" / "take_0001")
     assert bpy.ops.smokelift.open_log(take=row.take) == {"FINISHED"}
     assert "is not a video" in bpy.data.texts["Smokelift Log"].as_string()
 
@@ -236,7 +237,7 @@ def test_a_clip_without_smoke_is_not_done(scene, tmp_path) -> None:
     """It fails, and the sentence says what to do in Blender."""
     for number in (1, 2, 3):
         write_image(tmp_path / f"wall_{number}.png", np.full((96, 64, 3), 0.2, np.float32))
-    settings = scene.smokelift
+    settings = smoke(scene).smokelift
     settings.clip = bpy.data.movieclips.load(str(tmp_path / "wall_1.png"))
     settings.quality, settings.output = "draft", str(tmp_path / "out")
     settings.plate_mode, settings.plate = "FILE", str(tmp_path / "wall_1.png")
@@ -265,22 +266,22 @@ def test_a_look_ahead(shot, tmp_path) -> None:
 
 def test_going_on_with_what_was_stopped(shot, tmp_path) -> None:
     """From the last finished frame, with the settings of then, to a complete take."""
-    settings = shot.smokelift
+    settings = smoke(shot).smokelift
     choose(shot, tmp_path / "out")
-    take = run.write_take(shot)
+    take = run.write_take(smoke(shot))
     stopped = Scene.load(take.scene_file)
     with Clip.open(stopped.clip) as clip:
         frames = smokelift.reconstruct(clip, stopped, Settings.preset("draft"), take.directory)
         next(frames), next(frames)
         frames.close()
     settings.quality = "fine"
-    assert run.unfinished(shot) == take
+    assert run.unfinished(smoke(shot)) == take
     assert bpy.ops.smokelift.resume() == {"FINISHED"}
     (row,) = bpy.context.window_manager.smokelift.jobs
     assert (row.outcome, row.done, row.total) == ("done", 4, 4)
     assert take.complete()
-    assert settings.volume.data.frame_duration == 4
-    assert run.unfinished(shot) is None
+    assert smoke(shot).data.frame_duration == 4
+    assert run.unfinished(smoke(shot)) is None
     with pytest.raises(RuntimeError, match="No stopped run to resume"):
         bpy.ops.smokelift.resume()
 
@@ -289,17 +290,77 @@ def test_scenes_have_their_own_smoke(shot, tmp_path) -> None:
     """Each with its own takes and its own volume."""
     make(shot, tmp_path / "one")
     other = bpy.data.scenes.new("Other")
-    other.smokelift.clip = shot.smokelift.clip
-    other.smokelift.quality = "draft"
-    other.smokelift.first, other.smokelift.last = FIRST, FIRST + 1
-    other.smokelift.output = str(tmp_path / "two")
-    run.enqueue(bpy.context, other, run.write_take(other))
+    smoke(other).smokelift.clip = smoke(shot).smokelift.clip
+    smoke(other).smokelift.quality = "draft"
+    smoke(other).smokelift.first, smoke(other).smokelift.last = FIRST, FIRST + 1
+    smoke(other).smokelift.output = str(tmp_path / "two")
+    run.enqueue(bpy.context, smoke(other), run.write_take(smoke(other)))
     rows = bpy.context.window_manager.smokelift.jobs
     assert [row.outcome for row in rows] == ["done", "done"]
-    assert volume.shown_take(shot) == Take(tmp_path / "one" / "take_0001")
-    assert volume.shown_take(other) == Take(tmp_path / "two" / "take_0001")
-    assert other.smokelift.volume.name in other.objects
-    assert other.smokelift.volume.name not in shot.objects
+    assert volume.shown_take(smoke(shot)) == Take(tmp_path / "one" / "take_0001")
+    assert volume.shown_take(smoke(other)) == Take(tmp_path / "two" / "take_0001")
+    assert smoke(other).name in other.objects
+    assert smoke(other).name not in shot.objects
+
+
+def test_an_hours_trial(shot, tmp_path) -> None:
+    """Two smokes, each with its clip: one made again after it was moved, one stopped and resumed from elsewhere."""
+    project = tmp_path / "root" / "project"
+    shutil.copytree(EXAMPLE, project)
+    (project / "clip.mp4").rename(project / "left.mp4")
+    shutil.copy(EXAMPLE / "clip.mp4", project / "right.mp4")
+    bpy.ops.wm.save_as_mainfile(filepath=str(project / "shot.blend"))
+    left = smoke(shot)
+    left.smokelift.clip = bpy.data.movieclips.load(str(project / "left.mp4"))
+    assert bpy.ops.smokelift.add(filepath=str(project / "right.mp4")) == {"FINISHED"}
+    right = bpy.context.view_layer.objects.active
+    for name in ("box", "camera_mode", "plate_mode", "plate", "light_mode", "quality"):
+        setattr(right.smokelift, name, getattr(left.smokelift, name))
+    for obj, first in ((left, FIRST), (right, LAST - 1)):
+        settings = obj.smokelift
+        settings.first, settings.last, settings.longest_side = first, first + 1, 32
+        activate(obj, shot)
+        assert bpy.ops.smokelift.run() == {"FINISHED"}
+    folders = [project / "smokelift" / name for name in ("left", "right")]
+    assert [volume.shown_take(obj) for obj in (left, right)] == [Take(folder / "take_0001") for folder in folders]
+    assert [obj.data.frame_start for obj in (left, right)] == [FIRST, LAST - 1]
+
+    activate(left, shot)
+    left.location.x += 2.0
+    assert bpy.ops.smokelift.run() == {"FINISHED"}
+    assert volume.shown_take(left) == Take(folders[0] / "take_0002")
+    assert left.location.x == pytest.approx(2.0)
+    assert volume.shown_take(right) == Take(folders[1] / "take_0001")
+
+    activate(right, shot)
+    stopped = run.write_take(right)
+    known = Scene.load(stopped.scene_file)
+    with Clip.open(known.clip) as clip:
+        frames = smokelift.reconstruct(clip, known, Settings.preset("draft"), stopped.directory)
+        next(frames)
+        frames.close()
+    run.present(right, stopped)
+    (tmp_path / "root" / "elsewhere").mkdir()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "root" / "elsewhere" / "shot.blend"))
+    assert bpy.ops.smokelift.resume() == {"FINISHED"}
+    row = bpy.context.window_manager.smokelift.jobs[-1]
+    assert (row.outcome, row.done) == ("done", 2), row.sentence
+    assert stopped.complete()
+
+    left.smokelift.output, right.smokelift.output = (str(folder) for folder in folders)
+    for obj in (left, right):
+        activate(obj, shot)
+        assert bpy.ops.smokelift.remove_takes() == {"FINISHED"}
+    assert [[take.directory.name for take in takes(folder)] for folder in folders] == [["take_0002"], ["take_0002"]]
+    bpy.ops.wm.save_mainfile()
+
+    moved = (tmp_path / "root").rename(tmp_path / "moved")
+    quietly(lambda: bpy.ops.wm.open_mainfile(filepath=str(moved / "elsewhere" / "shot.blend")))
+    for obj in smokes(bpy.context.scene):
+        take = volume.shown_take(obj)
+        assert take.directory.is_relative_to(moved)
+        assert take.complete()
+    assert len(smokes(bpy.context.scene)) == 2
 
 
 # lights, as Cycles has them
@@ -364,13 +425,17 @@ def test_cycles_and_the_engine_agree_on_every_light(shot, kept, tmp_path, kind) 
     if kind == "panorama":
         light_by_picture(shot, tmp_path)
     bpy.context.view_layer.update()
-    tables = {**shot_tables(shot), "background": {"color": [0.0, 0.0, 0.0]}, "medium": vars(sequence.scene.medium)}
+    tables = {
+        **shot_tables(smoke(shot)),
+        "background": {"color": [0.0, 0.0, 0.0]},
+        "medium": vars(sequence.scene.medium),
+    }
     lit = scene_from_dict(tables)
     wanted = smokelift.render(sequence.density(LAST - FIRST + 1), lit)
     shot.render.engine = "CYCLES"
     shot.cycles.samples, shot.cycles.use_denoising = 64, False
     shot.render.resolution_percentage = 25
-    shot.smokelift.box.hide_render = True
+    smoke(shot).smokelift.box.hide_render = True
     shot.world.cycles_visibility.camera = False
     shot.frame_set(LAST)
     found = rendered(shot, tmp_path / "lit.exr")

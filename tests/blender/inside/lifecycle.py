@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 from mathutils import Vector
 
-from tests.example_shot import EXAMPLE, set_up_example
+from tests.example_shot import EXAMPLE, set_up_example, smoke
 
 ZIP = Path(os.environ["SMOKELIFT_ZIP"])
 MODULE = "bl_ext.user_default.smokelift"
@@ -127,8 +127,8 @@ def test_makes_smoke(folder) -> None:
     """The example becomes a Volume with the engine's grids, frames, place and material."""
     bpy.ops.wm.read_homefile(use_empty=True)
     scene = set_up_example(bpy.context.scene)
-    scene.smokelift.longest_side = LONGEST_SIDE
-    scene.smokelift.first, scene.smokelift.last = FIRST, LAST
+    smoke(scene).smokelift.longest_side = LONGEST_SIDE
+    smoke(scene).smokelift.first, smoke(scene).smokelift.last = FIRST, LAST
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "shot.blend"))
     assert bpy.ops.smokelift.run() == {"FINISHED"}
     obj = shown(scene)
@@ -136,7 +136,7 @@ def test_makes_smoke(folder) -> None:
     index = json.loads((take_of(obj) / "sequence.json").read_text())
     assert index["complete"] and len(index["frames"]) == FRAMES
     assert volume.is_sequence and volume.frame_duration == FRAMES
-    assert volume.frame_start == scene.smokelift.clip.frame_start + FIRST - 1
+    assert volume.frame_start == smoke(scene).smokelift.clip.frame_start + FIRST - 1
     assert volume.velocity_unit == "SECOND" and volume.velocity_grid == "velocity"
     assert volume.render.clipping == 0.0
     node = next(node for node in obj.active_material.node_tree.nodes if node.type == "PRINCIPLED_VOLUME")
@@ -188,9 +188,9 @@ def test_file_can_be_loaded_again(folder) -> None:
         bpy.ops.wm.read_homefile(use_empty=True)
         bpy.ops.wm.open_mainfile(filepath=str(moved / "shot.blend"))
         scene = bpy.context.scene
-        settings = scene.smokelift
+        settings = smoke(scene).smokelift
         assert (settings.last, settings.longest_side, settings.quality) == (LAST, LONGEST_SIDE, "draft")
-        assert settings.box.name == "Box" and settings.clip is not None and settings.volume == shown(scene)
+        assert settings.box.name == "Box" and settings.clip is not None and smoke(scene) == shown(scene)
         scene.frame_set(shown(scene).data.frame_start)
         assert shown(scene).data.grids.load()
         assert take_of(shown(scene)).is_relative_to(moved)

@@ -45,13 +45,13 @@ def story() -> Iterator[float]:
     # another variation, in the same tab beside the clip; nothing is drawn there that takes long in software
     area.type = "CLIP_EDITOR"
     space = area.spaces.active
-    space.clip, space.show_region_ui = window.scene.smokelift.clip, True
+    space.clip, space.show_region_ui = volume(window).smokelift.clip, True
     yield 1.0
     report["clip_editor"] = yield from make_smoke(window, area, "clip_editor", "bpy.ops.smokelift.vary()")
-    report["variation"] = window.scene.smokelift.seed
+    report["variation"] = volume(window).smokelift.seed
 
     # the clip moved in time: Blender tells the add-on
-    start, clip = volume(window).data.frame_start, window.scene.smokelift.clip
+    start, clip = volume(window).data.frame_start, volume(window).smokelift.clip
     clip.frame_start += 5
     yield 1.0
     report["moved_with_the_clip"] = volume(window).data.frame_start - start
@@ -69,7 +69,6 @@ def story() -> Iterator[float]:
     yield 8.0
     yield from picture("rendered")
     report["volumes"] = sum(obj.type == "VOLUME" for obj in window.scene.objects)
-    report["active"] = window.view_layer.objects.active == volume(window)
 
 
 def volume(window: bpy.types.Window) -> bpy.types.Object:

@@ -18,7 +18,8 @@ MODULE = "bl_ext.user_default.smokelift"
 def story() -> Iterator[float]:
     """One chapter after the other."""
     yield from undo()
-    yield from delete_and_rename()
+    yield from rename()
+    yield from delete()
     yield from save_elsewhere()
     yield from stop_with_the_keyboard()
     yield from queue()
@@ -77,14 +78,24 @@ def undo() -> Iterator[float]:
     report["undo"] = yield from end()
 
 
-def delete_and_rename() -> Iterator[float]:
-    """Delete the smoke with its data, and call the scene something else."""
+def rename() -> Iterator[float]:
+    """Call the smoke and the scene something else."""
     yield from begin()
-    data = volumes()[0].data
-    bpy.data.objects.remove(volumes()[0])
-    bpy.data.volumes.remove(data)
-    scene().name = "Räuchlein"
-    report["delete_and_rename"] = yield from end()
+    scene().name, volumes()[0].name = "Räuchlein", "煙"
+    report["rename"] = yield from end()
+
+
+def delete() -> Iterator[float]:
+    """Delete the smoke; then undo that, and resume."""
+    yield from begin()
+    for obj in scene().objects:
+        obj.select_set(obj == volumes()[0])
+    press("object.delete", "EXEC_DEFAULT", True)
+    report["deleted"] = yield from end()
+    shell("xdotool mousemove 500 400; xdotool key ctrl+z")
+    yield from until(volumes)
+    press("smokelift.resume")
+    report["restored"] = yield from end()
 
 
 def save_elsewhere() -> Iterator[float]:
@@ -117,7 +128,7 @@ def queue() -> Iterator[float]:
 
 def fail() -> Iterator[float]:
     """The clip's file is replaced by something else: a log opens."""
-    clip = Path(bpy.path.abspath(scene().smokelift.clip.filepath))
+    clip = Path(bpy.path.abspath(volumes()[0].smokelift.clip.filepath))
     good = clip.read_bytes()
     clip.write_text("not a video " * 100)
     press("smokelift.run")

@@ -7,7 +7,7 @@ from pathlib import Path
 import bpy
 
 sys.path.insert(0, str(Path(__file__).parents[3]))
-from tests.example_shot import EXAMPLE, set_up_example
+from tests.example_shot import EXAMPLE, set_up_example, smoke
 
 file, first, last, longest_side = sys.argv[sys.argv.index("--") + 1 :]
 folder = Path(file).parent
@@ -15,8 +15,8 @@ shutil.copytree(EXAMPLE, folder)
 for obj in list(bpy.data.objects):
     bpy.data.objects.remove(obj)
 scene = set_up_example(bpy.context.scene, folder)
-scene.smokelift.first, scene.smokelift.last = int(first), int(last)
-scene.smokelift.longest_side = int(longest_side)
+smoke(scene).smokelift.first, smoke(scene).smokelift.last = int(first), int(last)
+smoke(scene).smokelift.longest_side = int(longest_side)
 scene.frame_set(int(last))
 scene.render.resolution_percentage = 50
 scene.cycles.samples, scene.cycles.use_denoising = 32, False

@@ -1,0 +1,124 @@
+"""The smokes of a scene: Volume objects with the settings that they are made with."""
+
+from typing import Any
+
+import bpy
+from bpy.app.handlers import persistent
+from mathutils import Matrix
+
+GUESSED_CAMERA = "Smokelift Camera"
+"""Name of a camera that stands where the engine assumed the clip's."""
+
+
+def is_smoke(obj: bpy.types.Object | None) -> bool:
+    """Whether an object is a smoke that can be made: one that is linked from another file is finished."""
+    if obj is None or obj.type != "VOLUME" or obj.library is not None or obj.data.library is not None:
+        return False
+    return obj.smokelift.is_smoke
+
+
+def smokes(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """The smokes of a scene."""
+    return [obj for obj in scene.objects if is_smoke(obj)]
+
+
+def active_smoke(scene: bpy.types.Scene) -> bpy.types.Object | None:
+    """The smoke in the tab: the active object, else the one whose box, inlet or camera is active, else the first."""
+    active = _layer(scene).objects.active
+    if is_smoke(active):
+        return active
+    found = smokes(scene)
+    if active is not None:
+        for obj in found:
+            settings = obj.smokelift
+            if active in (settings.box, settings.inlet, settings.assumed_camera):
+                return obj
+    return found[0] if found else None
+
+
+def scene_of(smoke: bpy.types.Object) -> bpy.types.Scene:
+    """The scene of a smoke: the one at the window if it is in several."""
+    scenes = smoke.users_scene
+    return bpy.context.scene if bpy.context.scene in scenes else scenes[0]
+
+
+def new_smoke(scene: bpy.types.Scene, clip: bpy.types.MovieClip | None = None) -> bpy.types.Object:
+    """A new smoke, selected and active, which has no result yet."""
+    name = f"Smoke {clip.name}" if clip else "Smoke"
+    obj = bpy.data.objects.new(name, bpy.data.volumes.new(name))
+    scene.collection.objects.link(obj)
+    obj.smokelift.is_smoke = True
+    if clip is not None:
+        obj.smokelift.clip = clip
+    activate(obj, scene)
+    return obj
+
+
+def activate(obj: bpy.types.Object, scene: bpy.types.Scene) -> None:
+    """Select and activate an object, unless the artist works inside another."""
+    layer = _layer(scene)
+    active = layer.objects.active
+    if active is not None and active.mode != "OBJECT":
+        return
+    for other in layer.objects.selected:
+        other.select_set(False, view_layer=layer)
+    obj.select_set(True, view_layer=layer)
+    layer.objects.active = obj
+
+
+def _layer(scene: bpy.types.Scene) -> bpy.types.ViewLayer:
+    return bpy.context.view_layer if bpy.context.scene == scene else scene.view_layers[0]
+
+
+def hide_default_cube(scene: bpy.types.Scene) -> None:
+    """Hide the cube of a new file, which stands where smoke is put if nothing is known of its place."""
+    cube = scene.objects.get("Cube")
+    if cube is None or cube.type != "MESH" or cube.matrix_basis != Matrix.Identity(4):
+        return
+    if cube.parent or cube.children or cube.modifiers or cube.constraints or cube.animation_data:
+        return
+    places = {tuple(vertex.co) for vertex in cube.data.vertices}
+    if places == {(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)}:
+        cube.hide_viewport = cube.hide_render = True
+
+
+@persistent
+def migrate(_file: str = "") -> None:
+    """Give the settings of scenes, where version 1.0 kept them, to their smokes."""
+    for scene in bpy.data.scenes:
+        old = scene.smokelift
+        if scene.library is not None or (old.clip is None and old.volume is None):
+            continue
+        smoke = old.volume
+        if smoke is None or smoke.type != "VOLUME" or smoke.name not in scene.objects:
+            smoke = new_smoke(scene)
+        for name in _kept(old):
+            setattr(smoke.smokelift, name, getattr(old, name))
+        smoke.smokelift.is_smoke = True
+        camera = scene.objects.get(GUESSED_CAMERA)
+        if camera is not None and camera.type == "CAMERA":
+            smoke.smokelift.assumed_camera = camera
+        scene.property_unset("smokelift")
+
+
+def migrate_soon(scene: bpy.types.Scene) -> None:
+    """Migrate a file that was open before the add-on was enabled. Drawing code may call this."""
+    if scene.smokelift.clip is not None and not bpy.app.timers.is_registered(migrate):
+        bpy.app.timers.register(migrate)
+
+
+def _kept(old: Any) -> list[str]:
+    """Names of the settings of version 1.0; those first that change others when they are set."""
+    left_out = ("name", "volume", "is_smoke", "folder", "assumed_camera")
+    names = [setting.identifier for setting in old.bl_rna.properties if not setting.is_readonly]
+    return sorted(set(names) - set(left_out), key=lambda name: (name not in ("clip", "box"), name))
+
+
+def register() -> None:
+    bpy.app.handlers.load_post.append(migrate)
+
+
+def unregister() -> None:
+    bpy.app.handlers.load_post.remove(migrate)
+    if bpy.app.timers.is_registered(migrate):
+        bpy.app.timers.unregister(migrate)

@@ -1,0 +1,179 @@
+"""Smokes are objects: several in a scene, each with its own clip, settings and results."""
+
+from __future__ import annotations
+
+import bpy
+import pytest
+
+from addon import run, volume
+from addon.smoke import active_smoke, hide_default_cube, new_smoke, smokes
+from addon.take import Take, takes
+from conftest import quietly
+from tests.example_shot import EXAMPLE, add, add_box, add_camera, smoke
+
+
+@pytest.fixture
+def clip(blender) -> bpy.types.MovieClip:
+    """The example's."""
+    return bpy.data.movieclips.load(str(EXAMPLE / "clip.mp4"))
+
+
+def test_new_smoke_is_a_volume_that_is_selected_and_active(scene, clip) -> None:
+    """With all frames of its clip."""
+    camera = add_camera(scene, (0.0, 0.0, 0.0))
+    camera.select_set(True)
+    obj = new_smoke(scene, clip)
+    assert (obj.type, obj.name) == ("VOLUME", "Smoke clip.mp4")
+    assert bpy.context.view_layer.objects.active == obj
+    assert [other for other in scene.objects if other.select_get()] == [obj]
+    assert (obj.smokelift.first, obj.smokelift.last) == (1, clip.frame_duration)
+
+
+def test_the_active_smoke_is_that_of_the_active_object(scene, clip) -> None:
+    """Also through its box and its camera; where nothing of a smoke is active, the first."""
+    first, second = new_smoke(scene, clip), new_smoke(scene, clip)
+    box = second.smokelift.box = add_box(scene, (0, 0, 0), (1, 1, 1))
+    layer = bpy.context.view_layer
+    for active, wanted in ((first, first), (second, second), (box, second), (add_camera(scene, (0, 0, 0)), first)):
+        layer.objects.active = active
+        assert active_smoke(scene) == wanted
+    bpy.data.objects.remove(first)
+    bpy.data.objects.remove(second)
+    assert active_smoke(scene) is None
+
+
+def test_other_volumes_are_no_smoke(scene) -> None:
+    """Nor is anything else."""
+    add(scene, "Cloud", bpy.data.volumes.new("Cloud"))
+    add_camera(scene, (0.0, 0.0, 0.0))
+    assert smokes(scene) == []
+    assert not bpy.ops.smokelift.run.poll()
+
+
+def test_smokes_of_one_clip_have_folders_of_their_own(scene, clip, tmp_path) -> None:
+    """And keep them under a new name."""
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+    first, second = new_smoke(scene, clip), new_smoke(scene, clip)
+    second.name = "Other"
+    folders = [run.output_folder(obj) for obj in (first, second)]
+    assert folders == [tmp_path / "smokelift" / name for name in ("clip", "clip_2")]
+    second.smokelift.clip = clip
+    assert run.output_folder(second) == folders[1]
+
+
+def test_add_makes_one_more(scene) -> None:
+    """Each with its clip; the new one is active."""
+    for count in (1, 2):
+        assert bpy.ops.smokelift.add(filepath=str(EXAMPLE / "clip.mp4")) == {"FINISHED"}
+        assert len(smokes(scene)) == count
+        assert active_smoke(scene) == smokes(scene)[-1]
+    first = smokes(scene)[0]
+    assert bpy.ops.smokelift.show_smoke(smoke=first.name) == {"FINISHED"}
+    assert active_smoke(scene) == first
+
+
+def test_a_deleted_smoke_is_made_no_more(scene, clip, tmp_path) -> None:
+    """Its run is cancelled, and its finished frames stay."""
+    obj = new_smoke(scene, clip)
+    obj.smokelift.output = str(tmp_path)
+    take = run.write_take(obj)
+    uid = obj.session_uid
+    assert run.find_smoke(uid) == obj
+    scene.collection.objects.unlink(obj)
+    assert run.find_smoke(uid) is None
+    rows = bpy.context.window_manager.smokelift.jobs
+    row = rows.add()
+    row.take, row.smoke_uid = str(take.directory), uid
+    run.work(bpy.context)
+    assert rows[0].outcome == "cancelled"
+    assert take.resumable()
+
+
+@pytest.mark.parametrize("change", [None, "location", "name", "vertex"])
+def test_the_cube_of_a_new_file_does_not_hide_the_smoke(scene, change) -> None:
+    """A cube that somebody made something of stays."""
+    cube = add(scene, "Cube", bpy.data.meshes.new("Cube"))
+    corners = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
+    cube.data.from_pydata(corners, [], [(0, 1, 3, 2), (4, 6, 7, 5)])
+    if change == "location":
+        cube.location.x = 3.0
+    elif change == "name":
+        cube.name = "Crate"
+    elif change == "vertex":
+        cube.data.vertices[0].co.x = -2.0
+    hide_default_cube(scene)
+    assert cube.hide_render == cube.hide_viewport == (change is None)
+
+
+def test_smoke_that_is_linked_is_finished(scene, clip, tmp_path) -> None:
+    """Its settings belong to the file it comes from."""
+    new_smoke(scene, clip)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "library.blend"))
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_, wanted):
+        wanted.objects = ["Smoke clip.mp4"]
+    bpy.context.scene.collection.objects.link(wanted.objects[0])
+    assert smokes(bpy.context.scene) == []
+    volume.keep_step()
+
+
+# results
+
+
+def with_takes(scene: bpy.types.Scene, folder, count: int) -> list[Take]:
+    smoke(scene).smokelift.output = str(folder)
+    made = [run.write_take(smoke(scene)) for _ in range(count)]
+    for take in made:
+        take.directory.mkdir()
+        (take.directory / "smoke_0001.vdb").write_bytes(b"x" * 1000)
+        (take.directory / "sequence.json").write_text(
+            '{"complete": true, "frames": {"1": {}}, "scene": {"clip": {"fps": 24.0}, "medium": '
+            '{"extinction": 1.0, "albedo": 1.0, "anisotropy": 0.0}, "domain": {"min": [0, 0, 0], "max": [1, 1, 1], '
+            '"resolution": [8, 8, 8]}}}'
+        )
+    return made
+
+
+def test_results_are_picked_named_and_deleted(shot, tmp_path) -> None:
+    """One that is on show is not deleted."""
+    first, second = with_takes(shot, tmp_path / "out", 2)
+    assert bpy.ops.smokelift.show_take(take=str(first.directory)) == {"FINISHED"}
+    assert volume.shown_take(smoke(shot)) == first
+    assert first.title() == "Take 1"
+    assert bpy.ops.smokelift.name_take(take=str(first.directory), title="Slow and thick") == {"FINISHED"}
+    assert Take(first.directory).title() == "Slow and thick"
+    assert first.arguments()[0] == "reconstruct"
+    with pytest.raises(RuntimeError, match="show another one first"):
+        bpy.ops.smokelift.remove_take(take=str(first.directory))
+    assert bpy.ops.smokelift.remove_take(take=str(second.directory)) == {"FINISHED"}
+    assert takes(tmp_path / "out") == [first]
+    assert first.size() == pytest.approx(1e-3, rel=0.5)
+    with pytest.raises(RuntimeError, match="no finished frame"):
+        bpy.ops.smokelift.show_take(take=str(second.directory))
+
+
+# files of version 1.0
+
+
+def test_settings_of_a_scene_become_those_of_its_smoke(scene, clip, tmp_path) -> None:
+    """As version 1.0 saved them, with the Volume that showed the result or without one."""
+    obj = add(scene, "Smoke clip.mp4", bpy.data.volumes.new("Smoke"))
+    other = bpy.data.scenes.new("Other")
+    for where, result in ((scene, obj), (other, None)):
+        old = where.smokelift
+        old.clip, old.volume = clip, result
+        old.box, old.camera_mode = add_box(where, (0, 0, 0), (1, 1, 1)), "GUESS"
+        old.first, old.last, old.quality, old.output, old.extinction = 3, 8, "fine", "//out", 7.0
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+    quietly(lambda: bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend")))
+    for name in ("Scene", "Other"):
+        scene = bpy.data.scenes[name]
+        (found,) = smokes(scene)
+        settings = found.smokelift
+        assert (settings.clip.name, settings.first, settings.last) == ("clip.mp4", 3, 8)
+        assert (settings.box.name[:3], settings.camera_mode) == ("Box", "GUESS")
+        assert (settings.quality, settings.output, settings.extinction) == ("fine", "//out", 7.0)
+    assert smokes(bpy.data.scenes["Scene"])[0].name == "Smoke clip.mp4"
+    bpy.ops.wm.save_mainfile()
+    quietly(lambda: bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend")))
+    assert [len(smokes(scene)) for scene in bpy.data.scenes] == [1, 1]
