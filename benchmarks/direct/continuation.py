@@ -105,7 +105,7 @@ def main() -> None:
         rows += table(known, None)
         if options.runs and (folder := options.runs / scene.name / RUN).is_dir():
             rows += table(known, folder)
-    print(markdown(HEADER, rows))
+    print(markdown(HEADER, rows), flush=True)
     if options.picture:
         picture(baked_scene(options.scenes[0], 10**6), options.picture)
 

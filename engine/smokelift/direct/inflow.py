@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -12,8 +12,18 @@ from scipy import ndimage
 
 from smokelift.direct.constraint import FaceMasks, Mask, faces_of
 from smokelift.direct.moment import Moment
-from smokelift.transport import advect
+from smokelift.transport import Array, advect
 from smokelift.velocity.sources import SourceDetection
+
+MOTION = 0.5
+"""Share of its change that may be motion in a voxel of an inlet, at most."""
+
+PROMINENT = 0.25
+"""Share of the strongest inlet's smoke that another lets in at least: inlets of one scene are of one kind, and what a
+wrong velocity leaves is scattered."""
+
+FAINT = 0.01
+"""Share of the largest density below which a voxel is not in the smoke."""
 
 MARGIN = 1
 """Voxels around an inlet that belong to it: its smoke is taken from the clip until it is outside."""
@@ -70,14 +80,25 @@ def find_inflow(moments: Sequence[Moment], dt: float, marked: Mask | None = None
 
 
 def _found(moments: Sequence[Moment], dt: float) -> Mask:
+    """The voxels of inlets by the mean over all moments, for inlets stand still and errors do not."""
     detection, means = SourceDetection(), None
     smoke: Mask = np.zeros(moments[0].density.shape, bool)
-    for before, after in pairwise(moments):
+    for number, (before, after) in enumerate(pairwise(moments), 1):
         carried = advect(before.density, after.velocity, dt)
         densest = np.maximum(after.density, carried)
+        detection = replace(detection, news=1 / number)
         means = detection.means(after.density - carried, densest, 1.0, means)
-        smoke = densest > 0.01 * densest.max()
+        smoke = densest > FAINT * densest.max()
     if means is None:
         return smoke
-    entering: Mask = detection.weight(means, smoke) < 0.5
-    return entering
+    return _strongest(detection.weight(means, smoke) < MOTION, means.mean)
+
+
+def _strongest(entering: Mask, strength: Array) -> Mask:
+    """The connected places where most smoke enters."""
+    labels, count = ndimage.label(entering)
+    if count == 0:
+        return entering
+    sums = ndimage.sum_labels(strength, labels, np.arange(1, count + 1))
+    kept: Mask = np.isin(labels, 1 + np.flatnonzero(sums >= PROMINENT * sums.max()))
+    return kept

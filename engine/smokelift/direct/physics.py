@@ -13,6 +13,9 @@ from smokelift.direct.constraint import Mask, faces_of
 from smokelift.direct.moment import Moment
 from smokelift.transport import Array, Velocity, advect, project
 
+SIGNIFICANT = 3.0
+"""Standard errors from 0, beyond which a mean is no accident."""
+
 
 @dataclass(frozen=True)
 class Physics:
@@ -40,24 +43,40 @@ def lift(density: Array, like: Velocity) -> Velocity:
 def fit_physics(moments: Sequence[Moment], dt: float, inlets: Mask) -> Physics:
     """Fit buoyancy and dissipation to the moments of a clip.
 
-    The buoyancy is the one from which the change of velocity follows best:
+    From one moment to the next the buoyancy is the one from which the change of velocity follows best:
 
         min sum |u_n - P(advect(u_n-1)) - dt b P(rho_n-1 up)|^2
 
-    over the faces outside the inlets. The dissipation is what brings the mass outside the inlets from that of the
-    carried smoke to that found.
+    over the faces outside the inlets. The mean over the moments counts if they agree on it; where velocities are known
+    too roughly for that, it is 0. The dissipation is what brings the mass outside the inlets from that of the carried
+    smoke to that found.
     """
     outside = [~mask for mask in faces_of(inlets)]
-    along = square = carried_mass = found_mass = 0.0
+    found: list[float] = []
+    carried_mass = found_mass = 0.0
     for before, after in pairwise(moments):
-        predicted = project(advect(before.velocity, before.velocity, dt))
-        unit = project(lift(before.density, before.velocity))
-        for kept, now, then, pushed in zip(outside, after.velocity.faces, predicted.faces, unit.faces, strict=True):
-            along += float(np.vdot((now - then)[kept], pushed[kept]))
-            square += float(np.vdot(pushed[kept], pushed[kept]))
+        found += _buoyancy(before, after, dt, outside)
         carried = advect(before.density, after.velocity, dt, conserve=True)
         carried_mass += float(carried.sum(dtype=np.float64, where=~inlets))
         found_mass += float(after.density.sum(dtype=np.float64, where=~inlets))
-    buoyancy = along / (dt * square) if square > 0 else 0.0
     lost = math.log(carried_mass / found_mass) / dt if carried_mass > 0 and found_mass > 0 else 0.0
-    return Physics(buoyancy, max(0.0, lost))
+    return Physics(_agreed(found), max(0.0, lost))
+
+
+def _buoyancy(before: Moment, after: Moment, dt: float, outside: list[Mask]) -> list[float]:
+    """The buoyancy that two moments show; none where there is nothing to lift."""
+    predicted = project(advect(before.velocity, before.velocity, dt))
+    unit = project(lift(before.density, before.velocity))
+    along = square = 0.0
+    for kept, now, then, pushed in zip(outside, after.velocity.faces, predicted.faces, unit.faces, strict=True):
+        along += float(np.vdot((now - then)[kept], pushed[kept]))
+        square += float(np.vdot(pushed[kept], pushed[kept]))
+    return [along / (dt * square)] if square > 0 else []
+
+
+def _agreed(found: list[float]) -> float:
+    """The mean of what several moments show; 0 where it is within `SIGNIFICANT` standard errors of that."""
+    if len(found) < 2:
+        return 0.0
+    mean, error = float(np.mean(found)), float(np.std(found, ddof=1)) / math.sqrt(len(found))
+    return mean if abs(mean) > SIGNIFICANT * error else 0.0

@@ -77,6 +77,12 @@ def evaluate(
     """
     if not sequence.frames:
         raise ValueError(f"{sequence.directory}: there are no finished frames to evaluate yet.")
+    directed = sequence.settings.get("direct")
+    if isinstance(directed, dict) and directed.get("job") in ("retime", "loop"):
+        raise ValueError(
+            f"{sequence.directory}: its frames are no longer those of the clip; evaluate the sequence that it was made "
+            "from."
+        )
     frames = sequence.frames
     shown = {frames[i] for i in np.linspace(0, len(frames) - 1, SHEET_ROWS).round().astype(int)}
     tiles: Tiles = {number: [] for number in sorted(shown)}

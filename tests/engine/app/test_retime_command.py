@@ -11,6 +11,7 @@ def test_slow_motion(finished, tmp_path, capsys) -> None:
     assert command("retime", finished, "--out", out, "--speed", 0.5, "--npz", "--progress", "json") == 0
     said = events(capsys.readouterr().out)
     assert said[-1]["frames"] == 2 * frames - 1
+    assert "no longer those of the clip" in refused(capsys, "evaluate", out)
     assert said[0] == {"event": "start", "total": 2 * frames - 1, "done": 0}
 
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from smokelift.direct import Ball
+from smokelift.direct import Ball, Moment
 from smokelift.direct.inflow import Inflow, find_inflow
 from smokelift.direct.physics import fit_physics
+from smokelift.transport import project
 from tests.engine.direct.rising import DOMAIN, DT, PHYSICS, at_rest, blob, course, free, plume
 
 
@@ -16,6 +17,17 @@ def test_physics_of_a_free_blob_is_found():
     found = fit_physics(moments, DT, np.zeros(DOMAIN.shape, bool))
     assert found.buoyancy == pytest.approx(PHYSICS.buoyancy, rel=0.01)
     assert found.dissipation == pytest.approx(PHYSICS.dissipation, rel=0.01)
+
+
+def test_a_buoyancy_that_the_moments_do_not_agree_on_is_none():
+    """Errors of estimated velocities are as large as what buoyancy changes, and differ from frame to frame."""
+    random = np.random.default_rng(1)
+    moments = []
+    for moment in course(free(), at_rest(blob()), 8):
+        noise = [random.normal(size=f.shape).astype(np.float32) for f in moment.velocity.faces]
+        velocity = project(moment.velocity.with_faces(f + n for f, n in zip(moment.velocity.faces, noise, strict=True)))
+        moments.append(Moment(moment.density, velocity))
+    assert fit_physics(moments, DT, np.zeros(DOMAIN.shape, bool)).buoyancy == 0
 
 
 def test_smoke_without_motion_has_no_physics():
