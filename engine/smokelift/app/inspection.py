@@ -108,7 +108,7 @@ def facts(shot: Shot, given: Scene, cost: Cost) -> tuple[Fact, ...]:
         _known("medium", thick, given.medium is not None, _said(shot, "Medium")),
         _light(shot, given),
         _chosen(shot, "scattering", "scattering", scene.scattering, given.scattering is not None),
-        _chosen(shot, "axis depth", "place in depth", _depth(shot), shot.settings.axis_depth is not None),
+        _place(shot),
         Fact(
             "cost",
             f"{shot.length} frames: {spent}",
@@ -118,17 +118,19 @@ def facts(shot: Shot, given: Scene, cost: Cost) -> tuple[Fact, ...]:
     )
 
 
-def write_scene(path: Path, shot: Shot, known: Sequence[Fact]) -> tuple[Path, ...]:
+def write_scene(path: Path, shot: Shot, given: Scene, known: Sequence[Fact]) -> tuple[Path, ...]:
     """Write all that was found into a scene file, with what is known of it as comments; return the files.
 
-    A background that was estimated becomes a colour of the file, or a picture beside it.
+    A background that was estimated becomes a colour of the file, or a picture beside it. The turns of a camera that was
+    steadied belong to the background that they were found with. Both are left to be found again; camera and box stay as
+    they are given, if they are.
 
     Raises
     ------
     ValueError
         If a file is there already.
     """
-    scene, plate = shot.scene, shot.estimated_background
+    scene, plate = Scene(**vars(shot.scene)), shot.estimated_background
     picture = path.with_name(f"{path.stem}_background.exr")
     colour = None if plate is None else plate[0, 0]
     one = colour is not None and bool((plate == colour).all())
@@ -142,6 +144,8 @@ def write_scene(path: Path, shot: Shot, known: Sequence[Fact]) -> tuple[Path, ..
     elif plate is not None:
         write_image(picture, plate, half=False)
         scene = replace(scene, background=Background(image=picture.absolute()))
+    elif shot.moves and shot.scene.background == Background():
+        scene = replace(scene, camera=given.camera, domain=given.domain, background=None)
     scene.save(path, [f"{fact.what}: {fact.value} ({fact.origin})" for fact in known if fact.what != "cost"])
     return files
 
@@ -191,13 +195,17 @@ def _light(shot: Shot, given: Scene) -> Fact:
     return Fact("light", f"from everywhere, smoke of radiance {colour}", UNDETERMINED, _said(shot, "Light"))
 
 
-def _depth(shot: Shot) -> str:
-    if shot.settings.axis_depth is not None:
-        return f"{shot.settings.axis_depth:.2f} m behind the middle of the box"
-    if shot.place is not None:
-        depth = round(shot.place.depth, 2) + 0.0  # no minus before zero
-        return f"{depth:.2f} m behind the middle of the box, give or take {shot.place.deviation:.2f} m"
-    return "as the cameras show it" if len(shot.views) > 1 or shot.moves else "the middle of the box"
+def _place(shot: Shot) -> Fact:
+    given, place = shot.settings.axis_depth, shot.place
+    if given is not None:
+        return Fact("place in depth", f"{given:.2f} m behind the middle of the box", "given")
+    if len(shot.views) > 1:
+        return Fact("place in depth", "as the cameras show it", "estimated")
+    value = "the middle of the box"
+    if place is not None:
+        depth = round(place.depth, 2) + 0.0  # no minus before zero
+        value = f"{depth:.2f} m behind the middle of the box, give or take {place.deviation:.2f} m"
+    return _chosen(shot, "axis depth", "place in depth", value, False)
 
 
 def _chosen(shot: Shot, what: str, name: str, value: str, is_given: bool) -> Fact:

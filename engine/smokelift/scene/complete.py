@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -48,9 +47,9 @@ class CompleteScene:
     closed: tuple[Side, ...] = ()
     inlets: tuple[Inlet, ...] = ()
 
-    def save(self, path: str | Path, comments: Sequence[str] = ()) -> None:
-        """Write a scene file that `Scene.load` and `completed` read back as an equal scene, below lines of comment."""
-        write_file(vars(self), Path(path), comments)
+    def save(self, path: str | Path) -> None:
+        """Write a scene file that `Scene.load` and `completed` read back as an equal scene."""
+        write_file(vars(self), Path(path))
 
     def inflow(self) -> NDArray[np.bool_] | None:
         """Return the voxels where smoke enters, shape (nx, ny, nz); None if no inlet is marked."""

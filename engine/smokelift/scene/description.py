@@ -10,6 +10,7 @@ refused for the same reasons; `smokelift.scene.reading` adds the file and the li
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -141,9 +142,9 @@ class Scene:
         """
         return read_file(Path(path), cls)
 
-    def save(self, path: str | Path) -> None:
+    def save(self, path: str | Path, comments: Sequence[str] = ()) -> None:
         """Write a scene file that :meth:`load` reads back as an equal scene.
 
-        Paths below the file's folder are written relative to it, all others absolute.
+        Paths below the file's folder are written relative to it, all others absolute. Comments are lines at its top.
         """
-        write_file(vars(self), Path(path))
+        write_file(vars(self), Path(path), comments)

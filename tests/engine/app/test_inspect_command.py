@@ -125,6 +125,25 @@ def test_a_background_that_is_a_picture_is_written_beside_the_scene(plume, tmp_p
     np.testing.assert_allclose(read_image(background.image), wall, atol=0.03)
 
 
+def test_a_camera_that_was_steadied_is_found_again(tmp_path, capsys) -> None:
+    """Its turns and the background belong together; the page shows its path."""
+    random = np.random.default_rng(0)
+    wall = np.clip(0.3 + 0.1 * np.kron(random.standard_normal((35, 45)), np.ones((4, 4))), 0, 1)
+    rows, columns = np.mgrid[:140, :180]
+    for n, (down, right) in enumerate(random.integers(-4, 5, (8, 2)) + 8):
+        smoke = 0.8 * np.exp(-((rows - 95 + 6 * n) ** 2 + (columns - 90) ** 2) / 200)
+        seen = (wall * (1 - smoke) + 0.9 * smoke)[down : down + 120, right : right + 160]
+        write_image(tmp_path / f"shaken_{n}.png", seen)
+    scene, page = tmp_path / "scene.toml", tmp_path / "page.html"
+    words = ("--progress", "json", *QUICK)
+    assert command("inspect", tmp_path / "shaken_#.png", "--write", scene, "--page", page, *words) == 0
+    first = events(capsys.readouterr().out)[-1]["scene"]
+    assert "path of the box" in page.read_text(encoding="utf-8")
+    assert Scene.load(scene).camera is None
+    assert command("inspect", scene, *words) == 0
+    assert events(capsys.readouterr().out)[-1]["scene"]["camera"] == first["camera"]
+
+
 def test_pages_of_other_kinds_are_refused(shot, tmp_path, capsys) -> None:
     """Before the clip is looked at."""
     assert ".png or .html" in refused(capsys, "inspect", shot, "--page", tmp_path / "page.pdf")

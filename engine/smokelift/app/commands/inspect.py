@@ -67,7 +67,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
             for path in options.page:
                 write_page(path, page)
         if options.write is not None:
-            files += write_scene(options.write, shot, known)
+            files += write_scene(options.write, shot, scene, known)
     voxels = " x ".join(map(str, domain.resolution))
     written = f" {', '.join(map(str, files))} written." if files else ""
     say.finish(
