@@ -302,18 +302,40 @@ class SMOKELIFT_OT_open_log(bpy.types.Operator):
         text = bpy.data.texts.get(LOG_TEXT) or bpy.data.texts.new(LOG_TEXT)
         text.from_string(log.read_text(encoding="utf-8", errors="replace"))
         if not bpy.app.background:
-            editor = _text_editor(context)
+            editor = _editor(context, "TEXT_EDITOR")
             editor.text, editor.top = text, 0
         return {"FINISHED"}
 
 
-def _text_editor(context: bpy.types.Context) -> bpy.types.Space:
+class SMOKELIFT_OT_show_page(bpy.types.Operator):
+    """Show on a page what was found in the clip: box and light, background, smoke, and what stays undetermined"""
+
+    bl_idname = "smokelift.show_page"
+    bl_label = "Inspect Clip"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not (context.window_manager.smokelift.check_done and run.page_file().is_file()):
+            cls.poll_message_set("Check the shot first")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        page = bpy.data.images.load(str(run.page_file()), check_existing=True)
+        page.reload()
+        if not bpy.app.background:
+            _editor(context, "IMAGE_EDITOR").image = page
+        return {"FINISHED"}
+
+
+def _editor(context: bpy.types.Context, kind: str) -> bpy.types.Space:
+    """An editor of a kind, in a window of its own if there is none."""
     areas = [area for window in context.window_manager.windows for area in window.screen.areas]
-    found = next((area for area in areas if area.type == "TEXT_EDITOR"), None)
+    found = next((area for area in areas if area.type == kind), None)
     if found is None:
         bpy.ops.wm.window_new()
         found = context.window_manager.windows[-1].screen.areas[0]
-        found.type = "TEXT_EDITOR"
+        found.type = kind
     return found.spaces.active
 
 
@@ -432,6 +454,7 @@ _CLASSES = (
     SMOKELIFT_OT_match_clip,
     SMOKELIFT_OT_set_up,
     SMOKELIFT_OT_open_log,
+    SMOKELIFT_OT_show_page,
     SMOKELIFT_OT_show_smoke,
     SMOKELIFT_OT_show_take,
     SMOKELIFT_OT_name_take,

@@ -244,6 +244,7 @@ class _Advanced:
             for note in state.notes.split("\n"):
                 _label(layout, context, note)
         layout.operator("smokelift.check", icon="VIEWZOOM")
+        layout.operator("smokelift.show_page", icon="IMAGE_DATA")
 
 
 class _Results:

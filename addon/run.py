@@ -51,6 +51,11 @@ def unfinished(smoke: bpy.types.Object) -> Take | None:
     return next((take for take in candidates if take.resumable()), None)
 
 
+def page_file() -> Path:
+    """Where the engine shows in pictures what it found of the shot that was checked last."""
+    return Path(bpy.app.tempdir) / "smokelift_inspect.png"
+
+
 def enqueue(context: bpy.types.Context, smoke: bpy.types.Object, take: Take) -> None:
     """Append a take to the queue; without a window, wait for its end."""
     jobs = context.window_manager.smokelift.jobs
@@ -293,7 +298,8 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
         try:
             take = Take(folder / "smokelift_check")
             take.write(scene_file.shot_tables(smoke, quick=True), scene_file.options(smoke))
-            words = ["inspect", str(take.scene_file), "--progress", "json", *scene_file.options(smoke)]
+            words = ["inspect", str(take.scene_file), "--page", str(page_file()), "--progress", "json"]
+            words += scene_file.options(smoke)
             self._check = Job(engine_command(words), take.log_file)
         except (scene_file.ShotError, TakeError, EngineMissingError) as error:
             state.check_error = str(error)

@@ -258,6 +258,9 @@ def test_a_look_ahead(shot, tmp_path) -> None:
     assert 0.1 < state.memory < state.memory_free
     assert 1 < state.disk < 100
     assert "Medium not given" in state.notes
+    assert bpy.ops.smokelift.show_page() == {"FINISHED"}
+    page = bpy.data.images[run.page_file().name]
+    assert page.size[0] > 1000
     shot.camera = None
     bpy.ops.smokelift.check()
     assert not state.check_done
