@@ -64,6 +64,7 @@ def verdict(kind: Kind, ended: Ended, out: Path) -> str:
         return f"status {ended.status}: {lines[-1] if lines else ''}"
     if ended.status and len(lines) != 1:
         return f"{len(lines)} lines"
-    if ended.status and out.exists() and any(out.iterdir()):
+    empty = bool(lines) and lines[-1].startswith("No smoke found")  # all its frames are there, and empty
+    if ended.status and not empty and out.exists() and any(out.iterdir()):
         return "left files"
     return ""
