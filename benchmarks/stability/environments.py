@@ -15,6 +15,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +27,7 @@ EVENTS = ("open", "os.mkdir", "os.rename", "os.remove")
 """What a run does with its output folder, as Python's audit calls it."""
 
 MOST_EVENTS = 52
-"""Of them the first to the last of a run of the tiny shot."""
+"""Of them in a run of the tiny shot that writes OpenVDB too; a run that writes less may be over before its failure."""
 
 ORDINARY_USER = 54321
 """A number that no user has, so that all of its processes are ours."""
@@ -160,7 +161,8 @@ def terminated(out: Path, random: np.random.Generator) -> Iterator[Failure]:
 def killed(out: Path, random: np.random.Generator) -> Iterator[Failure]:
     """The process is killed between two of the things that it does with the folder."""
     number = int(random.integers(1, MOST_EVENTS))
-    yield Failure(lambda: _at_event(number, out, lambda: os.kill(os.getpid(), signal.SIGKILL)), ends=(-signal.SIGKILL,))
+    begin = partial(_at_event, number, out, lambda: os.kill(os.getpid(), signal.SIGKILL))
+    yield Failure(begin, ends=(0, -signal.SIGKILL))
 
 
 ENVIRONMENTS: Mapping[str, Environment] = {

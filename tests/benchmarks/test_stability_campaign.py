@@ -70,6 +70,7 @@ def test_a_run_goes_on_when_the_system_is_well_again(shot, open_folder, name) ->
     statuses, failed = failures(shot, name, cases, open_folder)
     assert failed == []
     assert sum(statuses.values()) == cases
+    assert name != "killed" or statuses[-signal.SIGKILL]
 
 
 def losing(name, tell):
