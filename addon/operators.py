@@ -307,7 +307,7 @@ class SMOKELIFT_OT_open_log(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SMOKELIFT_OT_show_page(bpy.types.Operator):
+class SMOKELIFT_OT_show_page(_NeedsClip, bpy.types.Operator):
     """Show on a page what was found in the clip: box and light, background, smoke, and what stays undetermined"""
 
     bl_idname = "smokelift.show_page"
@@ -315,7 +315,11 @@ class SMOKELIFT_OT_show_page(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not (context.window_manager.smokelift.check_done and run.page_file().is_file()):
+        if not super().poll(context):
+            return False
+        state = context.window_manager.smokelift
+        own = state.check_done and state.check_smoke == active_smoke(context.scene).session_uid
+        if not (own and run.page_file().is_file()):
             cls.poll_message_set("Check the shot first")
             return False
         return True
