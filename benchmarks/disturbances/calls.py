@@ -11,6 +11,7 @@ from benchmarks.disturbances.known import BLACK, FRONT, GRID, Known
 from benchmarks.disturbances.measure import Figures
 from benchmarks.disturbances.spoiled import FIRST, plain
 from smokelift import Settings
+from smokelift.baselines.velocity import PaperVelocity
 from smokelift.density import ViewSet
 from smokelift.evaluation.frame_means import SMOKE, eight_bit_values
 from smokelift.evaluation.metrics import psnr, velocity_error
@@ -37,9 +38,16 @@ def motion(known: Known, voxels: float, method: MethodName) -> Figures:
 
 
 def scaled_density(known: Known, factor: float, method: MethodName) -> Figures:
-    """Two true densities, both times a factor: the motion between them is the same."""
+    """Two true densities, both times a factor: the motion between them is the same.
+
+    The weights of the paper's estimate have the unit of a density squared. `PaperVelocity` takes them without a unit,
+    so the paper's own are made of them here, such that both agree where the factor is 1.
+    """
     before, after = (np.float32(factor) * known.density(moment) for moment in (FIRST, FIRST + 1))
     estimator = compose(_settings(method)).velocity_estimator
+    if isinstance(estimator, PaperVelocity):
+        smoothness, kinetic = (weight / factor**2 for weight in (estimator.smoothness, estimator.kinetic))
+        estimator = replace(estimator, smoothness=smoothness, kinetic=kinetic)
     found = estimator.estimate(before, after, 1 / known.fps, known.domain.voxel_size)
     counted = (after > SMOKE * after.max()) & ~known.inlets[FIRST + 1]
     return {"velocity_error": velocity_error(found.centres(), known.velocities[FIRST + 1], counted)[0]}
