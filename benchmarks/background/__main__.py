@@ -9,13 +9,15 @@ from __future__ import annotations
 
 import argparse
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.background.clips import Smoke, cases
+from benchmarks.background.clips import Case, Smoke, cases
 from benchmarks.background.score import score
-from smokelift.footage.plate import known_plate
+from benchmarks.background.turning import panned, shaken
+from smokelift.footage.plate import Plates, known_plate
 from smokelift.setup.background import find_plates
 
 FIGURES = ("plate", "lost", "missed", "false", "unknown")
@@ -30,21 +32,33 @@ def main() -> None:
     smokes = [Smoke.load(folder) for folder in options.scenes]
     print("| case | plate error (codes) | smoke's light lost | smoke missed | clear pixels masked | unknown | s |")
     print("| --- | --- | --- | --- | --- | --- | --- |")
-    for name in cases(smokes[0]):
+    for name in _cases(smokes[0]):
         if options.only and not any(name.startswith(start) for start in options.only):
             continue
         rows = []
         seconds = 0.0
         for smoke in smokes:
-            case = cases(smoke)[name]()
+            case = _cases(smoke)[name]()
             began = time.process_time()
-            plates = known_plate(case.plate, case.clip) if case.given else find_plates(case.clip, None, None).plates
+            if case.given:
+                plates: Plates = known_plate(case.plate, case.clip)
+            else:
+                plates = find_plates(case.clip, None, None, case.lens).plates
             seconds += time.process_time() - began
             rows.append(score(case, plates))
         figures = {key: [row[key] for row in rows] for key in FIGURES}
         cells = [f"{np.mean(figures['plate']):.1f} ({np.max(figures['plate']):.1f})"]
         cells += [f"{np.mean(figures[key]):.1%} ({np.max(figures[key]):.1%})" for key in FIGURES[1:]]
         print(f"| {name} | {' | '.join(cells)} | {seconds / len(rows):.1f} |", flush=True)
+
+
+def _cases(smoke: Smoke) -> dict[str, Callable[[], Case]]:
+    """All cases by name, those of a camera that turns last."""
+    return cases(smoke) | {
+        "wall, shaken by 3": lambda: shaken(smoke, 3),
+        "wall, shaken by 10": lambda: shaken(smoke, 10),
+        "wall, panned by a third": lambda: panned(smoke, 1 / 3),
+    }
 
 
 if __name__ == "__main__":

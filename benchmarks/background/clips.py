@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
+from smokelift.footage.alignment import Lens
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import Picture, linear_to_srgb, srgb_to_linear
 
@@ -74,18 +75,25 @@ class Case:
     ----------
     clip
         As it was filmed.
-    plate : (rows, columns, 3)
-        The true background, linear.
+    plate : (rows, columns, 3) or (frames, rows, columns, 3)
+        The true background, linear; one a frame if the camera turns.
     clean : (frames, rows, columns, 3)
         The true pictures, linear.
     given
         Whether the background is told.
+    lens
+        Of a camera that may turn.
     """
 
     clip: Clip
     plate: Picture
     clean: Picture
     given: bool
+    lens: Lens | None = None
+
+    def behind(self, number: int) -> Picture:
+        """The true background of a frame, linear (rows, columns, 3)."""
+        return self.plate if self.plate.ndim == 3 else self.plate[number]
 
 
 class Frames:

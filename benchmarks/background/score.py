@@ -27,13 +27,13 @@ def score(case: Case, plates: Plates) -> dict[str, float]:
     of the picture.
     """
     clip = steady(case.clip, plates)
-    truth = linear_to_srgb(case.plate)
-    missed, false, lost, smoke = [], [], 0.0, 0.0
-    touched = np.zeros(truth.shape[:2], np.bool_)
+    missed, false, errors, lost, smoke = [], [], [], 0.0, 0.0
+    touched = np.zeros(case.clean.shape[1:3], np.bool_)
     unknown = 0.0
     for number in clip.spread(LOOKED_AT):
         plate = plates.at(number)
-        clean = case.clean[number]
+        clean, behind = case.clean[number], case.behind(number)
+        truth = linear_to_srgb(behind)
         contrast = np.abs(linear_to_srgb(clean) - truth).max(-1) * 255
         found = matte(clip.frame(number), plate).mask
         visible = contrast > VISIBLE
@@ -41,12 +41,12 @@ def score(case: Case, plates: Plates) -> dict[str, float]:
         if visible.any():
             missed.append(float((visible & ~found).sum() / visible.sum()))
         false.append(float(found[contrast < CLEAR].mean()) if (contrast < CLEAR).any() else 0.0)
-        lost += float(np.abs(plate.image - case.plate)[visible].sum())
-        smoke += float(np.abs(clean - case.plate)[visible].sum())
-        error = np.abs(linear_to_srgb(plate.image) - truth).max(-1) * 255
+        lost += float(np.abs(plate.image - behind)[visible].sum())
+        smoke += float(np.abs(clean - behind)[visible].sum())
+        errors.append(np.abs(linear_to_srgb(plate.image) - truth).max(-1) * 255)
         unknown = float((plate.confidence < 0.5).mean())
     return {
-        "plate": float(np.percentile(error[touched], 95)),
+        "plate": float(np.percentile(np.stack(errors)[:, touched], 95)),
         "lost": lost / smoke,
         "missed": float(np.mean(missed)),
         "false": float(np.mean(false)),
