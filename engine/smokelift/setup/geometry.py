@@ -120,12 +120,18 @@ def clip_lens(camera: Camera | None, clip: Clip) -> Lens | None:
     """
     if camera is None:
         width, height = clip.size
-        focal = LENS * max(width, height)
+        focal = _focal(clip)
         return Lens(clip.size, (focal, focal), (width / 2, height / 2))
     if camera.type != "perspective" or camera.moves:
         return None
     camera = fitting(camera, clip)
     return Lens(camera.size, (camera.fx, camera.fy), (camera.cx, camera.cy))
+
+
+def _focal(clip: Clip) -> float:
+    """Focal length in pixels of a clip without a camera: the file's, or that of the usual lens."""
+    width, height = clip.size
+    return LENS * max(width, height) if clip.lens is None else clip.lens / FILM_DIAGONAL * math.hypot(width, height)
 
 
 def _turning(camera: Camera, turns: Turns | None) -> Camera:
@@ -159,7 +165,7 @@ def _uncalibrated(clip: Clip, samples: SmokeSamples, settings: Settings) -> tupl
     The box comes with every number of voxels that may be chosen, the fewest first.
     """
     width, height = clip.size
-    focal = LENS * max(width, height) if clip.lens is None else clip.lens / FILM_DIAGONAL * math.hypot(width, height)
+    focal = _focal(clip)
     metres = PICTURE_HEIGHT / height
     distance = focal * metres
     matrix = np.array([[1, 0, 0, 0], [0, 0, -1, -distance], [0, 1, 0, PICTURE_HEIGHT / 2], [0, 0, 0, 1]], np.float64)
