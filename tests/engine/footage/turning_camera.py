@@ -52,7 +52,7 @@ def pictures(
 class Frames:
     """Frames in memory; a `smokelift.footage.frame_source.FrameSource`."""
 
-    fps, warning, files, lens = 24.0, None, (), None
+    fps, warning, files, lens, backdrop = 24.0, None, (), None, None
 
     def __init__(self, frames: np.ndarray) -> None:
         self.frames, self.count = frames, len(frames)
