@@ -84,24 +84,49 @@ def work(context: bpy.types.Context) -> None:
     if bpy.app.background:
         bpy.ops.smokelift.work("EXEC_DEFAULT")
         return
-    if not workers(context.window_manager):
+    manager = context.window_manager
+    if _leaving(manager):
+        if not bpy.app.timers.is_registered(_work_later):
+            bpy.app.timers.register(_work_later, first_interval=TICK_SECONDS)
+    elif not workers(manager):
         # the first window exists as long as Blender does
-        with context.temp_override(window=context.window_manager.windows[0]):
+        with context.temp_override(window=manager.windows[0]):
             bpy.ops.smokelift.work("INVOKE_DEFAULT")
+
+
+def _work_later() -> None:
+    work(bpy.context)
 
 
 def workers(manager: bpy.types.WindowManager) -> list[bpy.types.Operator]:
     """The running worker, if any."""
     running = [operator for window in manager.windows for operator in window.modal_operators]
-    return [operator for operator in running if _works(operator)]
+    return [operator for operator in running if _name(operator) == SMOKELIFT_OT_work.__name__]
 
 
-def _works(operator: bpy.types.Operator) -> bool:
-    """Whether an operator is a worker; one whose add-on was switched off has no name, and ends with its next event."""
+def _leaving(manager: bpy.types.WindowManager) -> bool:
+    """Whether a window still lists an operator that was unregistered while it ran.
+
+    It drops it with its next event. Blender crashes if another modal operator starts before that.
+    """
+    return any(_name(operator) is None for window in manager.windows for operator in window.modal_operators)
+
+
+def _name(operator: bpy.types.Operator) -> str | None:
+    """The operator's name; None of one that was unregistered."""
     try:
-        return operator.bl_idname == SMOKELIFT_OT_work.__name__
+        return str(operator.bl_idname)
     except ValueError:
-        return False
+        return None
+
+
+def _drop_unregistered(timer: bpy.types.Timer) -> float | None:
+    """End a timer that gives the first window events, once no unregistered operator is left for them to drop."""
+    manager = bpy.context.window_manager
+    if _leaving(manager):
+        return TICK_SECONDS
+    manager.event_timer_remove(timer)
+    return None
 
 
 def check_soon(context: bpy.types.Context) -> None:
@@ -334,8 +359,14 @@ def register() -> None:
 
 def unregister() -> None:
     """Unregister the worker and end its jobs."""
-    if bpy.app.timers.is_registered(_check):
-        bpy.app.timers.unregister(_check)
-    for worker in workers(bpy.context.window_manager):
+    for later in (_check, _work_later):
+        if bpy.app.timers.is_registered(later):
+            bpy.app.timers.unregister(later)
+    manager = bpy.context.window_manager
+    running = workers(manager)
+    for worker in running:
         worker.cancel(bpy.context)
     bpy.utils.unregister_class(SMOKELIFT_OT_work)
+    if running:
+        timer = manager.event_timer_add(TICK_SECONDS, window=manager.windows[0])
+        bpy.app.timers.register(functools.partial(_drop_unregistered, timer), first_interval=TICK_SECONDS)
