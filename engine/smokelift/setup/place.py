@@ -24,6 +24,8 @@ def place_choice(place: AxisEstimate) -> Choice[str]:
     about = f"give or take {place.deviation:.2g} m"
     side = "behind" if place.depth >= 0 else "before"
     where = f"{abs(place.depth):.2g} m {side} the middle of the box"
+    if abs(place.depth) < 0.05 * place.deviation:  # so small a number would look exact
+        where = "in the middle of the box"
     reason = {
         "box": f"Where the smoke stands in depth is undetermined: the middle of the box is taken, {about}. {TELL}",
         "floor contact": f"By its contact with the floor of the box the smoke stands {where}, {about}. {TELL}",

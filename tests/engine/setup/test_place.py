@@ -19,6 +19,7 @@ from tests.engine.setup.shots import shot_of
     [
         ("box", 0.0, "undetermined: the middle of the box is taken, give or take 0.12 m."),
         ("floor contact", -0.25, "contact with the floor of the box the smoke stands 0.25 m before the middle"),
+        ("floor contact", 2e-5, "contact with the floor of the box the smoke stands in the middle of the box, give or"),
         ("inlets", 0.1, "marked inlets the smoke stands 0.1 m behind the middle of the box, give or take 0.12 m."),
         ("lamps", 0.1, "colours of the lamps"),
     ],
