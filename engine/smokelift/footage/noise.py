@@ -166,8 +166,9 @@ def temporal_noise(deviations: Picture, blocks: Picture) -> Noise:
 def clipped_black(deviations: Picture, blocks: Picture) -> Picture:
     """Return how bright a noisy black is on the mean, since noise below black is clipped, in sRGB values.
 
-    It is the median deviation of the block means, as far as noise explains it: a background that is told wrong, or
-    smoke that fills the picture, deviates more. 0 for what is less than a step of 8 bit video.
+    It is the deviation of the darkest tenth of the blocks, each at its median over time, as far as noise explains it: a
+    background that is told wrong, or smoke that fills the picture, deviates more. 0 for what is less than a step of 8
+    bit video.
 
     Parameters
     ----------
@@ -180,7 +181,7 @@ def clipped_black(deviations: Picture, blocks: Picture) -> Picture:
     """
     apart = np.abs(deviations[:, :, 1:] - deviations[:, :, :-1])
     explained = CLIPPED_MEAN * np.median(apart, axis=(0, 1, 2)) if apart.size else 0
-    offset = np.minimum(np.median(blocks, axis=(0, 1, 2)), explained)
+    offset = np.minimum(np.quantile(np.median(blocks, axis=0), 0.1, axis=(0, 1)), explained)
     return np.where(offset < EIGHT_BIT_STEP, 0, offset).astype(np.float32)
 
 
