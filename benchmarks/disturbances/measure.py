@@ -34,7 +34,8 @@ def whole_run(take: Take, method: MethodName) -> Figures:
     Returns
     -------
     ``psnr_VIEW`` and ``psnr_new``, the mean over the new views (dB); ``density_error`` and ``velocity_error``, both
-    relative; ``mass_ratio``. All are means over the frames that count.
+    relative, and ``mass_ratio``, which are absent in another box than the scene's. All are means over the frames that
+    count.
     """
     key = (take.known.name, take.pictures.tobytes(), take.told, take.gain, take.behind, take.scored, method)
     if key not in _done:
@@ -50,7 +51,11 @@ def _measured(take: Take, method: MethodName) -> Figures:
         frames = list(reconstruct(clip, take.told, shot=shot))
     except ValueError as error:
         return {"refused": str(error)}
-    return _picture_figures(take, shot.scene, frames) | _volume_figures(take, frames)
+    figures = _picture_figures(take, shot.scene, frames)
+    box, true_box = shot.scene.domain, take.known.domain
+    if np.allclose([*box.min, *box.max], [*true_box.min, *true_box.max]):
+        figures |= _volume_figures(take, frames)
+    return figures
 
 
 def _picture_figures(take: Take, scene: CompleteScene, frames: list[Frame]) -> Figures:

@@ -12,6 +12,7 @@ from benchmarks.background.clips import backdrop, compressed, noisy
 from benchmarks.disturbances.known import FRONT, SIZE, Known, Take
 from smokelift import Background, Scene
 from smokelift.footage.images import Picture, linear_to_srgb
+from smokelift.scene import Domain
 
 FIRST, LENGTH = 14, 6
 """The moments of a clip that nothing disturbs: its first, and how many."""
@@ -24,6 +25,19 @@ GREY = 0.18
 
 SMOKE = 0.05
 """Share of the brightest radiance from which a pixel is smoke."""
+
+GRIDS: dict[str, tuple[float, tuple[int, int, int]]] = {
+    "one voxel": (36, (1, 1, 1)),
+    "2 high": (18, (2, 2, 2)),
+    "3 high": (12, (2, 2, 3)),
+    "9 high": (4, (6, 6, 9)),
+    "36 high": (1, (24, 24, 36)),
+    "one deep": (1, (24, 1, 36)),
+    "3 deep": (1, (24, 3, 36)),
+    "very tall": (1, (24, 24, 144)),
+    "very wide": (1, (120, 24, 36)),
+}
+"""Boxes about the middle of the scene's: voxels of so many of its own, and how many along x, y, z."""
 
 
 def plain(known: Known) -> Take:
@@ -99,6 +113,16 @@ def bright_background(known: Known, share: float) -> Take:
     seen = part.radiance[FRONT]
     grey = share * float(np.quantile(seen[seen > SMOKE * seen.max()], 0.95))
     return before_grey(part, grey)
+
+
+def grid(known: Known, number: float) -> Take:
+    """A description with the box and the voxels that `GRIDS` has under a number."""
+    take = plain(usual(known))
+    coarser, shape = list(GRIDS.values())[int(number)]
+    half = np.array(shape) * coarser * known.domain.voxel_size / 2
+    middle = np.array(known.domain.centre)
+    box = Domain(tuple(middle - half), tuple(middle + half), shape)
+    return replace(take, told=replace(take.told, domain=box))
 
 
 def missing(known: Known, share: float) -> Take:

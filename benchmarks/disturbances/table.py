@@ -97,6 +97,10 @@ DISTURBANCES: dict[str, Disturbance] = {
         labels=tuple(smoke.EVENTS),
     ),
     "length": _disturbed(spoiled.clip_length, "Length of the clip", "frames", (1, 2, 3, 6, 12, 20), 6, (), True),
+    "grid": _disturbed(
+        spoiled.grid, "Boxes and grids", "", tuple(float(k) for k in range(len(spoiled.GRIDS))),
+        float(list(spoiled.GRIDS).index("36 high")), labels=tuple(spoiled.GRIDS),
+    ),
     "wrong-albedo": _disturbed(spoiled.wrong_albedo, "Albedo told wrong", "factor", (0.25, 0.5, 1, 1.25), 1),
     "wrong-anisotropy": _disturbed(
         spoiled.wrong_anisotropy, "Anisotropy told wrong", "mean cosine", (-0.9, -0.5, 0, 0.5, 0.9)

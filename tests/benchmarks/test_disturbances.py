@@ -104,6 +104,22 @@ def test_a_share_of_the_smoke_is_white(known) -> None:
     assert take.told.lights[0].irradiance[0] == pytest.approx(take.gain * known.light.irradiance[0])
 
 
+def test_grids_are_about_the_middle_of_the_box(known) -> None:
+    takes = [spoiled.grid(known, number) for number in range(len(spoiled.GRIDS))]
+    for take in takes:
+        assert take.told.domain is not None
+        np.testing.assert_allclose(take.told.domain.centre, known.domain.centre, atol=1e-6)
+    same = DISTURBANCES["grid"].undisturbed
+    assert np.allclose(takes[int(same)].told.domain.min, known.domain.min)
+    assert takes[int(same)].told.domain.resolution == GRID
+
+
+def test_volumes_are_compared_in_the_same_box_only(known) -> None:
+    """Pictures are compared in any; a box of one voxel is as good as any other."""
+    one = whole_run(spoiled.grid(known, 0), "default")
+    assert one["psnr_new"] is not None and "mass_ratio" not in one
+
+
 def test_black_is_crushed(known) -> None:
     plain, crushed = (spoiled.crushing(known, level).pictures for level in (0, 0.2))
     assert (crushed[plain < 0.2] == 0).all()
