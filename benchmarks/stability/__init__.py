@@ -12,3 +12,8 @@
 
 ``python -m benchmarks.stability FOLDER --cases 100`` runs so many cases of every class and prints a table.
 """
+
+import os
+
+# as the command does, before NumPy is loaded: OpenBLAS hangs in a fork that may start no threads
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

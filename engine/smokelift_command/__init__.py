@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 from types import FrameType
@@ -19,6 +20,8 @@ def main() -> int:
         raise KeyboardInterrupt
 
     signal.signal(signal.SIGTERM, terminate)
+    # NumPy's OpenBLAS hangs where the system gives it no threads, and the engine computes in its own
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         from smokelift.app import cli
 

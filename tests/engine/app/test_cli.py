@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import gc
 import json
+import os
 import re
 import signal
 import subprocess
 import sys
 import zipfile
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -149,3 +151,16 @@ def test_an_interrupt_while_writing_is_quiet(shot, tmp_path, capsys, monkeypatch
     assert not [name for name in names(tmp_path / "out") if name.endswith(".tmp")]
     assert command("reconstruct", shot, "--out", tmp_path / "out", "--npz", "--resume", *QUICK) == 0
     assert [cry.exc_value for cry in cries] == []
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="needs Linux to count threads")
+def test_the_command_loads_no_threads_of_openblas() -> None:
+    """Where the system allows no more threads it would hang in them."""
+    script = (
+        "import smokelift_command, sys; sys.argv = ['smokelift', 'doctor', '--help']\n"
+        "try: smokelift_command.main()\n"
+        "except SystemExit: print(open('/proc/self/status').read())"
+    )
+    unset = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
+    said = subprocess.run([sys.executable, "-c", script], env=unset, capture_output=True, text=True, check=True).stdout
+    assert "Threads:\t1\n" in said
