@@ -325,7 +325,7 @@ class Video:
                 frame = self._decode(self._shown[n])
                 if not any(component.is_alpha for component in frame.format.components):
                     return None
-                codes: npt.NDArray[Any] = frame.reformat(format="rgba").to_ndarray()
+                codes: npt.NDArray[Any] = frame.reformat(format="rgba", threads=1).to_ndarray()
                 # white that is multiplied by alpha in linear light is the brightest that there may be
                 limit = codes[..., 3:] / np.float32(255) + np.float32(BEYOND_ALPHA)
                 layers.append((frame, bool((srgb_to_linear(codes[..., :3] / np.float32(255)) <= limit).all())))
@@ -347,7 +347,8 @@ class Video:
         shown = self._field(frame) if interlaced else frame
         way = _SHRINKING if width < size[0] else _GROWING
         rows = shown.height if interlaced else height
-        codes: npt.NDArray[Any] = shown.reformat(width, rows, layout, interpolation=way).to_ndarray()
+        # in this thread: after a fork of a process that has read a video, the converter waits for its own for ever
+        codes: npt.NDArray[Any] = shown.reformat(width, rows, layout, interpolation=way, threads=1).to_ndarray()
         encoding = self._transfer or ENCODINGS.get(self._stream.codec_context.color_trc)
         white = _white(frame)
         linear, opacity = decode_integers(codes, encoding, white, self._premultiplied), decode_alpha(codes, white)
