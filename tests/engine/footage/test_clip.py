@@ -393,7 +393,7 @@ def test_huge_pictures_are_reduced(tmp_path: Path) -> None:
 
 def pictures(folder: Path, numbers: Sequence[int], suffix: str = "png") -> None:
     for n in numbers:
-        write_image(folder / f"frame_{n:04d}.{suffix}", srgb_to_linear(flat(10 * n) / 255))
+        write_image(folder / f"frame_{n:04d}.{suffix}", srgb_to_linear(flat(min(10 * n, 255)) / 255))
 
 
 def test_picture_sequences(tmp_path: Path) -> None:
