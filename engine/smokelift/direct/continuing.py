@@ -13,7 +13,7 @@ from smokelift.direct.constraint import Mask, faces_of
 from smokelift.direct.continuation import learnt_simulation
 from smokelift.direct.moment import Moment, read_moment
 from smokelift.direct.surroundings import Ball, Box, Fan, Surroundings
-from smokelift.direct.writing import SHORTEST, Written, directed_writer, simulated_figures, time_step
+from smokelift.direct.writing import SHORTEST, Written, directed_writer, simulated_figures, time_step, write_copy
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
 from smokelift.scene import Domain
@@ -109,10 +109,7 @@ def continue_sequence(
 def _copied(sequence: Sequence, numbers: tuple[int, ...], writer: SequenceWriter) -> Iterator[Written]:
     for number in numbers:
         if number not in writer.finished:
-            faces = sequence.staggered_velocity(number).faces
-            figures = {**sequence.figures(number), "origin": "clip"}
-            writer.write(number, sequence.density(number), faces, figures, ready=sequence.files(number))
-            yield number, {**figures, "seconds_density": 0.0, "seconds_velocity": 0.0}
+            yield write_copy(sequence, number, writer, number, {})
 
 
 def _simulated(

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from smokelift.direct.between import between
 from smokelift.direct.moment import Moment, read_moment
-from smokelift.direct.writing import SHORTEST, Written, directed_writer, simulated_figures, time_step
+from smokelift.direct.writing import SHORTEST, Written, directed_writer, simulated_figures, time_step, write_copy
 from smokelift.output.sequence import Sequence
 from smokelift.transport import Velocity
 from smokelift.velocity import estimate_velocity
@@ -91,12 +91,9 @@ def loop_sequence(
                 moment = seam(end, start, share, time_step(sequence) * (overlap + 1))
                 figures = simulated_figures(moment, began, "looped", {"place": place, "share": share})
                 writer.write(number, moment.density, moment.velocity.faces, figures)
+                yield number, figures
             else:
-                faces = sequence.staggered_velocity(place).faces
-                figures = {**sequence.figures(place), "origin": "clip", "place": place}
-                writer.write(number, sequence.density(place), faces, figures, ready=sequence.files(place))
-                figures |= {"seconds_density": 0.0, "seconds_velocity": 0.0}
-            yield number, figures
+                yield write_copy(sequence, place, writer, number, {"place": place})
 
 
 def seam(end: Moment, start: Moment, share: float, duration: float) -> Moment:

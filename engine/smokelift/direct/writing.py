@@ -93,6 +93,16 @@ def directed_writer(
     )
 
 
+def write_copy(
+    sequence: Sequence, place: int, writer: SequenceWriter, number: int, further: Mapping[str, float]
+) -> Written:
+    """Write a frame of the clip as it is, under a number, with further figures."""
+    figures = {**sequence.figures(place), "origin": "clip", **further}
+    faces = sequence.staggered_velocity(place).faces
+    writer.write(number, sequence.density(place), faces, figures, ready=sequence.files(place))
+    return number, {**figures, "seconds_density": 0.0, "seconds_velocity": 0.0}
+
+
 def simulated_figures(
     moment: Moment, began: float, origin: str, further: Mapping[str, float], solid: Mask | None = None
 ) -> dict[str, Any]:
