@@ -6,14 +6,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from smokelift.direct.constraint import FaceMasks, Mask, faces_between, faces_of, without_divergence_given
 from smokelift.scene import Domain
 from smokelift.scene.checks import Vector
 from smokelift.transport import Velocity, project
-
-Metres = npt.NDArray[np.float64]
 
 RISE = 0.5
 """Seconds in which the air takes on most (1 - 1/e) of a wind that sets in: a gust, and not a blow."""
@@ -36,7 +33,7 @@ class Ball:
 
     def voxels(self, domain: Domain) -> Mask:
         """The voxels whose centres lie in it, shape (nx, ny, nz)."""
-        x, y, z = _offsets(domain, self.centre)
+        x, y, z = domain.offsets(self.centre)
         inside: Mask = x**2 + y**2 + z**2 <= self.radius**2
         return inside
 
@@ -56,7 +53,7 @@ class Box:
 
     def voxels(self, domain: Domain) -> Mask:
         """The voxels whose centres lie in it, shape (nx, ny, nz)."""
-        above, below = _offsets(domain, self.low), _offsets(domain, self.high)
+        above, below = domain.offsets(self.low), domain.offsets(self.high)
         x, y, z = ((a >= 0) & (b <= 0) for a, b in zip(above, below, strict=True))
         inside: Mask = x & y & z
         return inside
@@ -113,10 +110,3 @@ class Surroundings:
         return velocity.with_faces(
             np.where(mask, np.float32(0), component) for mask, component in zip(inside, field.faces, strict=True)
         )
-
-
-def _offsets(domain: Domain, point: Vector) -> tuple[Metres, Metres, Metres]:
-    """Metres from a point to the voxels' centres along x, y and z, ready to be broadcast."""
-    places = zip(domain.min, point, domain.resolution, strict=True)
-    x, y, z = np.ix_(*(low + (np.arange(n) + 0.5) * domain.voxel_size - at for low, at, n in places))
-    return x, y, z

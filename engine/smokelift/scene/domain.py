@@ -87,6 +87,12 @@ class Domain:
         """Return whether a point lies inside the box or on its surface."""
         return all(low <= p <= high for low, p, high in zip(self.min, point, self.max, strict=True))
 
+    def offsets(self, point: Vector) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Return the metres from a point to the voxels' centres along x, y and z, ready to be broadcast."""
+        places = zip(self.min, point, self.resolution, strict=True)
+        x, y, z = np.ix_(*(low + (np.arange(n) + 0.5) * self.voxel_size - at for low, at, n in places))
+        return x, y, z
+
     def corners(self) -> np.ndarray[Any, np.dtype[np.float64]]:
         """Return the eight corners in metres, shape (8, 3)."""
         axes = np.meshgrid(*zip(self.min, self.max, strict=True), indexing="ij")
@@ -121,8 +127,7 @@ class Inlet:
 
     def voxels(self, domain: Domain) -> NDArray[np.bool_]:
         """Return the voxels whose centres lie in it, or the nearest ones if none does, shape (nx, ny, nz) bool."""
-        places = zip(domain.min, self.centre, domain.resolution, strict=True)
-        x, y, z = np.ix_(*(low + (np.arange(n) + 0.5) * domain.voxel_size - centre for low, centre, n in places))
+        x, y, z = domain.offsets(self.centre)
         squares = x**2 + y**2 + z**2
         inside: NDArray[np.bool_] = squares <= max(self.radius**2, squares.min())
         return inside
