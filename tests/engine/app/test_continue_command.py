@@ -17,7 +17,7 @@ def test_a_clip_goes_on(finished, tmp_path, capsys) -> None:
 
 
 def test_mistakes_end_in_one_sentence(finished, tmp_path, capsys) -> None:
-    start = ("continue", finished, "--out", tmp_path / "out")
+    start = ("continue", finished, "--out", tmp_path / "out", "--npz")
     assert "--frames 0" in refused(capsys, *start, "--frames", 0)
     assert "--fade 4" in refused(capsys, *start, "--frames", 3, "--fade", 4)
     assert "radius" in refused(capsys, *start, "--frames", 3, "--ball", 0, 0, 1, -1)
