@@ -35,6 +35,9 @@ VELOCITY_MARGIN = 2
 SETTINGS = "smokelift_settings"
 """Name of the grid metadata that holds the settings as JSON."""
 
+_LIMIT = np.float32(np.finfo(np.float16).max)
+"""Largest value that is stored."""
+
 _SPARE_BYTES = 65536
 """Bytes that are written after a file and taken away again, to see whether the disk is full."""
 
@@ -67,7 +70,7 @@ def vdb_module() -> ModuleType:
             sys.path.remove(str(folder))
     raise VdbUnavailable(
         "no OpenVDB module was found: install one with \"pip install 'smokelift[vdb]'\" (for Python 3.11 and "
-        "3.13; there is none for 3.12), or write NumPy files only with --npz"
+        "3.13; there is none for 3.12)"
     )
 
 
@@ -86,7 +89,7 @@ def _bpy_folders() -> list[Path]:
 def write_vdb(
     path: str | Path,
     density: npt.ArrayLike,
-    velocity_centres: npt.ArrayLike,
+    velocity_centres: npt.ArrayLike | None,
     domain: Domain,
     metadata: Mapping[str, Any] | None = None,
 ) -> None:
@@ -102,7 +105,7 @@ def write_vdb(
     density
         Shape (nx, ny, nz), not negative.
     velocity_centres
-        m/s at voxel centres, shape (nx, ny, nz, 3).
+        m/s at voxel centres, shape (nx, ny, nz, 3); None for a file of the density alone.
     domain
         Where the voxels lie.
     metadata
@@ -120,31 +123,29 @@ def write_vdb(
     vdb = vdb_module()
     # OpenVDB silently scrambles arrays of any other layout or type.
     rho = np.ascontiguousarray(density, np.float32)
-    velocity = np.ascontiguousarray(velocity_centres, np.float32)
-    if rho.shape != domain.shape or velocity.shape != (*domain.shape, 3):
-        raise ValueError(
-            f"density {rho.shape} and velocity {velocity.shape} do not fit the domain's {domain.shape} voxels"
-        )
-    if not (np.isfinite(rho).all() and np.isfinite(velocity).all()):
-        raise ValueError("density and velocity must be finite")
-    if rho.min() < 0.0:
-        raise ValueError("density must not be negative")
+    if rho.shape != domain.shape:
+        raise ValueError(f"density {rho.shape} does not fit the domain's {domain.shape} voxels")
+    if not np.isfinite(rho).all() or rho.min() < 0.0:
+        raise ValueError("density must be finite and not negative")
+    velocity = None if velocity_centres is None else np.ascontiguousarray(velocity_centres, np.float32)
+    if velocity is not None and velocity.shape != (*domain.shape, 3):
+        raise ValueError(f"velocity {velocity.shape} does not fit the domain's {domain.shape} voxels")
+    if velocity is not None and not np.isfinite(velocity).all():
+        raise ValueError("velocity must be finite")
 
-    limit = np.float32(np.finfo(np.float16).max)
     box = _around(rho > 0.0, VELOCITY_MARGIN)
     corner = tuple(side.start for side in box)
-    rho, velocity = np.minimum(rho[box], limit), np.clip(velocity[box], -limit, limit)
-    near = rho > 0.0
-    if near.any():
-        near = ndimage.maximum_filter(near, 2 * VELOCITY_MARGIN + 1, mode="constant")
+    rho = np.minimum(rho[box], _LIMIT)
     density_grid = vdb.FloatGrid()
     density_grid.copyFromArray(rho, ijk=corner)
     density_grid.gridClass = vdb.GridClass.FOG_VOLUME
-    velocity_grid = vdb.Vec3SGrid()
-    velocity_grid.copyFromArray(np.where(near[..., None], velocity, np.float32(0.0)), ijk=corner)
+    grids = {"density": density_grid}
+    if velocity is not None:
+        grids["velocity"] = vdb.Vec3SGrid()
+        grids["velocity"].copyFromArray(_near(rho, velocity[box]), ijk=corner)
     h = domain.voxel_size
     x, y, z = (low + 0.5 * h for low in domain.min)
-    for grid, name in ((density_grid, "density"), (velocity_grid, "velocity")):
+    for name, grid in grids.items():
         grid.name = name
         grid.creator = "Smokelift"
         grid.saveFloatAsHalf = True
@@ -155,10 +156,18 @@ def write_vdb(
         density_grid[SETTINGS] = json.dumps(dict(metadata), sort_keys=True)
     with atomic_path(path) as aside:
         try:
-            vdb.write(str(aside), grids=[density_grid, velocity_grid])
+            vdb.write(str(aside), grids=list(grids.values()))
         except RuntimeError as error:
             raise OSError(f"{path}: cannot be written: {error}") from error
         _ensure_written(aside)
+
+
+def _near(rho: Array, velocity: Array) -> Array:
+    """The velocity that is stored: the one near smoke."""
+    near = rho > 0.0
+    if near.any():
+        near = ndimage.maximum_filter(near, 2 * VELOCITY_MARGIN + 1, mode="constant")
+    return np.where(near[..., None], np.clip(velocity, -_LIMIT, _LIMIT), np.float32(0.0))
 
 
 def _around(marked: npt.NDArray[np.bool_], margin: int) -> tuple[slice, ...]:

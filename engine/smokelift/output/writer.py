@@ -302,7 +302,7 @@ def written_kinds(npz: bool) -> tuple[str, ...]:
         vdb_module()
     except VdbUnavailable as error:
         if not npz:
-            raise SequenceError(str(error)) from error
+            raise SequenceError(f"{error}, or write NumPy files only with --npz") from error
         return ("npz",)
     return ("vdb", "npz") if npz else ("vdb",)
 

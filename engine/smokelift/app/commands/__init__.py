@@ -9,6 +9,7 @@ from smokelift.app.commands import (
     continue_,
     doctor,
     evaluate,
+    export,
     inspect,
     loop,
     preview,
@@ -17,6 +18,6 @@ from smokelift.app.commands import (
     retime,
 )
 
-MODULES = reconstruct, inspect, render, preview, evaluate, continue_, retime, loop, chart, doctor, bench
+MODULES = reconstruct, inspect, render, preview, evaluate, continue_, retime, loop, export, chart, doctor, bench
 
 COMMANDS = tuple(module.add_parser for module in MODULES)

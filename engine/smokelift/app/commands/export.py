@@ -1,0 +1,68 @@
+"""``smokelift export``: small OpenVDB files, a proxy and a USD file of a sequence, for other programs and people."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from typing import Any, get_args
+
+from smokelift.app.options import named_path
+from smokelift.app.progress import Reporter
+from smokelift.output.export import (
+    ExportSettings,
+    Precision,
+    export_sequence,
+    export_size,
+    require_export,
+    require_space,
+)
+from smokelift.output.sequence import Sequence
+
+
+def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
+    """Add the command."""
+    parser = commands.add_parser("export", parents=[common], help="small OpenVDB files, a proxy and a USD file")
+    parser.add_argument("directory", type=named_path, help="of the sequence")
+    parser.add_argument("--out", type=named_path, required=True, help="folder for the export")
+    parser.add_argument(
+        "--precision",
+        choices=get_args(Precision),
+        default="half",
+        help="half: floats of 16 bits; quantised: as few bits as a picture of 8 bits needs",
+    )
+    parser.add_argument("--no-velocity", action="store_true", help="leave out the velocity, which motion blur needs")
+    parser.add_argument(
+        "--proxy", type=int, default=1, metavar="N", help="for viewports: a second sequence of N times larger voxels"
+    )
+    parser.add_argument("--size", action="store_true", help="say the size, and write nothing")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace, say: Reporter) -> None:
+    """Say the size, and export unless that is all that was asked for."""
+    began = time.monotonic()
+    settings = ExportSettings(options.precision, not options.no_velocity, options.proxy)
+    sequence = Sequence.open(options.directory)
+    require_export(sequence, options.out)
+    size = export_size(sequence, settings)
+    text = f"The export of {len(sequence.frames)} frames takes about {size / 1e6:.1f} MB"
+    if options.size:
+        say.finish(f"{text}.", {"size": size, "frames": len(sequence.frames)})
+        return
+    say.note(f"{text}.")
+    require_space(options.out, size)
+    say.start(len(sequence.frames), 0)
+    written, before = 0, time.monotonic()
+    for number, there in export_sequence(sequence, options.out, settings):
+        written, now = written + there, time.monotonic()
+        say.frame(number, {"origin": "exported", "seconds_density": now - before, "seconds_velocity": 0.0})
+        before = now
+    say.finish(
+        f"{len(sequence.frames)} frames in {options.out}, {written / 1e6:.1f} MB.",
+        {
+            "directory": str(options.out),
+            "frames": len(sequence.frames),
+            "size": written,
+            "seconds": round(time.monotonic() - began, 1),
+        },
+    )

@@ -1,0 +1,295 @@
+"""Writes what others need of a sequence: OpenVDB files that are as small as the picture allows, a proxy and a USD file.
+
+What is left out or rounded does not show in a picture of 8 bits:
+
+- Smoke that is so thin that a box full of it hides less than `THIN` of what is behind is left out.
+- Quantised densities are multiples of a power of two; rounding errors along a ray are independent, so over n voxels of
+  h metres they change the optical depth by extinction * h * sqrt(n / 12) steps (root mean square), which is kept below
+  `SHADE`. Powers of two leave the last bits of a 16 bit float zero, which compresses well.
+- Quantised velocities move smoke by at most half of `VELOCITY_STEP` voxels a frame.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import shutil
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from smokelift.output.atomic import atomic_path
+from smokelift.output.index import SequenceError
+from smokelift.output.layout import INDEX, frame_path
+from smokelift.output.sequence import Sequence
+from smokelift.output.usd import UsdVolume, usd_text
+from smokelift.output.vdb import vdb_module, write_vdb
+from smokelift.scene import Domain
+from smokelift.transport import Array
+
+NOTE = "export.json"
+"""Says what an export is and how it was made; a folder without it is not overwritten."""
+
+USD = "smoke.usda"
+
+THIN = 1e-3
+"""Share of the light that smoke may hide and yet be left out."""
+
+SHADE = 1 / 510
+"""Half a step of a picture of 8 bits."""
+
+VELOCITY_STEP = 1 / 16
+"""Step of a quantised velocity in voxels a frame."""
+
+USUAL_FPS = 24.0
+"""Frames a second where the clip does not say."""
+
+SAMPLES = 5
+"""Frames that are written to estimate the size of all."""
+
+Precision = Literal["half", "quantised"]
+
+_OWN = re.compile(r"(smoke|proxy)_\d{4,}\.vdb")
+
+
+@dataclass(frozen=True)
+class ExportSettings:
+    """What is exported.
+
+    Attributes
+    ----------
+    precision
+        ``"half"`` for floats of 16 bits; ``"quantised"`` for as few bits as a picture of 8 bits needs.
+    velocity
+        Whether to export the velocity, which motion blur needs.
+    proxy
+        How many times coarser a second sequence for viewports is, of the density alone; 1 for none.
+
+    Raises
+    ------
+    ValueError
+        If the proxy is not 1 to 16.
+    """
+
+    precision: Precision = "half"
+    velocity: bool = True
+    proxy: int = 1
+
+    def __post_init__(self) -> None:
+        """Check the proxy."""
+        if not 1 <= self.proxy <= 16:
+            raise ValueError(f"the proxy must be 1 (none) to 16 times coarser, not {self.proxy}.")
+
+    @property
+    def grids(self) -> tuple[str, ...]:
+        """Names of the grids in the files."""
+        return ("density", "velocity") if self.velocity else ("density",)
+
+
+def export_sequence(sequence: Sequence, out: str | Path, settings: ExportSettings) -> Iterator[tuple[int, int]]:
+    """Export a sequence to a folder: `smoke_0001.vdb`, ..., `smoke.usda`, `export.json`, and `proxy_0001.vdb`, ...
+
+    An earlier export in the folder is replaced. The sequence stays as it is.
+
+    Parameters
+    ----------
+    sequence
+        What is exported, with all its frames.
+    out
+        The folder, which is made if it is missing.
+    settings
+        What of it.
+
+    Yields
+    ------
+    The number of every frame, which is written already, and the bytes of its files.
+
+    Raises
+    ------
+    SequenceError
+        If there are no frames, the folder holds other files, or a file cannot be read or written.
+    VdbUnavailable
+        If there is no OpenVDB module.
+    """
+    out = Path(out)
+    require_export(sequence, out)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        _clear(out)
+        note = {**_note(sequence, settings), "complete": False}
+        _write_text(out / NOTE, json.dumps(note, indent=1) + "\n")  # first: it says whose files these are
+        for number in sequence.frames:
+            yield number, _write_frame(sequence, number, out, settings)
+        _write_text(out / USD, usd_text(_usd_volumes(sequence, settings), _fps(sequence), _medium(sequence)))
+        _write_text(out / NOTE, json.dumps({**note, "complete": True}, indent=1) + "\n")
+    except OSError as error:
+        raise SequenceError(f"{out}: cannot be written: {error}") from error
+
+
+def require_export(sequence: Sequence, out: Path) -> None:
+    """Check, before anything is spent or written, that a sequence can be exported to a folder.
+
+    Raises
+    ------
+    SequenceError, VdbUnavailable
+        As `export_sequence`.
+    """
+    vdb_module()
+    if not sequence.frames:
+        raise SequenceError(f"{sequence.directory}: has no finished frame to export yet.")
+    if out.exists() and not out.is_dir():
+        raise SequenceError(f"{out}: is a file; choose a folder for the export.")
+    names = [file.name for file in out.iterdir() if not file.name.startswith(".")] if out.is_dir() else []
+    foreign = [name for name in names if not (name in (NOTE, USD) or _OWN.fullmatch(name))]
+    if foreign or (names and NOTE not in names):
+        other = INDEX if INDEX in names else sorted(foreign or names)[0]
+        raise SequenceError(f"{out}: holds other files ({other}); nothing was overwritten, choose an empty folder.")
+
+
+def export_size(sequence: Sequence, settings: ExportSettings) -> int:
+    """Estimate the bytes of an export, from frames that are evenly spaced over the sequence.
+
+    Raises
+    ------
+    SequenceError, VdbUnavailable
+        As `export_sequence`.
+    """
+    places = np.unique(np.linspace(0, len(sequence.frames) - 1, SAMPLES).round().astype(int))
+    with tempfile.TemporaryDirectory() as folder:
+        sizes = [_write_frame(sequence, sequence.frames[place], Path(folder), settings) for place in places]
+    return round(float(np.interp(np.arange(len(sequence.frames)), places, sizes).sum()))
+
+
+def require_space(out: Path, size: int) -> None:
+    """Check that so many bytes are free where a folder will be.
+
+    Raises
+    ------
+    SequenceError
+        If they are not.
+    """
+    there = next(folder for folder in (out, *out.absolute().parents) if folder.exists())
+    free = shutil.disk_usage(there).free
+    if free < size:
+        raise SequenceError(f"{out}: the export takes {size / 1e6:.0f} MB, and {free / 1e6:.0f} MB are free.")
+
+
+def _write_frame(sequence: Sequence, number: int, out: Path, settings: ExportSettings) -> int:
+    """Write the files of a frame; returns their bytes."""
+    domain, extinction = sequence.scene.domain, sequence.scene.medium.extinction
+    density = sequence.density(number)
+    velocity = sequence.velocity(number) if settings.velocity else None
+    paths = [frame_path(out, number, "vdb")]
+    rho = _thinned(density, domain, extinction)
+    if settings.precision == "quantised":
+        rho = _rounded(rho, density_step(domain, extinction))
+        velocity = None if velocity is None else _rounded(velocity, velocity_step(domain, _fps(sequence)))
+    write_vdb(paths[0], rho, velocity, domain, sequence.settings)
+    if settings.proxy > 1:
+        paths.append(out / _proxy_name(number))
+        coarse, wide = coarser(density, domain, settings.proxy)
+        coarse = _rounded(_thinned(coarse, wide, extinction), density_step(wide, extinction))
+        write_vdb(paths[1], coarse, None, wide, sequence.settings)
+    return sum(path.stat().st_size for path in paths)
+
+
+def density_step(domain: Domain, extinction: float) -> float:
+    """Step of a quantised density: the largest power of two whose rounding does not show (see the module)."""
+    longest = max(domain.resolution)
+    return _power_of_two(SHADE / (extinction * domain.voxel_size * math.sqrt(longest / 12)))
+
+
+def velocity_step(domain: Domain, fps: float) -> float:
+    """Step of a quantised velocity in m/s (see the module)."""
+    return _power_of_two(VELOCITY_STEP * domain.voxel_size * fps)
+
+
+def coarser(density: Array, domain: Domain, times: int) -> tuple[Array, Domain]:
+    """Return the means of a density over cubes of voxels, and the box of those, which may be larger.
+
+    Parameters
+    ----------
+    density : (nx, ny, nz)
+    domain
+        Its box.
+    times
+        Voxels along a side of a cube.
+    """
+    counts = tuple(-(-n // times) for n in domain.resolution)
+    padded = np.pad(density, [(0, count * times - n) for count, n in zip(counts, density.shape, strict=True)])
+    x, y, z = counts
+    coarse = padded.reshape(x, times, y, times, z, times).mean((1, 3, 5), dtype=np.float32)
+    edge = times * domain.voxel_size
+    a, b, c = (low + count * edge for low, count in zip(domain.min, counts, strict=True))
+    return coarse, Domain(domain.min, (a, b, c), (x, y, z))
+
+
+def _thinned(density: Array, domain: Domain, extinction: float) -> Array:
+    longest = max(domain.resolution) * domain.voxel_size
+    return np.where(density < THIN / (extinction * longest), np.float32(0.0), density)
+
+
+def _rounded(values: Array, step: float) -> Array:
+    rounded: Array = np.round(values / np.float32(step)) * np.float32(step)
+    return rounded
+
+
+def _power_of_two(value: float) -> float:
+    return 2.0 ** math.floor(math.log2(value))
+
+
+def _fps(sequence: Sequence) -> float:
+    clip = sequence.scene.clip
+    return (clip.fps if clip is not None else None) or USUAL_FPS
+
+
+def _medium(sequence: Sequence) -> dict[str, float]:
+    medium = sequence.scene.medium
+    return {"extinction": medium.extinction, "albedo": medium.albedo, "anisotropy": medium.anisotropy}
+
+
+def _proxy_name(number: int) -> str:
+    return f"proxy_{number:04d}.vdb"
+
+
+def _usd_volumes(sequence: Sequence, settings: ExportSettings) -> list[UsdVolume]:
+    domain, numbers = sequence.scene.domain, sequence.frames
+    files = {number: frame_path(Path(), number, "vdb").name for number in numbers}
+    if settings.proxy == 1:
+        return [UsdVolume("Volume", "default", files, settings.grids, domain)]
+    proxies = {number: _proxy_name(number) for number in numbers}
+    return [
+        UsdVolume("Volume", "render", files, settings.grids, domain),
+        UsdVolume("Proxy", "proxy", proxies, ("density",), domain),
+    ]
+
+
+def _note(sequence: Sequence, settings: ExportSettings) -> dict[str, Any]:
+    domain = sequence.scene.domain
+    return {
+        "precision": settings.precision,
+        "grids": list(settings.grids),
+        "proxy": settings.proxy,
+        "frames": [sequence.frames[0], sequence.frames[-1]],
+        "fps": _fps(sequence),
+        "medium": _medium(sequence),
+        "domain": {"min": list(domain.min), "max": list(domain.max), "resolution": list(domain.resolution)},
+        "provenance": [dict(part) for part in sequence.provenance],
+    }
+
+
+def _clear(out: Path) -> None:
+    """Delete the frames of an earlier export."""
+    for path in out.iterdir():
+        if _OWN.fullmatch(path.name) or path.name == USD:
+            path.unlink()
+
+
+def _write_text(path: Path, text: str) -> None:
+    with atomic_path(path) as aside:
+        aside.write_text(text, encoding="utf-8")

@@ -1,0 +1,143 @@
+"""What an export leaves out, and that it does not show."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from small_sequence import SCENE, SETTINGS, frame, has_vdb, needs_vdb, write
+
+from smokelift.output import export, vdb
+from smokelift.output.export import ExportSettings, export_sequence, export_size
+from smokelift.output.index import SequenceError
+from smokelift.output.sequence import Sequence
+from smokelift.output.writer import SequenceWriter
+from smokelift.scene import Domain
+
+DOMAIN, EXTINCTION = SCENE.domain, SCENE.medium.extinction
+
+
+@pytest.fixture
+def sequence(tmp_path: Path) -> Sequence:
+    """Smoke in the middle of thin air, without its OpenVDB files where there is no module."""
+    with SequenceWriter(tmp_path / "smoke", SCENE, SETTINGS, npz=True) as writer:
+        for number in (1, 2, 3):
+            rho, faces = frame(number)
+            rho[:, :, 6:] = 1e-6
+            writer.write(number, rho, faces)
+    return Sequence.open(tmp_path / "smoke")
+
+
+def exported(sequence: Sequence, out: Path, **settings: object) -> list[tuple[int, int]]:
+    return list(export_sequence(sequence, out, ExportSettings(**settings)))  # type: ignore[arg-type]  # by name
+
+
+def grids(path: Path) -> dict[str, object]:
+    return {grid.name: grid for grid in vdb.vdb_module().readAll(str(path))[0]}
+
+
+@needs_vdb
+def test_the_files_of_an_export(sequence: Sequence, tmp_path: Path) -> None:
+    written = exported(sequence, tmp_path / "out", proxy=2)
+    names = sorted(path.name for path in (tmp_path / "out").iterdir())
+    frames = [f"{kind}_{number:04d}.vdb" for kind in ("proxy", "smoke") for number in (1, 2, 3)]
+    assert names == sorted([*frames, "export.json", "smoke.usda"])
+    assert sum(size for _, size in written) == sum((tmp_path / "out" / name).stat().st_size for name in frames)
+    note = json.loads((tmp_path / "out" / "export.json").read_text())
+    assert note["complete"] and note["frames"] == [1, 3] and note["medium"]["extinction"] == EXTINCTION
+
+
+@needs_vdb
+def test_thin_air_is_left_out_and_smoke_is_kept(sequence: Sequence, tmp_path: Path) -> None:
+    exported(sequence, tmp_path / "out")
+    rho, u = vdb.read_vdb(tmp_path / "out" / "smoke_0002.vdb", DOMAIN.shape)
+    assert not rho[:, :, 6:].any() and not u[:, :, 8:].any()
+    np.testing.assert_allclose(rho[:, :, :6], sequence.density(2)[:, :, :6], atol=1e-3)
+    np.testing.assert_allclose(u[:, :, :6], sequence.velocity(2)[:, :, :6], atol=2e-3)
+
+
+@needs_vdb
+def test_quantised_shows_in_no_picture_of_8_bits(sequence: Sequence, tmp_path: Path) -> None:
+    exported(sequence, tmp_path / "out", precision="quantised")
+    rho, u = vdb.read_vdb(tmp_path / "out" / "smoke_0001.vdb", DOMAIN.shape)
+    true = sequence.density(1)
+    assert not np.array_equal(rho, true)
+    for axis in range(3):
+        seen, wanted = (np.exp(-EXTINCTION * DOMAIN.voxel_size * r.sum(axis)) for r in (rho, true))
+        assert np.abs(seen - wanted).max() < 1 / 255
+    voxels_a_frame = DOMAIN.voxel_size * 24
+    near = rho > 0
+    assert np.abs(u - sequence.velocity(1))[near].max() <= voxels_a_frame / 32
+
+
+@needs_vdb
+def test_less_is_smaller(sequence: Sequence, tmp_path: Path) -> None:
+    sizes = [
+        export_size(sequence, settings)
+        for settings in (ExportSettings(), ExportSettings("quantised"), ExportSettings("quantised", velocity=False))
+    ]
+    assert sizes == sorted(sizes, reverse=True) and len(set(sizes)) == 3
+    written = exported(sequence, tmp_path / "out", precision="quantised", velocity=False)
+    assert sum(size for _, size in written) == pytest.approx(sizes[-1], rel=0.01)
+    assert set(grids(tmp_path / "out" / "smoke_0001.vdb")) == {"density"}
+
+
+@needs_vdb
+def test_the_proxy_lies_where_the_smoke_is(sequence: Sequence, tmp_path: Path) -> None:
+    exported(sequence, tmp_path / "out", proxy=4)
+    (density,) = grids(tmp_path / "out" / "proxy_0001.vdb").values()
+    edge = DOMAIN.voxel_size
+    middle = tuple(low + 2 * edge for low in DOMAIN.min)
+    assert density.transform.voxelSize() == pytest.approx((4 * edge,) * 3)  # type: ignore[attr-defined]  # no stubs
+    assert density.transform.indexToWorld((0, 0, 0)) == pytest.approx(middle)  # type: ignore[attr-defined]  # no stubs
+
+
+def test_a_coarser_box_keeps_the_mass() -> None:
+    domain = Domain((0, 0, 0), (0.5, 0.7, 0.9), (5, 7, 9))
+    rho = np.random.default_rng(1).random((5, 7, 9)).astype(np.float32)
+    coarse, wide = export.coarser(rho, domain, 3)
+    assert coarse.shape == wide.shape == (2, 3, 3)
+    assert wide.max == pytest.approx((0.6, 0.9, 0.9))
+    assert coarse.sum() * 27 == pytest.approx(rho.sum(), rel=1e-5)
+
+
+@needs_vdb
+def test_an_export_takes_the_place_of_an_earlier_one(sequence: Sequence, tmp_path: Path) -> None:
+    exported(sequence, tmp_path / "out", proxy=2)
+    exported(sequence, tmp_path / "out", velocity=False)
+    assert not list((tmp_path / "out").glob("proxy_*"))
+    assert "proxy" not in (tmp_path / "out" / "smoke.usda").read_text()
+
+
+@needs_vdb
+def test_other_files_are_not_overwritten(sequence: Sequence, tmp_path: Path) -> None:
+    with pytest.raises(SequenceError, match=r"sequence\.json"):
+        exported(sequence, sequence.directory)
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "holiday.jpg").touch()
+    with pytest.raises(SequenceError, match=r"holiday\.jpg"):
+        exported(sequence, tmp_path / "out")
+    with pytest.raises(SequenceError, match="is a file"):
+        exported(sequence, tmp_path / "out" / "holiday.jpg")
+    with pytest.raises(SequenceError, match=r"takes 1000000000 MB"):
+        export.require_space(tmp_path / "new" / "er", 10**15)
+
+
+@needs_vdb
+def test_nothing_to_export(tmp_path: Path) -> None:
+    write(tmp_path / "smoke", [])
+    with pytest.raises(SequenceError, match="no finished frame"):
+        exported(Sequence.open(tmp_path / "smoke"), tmp_path / "out")
+
+
+@pytest.mark.skipif(has_vdb(), reason="there is an OpenVDB module")
+def test_without_a_module_it_is_said(sequence: Sequence, tmp_path: Path) -> None:
+    with pytest.raises(vdb.VdbUnavailable, match="smokelift"):
+        exported(sequence, tmp_path / "out")
+
+
+def test_a_proxy_is_coarser() -> None:
+    with pytest.raises(ValueError, match=r"1 .none. to 16"):
+        ExportSettings(proxy=0)
