@@ -3,6 +3,7 @@
 from smokelift.direct.continuation import Simulation, learnt_simulation
 from smokelift.direct.continuing import Continuation, continue_sequence
 from smokelift.direct.looping import loop_length, loop_sequence, usual_overlap
+from smokelift.direct.mesh import Mesh
 from smokelift.direct.moment import Moment, completed, read_moment
 from smokelift.direct.retiming import paced, retime_sequence
 from smokelift.direct.surroundings import Ball, Box, Fan
@@ -13,6 +14,7 @@ __all__ = [
     "Box",
     "Continuation",
     "Fan",
+    "Mesh",
     "Moment",
     "Simulation",
     "completed",

@@ -6,11 +6,13 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from smokelift.direct.constraint import Mask, faces_of
 from smokelift.direct.continuation import learnt_simulation
+from smokelift.direct.mesh import Mesh
 from smokelift.direct.moment import Moment, read_moment
 from smokelift.direct.surroundings import Ball, Box, Fan, Surroundings
 from smokelift.direct.writing import SHORTEST, Written, directed_writer, simulated_figures, time_step, write_copy
@@ -48,7 +50,7 @@ class Continuation:
     fade: int = 0
     wind: Vector = (0.0, 0.0, 0.0)
     fans: tuple[Fan, ...] = ()
-    obstacles: tuple[Ball | Box, ...] = ()
+    obstacles: tuple[Ball | Box | Mesh, ...] = ()
 
 
 def continue_sequence(
@@ -92,7 +94,7 @@ def continue_sequence(
         "fade": continuation.fade,
         "wind": continuation.wind,
         "fans": [vars(fan.place) | {"velocity": fan.velocity} for fan in continuation.fans],
-        "obstacles": [vars(obstacle) for obstacle in continuation.obstacles],
+        "obstacles": [_told(obstacle) for obstacle in continuation.obstacles],
     }
     how = (
         f"Frames {start + 1} to {last} are a simulation that starts from frame {start}, with the buoyancy, the "
@@ -154,7 +156,11 @@ def _surroundings(continuation: Continuation, domain: Domain) -> Surroundings:
     return Surroundings(continuation.wind, tuple(blown), solid)
 
 
-def _placed(thing: Ball | Box, domain: Domain, what: str) -> Mask:
+def _told(obstacle: Ball | Box | Mesh) -> dict[str, Any]:
+    return obstacle.told() if isinstance(obstacle, Mesh) else vars(obstacle)
+
+
+def _placed(thing: Ball | Box | Mesh, domain: Domain, what: str) -> Mask:
     """The voxels of a thing that has to be in the box."""
     voxels = thing.voxels(domain)
     if not voxels.any():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 from command_line import command, events, names, refused
 
 
@@ -25,4 +26,16 @@ def test_mistakes_end_in_one_sentence(finished, tmp_path, capsys) -> None:
     assert "cannot go on from frame 77" in refused(capsys, *start, "--frames", 3, "--start", 77)
     assert "the sequence itself" in refused(capsys, "continue", finished, "--out", finished, "--frames", 3)
     assert "holds no sequence" in refused(capsys, "continue", tmp_path, "--out", tmp_path / "out", "--frames", 3)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_mesh_is_an_obstacle(finished, tmp_path, capsys) -> None:
+    start = ("continue", finished, "--out", tmp_path / "out", "--npz", "--frames", 1)
+    assert "mesh.stl: is no file" in refused(capsys, *start, "--mesh", tmp_path / "mesh.stl")
+    corners = np.array([(9, 9, 9), (8, 9, 9), (9, 8, 9), (9, 9, 8)], np.float32)
+    with (tmp_path / "mesh.stl").open("wb") as file:
+        file.write(bytes(80) + (4).to_bytes(4, "little"))
+        for number in range(4):
+            file.write(bytes(12) + np.delete(corners, number, axis=0).tobytes() + bytes(2))
+    assert "no voxel" in refused(capsys, *start, "--mesh", tmp_path / "mesh.stl")
     assert not (tmp_path / "out").exists()

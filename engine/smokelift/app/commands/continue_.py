@@ -6,9 +6,9 @@ import argparse
 import time
 from typing import Any
 
-from smokelift.app.options import add_directed_options, finite, require_new
+from smokelift.app.options import add_directed_options, finite, named_path, require_new
 from smokelift.app.progress import Reporter, say_frames
-from smokelift.direct import Ball, Box, Continuation, Fan, continue_sequence, open_source
+from smokelift.direct import Ball, Box, Continuation, Fan, Mesh, continue_sequence, open_source
 
 
 def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
@@ -59,6 +59,14 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
         metavar=("X", "Y", "Z", "X2", "Y2", "Z2"),
         help="an obstacle from one corner to the other, in metres; may be given again",
     )
+    parser.add_argument(
+        "--mesh",
+        type=named_path,
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="an obstacle of any shape: a closed mesh in a binary STL file, in metres, Z up; may be given again",
+    )
     parser.set_defaults(run=run)
 
 
@@ -93,7 +101,7 @@ def _continuation(options: argparse.Namespace) -> Continuation:
         fade=options.fade,
         wind=tuple(options.wind),
         fans=tuple(Fan(_ball("--fan", values[:4]), tuple(values[4:])) for values in options.fan),
-        obstacles=(*balls, *boxes),
+        obstacles=(*balls, *boxes, *map(Mesh.read, options.mesh)),
     )
 
 
