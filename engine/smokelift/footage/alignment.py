@@ -125,6 +125,14 @@ class Level:
     lens: Lens
     detail: Picture
 
+    def at(self, places: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """The values at places (n, 2) across and down, and which of them are inside the picture."""
+        x, y = places.T
+        rows, columns = self.detail.shape
+        inside = (x > 1) & (x < columns - 1) & (y > 1) & (y < rows - 1)
+        values = ndimage.map_coordinates(self.detail, [y - 0.5, x - 0.5], order=1, mode="nearest")
+        return values.astype(np.float64), inside
+
 
 def levels(picture: Picture, lens: Lens) -> tuple[Level, ...]:
     """Return a linear picture (rows, columns, 3) at all resolutions, the coarsest first."""
@@ -153,6 +161,8 @@ class Points:
         Directions.
     values : (n,)
         Of the band-passed picture.
+    gradient : (n, 2)
+        Change of the value by a pixel across and down.
     slopes : (n, 3)
         Change of the value by a turn about x, y and z (per radian).
     cells : (n,)
@@ -162,6 +172,7 @@ class Points:
     lens: Lens
     rays: Array
     values: Array
+    gradient: Array
     slopes: Array
     cells: NDArray[np.intp]
 
@@ -183,25 +194,22 @@ class Points:
         chosen = order[(rank < most) & (steep.ravel()[order] > 0)]
         y, x = np.divmod(chosen, columns)
         rays = level.lens.rays(np.column_stack([x + 0.5, y + 0.5]))
-        gradient = np.column_stack([across.ravel()[chosen], down.ravel()[chosen]]) * level.lens.focal
+        gradient = np.column_stack([across.ravel()[chosen], down.ravel()[chosen]]).astype(np.float64)
         # a ray (a, b, 1) that turns by w moves by w x ray, and its place on the plane z = 1 by that less its drift
         a, b = rays[:, 0], rays[:, 1]
         turn_x = np.column_stack([-a * b, -1 - b**2])
         turn_y = np.column_stack([1 + a**2, a * b])
         turn_z = np.column_stack([-b, a])
-        slopes = np.column_stack([(gradient * turn).sum(1) for turn in (turn_x, turn_y, turn_z)])
-        return Points(level.lens, rays, level.detail.ravel()[chosen].astype(np.float64), slopes, cell.ravel()[chosen])
+        slopes = np.column_stack([(gradient * level.lens.focal * turn).sum(1) for turn in (turn_x, turn_y, turn_z)])
+        values = level.detail.ravel()[chosen].astype(np.float64)
+        return Points(level.lens, rays, values, gradient, slopes, cell.ravel()[chosen])
 
     def seen_in(self, level: Level, turn: Rotation) -> tuple[Array, NDArray[np.bool_]]:
         """The values at the points in another picture, and which are inside it.
 
         ``turn`` turns directions of this picture into those of the other.
         """
-        x, y = self.lens.pixels(turn.apply(self.rays)).T
-        rows, columns = level.detail.shape
-        inside = (x > 1) & (x < columns - 1) & (y > 1) & (y < rows - 1)
-        values = ndimage.map_coordinates(level.detail, [y - 0.5, x - 0.5], order=1, mode="nearest")
-        return values.astype(np.float64), inside
+        return level.at(self.lens.pixels(turn.apply(self.rays)))
 
 
 def points_of(pictures: Sequence[Level]) -> tuple[Points, ...]:
@@ -271,7 +279,8 @@ def judged(points: Points, level: Level, turn: Rotation) -> Alignment:
     values, inside = points.seen_in(level, turn)
     if not inside.any():
         return Alignment(turn, 0.0, 0.0)
-    correlation = _correlations(points, values, inside)
+    correlation = cell_correlations(points, values, inside)
+    correlation = correlation[np.isfinite(correlation)]
     same = float((correlation >= SAME).mean()) if len(correlation) >= FEWEST_CELLS else 0.0
     return Alignment(turn, same, float(inside.mean()))
 
@@ -285,17 +294,30 @@ def _residual(points: Points, level: Level, turn: Rotation) -> tuple[Array, Arra
     return residual, weight
 
 
-def _correlations(points: Points, values: Array, inside: NDArray[np.bool_]) -> Array:
-    """Correlation in both pictures of each cell that has the texture to say anything."""
+def cell_correlations(points: Points, values: Array, inside: NDArray[np.bool_]) -> Array:
+    """Return how alike each cell is in two pictures.
+
+    Parameters
+    ----------
+    points
+        Of the first picture.
+    values, inside : (n,)
+        What the second shows at the points, and which of them are inside it.
+
+    Returns
+    -------
+    (cells,)
+        Correlation; not a number for a cell that has not the texture to say anything.
+    """
     cells, here, there = points.cells[inside], points.values[inside], values[inside]
 
     def mean(of: Array) -> Array:
-        return np.asarray(np.bincount(cells, of) / np.maximum(number, 1))
+        return np.asarray(np.bincount(cells, of, CELLS**2) / np.maximum(number, 1))
 
-    number = np.bincount(cells)
+    number = np.bincount(cells, minlength=CELLS**2)
     mean_here, mean_there = mean(here), mean(there)
     variance_here = mean(here**2) - mean_here**2
     variance_there = mean(there**2) - mean_there**2
     shared = mean(here * there) - mean_here * mean_there
     correlation = shared / np.sqrt(np.maximum(variance_here * variance_there, np.finfo(float).tiny))
-    return np.asarray(correlation[(number >= POINTS // 2) & (variance_here > TEXTURE**2)])
+    return np.where((number >= POINTS // 2) & (variance_here > TEXTURE**2), correlation, np.nan)

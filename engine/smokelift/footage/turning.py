@@ -5,7 +5,8 @@ of the key frame is left in the picture, the last frame that was laid becomes th
 
 A camera moves if some frames show the same as the key only once they are turned. For a still camera the turn that is
 found is zero up to noise, so as much is the same with it as without it, however much smoke there is. The smoke's own
-motion is no turn, because smoke does not keep its shape from the middle of a clip to its ends.
+motion is no turn, because smoke does not keep its shape from the middle of a clip to its ends. A camera that moves,
+but does not turn in its place, is refused (`smokelift.footage.parallax`).
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from scipy.spatial.transform import Rotation
 
 from smokelift.footage.alignment import Lens, align, judged, levels, points_of, shift
 from smokelift.footage.clip import Clip
+from smokelift.footage.parallax import travels
 from smokelift.scene import Camera, as_matrix
 
 HELD = 0.5
@@ -85,11 +87,20 @@ def find_turns(clip: Clip, lens: Lens) -> Turns | None:
     ------
     ClipError
         If a frame cannot be read.
+    ValueError
+        If the camera travels or zooms.
     """
     middle = len(clip) // 2
     ahead, back = range(middle + 1, len(clip)), range(middle - 1, -1, -1)
     found = _followed(clip, lens, middle, ahead) | _followed(clip, lens, middle, back)
-    if not found or np.median([each.same for each in found.values()]) < HELD:
+    if not found:
+        return None
+    if np.median([each.same for each in found.values()]) < HELD:
+        if travels(clip, lens, {number for number, each in found.items() if each.same < HELD}):
+            raise ValueError(
+                "The camera travels or zooms, so near and far move unlike each other and no turn steadies the clip; "
+                "track it in Blender, and give its matrices in [camera] and what is behind the smoke in [background]."
+            )
         return None
     if np.mean([each.as_it_stands <= MOVED * each.same for each in found.values()]) < MOVING_FRAMES:
         return None
