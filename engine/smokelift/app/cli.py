@@ -17,10 +17,18 @@ from typing import NoReturn
 
 from smokelift.app.commands import COMMANDS
 from smokelift.app.progress import OutputError, one_line, reporter
+from smokelift.output.index import DirectoryBusyError
 from smokelift.output.vdb import VdbUnavailable
 from smokelift.render import DeviceError
 
 DONE, BAD_INPUT, NO_DEVICE, CANCELLED = 0, 2, 3, 130
+
+_PASSING = {
+    getattr(errno, name)
+    for name in ("ENOSPC", "EDQUOT", "EIO", "ESTALE", "ETIMEDOUT", "EHOSTDOWN", "EHOSTUNREACH", "ENOTCONN")
+    if hasattr(errno, name)  # some systems lack some
+}
+"""Failures of a storage: it is full, or its server is away."""
 
 _HINT = " Finished frames stay, --resume goes on from them."
 
@@ -78,18 +86,30 @@ def _run(options: argparse.Namespace) -> int:
     except OutputError:
         raise
     except (DeviceError, MemoryError) as error:
-        say.fail(str(error) or "Out of memory; choose a lower --resolution.", NO_DEVICE)
+        lacking = isinstance(error, MemoryError)
+        say.fail(str(error) or "Out of memory; choose a lower --resolution.", NO_DEVICE, later=lacking)
         return NO_DEVICE
     except (ValueError, VdbUnavailable, OSError, RuntimeError) as error:
         # the system's limits: ulimit -v, ulimit -u
         if getattr(error, "errno", None) in (errno.EAGAIN, errno.ENOMEM) or "start new thread" in str(error):
-            say.fail(f"The system gives no more memory or threads ({error}); end other programs.", NO_DEVICE)
+            say.fail(
+                f"The system gives no more memory or threads ({error}); end other programs.", NO_DEVICE, later=True
+            )
             return NO_DEVICE
         if isinstance(error, RuntimeError) and not isinstance(error, VdbUnavailable):
             raise
-        say.fail(str(error), BAD_INPUT)
+        say.fail(str(error), BAD_INPUT, later=_passes(error))
         return BAD_INPUT
     return DONE
+
+
+def _passes(error: BaseException | None) -> bool:
+    """Return whether a failure is one of the storage or of another run, which pass without anything being changed."""
+    while error is not None:
+        if isinstance(error, DirectoryBusyError) or getattr(error, "errno", None) in _PASSING:
+            return True
+        error = error.__cause__
+    return False
 
 
 def _parser() -> argparse.ArgumentParser:

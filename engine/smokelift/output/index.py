@@ -28,6 +28,10 @@ class SequenceError(ValueError):
     """A directory that cannot be written to or opened, and why."""
 
 
+class DirectoryBusyError(SequenceError):
+    """A directory that another run is writing into."""
+
+
 def software_versions() -> dict[str, str]:
     """Return the versions of what a result depends on."""
     versions = {"python": platform.python_version()}

@@ -23,7 +23,7 @@ from smokelift.output.archive import VELOCITY, write_arrays
 from smokelift.output.atomic import atomic_path
 from smokelift.output.checksum import checksum
 from smokelift.output.images import write_image
-from smokelift.output.index import Index, SequenceError, difference, plain
+from smokelift.output.index import DirectoryBusyError, Index, SequenceError, difference, plain
 from smokelift.output.layout import BACKGROUND, INDEX, LOCK, RESUME, frame_path, is_foreign
 from smokelift.output.lock import Lock
 from smokelift.output.resume import ResumeState
@@ -114,7 +114,7 @@ class SequenceWriter:
         try:
             self.directory.mkdir(parents=True, exist_ok=True)
             if not self._lock.acquire():
-                raise SequenceError(f"{self.directory}: another run is writing into this directory")
+                raise DirectoryBusyError(f"{self.directory}: another run is writing into this directory")
         except OSError as error:
             raise SequenceError(f"{self.directory}: cannot be written to: {error.strerror}") from error
         try:

@@ -38,7 +38,7 @@ def test_json_events_are_a_line_each(capsys) -> None:
     assert (frame["event"], frame["frame"], frame["done"], frame["total"]) == ("frame", 2, 2, 4)
     assert frame["figures"] == figures(2.0)
     assert done == {"event": "done", "text": "done.", "directory": "out"}
-    assert error == {"event": "error", "text": "no.", "status": 2}
+    assert error == {"event": "error", "text": "no.", "status": 2, "later": False}
 
 
 def test_json_is_told_how_long_it_takes(capsys) -> None:

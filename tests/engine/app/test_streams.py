@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import json
 import os
 import subprocess
 import sys
@@ -13,6 +14,7 @@ import pytest
 from command_line import ENVIRONMENT, MODULE, command, refused
 
 from smokelift.app.progress import printable
+from smokelift.output.index import SequenceError
 from smokelift.render import device
 
 MISSING = ("inspect", "missing.toml")
@@ -105,6 +107,26 @@ def test_limits_of_the_system_are_said_to_be_limits(shot, capsys, monkeypatch, e
 
     monkeypatch.setattr(device, "start", fail)
     assert "gives no more memory or threads" in refused(capsys, "inspect", shot, status=3)
+
+
+@pytest.mark.parametrize(
+    ("reason", "later"),
+    [
+        (OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)), True),
+        (OSError(errno.EACCES, os.strerror(errno.EACCES)), False),
+        (None, False),
+    ],
+)
+def test_programs_are_told_what_may_pass(shot, capsys, monkeypatch, reason, later) -> None:
+    """A full disk does, whatever the sentence is about."""
+
+    def fail(_choice: str) -> None:
+        raise SequenceError("It could not be written.") from reason
+
+    monkeypatch.setattr(device, "start", fail)
+    assert command("inspect", shot, "--progress", "json") == 2
+    error = json.loads(capsys.readouterr().out.splitlines()[-1])
+    assert error == {"event": "error", "text": "It could not be written.", "status": 2, "later": later}
 
 
 def test_another_error_is_not_hidden(shot, monkeypatch) -> None:

@@ -4,6 +4,7 @@ A module's `add_parser` adds the command with its options to the parser; the opt
 """
 
 from smokelift.app.commands import (
+    batch,
     bench,
     chart,
     continue_,
@@ -18,6 +19,20 @@ from smokelift.app.commands import (
     retime,
 )
 
-MODULES = reconstruct, inspect, render, preview, evaluate, continue_, retime, loop, export, chart, doctor, bench
+MODULES = (
+    reconstruct,
+    batch,
+    inspect,
+    render,
+    preview,
+    evaluate,
+    continue_,
+    retime,
+    loop,
+    export,
+    chart,
+    doctor,
+    bench,
+)
 
 COMMANDS = tuple(module.add_parser for module in MODULES)

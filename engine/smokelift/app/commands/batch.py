@@ -1,0 +1,209 @@
+"""``smokelift batch``: a list of shots, on this machine or on many."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import os
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from typing import Any, NoReturn
+
+import psutil
+
+from smokelift.app.commands import reconstruct
+from smokelift.app.cost import memory_free
+from smokelift.app.options import named_path
+from smokelift.app.progress import Reporter
+from smokelift.batch import (
+    Expected,
+    Frames,
+    Record,
+    Room,
+    Shot,
+    duration,
+    expected,
+    finish_shot,
+    finished_frames,
+    look_at_shot,
+    read_record,
+    read_shots,
+    run_here,
+    write_report,
+)
+
+MEMORY_SHARE = 0.9
+"""Part of the free memory that the shots may take together; what is foretold is right to a tenth or two."""
+
+
+def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
+    """Add the command."""
+    parser = commands.add_parser("batch", parents=[common], help="a list of shots, as many at a time as memory allows")
+    parser.add_argument("list", type=named_path, help="shots.toml")
+    parser.add_argument("--plan", action="store_true", help="only say what is left and how long it takes")
+    parser.add_argument(
+        "--workers", type=_count, metavar="N", help="shots at a time, at most (default: a processor core each)"
+    )
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace, say: Reporter) -> None:
+    """Run the shots that are not finished.
+
+    Raises
+    ------
+    ValueError
+        If the list cannot be used, or a shot did not come to its end; the others did.
+    """
+    shots = read_shots(options.list, _judge)
+    known = {shot.name: (shot, read_record(shot), finished_frames(shot)) for shot in shots}
+    open_shots = [shot for shot, record, frames in known.values() if not (record.status == "done" and frames.complete)]
+    stop = threading.Event()
+    workers = options.workers or os.cpu_count() or 1
+    try:
+        for shot in open_shots:
+            if known[shot.name][1].forecast is None:
+                say.note(f"{shot.name}: looking at the clip ...")
+            record = look_at_shot(shot, stop)
+            known[shot.name] = shot, record, finished_frames(shot)
+            if record.forecast is None:
+                say.note(f"{shot.name}: {record.sentence}")
+        left = expected(known.values())
+        for line in _forecast(left, workers):
+            say.note(line)
+        if options.plan:
+            say.finish(_summary(left, workers), _as_dict(left, workers))
+            return
+        _run(options, say, known, left, workers, stop)
+    finally:
+        stop.set()
+
+
+def _run(
+    options: argparse.Namespace,
+    say: Reporter,
+    known: dict[str, tuple[Shot, Record, Frames]],
+    left: Sequence[Expected],
+    workers: int,
+    stop: threading.Event,
+) -> None:
+    """Run what is left, and keep the report up to date."""
+    begin = [(each.shot, known[each.shot.name][1]) for each in left]
+    for shot, record in _ended(begin, workers, stop, say):
+        frames = finished_frames(shot)
+        known[shot.name] = shot, record, frames
+        say.note(f"{shot.name}: {record.status}. {record.sentence}")
+        with suppress(OSError):  # the storage may be full for a while; the next shot brings the page up to date
+            write_report(shot.folder, options.list.stem, list(known.values()))
+    shots = list(known.values())
+    page = write_report(shots[0][0].folder, options.list.stem, shots)
+    missing = [shot.name for shot, record, _ in shots if record.status != "done"]
+    if missing:
+        raise ValueError(
+            f"{len(missing)} of {len(shots)} shots did not come to their end ({', '.join(missing)}); {page} says why. "
+            "The same command goes on with them."
+        )
+    say.finish(
+        f"{len(shots)} shots are finished; {page} shows them.",
+        {"report": str(page), "shots": [str(shot.directory) for shot, _, _ in shots]},
+    )
+
+
+def _ended(
+    begin: Sequence[tuple[Shot, Record]], workers: int, stop: threading.Event, say: Reporter
+) -> Iterator[tuple[Shot, Record]]:
+    """Run shots here and yield each when it has ended."""
+    room = Room(round(MEMORY_SHARE * memory_free()), workers)
+    total = psutil.virtual_memory().total
+    fitting = []
+    for shot, record in begin:
+        if record.forecast is not None and record.forecast.memory > total:
+            say.note(
+                f"{shot.name}: needs {_gib(record.forecast.memory)} and this machine has {_gib(total)}; choose a lower "
+                "resolution."
+            )
+        else:
+            fitting.append((shot, record))
+    told = threading.Lock()
+
+    def tell(text: str) -> None:
+        with told:
+            say.note(text)
+
+    def work(shot: Shot) -> Record:
+        tell(f"{shot.name}: begins.")
+        return finish_shot(shot, stop, tell)
+
+    yield from run_here(fitting, work, room, stop)
+
+
+def _forecast(left: Sequence[Expected], workers: int) -> Iterator[str]:
+    """What is left, a line a shot and a line for each number of workers worth having."""
+    for each in left:
+        memory = f"{_gib(each.memory)} of memory"
+        yield f"{each.shot.name}: {each.frames} frames, {_time(each.seconds)}, {memory} ({each.basis})"
+    counts = sorted({2**n for n in range(math.ceil(math.log2(max(workers, 1))) + 1) if 2**n < workers} | {workers})
+    for count in counts if left else ():
+        yield f"{count} at a time: {_time(duration(left, count))}"
+
+
+def _summary(left: Sequence[Expected], workers: int) -> str:
+    if not left:
+        return "Nothing is left to do."
+    frames = sum(each.frames for each in left)
+    return (
+        f"{len(left)} shots are left, {frames} frames: {_time(duration(left, workers))} with {workers} at a time; the "
+        f"longest alone takes {_time(left[0].seconds)}."
+    )
+
+
+def _as_dict(left: Sequence[Expected], workers: int) -> dict[str, Any]:
+    return {
+        "seconds": round(duration(left, workers), 1),
+        "workers": workers,
+        "shots": [
+            {
+                "name": each.shot.name,
+                "frames": each.frames,
+                "seconds": round(each.seconds, 1),
+                "memory": each.memory,
+                "basis": each.basis,
+            }
+            for each in left
+        ],
+    }
+
+
+def _time(seconds: float) -> str:
+    minutes = round(seconds / 60)
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    return f"{minutes} min" if minutes < 90 else f"{minutes // 60} h {minutes % 60} min"
+
+
+def _gib(size: float) -> str:
+    return f"{size / 2**30:.1f} GiB"
+
+
+class _Judge(argparse.ArgumentParser):
+    """Says what is wrong with a shot's options as an exception."""
+
+    def error(self, message: str) -> NoReturn:
+        raise ValueError(message)
+
+
+def _judge(arguments: Sequence[str]) -> None:
+    """Raise ValueError if ``smokelift reconstruct`` does not take the arguments."""
+    parser = _Judge()
+    common = argparse.ArgumentParser(add_help=False)
+    common.add_argument("--device", choices=("auto", "cpu", "gpu"))
+    reconstruct.add_parser(parser.add_subparsers(), common)
+    parser.parse_args(["reconstruct", *arguments])
+
+
+def _count(text: str) -> int:
+    count = int(text) if text.isascii() and text.isdigit() else 0
+    if not 0 < count < 100_000:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected a number from 1")
+    return count

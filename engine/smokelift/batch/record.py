@@ -1,0 +1,133 @@
+"""What is known of a shot besides its sequence, in a file of its own beside it: ``NAME.json``.
+
+The sequence itself says which frames are finished. The record says whether the shot is, and what it took.
+"""
+
+from __future__ import annotations
+
+import json
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any, Literal
+
+from smokelift.batch.shots import Shot
+from smokelift.output.atomic import atomic_path
+from smokelift.output.index import Index, SequenceError
+
+Status = Literal["waiting", "done", "refused", "crashed", "stuck", "cancelled"]
+"""``refused``: the engine says what is wrong; ``stuck``: what passes (a full disk, say) did not pass in time."""
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """What ``smokelift inspect`` foretells of a shot: its frames, seconds, and bytes of memory at the peak."""
+
+    frames: int
+    seconds: float
+    memory: int
+
+
+@dataclass(frozen=True)
+class Record:
+    """What is known of a shot.
+
+    Attributes
+    ----------
+    of
+        Options, size and time of change of the input, when it was last run.
+    status, sentence
+        How its last run ended, and what the engine said then.
+    notes
+        What the engine assumed and noticed.
+    runs
+        How often the engine was started for it.
+    seconds, processor_seconds
+        Of all its runs.
+    memory
+        Bytes at the peak, as measured.
+    machine
+        Where it ran last.
+    forecast
+        None before the clip was looked at.
+    """
+
+    of: dict[str, Any]
+    status: Status = "waiting"
+    sentence: str = ""
+    notes: tuple[str, ...] = ()
+    runs: int = 0
+    seconds: float = 0.0
+    processor_seconds: float = 0.0
+    memory: int = 0
+    machine: str = ""
+    forecast: Forecast | None = None
+
+    def write(self, shot: Shot) -> None:
+        """Write the file; OSError if that fails."""
+        with atomic_path(_path(shot)) as aside:
+            aside.write_text(json.dumps(asdict(self), indent=1) + "\n", encoding="utf-8")
+
+
+@dataclass(frozen=True)
+class Frames:
+    """The finished frames of a shot.
+
+    Attributes
+    ----------
+    count
+        How many.
+    complete
+        Whether these are all.
+    seconds
+        That were spent on each.
+    psnr
+        Of those with smoke, dB.
+    """
+
+    count: int = 0
+    complete: bool = False
+    seconds: list[float] = field(default_factory=list)
+    psnr: list[float] = field(default_factory=list)
+
+
+def read_record(shot: Shot) -> Record:
+    """Return what is known of a shot as it is now listed; of one whose options or input changed that is nothing."""
+    fresh = Record(of=_identity(shot))
+    with suppress(OSError, ValueError, TypeError, AttributeError):  # a damaged record is none
+        data = json.loads(_path(shot).read_text(encoding="utf-8"))
+        forecast = data.pop("forecast")
+        record = Record(**{**data, "notes": tuple(data["notes"])})
+        if record.of == fresh.of:
+            return replace(record, forecast=Forecast(**forecast) if forecast else None)
+    return fresh
+
+
+def finished_frames(shot: Shot) -> Frames:
+    """Return what the shot's sequence says of its frames; none if there is no sequence."""
+    try:
+        index = Index.read(shot.directory)
+    except SequenceError:
+        return Frames()
+    figures = list(index.frames.values())
+    seconds = [float(of.get("seconds_density") or 0) + float(of.get("seconds_velocity") or 0) for of in figures]
+    psnr = [float(of["psnr"]) for of in figures if of.get("psnr") is not None]
+    return Frames(len(figures), index.complete, seconds, psnr)
+
+
+def is_finished(shot: Shot) -> bool:
+    """Return whether the shot need not be run again, as it is now listed."""
+    return read_record(shot).status == "done" and finished_frames(shot).complete
+
+
+def _path(shot: Shot) -> Path:
+    return shot.folder / f"{shot.name}.json"
+
+
+def _identity(shot: Shot) -> dict[str, Any]:
+    """What a shot is a reconstruction of, as JSON holds it."""
+    identity: dict[str, Any] = {"options": list(shot.options), "input": None}
+    with suppress(OSError):  # a pattern of pictures is no file; the engine says if there are none
+        stat = shot.input.stat()
+        identity["input"] = [stat.st_size, stat.st_mtime_ns]
+    return identity

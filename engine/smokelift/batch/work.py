@@ -1,0 +1,167 @@
+"""The work on one shot, wherever it is done: look at its clip, and reconstruct it to its end.
+
+It may be called for the same shot by several processes on several machines: one does the work, the others wait for it.
+What decides is on the storage that they share: the lock, the record and the sequence.
+"""
+
+from __future__ import annotations
+
+import platform
+import threading
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from smokelift.batch.engine import BAD_INPUT, CANCELLED, DONE, ENGINE, NO_DEVICE, Ended, run_engine
+from smokelift.batch.record import Forecast, Record, Status, finished_frames, is_finished, read_record
+from smokelift.batch.shots import Shot
+from smokelift.output.lock import Lock
+
+
+@dataclass(frozen=True)
+class Patience:
+    """How long is waited for what passes: a full disk, a server that is away, memory that others use.
+
+    Attributes
+    ----------
+    pause
+        Seconds before the first new try; each further pause is twice as long.
+    longest_pause
+        Seconds.
+    total
+        Seconds without a new frame after which the shot is given up.
+    """
+
+    pause: float = 5.0
+    longest_pause: float = 120.0
+    total: float = 3600.0
+
+
+def look_at_shot(shot: Shot, stop: threading.Event, engine: Sequence[str] = ENGINE) -> Record:
+    """Ask the engine what a shot will take, unless that is known.
+
+    Returns
+    -------
+    Record
+        With a forecast; or ``refused`` with the reason, which is not kept.
+
+    Raises
+    ------
+    OSError
+        If the folder cannot be written to.
+    """
+    record = read_record(shot)
+    if record.forecast is not None:
+        return record
+    shot.folder.mkdir(parents=True, exist_ok=True)
+    options = [word for word in shot.options if word != "--npz"]  # `inspect` writes nothing
+    ended = run_engine(["inspect", str(shot.input), *options], stop, shot.log, engine)
+    if ended.status != DONE:
+        return replace(record, status=_status(ended), sentence=ended.sentence)
+    known = ended.details
+    record = replace(record, forecast=Forecast(int(known["frames"]), float(known["seconds"]), int(known["memory"])))
+    record.write(shot)
+    return record
+
+
+PATIENCE = Patience()
+
+
+def finish_shot(
+    shot: Shot,
+    stop: threading.Event,
+    say: Callable[[str], None] = lambda _text: None,
+    patience: Patience = PATIENCE,
+    engine: Sequence[str] = ENGINE,
+) -> Record:
+    """Reconstruct a shot to its end, going on from the frames that are there.
+
+    What passes is waited for. A crash is not: whoever calls decides where to try again.
+
+    Parameters
+    ----------
+    shot
+        What to reconstruct.
+    stop
+        Ends the work once it is set; finished frames stay.
+    say
+        Is told what is waited for.
+    patience
+        How long to wait for what passes.
+    engine
+        The command.
+
+    Returns
+    -------
+    Record
+        As it was written beside the sequence.
+    """
+    waited, pause, frames = 0.0, patience.pause, -1
+    while True:
+        try:
+            record, later = _try(shot, stop, engine)
+        except OSError as error:  # the storage itself
+            record, later = replace(read_record(shot), status="stuck", sentence=str(error)), True
+        if stop.is_set() and record.status != "done":
+            return replace(record, status="cancelled", sentence="Cancelled; finished frames stay.")
+        if not later:
+            return record
+        if (there := finished_frames(shot).count) > frames:
+            waited, pause, frames = 0.0, patience.pause, there
+        if waited >= patience.total:
+            return record
+        say(f"{shot.name}: {record.sentence} It is tried again in {pause:.0f} s.")
+        stop.wait(pause)
+        waited, pause = waited + pause, min(2 * pause, patience.longest_pause)
+
+
+def _try(shot: Shot, stop: threading.Event, engine: Sequence[str]) -> tuple[Record, bool]:
+    """Run the engine once, if nobody else does; return what came of it and whether to try again later."""
+    shot.folder.mkdir(parents=True, exist_ok=True)
+    lock = Lock(shot.folder / f".{shot.name}.lock")
+    if not lock.acquire():
+        sentence = f"{shot.directory}: another batch is at work on this shot."
+        return replace(read_record(shot), status="stuck", sentence=sentence), True
+    try:
+        before = read_record(shot)
+        if is_finished(shot) or stop.is_set():
+            return before, False
+        arguments = ["reconstruct", str(shot.input), "--out", str(shot.directory), "--thumbnail", str(shot.picture)]
+        ended = run_engine([*arguments, "--resume", *shot.options], stop, shot.log, engine)
+        record = replace(
+            before,
+            status=_status(ended),
+            sentence=ended.sentence,
+            notes=tuple(ended.notes) or before.notes,
+            runs=before.runs + 1,
+            seconds=before.seconds + ended.seconds,
+            processor_seconds=before.processor_seconds + ended.processor_seconds,
+            memory=max(before.memory, ended.memory),
+            machine=platform.node(),
+        )
+        _keep(record, shot, stop)
+        return record, ended.later and ended.status != DONE
+    finally:
+        lock.release()
+
+
+KEEPING = (0.5, 2.0, 8.0)
+"""Seconds between tries to write a record. Without it a shot is prepared once more, and none of its frames made."""
+
+
+def _keep(record: Record, shot: Shot, stop: threading.Event) -> None:
+    for pause in KEEPING:
+        try:
+            return record.write(shot)
+        except OSError:
+            stop.wait(pause)
+    record.write(shot)
+
+
+def _status(ended: Ended) -> Status:
+    if ended.status == DONE:
+        return "done"
+    if ended.status == CANCELLED:
+        return "cancelled"
+    if ended.later:
+        return "stuck"
+    return "refused" if ended.status in (BAD_INPUT, NO_DEVICE) else "crashed"

@@ -1,0 +1,40 @@
+"""Shots of an engine that computes nothing."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from smokelift.batch import Shot
+
+FAKE = Path(__file__).parent / "fake_engine.py"
+
+
+@pytest.fixture
+def fake() -> tuple[str, ...]:
+    """The command of the fake engine."""
+    return sys.executable, "-S", str(FAKE)
+
+
+@pytest.fixture
+def make_shot(tmp_path: Path) -> Callable[..., Shot]:
+    """Make a shot of so many frames; see `fake_engine`."""
+
+    def make(name: str = "shot", frames: int = 3, seconds: float = 0.0, memory: int = 2**20, **ends: Any) -> Shot:
+        path = tmp_path / f"{name}.task"
+        task = {"frames": frames, "seconds": seconds, "memory": memory}
+        path.write_text(json.dumps({**task, "ends": {number[1:]: end for number, end in ends.items()}}))
+        return Shot(name, path, (), tmp_path / "results")
+
+    return make
+
+
+@pytest.fixture
+def ledger() -> Callable[[Shot], list[int]]:
+    """Read the frames of a shot that were finished, in the order in which they were."""
+    return lambda shot: [int(line) for line in (shot.folder / f"{shot.name}.ledger").read_text().split()]
