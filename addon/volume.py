@@ -10,13 +10,11 @@ from mathutils import Vector
 
 from .contract import FRAME_FILE, MADE_UP
 from .kept import set_unless_changed
+from .look import fit_look
 from .paths import absolute, relative
 from .scene_file import engine_to_world, frame_rate
 from .smoke import scene_of, smokes
 from .take import Take
-
-SHADER = "Smokelift"
-"""Name of the shader node that holds the fitted values; a material without it is the user's own."""
 
 PROVENANCE = "smokelift_provenance"
 """Custom property of the Volume that says what of the smoke is measured, also where its files are not at hand."""
@@ -38,7 +36,7 @@ def show(smoke: bpy.types.Object, take: Take) -> bpy.types.Object | None:
     _correct_position(smoke, index["scene"]["domain"])
     _set_file(smoke.data, take, index)
     _set_time(smoke, scene_of(smoke), index)
-    _set_material(smoke.data, index["scene"]["medium"])
+    fit_look(smoke.data, index["scene"])
     smoke.data[PROVENANCE] = _provenance(index.get("provenance", []))
     return smoke
 
@@ -147,41 +145,6 @@ def _frames_before(settings: bpy.types.PropertyGroup, index: dict[str, Any]) -> 
     """Number of the clip's frames before the take's first, which settings for the next take do not change."""
     frames = index["scene"]["clip"].get("frames")
     return settings.first - 1 if frames is None or settings.clip is None else frames[0] - settings.clip.frame_offset
-
-
-def _set_material(volume: bpy.types.Volume, medium: dict[str, float]) -> None:
-    material = volume.materials[0] if volume.materials else None
-    if material is None:
-        material = _material(volume.name)
-        volume.materials.clear()
-        volume.materials.append(material)
-    shader = material.node_tree.nodes.get(SHADER) if material.node_tree else None
-    if shader is None:
-        return  # the user's own material
-    values = {
-        "Density": medium["extinction"],
-        "Color": (*[medium["albedo"]] * 3, 1.0),
-        "Anisotropy": medium["anisotropy"],
-    }
-    for name, value in values.items():
-        set_unless_changed(material, name.lower(), shader.inputs[name], "default_value", value)
-
-
-def _material(name: str) -> bpy.types.Material:
-    """A material that scatters density x extinction x albedo and absorbs the rest of the extinction."""
-    material = bpy.data.materials.new(name)
-    if material.node_tree is None:  # since 5.0 there always is one
-        material.use_nodes = True
-    tree = material.node_tree
-    tree.nodes.clear()
-    output = tree.nodes.new("ShaderNodeOutputMaterial")
-    shader = tree.nodes.new("ShaderNodeVolumePrincipled")
-    shader.name = shader.label = SHADER
-    shader.location = (-300.0, 0.0)
-    shader.inputs["Density Attribute"].default_value = "density"
-    shader.inputs["Absorption Color"].default_value = (0.0, 0.0, 0.0, 1.0)
-    tree.links.new(shader.outputs["Volume"], output.inputs["Volume"])
-    return material
 
 
 @persistent

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import sys
 from collections.abc import Iterator
@@ -12,7 +13,13 @@ import bpy
 import pytest
 
 import addon
-from tests.example_shot import set_up_example
+from addon.take import Take
+from smokelift.output.vdb import write_vdb
+from smokelift.scene import Domain, Medium, Scene, scene_to_dict
+from tests.example_shot import EXAMPLE, set_up_example
+
+FRAMES = 6
+"""Of a take that `made` makes."""
 
 
 @pytest.fixture(autouse=True)
@@ -38,6 +45,25 @@ def scene(blender) -> bpy.types.Scene:
 def shot(scene) -> bpy.types.Scene:
     """The example as an artist would have it."""
     return set_up_example(scene)
+
+
+def made(folder: Path, frames: int = FRAMES, fps: float = 24.0, medium: Medium | None = None, number: int = 1) -> Take:
+    """A take as the engine leaves it: smoke that fills a box in a corner of the domain, and the first frame empty."""
+    take = Take(folder / f"take_{number:04d}")
+    take.directory.mkdir(parents=True)
+    import numpy as np
+
+    domain = Domain((-1.0, -1.0, 0.0), (1.0, 1.0, 3.0), (16, 16, 24))
+    for n in range(1, frames + 1):
+        density = np.zeros(domain.resolution, np.float32)
+        if n > 1:
+            density[10:13, 3:5, 12:14] = 1.0 + n
+        write_vdb(take.directory / f"smoke_{n:04d}.vdb", density, np.ones((*domain.resolution, 3)), domain)
+    scene = scene_to_dict(Scene(domain=domain, medium=medium or Medium(4.0, 0.8, 0.3)))
+    scene["clip"] = {"path": str(EXAMPLE / "clip.mp4"), "fps": fps}
+    index = {"complete": True, "scene": scene, "settings": {}, "frames": {str(n): {} for n in range(1, frames + 1)}}
+    (take.directory / "sequence.json").write_text(json.dumps(index))
+    return take
 
 
 def rendered(scene: bpy.types.Scene, path: Path) -> Any:

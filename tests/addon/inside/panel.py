@@ -8,7 +8,8 @@ from typing import Any
 import bpy
 import pytest
 
-from addon import panel
+from addon import look_panel, panel, volume
+from conftest import made
 from tests.example_shot import smoke
 
 WIDTH = 258
@@ -63,6 +64,16 @@ def test_no_line_is_cut_off(shot) -> None:
     texts = drawn(shot, panel.SMOKELIFT_PT_view, panel.SMOKELIFT_PT_view_advanced)
     assert any("112.4 GB" in text for text in texts)
     assert [text for text in texts if len(text) > LETTERS] == []
+
+
+def test_the_look_is_in_the_tab(shot, tmp_path) -> None:
+    """Once there is smoke; every input by its name, and how it is shown."""
+    assert not look_panel.SMOKELIFT_PT_view_look.poll(SimpleNamespace(scene=shot))
+    volume.show(smoke(shot), made(tmp_path))
+    assert look_panel.SMOKELIFT_PT_view_look.poll(SimpleNamespace(scene=shot))
+    texts = drawn(shot, look_panel.SMOKELIFT_PT_view_look)
+    assert {"Density", "Brightness", "Color", "Edge Contrast", "Absorption Color", "Anisotropy"} <= set(texts)
+    assert {"Presets    ", "Viewport Density", "Render Step"} <= set(texts)
 
 
 @pytest.mark.parametrize("word", ["Captured At", "Pixels", "Processor", "Graphics Card", "Anew"])

@@ -13,35 +13,16 @@ import numpy as np
 import pytest
 from mathutils import Vector
 
-from addon import run, shot_setup, volume
+from addon import look, run, shot_setup, volume
 from addon.scene_file import box_corners
 from addon.take import Take
-from conftest import quietly, rendered
+from conftest import FRAMES, made, quietly, rendered
 from smokelift.output.images import write_image
-from smokelift.output.vdb import write_vdb
 from smokelift.output.video import write_video
-from smokelift.scene import Camera, Domain, Medium, Scene, scene_to_dict
+from smokelift.scene import Camera, Medium, Scene, scene_to_dict
 from tests.example_shot import EXAMPLE, smoke
 
-FRAMES = 6
 HALF_VOXEL_TOO_FAR = bpy.app.version < (5, 0, 0)
-
-
-def made(folder: Path, frames: int = FRAMES, fps: float = 24.0, medium: Medium | None = None, number: int = 1) -> Take:
-    """A take as the engine leaves it: smoke that fills a box in a corner of the domain, and the first frame empty."""
-    take = Take(folder / f"take_{number:04d}")
-    take.directory.mkdir(parents=True)
-    domain = Domain((-1.0, -1.0, 0.0), (1.0, 1.0, 3.0), (16, 16, 24))
-    for n in range(1, frames + 1):
-        density = np.zeros(domain.resolution, np.float32)
-        if n > 1:
-            density[10:13, 3:5, 12:14] = 1.0 + n
-        write_vdb(take.directory / f"smoke_{n:04d}.vdb", density, np.ones((*domain.resolution, 3)), domain)
-    scene = scene_to_dict(Scene(domain=domain, medium=medium or Medium(4.0, 0.8, 0.3)))
-    scene["clip"] = {"path": str(EXAMPLE / "clip.mp4"), "fps": fps}
-    index = {"complete": True, "scene": scene, "settings": {}, "frames": {str(n): {} for n in range(1, frames + 1)}}
-    (take.directory / "sequence.json").write_text(json.dumps(index))
-    return take
 
 
 def evaluated(scene: bpy.types.Scene, frame: int) -> bpy.types.Object:
@@ -258,11 +239,10 @@ def test_the_material_is_the_mediums(shot, tmp_path) -> None:
     obj = volume.show(smoke(shot), made(tmp_path))
     (material,) = obj.data.materials
     output = next(node for node in material.node_tree.nodes if node.type == "OUTPUT_MATERIAL")
-    shader = output.inputs["Volume"].links[0].from_node
-    values = {name: shader.inputs[name].default_value for name in ("Density", "Anisotropy", "Density Attribute")}
-    assert values == {"Density": 4.0, "Anisotropy": pytest.approx(0.3), "Density Attribute": "density"}
-    assert list(shader.inputs["Color"].default_value) == pytest.approx([0.8, 0.8, 0.8, 1.0])
-    assert shader.inputs["Emission Strength"].default_value == 0.0
+    inputs = output.inputs["Volume"].links[0].from_node.inputs
+    values = {name: inputs[name].default_value for name in ("Extinction", "Anisotropy", "Density", "Brightness")}
+    assert values == {"Extinction": 4.0, "Anisotropy": pytest.approx(0.3), "Density": 1.0, "Brightness": 1.0}
+    assert list(inputs["Albedo"].default_value) == pytest.approx([0.8, 0.8, 0.8, 1.0])
     data = obj.data
     assert (data.velocity_grid, data.velocity_unit, data.render.clipping) == ("velocity", "SECOND", 0.0)
     assert data.display.density == 4.0
@@ -306,19 +286,19 @@ def test_running_again_replaces(shot, tmp_path) -> None:
     assert [len(kind) for kind in (bpy.data.objects, bpy.data.volumes, bpy.data.materials)] == before
     assert "take_0002" in obj.data.filepath
     assert obj.data.frame_duration == 3
-    shader = obj.data.materials[0].node_tree.nodes[volume.SHADER]
-    assert shader.inputs["Density"].default_value == 9.0
+    shader = obj.data.materials[0].node_tree.nodes[look.NODE]
+    assert shader.inputs["Extinction"].default_value == 9.0
 
 
 def test_a_material_that_was_changed_stays(shot, tmp_path) -> None:
     """What was changed of it and of the view, when the smoke is made anew; the rest is the new medium's."""
     obj = volume.show(smoke(shot), made(tmp_path))
-    inputs = obj.data.materials[0].node_tree.nodes[volume.SHADER].inputs
-    inputs["Density"].default_value, inputs["Color"].default_value = 12.0, (1.0, 0.5, 0.2, 1.0)
+    inputs = obj.data.materials[0].node_tree.nodes[look.NODE].inputs
+    inputs["Density"].default_value, inputs["Albedo"].default_value = 3.0, (1.0, 0.5, 0.2, 1.0)
     obj.data.display.density = 1.5
     volume.show(smoke(shot), made(tmp_path, medium=Medium(9.0, 0.5, -0.2), number=2))
-    assert inputs["Density"].default_value == 12.0
-    assert list(inputs["Color"].default_value) == pytest.approx([1.0, 0.5, 0.2, 1.0])
+    assert (inputs["Density"].default_value, inputs["Extinction"].default_value) == (3.0, 9.0)
+    assert list(inputs["Albedo"].default_value) == pytest.approx([1.0, 0.5, 0.2, 1.0])
     assert inputs["Anisotropy"].default_value == pytest.approx(-0.2)
     assert obj.data.display.density == 1.5
 
@@ -356,7 +336,7 @@ def test_it_survives_saving_and_loading(shot, tmp_path) -> None:
     assert volume.shown_take(smoke(scene)) == Take(moved / "out" / "take_0001")
     assert plays(scene, 5) == 1
     assert plays(scene, 7) == 2
-    assert smoke(scene).data.materials[0].node_tree.nodes[volume.SHADER].inputs["Density"].default_value == 4.0
+    assert smoke(scene).data.materials[0].node_tree.nodes[look.NODE].inputs["Extinction"].default_value == 4.0
 
 
 def reopened(folder: Path) -> bpy.types.Scene:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import smokelift
-from addon import run, volume
+from addon import look, run, volume
 from addon.scene_file import point_intensity, shot_tables, sun_irradiance
 from addon.smoke import activate, smokes
 from addon.take import Take, takes
@@ -96,8 +96,8 @@ def test_everything_known(shot, kept, tmp_path) -> None:
     assert sequence.complete
     data = smoke(shot).data
     assert (data.frame_start, data.frame_duration) == (FIRST, 4)
-    shader = data.materials[0].node_tree.nodes[volume.SHADER]
-    assert shader.inputs["Density"].default_value == pytest.approx(sequence.scene.medium.extinction)
+    shader = data.materials[0].node_tree.nodes[look.NODE]
+    assert shader.inputs["Extinction"].default_value == pytest.approx(sequence.scene.medium.extinction)
     whole, within = look_alike(shot, tmp_path)
     assert whole > WANTED_DB + 5
     assert within > WANTED_DB

@@ -139,9 +139,9 @@ def test_makes_smoke(folder) -> None:
     assert volume.frame_start == smoke(scene).smokelift.clip.frame_start + FIRST - 1
     assert volume.velocity_unit == "SECOND" and volume.velocity_grid == "velocity"
     assert volume.render.clipping == 0.0
-    node = next(node for node in obj.active_material.node_tree.nodes if node.type == "PRINCIPLED_VOLUME")
+    node = next(node for node in obj.active_material.node_tree.nodes if node.name == "Smokelift")
     medium = index["scene"]["medium"]
-    assert node.inputs["Density"].default_value == pytest.approx(medium["extinction"])
+    assert node.inputs["Extinction"].default_value == pytest.approx(medium["extinction"])
     assert node.inputs["Color"].default_value[:3] == pytest.approx([medium["albedo"]] * 3)
     assert node.inputs["Anisotropy"].default_value == pytest.approx(medium["anisotropy"])
     bpy.ops.wm.save_mainfile()

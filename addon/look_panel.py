@@ -1,0 +1,83 @@
+"""The sub-panel Look: presets, the artist's inputs of the material, and how the viewport shows the smoke."""
+
+import bpy
+from bpy.props import EnumProperty
+
+from . import look, volume
+from .smoke import active_smoke
+
+
+class SMOKELIFT_OT_use_look(bpy.types.Operator):
+    """Set density, brightness, colors and edges of the smoke. What was fitted to the clip stays"""
+
+    bl_idname = "smokelift.use_look"
+    bl_label = "Use Look"
+    bl_options = {"REGISTER", "UNDO"}
+
+    preset: EnumProperty(
+        name="Preset",
+        description="Kind of smoke",
+        items=[(key, name, description) for key, (name, description, _) in look.PRESETS.items()],
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        smoke = active_smoke(context.scene)
+        if smoke is None or volume.shown_take(smoke) is None:
+            cls.poll_message_set("Make smoke first")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        if not look.use_preset(active_smoke(context.scene).data, self.preset):
+            self.report({"ERROR"}, "The smoke's material is your own: remove it and show the result again for presets.")
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
+class _Look:
+    bl_label = "Look"
+    bl_category = "Smokelift"
+    bl_region_type = "UI"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        smoke = active_smoke(context.scene)
+        return smoke is not None and volume.shown_take(smoke) is not None
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        data = active_smoke(context.scene).data
+        sockets = look.controls(data)
+        if sockets:
+            layout.operator_menu_enum("smokelift.use_look", "preset", text="Presets", icon="PRESET")
+        else:
+            layout.label(text="The material is your own", icon="MATERIAL")
+        column = layout.column()
+        for socket in sockets:
+            column.prop(socket, "default_value", text=socket.name)
+        column = layout.column()
+        column.use_property_decorate = False
+        column.prop(data.display, "density", text="Viewport Density")
+        column.prop(data.render, "step_size", text="Render Step")
+
+
+class SMOKELIFT_PT_view_look(_Look, bpy.types.Panel):
+    """In the 3D View."""
+
+    bl_space_type = "VIEW_3D"
+    bl_parent_id = "SMOKELIFT_PT_view"
+
+
+class SMOKELIFT_PT_clip_look(_Look, bpy.types.Panel):
+    """In the Movie Clip Editor."""
+
+    bl_space_type = "CLIP_EDITOR"
+    bl_parent_id = "SMOKELIFT_PT_clip"
+
+
+register, unregister = bpy.utils.register_classes_factory(
+    (SMOKELIFT_OT_use_look, SMOKELIFT_PT_view_look, SMOKELIFT_PT_clip_look)
+)

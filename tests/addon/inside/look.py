@@ -1,0 +1,191 @@
+"""How the smoke looks: presets, fire, and materials of earlier versions."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+
+from addon import look, volume
+from conftest import made, quietly, rendered
+from smokelift.output.vdb import write_vdb
+from smokelift.scene import Domain, Medium
+from tests.example_shot import add, add_camera, smoke
+
+MEDIUM = Medium(4.0, 0.8, 0.3)
+
+
+@pytest.fixture
+def lit(scene) -> bpy.types.Scene:
+    """A camera close to the smoke of `made`, a sun and a grey background; 8 x 8 pixels in Cycles."""
+    scene.render.engine = "CYCLES"
+    scene.render.resolution_x = scene.render.resolution_y = 8
+    scene.cycles.samples, scene.cycles.use_denoising, scene.cycles.seed = 64, False, 1
+    camera = add_camera(scene, (0.44, -3.0, 1.62), (np.pi / 2, 0.0, 0.0))
+    camera.data.type, camera.data.ortho_scale = "ORTHO", 0.5
+    sun = add(scene, "Sun", bpy.data.lights.new("Sun", "SUN"))
+    sun.data.energy, sun.rotation_euler = 5.0, (0.8, 0.0, 0.0)
+    world = scene.world = bpy.data.worlds.new("World")
+    if world.node_tree is None:
+        world.use_nodes = True
+    world.node_tree.nodes["Background"].inputs["Color"].default_value = (0.2, 0.2, 0.2, 1.0)
+    scene.frame_set(3)
+    return scene
+
+
+def node(scene: bpy.types.Scene) -> bpy.types.ShaderNode:
+    """The one with the values of the scene's smoke."""
+    return look.node_of(smoke(scene).data)
+
+
+def as_before(obj: bpy.types.Object) -> bpy.types.ShaderNode:
+    """The material of `MEDIUM` as version 1.0 made it."""
+    material = bpy.data.materials.new("Old")
+    if material.node_tree is None:
+        material.use_nodes = True
+    tree = material.node_tree
+    tree.nodes.clear()
+    output = tree.nodes.new("ShaderNodeOutputMaterial")
+    shader = tree.nodes.new("ShaderNodeVolumePrincipled")
+    shader.name = shader.label = look.NODE
+    shader.inputs["Density Attribute"].default_value = "density"
+    shader.inputs["Absorption Color"].default_value = (0.0, 0.0, 0.0, 1.0)
+    tree.links.new(shader.outputs["Volume"], output.inputs["Volume"])
+    values = {"Density": 4.0, "Color": (0.8, 0.8, 0.8, 1.0), "Anisotropy": 0.3}
+    for name, value in values.items():
+        shader.inputs[name].default_value = value
+        remembered = shader.inputs[name].default_value
+        material[f"smokelift_{name.lower()}"] = list(remembered) if name == "Color" else [remembered]
+    obj.data.materials.clear()
+    obj.data.materials.append(material)
+    return shader
+
+
+def test_presets_look_different(lit, tmp_path) -> None:
+    """Soot is dark and hides what is behind it, mist hardly does; dust is red, steam is white and bright."""
+    volume.show(smoke(lit), made(tmp_path, medium=MEDIUM))
+    seen = {}
+    for name in look.PRESETS:
+        assert bpy.ops.smokelift.use_look(preset=name) == {"FINISHED"}
+        seen[name] = rendered(lit, tmp_path / "seen.exr")[3:5, 3:5].mean((0, 1))
+    assert seen["SOOT"].max() < 0.3 * seen["SMOKE"].min()
+    assert seen["STEAM"].min() > 1.1 * seen["SMOKE"].max()
+    assert seen["DUST"][0] > 1.3 * seen["DUST"][2]
+    assert np.ptp(seen["STEAM"]) < 0.1 * seen["STEAM"].mean()
+    assert np.abs(seen["MIST"] - 0.2).max() < np.abs(seen["STEAM"] - 0.2).max()
+
+
+def test_presets_keep_what_was_fitted_and_runs_keep_the_preset(lit, tmp_path) -> None:
+    """A result made anew brings its extinction, and changes nothing of the artist's."""
+    volume.show(smoke(lit), made(tmp_path, medium=MEDIUM))
+    bpy.ops.smokelift.use_look(preset="DUST")
+    volume.show(smoke(lit), made(tmp_path, medium=Medium(9.0, 0.5), number=2))
+    found = {name: socket.default_value for name, socket in node(lit).inputs.items()}
+    for name, value in look.PRESETS["DUST"][2].inputs().items():
+        assert (found[name] if isinstance(value, float) else tuple(found[name])) == pytest.approx(value), name
+    assert (found["Extinction"], found["Albedo"][0]) == (9.0, 0.5)
+    bpy.ops.smokelift.use_look(preset="SMOKE")
+    assert node(lit).inputs["Color"].default_value[:] == (1.0, 1.0, 1.0, 1.0)
+
+
+def test_a_preset_needs_our_material(lit, tmp_path) -> None:
+    """An artist's own is left alone, in one sentence."""
+    assert not bpy.ops.smokelift.use_look.poll()
+    obj = volume.show(smoke(lit), made(tmp_path))
+    obj.data.materials[0] = bpy.data.materials.new("Own")
+    with pytest.raises(RuntimeError, match="material is your own"):
+        bpy.ops.smokelift.use_look(preset="SOOT")
+    assert look.controls(obj.data) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "least", "most"),
+    [("Edge Contrast", 2.0, 0.03, 0.25), ("Edge Contrast", 0.5, 1.8, 5.0), ("Density", 4.0, 3.0, 4.5)],
+)
+def test_edges_and_density(lit, tmp_path, name, value, least, most) -> None:
+    """Edge contrast acts where smoke is thin; below 1 thin smoke is seen better."""
+    lit.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0.0
+    lit.cycles.samples = 512
+    volume.show(smoke(lit), made(tmp_path, medium=Medium(0.02, 0.8)))  # so thin that all of it is an edge
+    before = rendered(lit, tmp_path / "before.exr").sum()
+    node(lit).inputs[name].default_value = value
+    assert least < rendered(lit, tmp_path / "after.exr").sum() / before < most
+    node(lit).inputs["Edge Density"].default_value = 1e-6  # nothing is an edge
+    if name == "Edge Contrast":
+        assert rendered(lit, tmp_path / "thick.exr").sum() == pytest.approx(before, rel=0.1)
+
+
+def test_brightness_goes_from_black_to_white(lit, tmp_path) -> None:
+    """And never beyond."""
+    lit.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0.0
+    volume.show(smoke(lit), made(tmp_path, medium=MEDIUM))
+    seen = []
+    for value in (0.0, 0.5, 1.0, 4.0, 1000.0):
+        node(lit).inputs["Brightness"].default_value = value
+        seen.append(float(rendered(lit, tmp_path / "seen.exr").mean()))
+    assert seen[0] == 0.0
+    assert seen == sorted(seen)
+    node(lit).inputs["Albedo"].default_value = (1.0, 1.0, 1.0, 1.0)
+    assert rendered(lit, tmp_path / "white.exr").mean() == pytest.approx(seen[-1], rel=0.02)
+
+
+@pytest.mark.parametrize("grid", ["flame", "temperature"])
+def test_fire_glows_where_a_file_has_it(lit, tmp_path, grid) -> None:
+    """In the dark; smoke without such a grid stays dark."""
+    lit.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0.0
+    bpy.data.objects["Sun"].hide_render = True
+    volume.show(smoke(lit), made(tmp_path))
+    assert rendered(lit, tmp_path / "dark.exr").max() == 0.0
+    take = made(tmp_path, number=2)
+    openvdb = pytest.importorskip("openvdb")
+    file = take.directory / "smoke_0003.vdb"
+    grids, metadata = openvdb.readAll(str(file))
+    density = next(each for each in grids if each.name == "density")
+    fire = density.deepCopy()
+    fire.name = grid
+    openvdb.write(str(file), [*grids, fire], metadata)
+    volume.show(smoke(lit), take)
+    assert rendered(lit, tmp_path / "fire.exr").max() > 0.01
+
+
+def test_a_material_of_an_earlier_version_looks_the_same_with_our_group(lit, tmp_path) -> None:
+    """It takes the group when its file is opened, with what the artist had changed."""
+    obj = volume.show(smoke(lit), made(tmp_path, medium=MEDIUM))
+    shader = as_before(obj)
+    shader.inputs["Color"].default_value = (0.9, 0.6, 0.3, 1.0)
+    before = rendered(lit, tmp_path / "before.exr")
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+    quietly(lambda: bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend")))
+    scene = bpy.context.scene
+    assert node(scene).type == "GROUP"
+    np.testing.assert_allclose(rendered(scene, tmp_path / "after.exr"), before, rtol=0.02, atol=1e-3)
+    volume.show(smoke(scene), made(tmp_path, medium=Medium(9.0, 0.5, -0.2), number=2))
+    inputs = node(scene).inputs
+    assert inputs["Extinction"].default_value == 9.0
+    assert list(inputs["Albedo"].default_value) == pytest.approx([0.9, 0.6, 0.3, 1.0])
+    assert inputs["Anisotropy"].default_value == pytest.approx(-0.2)
+
+
+def test_an_old_material_that_the_artist_built_upon_stays(lit, tmp_path) -> None:
+    """Its values still follow the newest result."""
+    obj = volume.show(smoke(lit), made(tmp_path, medium=MEDIUM))
+    shader = as_before(obj)
+    tree = shader.id_data
+    tree.links.new(tree.nodes.new("ShaderNodeRGB").outputs[0], shader.inputs["Emission Color"])
+    volume.show(smoke(lit), made(tmp_path, medium=Medium(9.0, 0.5, -0.2), number=2))
+    assert node(lit) == shader
+    assert shader.inputs["Density"].default_value == 9.0
+    assert [socket.name for socket in look.controls(obj.data)] == ["Density", "Color", "Absorption Color", "Anisotropy"]
+    with pytest.raises(RuntimeError, match="material is your own"):
+        bpy.ops.smokelift.use_look(preset="SOOT")
+
+
+def test_all_smokes_share_one_group(lit, tmp_path) -> None:
+    """As the artist changed it; a group of another kind of the same name is left alone."""
+    bpy.data.node_groups.new(look.GROUP, "CompositorNodeTree")
+    obj = volume.show(smoke(lit), made(tmp_path))
+    other = add(lit, "Other", bpy.data.volumes.new("Other"))
+    other.smokelift.is_smoke = True
+    volume.show(other, made(tmp_path, number=2))
+    assert look.node_of(obj.data).node_tree == look.node_of(other.data).node_tree
+    assert obj.data.materials[0] != other.data.materials[0]
