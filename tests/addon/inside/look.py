@@ -8,8 +8,7 @@ import pytest
 
 from addon import look, volume
 from conftest import made, quietly, rendered
-from smokelift.output.vdb import write_vdb
-from smokelift.scene import Domain, Medium
+from smokelift.scene import Medium
 from tests.example_shot import add, add_camera, smoke
 
 MEDIUM = Medium(4.0, 0.8, 0.3)

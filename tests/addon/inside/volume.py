@@ -20,7 +20,7 @@ from conftest import FRAMES, made, quietly, rendered
 from smokelift.output.images import write_image
 from smokelift.output.video import write_video
 from smokelift.scene import Camera, Medium, Scene, scene_to_dict
-from tests.example_shot import EXAMPLE, smoke
+from tests.example_shot import smoke
 
 HALF_VOXEL_TOO_FAR = bpy.app.version < (5, 0, 0)
 
