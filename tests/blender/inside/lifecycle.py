@@ -142,7 +142,7 @@ def test_makes_smoke(folder) -> None:
     node = next(node for node in obj.active_material.node_tree.nodes if node.name == "Smokelift")
     medium = index["scene"]["medium"]
     assert node.inputs["Extinction"].default_value == pytest.approx(medium["extinction"])
-    assert node.inputs["Color"].default_value[:3] == pytest.approx([medium["albedo"]] * 3)
+    assert node.inputs["Albedo"].default_value[:3] == pytest.approx([medium["albedo"]] * 3)
     assert node.inputs["Anisotropy"].default_value == pytest.approx(medium["anisotropy"])
     bpy.ops.wm.save_mainfile()
 
