@@ -11,8 +11,9 @@ within the noise, and smoke, when it has any. Three facts tell them apart:
 - Stock footage stands before one colour, mostly black. Where the pixels that never change have one, it is behind all
   that do.
 
-A pixel without a certain value (over the source, as a rule) is unknown. What is behind it follows smoothly from its
-neighbours; its detail is that of its samples, with the contrast that the smoke takes from it given back.
+A pixel that only drifts is clear as well if it looks like its surroundings, or so unlike them that smoke would
+change more. A pixel without a certain value (over the source, as a rule) is unknown. What is behind it follows smoothly
+from its neighbours; its detail is that of its samples, with the contrast that the smoke takes from it given back.
 
 A camera that moves shows another part of the background in every frame, so a pixel has no value of its own: the
 background has to be of one colour, or known frame by frame.
@@ -75,6 +76,10 @@ DRIFT = 8 / 255
 
 LIKE_SURROUNDINGS = 3 * DRIFT
 """Difference in sRGB values from what the surroundings let expect, of a background."""
+
+LEAST_CHANGE = 1 / 4
+"""Range of smoke over time, as a share of its difference from the background: what is steadier is a chair or a jacket.
+"""
 
 PRIOR_PAIRS = 4.0
 """Pairs of samples that the clip's share of like pairs counts for beside a pixel's own."""
@@ -186,9 +191,10 @@ def clear_picture(
         image[band], known[band], calm[band] = _clear_value(samples[:, band], away, window, smoke.likeness)
     known = _in_one_piece(known)
     if not known.all():
-        # what changes by drift at most and looks like its surroundings is no smoke
-        unlike = np.abs((linear_to_srgb(image) - _filled(linear_to_srgb(image), known.astype(np.float32))).mean(-1))
-        known = _in_one_piece(known | (calm & (unlike <= LIKE_SURROUNDINGS)))
+        # what changes by drift at most is no smoke if it is too little like its surroundings for smoke so steady
+        known = _in_one_piece(known | (calm & (LEAST_CHANGE * _unlike(image, known) >= window + DRIFT)))
+        # or if it looks like them
+        known = _in_one_piece(known | (calm & (_unlike(image, known) <= LIKE_SURROUNDINGS)))
     mean = _mean(samples, seen)
     if seen is not None and not seen.any(0).all():
         never = ~seen.any(0)
@@ -390,6 +396,12 @@ def _completed(
     filled -= np.where(brightens, np.maximum(beyond, 0), np.minimum(beyond, 0))[..., None]
     filled = srgb_to_linear(np.maximum(filled, 0))
     return np.where(known[..., None], image, filled)
+
+
+def _unlike(image: Picture, known: npt.NDArray[np.bool_]) -> Picture:
+    """By how much a linear picture differs from what is known around, in grey sRGB values (rows, columns)."""
+    encoded = linear_to_srgb(image)
+    return np.asarray(np.abs((encoded - _filled(encoded, known.astype(np.float32))).mean(-1)))
 
 
 def _filled(image: Picture, confidence: Picture) -> Picture:

@@ -69,6 +69,25 @@ def test_pixels_that_are_never_clear_are_filled_and_marked(tmp_path: Path) -> No
     assert all(matte(clip.frame(n), plate).mask[inner].all() for n in (0, 11, 23))
 
 
+def test_what_hardly_changes_is_no_smoke_however_unlike_its_surroundings(tmp_path: Path) -> None:
+    """A dark jacket before a bright wall that breathes by ten codes, beside a puff."""
+    jacket = np.s_[40:, :12]
+    truth = wall(0.6, 0.9)
+    truth[jacket] = 0.01
+
+    def opacity(n: int) -> np.ndarray:
+        seen = puff(n)
+        seen[jacket] = np.random.default_rng(n).uniform(0.0, 0.03)
+        return seen
+
+    clip = film(tmp_path, truth, opacity, 0.25, 0.5)
+    plate = estimate_plate(clip)
+    inner = np.s_[44:, :9]
+    assert plate.confidence[inner].min() == 1.0
+    assert codes_apart(plate.image, truth)[inner].max() < 12
+    assert not matte(clip.frame(12), plate).mask[inner].any()
+
+
 def test_one_frame_is_its_own_plate(tmp_path: Path) -> None:
     write_image(tmp_path / "still.png", wall(0.2, 0.8))
     clip = Clip.open(tmp_path / "still.png")
