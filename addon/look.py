@@ -118,7 +118,9 @@ def fit_look(volume: bpy.types.Volume, scene: dict[str, Any]) -> None:
         return
     medium, domain = scene["medium"], scene["domain"]
     fitted = {"Anisotropy": medium["anisotropy"]}
-    albedo = (*[medium["albedo"]] * 3, 1.0)
+    # earlier versions of the engine know no coloured smoke
+    color = medium.get("color", [1.0, 1.0, 1.0])
+    albedo = (*[medium["albedo"] * share for share in color], 1.0)
     if node.type == "GROUP":
         fitted |= {"Extinction": medium["extinction"], "Albedo": albedo}
         width = min(high - low for low, high in zip(domain["min"], domain["max"], strict=True))

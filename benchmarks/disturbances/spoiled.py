@@ -12,7 +12,7 @@ from benchmarks.background.clips import backdrop, compressed, noisy
 from benchmarks.disturbances.known import FRONT, SIZE, Known, Take
 from smokelift import Background, Scene
 from smokelift.footage.images import Picture, linear_to_srgb
-from smokelift.scene import Domain
+from smokelift.scene import Domain, Medium
 
 FIRST, LENGTH = 14, 6
 """The moments of a clip that nothing disturbs: its first, and how many."""
@@ -162,22 +162,22 @@ def wrong_light(known: Known, degrees: float) -> Take:
 
 def wrong_extinction(known: Known, factor: float) -> Take:
     """A description with another extinction."""
-    return _told_medium(known, extinction=factor * known.medium.extinction)
+    return _told_medium(known, replace(known.medium, extinction=factor * known.medium.extinction))
 
 
 def wrong_albedo(known: Known, factor: float) -> Take:
     """A description with another albedo, 1 at most."""
-    return _told_medium(known, albedo=min(factor * known.medium.albedo, 1.0))
+    return _told_medium(known, replace(known.medium, albedo=min(factor * known.medium.albedo, 1.0)))
 
 
 def wrong_anisotropy(known: Known, anisotropy: float) -> Take:
     """A description with another anisotropy; the smoke's is 0."""
-    return _told_medium(known, anisotropy=anisotropy)
+    return _told_medium(known, replace(known.medium, anisotropy=anisotropy))
 
 
-def _told_medium(known: Known, **changes: float) -> Take:
+def _told_medium(known: Known, medium: Medium) -> Take:
     take = plain(usual(known))
-    return replace(take, told=replace(take.told, medium=replace(known.medium, **changes)))
+    return replace(take, told=replace(take.told, medium=medium))
 
 
 def _lit(known: Known, gain: float) -> Scene:

@@ -116,11 +116,11 @@ def inscatter_of(kappa, camera, domain, medium, lights, scattering):
         cosine = np.sum(to_eye * travel, -1)
         phase = (1 - g * g) / (4 * np.pi * (1 + g * g - 2 * g * cosine) ** 1.5)
         shadow = np.ones_like(depth) if scattering == "unshadowed" else np.exp(-depth)
-        total = total + medium.albedo * (phase * shadow)[..., None] * energy
-    return total + diffuse_inscatter(kappa, total, h, medium.albedo) if scattering == "multiple" else total
+        total = total + np.array(medium.albedos) * (phase * shadow)[..., None] * energy
+    return total + diffuse_inscatter(kappa, total, h, medium.albedos) if scattering == "multiple" else total
 
 
-def diffuse_inscatter(kappa, inscatter, h, albedo):
+def diffuse_inscatter(kappa, inscatter, h, albedos):
     """What light that has been scattered adds to the in-scattered radiance, by a dense matrix over blocks of voxels."""
     size = min(max(round(max(kappa.shape) / 32), 1), 3)
     # the blocks reach around the voxels, so the first begins up to a block before the grid
@@ -133,15 +133,17 @@ def diffuse_inscatter(kappa, inscatter, h, albedo):
     extinction, emission = means[0], means[1:].reshape(3, -1)
     transport = block_transport(extinction, h * size)
     count = extinction.size
-    radiance = np.linalg.solve(
-        np.eye(count) - transport * (albedo * extinction).ravel(), transport @ emission.T
-    ).reshape(*blocks, 3)
+    channels = [
+        np.linalg.solve(np.eye(count) - transport * (albedo * extinction).ravel(), transport @ emitted)
+        for albedo, emitted in zip(albedos, emission, strict=True)
+    ]
+    radiance = np.stack(channels, -1).reshape(*blocks, 3)
     for axis, n in enumerate(kappa.shape):
         at = (np.arange(n) + 0.5) / size - 0.5 + 1
         low = np.floor(at).astype(int)
         part = (at - low).reshape([-1 if a == axis else 1 for a in range(4)])
         radiance = (1 - part) * radiance.take(low, axis) + part * radiance.take(low + 1, axis)
-    return albedo * radiance
+    return np.array(albedos) * radiance
 
 
 def block_transport(extinction, edge):

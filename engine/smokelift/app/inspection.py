@@ -88,6 +88,7 @@ def facts(shot: Shot, given: Scene, cost: Cost) -> tuple[Fact, ...]:
     calibrated = given.camera is not None
     medium = scene.medium
     thick = f"extinction {medium.extinction:.3g} 1/m at density 1, albedo {medium.albedo:.3g}"
+    tint = "grey" if medium.is_grey else ", ".join(f"{v:.2f}" for v in medium.color)
     taken = f"The picture is taken to be {PICTURE_HEIGHT:g} m high where the smoke is."
     around = "around the smoke of the whole clip"
     exposure = f"changes by up to {shot.exposure:.0%}, evened out" if shot.exposure > 0 else "steady"
@@ -106,6 +107,7 @@ def facts(shot: Shot, given: Scene, cost: Cost) -> tuple[Fact, ...]:
         Fact("box", "as given", "given") if calibrated else Fact("box", around, "estimated", _said(shot, "Domain")),
         _chosen(shot, "resolution", "grid", " x ".join(map(str, domain.resolution)), calibrated),
         _known("medium", thick, given.medium is not None, _said(shot, "Medium")),
+        _chosen(shot, "smoke colour", "smoke colour", tint, given.medium is not None),
         _light(shot, given),
         _chosen(shot, "scattering", "scattering", scene.scattering, given.scattering is not None),
         _place(shot),

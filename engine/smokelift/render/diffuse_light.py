@@ -7,6 +7,8 @@ sharp shadows, stays on the voxels. Figures: docs/experiments/multiple-scatterin
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,7 +29,13 @@ class DiffuseLight:
 
     def __init__(self, plan: RenderPlan, support: _core.Support) -> None:
         self._support = support
-        self._albedo = plan.medium.albedo
+        albedos = plan.medium.albedos
+        self._albedo = max(albedos)
+        # grey smoke scatters all channels alike, whatever colours they are
+        whole = slice(0, plan.lighting.channels)
+        self._alike = [(self._albedo, whole)] if plan.medium.is_grey else _channels(albedos)
+        shares = np.ones(plan.lighting.channels) if plan.medium.is_grey else np.array(albedos) / self._albedo
+        self._shares = shares.astype(np.float32)[:, None, None, None]
         size = min(max(round(max(plan.domain.resolution) / BLOCKS), 1), LARGEST)
         self._edge = size * plan.domain.voxel_size
         # blocks lie alike in the domain whatever the box; their centres reach around all voxels of the box
@@ -42,8 +50,9 @@ class DiffuseLight:
     def add(self, medium: Floats) -> None:
         """Add to the radiance that the voxels scatter what they scatter of scattered light."""
         self._means = _core.average(medium, self._support, self._blocks)
-        self._radiance = _core.diffuse(self._means, self._albedo, self._edge)
-        _core.add_interpolated(self._radiance, self._albedo, self._blocks, medium, self._support)
+        parts = [_core.diffuse(_of(self._means, part), albedo, self._edge) for albedo, part in self._alike]
+        self._radiance = np.concatenate(parts)
+        self._interpolate(self._radiance, self._albedo, medium)
 
     def pull_back(self, medium: Floats, gradient: Floats) -> None:
         """Add to a derivative by extinction and scattered radiance what it says of them through the light added.
@@ -52,7 +61,25 @@ class DiffuseLight:
         """
         if self._means is None or self._radiance is None:
             raise RuntimeError("No diffuse light has been added.")
-        _core.add_interpolated(self._radiance, -self._albedo, self._blocks, medium, self._support)
-        of_radiance = _core.interpolate_adjoint(gradient, self._support, self._albedo, self._blocks)
-        of_means = _core.diffuse_adjoint(self._means, self._radiance, of_radiance, self._albedo, self._edge)
+        self._interpolate(self._radiance, -self._albedo, medium)
+        of_radiance = self._shares * _core.interpolate_adjoint(gradient, self._support, self._albedo, self._blocks)
+        of_means = np.zeros_like(self._means)
+        for albedo, part in self._alike:
+            means = _of(self._means, part)
+            of_part = _core.diffuse_adjoint(means, self._radiance[part], of_radiance[part], albedo, self._edge)
+            of_means[0] += of_part[0]
+            of_means[1:][part] = of_part[1:]
         _core.average_adjoint(medium, self._support, self._blocks, of_means, gradient)
+
+    def _interpolate(self, radiance: Floats, factor: float, medium: Floats) -> None:
+        """Add a multiple of what the voxels scatter of the blocks' radiance, each channel by its share."""
+        _core.add_interpolated(self._shares * radiance, factor, self._blocks, medium, self._support)
+
+
+def _channels(albedos: Sequence[float]) -> list[tuple[float, slice]]:
+    return [(albedo, slice(number, number + 1)) for number, albedo in enumerate(albedos)]
+
+
+def _of(means: Floats, channels: slice) -> Floats:
+    """The means of the extinction, and of what some channels emit."""
+    return np.concatenate([means[:1], means[1:][channels]])

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from smokelift.render.camera_rays import LATERAL
 from smokelift.scene import DirectionalLight, Domain, FiniteLight, PointLight
+from smokelift.scene.checks import Vector
 
 Array = NDArray[np.float64]
 Box = tuple[int, int, int]
@@ -116,7 +117,7 @@ class Lighting:
     lights
         The sweeps to do.
     colour : (channels, 3)
-        Turns the channels into colours. Smoke is grey, so lights of one colour need one channel, others three.
+        Turns the channels into colours. Light of one colour needs one channel, other light three.
     """
 
     lights: tuple[ParallelSweep | PointSweep, ...]
@@ -128,23 +129,35 @@ class Lighting:
         return len(self.colour)
 
 
-def lighting(lights: Sequence[FiniteLight], domain: Domain, corner: Box, shape: Box) -> Lighting:
+def lighting(
+    lights: Sequence[FiniteLight],
+    domain: Domain,
+    corner: Box,
+    shape: Box,
+    scattered: Vector = (1.0, 1.0, 1.0),
+    split: bool = False,
+) -> Lighting:
     """Lights over a box of a domain's voxels; those without energy are left out.
 
     Parameters
     ----------
     corner, shape
         First voxel of the box, and its size in voxels.
+    scattered
+        Share of red, green and blue light by which the lights' energy is multiplied: the colour of the smoke.
+    split
+        Whether each colour has a channel of its own, although one may do.
 
     Raises
     ------
     SceneError
         If a point light stands inside the domain or too far away.
     """
-    bright = [light for light in lights if max(_colour(light)) >= DARKEST]
+    bright = [light for light in lights if (np.array(_colour(light)) * scattered).max() >= DARKEST]
     if not bright:
         return Lighting((), np.zeros((0, 3)))
-    colour, energies = _channels(np.array([_colour(light) for light in bright], np.float64))
+    colours = np.array([_colour(light) for light in bright], np.float64) * scattered
+    colour, energies = (np.eye(3), colours) if split else _channels(colours)
     sweeps = [
         _point(light, energy, domain, corner, shape)
         if isinstance(light, PointLight)

@@ -49,8 +49,9 @@ class Optics:
                 total += np.array(light.intensity) / np.sum((np.array(self.domain.centre) - light.position) ** 2)
             else:
                 total += light.irradiance
-        orders = 2 / (1 + np.sqrt(1 - self.medium.albedo)) if self.scattering == "multiple" else 1.0
-        return orders * self.medium.albedo / (4 * np.pi) * total
+        albedos = np.array(self.medium.albedos)
+        orders = 2 / (1 + np.sqrt(1 - albedos)) if self.scattering == "multiple" else 1.0
+        return np.asarray(orders * albedos / (4 * np.pi) * total)
 
 
 def scene_optics(scene: CompleteScene) -> Optics:

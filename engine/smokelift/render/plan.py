@@ -36,7 +36,7 @@ class RenderPlan:
     to_eye : (3, 4)
         Affine map from a voxel's index in the box to the direction from there to the eye, of any length.
     lighting
-        The lights, in coordinates of the box. Without channels the smoke only absorbs.
+        The lights, in coordinates of the box, in the smoke's colour. Without channels the smoke only absorbs.
     shadows
         Whether light is attenuated on its way to the voxels.
     diffuse
@@ -85,7 +85,10 @@ def plan_render(
         support = np.broadcast_to(np.True_, domain.resolution)
     corner, part = _box_around(support)
     box = _part_of(domain, part)
-    found = lighting(() if scattering == "absorption" else lights, domain, corner, box.resolution)
+    scatters = () if scattering == "absorption" else lights
+    # light that is scattered again takes on more of the smoke's colour
+    split = scattering == "multiple" and not medium.is_grey
+    found = lighting(scatters, domain, corner, box.resolution, medium.color, split)
     return RenderPlan(
         domain=domain,
         corner=corner,

@@ -1,7 +1,8 @@
 """One camera before one grid: a density in, an image out, and the derivative back.
 
-The smoke is grey, so a picture is scattered radiance S, in one channel where all lights have the same colour and in
-three otherwise, and transmittance T = exp(-optical depth). Colours are a matter of the last line:
+Smoke takes the same share of all colours away, so a picture is scattered radiance S, in one channel where all that is
+scattered has the same colour and in three otherwise, and transmittance T = exp(-optical depth). Colours are a matter of
+the last line:
 
     L_rgb = S colour + T background_rgb.
 """

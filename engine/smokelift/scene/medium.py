@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from smokelift.scene.checks import number, one_of, positive, set_fields, unexpected
+from smokelift.scene.checks import Vector, number, one_of, positive, set_fields, unexpected, vector
 
 Scattering = Literal["multiple", "single", "unshadowed", "absorption"]
 """How light is scattered: any number of times, once and with self-shadowing, once without, or not at all."""
@@ -28,11 +28,15 @@ class Medium:
         Single-scattering albedo, 0 to 1.
     anisotropy
         Henyey-Greenstein g, -1 < g < 1.
+    color
+        Colour of the smoke itself, red, green and blue from 0 to 1: ``albedo`` times it is the albedo of each.
+        Extinction is the same for all.
     """
 
     extinction: float = 5.0
     albedo: float = 0.9
     anisotropy: float = 0.0
+    color: Vector = (1.0, 1.0, 1.0)
 
     def __post_init__(self) -> None:
         """Check every value."""
@@ -41,7 +45,28 @@ class Medium:
             extinction=positive(self.extinction, "extinction"),
             albedo=number(self.albedo, "albedo", "a number from 0 to 1", lambda v: 0.0 <= v <= 1.0),
             anisotropy=number(self.anisotropy, "anisotropy", "a number between -1 and 1", lambda v: -1.0 < v < 1.0),
+            color=_share(self.color, "color"),
         )
+
+    @property
+    def albedos(self) -> Vector:
+        """Single-scattering albedo of red, green and blue."""
+        red, green, blue = self.color
+        return self.albedo * red, self.albedo * green, self.albedo * blue
+
+    @property
+    def is_grey(self) -> bool:
+        """Whether the smoke scatters red, green and blue alike."""
+        return min(self.color) == max(self.color)
+
+
+def _share(value: Any, key: str) -> Vector:
+    """Return ``value`` as shares of red, green and blue, or raise a SceneError that names ``key``."""
+    expected = "three numbers [r, g, b] from 0 to 1, one of them above 0"
+    rgb = vector(value, key, expected)
+    if min(rgb) < 0.0 or max(rgb) > 1.0 or max(rgb) == 0.0:
+        raise unexpected(list(rgb), key, expected)
+    return rgb
 
 
 def checked_scattering(value: Any) -> Scattering | None:

@@ -6,6 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
 
+UNDETERMINED = "undetermined"
+"""What is chosen where nothing in the clip or the scene decides it."""
+
 Chosen = TypeVar("Chosen", str, int, tuple[int, int, int], covariant=True)
 
 
@@ -17,9 +20,9 @@ class Choice(Generic[Chosen]):
     ----------
     what
         ``"scattering"``, ``"light strength"``, ``"resolution"``, ``"domain"``, ``"environment directions"``,
-        ``"iterations"``, ``"velocity grid coarsening"``, ``"velocity levels"`` or ``"axis depth"``.
+        ``"iterations"``, ``"velocity grid coarsening"``, ``"velocity levels"``, ``"axis depth"`` or ``"smoke colour"``.
     chosen
-        What will be used.
+        What will be used, or `UNDETERMINED`.
     reason
         Why, in a sentence with the figure that decided it.
     measured

@@ -2,14 +2,33 @@
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import replace
 
-from smokelift.scene import SHADOWED, DirectionalLight, Light, Medium, Scattering
+import numpy as np
+from numpy.typing import NDArray
+
+from smokelift.render import scene_optics
+from smokelift.scene import (
+    SHADOWED,
+    Background,
+    Camera,
+    CompleteScene,
+    DirectionalLight,
+    Domain,
+    EnvironmentLight,
+    Light,
+    Medium,
+    Scattering,
+)
 from smokelift.setup.smoke import SmokeSamples
 
 BEYOND = 0.1
 """Share by which the source radiance exceeds the 99th percentile of the smoke's. That smoke then has an optical depth
 of about 2.4, not an infinite one."""
+
+
+FEW = 8
+"""Directions of an environment whose colour alone is asked for."""
 
 
 def richest_scattering(asked: Scattering | None, lights: tuple[Light, ...], medium: Medium) -> Scattering:
@@ -31,6 +50,15 @@ def richest_scattering(asked: Scattering | None, lights: tuple[Light, ...], medi
     return "single" if lights else "unshadowed"
 
 
+def light_colour(lights: tuple[Light, ...], camera: Camera, domain: Domain, medium: Medium) -> NDArray[np.float64]:
+    """Colour (3,) of the light in the middle of a box, the largest 1; ones where no light is known."""
+    few = tuple(replace(light, directions=FEW) if isinstance(light, EnvironmentLight) else light for light in lights)
+    grey = replace(medium, color=(1.0, 1.0, 1.0))
+    scene = CompleteScene(camera, domain, grey, few, Background(), "single")
+    source = scene_optics(scene).unshadowed_source()
+    return source / source.max() if source.max() > 0 else np.ones(3)
+
+
 def ambient_sun(samples: SmokeSamples, medium: Medium) -> DirectionalLight:
     """Uniform light whose source radiance is about the radiance of the clip's thickest smoke.
 
@@ -45,5 +73,6 @@ def ambient_sun(samples: SmokeSamples, medium: Medium) -> DirectionalLight:
             source = (1 + BEYOND) * np.percentile(samples.colours, 99, axis=0)
         else:
             source = (1 - BEYOND) * np.percentile(samples.colours, 1, axis=0)
-    irradiance = source * 4 * np.pi / medium.albedo
+    scattered = np.array(medium.albedos) / (4 * np.pi)
+    irradiance = np.divide(source, scattered, out=np.zeros(3), where=scattered > 0)
     return DirectionalLight((0.0, 0.0, -1.0), (float(irradiance[0]), float(irradiance[1]), float(irradiance[2])))

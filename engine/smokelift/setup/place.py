@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from smokelift.density import AxisEstimate, clip_axis
-from smokelift.setup.choice import Choice
+from smokelift.setup.choice import UNDETERMINED, Choice
 from smokelift.setup.shot import Shot
 
 TELL = "If you know better, say it by --axis-depth, an [[inlet]] or a second view."
@@ -32,5 +32,5 @@ def place_choice(place: AxisEstimate) -> Choice[str]:
         "inlets": f"By the marked inlets the smoke stands {where}, {about}.",
         "lamps": f"By the colours of the lamps the smoke stands {where}, {about}.",
     }[place.cue]
-    chosen = "undetermined" if place.cue == "box" else place.cue
+    chosen = UNDETERMINED if place.cue == "box" else place.cue
     return Choice("axis depth", chosen, reason, {"depth": place.depth, "deviation": place.deviation})

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import replace
+from typing import Any
 
 from smokelift.density.axis import SmokeAxis
 from smokelift.footage.clip import Clip
@@ -16,14 +17,16 @@ from smokelift.footage.working_picture import CameraError, WorkingPicture, worki
 from smokelift.render import scene_optics
 from smokelift.scene import Background, Camera, CompleteScene, Domain, Medium, Scene
 from smokelift.setup.background import exposure_change, exposure_notes, find_plates, smoke_in_plate
+from smokelift.setup.choice import Choice
 from smokelift.setup.further_views import disagreement, open_view
 from smokelift.setup.geometry import clip_lens, find_geometry
-from smokelift.setup.light import ambient_sun, richest_scattering
+from smokelift.setup.light import ambient_sun, light_colour, richest_scattering
 from smokelift.setup.model import choose_model
 from smokelift.setup.place import placed
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot, ShotView
 from smokelift.setup.smoke import sample_smoke
+from smokelift.setup.smoke_colour import smoke_colour
 
 OPTICAL_DEPTH_AT_ONE = 5.0
 """Optical depth of smoke of density 1 across the domain when the medium is not given: thick, not solid."""
@@ -61,9 +64,13 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
     notes = [*remarks, *found.notes, *doubts, *exposure_notes(exposure), *geometry.notes]
     if settings.axis_depth is not None:
         SmokeAxis.given(settings.axis_depth, camera, domain)  # refuse early what cannot be
+    choices: tuple[Choice[Any], ...] = () if geometry.resolution is None else (geometry.resolution,)
     medium = scene.medium
     if medium is None:
-        medium = _usual_medium(domain)
+        usual = _usual_medium(domain)
+        colour = smoke_colour(samples, light_colour(scene.lights, camera, domain, usual))
+        medium = replace(usual, color=colour.color)
+        choices += (colour.choice,)
         notes.append(
             f"Medium not given: extinction {medium.extinction:.3g} 1/m (density 1 is thick smoke), "
             f"albedo {medium.albedo:g}, isotropic."
@@ -89,7 +96,6 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
         closed=scene.closed,
         inlets=scene.inlets,
     )
-    choices = () if geometry.resolution is None else (geometry.resolution,)
     if settings.selection.measure:
         model = choose_model(clip, complete, plates, samples.smoky, asked is not None, settings)
         complete, settings = model.scene, replace(settings, velocity=model.velocity)

@@ -44,20 +44,38 @@ def test_image_equals_the_sums_in_double_precision(density, lights, extinction):
     np.testing.assert_allclose(image, exact(density.astype(float), lights, medium), rtol=5e-4)
 
 
-@pytest.mark.parametrize(("hull", "lights"), [(False, (SUN,)), (True, (SUN, SKY))], ids=["one light", "several, hull"])
-def test_gradient_equals_a_complex_step(density, lights, hull):
+def test_coloured_smoke_in_white_light_is_deeper_in_colour_where_light_is_scattered_again(density):
+    """As the sums have it; single scattering shows the colour itself."""
+    thick = replace(MEDIUM, extinction=100.0, color=(1.0, 0.8, 0.5))
+    image = renderer(medium=thick, background=np.zeros(3, np.float32)).image(density)
+    black = np.zeros(3)
+    sums = reference.render(density.astype(float), CAMERA, DOMAIN, thick, (SUN,), black, "multiple")
+    np.testing.assert_allclose(image, sums, rtol=5e-4, atol=1e-6)
+    once = Renderer(CAMERA, DOMAIN, thick, (SUN,), black.astype(np.float32)).image(density)
+    lit = once.max(-1) > 0.1 * once.max()
+    np.testing.assert_allclose(once[lit] / once[lit][:, :1], np.broadcast_to(thick.color, once[lit].shape), rtol=1e-5)
+    assert (image[lit][:, 2] / image[lit][:, 0]).max() < 0.48
+
+
+@pytest.mark.parametrize(
+    ("hull", "lights", "colour"),
+    [(False, (SUN,), (1.0, 1.0, 1.0)), (True, (SUN, SKY), (1.0, 1.0, 1.0)), (True, (SUN,), (0.4, 1.0, 0.7))],
+    ids=["one light", "several, hull", "coloured smoke"],
+)
+def test_gradient_equals_a_complex_step(density, lights, hull, colour):
     """In voxels at random, those that light reaches late among them."""
+    medium = replace(MEDIUM, color=colour)
     rng = np.random.default_rng(5)
     support = density > 0.2 if hull else None
     values = np.where(support, density, 0) if hull else density
     weights = rng.standard_normal((11, 12, 3))
-    ours = renderer(lights, support=support)
+    ours = renderer(lights, medium, support)
     ours.image(values.astype(np.float32), keep_record=True)
     gradient = ours.gradient(weights.astype(np.float32))
     for voxel in rng.choice(np.argwhere(values > 0), 3, replace=False):
         moved = values.astype(complex)
         moved[tuple(voxel)] += 1e-30j
-        slope = np.sum(weights * exact(moved, lights)).imag / 1e-30
+        slope = np.sum(weights * exact(moved, lights, medium)).imag / 1e-30
         assert gradient[tuple(voxel)] == pytest.approx(slope, rel=2e-3, abs=1e-3 * float(np.abs(gradient).max()))
 
 

@@ -95,6 +95,8 @@ def test_a_file_may_hold_any_one_table(tmp_path: Path) -> None:
         ("albedo = 0.5", 'albedo = "x"', 'line 22: [medium] albedo must be a number from 0 to 1, not "x"'),
         ("albedo = 0.5", "albedo = true", "line 22: [medium] albedo must be a number from 0 to 1, not true"),
         ("albedo = 0.5", "albedo = nan", "line 22: [medium] albedo must be"),
+        ("albedo = 0.5", "color = [1, 2, 0]", "line 22: [medium] color must be three numbers [r, g, b] from 0 to 1"),
+        ("albedo = 0.5", "color = [0, 0, 0]", "from 0 to 1, one of them above 0, not [0.0, 0.0, 0.0]"),
         (
             "albedo = 0.5",
             "anisotropy = 1",

@@ -93,7 +93,11 @@ def scenes(draw: st.DrawFn) -> Scene:
         medium=draw(
             st.none()
             | st.builds(
-                Medium, positive, st.floats(0, 1, allow_subnormal=False), st.floats(-0.99, 0.99, allow_subnormal=False)
+                Medium,
+                positive,
+                st.floats(0, 1, allow_subnormal=False),
+                st.floats(-0.99, 0.99, allow_subnormal=False),
+                st.tuples(*[st.floats(0, 1, allow_subnormal=False)] * 2, st.floats(0.01, 1)),
             )
         ),
         scattering=draw(st.sampled_from([None, *SCATTERINGS])),

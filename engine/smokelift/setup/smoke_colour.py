@@ -1,0 +1,131 @@
+"""The smoke's own colour, where the clip shows one that is not the light's.
+
+A pixel shows T behind + (1 - T) source: it lies between its background and the source radiance, which is the light's
+colour times the smoke's. So the source lies on the line from the background through the smoke, beyond the thickest
+smoke that is seen. Before black the line has one colour; before anything else it has many. Smoke has a colour of its
+own if no source on that line has a colour that light may have: white, as cameras balance it, or that of what is behind
+the smoke, which stands in the same light. Figures: docs/experiments/smoke-colour.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smokelift.scene.checks import Vector
+from smokelift.setup.choice import UNDETERMINED, Choice
+from smokelift.setup.smoke import SmokeSamples
+
+Array = NDArray[np.float64]
+
+LEAST = 12.0
+"""Degrees between two colours as vectors of linear light, from which white balance does not explain their difference.
+Grey world and its kin are 5 to 6 degrees wrong on the mean, and 10 in the worst quarter of pictures (Gijsenij, Gevers
+and van de Weijer, "Computational color constancy: survey and experiments", 2011)."""
+
+THICKEST = 90
+"""Percentile of the change from which on smoke is looked at: the thickest is nearest to the source."""
+
+CLIPPED = 0.95
+"""Linear value from which on a channel may have been larger."""
+
+FEWEST = 50
+"""Smoke pixels at least."""
+
+FAINTEST = 0.01
+"""Linear value of the brightest channel at least: a darker source has no colour that 8 bits show."""
+
+PLACES = 256
+"""Points of the line that are looked at."""
+
+
+@dataclass(frozen=True)
+class SmokeColour:
+    """The colour of the smoke.
+
+    Attributes
+    ----------
+    color
+        Red, green and blue, the largest 1; white where nothing says that the smoke is not grey.
+    choice
+        The same in words.
+    """
+
+    color: Vector
+    choice: Choice[str]
+
+
+def smoke_colour(samples: SmokeSamples, light: Array) -> SmokeColour:
+    """Find the smoke's own colour.
+
+    Parameters
+    ----------
+    samples
+        Smoke pixels of the clip and what is behind them.
+    light : (3,)
+        Colour of the light, ones where it is unknown.
+    """
+    line = _line(samples)
+    if line is None:
+        return _grey("no smoke is thick, bright and free of clipped pixels enough to show a colour")
+    behind, seen = line
+    sources = _sources(behind, seen)
+    white = _degrees(sources, light)
+    least = white
+    if behind.max() > FAINTEST:
+        least = np.minimum(white, _degrees(sources, behind))
+    if least.min() < LEAST:
+        nearest = "grey smoke" if white.min() < LEAST else "what is behind it"
+        return _grey(
+            f"it may be {least.min():.0f} degrees from {nearest} in colour, less than the {LEAST:g} of coloured light",
+            float(least.min()),
+        )
+    # the palest that explains the clip
+    own = sources[white.argmin()] / np.maximum(light, 1e-6)
+    red, green, blue = (float(round(v, 3)) for v in own / own.max())
+    named = f"{red:.2f}, {green:.2f}, {blue:.2f}"
+    return SmokeColour(
+        (red, green, blue),
+        Choice(
+            "smoke colour",
+            named,
+            f"Smoke colour: {named} (linear), at least {white.min():.0f} degrees from that of grey smoke; if the light "
+            "has this colour and the smoke is grey, say so by color = [1, 1, 1] in [medium].",
+            {"degrees": float(white.min())},
+            LEAST,
+        ),
+    )
+
+
+def _grey(why: str, degrees: float | None = None) -> SmokeColour:
+    reason = f"Smoke colour: undetermined, grey is taken: {why}."
+    measured = {} if degrees is None else {"degrees": degrees}
+    return SmokeColour((1.0, 1.0, 1.0), Choice("smoke colour", UNDETERMINED, reason, measured, LEAST))
+
+
+def _line(samples: SmokeSamples) -> tuple[Array, Array] | None:
+    """Background and colour of the thickest smoke that is not clipped; None if there is too little of it."""
+    clear = samples.colours.max(-1, initial=0.0) < CLIPPED
+    if clear.sum() < max(FEWEST, 0.1 * len(clear)):
+        return None
+    colours, behind = (values[clear].astype(np.float64) for values in (samples.colours, samples.behind))
+    change = np.linalg.norm(colours - behind, axis=-1)
+    thick = change >= np.percentile(change, THICKEST)
+    seen = colours[thick].mean(0)
+    return (np.maximum(behind[thick].mean(0), 0), seen) if seen.max() >= FAINTEST else None
+
+
+def _sources(behind: Array, seen: Array) -> Array:
+    """Source radiances (n, 3) that the line allows: from the smoke that is seen to where a channel is negative."""
+    change = seen - behind
+    falling = change < 0
+    most = min((behind[falling] / -change[falling]).min(), 1e3) if falling.any() else 1e3
+    return np.asarray(np.maximum(behind + np.geomspace(1, max(most, 1), PLACES)[:, None] * change, 0))
+
+
+def _degrees(colours: Array, other: Array) -> Array:
+    """Angle of colours (n, 3) from another."""
+    length = np.linalg.norm(colours, axis=-1) * np.linalg.norm(other)
+    return np.asarray(np.degrees(np.arccos(np.clip(colours @ other / np.maximum(length, 1e-12), -1, 1))))

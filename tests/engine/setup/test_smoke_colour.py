@@ -1,0 +1,73 @@
+"""The smoke's own colour: found where no light explains it, and called undetermined elsewhere."""
+
+import numpy as np
+import pytest
+
+from smokelift.setup.choice import UNDETERMINED
+from smokelift.setup.smoke import SmokeSamples
+from smokelift.setup.smoke_colour import smoke_colour
+
+WHITE = np.ones(3)
+RED, DUST = np.array((1.0, 0.3, 0.2)), np.array((1.0, 0.75, 0.48))
+BLACK, SKY, BRICK = np.zeros(3), np.array((0.25, 0.45, 0.9)), np.array((0.2, 0.12, 0.08))
+
+
+def samples(source, behind, thickest=0.9):
+    """Smoke of optical depths up to one before one colour, with a little noise."""
+    rng = np.random.default_rng(1)
+    opacity = rng.random((500, 1)) * thickest
+    behind = np.broadcast_to(behind, (500, 3))
+    colours = (1 - opacity) * behind + opacity * source + 0.002 * rng.standard_normal((500, 3))
+    return SmokeSamples(1.0, (0, 0, 1, 1), np.ones((1, 1), bool), colours.astype("f4"), behind.astype("f4"), (0,))
+
+
+def apart(one, other):
+    """Degrees between two colours."""
+    return np.degrees(np.arccos(np.dot(one, other) / (np.linalg.norm(one) * np.linalg.norm(other))))
+
+
+@pytest.mark.parametrize(
+    ("source", "behind"), [(RED, BLACK), (RED, BRICK), (0.1 * RED, BLACK)], ids=["black", "brick", "dim"]
+)
+def test_a_colour_of_its_own_is_found(source, behind):
+    found = smoke_colour(samples(source, behind), WHITE)
+    assert apart(found.color, RED) < 6
+    assert max(found.color) == 1
+    assert "if the light has this colour" in found.choice.reason
+
+
+@pytest.mark.parametrize("thickest", [0.3, 0.9])
+@pytest.mark.parametrize("behind", [BLACK, SKY, BRICK], ids=["black", "sky", "brick"])
+@pytest.mark.parametrize("source", [0.8 * WHITE, 0.02 * WHITE, BLACK], ids=["white", "soot", "black"])
+def test_grey_smoke_stays_grey_before_anything(source, behind, thickest):
+    """Thin smoke has the colour of what is behind it, and takes most of one colour away from it."""
+    found = smoke_colour(samples(source, behind, thickest), WHITE)
+    assert (found.color, found.choice.chosen) == ((1, 1, 1), UNDETERMINED)
+
+
+def test_what_white_balance_explains_is_the_lights():
+    assert smoke_colour(samples(np.array((1.0, 0.9, 0.8)), BLACK), WHITE).choice.chosen == UNDETERMINED
+    assert smoke_colour(samples(DUST, BLACK), WHITE).choice.chosen != UNDETERMINED
+
+
+def test_smoke_of_the_colour_of_its_surroundings_is_undetermined():
+    """All is orange at sunset."""
+    assert smoke_colour(samples(0.8 * DUST, 0.4 * DUST), WHITE).choice.chosen == UNDETERMINED
+
+
+def test_a_known_light_leaves_the_smoke_the_rest():
+    light = np.array((1.0, 0.5, 0.3))
+    assert smoke_colour(samples(0.8 * light, BLACK), light).choice.chosen == UNDETERMINED
+    assert apart(smoke_colour(samples(0.8 * light * RED, BLACK), light).color, RED) < 1
+
+
+def test_thin_smoke_before_a_sky_is_taken_no_more_coloured_than_it_is():
+    found = smoke_colour(samples(RED, SKY, 0.7), WHITE)
+    assert apart(found.color, WHITE) <= apart(RED, WHITE) + 1
+
+
+@pytest.mark.parametrize("colours", [np.ones((500, 3)), np.zeros((0, 3))], ids=["clipped", "none"])
+def test_pixels_without_a_colour_say_nothing(colours):
+    empty = np.zeros_like(colours)
+    seen = SmokeSamples(1.0, (0, 0, 1, 1), np.ones((1, 1), bool), colours.astype("f4"), empty.astype("f4"), (0,))
+    assert smoke_colour(seen, WHITE).choice.chosen == UNDETERMINED
