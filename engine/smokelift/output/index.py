@@ -23,6 +23,9 @@ from smokelift.scene.files import read_text
 FORMAT = 1
 """Version of the file's structure; any other is refused."""
 
+FILES = ("path", "image")
+"""Keys of a scene that hold paths."""
+
 
 class SequenceError(ValueError):
     """A directory that cannot be written to or opened, and why."""
@@ -139,6 +142,16 @@ def plain(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [plain(item) for item in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def without_folders(scene: Any) -> Any:
+    """Return the plain values of a scene with the names of its files in place of their paths."""
+    if isinstance(scene, dict):
+        return {
+            key: Path(value).name if key in FILES and isinstance(value, str) else without_folders(value)
+            for key, value in scene.items()
+        }
+    return [without_folders(value) for value in scene] if isinstance(scene, list) else scene
 
 
 def difference(place: str, there: Any, now: Any) -> str:

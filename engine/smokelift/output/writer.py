@@ -23,7 +23,7 @@ from smokelift.output.archive import VELOCITY, write_arrays
 from smokelift.output.atomic import atomic_path
 from smokelift.output.checksum import checksum
 from smokelift.output.images import write_image
-from smokelift.output.index import DirectoryBusyError, Index, SequenceError, difference, plain
+from smokelift.output.index import DirectoryBusyError, Index, SequenceError, difference, plain, without_folders
 from smokelift.output.layout import BACKGROUND, INDEX, LOCK, RESUME, frame_path, is_foreign
 from smokelift.output.lock import Lock
 from smokelift.output.resume import ResumeState
@@ -220,6 +220,8 @@ class SequenceWriter:
             return
         for part in ("scene", "settings", "sources", "versions"):
             before, now = (getattr(index, part) for index in (there, self._index))
+            if part == "scene" and there.sources:  # their checksums tell files apart, wherever a project was moved to
+                before, now = without_folders(before), without_folders(now)
             # early versions kept no sources; a patch of Python changes no result
             changed = difference(part, before, now | {"python": before.get("python")} if part == "versions" else now)
             if changed and before:

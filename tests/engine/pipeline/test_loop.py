@@ -272,6 +272,24 @@ def test_a_file_that_was_replaced_under_its_name_is_not_mixed_in(plume, draft, t
     assert Sequence.open(tmp_path / "out").frames == (1, 2)
 
 
+def test_a_run_is_resumed_after_its_project_was_moved(plume, draft, tmp_path) -> None:
+    """The files have other paths, and the same names and content."""
+    project = tmp_path / "project"
+    project.mkdir()
+
+    def shot(folder: Path) -> Scene:
+        clip = replace(written.clip, path=folder / "clip" / written.clip.path.name)
+        return replace(plume.scene, clip=clip, background=Background(image=folder / "plate.png"))
+
+    written = plume.write(project / "clip", plume.densities)
+    write_image(project / "plate.png", np.zeros((56, 40, 3)))
+    cut_off(shot(project), draft, project / "out", 3)
+    moved = project.rename(tmp_path / "moved")
+    rest = frames_of(shot(moved), draft, moved / "out", npz=True, resume=True)
+    assert [frame.number for frame in rest] == [4, 5]
+    assert Sequence.open(moved / "out").scene.clip.path.is_relative_to(moved)
+
+
 def test_an_estimated_background_resumes_and_moves(plume, draft, tmp_path) -> None:
     """What was estimated is kept with the sequence: the run goes on, and the directory can be moved."""
     heights = np.linspace(-0.3, 1.9, 8)
