@@ -38,6 +38,8 @@ def main(words: Sequence[str]) -> int:
     try:
         smoke = _smoke(choices)
         take = run.unfinished(smoke) if choices.resume else None
+        if take is not None:
+            run.find_again(smoke, take)
         take = take or run.write_take(smoke)
         job = Job(engine_command(take.arguments()), take.log_file)
     except (ShotError, TakeError, EngineMissingError) as error:

@@ -27,3 +27,16 @@ IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".exr", ".hdr")
 
 PANORAMA_SUFFIXES = (".exr", ".hdr")
 """Pictures that the engine takes as an environment light."""
+
+DIRECTIONS = {
+    "continue": ("--frames", "--start", "--fade", "--wind", "--fan"),
+    "retime": ("--speed",),
+    "loop": ("--frames", "--overlap"),
+}
+"""What the engine makes of a take, with the options that decide the result; ``--mesh`` names a file besides."""
+
+SLOWEST, FASTEST = 0.01, 100.0
+"""Speeds that retiming has."""
+
+SHORTEST = 4
+"""Frames that a take has at least, if something is made of it."""

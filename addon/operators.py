@@ -28,6 +28,17 @@ class _NeedsClip:
         return True
 
 
+class NeedsResult(_NeedsClip):
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not super().poll(context):
+            return False
+        if volume.shown_take(active_smoke(context.scene)) is None:
+            cls.poll_message_set("Make smoke first")
+            return False
+        return True
+
+
 class SMOKELIFT_OT_add(bpy.types.Operator):
     """Add smoke that is made from a video or an image sequence"""
 
@@ -132,6 +143,11 @@ class SMOKELIFT_OT_resume(_NeedsClip, bpy.types.Operator):
         take = run.unfinished(smoke)
         if take is None or run.busy(context.window_manager, take):
             self.report({"ERROR"}, "No stopped run to resume: press Make Smoke.")
+            return {"CANCELLED"}
+        try:
+            run.find_again(smoke, take)
+        except TakeError as error:
+            self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         run.enqueue(context, smoke, take)
         return {"FINISHED"}
@@ -379,6 +395,45 @@ class SMOKELIFT_OT_show_take(_NeedsClip, bpy.types.Operator):
         return {"FINISHED"}
 
 
+class SMOKELIFT_OT_switch_take(NeedsResult, bpy.types.Operator):
+    """Show the result that was shown before; again to come back"""
+
+    bl_idname = "smokelift.switch_take"
+    bl_label = "Switch"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not super().poll(context):
+            return False
+        if volume.take_before(active_smoke(context.scene)) is None:
+            cls.poll_message_set("Show another result first")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        smoke = active_smoke(context.scene)
+        run.present(smoke, volume.take_before(smoke))
+        return {"FINISHED"}
+
+
+class SMOKELIFT_OT_show_beside(NeedsResult, bpy.types.Operator):
+    """Show this result beside the smoke, in a Volume object of its own that can be deleted like any other"""
+
+    bl_idname = "smokelift.show_beside"
+    bl_label = "Show Beside"
+    bl_options = {"REGISTER", "UNDO"}
+
+    take: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        take = Take(Path(self.take))
+        if volume.show_beside(active_smoke(context.scene), take) is None:
+            self.report({"ERROR"}, f"There is no finished frame in {take.directory}.")
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
 class SMOKELIFT_OT_name_take(bpy.types.Operator):
     """Give this result a name"""
 
@@ -416,7 +471,7 @@ class SMOKELIFT_OT_remove_take(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         take = Take(Path(self.take))
         if take.directory.resolve() in _in_use(context):
-            self.report({"ERROR"}, "A Volume shows this result, or a run writes it: show another one first.")
+            self.report({"ERROR"}, "A Volume shows this result, or a run needs it: show another one first.")
             return {"CANCELLED"}
         take.remove()
         return {"FINISHED"}
@@ -426,8 +481,9 @@ def _in_use(context: bpy.types.Context) -> set[Path]:
     """Directories of the takes that Volumes of this file show or that runs write; a link may lead to the same one."""
     shown = {take.directory for data in bpy.data.volumes if (take := volume.take_of(data)) is not None}
     rows = context.window_manager.smokelift.jobs
-    queued = {Path(row.take) for row in rows if row.outcome not in run.ENDED}
-    return {directory.resolve() for directory in shown | queued}
+    queued = {Take(Path(row.take)) for row in rows if row.outcome not in run.ENDED}
+    read = {source for take in queued if (source := take.source()) is not None}
+    return {directory.resolve() for directory in shown | {take.directory for take in queued | read}}
 
 
 class SMOKELIFT_OT_remove_takes(_NeedsClip, bpy.types.Operator):
@@ -461,6 +517,8 @@ _CLASSES = (
     SMOKELIFT_OT_show_page,
     SMOKELIFT_OT_show_smoke,
     SMOKELIFT_OT_show_take,
+    SMOKELIFT_OT_switch_take,
+    SMOKELIFT_OT_show_beside,
     SMOKELIFT_OT_name_take,
     SMOKELIFT_OT_remove_take,
     SMOKELIFT_OT_remove_takes,

@@ -131,7 +131,7 @@ def _draw_run(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy
     if volume.shown_take(smoke) is not None:
         data = smoke.data
         last = data.frame_start + data.frame_duration - 1
-        if not data.frame_start <= context.scene.frame_current <= last:
+        if data.sequence_mode == "CLIP" and not data.frame_start <= context.scene.frame_current <= last:
             _label(layout, context, f"The smoke is seen in frames {data.frame_start} to {last}.", "INFO")
         known = volume.provenance_note(smoke)
         if known:
@@ -269,6 +269,13 @@ class _Results:
             row.operator("smokelift.show_take", text=text, depress=take == shown).take = str(take.directory)
             row.operator("smokelift.name_take", text="", icon="GREASEPENCIL").take = str(take.directory)
             row.operator("smokelift.remove_take", text="", icon="TRASH").take = str(take.directory)
+        if len(found) > 1:
+            column = layout.column()
+            column.operator("smokelift.switch_take", icon="FILE_REFRESH")
+            other = volume.take_before(smoke)
+            if other is not None:
+                text = f"Show {other.title()} Beside"
+                column.operator("smokelift.show_beside", text=text, icon="MOD_MIRROR").take = str(other.directory)
         row = layout.row()
         row.active = len(found) > 1
         row.operator("smokelift.remove_takes", text=f"Delete Earlier Results ({max(0, len(found) - 1)})", icon="TRASH")

@@ -1,8 +1,5 @@
 """Settings of a smoke, saved with its object, and the state of this session, on the window manager."""
 
-import itertools
-from pathlib import Path
-
 import bpy
 from bpy.props import (
     BoolProperty,
@@ -16,6 +13,8 @@ from bpy.props import (
 )
 
 from . import volume
+from .contract import FASTEST, SLOWEST
+from .smoke import free_folder
 
 SEEDS = 2**31
 """Numbers of variations: as many as Blender's whole numbers have from 0."""
@@ -35,10 +34,7 @@ def _clip_chosen(settings: "SmokeliftSettings", context: bpy.types.Context) -> N
     if settings.clip is None:
         return
     settings.first, settings.last = 1, max(1, settings.clip.frame_duration)
-    taken = {obj.smokelift.folder for obj in bpy.data.objects if obj != settings.id_data and obj.smokelift.is_smoke}
-    stem = bpy.path.clean_name(Path(settings.clip.filepath).stem)
-    names = itertools.chain([stem], (f"{stem}_{number}" for number in itertools.count(2)))
-    settings.folder = next(name for name in names if name not in taken)
+    settings.folder = free_folder(settings.id_data)
 
 
 def _box_chosen(settings: "SmokeliftSettings", context: bpy.types.Context) -> None:
@@ -60,11 +56,100 @@ def _is_empty(_settings: "SmokeliftSettings", obj: bpy.types.Object) -> bool:
     return obj.type == "EMPTY"
 
 
+class SmokeliftDirecting(bpy.types.PropertyGroup):
+    """What is made of the result on show."""
+
+    direction: EnumProperty(
+        name="Direction",
+        description="What is made of the result on show",
+        items=[
+            ("continue", "Continue", "Let the smoke go on after its last frame, in wind and around obstacles"),
+            ("retime", "Retime", "Slow motion, fast motion and speed ramps"),
+            ("loop", "Loop", "Repeat the smoke without a seam"),
+        ],
+    )
+    frames: IntProperty(name="Frames", description="Number of frames to add", default=48, min=1, max=100_000)
+    fade: IntProperty(name="Fade", description="Frames at the end in which the smoke fades to nothing", min=0)
+    use_start: BoolProperty(
+        name="Start", description="Simulate from a frame on, in place of the clip's own frames after it"
+    )
+    start: IntProperty(
+        name="Start", description="Frame of the scene, the last one that stays as it is", default=1, min=-1_000_000
+    )
+    effectors: PointerProperty(
+        name="Effectors",
+        description=(
+            "Collection of what acts on the smoke: closed meshes are obstacles, a Wind force field is wind. An Empty, "
+            "a Force field or a Wind field with Max Distance is a fan, which blows along its Z axis. Strength is m/s"
+        ),
+        type=bpy.types.Collection,
+    )
+    fan_speed: FloatProperty(
+        name="Fan Speed",
+        description="Velocity of the air in Empties that have no force field",
+        unit="VELOCITY",
+        default=1.0,
+        soft_min=-10.0,
+        soft_max=10.0,
+    )
+    speed: FloatProperty(
+        name="Speed",
+        description="Speed of the smoke: 0.5 is half as fast",
+        default=0.5,
+        min=SLOWEST,
+        max=FASTEST,
+        soft_max=4.0,
+        update=_speed_chosen,
+    )
+    use_ramp: BoolProperty(
+        name="Ramp",
+        description="Change the speed from the first frame to the middle and to the last",
+        update=_speed_chosen,
+    )
+    speed_middle: FloatProperty(
+        name="Middle",
+        description="Speed in the middle of the result",
+        default=0.5,
+        min=SLOWEST,
+        max=FASTEST,
+        soft_max=4.0,
+        update=_speed_chosen,
+    )
+    speed_end: FloatProperty(
+        name="End",
+        description="Speed at the last frame",
+        default=1.0,
+        min=SLOWEST,
+        max=FASTEST,
+        soft_max=4.0,
+        update=_speed_chosen,
+    )
+    live: BoolProperty(
+        name="Preview",
+        description="Play the result on show at this speed now. Frames in between are made by Retime",
+        update=_speed_chosen,
+    )
+    use_part: BoolProperty(name="Part", description="Loop a part of the result, in which the smoke is steady")
+    part_first: IntProperty(
+        name="First", description="First frame of the part, in the scene", default=1, min=-1_000_000
+    )
+    part_last: IntProperty(name="Last", description="Last frame of the part, in the scene", default=48, min=-1_000_000)
+    overlap: IntProperty(
+        name="Overlap", description="Frames in which the end becomes the start; 0 is a third, 24 at most", min=0
+    )
+
+    def speeds(self) -> tuple[float, ...]:
+        """One speed, or those of a ramp."""
+        return (self.speed, self.speed_middle, self.speed_end) if self.use_ramp else (self.speed,)
+
+
 class SmokeliftSettings(bpy.types.PropertyGroup):
     """Settings of one smoke, on its Volume object."""
 
     is_smoke: BoolProperty(name="Smoke", description="The object is made from a clip", options={"HIDDEN"})
     folder: StringProperty(name="Folder", description="Name of the folder for the results", options={"HIDDEN"})
+    before: StringProperty(name="Before", description="The result that was shown before", options={"HIDDEN"})
+    directing: PointerProperty(name="Direct", description="What is made of the result", type=SmokeliftDirecting)
 
     clip: PointerProperty(
         name="Clip",
@@ -308,7 +393,7 @@ class SmokeliftState(bpy.types.PropertyGroup):
     disk: FloatProperty(description="MB")
 
 
-_CLASSES = (SmokeliftSettings, SmokeliftSceneSettings, SmokeliftJob, SmokeliftState)
+_CLASSES = (SmokeliftDirecting, SmokeliftSettings, SmokeliftSceneSettings, SmokeliftJob, SmokeliftState)
 
 
 def register() -> None:

@@ -7,10 +7,10 @@ from pathlib import Path
 import bpy
 import bpy.utils.previews
 
-from . import scene_file, shot_setup, volume
+from . import directing, scene_file, shot_setup, volume
 from .job import ENDED, EngineMissingError, Job, Queue, engine_command
 from .paths import absolute
-from .smoke import active_smoke, smokes
+from .smoke import active_smoke, part_duplicate, smokes
 from .take import Take, TakeError, new_take, takes
 
 TICK_SECONDS = 0.1
@@ -37,9 +37,46 @@ def write_take(smoke: bpy.types.Object) -> Take:
         If the shot is unusable, or the folder cannot be written to.
     """
     tables = scene_file.shot_tables(smoke)
+    part_duplicate(smoke)
     take = new_take(output_folder(smoke))
     take.write(tables, scene_file.options(smoke))
     return take
+
+
+def write_directed(smoke: bpy.types.Object) -> Take:
+    """Write the files of a new take that is made of the one on show.
+
+    Raises
+    ------
+    ShotError, TakeError
+        If a setting or an object cannot be used, or the folder cannot be written to.
+    """
+    source = volume.shown_take(smoke)
+    if source is None:
+        raise scene_file.ShotError("Make smoke first: there is none yet to direct.")
+    if busy(bpy.context.window_manager, source):
+        raise scene_file.ShotError("The result on show is still being made: wait for its end, or cancel it.")
+    direction, options, meshes = directing.request(smoke)
+    part_duplicate(smoke)
+    take = new_take(output_folder(smoke))
+    take.write_directed(direction, source, options, meshes)
+    return take
+
+
+def find_again(smoke: bpy.types.Object, take: Take) -> None:
+    """Tell a take that is resumed where clip and plate are today, if the project was moved.
+
+    Raises
+    ------
+    TakeError
+        If its files are damaged.
+    """
+    settings = smoke.smokelift
+    if take.direction() is None:
+        files = {"clip": ("path", scene_file.clip_path(settings.clip))}
+        if settings.plate:
+            files["background"] = ("image", absolute(settings.plate))
+        take.find_again(files)
 
 
 def unfinished(smoke: bpy.types.Object) -> Take | None:
@@ -191,6 +228,7 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
     def _begin(self) -> None:
         self._queue = Queue()
         self._jobs: dict[str, Job] = {}
+        self._before: dict[str, Take | None] = {}  # what was on show when a job's first frame came
         self._not_shown: dict[str, Job] = {}  # jobs whose newest frames the viewport does not show yet
         self._check: Job | None = None
         self._thumbnails = bpy.utils.previews.new()
@@ -258,9 +296,9 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
         smoke = find_smoke(row.smoke_uid)
         created = 0
         if smoke is not None:
-            before = _datablocks()
-            present(smoke, take)
-            created = _datablocks() - before
+            count = _datablocks()
+            self._show_or_return(smoke, take, job)
+            created = _datablocks() - count
         if not bpy.app.background:
             row.icon = self._thumbnail(take)
             if smoke is not None and (created or job.ended):  # where it was deleted, one undo brings it back
@@ -271,6 +309,15 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
             if job.outcome == "failed":
                 # later: Blender never removes a modal operator that opens a window from its first one
                 bpy.app.timers.register(functools.partial(_open_log, row.take))
+
+    def _show_or_return(self, smoke: bpy.types.Object, take: Take, job: Job) -> None:
+        """Show a take while it is made; after a failure, or if it is stopped, what was on show before."""
+        shown = volume.shown_take(smoke)
+        before = self._before.setdefault(str(take.directory), shown)
+        if shown not in (before, take):
+            return  # the artist has chosen another
+        stopped = job.outcome in ("failed", "cancelled")
+        present(smoke, before if stopped and before is not None else take)
 
     def _thumbnail(self, take: Take) -> int:
         """The icon of the take's thumbnail; 0 if there is none."""

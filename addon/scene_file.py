@@ -48,7 +48,7 @@ def shot_tables(smoke: bpy.types.Object, quick: bool = False) -> dict[str, Any]:
     """
     settings, scene = smoke.smokelift, scene_of(smoke)
     tables: dict[str, Any] = {"clip": clip_table(smoke)}
-    with _at_frame(scene, scene.frame_current if quick else start_frame(settings)) as depsgraph:
+    with at_frame(scene, scene.frame_current if quick else start_frame(settings)) as depsgraph:
         rotation = Matrix.Identity(3)
         if settings.camera_mode == "SCENE":
             box = box_of(smoke)
@@ -274,7 +274,7 @@ def _sample_camera(
 ) -> list[tuple[dict[str, Any], bool]]:
     """The camera's table in each frame, and whether the box is in its picture."""
     samples, scene = [], scene_of(smoke)
-    with _at_frame(scene, frames[0]) as depsgraph:
+    with at_frame(scene, frames[0]) as depsgraph:
         for frame in frames:
             if frame != scene.frame_current:
                 scene.frame_set(frame)
@@ -469,7 +469,7 @@ def _require_lights_outside(tables: dict[str, Any]) -> None:
 
 
 @contextmanager
-def _at_frame(scene: bpy.types.Scene, frame: int) -> Iterator[bpy.types.Depsgraph]:
+def at_frame(scene: bpy.types.Scene, frame: int) -> Iterator[bpy.types.Depsgraph]:
     """The scene evaluated in a frame; restores the current frame afterwards."""
     before, fraction = scene.frame_current, scene.frame_subframe
     if frame != before:

@@ -1,5 +1,8 @@
 """The smokes of a scene: Volume objects with the settings that they are made with."""
 
+import itertools
+import os.path
+from pathlib import Path
 from typing import Any
 
 import bpy
@@ -66,6 +69,30 @@ def activate(obj: bpy.types.Object, scene: bpy.types.Scene) -> None:
     layer.objects.active = obj
 
 
+def free_folder(smoke: bpy.types.Object) -> str:
+    """A name for the folder of a smoke's takes that no other smoke has: its clip's, with a number if need be."""
+    taken = {obj.smokelift.folder for obj in bpy.data.objects if obj != smoke and obj.smokelift.is_smoke}
+    stem = bpy.path.clean_name(Path(smoke.smokelift.clip.filepath).stem)
+    names = itertools.chain([stem], (f"{stem}_{number}" for number in itertools.count(2)))
+    return next(name for name in names if name not in taken)
+
+
+def part_duplicate(smoke: bpy.types.Object) -> None:
+    """Give a duplicate of another smoke a folder, and a Volume, of its own before it gets a take of its own.
+
+    The duplicate is the younger one; what both show stays where it is.
+    """
+    settings = smoke.smokelift
+    twins = [obj for obj in bpy.data.objects if is_smoke(obj) and obj.smokelift.folder == settings.folder]
+    if all(obj.session_uid >= smoke.session_uid for obj in twins):
+        return
+    settings.folder = free_folder(smoke)
+    if settings.output:
+        settings.output = os.path.join(settings.output, settings.folder)  # noqa: PTH118 - a Path would lose the // of Blender
+    if smoke.data.users > 1:
+        smoke.data = smoke.data.copy()
+
+
 def _layer(scene: bpy.types.Scene) -> bpy.types.ViewLayer:
     return bpy.context.view_layer if bpy.context.scene == scene else scene.view_layers[0]
 
@@ -109,7 +136,7 @@ def migrate_soon(scene: bpy.types.Scene) -> None:
 
 def _kept(old: Any) -> list[str]:
     """Names of the settings of version 1.0; those first that change others when they are set."""
-    left_out = ("name", "volume", "is_smoke", "folder", "assumed_camera")
+    left_out = ("name", "volume", "is_smoke", "folder", "before", "assumed_camera")
     names = [setting.identifier for setting in old.bl_rna.properties if not setting.is_readonly]
     return sorted(set(names) - set(left_out), key=lambda name: (name not in ("clip", "box"), name))
 

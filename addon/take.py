@@ -7,6 +7,11 @@ Every take has the next free number, so no run overwrites another:
     take_0003.json    the engine's further options
     take_0003.log     the engine's messages
     take_0003.png     a thumbnail of the last frame, input beside reconstruction
+
+One that is made of another take, which goes on after its clip, has another pace or repeats, has no scene file:
+
+    take_0004.json    what is done, the other take, and the engine's further options
+    take_0004.stl     the meshes that are obstacles, if there are any
 """
 
 from __future__ import annotations
@@ -15,16 +20,23 @@ import json
 import os
 import re
 import shutil
+import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from . import toml
-from .contract import INDEX_FILE
+from .contract import DIRECTIONS, INDEX_FILE
 
 OPTIONS = ("--quality", "--device", "--detail", "--seed", "--resolution", "--axis-depth")
 """The engine's options that a take may hold: those that decide the result."""
+
+TITLES = {"continue": "Continued", "retime": "Retimed", "loop": "Loop"}
+"""What a take is called that is made of another one."""
+
+_NUMBER = re.compile(r"-?\d+(\.\d+)?(:\d+)?")
+"""A number or a range of frames; never an option."""
 
 _NAME = re.compile(r"take_(\d{4,})")
 
@@ -59,6 +71,11 @@ class Take:
         """The thumbnail of the last frame."""
         return self.directory.with_suffix(".png")
 
+    @property
+    def mesh_file(self) -> Path:
+        """The obstacles of a take that is made of another one."""
+        return self.directory.with_suffix(".stl")
+
     def write(self, tables: Mapping[str, Any], options: Sequence[str]) -> None:
         """Write the scene file from its tables, and the engine's further options.
 
@@ -67,14 +84,89 @@ class Take:
         TakeError
             If the folder cannot be written to.
         """
+        text = json.dumps({"options": list(options)}) + "\n"
+        self._write({self.scene_file: toml.dumps(tables).encode(), self.request_file: text.encode()})
+
+    def write_directed(self, direction: str, source: Take, options: Sequence[str], meshes: bytes = b"") -> None:
+        """Write what is made of another take.
+
+        Parameters
+        ----------
+        direction
+            A key of `DIRECTIONS`.
+        source
+            The other take.
+        options
+            The engine's, with those of its values that are numbers.
+        meshes
+            Obstacles, as a binary STL file; none if empty.
+
+        Raises
+        ------
+        TakeError
+            If the folder cannot be written to.
+        """
+        try:  # so that a project can be moved
+            there = os.path.relpath(source.directory, self.directory.parent)
+        except ValueError:  # on another drive
+            there = str(source.directory)
+        request = {"direction": direction, "source": there, "options": list(options)}
+        files = {self.mesh_file: meshes} if meshes else {}
+        self._write({**files, self.request_file: (json.dumps(request) + "\n").encode()})
+
+    def _write(self, files: Mapping[Path, bytes]) -> None:
         try:
             self.directory.parent.mkdir(parents=True, exist_ok=True)
-            self.scene_file.write_text(toml.dumps(tables), encoding="utf-8")
-            self.request_file.write_text(json.dumps({"options": list(options)}) + "\n", encoding="utf-8")
+            for file, content in files.items():
+                file.write_bytes(content)
         except OSError as error:
             raise TakeError(
                 f"{self.directory.parent} cannot be written to ({error.strerror}): choose another output folder."
             ) from error
+
+    def source(self) -> Take | None:
+        """The take that it is made of; None of one that is made from a clip, or whose request is damaged."""
+        there = self._request().get("source")
+        return Take(Path(os.path.normpath(self.directory.parent / there))) if isinstance(there, str) else None
+
+    def direction(self) -> str | None:
+        """What is done to the other take, a key of `DIRECTIONS`; None of one that is made from a clip, or damaged."""
+        found = self._request().get("direction")
+        return found if isinstance(found, str) and found in DIRECTIONS else None
+
+    def _request(self) -> dict[str, Any]:
+        """The content of its request file; nothing if that is missing or damaged."""
+        try:
+            request = json.loads(self.request_file.read_text(encoding="utf-8"))
+        except (OSError, ValueError, RecursionError):
+            return {}
+        return request if isinstance(request, dict) else {}
+
+    def find_again(self, files: Mapping[str, tuple[str, Path]]) -> None:
+        """Tell its scene file where the files lie that are not where they were: the project was moved.
+
+        Parameters
+        ----------
+        files
+            Today's path and its key, by the table it is in.
+
+        Raises
+        ------
+        TakeError
+            If the scene file is damaged or cannot be written.
+        """
+        try:
+            tables = tomllib.loads(self.scene_file.read_text(encoding="utf-8"))
+            moved = False
+            for table, (key, path) in files.items():
+                before = tables.get(table, {}).get(key)
+                if isinstance(before, str) and not Path(before).is_file() and path.is_file():
+                    tables[table][key] = str(path)
+                    moved = True
+        except (OSError, ValueError, AttributeError) as error:
+            raise TakeError(f"{self.scene_file} is missing or damaged: make the smoke again.") from error
+        if moved:
+            self._write({self.scene_file: toml.dumps(tables).encode()})
 
     def arguments(self) -> list[str]:
         """The engine's arguments, which start this take or resume it.
@@ -82,19 +174,23 @@ class Take:
         Raises
         ------
         TakeError
-            If its files are missing or damaged, or hold an option that is none of `OPTIONS`.
+            If its files are missing or damaged, or hold an option that does not decide its result.
         """
-        try:
-            request = json.loads(self.request_file.read_text(encoding="utf-8"))
-            options = [str(word) for word in request["options"]]
-        except (OSError, ValueError, LookupError, TypeError, RecursionError) as error:
-            raise TakeError(f"{self.request_file} is missing or damaged: make the smoke again.") from error
+        request, direction, source = self._request(), self.direction(), self.source()
+        options = request.get("options")
+        if not isinstance(options, list) or ("direction" in request and (direction is None or source is None)):
+            raise TakeError(f"{self.request_file} is missing or damaged: make the smoke again.")
+        options = [str(word) for word in options]
+        known = OPTIONS if direction is None else DIRECTIONS[direction]
         for word in options:
             # the file may come with somebody else's project, and must not choose what is written where
-            if word.startswith("-") and word.partition("=")[0] not in OPTIONS:
+            if word.startswith("-") and word.partition("=")[0] not in known and not _NUMBER.fullmatch(word):
                 raise TakeError(f"{self.request_file} asks for {word!r}, which no shot does: make the smoke again.")
-        files = ["--out", str(self.directory), "--thumbnail", str(self.thumbnail_file)]
-        return ["reconstruct", str(self.scene_file), *files, "--resume", "--progress", "json", *options]
+        run = ["--out", str(self.directory), "--resume", "--progress", "json", *options]
+        if direction is None or source is None:
+            return ["reconstruct", str(self.scene_file), "--thumbnail", str(self.thumbnail_file), *run]
+        meshes = ["--mesh", str(self.mesh_file)] if self.mesh_file.is_file() else []
+        return [direction, str(source.directory), *run, *meshes]
 
     def index(self) -> dict[str, Any] | None:
         """The content of `sequence.json`; None before the engine writes it."""
@@ -116,15 +212,13 @@ class Take:
 
     def resumable(self) -> bool:
         """Whether its run can go on: it started and is not complete."""
-        return self.scene_file.is_file() and self.request_file.is_file() and not self.complete()
+        begun = self.direction() is not None or self.scene_file.is_file()
+        return begun and self.request_file.is_file() and not self.complete()
 
     def title(self) -> str:
         """The name that the artist gave it, or its number."""
-        try:
-            given = str(json.loads(self.request_file.read_text(encoding="utf-8")).get("title", ""))
-        except (OSError, ValueError, AttributeError, RecursionError):
-            given = ""
-        return given or f"Take {int(self.directory.name.rpartition('_')[2])}"
+        given = str(self._request().get("title", ""))
+        return given or f"{TITLES.get(self.direction() or '', 'Take')} {int(self.directory.name.rpartition('_')[2])}"
 
     def give_title(self, title: str) -> None:
         """Give it a name.
@@ -151,7 +245,7 @@ class Take:
     def remove(self) -> None:
         """Delete all its files."""
         shutil.rmtree(self.directory, ignore_errors=True)
-        for file in (self.scene_file, self.request_file, self.log_file, self.thumbnail_file):
+        for file in (self.scene_file, self.request_file, self.log_file, self.thumbnail_file, self.mesh_file):
             file.unlink(missing_ok=True)
 
 

@@ -8,13 +8,20 @@ import bpy
 from bpy.app.handlers import persistent
 from mathutils import Vector
 
-from .contract import FRAME_FILE, MADE_UP
+from .contract import DIRECTIONS, FRAME_FILE, MADE_UP
 from .kept import set_unless_changed
 from .look import fit_look
+from .pace import paced
 from .paths import absolute, relative
 from .scene_file import engine_to_world, frame_rate
 from .smoke import scene_of, smokes
 from .take import Take
+
+BESIDE = 1.1
+"""Widths of the box between a smoke and another take beside it."""
+
+EARLY = 0.001
+"""Frames by which a frame of the clip is shown early, so that rounding does not delay it by a whole one."""
 
 PROVENANCE = "smokelift_provenance"
 """Custom property of the Volume that says what of the smoke is measured, also where its files are not at hand."""
@@ -30,7 +37,9 @@ def show(smoke: bpy.types.Object, take: Take) -> bpy.types.Object | None:
     index = take.index()
     if not index or not index["frames"]:
         return None
-    if shown_take(smoke) != take:
+    before = shown_take(smoke)
+    if before != take:
+        smoke.smokelift.before = relative(before.directory) if before is not None else ""
         smoke.delta_location = (0.0, 0.0, 0.0)
         set_unless_changed(smoke, "place", smoke, "matrix_basis", engine_to_world(smoke))
     _correct_position(smoke, index["scene"]["domain"])
@@ -46,6 +55,67 @@ def shown_take(smoke: bpy.types.Object) -> Take | None:
     return take_of(smoke.data)
 
 
+def shown_numbers(smoke: bpy.types.Object) -> list[int]:
+    """The numbers of the finished frames of the take that a smoke shows."""
+    take = shown_take(smoke)
+    index = take.index() if take is not None else None
+    return _numbers(index) if index else []
+
+
+def number_at(smoke: bpy.types.Object, frame: int) -> int:
+    """The number in the take that a smoke shows in a frame of its scene, without a live pace."""
+    data, (first, ratio) = smoke.data, _step(smoke)
+    return first + math.floor((frame - data.frame_start + EARLY) / ratio)
+
+
+def scene_frame(smoke: bpy.types.Object, number: int) -> int:
+    """The first frame of its scene in which a smoke shows a number of its take, without a live pace."""
+    data, (first, ratio) = smoke.data, _step(smoke)
+    return data.frame_start + math.ceil((number - first) * ratio - EARLY)
+
+
+def _step(smoke: bpy.types.Object) -> tuple[int, float]:
+    """The first number of the take on show, and frames of the scene for each."""
+    take = shown_take(smoke)
+    index = take.index() if take is not None else None
+    if not index or not index["frames"]:
+        return 1, 1.0
+    ratio = _ratio(smoke, scene_of(smoke), index)
+    return _numbers(index)[0], ratio if _real_time(smoke, ratio, index) else 1.0
+
+
+def take_before(smoke: bpy.types.Object) -> Take | None:
+    """The take that a smoke showed before; None if it has no frames any more."""
+    path = smoke.smokelift.before
+    take = Take(absolute(path)) if path else None
+    return take if take is not None and take.frames() else None
+
+
+def show_beside(smoke: bpy.types.Object, take: Take) -> bpy.types.Object | None:
+    """Show a take in a copy of a smoke, on its right; it is no smoke itself, and can be deleted like any object.
+
+    Returns
+    -------
+    The copy, or None if no frame is finished.
+    """
+    index = take.index()
+    if not index or not index["frames"]:
+        return None
+    copy = smoke.copy()
+    copy.name = f"{smoke.name}, {take.title()}"
+    copy.data = smoke.data.copy()
+    copy.data.name = copy.name
+    copy.smokelift.is_smoke = False
+    for collection in smoke.users_collection:
+        collection.objects.link(copy)
+    domain = index["scene"]["domain"]
+    width = (domain["max"][0] - domain["min"][0]) * BESIDE
+    copy.location += copy.matrix_basis.to_3x3() @ Vector((width, 0.0, 0.0))
+    _set_file(copy.data, take, index)
+    _set_time(copy, scene_of(smoke), index)
+    return copy
+
+
 def take_of(volume: bpy.types.Volume) -> Take | None:
     """The take that a Volume plays; None for one without a file, whose empty path saving turns into ``//``."""
     path = absolute(volume.filepath, volume.library)
@@ -58,13 +128,16 @@ def provenance_note(smoke: bpy.types.Object) -> str:
 
 
 def _provenance(parts: list[dict[str, Any]]) -> str:
+    directed = [part["how"] for part in parts if part["what"] in DIRECTIONS]
+    parts = [part for part in parts if part["what"] not in DIRECTIONS]
     if not parts:  # the engine of earlier versions did not say
-        return ""
-    for part in parts:
-        if part["origin"] == MADE_UP:
-            detail, seed = part["settings"]["detail"], part["settings"]["seed"]
-            return f"The camera's view is measured. Depth detail {detail:.2g} is made up: variation {seed}."
-    return "The camera's view is measured. Nothing is made up: the depth is smooth."
+        return " ".join(directed)
+    made_up = next((part["settings"] for part in parts if part["origin"] == MADE_UP), None)
+    if made_up is None:
+        what = "Nothing is made up: the depth is smooth."
+    else:
+        what = f"Depth detail {made_up['detail']:.2g} is made up: variation {made_up['seed']}."
+    return " ".join(["The camera's view is measured.", what, *directed])
 
 
 @persistent
@@ -107,7 +180,6 @@ def _set_file(volume: bpy.types.Volume, take: Take, index: dict[str, Any]) -> No
     if volume.filepath != path:
         volume.filepath = path
     volume.is_sequence = True
-    volume.sequence_mode = "CLIP"
     if volume.velocity_grid != "velocity":  # Blender complains if the default is set again
         volume.velocity_grid = "velocity"
     volume.velocity_unit = "SECOND"
@@ -117,28 +189,54 @@ def _set_file(volume: bpy.types.Volume, take: Take, index: dict[str, Any]) -> No
 
 
 def _set_time(smoke: bpy.types.Object, scene: bpy.types.Scene, index: dict[str, Any]) -> None:
-    """Make a smoke play when its clip does."""
+    """Make a smoke play when its clip does, at the pace that is tried out."""
     volume, settings = smoke.data, smoke.smokelift
-    numbers = _numbers(index)
-    clip_rate, scene_rate = index["scene"]["clip"]["fps"], frame_rate(scene)
-    ratio = scene_rate / clip_rate
-    # the smoke keeps step with a moving camera, which has one matrix for each frame of the clip
-    tracked = "matrices" in index["scene"].get("camera", {})
-    real = settings.speed == "REAL" and not tracked and not math.isclose(ratio, 1.0, rel_tol=1e-3)
+    numbers, ratio = _numbers(index), _ratio(smoke, scene, index)
+    real = _real_time(smoke, ratio, index)
+    direction = index.get("settings", {}).get("direct", {}).get("job")
+    live = settings.directing.live and direction != "retime" and not _tracked(index)
     clip = settings.clip
     before = _frames_before(settings, index)
     start = (clip.frame_start if clip else 1) + (round(before * ratio) if real else before)
     set_unless_changed(volume, "start", volume, "frame_start", start)
     volume.frame_offset = numbers[0] - 1
-    volume.frame_duration = math.ceil(len(numbers) * ratio) if real else len(numbers)
-    volume.driver_remove("frame_offset")
-    if real:
+    volume.sequence_mode = "REPEAT" if direction == "loop" else "CLIP"
+    for name in ("frame_offset", "velocity_scale"):
+        volume.driver_remove(name)
+    steps = ratio if real else 1.0
+    pace = paced(len(numbers), settings.directing.speeds() if live else (1.0,))
+    volume.frame_duration = max(1, math.ceil(steps * pace.duration - EARLY))
+    volume.velocity_scale = (1.0 if real else ratio) * pace.speeds[0]
+    if real or live:
         # Blender shows one file in each frame of the scene; the driven offset selects another
-        driver = volume.driver_add("frame_offset").driver
-        driver.type = "SCRIPTED"
         start = volume.frame_start
-        driver.expression = f"floor((frame - {start} + 0.001) / {ratio:.9g}) - (frame - {start}) + {numbers[0] - 1}"
-    volume.velocity_scale = 1.0 if real else ratio
+        time = f"(frame-{start}+{EARLY})/{steps:.9g}"
+        place = f"min({pace.place(time)},{len(numbers) - 1})"
+        _drive(volume, "frame_offset", f"floor({place})-(frame-{start})+{numbers[0] - 1}")
+    if live and len(pace.speeds) > 1:
+        _drive(volume, "velocity_scale", f"{1.0 if real else ratio:.9g}*({pace.speed(time)})")
+
+
+def _drive(volume: bpy.types.Volume, name: str, expression: str) -> None:
+    driver = volume.driver_add(name).driver
+    driver.type = "SCRIPTED"
+    driver.expression = expression
+
+
+def _ratio(smoke: bpy.types.Object, scene: bpy.types.Scene, index: dict[str, Any]) -> float:
+    """Frames of the scene in the time of one of the clip."""
+    rate: float = index["scene"]["clip"]["fps"]
+    return frame_rate(scene) / rate
+
+
+def _tracked(index: dict[str, Any]) -> bool:
+    """Whether the smoke keeps step with a moving camera, which has one matrix for each frame of the clip."""
+    return "matrices" in index["scene"].get("camera", {})
+
+
+def _real_time(smoke: bpy.types.Object, ratio: float, index: dict[str, Any]) -> bool:
+    """Whether frames are left out or repeated so that the smoke is as fast as in reality."""
+    return smoke.smokelift.speed == "REAL" and not _tracked(index) and not math.isclose(ratio, 1.0, rel_tol=1e-3)
 
 
 def _frames_before(settings: bpy.types.PropertyGroup, index: dict[str, Any]) -> int:

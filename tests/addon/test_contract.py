@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 from pathlib import Path
 from typing import get_args
 
@@ -9,6 +10,8 @@ import pytest
 
 from addon import contract
 from smokelift.app import cli
+from smokelift.app.commands import continue_, loop, retime
+from smokelift.direct import writing
 from smokelift.footage.images import READABLE
 from smokelift.output.layout import INDEX, frame_path
 from smokelift.scene import EnvironmentLight, SceneError
@@ -39,6 +42,23 @@ def test_resolutions() -> None:
     Settings.preset("draft", "default", (fewest,) * 3)
     with pytest.raises(ValueError, match="resolution"):
         Settings.preset("draft", "default", (fewest, fewest, fewest - 1))
+
+
+def test_directions() -> None:
+    """Every option of a take that is made of another is the engine's, and the limits are."""
+    parser = argparse.ArgumentParser()
+    commands = parser.add_subparsers()
+    for module in (continue_, retime, loop):
+        module.add_parser(commands, argparse.ArgumentParser(add_help=False))
+    values = {"--frames": {"continue": "9", "loop": "1:9"}, "--wind": "1 2 -3", "--fan": "1 2 3 1 -4 5 6"}
+    for direction, options in contract.DIRECTIONS.items():
+        for option in options:
+            value = values.get(option, "2")
+            words = (value if isinstance(value, str) else value[direction]).split()
+            needed = ["--frames", "9"] if direction == "continue" else ["--speed", "2"] if direction == "retime" else []
+            parser.parse_args([direction, "take", "--out", "new", *needed, option, *words])
+    assert (contract.SLOWEST, contract.FASTEST) == retime.SPEEDS
+    assert contract.SHORTEST == writing.SHORTEST
 
 
 def test_pictures() -> None:

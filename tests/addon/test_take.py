@@ -88,6 +88,69 @@ def test_a_request_for_something_else_is_refused(tmp_path, words) -> None:
         take.arguments()
 
 
+def test_what_is_made_of_a_take(tmp_path) -> None:
+    """It knows the other take, also after both were moved, and its obstacles; numbers may be below zero."""
+    source = begun(tmp_path / "old" / "first")
+    take = new_take(tmp_path / "old" / "second")
+    assert (take.direction(), take.source()) == (None, None)
+    take.write_directed("continue", source, ["--frames", "5", "--wind", "-1.5", "0", "0"], b"mesh")
+    (tmp_path / "old").rename(tmp_path / "new")
+    take, source = (Take(tmp_path / "new" / t.directory.relative_to(tmp_path / "old")) for t in (take, source))
+    assert (take.direction(), take.source(), take.title()) == ("continue", source, "Continued 1")
+    arguments = take.arguments()
+    assert arguments[:2] == ["continue", str(source.directory)]
+    assert arguments[arguments.index("--mesh") + 1] == str(take.mesh_file)
+    assert arguments[arguments.index("--wind") + 1] == "-1.5"
+    assert "--resume" in arguments
+    assert take.resumable()
+    take.give_title("Windy")
+    assert (take.title(), take.direction()) == ("Windy", "continue")
+    take.remove()
+    assert list(take.directory.parent.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("request_", "said"),
+    [
+        ({"direction": "continue", "source": "x", "options": ["--out", "/etc"]}, "asks for"),
+        ({"direction": "continue", "source": "x", "options": ["--mesh", "/etc"]}, "asks for"),
+        ({"direction": "retime", "source": "x", "options": ["--wind", "1"]}, "asks for"),
+        ({"direction": "doctor", "source": "x", "options": []}, "damaged"),
+        ({"direction": ["loop"], "source": "x", "options": []}, "damaged"),
+        ({"direction": "loop", "source": 3, "options": []}, "damaged"),
+        ({"direction": "loop", "options": []}, "damaged"),
+    ],
+)
+def test_a_direction_that_is_none_is_refused(tmp_path, request_, said) -> None:
+    """Nothing but what decides the result reaches the engine."""
+    take = begun(tmp_path)
+    take.request_file.write_text(json.dumps(request_))
+    with pytest.raises(TakeError, match=said):
+        take.arguments()
+
+
+def test_a_scene_file_is_told_where_its_files_went(tmp_path) -> None:
+    """Only what is not there any more, and is found elsewhere."""
+    (tmp_path / "plate.png").write_text("picture")
+    take = new_take(tmp_path)
+    tables = {
+        "clip": {"path": str(tmp_path / "gone" / "clip.mp4")},
+        "background": {"image": str(tmp_path / "plate.png")},
+    }
+    take.write(tables, [])
+    files = {"clip": ("path", tmp_path / "clip.mp4"), "background": ("image", tmp_path / "other.png")}
+    take.find_again(files)
+    assert tomllib.loads(take.scene_file.read_text()) == tables
+    for name in ("clip.mp4", "other.png"):
+        (tmp_path / name).write_text("found")
+    take.find_again(files)
+    tables["clip"]["path"] = str(tmp_path / "clip.mp4")
+    assert tomllib.loads(take.scene_file.read_text()) == tables
+    take.scene_file.write_text("[clip")
+    with pytest.raises(TakeError, match="make the smoke again"):
+        take.find_again(files)
+
+
 def test_a_folder_that_cannot_be_written_to(tmp_path) -> None:
     """One sentence with the folder."""
     (tmp_path / "file").write_text("in the way")

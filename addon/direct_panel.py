@@ -1,0 +1,110 @@
+"""The sub-panel Direct: what is made of the result on show, and the button that does it."""
+
+import bpy
+
+from . import run, volume
+from .operators import NeedsResult
+from .scene_file import ShotError
+from .smoke import active_smoke
+from .take import TakeError
+
+
+class SMOKELIFT_OT_direct(NeedsResult, bpy.types.Operator):
+    """Make a new result of the one on show: longer, at another speed, or repeating. The one on show stays"""
+
+    bl_idname = "smokelift.direct"
+    bl_label = "Direct Smoke"
+    bl_options = {"UNDO"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        smoke = active_smoke(context.scene)
+        try:
+            take = run.write_directed(smoke)
+        except (ShotError, TakeError) as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        run.enqueue(context, smoke, take)
+        return {"FINISHED"}
+
+
+class _Direct:
+    bl_label = "Direct"
+    bl_category = "Smokelift"
+    bl_region_type = "UI"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        smoke = active_smoke(context.scene)
+        return smoke is not None and volume.shown_take(smoke) is not None
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        settings = active_smoke(context.scene).smokelift.directing
+        row = layout.row()
+        row.use_property_split = False
+        row.prop(settings, "direction", expand=True)
+        _DIRECTIONS[settings.direction](layout, settings)
+        label = settings.bl_rna.properties["direction"].enum_items[settings.direction].name
+        row = layout.row()
+        row.scale_y = 1.5
+        row.operator("smokelift.direct", text=f"{label} Smoke", icon="PLAY")
+
+
+def _draw_continue(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+    layout.prop(settings, "frames")
+    layout.prop(settings, "fade")
+    _draw_ticked(layout, settings, "use_start", "start")
+    layout.prop(settings, "effectors")
+    row = layout.row()
+    row.active = settings.effectors is not None
+    row.prop(settings, "fan_speed")
+
+
+def _draw_retime(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+    layout.prop(settings, "speed")
+    layout.prop(settings, "use_ramp")
+    column = layout.column()
+    column.active = settings.use_ramp
+    column.prop(settings, "speed_middle")
+    column.prop(settings, "speed_end")
+    layout.prop(settings, "live")
+
+
+def _draw_loop(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+    _draw_ticked(layout, settings, "use_part", "part_first", "part_last")
+    layout.prop(settings, "overlap")
+
+
+_DIRECTIONS = {"continue": _draw_continue, "retime": _draw_retime, "loop": _draw_loop}
+
+
+def _draw_ticked(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, tick: str, *names: str) -> None:
+    """Settings that a tick makes count."""
+    row = layout.row(heading=settings.bl_rna.properties[tick].name)
+    row.prop(settings, tick, text="")
+    values = row.row(align=True)
+    values.active = getattr(settings, tick)
+    for name in names:
+        values.prop(settings, name, text="")
+
+
+class SMOKELIFT_PT_view_direct(_Direct, bpy.types.Panel):
+    """In the 3D View."""
+
+    bl_space_type = "VIEW_3D"
+    bl_parent_id = "SMOKELIFT_PT_view"
+
+
+class SMOKELIFT_PT_clip_direct(_Direct, bpy.types.Panel):
+    """In the Movie Clip Editor."""
+
+    bl_space_type = "CLIP_EDITOR"
+    bl_parent_id = "SMOKELIFT_PT_clip"
+
+
+_CLASSES = (SMOKELIFT_OT_direct, SMOKELIFT_PT_view_direct, SMOKELIFT_PT_clip_direct)
+
+register, unregister = bpy.utils.register_classes_factory(_CLASSES)

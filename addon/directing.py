@@ -1,0 +1,155 @@
+"""What an artist does to a smoke after its clip, as the engine's options.
+
+Objects of the scene act on the smoke: meshes are obstacles, a Wind field is wind, other Empties are fans. The smoke may
+have been moved, rotated and scaled, so places and velocities are turned into those of its own space.
+"""
+
+import math
+from typing import Any
+
+import bpy
+import numpy as np
+import numpy.typing as npt
+from mathutils import Matrix, Vector
+
+from . import volume
+from .contract import SHORTEST
+from .scene_file import ShotError, at_frame
+from .smoke import scene_of
+
+BLOWING = ("WIND", "FORCE")
+"""Force fields that blow along their Z axis."""
+
+MESHES = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
+"""Objects that have a surface."""
+
+STL_HEADER = 80
+"""Bytes before the number of triangles."""
+
+
+def request(smoke: bpy.types.Object) -> tuple[str, list[str], bytes]:
+    """What is done to the take that a smoke shows.
+
+    Returns
+    -------
+    The engine's command, its options, and obstacles as a binary STL file.
+
+    Raises
+    ------
+    ShotError
+        If a setting or an object cannot be used.
+    """
+    settings = smoke.smokelift.directing
+    numbers = volume.shown_numbers(smoke)
+    if len(numbers) < SHORTEST:
+        raise ShotError(f"The smoke has {len(numbers)} frames, and {SHORTEST} are needed to see how it moves.")
+    if settings.direction == "retime":
+        return "retime", ["--speed", *map(_word, settings.speeds())], b""
+    if settings.direction == "loop":
+        words = ["--overlap", str(settings.overlap)] if settings.overlap else []
+        if settings.use_part:
+            first, last = (_number(smoke, numbers, f) for f in (settings.part_first, settings.part_last))
+            if last - first + 1 < SHORTEST:
+                raise ShotError(f"A loop needs {SHORTEST} frames at least: choose a later last frame.")
+            words = ["--frames", f"{first}:{last}", *words]
+        return "loop", words, b""
+    return _continued(smoke, numbers)
+
+
+def _continued(smoke: bpy.types.Object, numbers: list[int]) -> tuple[str, list[str], bytes]:
+    settings, scene = smoke.smokelift.directing, scene_of(smoke)
+    if settings.fade > settings.frames:
+        raise ShotError(f"The smoke fades in {settings.fade} frames, and only {settings.frames} are added.")
+    words = ["--frames", str(settings.frames), "--fade", str(settings.fade)]
+    start = volume.scene_frame(smoke, numbers[-1])
+    if settings.use_start:
+        start = settings.start
+        number = _number(smoke, numbers, start)
+        if number < numbers[SHORTEST - 1]:
+            raise ShotError(f"{SHORTEST} frames are needed before the smoke reacts: choose a later frame.")
+        words += ["--start", str(number)]
+    with at_frame(scene, start) as depsgraph:
+        blown, meshes = _effects(smoke, depsgraph)
+    return "continue", words + blown, meshes
+
+
+def _number(smoke: bpy.types.Object, numbers: list[int], frame: int) -> int:
+    """The number in the take that is shown in a frame of the scene."""
+    number = volume.number_at(smoke, frame)
+    if number not in numbers:
+        first, last = (volume.scene_frame(smoke, n) for n in (numbers[0], numbers[-1]))
+        raise ShotError(f"The smoke is not seen in frame {frame}: choose one from {first} to {last}.")
+    return number
+
+
+def _effects(smoke: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[list[str], bytes]:
+    """What the objects of the collection do: options for wind and fans, and a file of the obstacles."""
+    settings = smoke.smokelift.directing
+    to_smoke = _world_to_smoke(smoke.evaluated_get(depsgraph))
+    scale = abs(to_smoke.to_3x3().determinant()) ** (1 / 3)
+    wind, fans, obstacles = Vector(), [], []
+    for obj in settings.effectors.all_objects if settings.effectors else ():
+        if obj in (smoke, smoke.smokelift.box) or obj.hide_viewport:
+            continue
+        seen = obj.evaluated_get(depsgraph)
+        field = seen.field
+        kind = "NONE" if field is None else field.type
+        if kind not in ("NONE", *BLOWING):
+            raise ShotError(f"The force field of {obj.name} cannot be used: only Wind and Force blow smoke.")
+        matrix = seen.matrix_world
+        ahead = to_smoke.to_3x3() @ matrix.to_3x3().col[2].normalized()
+        if kind == "WIND" and not field.use_max_distance:
+            wind += field.strength * ahead
+        elif kind != "NONE" or obj.type == "EMPTY":
+            own = field.distance_max if kind != "NONE" and field.use_max_distance else None
+            radius = obj.empty_display_size * abs(matrix.to_3x3().determinant()) ** (1 / 3) if own is None else own
+            blown = (settings.fan_speed if kind == "NONE" else field.strength) * ahead
+            fans += ["--fan", *map(_word, (*(to_smoke @ matrix.translation), radius * scale, *blown))]
+        elif obj.type in MESHES:
+            obstacles.append(_triangles(seen, to_smoke @ matrix))
+    words = ["--wind", *map(_word, wind)] if wind.length > 0.0 else []
+    return words + fans, _stl(obstacles)
+
+
+def _world_to_smoke(smoke: bpy.types.Object) -> Matrix:
+    """From the world to the smoke's own space, without what its position corrects for Cycles."""
+    corrected = Matrix.Translation(smoke.delta_location) @ smoke.matrix_basis
+    return (smoke.matrix_world @ corrected.inverted() @ smoke.matrix_basis).inverted()
+
+
+def _triangles(obj: bpy.types.Object, matrix: Matrix) -> npt.NDArray[np.float64]:
+    """The triangles (n, 3, 3) of an evaluated object, turned outwards if it is closed."""
+    mesh = obj.to_mesh()
+    if mesh is None:
+        return np.empty((0, 3, 3))
+    try:
+        mesh.calc_loop_triangles()
+        places = np.empty(3 * len(mesh.vertices), np.float32)
+        mesh.vertices.foreach_get("co", places)
+        corners = np.empty(3 * len(mesh.loop_triangles), np.int32)
+        mesh.loop_triangles.foreach_get("vertices", corners)
+    finally:
+        obj.to_mesh_clear()
+    whole = np.array(matrix)
+    moved = places.reshape(-1, 3) @ whole[:3, :3].T + whole[:3, 3]
+    triangles = moved[corners].reshape(-1, 3, 3)
+    inward = np.einsum("ni,ni", triangles[:, 0], np.cross(triangles[:, 1], triangles[:, 2])) < 0
+    return triangles[:, ::-1] if inward else triangles
+
+
+def _stl(parts: list[npt.NDArray[np.float64]]) -> bytes:
+    """A binary STL file; nothing without triangles."""
+    triangles = np.concatenate(parts) if parts else np.empty((0, 3, 3))
+    if not len(triangles):
+        return b""
+    kind: Any = [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")]
+    records = np.zeros(len(triangles), kind)
+    records["corners"] = triangles
+    return bytes(STL_HEADER) + len(records).to_bytes(4, "little") + records.tobytes()
+
+
+def _word(value: float) -> str:
+    """A number as the engine's command line reads it, which takes ``-1e-05`` for an option."""
+    if not math.isfinite(value):
+        raise ShotError("A place or a speed is not finite: look at the scale of the smoke and of its effectors.")
+    return f"{value:.6f}"

@@ -1,0 +1,383 @@
+"""What is made of a result: what the scene tells the engine, the tab, a whole run, and the pace that is tried out."""
+
+from __future__ import annotations
+
+import math
+import shutil
+from types import SimpleNamespace
+
+import bpy
+import numpy as np
+import pytest
+
+from addon import direct_panel, directing, run, volume
+from addon.scene_file import ShotError
+from addon.smoke import activate, smokes
+from addon.take import Take, takes
+from smokelift.direct import Box, Mesh
+from smokelift.output.sequence import Sequence
+from tests.addon.inside.panel import LETTERS, drawn
+from tests.engine.direct.rising import DOMAIN, write_plume
+from tests.example_shot import smoke
+
+FRAMES = 6
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A take of six frames."""
+    folder = tmp_path_factory.mktemp("made")
+    take = Take(folder / "take_0001")
+    take.write({"clip": {"path": "clip.mp4"}}, [])
+    write_plume(take.directory, FRAMES)
+    return folder
+
+
+@pytest.fixture
+def result(shot, made, tmp_path):
+    """The example's smoke, which shows the take."""
+    folder = tmp_path / "out"
+    shutil.copytree(made, folder)
+    obj = smoke(shot)
+    obj.smokelift.output = str(folder)
+    shot.render.fps = 24
+    activate(obj, shot)
+    run.present(obj, Take(folder / "take_0001"))
+    return obj
+
+
+@pytest.fixture
+def acting(shot, result) -> bpy.types.Collection:
+    """The collection of what acts on the smoke."""
+    collection = bpy.data.collections.new("Effectors")
+    shot.collection.children.link(collection)
+    result.smokelift.directing.effectors = collection
+    return collection
+
+
+def placed(collection, name, data=None, field="NONE", **values) -> bpy.types.Object:
+    """An object in the collection, perhaps with a force field."""
+    obj = bpy.data.objects.new(name, data)
+    collection.objects.link(obj)
+    for key, value in values.items():
+        setattr(obj, key, value)
+    if field != "NONE":
+        bpy.context.view_layer.update()
+        with bpy.context.temp_override(object=obj, active_object=obj):
+            bpy.ops.object.forcefield_toggle()
+        obj.field.type = field
+    return obj
+
+
+def cube(scale=0.5, location=(0.0, 0.0, 1.5)) -> tuple[bpy.types.Mesh, dict]:
+    mesh = bpy.data.meshes.new("Cube")
+    corners = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
+    mesh.from_pydata(corners, [], [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)])
+    return mesh, {"location": location, "scale": (scale,) * 3}
+
+
+def words(options: list[str], name: str) -> list[list[float]]:
+    """The numbers after an option, each time it is given."""
+    found = []
+    for place, word in enumerate(options):
+        if word == name:
+            count = next(
+                (n for n, w in enumerate(options[place + 1 :]) if w.startswith("--")), len(options) - place - 1
+            )
+            found.append([float(w) for w in options[place + 1 : place + 1 + count]])
+    return found
+
+
+def solid(content: bytes, tmp_path) -> np.ndarray:
+    """The voxels of an STL file."""
+    (tmp_path / "mesh.stl").write_bytes(content)
+    return Mesh.read(tmp_path / "mesh.stl").voxels(DOMAIN)
+
+
+# what the scene tells the engine
+
+
+def test_frames_are_those_of_the_scene(shot, result) -> None:
+    """The take begins where the clip does, and may be moved in time."""
+    settings = result.smokelift.directing
+    settings.frames, settings.fade = 10, 4
+    assert directing.request(result) == ("continue", ["--frames", "10", "--fade", "4"], b"")
+    result.data.frame_start = 101
+    settings.use_start, settings.start = True, 105
+    assert directing.request(result)[1][-2:] == ["--start", "5"]
+    for frame, said in ((102, "4 frames are needed"), (107, "from 101 to 106")):
+        settings.start = frame
+        with pytest.raises(ShotError, match=said):
+            directing.request(result)
+    settings.fade = 11
+    with pytest.raises(ShotError, match="fades in 11"):
+        directing.request(result)
+
+
+def test_frames_in_real_time(shot, result) -> None:
+    """Where the scene has another rate than the clip."""
+    shot.render.fps = 48
+    result.smokelift.speed = "REAL"
+    first = result.data.frame_start
+    assert [volume.number_at(result, first + frame) for frame in (0, 1, 2, 3, 11)] == [1, 1, 2, 2, 6]
+    assert [volume.scene_frame(result, number) - first for number in (1, 2, 6)] == [0, 2, 10]
+
+
+def test_meshes_are_obstacles(result, acting, tmp_path) -> None:
+    """With their modifiers, also mirrored ones; those outside and the smoke's box count for nothing."""
+    mesh, place = cube()
+    obj = placed(acting, "Crate", mesh, **place)
+    acting.objects.link(result.smokelift.box)
+    wanted = Box((-0.5, -0.5, 1.0), (0.5, 0.5, 2.0)).voxels(DOMAIN)
+    content = directing.request(result)[2]
+    np.testing.assert_array_equal(solid(content, tmp_path), wanted)
+    obj.scale.x = -0.5
+    other, there = cube(0.25, (0.5, 0.0, 1.5))
+    small = placed(acting, "Small", other, **there)
+    both = wanted | Box((0.25, -0.25, 1.25), (0.75, 0.25, 1.75)).voxels(DOMAIN)
+    np.testing.assert_array_equal(solid(directing.request(result)[2], tmp_path), both)
+    obj.hide_viewport = True
+    assert solid(directing.request(result)[2], tmp_path).sum() < both.sum()
+    modifier = small.modifiers.new("Round", "SUBSURF")
+    modifier.levels = 2
+    assert len(directing.request(result)[2]) > len(content)
+
+
+def test_the_smokes_own_space_counts(result, acting, tmp_path) -> None:
+    """A smoke that was moved, rotated and scaled meets what stands in its way there."""
+    mesh, place = cube()
+    obj = placed(acting, "Crate", mesh, **place)
+    fan = placed(
+        acting, "Fan", empty_display_size=0.5, location=(-0.8, 0.0, 0.6), rotation_euler=(0.0, math.pi / 2, 0.0)
+    )
+    before, options = (part for part in directing.request(result)[:0:-1])
+    result.location, result.scale, result.rotation_euler = (3.0, 1.0, -2.0), (2.0, 2.0, 2.0), (0.0, 0.0, 1.2)
+    bpy.context.view_layer.update()
+    moved = result.matrix_basis @ obj.matrix_basis
+    obj.matrix_basis, fan.matrix_basis = moved, result.matrix_basis @ fan.matrix_basis
+    after, found = (part for part in directing.request(result)[:0:-1])
+    np.testing.assert_array_equal(solid(after, tmp_path), solid(before, tmp_path))
+    # one metre in the scene is half a metre of the smoke's own
+    np.testing.assert_allclose(words(found, "--fan")[0][:4], words(options, "--fan")[0][:4], atol=1e-5)
+    np.testing.assert_allclose(words(found, "--fan")[0][4:], [0.5, 0.0, 0.0], atol=1e-5)
+
+
+def test_winds_and_fans(result, acting) -> None:
+    """Winds add up; an Empty, a Force field and a Wind field with a distance are fans."""
+    for name in ("One", "Two"):
+        placed(acting, name, field="WIND", rotation_euler=(0.0, math.pi / 2, 0.0)).field.strength = 0.4
+    placed(acting, "Empty", location=(0.1, 0.2, 0.3), empty_display_size=0.25)
+    field = placed(
+        acting, "Force", field="FORCE", location=(0.0, 0.0, 1.0), scale=(2.0, 2.0, 2.0), empty_display_size=0.1
+    )
+    field.field.strength = -2.0
+    gust = placed(acting, "Gust", field="WIND", location=(0.0, 0.5, 1.0)).field
+    gust.strength, gust.use_max_distance, gust.distance_max = 3.0, True, 0.3
+    result.smokelift.directing.fan_speed = 1.5
+    options = directing.request(result)[1]
+    np.testing.assert_allclose(words(options, "--wind"), [[0.8, 0.0, 0.0]], atol=1e-5)
+    wanted = [
+        [0.0, 0.0, 1.0, 0.2, 0.0, 0.0, -2.0],
+        [0.0, 0.5, 1.0, 0.3, 0.0, 0.0, 3.0],
+        [0.1, 0.2, 0.3, 0.25, 0.0, 0.0, 1.5],
+    ]
+    np.testing.assert_allclose(sorted(words(options, "--fan")), wanted, atol=1e-5)
+    placed(acting, "Swirl", field="VORTEX")
+    with pytest.raises(ShotError, match="field of Swirl cannot be used"):
+        directing.request(result)
+
+
+def test_retime_and_loop(result) -> None:
+    """One speed or three; the whole or a part."""
+    settings = result.smokelift.directing
+    settings.direction, settings.speed = "retime", 0.25
+    assert directing.request(result)[:2] == ("retime", ["--speed", "0.250000"])
+    settings.use_ramp = True
+    assert len(directing.request(result)[1]) == 4
+    settings.direction = "loop"
+    assert directing.request(result)[:2] == ("loop", [])
+    settings.use_part, settings.part_first, settings.part_last, settings.overlap = True, 2, 6, 2
+    assert directing.request(result)[1] == ["--frames", "2:6", "--overlap", "2"]
+    settings.part_last = 4
+    with pytest.raises(ShotError, match="4 frames"):
+        directing.request(result)
+
+
+# whole runs
+
+
+def test_smoke_goes_around_a_mesh(result, acting, tmp_path) -> None:
+    """The result is a new take of the same object, made by the engine; the one that it is made of stays."""
+    mesh, place = cube(0.3)
+    placed(acting, "Crate", mesh, **place)
+    result.location.x = 0.0
+    result.smokelift.directing.frames = 3
+    assert bpy.ops.smokelift.direct() == {"FINISHED"}
+    (row,) = bpy.context.window_manager.smokelift.jobs
+    assert (row.outcome, row.done, row.total) == ("done", FRAMES + 3, FRAMES + 3), row.sentence
+    source, take = takes(tmp_path / "out")
+    assert volume.shown_take(result) == take
+    assert (take.title(), take.source(), take.complete()) == ("Continued 2", source, True)
+    assert result.data.frame_duration == FRAMES + 3
+    assert source.complete()
+    inside = Box((-0.3, -0.3, 1.2), (0.3, 0.3, 1.8)).voxels(DOMAIN)
+    assert not Sequence.open(take.directory).density(FRAMES + 3)[inside].any()
+    assert len(smokes(bpy.context.scene)) == 1
+    assert "Frames 7 to 9 are a simulation" in volume.provenance_note(result)
+
+
+def test_a_loop_repeats_and_slow_motion_lasts(result, tmp_path) -> None:
+    """In the volume on show."""
+    settings = result.smokelift.directing
+    settings.direction = "loop"
+    assert bpy.ops.smokelift.direct() == {"FINISHED"}
+    assert result.data.sequence_mode == "REPEAT"
+    assert result.data.frame_duration == 4
+    assert bpy.ops.smokelift.switch_take() == {"FINISHED"}
+    assert (result.data.sequence_mode, result.data.frame_duration) == ("CLIP", FRAMES)
+    settings.direction, settings.speed, settings.live = "retime", 0.5, True
+    assert bpy.ops.smokelift.direct() == {"FINISHED"}
+    assert result.data.frame_duration == 2 * FRAMES - 1
+    assert result.data.velocity_scale == 1.0  # its files hold the velocity that is seen
+    assert [take.title() for take in takes(tmp_path / "out")] == ["Take 1", "Loop 2", "Retimed 3"]
+
+
+def test_a_run_that_fails_leaves_the_result_on_show(result, acting, tmp_path) -> None:
+    """An obstacle that fills the box, and a run that is stopped."""
+    shown = volume.shown_take(result)
+    mesh, place = cube(9.0)
+    placed(acting, "Crate", mesh, **place)
+    assert bpy.ops.smokelift.direct() == {"FINISHED"}
+    (row,) = bpy.context.window_manager.smokelift.jobs
+    assert (row.outcome, row.sentence) == ("failed", "the obstacles fill the whole box; make them smaller.")
+    assert volume.shown_take(result) == shown
+
+
+@pytest.mark.parametrize("outcome", ["cancelled", "failed", "done"])
+def test_frames_of_a_stopped_run_do_not_stay_on_show(result, tmp_path, outcome) -> None:
+    """They are seen while they are made, and can be resumed or picked."""
+    shown, take = volume.shown_take(result), Take(tmp_path / "out" / "take_0002")
+    shutil.copytree(shown.directory, take.directory)
+    worker = SimpleNamespace(_before={})
+    show = run.SMOKELIFT_OT_work._show_or_return
+    show(worker, result, take, SimpleNamespace(outcome="running"))
+    assert volume.shown_take(result) == take
+    show(worker, result, take, SimpleNamespace(outcome=outcome))
+    assert volume.shown_take(result) == (take if outcome == "done" else shown)
+
+
+def test_a_result_that_the_artist_chose_meanwhile_stays(result, tmp_path) -> None:
+    """A run does not take it away."""
+    shown = volume.shown_take(result)
+    take, other = (Take(tmp_path / "out" / name) for name in ("take_0002", "take_0003"))
+    for copy in (take, other):
+        shutil.copytree(shown.directory, copy.directory)
+    worker = SimpleNamespace(_before={})
+    show = run.SMOKELIFT_OT_work._show_or_return
+    show(worker, result, take, SimpleNamespace(outcome="running"))
+    run.present(result, other)
+    show(worker, result, take, SimpleNamespace(outcome="done"))
+    assert volume.shown_take(result) == other
+
+
+# the pace that is tried out
+
+
+@pytest.mark.parametrize("speeds", [(0.5,), (2.0,), (1.0, 0.25, 1.0)])
+def test_a_pace_is_seen_at_once(shot, result, speeds) -> None:
+    """The frame that is shown, how long it lasts, and the velocity for motion blur; and all of it goes away again."""
+    settings = result.smokelift.directing
+    settings.speed, settings.use_ramp = speeds[0], len(speeds) > 1
+    if len(speeds) > 1:
+        settings.speed_middle, settings.speed_end = speeds[1:]
+    settings.live = True
+    data, first = result.data, result.data.frame_start
+    shown, scales = [], []
+    for frame in range(data.frame_duration):
+        shot.frame_set(first + frame)
+        seen = result.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+        shown.append(1 + frame + seen.frame_offset)
+        scales.append(seen.velocity_scale)
+    if speeds == (0.5,):
+        assert shown == [1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 6, 6]
+    elif speeds == (2.0,):
+        assert shown == [1, 3, 5]
+    else:
+        assert shown == sorted(shown)
+        assert (shown[0], shown[-1]) == (1, FRAMES)
+        assert scales[0] == pytest.approx(1.0, abs=1e-3)
+        assert 0.25 <= min(scales) < 0.4
+    if len(speeds) == 1:
+        assert scales == pytest.approx(list(speeds) * len(scales))
+    settings.live = False
+    assert (data.frame_duration, data.velocity_scale) == (FRAMES, 1.0)
+    assert not data.animation_data.drivers
+
+
+# results
+
+
+def test_two_results_are_compared(result, tmp_path) -> None:
+    """By turns in one place, or beside each other."""
+    one, two = volume.shown_take(result), Take(tmp_path / "out" / "take_0002")
+    assert not bpy.ops.smokelift.switch_take.poll()
+    shutil.copytree(one.directory, two.directory)
+    assert bpy.ops.smokelift.show_take(take=str(two.directory)) == {"FINISHED"}
+    result.location = (1.0, 0.0, 0.0)
+    for wanted in (one, two, one):
+        assert bpy.ops.smokelift.switch_take() == {"FINISHED"}
+        assert volume.shown_take(result) == wanted
+    assert bpy.ops.smokelift.show_beside(take=str(two.directory)) == {"FINISHED"}
+    assert smokes(bpy.context.scene) == [result]
+    (copy,) = [obj for obj in bpy.context.scene.objects if obj.type == "VOLUME" and obj != result]
+    assert volume.take_of(copy.data) == two
+    assert volume.shown_take(result) == one
+    assert copy.location.x - result.location.x == pytest.approx(2.2)
+    assert copy.data.materials[0] == result.data.materials[0]
+    with pytest.raises(RuntimeError, match="show another one first"):
+        bpy.ops.smokelift.remove_take(take=str(two.directory))
+
+
+@pytest.mark.parametrize("output", ["", "//", "//chosen"])
+def test_duplicates_have_folders_of_their_own(shot, result, tmp_path, output) -> None:
+    """For what they make; until then a duplicate shows what the other does. The first one keeps its folder."""
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+    result.smokelift.output = output
+    kept, data = run.output_folder(result), result.data
+    other = result.copy()
+    shot.collection.objects.link(other)
+    assert run.output_folder(other) == kept
+    result.smokelift.directing.frames = other.smokelift.directing.frames = 1
+    made = [run.write_directed(obj) for obj in (other, result, other)]
+    assert [take.directory.parent == kept for take in made] == [False, True, False]
+    assert made[0].directory.parent == made[2].directory.parent
+    assert made[0].source() == made[1].source() == volume.shown_take(result)
+    assert (result.data, other.data == data) == (data, False)
+
+
+def test_a_result_that_a_run_reads_is_not_deleted(result, tmp_path) -> None:
+    """What is made of it waits in the queue."""
+    shown, other = volume.shown_take(result), Take(tmp_path / "out" / "take_0009")
+    take = run.write_directed(result)
+    shutil.copytree(shown.directory, other.directory)
+    run.present(result, other)
+    row = bpy.context.window_manager.smokelift.jobs.add()
+    row.take, row.smoke_uid = str(take.directory), result.session_uid
+    with pytest.raises(RuntimeError, match="a run needs it"):
+        bpy.ops.smokelift.remove_take(take=str(shown.directory))
+
+
+# the tab
+
+
+@pytest.mark.parametrize("direction", ["continue", "retime", "loop"])
+def test_the_tab_shows_what_a_direction_needs(shot, result, direction) -> None:
+    """No line is cut off, and there is no tab without a result."""
+    result.smokelift.directing.direction = direction
+    context = SimpleNamespace(scene=shot)
+    assert direct_panel.SMOKELIFT_PT_view_direct.poll(context)
+    texts = drawn(shot, direct_panel.SMOKELIFT_PT_view_direct)
+    assert any(text.startswith(direction.capitalize()) for text in texts)
+    assert [text for text in texts if len(text) > LETTERS] == []
+    result.data.filepath = ""
+    assert not direct_panel.SMOKELIFT_PT_view_direct.poll(context)
