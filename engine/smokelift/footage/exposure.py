@@ -7,6 +7,8 @@ estimates of location", 1972).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 
@@ -52,6 +54,11 @@ def gain_of(picture: Picture, background: Picture) -> Picture:
     if max(spread) > SPREAD:
         return gains
     return np.exp(np.array(middle, np.float32))
+
+
+def largest_change(gains: Sequence[Picture]) -> float:
+    """Return the share by which gains of a clip's frames differ from 1 at most."""
+    return float(np.expm1(np.abs(np.log(gains)).max()))
 
 
 def small(picture: Picture) -> Picture:

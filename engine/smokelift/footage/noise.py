@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from smokelift.footage.clip import Clip
 from smokelift.footage.images import Picture, linear_to_srgb, srgb_to_linear
 from smokelift.footage.seen import quantile_of_seen
 
@@ -82,34 +81,6 @@ EIGHT_BIT_NOISE = lasting_noise(EIGHT_BIT_STEP)
 """Of footage that is as clean as eight bits allow."""
 
 
-def sample_frames(clip: Clip, count: int) -> npt.NDArray[np.uint16]:
-    """Return frames spread evenly over a clip, in fixed point; `decode_samples` reads them.
-
-    Parameters
-    ----------
-    clip
-        The footage.
-    count
-        How many frames; fewer are returned of a shorter clip, and of pictures so large that they need too much memory.
-
-    Returns
-    -------
-    (frames, rows, columns, 3) uint16
-        sRGB values.
-
-    Raises
-    ------
-    ClipError
-        If a frame cannot be read.
-    """
-    width, height = clip.size
-    numbers = clip.spread(sampled_count(count, width, height))
-    samples = np.empty((len(numbers), height, width, 3), np.uint16)
-    for sample, number in zip(samples, numbers, strict=True):
-        sample[...] = encode_sample(clip.frame(number))
-    return samples
-
-
 def sampled_count(count: int, width: int, height: int) -> int:
     """Return how many pictures of a size are stored of so many that are asked for."""
     return min(count, max(3, _SAMPLE_BYTES // (width * height * 6)))
@@ -121,12 +92,12 @@ def encode_sample(linear: Picture) -> npt.NDArray[np.uint16]:
 
 
 def decode_samples(samples: npt.NDArray[np.uint16]) -> Picture:
-    """Return what `sample_frames` stored as float32 sRGB values."""
+    """Return what `encode_sample` stored as float32 sRGB values."""
     return samples.astype(np.float32) / np.float32(_FIXED_POINT)
 
 
 def linear_samples(samples: npt.NDArray[np.uint16]) -> Picture:
-    """Return what `sample_frames` stored as float32 linear values."""
+    """Return what `encode_sample` stored as float32 linear values."""
     return _LINEAR[samples]
 
 
@@ -135,7 +106,8 @@ def block_means(pictures: Picture) -> Picture:
     size = min(BLOCK, *pictures.shape[1:3])
     frames, rows, columns = len(pictures), pictures.shape[1] // size, pictures.shape[2] // size
     whole = pictures[:, : rows * size, : columns * size]
-    means: Picture = whole.reshape(frames, rows, size, columns, size, 3).mean(axis=(2, 4))
+    lines = whole.reshape(frames, rows, size, columns * size * 3).sum(axis=2)  # along memory: several times faster
+    means: Picture = lines.reshape(frames, rows, columns, size, 3).sum(axis=3) / np.float32(size**2)
     return means
 
 

@@ -170,7 +170,7 @@ def wide_samples(clip: Clip, place: WidePicture, count: int) -> tuple[npt.NDArra
     Returns
     -------
     samples : (frames, rows, columns, 3) uint16
-        As `smokelift.footage.noise.sample_frames`.
+        As `smokelift.footage.plate_estimation.steady_samples`.
     seen : (frames, rows, columns) bool
         What each frame shows.
     """

@@ -43,7 +43,7 @@ from smokelift.footage.noise import (
     encode_sample,
     linear_samples,
     over_time,
-    sample_frames,
+    sampled_count,
     temporal_noise,
 )
 from smokelift.footage.plate import Plate
@@ -215,10 +215,33 @@ def one_colour(plate: Plate) -> tuple[float, float, float] | None:
 
 
 def steady_samples(clip: Clip, count: int = 32) -> npt.NDArray[np.uint16]:
-    """Return frames spread over a clip, all of one exposure; as `sample_frames`."""
-    samples = sample_frames(clip, count)
-    gains = sample_gains(np.stack([small(linear_samples(sample)) for sample in samples]))
-    for sample, gain in zip(samples, gains, strict=True):
+    """Return frames spread evenly over a clip, all of one exposure, in fixed point; `decode_samples` reads them.
+
+    Parameters
+    ----------
+    clip
+        The footage.
+    count
+        How many frames; fewer are returned of a shorter clip, and of pictures so large that they need too much memory.
+
+    Returns
+    -------
+    (frames, rows, columns, 3) uint16
+        sRGB values.
+
+    Raises
+    ------
+    ClipError
+        If a frame cannot be read.
+    """
+    width, height = clip.size
+    numbers = clip.spread(sampled_count(count, width, height))
+    samples = np.empty((len(numbers), height, width, 3), np.uint16)
+    tiny = []
+    for sample, number in zip(samples, numbers, strict=True):
+        sample[...] = encode_sample(clip.frame(number))
+        tiny.append(small(clip.frame(number)))
+    for sample, gain in zip(samples, sample_gains(np.stack(tiny)), strict=True):
         if (gain != 1).any():
             sample[...] = encode_sample(linear_samples(sample) / gain)
     return samples

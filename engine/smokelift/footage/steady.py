@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 
 from smokelift.footage.clip import Clip
@@ -20,13 +21,20 @@ def steady(clip: Clip, plates: Plates) -> Clip:
     plates
         Its backgrounds.
     """
+    gains_of = exposures(plates)
+
+    def balanced(number: int, picture: Picture) -> Picture:
+        gains = gains_of(number, picture)
+        return picture if (gains == 1).all() else picture / gains
+
+    return clip.changed(balanced)
+
+
+def exposures(plates: Plates) -> Callable[[int, Picture], Picture]:
+    """Return what tells by how much a frame, given by number and picture, is brighter than its background, (3,)."""
 
     @lru_cache(maxsize=1)
     def still(plate: Plate) -> Picture:
         return small(plate.image)
 
-    def balanced(number: int, picture: Picture) -> Picture:
-        gains = gain_of(small(picture), still(plates.at(number)))
-        return picture if (gains == 1).all() else picture / gains
-
-    return clip.changed(balanced)
+    return lambda number, picture: gain_of(small(picture), still(plates.at(number)))

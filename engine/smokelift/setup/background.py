@@ -10,7 +10,7 @@ from smokelift.footage.alignment import Lens
 from smokelift.footage.background import given_plates
 from smokelift.footage.clip import Clip
 from smokelift.footage.evidence import evidence
-from smokelift.footage.exposure import gain_of, small
+from smokelift.footage.exposure import largest_change
 from smokelift.footage.images import area_average
 from smokelift.footage.panorama import estimate_panorama
 from smokelift.footage.plate import Plate, Plates, known_plate
@@ -23,6 +23,7 @@ from smokelift.footage.plate_estimation import (
     one_colour,
     steady_samples,
 )
+from smokelift.footage.steady import exposures
 from smokelift.footage.turning import Turns, find_turns
 from smokelift.scene import Background, Camera
 from smokelift.setup.smoke import SmokeSamples
@@ -108,8 +109,8 @@ def find_plates(
 
 def exposure_change(clip: Clip, plates: Plates) -> float:
     """Return by which share the exposure of a clip differs from its background's at most; 0 if it never does."""
-    gains = [gain_of(small(clip.frame(n)), small(plates.at(n).image)) for n in clip.spread(EXPOSURE_SAMPLES)]
-    return float(np.expm1(np.abs(np.log(gains)).max()))
+    gains_of = exposures(plates)
+    return largest_change([gains_of(number, clip.frame(number)) for number in clip.spread(EXPOSURE_SAMPLES)])
 
 
 def exposure_notes(change: float) -> tuple[str, ...]:

@@ -16,7 +16,7 @@ from smokelift.footage.steady import steady
 from smokelift.footage.working_picture import CameraError, WorkingPicture, working_picture
 from smokelift.render import scene_optics
 from smokelift.scene import Background, Camera, CompleteScene, Domain, Medium, Scene
-from smokelift.setup.background import exposure_change, exposure_notes, find_plates, smoke_in_plate
+from smokelift.setup.background import exposure_notes, find_plates, smoke_in_plate
 from smokelift.setup.choice import Choice
 from smokelift.setup.further_views import disagreement, open_view
 from smokelift.setup.geometry import clip_lens, find_geometry
@@ -55,13 +55,12 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
     lens = None if scene.views else clip_lens(scene.camera, clip)
     found = find_plates(clip, scene.camera, scene.background, lens)
     plates = found.plates
-    exposure = exposure_change(clip, plates)
-    clip = steady(clip, plates)
     samples = sample_smoke(clip, plates, found.turns)
+    clip = steady(clip, plates)
     geometry = find_geometry(clip, scene, settings, plates, samples, found.turns)
     camera, domain = geometry.camera, geometry.domain
     doubts = smoke_in_plate(plates, samples)
-    notes = [*remarks, *found.notes, *doubts, *exposure_notes(exposure), *geometry.notes]
+    notes = [*remarks, *found.notes, *doubts, *exposure_notes(samples.exposure), *geometry.notes]
     if settings.axis_depth is not None:
         SmokeAxis.given(settings.axis_depth, camera, domain)  # refuse early what cannot be
     choices: tuple[Choice[Any], ...] = () if geometry.resolution is None else (geometry.resolution,)
@@ -113,7 +112,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
         estimated_background=plates.image if found.background is None and isinstance(plates, Plate) else None,
         notes=tuple(notes),
         choices=choices,
-        exposure=exposure,
+        exposure=samples.exposure,
         smoky=samples.smoky,
         place=None,
     )

@@ -8,10 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.footage.clip import Clip
+from smokelift.footage.exposure import largest_change
 from smokelift.footage.images import area_average
 from smokelift.footage.matte import matte
 from smokelift.footage.panorama import WidePicture
 from smokelift.footage.plate import Plates
+from smokelift.footage.steady import exposures
 from smokelift.footage.turning import Turns
 
 SAMPLES = 16
@@ -39,6 +41,8 @@ class SmokeSamples:
         Background radiance at the same pixels.
     smoky
         Numbers of the frames with smoke, those with the most first.
+    exposure
+        Share by which the exposure of a sample differs from its background's at most; they are evened out.
     """
 
     scale: float
@@ -47,20 +51,24 @@ class SmokeSamples:
     colours: NDArray[np.float32]
     behind: NDArray[np.float32]
     smoky: tuple[int, ...]
+    exposure: float
 
 
 def sample_smoke(clip: Clip, plates: Plates, turns: Turns | None = None) -> SmokeSamples:
-    """Find the smoke in frames spread over a clip, whose camera may turn."""
+    """Find the smoke in frames spread over a clip, whose camera may turn and whose exposure may change."""
     width, height = clip.size
     scale = max(1.0, max(width, height) / LONGEST_SIDE)
     columns, rows = max(1, round(width / scale)), max(1, round(height / scale))
     wide = None if turns is None else WidePicture.around(turns).resized(columns, rows)
     covered = np.zeros((rows, columns) if wide is None else wide.size[::-1], np.bool_)
-    colours, behind = [], []
+    colours, behind, gains = [], [], []
+    gains_of = exposures(plates)
     amounts: dict[int, int] = {}
     for number in clip.spread(SAMPLES):
         plate = plates.at(number).through(lambda whole: area_average(whole, columns, rows), scale**2)
-        picture = area_average(clip.frame(number), columns, rows)
+        frame = clip.frame(number)
+        gains.append(gains_of(number, frame))
+        picture = area_average(frame, columns, rows) / gains[-1]
         mask = matte(picture, plate).mask
         covered |= mask if wide is None else wide.spread_out(mask.astype(np.float32), number) > 0.5
         colours.append(picture[mask])
@@ -73,4 +81,5 @@ def sample_smoke(clip: Clip, plates: Plates, turns: Turns | None = None) -> Smok
         corners = (wide.left, wide.top, wide.left + wide.size[0], wide.top + wide.size[1])
         left, top, right, bottom = (scale * corner for corner in corners)
         bounds = (left, top, right, bottom)
-    return SmokeSamples(scale, bounds, covered, np.concatenate(colours), np.concatenate(behind), smoky)
+    change = largest_change(gains)
+    return SmokeSamples(scale, bounds, covered, np.concatenate(colours), np.concatenate(behind), smoky, change)

@@ -32,7 +32,7 @@ def test_smoke_that_may_be_in_the_plate_is_said(unknown_rows, said) -> None:
     covered[10:80] = True
     colours = np.zeros((0, 3), np.float32)
     plate = Plate(np.zeros((100, 50, 3), np.float32), confidence, EIGHT_BIT_NOISE)
-    notes = smoke_in_plate(plate, SmokeSamples(1.0, (0, 0, 50, 100), covered, colours, colours, (0,)))
+    notes = smoke_in_plate(plate, SmokeSamples(1.0, (0, 0, 50, 100), covered, colours, colours, (0,), 0.0))
     assert bool(notes) is said
     assert not said or "75% of where smoke is or may be" in notes[0]
 
