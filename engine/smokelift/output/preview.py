@@ -1,7 +1,8 @@
 """Pictures that show at a glance what a sequence is: a contact sheet, an orbit, a strip and a video.
 
 All of them show the part of the picture that holds smoke in some frame. The scene's own camera has the clip's
-background behind the smoke, all others one colour: the background's own where it has one, else black.
+background behind the smoke, all others one colour: the background's own where it has one, else black. A sequence keeps
+no background of a camera that was steadied against it: its own camera has that one colour too.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from smokelift.output.sheet import write_sheet
 from smokelift.output.video import write_video
 from smokelift.output.viewer import Viewer
 from smokelift.render import Image
-from smokelift.scene import Camera, CompleteScene, orbit
+from smokelift.scene import Background, Camera, CompleteScene, orbit
 
 SHEET_ANGLES = (0, 20, 45, 90)
 ORBIT_ANGLES = tuple(range(0, 360, 30))
@@ -48,10 +49,9 @@ def write_contact_sheet(path: Path, sequence: Sequence, clip: Clip, framing: Fra
     frames = sequence.frames
     spread = np.unique(np.linspace(0, len(frames) - 1, SHEET_ROWS + 2).round().astype(int))
     numbers = [frames[i] for i in spread[1:-1]] or list(frames)
-    camera, behind = framing.camera(sequence.scene.camera, SHEET_HEIGHT), _behind_others(sequence.scene)
-    viewers = [
-        Viewer(sequence.scene, orbit(camera, framing.box, angle), behind if angle else None) for angle in SHEET_ANGLES
-    ]
+    scene, camera = sequence.scene, framing.camera(sequence.scene.camera, SHEET_HEIGHT)
+    own, others = _behind_own(scene, clip), _behind_others(scene, clip)
+    viewers = [Viewer(scene, orbit(camera, framing.box, angle), others if angle else own) for angle in SHEET_ANGLES]
     rows = []
     for number in numbers:
         density = sequence.density(number)
@@ -60,10 +60,10 @@ def write_contact_sheet(path: Path, sequence: Sequence, clip: Clip, framing: Fra
     _write_pictures(path, rows, titles, [f"frame {number}" for number in numbers])
 
 
-def write_orbit(path: Path, sequence: Sequence, framing: Framing) -> None:
+def write_orbit(path: Path, sequence: Sequence, clip: Clip, framing: Framing) -> None:
     """Write one moment from twelve angles, as a PNG."""
     number = _late(sequence)
-    density, behind = sequence.density(number), _behind_others(sequence.scene)
+    density, behind = sequence.density(number), _behind_others(sequence.scene, clip)
     camera = framing.camera(sequence.scene.camera.at(number - 1), SHEET_HEIGHT)
     viewers = [Viewer(sequence.scene, orbit(camera, framing.box, angle), behind) for angle in ORBIT_ANGLES]
     pictures = [viewer.image(number, density) for viewer in viewers]
@@ -81,7 +81,7 @@ def write_strip(path: Path, sequence: Sequence, clip: Clip, framing: Framing) ->
     last = min(len(frames), frames.index(_late(sequence)) + STRIP_FRAMES // 2)
     numbers = frames[max(0, last - STRIP_FRAMES) :][:STRIP_FRAMES]
     camera = framing.camera(scene.camera, SHEET_HEIGHT)
-    viewer = Viewer(scene, orbit(camera, framing.box, SIDE), _behind_others(scene))
+    viewer = Viewer(scene, orbit(camera, framing.box, SIDE), _behind_others(scene, clip))
     filmed = [_filmed(clip, number, framing, camera) for number in numbers]
     turned = [viewer.image(number, sequence.density(number)) for number in numbers]
     titles = [f"frame {number}" for number in numbers]
@@ -99,24 +99,33 @@ def _turning(sequence: Sequence, clip: Clip, framing: Framing) -> Iterator[Image
     camera = framing.camera(scene.camera, PREVIEW_HEIGHT)
     turns = [orbit(camera.at(n), framing.box, step * n) for n in range(frames[-1])]
     turning = replace(turns[0], matrices=tuple(turned.matrix for turned in turns))
-    front, around = Viewer(scene, camera), Viewer(scene, turning, _behind_others(scene))
+    front = Viewer(scene, camera, _behind_own(scene, clip))
+    around = Viewer(scene, turning, _behind_others(scene, clip))
     for number in frames:
         density = sequence.density(number)
         filmed = _filmed(clip, number, framing, camera)
         yield np.concatenate([filmed, front.image(number, density), around.image(number, density)], 1)
 
 
-def _behind_others(scene: CompleteScene) -> Image:
+def _behind_own(scene: CompleteScene, clip: Clip) -> Image | None:
+    """What is behind the smoke for the scene's own camera, (3,) linear; None if the scene says it."""
+    return _behind_others(scene, clip) if scene.background == Background() else None
+
+
+def _behind_others(scene: CompleteScene, clip: Clip) -> Image:
     """What is behind the smoke for all cameras but the scene's own: one linear colour, (3,).
 
     A background seen from aside is not known, and its mean colour looks like haze. It is taken only where black hides
-    the smoke, which absorbs and does no more.
+    the smoke, which absorbs and does no more; of a background that the sequence does not keep, the clip's mean is.
     """
+    absorbs = scene.scattering == "absorption"
+    if absorbs and scene.background == Background():
+        return np.asarray(clip.frame(0).mean((0, 1)))
     plate = background_picture(scene)
     colour = plate if plate.ndim == 1 else backdrop_colour(plate)
     if colour is not None:
         return colour
-    return np.asarray(plate.mean((0, 1)) if scene.scattering == "absorption" else np.zeros(3), np.float32)
+    return np.asarray(plate.mean((0, 1)) if absorbs else np.zeros(3), np.float32)
 
 
 def _late(sequence: Sequence) -> int:

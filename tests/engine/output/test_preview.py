@@ -75,7 +75,8 @@ def test_an_orbit_shows_one_moment_from_twelve_angles(plume, tmp_path) -> None:
     """The first is the camera's own; each angle shows other smoke than the one opposite."""
     sequence = written(plume.scene, plume.densities, tmp_path / "out")
     framing = frame_smoke(sequence)
-    write_orbit(tmp_path / "orbit.png", sequence, framing)
+    with Clip.open(plume.scene.clip) as clip:
+        write_orbit(tmp_path / "orbit.png", sequence, clip, framing)
     shown = [tile for row in tiles(tmp_path / "orbit.png", sequence, 2, 6) for tile in row]
     assert all(tile.max() > 100 for tile in shown)
     viewer = Viewer(sequence.scene, framed(sequence))
@@ -138,6 +139,20 @@ def test_a_plate_does_not_turn_along(plume, tmp_path, plate, scattering, behind)
             np.testing.assert_allclose(preview.frame(n)[[20, -20], -20], behind, atol=0.02)
             front = preview.frame(n)[[20, -20], preview.size[0] // 2]
             np.testing.assert_allclose(front.mean(-1), plate, atol=0.02)
+
+
+def test_smoke_that_only_absorbs_is_seen_before_a_background_that_is_not_kept(plume, tmp_path) -> None:
+    """As of a camera that was steadied: before the clip's mean colour, from all sides."""
+    scene = replace(plume.scene, background=Background(), scattering="absorption")
+    sequence = written(scene, plume.densities[:1], tmp_path / "out")
+    framing = frame_smoke(sequence)
+    with Clip.open(scene.clip) as file:
+        clip = file.changed(lambda _, picture: np.full_like(picture, 0.3))
+        write_contact_sheet(tmp_path / "sheet.png", sequence, clip, framing)
+    grey = eight_bit(np.float32(0.3))
+    for tile in tiles(tmp_path / "sheet.png", sequence, 1, 1 + len(SHEET_ANGLES))[0][1:]:
+        np.testing.assert_allclose(tile[[1, -2], 1], grey, atol=2)
+        assert tile.min() < grey - 40
 
 
 def test_a_preview_shows_three_views(plume, tmp_path) -> None:

@@ -36,7 +36,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     framing = frame_smoke(sequence)
     with Clip.open(sequence.scene.clip) as clip:
         write_contact_sheet(out / CONTACT_SHEET, sequence, clip, framing)
-        write_orbit(out / ORBIT, sequence, framing)
+        write_orbit(out / ORBIT, sequence, clip, framing)
         write_strip(out / STRIP, sequence, clip, framing)
         write_preview(out / PREVIEW, sequence, clip, framing)
     files = [str(out / name) for name in PICTURES]
