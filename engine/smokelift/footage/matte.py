@@ -12,6 +12,7 @@ import numpy.typing as npt
 from scipy import ndimage
 
 from smokelift.footage.images import Picture, linear_to_srgb
+from smokelift.footage.noise import Noise
 from smokelift.footage.plate import Plate
 
 SMOKE_THRESHOLD = 4.0
@@ -22,7 +23,10 @@ CERTAIN_AREA = 1e-4
 """Share of the picture that has to be smoke for certain in a patch of smoke; less is an accident of the noise."""
 
 SMOOTHING = 1.5
-"""Standard deviation of the Gaussian that smooths the deviation, in pixels."""
+"""Standard deviation of the Gaussian that smooths the deviation, in pixels, at least."""
+
+MOST_SMOOTHING = 4.0
+"""The same at most, in noise: more hides the smoke's own shape."""
 
 GLOBAL_DEVIATION = 2.0
 """Units of noise. A median deviation of a frame up to this is treated as drift of exposure or of the codec, not as
@@ -65,10 +69,11 @@ def matte(frame: npt.ArrayLike, plate: Plate) -> Matte:
         raise ValueError(f"the frame {linear.shape} and the plate {plate.image.shape} must have one shape")
     if not np.isfinite(linear).all():
         raise ValueError("the frame must be finite")
+    width = smoothing(plate.noise)
     # as far as white noise goes, a Gaussian is a mean over so many pixels
-    noise = plate.noise.averaged(4 * np.pi * SMOOTHING**2).total
+    noise = plate.noise.averaged(4 * np.pi * width**2).total
     difference = (linear_to_srgb(linear) - linear_to_srgb(plate.image)) / noise
-    smooth = ndimage.gaussian_filter(difference, (SMOOTHING, SMOOTHING, 0.0))
+    smooth = ndimage.gaussian_filter(difference, (width, width, 0.0))
     deviation = np.sqrt((smooth**2).mean(axis=2))
     deviation /= np.clip(np.median(deviation), 1.0, GLOBAL_DEVIATION)
     certain = 2.0 * SMOKE_THRESHOLD
@@ -76,3 +81,9 @@ def matte(frame: npt.ArrayLike, plate: Plate) -> Matte:
     certain_pixels = np.bincount(patches[deviation > certain], minlength=count + 1)
     is_smoke = certain_pixels > CERTAIN_AREA * patches.size
     return Matte(deviation, is_smoke[patches])
+
+
+def smoothing(noise: Noise) -> float:
+    """Return the standard deviation in pixels of the Gaussian that leaves as much of white noise as lasts anyway."""
+    even = float((noise.white / noise.lasting).max()) / np.sqrt(4 * np.pi)
+    return float(np.clip(even, SMOOTHING, MOST_SMOOTHING))

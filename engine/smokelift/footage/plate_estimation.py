@@ -271,7 +271,9 @@ def _backdrop(samples: npt.NDArray[np.uint16], noise: Noise) -> Picture | None:
     if not still.any():
         return None
     colour = np.median(middle[still], axis=0)
-    alike = (np.abs(middle - colour) <= limit).all(-1)
+    # the median of many samples has less noise than they have, by pi / 2 more variance than their mean
+    settled = SMOKE_TO_NOISE * noise.averaged(BLOCK**2 * max(1.0, len(samples) / (np.pi / 2))).total
+    alike = (np.abs(middle - colour) <= settled).all(-1)
     if alike[still].mean() < ONE_COLOUR:
         return None
     clear = np.median(linear, axis=0)

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 from films import HEIGHT, WIDTH, film, overlap, wall
 
-from smokelift.footage.matte import matte
+from smokelift.footage.matte import MOST_SMOOTHING, SMOOTHING, matte, smoothing
+from smokelift.footage.noise import Noise, lasting_noise
 from smokelift.footage.plate import known_plate
 from smokelift.footage.plate_estimation import estimate_plate
 
@@ -32,3 +33,21 @@ def test_smoke_over_most_of_the_picture_is_not_noise(tmp_path: Path) -> None:
         assert 0.5 < plate.noise.total.mean() * 255 < 2.0
         for n in (4, 12, 20):
             assert overlap(matte(clip.frame(n), plate).mask, billows(n) > 0.002) > 0.9
+
+
+def test_noise_is_smoothed_as_far_as_that_helps() -> None:
+    """Clean pictures stay sharp; noise that neighbours share is not lessened by it."""
+    codes = np.full(3, 1 / 255, np.float32)
+    assert smoothing(lasting_noise(0.1)) == smoothing(Noise(2 * codes, codes)) == SMOOTHING
+    assert SMOOTHING < smoothing(Noise(10 * codes, codes)) < MOST_SMOOTHING
+    assert smoothing(Noise(50 * codes, codes)) == MOST_SMOOTHING
+
+
+def test_faint_smoke_is_seen_in_noise(tmp_path: Path) -> None:
+    """A veil of 20 codes in noise of 25, before a wall that is given."""
+    rows, columns = np.mgrid[:HEIGHT, :WIDTH]
+    veil = np.where(np.hypot(rows - 36, columns - 28) < 16, 0.15, 0.0)
+    truth = wall(0.2, 0.3)
+    clip = film(tmp_path, truth, lambda n: veil, 0.6, 25.0)
+    found = matte(clip.frame(5), known_plate(truth, clip)).mask
+    assert overlap(found, veil > 0) > 0.7
