@@ -3,23 +3,30 @@
 The library knows nothing of Blender: `take` is the files of a run, `job` the engine's process, `toml` the text of a
 scene file, `pace` a speed ramp, `contract` what the add-on repeats of the engine. `smoke` finds the objects that hold
 the settings. `scene_file` (Blender scene to scene file), `volume` (sequence to Volume object), `look` (its material),
-`directing` (what acts on the smoke after its clip) and `shot_setup` (camera, world and light that match the clip)
-translate to Blender's data and back. The interface is thin: `properties`, `panel` with its sub-panels `look_panel` and
-`direct_panel`, and `operators`; `run` keeps the queue; `batch` is the command line.
+`directing` (what acts on the smoke after its clip), `shot_setup` (camera, world and light that match the clip) and
+`compositing` (smoke over the clip), both with the clean `plate`, translate to Blender's data and back. The interface is
+thin: `properties`, `panel` with its sub-panels `look_panel`, `setup_panel` and `direct_panel`, and `operators`; `run`
+keeps the queue; `batch` is the command line.
 """
+
+from types import ModuleType
 
 
 def register() -> None:
     """Register all classes, properties and handlers."""
-    from . import batch, direct_panel, look, look_panel, operators, panel, properties, run, smoke, volume
-
-    for module in (properties, smoke, look, volume, run, operators, panel, look_panel, direct_panel, batch):
+    for module in _modules():
         module.register()
 
 
 def unregister() -> None:
     """Unregister them."""
-    from . import batch, direct_panel, look, look_panel, operators, panel, properties, run, smoke, volume
-
-    for module in (batch, direct_panel, look_panel, panel, operators, run, volume, look, smoke, properties):
+    for module in reversed(_modules()):
         module.unregister()
+
+
+def _modules() -> tuple[ModuleType, ...]:
+    """Those with something to register, each after those it needs; panels in the order of the tab."""
+    from . import batch, direct_panel, look, look_panel, operators, panel, properties, run, setup_panel, smoke, volume
+
+    panels = (panel, look_panel, setup_panel, direct_panel)
+    return (properties, smoke, look, volume, run, operators, *panels, batch)

@@ -51,14 +51,14 @@ class Look:
 
 PRESETS = {
     "SMOKE": ("Smoke", "As in the clip", Look()),
-    "STEAM": ("Steam", "White and light, with soft edges", Look(0.8, 6.0, edge_contrast=0.8)),
-    "SOOT": ("Soot", "Black and thick", Look(2.0, color=(0.05, 0.045, 0.04), edge_contrast=1.2)),
+    "STEAM": ("Steam", "White and light, with soft edges", Look(0.5, 8.0, edge_contrast=0.7)),
+    "SOOT": ("Soot", "Black and thick", Look(2.5, color=(0.05, 0.045, 0.04))),
     "DUST": (
         "Dust",
         "The color of sand, which reddens the light that passes through",
-        Look(1.2, color=(0.85, 0.6, 0.38), edge_contrast=1.4, absorption_color=(0.25, 0.08, 0.02)),
+        Look(1.2, color=(0.7, 0.55, 0.4), edge_contrast=1.4, absorption_color=(0.25, 0.1, 0.03)),
     ),
-    "MIST": ("Mist", "White, thin and without edges", Look(0.3, 6.0, edge_contrast=0.4)),
+    "MIST": ("Mist", "White, thin and without edges", Look(0.2, 8.0, edge_contrast=0.3)),
 }
 """Name, description and look of each preset."""
 

@@ -294,7 +294,8 @@ class SMOKELIFT_OT_set_up(_NeedsClip, bpy.types.Operator):
         if index is None:
             self.report({"ERROR"}, f"The files of the smoke in {take.directory} are missing: make it again.")
             return {"CANCELLED"}
-        if smoke.smokelift.camera_mode == "SCENE" and context.scene.camera is None:
+        settings = smoke.smokelift
+        if settings.set_up_camera and settings.camera_mode == "SCENE" and context.scene.camera is None:
             self.report({"ERROR"}, "The scene has no camera: choose the one that the smoke was made for.")
             return {"CANCELLED"}
         shot_setup.set_up(smoke, take, index)

@@ -346,6 +346,44 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
             ("gpu", "GPU Compute", "The GPU, or fail"),
         ],
     )
+    set_up_range: BoolProperty(
+        name="Size, Rate and Range",
+        description="Give the scene the clip's resolution, frame rate and length",
+        default=True,
+    )
+    set_up_camera: BoolProperty(
+        name="Camera",
+        description="Look through the camera of the clip, with the clip behind it",
+        default=True,
+    )
+    set_up_light: BoolProperty(
+        name="Light",
+        description="Render with Cycles, and add the light that was estimated from the clip",
+        default=True,
+    )
+    set_up_plate: BoolProperty(
+        name="Background",
+        description="Show the clean plate behind the smoke",
+        default=True,
+    )
+    set_up_colors: BoolProperty(
+        name="Color Management",
+        description="View transform Standard, in which the clip looks as it was filmed",
+        default=True,
+    )
+    plate_place: EnumProperty(
+        name="Place",
+        description="Where the background is put behind the smoke",
+        items=[
+            ("WORLD", "World", "In the world, seen by the camera only"),
+            (
+                "COMPOSITE",
+                "Compositor",
+                "Transparent film over the plate in the compositor, with the smoke's shadow on the floor, holdouts, "
+                "the clip's grain, and the clip in front of it all where a mask says so",
+            ),
+        ],
+    )
     assumed_camera: PointerProperty(
         name="Assumed Camera",
         description="Camera object that stands where the clip was assumed to be filmed from",

@@ -1,18 +1,17 @@
-"""Set Up Shot: size, speed, background, light and colours of the clip for the Blender scene.
+"""Set Up Shot: size, speed, camera, background, light and colours of the clip for the Blender scene.
 
 Everything made here is found again by its name, so a second set-up changes nothing.
 """
 
 import math
-import re
-from pathlib import Path
 from typing import Any
 
 import bpy
 from mathutils import Matrix, Vector
 
+from .compositing import composite
 from .kept import set_unless_changed
-from .paths import relative
+from .plate import plate_image, play_beside
 from .smoke import GUESSED_CAMERA, scene_of
 from .take import Take
 
@@ -34,7 +33,7 @@ def match_clip(smoke: bpy.types.Object) -> None:
 
 
 def set_up(smoke: bpy.types.Object, take: Take, index: dict[str, Any]) -> None:
-    """Make a Cycles render from the camera match the clip.
+    """Make a render from the camera match the clip, in the parts that are ticked.
 
     Parameters
     ----------
@@ -44,16 +43,24 @@ def set_up(smoke: bpy.types.Object, take: Take, index: dict[str, Any]) -> None:
         The take on show, and its `sequence.json`.
     """
     settings, scene = smoke.smokelift, scene_of(smoke)
-    match_clip(smoke)
-    scene.camera = assumed_camera(smoke, index) or scene.camera
-    _add_background_clip(scene.camera.data, settings.clip)
-    if settings.light_mode == "ESTIMATE":
-        _estimated_sun(scene, index)
-    _set_world(scene, settings.clip, take, index["scene"])
-    scene.render.engine = "CYCLES"
-    scene.view_settings.view_transform = "Standard"
-    scene.view_settings.look = "None"
-    scene.view_settings.exposure, scene.view_settings.gamma = 0.0, 1.0
+    if settings.set_up_range:
+        match_clip(smoke)
+    if settings.set_up_camera:
+        scene.camera = assumed_camera(smoke, index) or scene.camera
+        _add_background_clip(scene.camera.data, settings.clip)
+    if settings.set_up_light:
+        scene.render.engine = "CYCLES"
+        if settings.light_mode == "ESTIMATE":
+            _estimated_sun(scene, index)
+    if settings.set_up_plate:
+        if settings.plate_place == "COMPOSITE":
+            composite(smoke, take, index)
+        else:
+            _set_world(scene, settings.clip, take, index["scene"])
+    if settings.set_up_colors:
+        scene.view_settings.view_transform = "Standard"
+        scene.view_settings.look = "None"
+        scene.view_settings.exposure, scene.view_settings.gamma = 0.0, 1.0
 
 
 def assumed_camera(smoke: bpy.types.Object, index: dict[str, Any]) -> bpy.types.Object | None:
@@ -141,7 +148,7 @@ def _set_world(scene: bpy.types.Scene, clip: bpy.types.MovieClip, take: Take, ta
     background = mix.inputs[2].links[0].from_node
     plate = _set_plate(world.node_tree, background, take, tables.get("background") or {})
     if plate is not None:
-        _set_plate_frames(plate, clip, "matrices" in tables["camera"])
+        play_beside(plate.image, plate.image_user, clip, "matrices" in tables["camera"])
 
 
 def _remove_unused_worlds() -> None:
@@ -169,25 +176,6 @@ def _set_plate(
         tree.links.new(texture.outputs["Color"], colour)
         for node, left in ((texture, 300.0), (coordinates, 500.0)):
             node.location = shader.location - Vector((left, 0.0))
-    path = Path(background["image"])
-    path = path if path.is_absolute() else take.directory / path
     node = colour.links[0].from_node
-    node.image = bpy.data.images.load(str(path), check_existing=True)
-    if node.image.filepath != relative(path):
-        node.image.filepath = relative(path)
+    node.image = plate_image(take, background["image"])
     return node
-
-
-def _set_plate_frames(node: bpy.types.ShaderNode, clip: bpy.types.MovieClip, tracked: bool) -> None:
-    """Keep a plate of many pictures in step with the clip."""
-    image, user = node.image, node.image_user
-    number = re.search(r"(\d+)\.\w+$", image.filepath)
-    if tracked and image.source == "FILE" and number:
-        image.source = "SEQUENCE"
-    if image.source == "FILE":
-        return
-    # Blender counts the images of a sequence by the numbers in their names, and the frames of a video from 1
-    before = int(number[1]) - 1 if number and image.source == "SEQUENCE" else 0
-    user.frame_start, user.frame_duration = clip.frame_start, clip.frame_duration
-    user.frame_offset = before + clip.frame_offset
-    user.use_auto_refresh = True

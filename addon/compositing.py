@@ -1,0 +1,243 @@
+"""The smoke over its clip in Blender's compositor.
+
+The film is transparent. A plane below the smoke catches its shadow, and what is in the collection for holdouts hides
+the smoke. The compositor puts the render over the clean plate, adds the clip's own grain, and shows the clip in front
+of it all where a mask says so. What the artist changes of it stays.
+"""
+
+from typing import Any
+
+import bpy
+from mathutils import Matrix, Vector
+
+from .plate import plate_image, play_beside
+from .scene_file import engine_to_world
+from .smoke import scene_of
+from .take import Take
+
+GROUP = "Smokelift Composite"
+"""Name of the node group, and of its node in the scene's compositor."""
+
+MARK = "smokelift_composite"
+"""Custom property by which the group is known under any name."""
+
+FLOOR = "Smokelift Floor"
+"""Name of the plane that catches the shadow."""
+
+FLOOR_WIDTHS = 4.0
+"""Width of that plane over the box's: room for the shadow of a low sun."""
+
+HOLDOUTS = "Smokelift Holdouts"
+"""Name of the collection whose objects hide the smoke, and show the plate."""
+
+GRAIN_PIXELS = 4
+"""What is finer than this is grain: the blur that separates it (pixels). Sensor noise differs from pixel to pixel."""
+
+SINCE_5 = bpy.app.version >= (5, 0, 0)
+"""Blender 5.0 makes the compositor of node groups, and gives it the shaders' Mix node."""
+
+
+def composite(smoke: bpy.types.Object, take: Take, index: dict[str, Any]) -> None:
+    """Set the compositor up for a smoke; a second time changes the plate and the clip only.
+
+    Parameters
+    ----------
+    smoke
+        Shows its take already.
+    take, index
+        The take on show, and its `sequence.json`.
+    """
+    scene = scene_of(smoke)
+    scene.render.engine = "CYCLES"  # EEVEE has no shadow catcher
+    scene.render.film_transparent = True
+    _catch_shadow(scene, smoke, index["scene"]["domain"])
+    _hold_out(scene)
+    tree, shown = _compositor(scene)
+    node = tree.nodes.get(GROUP)
+    if node is None:
+        node = _insert(tree, shown)
+    _connect_plate(tree, node, smoke, take, index["scene"])
+    _connect_clip(tree, node, smoke.smokelift.clip)
+
+
+def _catch_shadow(scene: bpy.types.Scene, smoke: bpy.types.Object, domain: dict[str, Any]) -> None:
+    """A plane at the bottom of the smoke's box, unless the scene has one."""
+    if FLOOR in scene.objects:
+        return
+    low, high = Vector(domain["min"]), Vector(domain["max"])
+    half = FLOOR_WIDTHS * max(high.x - low.x, high.y - low.y) / 2
+    mesh = bpy.data.meshes.new(FLOOR)
+    mesh.from_pydata([(-half, -half, 0), (half, -half, 0), (half, half, 0), (-half, half, 0)], [], [(0, 1, 2, 3)])
+    plane = bpy.data.objects.new(FLOOR, mesh)
+    middle = Vector(((low.x + high.x) / 2, (low.y + high.y) / 2, low.z))
+    plane.matrix_basis = engine_to_world(smoke) @ Matrix.Translation(middle)
+    plane.is_shadow_catcher = True
+    plane.display_type = "WIRE"
+    scene.collection.objects.link(plane)
+
+
+def _hold_out(scene: bpy.types.Scene) -> None:
+    """A collection for what hides the smoke, unless the scene has one."""
+    if HOLDOUTS in scene.collection.children:
+        return
+    scene.collection.children.link(bpy.data.collections.new(HOLDOUTS))
+    name = scene.collection.children[-1].name
+    for layer in scene.view_layers:
+        layer.layer_collection.children[name].holdout = True
+
+
+def _compositor(scene: bpy.types.Scene) -> tuple[bpy.types.NodeTree, bpy.types.NodeSocket]:
+    """The scene's compositor, made if there is none, and the socket of its output."""
+    if SINCE_5:
+        tree = scene.compositing_node_group
+        if tree is None:
+            tree = scene.compositing_node_group = bpy.data.node_groups.new("Compositing", "CompositorNodeTree")
+        if not any(item.item_type == "SOCKET" and item.in_out == "OUTPUT" for item in tree.interface.items_tree):
+            tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
+        kind, identifier = "GROUP_OUTPUT", "NodeGroupOutput"
+    else:
+        scene.use_nodes = True
+        tree = scene.node_tree
+        kind, identifier = "COMPOSITE", "CompositorNodeComposite"
+    scene.render.use_compositing = True
+    output = next((node for node in tree.nodes if node.type == kind), None) or tree.nodes.new(identifier)
+    return tree, output.inputs[0]
+
+
+def _insert(tree: bpy.types.NodeTree, shown: bpy.types.NodeSocket) -> bpy.types.Node:
+    """Put our group between the output and what it showed, or the render if it showed nothing."""
+    if shown.links:
+        render = shown.links[0].from_socket
+    else:
+        layers = next((node for node in tree.nodes if node.type == "R_LAYERS"), None)
+        layers = layers or tree.nodes.new("CompositorNodeRLayers")
+        render = layers.outputs["Image"]
+    node = tree.nodes.new("CompositorNodeGroup")
+    node.node_tree = _group()
+    node.name = node.label = GROUP
+    node.width = 200.0
+    node.location = render.node.location + Vector((render.node.width + 60.0, 0.0))
+    shown.node.location = node.location + Vector((node.width + 60.0, 0.0))
+    tree.links.new(render, node.inputs["Render"])
+    tree.links.new(node.outputs[0], shown)
+    return node
+
+
+def _connect_plate(
+    tree: bpy.types.NodeTree, node: bpy.types.Node, smoke: bpy.types.Object, take: Take, tables: dict[str, Any]
+) -> None:
+    """Feed the plate's socket, whose source has our name unless the artist put another there."""
+    background, socket = tables.get("background") or {}, node.inputs["Plate"]
+    name = f"{GROUP} Plate"
+    if socket.links and tree.nodes.get(name) is None:
+        return
+    if "image" not in background:
+        if tree.nodes.get(name) is not None:
+            tree.nodes.remove(tree.nodes[name])
+        socket.default_value = (*background.get("color", (0.0, 0.0, 0.0)), 1.0)
+        return
+    source = tree.nodes.get(name)
+    if source is None:
+        source = _source(tree, "CompositorNodeImage", name, node, -300.0, socket)
+    source.image = plate_image(take, background["image"])
+    play_beside(source.image, source, smoke.smokelift.clip, "matrices" in tables["camera"])
+
+
+def _connect_clip(tree: bpy.types.NodeTree, node: bpy.types.Node, clip: bpy.types.MovieClip) -> None:
+    name, socket = f"{GROUP} Clip", node.inputs["Clip"]
+    source = tree.nodes.get(name)
+    if source is None:
+        if socket.links:
+            return
+        source = _source(tree, "CompositorNodeMovieClip", name, node, -600.0, socket)
+    source.clip = clip
+
+
+def _source(
+    tree: bpy.types.NodeTree, kind: str, name: str, node: bpy.types.Node, down: float, socket: bpy.types.NodeSocket
+) -> bpy.types.Node:
+    """A node of pictures that feeds a socket of ours."""
+    source = tree.nodes.new(kind)
+    source.name = source.label = name
+    source.location = node.location + Vector((-300.0, down))
+    tree.links.new(source.outputs["Image"], socket)
+    return source
+
+
+def _group() -> bpy.types.NodeTree:
+    """The node group: the file's own, which the artist may have changed, else a new one."""
+    for known in bpy.data.node_groups:
+        if known.library is None and known.get(MARK):
+            return known
+    tree = bpy.data.node_groups.new(GROUP, "CompositorNodeTree")
+    tree[MARK] = True
+    for name, kind, default, description in (
+        ("Render", "NodeSocketColor", (0.0, 0.0, 0.0, 0.0), "The smoke on transparent film"),
+        ("Plate", "NodeSocketColor", (0.0, 0.0, 0.0, 1.0), "What is behind it: the clean plate, or another clip"),
+        ("Clip", "NodeSocketColor", (0.0, 0.0, 0.0, 1.0), "Gives the grain, and what is in front"),
+        ("Foreground", "NodeSocketFloat", 0.0, "Mask of what is in front of the smoke in the clip"),
+        ("Grain", "NodeSocketFloat", 1.0, "Of the clip, added to plate and smoke; 0 is none"),
+    ):
+        socket = tree.interface.new_socket(name, description=description, in_out="INPUT", socket_type=kind)
+        if kind == "NodeSocketFloat":
+            socket.min_value, socket.max_value = 0.0, 1.0 if name == "Foreground" else 10.0
+        socket.default_value = default
+    tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
+    given, output = tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
+    source = given.outputs
+    over = tree.nodes.new("CompositorNodeAlphaOver")
+    below, above = (over.inputs[0], over.inputs[1]) if SINCE_5 else (over.inputs[1], over.inputs[2])
+    plate, clip = _at_render_size(tree, source["Plate"]), _at_render_size(tree, source["Clip"])
+    tree.links.new(plate, below)
+    tree.links.new(source["Render"], above)
+    # the plate has no grain, and the same edges as the clip: what is left of their difference without its blur
+    # is the clip's own grain, frame by frame
+    differs = _mix(tree, "SUBTRACT", 1.0, clip, plate)
+    fine = _mix(tree, "SUBTRACT", 1.0, differs, _blurred(tree, differs))
+    grainy = _mix(tree, "ADD", source["Grain"], over.outputs["Image"], fine)
+    front = _mix(tree, "MIX", source["Foreground"], grainy, clip)
+    tree.links.new(front, output.inputs[0])
+    for place, node in enumerate(tree.nodes):
+        node.location = (0.0, 0.0) if node == given else (220.0 * (len(tree.nodes) if node == output else place), 0.0)
+    return tree
+
+
+def _at_render_size(tree: bpy.types.NodeTree, picture: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
+    node = tree.nodes.new("CompositorNodeScale")
+    if "Type" in node.inputs:  # since 5.0
+        node.inputs["Type"].default_value = "Render Size"
+    else:
+        node.space = "RENDER_SIZE"
+    tree.links.new(picture, node.inputs["Image"])
+    return node.outputs[0]
+
+
+def _mix(tree: bpy.types.NodeTree, blend: str, factor: Any, a: Any, b: Any) -> bpy.types.NodeSocket:
+    """Two pictures in one."""
+    if SINCE_5:
+        node = tree.nodes.new("ShaderNodeMix")
+        node.data_type, node.clamp_factor = "RGBA", False
+        sockets = [
+            next(s for s in node.inputs if s.identifier == name) for name in ("Factor_Float", "A_Color", "B_Color")
+        ]
+        result = next(s for s in node.outputs if s.identifier == "Result_Color")
+    else:
+        node = tree.nodes.new("CompositorNodeMixRGB")
+        sockets, result = list(node.inputs), node.outputs[0]
+    node.blend_type = blend
+    for socket, value in zip(sockets, (factor, a, b), strict=True):
+        if isinstance(value, bpy.types.NodeSocket):
+            tree.links.new(value, socket)
+        else:
+            socket.default_value = value
+    return result
+
+
+def _blurred(tree: bpy.types.NodeTree, picture: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
+    node = tree.nodes.new("CompositorNodeBlur")
+    if "Size" in node.inputs and node.inputs["Size"].type == "VECTOR":  # since 4.5
+        node.inputs["Size"].default_value = [GRAIN_PIXELS] * len(node.inputs["Size"].default_value)
+    else:
+        node.size_x = node.size_y = GRAIN_PIXELS
+    tree.links.new(picture, node.inputs["Image"])
+    return node.outputs[0]

@@ -1,0 +1,46 @@
+"""The clean plate as a picture in Blender, in step with the clip."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from .paths import relative
+from .take import Take
+
+
+def plate_image(take: Take, path: str) -> bpy.types.Image:
+    """The plate of a take, by a path relative to the .blend where there is one."""
+    file = Path(path)
+    file = file if file.is_absolute() else take.directory / file
+    image = bpy.data.images.load(str(file), check_existing=True)
+    if image.filepath != relative(file):
+        image.filepath = relative(file)
+    return image
+
+
+def play_beside(image: bpy.types.Image, user: Any, clip: bpy.types.MovieClip, tracked: bool) -> None:
+    """Keep a plate of many pictures in step with the clip.
+
+    Parameters
+    ----------
+    image
+        The plate.
+    user
+        What says which of its frames is shown: an image user, or a node of the compositor.
+    clip
+        The clip that it belongs to.
+    tracked
+        Whether the camera moves, so that every frame has a plate of its own.
+    """
+    number = re.search(r"(\d+)\.\w+$", image.filepath)
+    if tracked and image.source == "FILE" and number:
+        image.source = "SEQUENCE"
+    if image.source == "FILE":
+        return
+    # Blender counts the images of a sequence by the numbers in their names, and the frames of a video from 1
+    before = int(number[1]) - 1 if number and image.source == "SEQUENCE" else 0
+    user.frame_start, user.frame_duration = clip.frame_start, clip.frame_duration
+    user.frame_offset = before + clip.frame_offset
+    user.use_auto_refresh = True
