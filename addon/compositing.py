@@ -24,14 +24,17 @@ MARK = "smokelift_composite"
 FLOOR = "Smokelift Floor"
 """Name of the plane that catches the shadow."""
 
-FLOOR_WIDTHS = 4.0
-"""Width of that plane over the box's: room for the shadow of a low sun."""
+FLOOR_WIDTHS = 2.0
+"""Width of that plane over the box's: room for the shadow, and little beyond a wall behind the smoke."""
 
 HOLDOUTS = "Smokelift Holdouts"
 """Name of the collection whose objects hide the smoke, and show the plate."""
 
 GRAIN_PIXELS = 4
 """What is finer than this is grain: the blur that separates it (pixels). Sensor noise differs from pixel to pixel."""
+
+LARGEST_DIFFERENCE = 0.05
+"""Between clip and plate, blurred (linear light): beyond it the clip shows smoke, whose detail is no grain."""
 
 SINCE_5 = bpy.app.version >= (5, 0, 0)
 """Blender 5.0 makes the compositor of node groups, and gives it the shaders' Mix node."""
@@ -72,6 +75,8 @@ def _catch_shadow(scene: bpy.types.Scene, smoke: bpy.types.Object, domain: dict[
     middle = Vector(((low.x + high.x) / 2, (low.y + high.y) / 2, low.z))
     plane.matrix_basis = engine_to_world(smoke) @ Matrix.Translation(middle)
     plane.is_shadow_catcher = True
+    # the light that a floor throws back is in what was fitted already
+    plane.visible_volume_scatter = plane.visible_diffuse = plane.visible_shadow = False
     plane.display_type = "WIRE"
     scene.collection.objects.link(plane)
 
@@ -193,8 +198,14 @@ def _group() -> bpy.types.NodeTree:
     # the plate has no grain, and the same edges as the clip: what is left of their difference without its blur
     # is the clip's own grain, frame by frame
     differs = _mix(tree, "SUBTRACT", 1.0, clip, plate)
-    fine = _mix(tree, "SUBTRACT", 1.0, differs, _blurred(tree, differs))
-    grainy = _mix(tree, "ADD", source["Grain"], over.outputs["Image"], fine)
+    blurred = _blurred(tree, differs)
+    fine = _mix(tree, "SUBTRACT", 1.0, differs, blurred)
+    steep = (*[1.0 / LARGEST_DIFFERENCE] * 3, 1.0)
+    ratio = _mix(tree, "MULTIPLY", 1.0, blurred, steep)
+    smoky = _mix(tree, "MULTIPLY", 1.0, ratio, ratio)
+    clear = _mix(tree, "SUBTRACT", 1.0, (1.0, 1.0, 1.0, 1.0), smoky, clamp=True)
+    grain = _mix(tree, "MULTIPLY", 1.0, fine, clear)
+    grainy = _mix(tree, "ADD", source["Grain"], over.outputs["Image"], grain)
     front = _mix(tree, "MIX", source["Foreground"], grainy, clip)
     tree.links.new(front, output.inputs[0])
     for place, node in enumerate(tree.nodes):
@@ -212,17 +223,20 @@ def _at_render_size(tree: bpy.types.NodeTree, picture: bpy.types.NodeSocket) -> 
     return node.outputs[0]
 
 
-def _mix(tree: bpy.types.NodeTree, blend: str, factor: Any, a: Any, b: Any) -> bpy.types.NodeSocket:
-    """Two pictures in one."""
+def _mix(
+    tree: bpy.types.NodeTree, blend: str, factor: Any, a: Any, b: Any, clamp: bool = False
+) -> bpy.types.NodeSocket:
+    """Two pictures in one; from 0 to 1 if it is clamped."""
     if SINCE_5:
         node = tree.nodes.new("ShaderNodeMix")
-        node.data_type, node.clamp_factor = "RGBA", False
+        node.data_type, node.clamp_factor, node.clamp_result = "RGBA", False, clamp
         sockets = [
             next(s for s in node.inputs if s.identifier == name) for name in ("Factor_Float", "A_Color", "B_Color")
         ]
         result = next(s for s in node.outputs if s.identifier == "Result_Color")
     else:
         node = tree.nodes.new("CompositorNodeMixRGB")
+        node.use_clamp = clamp
         sockets, result = list(node.inputs), node.outputs[0]
     node.blend_type = blend
     for socket, value in zip(sockets, (factor, a, b), strict=True):

@@ -87,6 +87,29 @@ def test_grain_is_the_clips(filmed, tmp_path) -> None:
     assert shown(filmed, tmp_path, Foreground=0.0, Grain=2.0).std() > 1.5 * grain.std()
 
 
+def test_smoke_in_the_clip_is_no_grain(filmed, tmp_path) -> None:
+    """Where it was filmed, no ghost of it is left when the smoke in Blender is moved away."""
+    for frame in range(1, 7):
+        clip = np.full((SIZE, SIZE, 3), PLATE, np.float32)
+        clip[8:20, 10:20] = 0.6
+        write_image(tmp_path / f"smoky_{frame:04d}.png", clip)
+    smoke(filmed).smokelift.clip = bpy.data.movieclips.load(str(tmp_path / "smoky_0001.png"))
+    smoke(filmed).hide_render = True
+    ghost = shown(filmed, tmp_path, Grain=1.0) - PLATE
+    assert np.abs(ghost[10:18, 12:18]).max() < 0.005
+    assert np.abs(ghost).max() < 0.25 * (0.6 - PLATE)
+
+
+def test_the_floor_throws_no_light_on_the_smoke(filmed, tmp_path) -> None:
+    """What was fitted to the clip has that already."""
+    bpy.ops.smokelift.set_up()
+    filmed.render.use_compositing, filmed.cycles.samples = False, 64
+    smoke_alone = slice(14, 20), slice(12, 19)
+    with_floor = rendered(filmed, tmp_path / "with.exr")[smoke_alone].mean()
+    filmed.objects[compositing.FLOOR].hide_render = True
+    assert with_floor == pytest.approx(rendered(filmed, tmp_path / "without.exr")[smoke_alone].mean(), rel=0.03)
+
+
 def test_the_clip_is_in_front_where_the_mask_says_so(filmed, tmp_path) -> None:
     """All of it with the whole mask, as the clip's file has it."""
     found = shown(filmed, tmp_path, Foreground=1.0)
