@@ -3,6 +3,7 @@
 What is finished is on the storage and nowhere else, so every part of a batch may be ended and started again.
 """
 
+from smokelift.batch.cluster import run_on_cluster
 from smokelift.batch.local import Room, run_here
 from smokelift.batch.plan import Expected, duration, expected
 from smokelift.batch.record import Frames, Record, finished_frames, is_finished, read_record
@@ -25,5 +26,6 @@ __all__ = [
     "read_record",
     "read_shots",
     "run_here",
+    "run_on_cluster",
     "write_report",
 ]

@@ -15,8 +15,9 @@ from smokelift.batch.shots import Shot
 from smokelift.output.atomic import atomic_path
 from smokelift.output.index import Index, SequenceError
 
-Status = Literal["waiting", "done", "refused", "crashed", "stuck", "cancelled"]
-"""``refused``: the engine says what is wrong; ``stuck``: what passes (a full disk, say) did not pass in time."""
+Status = Literal["waiting", "running", "done", "refused", "crashed", "stuck", "cancelled"]
+"""``running``: or its machine was lost while it ran; ``refused``: the engine says what is wrong; ``stuck``: what passes
+(a full disk, say) did not pass in time."""
 
 
 @dataclass(frozen=True)

@@ -125,6 +125,8 @@ def _try(shot: Shot, stop: threading.Event, engine: Sequence[str]) -> tuple[Reco
         before = read_record(shot)
         if is_finished(shot) or stop.is_set():
             return before, False
+        before = replace(before, status="running", sentence="", runs=before.runs + 1, machine=platform.node())
+        before.write(shot)
         arguments = ["reconstruct", str(shot.input), "--out", str(shot.directory), "--thumbnail", str(shot.picture)]
         ended = run_engine([*arguments, "--resume", *shot.options], stop, shot.log, engine)
         record = replace(
@@ -132,11 +134,9 @@ def _try(shot: Shot, stop: threading.Event, engine: Sequence[str]) -> tuple[Reco
             status=_status(ended),
             sentence=ended.sentence,
             notes=tuple(ended.notes) or before.notes,
-            runs=before.runs + 1,
             seconds=before.seconds + ended.seconds,
             processor_seconds=before.processor_seconds + ended.processor_seconds,
             memory=max(before.memory, ended.memory),
-            machine=platform.node(),
         )
         _keep(record, shot, stop)
         return record, ended.later and ended.status != DONE

@@ -6,8 +6,8 @@ import argparse
 import math
 import os
 import threading
-from collections.abc import Iterator, Sequence
-from contextlib import suppress
+from collections.abc import Generator, Iterator, Sequence
+from contextlib import closing, suppress
 from typing import Any, NoReturn
 
 import psutil
@@ -30,6 +30,7 @@ from smokelift.batch import (
     read_record,
     read_shots,
     run_here,
+    run_on_cluster,
     write_report,
 )
 
@@ -44,6 +45,9 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
     parser.add_argument("--plan", action="store_true", help="only say what is left and how long it takes")
     parser.add_argument(
         "--workers", type=_count, metavar="N", help="shots at a time, at most (default: a processor core each)"
+    )
+    parser.add_argument(
+        "--scheduler", metavar="ADDRESS", help="run on a Dask cluster, as tcp://host:8786 (needs the extra [cluster])"
     )
     parser.set_defaults(run=run)
 
@@ -62,13 +66,14 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     stop = threading.Event()
     workers = options.workers or os.cpu_count() or 1
     try:
-        for shot in open_shots:
-            if known[shot.name][1].forecast is None:
-                say.note(f"{shot.name}: looking at the clip ...")
-            record = look_at_shot(shot, stop)
-            known[shot.name] = shot, record, finished_frames(shot)
-            if record.forecast is None:
-                say.note(f"{shot.name}: {record.sentence}")
+        unknown = [(shot, known[shot.name][1]) for shot in open_shots if known[shot.name][1].forecast is None]
+        if unknown:
+            say.note(f"Looking at {len(unknown)} clips ...")
+        with closing(_looked(options.scheduler, unknown, stop, say)) as looked:
+            for shot, record in looked:
+                known[shot.name] = shot, record, finished_frames(shot)
+                if record.forecast is None:
+                    say.note(f"{shot.name}: {record.sentence}")
         left = expected(known.values())
         for line in _forecast(left, workers):
             say.note(line)
@@ -90,12 +95,12 @@ def _run(
 ) -> None:
     """Run what is left, and keep the report up to date."""
     begin = [(each.shot, known[each.shot.name][1]) for each in left]
-    for shot, record in _ended(begin, workers, stop, say):
-        frames = finished_frames(shot)
-        known[shot.name] = shot, record, frames
-        say.note(f"{shot.name}: {record.status}. {record.sentence}")
-        with suppress(OSError):  # the storage may be full for a while; the next shot brings the page up to date
-            write_report(shot.folder, options.list.stem, list(known.values()))
+    with closing(_ended(options.scheduler, begin, workers, stop, say)) as all_ended:
+        for shot, record in all_ended:
+            known[shot.name] = shot, record, finished_frames(shot)
+            say.note(f"{shot.name}: {record.status}. {record.sentence}")
+            with suppress(OSError):  # the storage may be full for a while; the next shot brings the page up to date
+                write_report(shot.folder, options.list.stem, list(known.values()))
     shots = list(known.values())
     page = write_report(shots[0][0].folder, options.list.stem, shots)
     missing = [shot.name for shot, record, _ in shots if record.status != "done"]
@@ -110,10 +115,27 @@ def _run(
     )
 
 
+def _looked(
+    scheduler: str | None, unknown: Sequence[tuple[Shot, Record]], stop: threading.Event, say: Reporter
+) -> Generator[tuple[Shot, Record], None, None]:
+    """Look at shots, one after the other or on a cluster."""
+    if scheduler is not None:
+        yield from run_on_cluster(unknown, look_at_shot, scheduler, say.note)
+    else:
+        yield from ((shot, look_at_shot(shot, stop)) for shot, _ in unknown)
+
+
 def _ended(
-    begin: Sequence[tuple[Shot, Record]], workers: int, stop: threading.Event, say: Reporter
-) -> Iterator[tuple[Shot, Record]]:
-    """Run shots here and yield each when it has ended."""
+    scheduler: str | None,
+    begin: Sequence[tuple[Shot, Record]],
+    workers: int,
+    stop: threading.Event,
+    say: Reporter,
+) -> Generator[tuple[Shot, Record], None, None]:
+    """Run shots, here or on a cluster, and yield each when it has ended."""
+    if scheduler is not None:
+        yield from run_on_cluster(begin, finish_shot, scheduler, say.note)
+        return
     room = Room(round(MEMORY_SHARE * memory_free()), workers)
     total = psutil.virtual_memory().total
     fitting = []

@@ -1,0 +1,32 @@
+"""Runs shots of the fake engine on a cluster, and says of each how it ended: a line a shot.
+
+In a process of its own, because a client that lost its scheduler leaves sockets behind, of which pytest complains.
+"""
+
+import functools
+import sys
+from pathlib import Path
+
+from smokelift.batch import Shot, finish_shot, read_record, run_on_cluster
+from smokelift.batch.work import Patience
+
+FAKE = (sys.executable, "-S", str(Path(__file__).with_name("fake_engine.py")))
+
+
+def main(address: str, folder: Path) -> None:
+    shots = [Shot(path.stem, path, (), folder / "results") for path in sorted(folder.glob("*.task"))]
+    patience = Patience(pause=0.1, longest_pause=0.2, total=60)
+    task = functools.partial(finish_shot, patience=patience, engine=FAKE)
+    print("began", flush=True)
+    ended = run_on_cluster(
+        [(shot, read_record(shot)) for shot in shots], task, address, functools.partial(print, flush=True), pause=0.2
+    )
+    try:
+        for shot, record in ended:
+            print(shot.name, record.status, flush=True)
+    except KeyboardInterrupt:
+        print("cancelled", flush=True)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], Path(sys.argv[2]))

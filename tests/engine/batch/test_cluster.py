@@ -1,0 +1,134 @@
+"""A batch on a cluster of several processes: nothing lost and nothing done twice, whatever of it is lost."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+import smokelift
+from smokelift.batch import run_on_cluster
+from smokelift.batch.cluster import ClusterError
+
+needs_dask = pytest.mark.skipif(
+    importlib.util.find_spec("distributed") is None, reason="Dask distributed is not installed"
+)
+posix = pytest.mark.skipif(os.name == "nt", reason="processes are killed by signals")
+
+ENVIRONMENT = {
+    **os.environ,
+    "PYTHONPATH": os.pathsep.join([str(Path(smokelift.__file__).parents[1]), os.environ.get("PYTHONPATH", "")]),
+    "DASK_DISTRIBUTED__COMM__RETRY__COUNT": "0",
+}
+SECONDS = 60.0
+
+
+class Cluster:
+    """A scheduler and its workers, each a process."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            self.port = free.getsockname()[1]
+        self.address = f"tcp://127.0.0.1:{self.port}"
+        self.processes: list[subprocess.Popen[str]] = []
+
+    def scheduler(self) -> subprocess.Popen[str]:
+        return self._start("distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", str(self.port))
+
+    def worker(self) -> subprocess.Popen[str]:
+        options = ("--nthreads", "1", "--no-nanny", "--memory-limit", "0", "--local-directory", str(self.folder))
+        return self._start("distributed.cli.dask_worker", self.address, *options)
+
+    def drive(self) -> subprocess.Popen[str]:
+        return self._process(str(Path(__file__).with_name("cluster_driver.py")), self.address, str(self.folder))
+
+    def close(self) -> None:
+        for process in self.processes:
+            process.kill()
+            process.communicate()
+
+    def _start(self, module: str, *options: str) -> subprocess.Popen[str]:
+        return self._process("-m", module, *options, "--no-dashboard")
+
+    def _process(self, *words: str) -> subprocess.Popen[str]:
+        with (self.folder / "cluster.log").open("a") as log:
+            process = subprocess.Popen(
+                [sys.executable, *words], env=ENVIRONMENT, stdout=subprocess.PIPE, stderr=log, text=True
+            )
+        self.processes.append(process)
+        return process
+
+
+@pytest.fixture
+def cluster(tmp_path: Path) -> Iterator[Cluster]:
+    made = Cluster(tmp_path)
+    yield made
+    made.close()
+
+
+def until(true: Callable[[], object]) -> None:
+    """Wait for something to become true."""
+    end = time.monotonic() + SECONDS
+    while not true():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+@needs_dask
+@posix
+def test_what_is_lost_of_a_cluster_loses_nothing_and_repeats_nothing(cluster, make_shot, tmp_path, ledger) -> None:
+    """A worker and the scheduler are killed while shots run, and the storage is full for a while."""
+    full = tmp_path / "full"
+    full.touch()
+    shots = [make_shot(f"shot{n}", frames=12, seconds=0.1, n9=str(full), n4="crash") for n in range(3)]
+
+    def frames() -> int:
+        return sum(len(ledger(shot)) for shot in shots if (shot.folder / f"{shot.name}.ledger").exists())
+
+    scheduler, first, second = cluster.scheduler(), cluster.worker(), cluster.worker()
+    driver = cluster.drive()
+    until(lambda: frames() >= 5)
+    first.kill()
+    until(lambda: frames() >= 10)
+    scheduler.kill()
+    second.wait(SECONDS)  # a worker ends without its scheduler, and its shot with it
+    cluster.scheduler(), cluster.worker(), cluster.worker()
+    until(lambda: frames() >= 16)
+    full.unlink()
+    said, _ = driver.communicate(timeout=SECONDS)
+    assert sorted(line for line in said.splitlines() if line.startswith("shot")) == [f"shot{n} done" for n in range(3)]
+    assert "went away; waiting for it to return" in said
+    assert [ledger(shot) for shot in shots] == [list(range(1, 13))] * 3
+
+
+@needs_dask
+@posix
+def test_a_cancelled_batch_ends_on_its_workers(cluster, make_shot, ledger) -> None:
+    shot, waiting = (make_shot(name, frames=1000, seconds=0.02) for name in ("running", "waiting"))
+    cluster.scheduler(), cluster.worker()
+    driver = cluster.drive()
+    until((shot.folder / "running.ledger").exists)
+    driver.send_signal(signal.SIGINT)
+    said, _ = driver.communicate(timeout=SECONDS)
+    assert said.splitlines()[-1] == "cancelled"
+    until(lambda: not list(shot.folder.glob(".*.lock")))
+    there = len(ledger(shot))
+    time.sleep(0.2)
+    assert len(ledger(shot)) == there < 1000
+    assert not (waiting.folder / "waiting.ledger").exists()
+
+
+def test_a_cluster_that_is_not_there_is_said(make_shot, monkeypatch) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(ClusterError, match=r"--scheduler needs Dask: pip install 'smokelift\[cluster\]'"):
+        list(run_on_cluster([(make_shot(), None)], lambda shot, stop: None, "tcp://127.0.0.1:1", print))
