@@ -23,7 +23,7 @@ td, th { padding: .4em 1.2em .4em 0; vertical-align: top }
 td.number { text-align: right; white-space: nowrap }
 tr { border-top: 1px solid #333 }
 table { border-collapse: collapse }
-img { max-width: 22em; max-height: 14em }
+img { height: 12em; max-width: 24em; object-fit: contain }
 .said { max-width: 36em; color: #a5a5a5 }
 .refused, .crashed, .stuck { color: #ffaa46 }
 .done { color: #8fd18f }

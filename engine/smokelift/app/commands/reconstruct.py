@@ -80,7 +80,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
             f"clip's noise, so all frames in {options.out} are empty. Give a clean plate ([background] in a scene "
             "file, Clean Plate in Blender), or check the one that is given."
         )
-    for note in _shortcomings(figures, empty):
+    for note in shortcomings(figures, empty):
         say.note(note)
     seconds = time.monotonic() - began
     say.finish(
@@ -89,7 +89,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     )
 
 
-def _shortcomings(figures: Rows[Mapping[str, Any]], empty: int) -> list[str]:
+def shortcomings(figures: Rows[Mapping[str, Any]], empty: int) -> list[str]:
     """What the figures of a finished run say against it, a sentence each."""
     said = []
     if empty:

@@ -1,0 +1,43 @@
+"""``smokelift check``: whether a sequence is whole."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from smokelift.app.commands.reconstruct import shortcomings
+from smokelift.app.options import named_path
+from smokelift.app.progress import Reporter
+from smokelift.output.sequence import Sequence
+
+
+def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
+    """Add the command."""
+    parser = commands.add_parser("check", parents=[common], help="whether a sequence is complete and undamaged")
+    parser.add_argument("directory", type=named_path, help="of the sequence")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace, say: Reporter) -> None:
+    """Look at every file.
+
+    Raises
+    ------
+    ValueError
+        If frames are missing or damaged, or no frame shows smoke.
+    """
+    sequence = Sequence.open(options.directory)
+    if not sequence.complete:
+        count = len(sequence.frames)
+        raise ValueError(f"{options.directory}: has {count} finished frames and is no complete run; --resume goes on.")
+    for number in sequence.frames:
+        if not sequence.files(number):
+            raise ValueError(f"{options.directory}: the file of frame {number} is missing.")
+    figures = [sequence.figures(number) for number in sequence.frames]
+    empty = sum(not (of_frame.get("hull_share") or 0) > 0 for of_frame in figures)
+    if empty == len(figures):
+        raise ValueError(f"{options.directory}: no frame shows smoke.")
+    for note in shortcomings(figures, empty):
+        say.note(note)
+    count = len(sequence.frames)
+    say.finish(f"{count} frames in {options.directory} are as they were written.", {"frames": count, "empty": empty})

@@ -1,0 +1,109 @@
+"""The Flamenco job type: its script in a model of the Manager, and its commands run for real."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import smokelift
+from smokelift.output.sequence import Sequence
+
+FOLDER = Path(__file__).resolve().parents[2] / "integrations" / "flamenco"
+MODEL = Path(__file__).with_name("flamenco_model.js")
+EXAMPLE = FOLDER.parents[1] / "examples" / "plume" / "scene.toml"
+ENVIRONMENT = {
+    **os.environ,
+    "PYTHONPATH": os.pathsep.join([str(Path(smokelift.__file__).parents[1]), os.environ.get("PYTHONPATH", "")]),
+}
+NODE = shutil.which("node")
+
+pytestmark = pytest.mark.skipif(NODE is None, reason="Node is not installed")
+
+# What `blender --background ... --python SCRIPT -- ...` does, by the bpy module.
+BLENDER = """
+import runpy, sys
+words = sys.argv
+assert words[1:3] == ["--background", "--factory-startup"]
+runpy.run_path(words[words.index("--python") + 1], run_name="__main__")
+"""
+
+
+def compiled(**settings: Any) -> dict[str, Any]:
+    """The job type's settings, and the tasks of a job in an order in which they can run."""
+    job = json.dumps({"name": "a job", "settings": settings})
+    done = subprocess.run(
+        [str(NODE), str(MODEL), str(FOLDER / "smokelift.js")], input=job, capture_output=True, text=True, check=False
+    )
+    if done.returncode:
+        raise ValueError(done.stderr)
+    return json.loads(done.stdout)
+
+
+def run(task: dict[str, Any]) -> subprocess.CompletedProcess[str]:
+    """Run a task's command as a worker does."""
+    (command,) = task["commands"]
+    variables = {"{smokelift}": ["-m", "smokelift"], "{blender}": ["-c", BLENDER]}
+    words = [sys.executable, *variables[command["parameters"]["exe"]], *command["parameters"]["args"]]
+    return subprocess.run(words, env=ENVIRONMENT, capture_output=True, text=True, check=False)
+
+
+def test_a_job_is_reconstruct_then_check() -> None:
+    tasks = compiled(input="/clips/a b.mp4", output="/out/a", frames="3:9", quality="draft")["tasks"]
+    assert [(task["name"], task["type"], task["dependencies"]) for task in tasks] == [
+        ("reconstruct", "misc", []),
+        ("check", "misc", ["reconstruct"]),
+    ]
+    assert tasks[0]["commands"][0]["parameters"]["args"][:4] == ["reconstruct", "/clips/a b.mp4", "--out", "/out/a"]
+    assert tasks[0]["commands"][0]["parameters"]["args"][-3:] == ["--frames", "3:9", "--resume"]
+
+
+def test_a_preview_waits_for_the_check_and_lies_beside_the_sequence() -> None:
+    preview = compiled(input="/a.mp4", output="/out/a", preview_script="/s/cycles_preview.py")["tasks"][-1]
+    assert (preview["name"], preview["type"], preview["dependencies"]) == ("preview", "blender", ["check"])
+    assert "/out/a_preview" in preview["commands"][0]["parameters"]["args"]
+
+
+@pytest.mark.parametrize("settings", [{"input": "a.mp4"}, {"input": "a.mp4", "output": "a", "quality": "best"}])
+def test_the_model_refuses_what_the_manager_refuses(settings) -> None:
+    with pytest.raises(ValueError, match=r"output is required|quality is none of"):
+        compiled(**settings)
+
+
+def test_the_commands_run(tmp_path) -> None:
+    """A shot of two frames; the check fails before it is finished, and the task that is run again loses nothing."""
+    if importlib.util.find_spec("bpy") is None:
+        pytest.skip("there is no bpy module, and so no OpenVDB and no Cycles")
+    for path in EXAMPLE.parent.glob("*.[mp]*"):
+        shutil.copy(path, tmp_path)
+    scene = tmp_path / "scene.toml"
+    scene.write_text(re.sub(r"resolution = .*", "resolution = [16, 16, 24]", EXAMPLE.read_text()))
+    out = tmp_path / "smoke"
+    job = compiled(
+        input=str(scene),
+        output=str(out),
+        frames="30:31",
+        quality="draft",
+        preview_script=str(FOLDER / "cycles_preview.py"),
+        preview_frames=1,
+        preview_samples=1,
+    )
+    reconstruct, check, preview = job["tasks"]
+    assert run(check).returncode == 2
+    for _ in range(2):
+        done = run(reconstruct)
+        assert done.returncode == 0, done.stderr
+    assert Sequence.open(out).complete
+    done = run(check)
+    assert (done.returncode, done.stdout.splitlines()[-1]) == (0, f"2 frames in {out} are as they were written.")
+    done = run(preview)
+    assert done.returncode == 0, done.stderr
+    assert [path.name for path in (tmp_path / "smoke_preview").iterdir()] == ["frame_0002.png"]
