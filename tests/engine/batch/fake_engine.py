@@ -12,11 +12,15 @@ import threading
 import time
 from pathlib import Path
 
+COMMITTING = threading.Lock()
+"""Held while a frame and its line in the ledger are written, which no end may come between."""
+
 
 def end_with_input():
     while os.read(0, 4096):
         pass
-    os._exit(130)
+    with COMMITTING:
+        os._exit(130)
 
 
 def say(event, **fields):
@@ -51,9 +55,10 @@ def main(words):
         written = {"format": 1, "scene": {}, "settings": {}, "frames": there, "versions": {}}
         aside = out / ".aside.tmp"
         aside.write_text(json.dumps({**written, "complete": number == task["frames"]}))
-        aside.replace(index)
-        with (out.parent / f"{out.name}.ledger").open("a") as ledger:
+        with COMMITTING, (out.parent / f"{out.name}.ledger").open("a") as ledger:
+            aside.replace(index)
             ledger.write(f"{number}\n")
+            ledger.flush()
     return say("done", text="Finished.")
 
 
