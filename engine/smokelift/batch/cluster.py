@@ -8,20 +8,19 @@ of the scheduler, which forgets everything, the shots that are not finished are 
 from __future__ import annotations
 
 import logging
-import threading
 import time
 import uuid
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from smokelift.batch.local import RETRIES
 from smokelift.batch.record import Record, read_record
 from smokelift.batch.shots import Shot
 
-Task = Callable[[Shot, threading.Event], Record]
-"""Work that a worker can import: it gets the shot and what ends it."""
+if TYPE_CHECKING:
+    from smokelift.batch.worker import Task
 
 CONNECT_SECONDS = 30
 """Time for the scheduler to answer."""
@@ -38,14 +37,6 @@ MEMORY = "memory"
 
 class ClusterError(ValueError):
     """A cluster that cannot be used, and why."""
-
-
-class ShotCrashedError(RuntimeError):
-    """The engine ended by itself; Dask tries again, where it likes."""
-
-    def __init__(self, record: Record) -> None:
-        super().__init__(record)
-        self.record = record
 
 
 class _SchedulerLostError(Exception):
@@ -121,12 +112,15 @@ def _submitted(
     """Give shots to a scheduler and yield each when it has ended; `_SchedulerLostError` if it forgets them."""
     from distributed import KilledWorker, as_completed
 
+    from smokelift.batch import worker
+
+    client.register_plugin(worker.EndShots())
     by_memory = bool(client.run_on_scheduler(_workers_have_memory))
     of = {}
     for shot, record in shots:
         needed = {MEMORY: record.forecast.memory} if by_memory and record.forecast is not None else None
         key = f"smokelift-{shot.name}-{uuid.uuid4().hex}"
-        future = client.submit(_work, shot, task, batch, key=key, retries=RETRIES, pure=False, resources=needed)
+        future = client.submit(worker.work, shot, task, batch, key=key, retries=RETRIES, pure=False, resources=needed)
         of[future] = shot
     try:
         for future in as_completed(list(of), loop=client.loop):
@@ -136,7 +130,7 @@ def _submitted(
             error = future.exception()
             if error is None:
                 yield shot, future.result()
-            elif isinstance(error, ShotCrashedError):
+            elif isinstance(error, worker.ShotCrashedError):
                 yield shot, error.record
             elif isinstance(error, KilledWorker):
                 sentence = "The workers that had this shot were lost, one after the other; is there too little memory?"
@@ -151,26 +145,12 @@ def _submitted(
 
 def _stop(client: Any, futures: Sequence[Any], batch: str) -> None:
     """End the tasks that wait, and then those that run, which Dask cannot."""
+    from smokelift.batch import worker
+
     with suppress(Exception):  # without a scheduler there is nobody to tell; the workers end their tasks then
         client.cancel(futures)
-        client.run(_stop_here, batch)
-
-
-_STOPS: dict[str, threading.Event] = {}
-"""What ends the shots that this process works on, by batch."""
-
-
-def _stop_here(batch: str) -> None:
-    _STOPS.setdefault(batch, threading.Event()).set()
-
-
-def _work(shot: Shot, task: Task, batch: str) -> Record:
-    """Work on a shot in a worker."""
-    record = task(shot, _STOPS.setdefault(batch, threading.Event()))
-    if record.status == "crashed":
-        raise ShotCrashedError(record)
-    return record
+        client.run(worker.stop_batch, batch)
 
 
 def _workers_have_memory(dask_scheduler: Any) -> bool:
-    return any(MEMORY in worker.resources for worker in dask_scheduler.workers.values())
+    return any(MEMORY in each.resources for each in dask_scheduler.workers.values())

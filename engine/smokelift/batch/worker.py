@@ -1,0 +1,65 @@
+"""What a worker of a Dask cluster does with a shot; needs Dask."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import Any
+
+from distributed import Reschedule, WorkerPlugin
+
+from smokelift.batch.record import Record
+from smokelift.batch.shots import Shot
+
+Task = Callable[[Shot, threading.Event], Record]
+"""Work that a worker can import: it gets the shot and what ends it."""
+
+_STOPS: dict[str, threading.Event] = {}
+"""What ends the shots that this process works on, by batch."""
+
+_CLOSING = threading.Event()
+"""Whether this worker ends."""
+
+
+class ShotCrashedError(RuntimeError):
+    """The engine ended by itself; Dask tries again, where it likes."""
+
+    def __init__(self, record: Record) -> None:
+        super().__init__(record)
+        self.record = record
+
+
+class EndShots(WorkerPlugin):  # type: ignore[misc]  # Dask is not followed
+    """Ends the shots of a worker that ends: Dask would wait for them, and give them up only then."""
+
+    name = "smokelift-end-shots"
+    idempotent = True
+
+    def teardown(self, worker: Any) -> None:
+        """Called by Dask."""
+        _CLOSING.set()
+        for stop in list(_STOPS.values()):
+            stop.set()
+
+
+def work(shot: Shot, task: Task, batch: str) -> Record:
+    """Work on a shot.
+
+    Raises
+    ------
+    ShotCrashedError
+        If the engine ended by itself.
+    Reschedule
+        If the worker ends before the shot does.
+    """
+    record = task(shot, _STOPS.setdefault(batch, threading.Event()))
+    if record.status == "cancelled" and _CLOSING.is_set():
+        raise Reschedule
+    if record.status == "crashed":
+        raise ShotCrashedError(record)
+    return record
+
+
+def stop_batch(batch: str) -> None:
+    """End the shots of a batch that this worker works on, and take no more."""
+    _STOPS.setdefault(batch, threading.Event()).set()
