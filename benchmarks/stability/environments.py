@@ -63,14 +63,14 @@ Environment = Callable[[Path, np.random.Generator], AbstractContextManager[Failu
 @contextmanager
 def full_disk(out: Path, random: np.random.Generator) -> Iterator[Failure]:
     """The folder is a file system of too few bytes."""
-    with _file_system(out, f"size={4 * random.integers(1, 110)}k") as remount:
+    with file_system(out, f"size={4 * random.integers(1, 110)}k") as remount:
         yield Failure(mend=lambda: remount("size=64m"))
 
 
 @contextmanager
 def no_inodes(out: Path, random: np.random.Generator) -> Iterator[Failure]:
     """The folder is a file system of too few files."""
-    with _file_system(out, f"nr_inodes={random.integers(2, 12)}") as remount:
+    with file_system(out, f"nr_inodes={random.integers(2, 12)}") as remount:
         yield Failure(mend=lambda: remount("nr_inodes=1000"))
 
 
@@ -209,7 +209,7 @@ def lacking(name: str, folder: Path) -> str:
 
 
 @contextmanager
-def _file_system(out: Path, options: str) -> Iterator[Callable[[str], None]]:
+def file_system(out: Path, options: str) -> Iterator[Callable[[str], None]]:
     """A file system in memory with these options; it is given others by what this yields."""
     out.mkdir()
 

@@ -1,0 +1,1 @@
+"""A batch on a cluster whose parts are killed while it runs."""
