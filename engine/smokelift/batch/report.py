@@ -60,7 +60,10 @@ def _row(shot: Shot, record: Record, frames: Frames) -> str:
     named = (
         f"<b>{html.escape(shot.name)}</b><br>{html.escape(shot.input.name)}<br>{html.escape(' '.join(shot.options))}"
     )
-    said = "".join(f"<p>{html.escape(text)}</p>" for text in (record.sentence, *record.notes) if text)
+    said = html.escape(record.sentence)
+    if record.notes:
+        notes = "".join(f"<p>{html.escape(note)}</p>" for note in record.notes)
+        said += f"<details><summary>{len(record.notes)} notes</summary>{notes}</details>"
     return (
         f"<tr><td>{_picture(shot.picture)}</td><td>{named}</td>"
         f'<td class="{record.status}">{record.status}</td>'
