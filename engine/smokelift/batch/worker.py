@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import platform
 import threading
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 from distributed import Reschedule, WorkerPlugin
 
-from smokelift.batch.record import Record
+from smokelift.batch.record import Record, read_record
 from smokelift.batch.shots import Shot
 
 Task = Callable[[Shot, threading.Event], Record]
@@ -52,7 +54,10 @@ def work(shot: Shot, task: Task, batch: str) -> Record:
     Reschedule
         If the worker ends before the shot does.
     """
-    record = task(shot, _STOPS.setdefault(batch, threading.Event()))
+    try:
+        record = task(shot, _STOPS.setdefault(batch, threading.Event()))
+    except OSError as error:  # to the batch that would look like a lost connection
+        return replace(read_record(shot), status="stuck", sentence=f"{platform.node()}: {error}")
     if record.status == "cancelled" and _CLOSING.is_set():
         raise Reschedule
     if record.status == "crashed":
