@@ -44,9 +44,9 @@ def test_noise_is_smoothed_as_far_as_that_helps() -> None:
 
 
 def test_faint_smoke_is_seen_in_noise(tmp_path: Path) -> None:
-    """A veil of 20 codes in noise of 25, before a wall that is given."""
+    """A veil too faint for the noise of single pixels, before a wall that is given."""
     rows, columns = np.mgrid[:HEIGHT, :WIDTH]
-    veil = np.where(np.hypot(rows - 36, columns - 28) < 16, 0.15, 0.0)
+    veil = np.where(np.hypot(rows - 36, columns - 28) < 16, 0.09, 0.0)
     truth = wall(0.2, 0.3)
     clip = film(tmp_path, truth, lambda n: veil, 0.6, 25.0)
     found = matte(clip.frame(5), known_plate(truth, clip)).mask
