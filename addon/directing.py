@@ -113,8 +113,8 @@ def _effects(smoke: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[l
 
 def _world_to_smoke(smoke: bpy.types.Object) -> Matrix:
     """From the world to the smoke's own space, without what its position corrects for Cycles."""
-    corrected = Matrix.Translation(smoke.delta_location) @ smoke.matrix_basis
-    return (smoke.matrix_world @ corrected.inverted() @ smoke.matrix_basis).inverted()
+    basis = smoke.matrix_basis  # with the correction
+    return (smoke.matrix_world @ basis.inverted() @ Matrix.Translation(-smoke.delta_location) @ basis).inverted()
 
 
 def _triangles(obj: bpy.types.Object, matrix: Matrix) -> npt.NDArray[np.float64]:

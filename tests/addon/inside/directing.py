@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import bpy
 import numpy as np
 import pytest
+from mathutils import Matrix
 
 from addon import direct_panel, directing, run, volume
 from addon.scene_file import ShotError
@@ -153,8 +154,8 @@ def test_the_smokes_own_space_counts(result, acting, tmp_path) -> None:
     before, options = (part for part in directing.request(result)[:0:-1])
     result.location, result.scale, result.rotation_euler = (3.0, 1.0, -2.0), (2.0, 2.0, 2.0), (0.0, 0.0, 1.2)
     bpy.context.view_layer.update()
-    moved = result.matrix_basis @ obj.matrix_basis
-    obj.matrix_basis, fan.matrix_basis = moved, result.matrix_basis @ fan.matrix_basis
+    there = Matrix.Translation(result.location) @ result.rotation_euler.to_matrix().to_4x4() @ Matrix.Scale(2.0, 4)
+    obj.matrix_basis, fan.matrix_basis = there @ obj.matrix_basis, there @ fan.matrix_basis
     after, found = (part for part in directing.request(result)[:0:-1])
     np.testing.assert_array_equal(solid(after, tmp_path), solid(before, tmp_path))
     # one metre in the scene is half a metre of the smoke's own
