@@ -15,7 +15,7 @@ from addon import direct_panel, directing, run, volume
 from addon.scene_file import ShotError
 from addon.smoke import activate, smokes
 from addon.take import Take, takes
-from smokelift.direct import Box, Mesh
+from smokelift.direct import Box, Continuation, Mesh, continue_sequence, open_source
 from smokelift.output.sequence import Sequence
 from tests.addon.inside.panel import LETTERS, drawn
 from tests.engine.direct.rising import DOMAIN, write_plume
@@ -241,6 +241,21 @@ def test_a_loop_repeats_and_slow_motion_lasts(result, tmp_path) -> None:
     assert result.data.frame_duration == 2 * FRAMES - 1
     assert result.data.velocity_scale == 1.0  # its files hold the velocity that is seen
     assert [take.title() for take in takes(tmp_path / "out")] == ["Take 1", "Loop 2", "Retimed 3"]
+
+
+def test_a_stopped_run_is_resumed_after_its_project_was_moved(result, tmp_path) -> None:
+    """The other take lies beside it."""
+    result.smokelift.directing.frames = 3
+    take = run.write_directed(result)
+    written = continue_sequence(open_source(take.source().directory), take.directory, Continuation(3))
+    assert [next(written)[0] for _ in range(FRAMES + 1)][-1] == FRAMES + 1
+    written.close()
+    (tmp_path / "out").rename(tmp_path / "moved")
+    result.smokelift.output = str(tmp_path / "moved")
+    assert bpy.ops.smokelift.resume() == {"FINISHED"}
+    (row,) = bpy.context.window_manager.smokelift.jobs
+    assert (row.outcome, row.done) == ("done", FRAMES + 3), row.sentence
+    assert volume.shown_take(result) == Take(tmp_path / "moved" / "take_0002")
 
 
 def test_a_run_that_fails_leaves_the_result_on_show(result, acting, tmp_path) -> None:

@@ -289,6 +289,31 @@ def test_going_on_with_what_was_stopped(shot, tmp_path) -> None:
         bpy.ops.smokelift.resume()
 
 
+def test_going_on_after_the_project_was_moved(shot, tmp_path) -> None:
+    """Clip, plate, .blend and results lie in another folder than when the run began."""
+    project = tmp_path / "project"
+    shutil.copytree(EXAMPLE, project)
+    settings = smoke(shot).smokelift
+    settings.clip, settings.plate = bpy.data.movieclips.load(str(project / "clip.mp4")), str(project / "plate.png")
+    settings.first, settings.last, settings.longest_side = FIRST, FIRST + 1, 32
+    bpy.ops.wm.save_as_mainfile(filepath=str(project / "shot.blend"))
+    bpy.ops.file.make_paths_relative()
+    settings.plate = "//plate.png"
+    take = run.write_take(smoke(shot))
+    stopped = Scene.load(take.scene_file)
+    with Clip.open(stopped.clip) as clip:
+        frames = smokelift.reconstruct(clip, stopped, Settings.preset("draft"), take.directory)
+        next(frames)
+        frames.close()
+    bpy.ops.wm.save_mainfile()
+    moved = project.rename(tmp_path / "moved")
+    quietly(lambda: bpy.ops.wm.open_mainfile(filepath=str(moved / "shot.blend")))
+    assert bpy.ops.smokelift.resume() == {"FINISHED"}
+    (row,) = bpy.context.window_manager.smokelift.jobs
+    assert (row.outcome, row.done) == ("done", 2), row.sentence
+    assert volume.shown_take(smoke(bpy.context.scene)).directory.is_relative_to(moved)
+
+
 def test_scenes_have_their_own_smoke(shot, tmp_path) -> None:
     """Each with its own takes and its own volume."""
     make(shot, tmp_path / "one")
