@@ -42,7 +42,7 @@ def request(smoke: bpy.types.Object) -> tuple[str, list[str], bytes]:
     settings = smoke.smokelift.directing
     numbers = volume.shown_numbers(smoke)
     if len(numbers) < SHORTEST:
-        raise ShotError(f"The smoke has {len(numbers)} frames, and {SHORTEST} are needed to see how it moves.")
+        raise ShotError(f"{SHORTEST} frames at least are needed to see how smoke moves: make the result longer first.")
     if settings.direction == "retime":
         return "retime", ["--speed", *map(_word, settings.speeds())], b""
     if settings.direction == "loop":
