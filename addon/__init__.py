@@ -4,7 +4,8 @@ The library knows nothing of Blender: `take` is the files of a run, `job` the en
 scene file, `pace` a speed ramp, `contract` what the add-on repeats of the engine. `smoke` finds the objects that hold
 the settings. `scene_file` (Blender scene to scene file), `volume` (sequence to Volume object), `look` (its material),
 `directing` (what acts on the smoke after its clip), `shot_setup` (camera, world and light that match the clip) and
-`compositing` (smoke over the clip), both with the clean `plate`, translate to Blender's data and back. The interface is
+`compositing` (smoke over the clip), both with the clean `plate`, and
+`undistort` (the clip without its lens's distortion) translate to Blender's data and back. The interface is
 thin: `properties`, `panel` with its sub-panels `look_panel`, `setup_panel` and `direct_panel`, and `operators`; `run`
 keeps the queue; `batch` is the command line.
 """
@@ -26,7 +27,20 @@ def unregister() -> None:
 
 def _modules() -> tuple[ModuleType, ...]:
     """Those with something to register, each after those it needs; panels in the order of the tab."""
-    from . import batch, direct_panel, look, look_panel, operators, panel, properties, run, setup_panel, smoke, volume
+    from . import (
+        batch,
+        direct_panel,
+        look,
+        look_panel,
+        operators,
+        panel,
+        properties,
+        run,
+        setup_panel,
+        smoke,
+        undistort,
+        volume,
+    )
 
     panels = (panel, look_panel, setup_panel, direct_panel)
-    return (properties, smoke, look, volume, run, operators, *panels, batch)
+    return (properties, smoke, look, volume, run, operators, undistort, *panels, batch)

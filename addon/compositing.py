@@ -55,7 +55,7 @@ def composite(smoke: bpy.types.Object, take: Take, index: dict[str, Any]) -> Non
     scene.render.film_transparent = True
     _catch_shadow(scene, smoke, index["scene"]["domain"])
     _hold_out(scene)
-    tree, shown = _compositor(scene)
+    tree, shown = compositor(scene)
     node = tree.nodes.get(GROUP)
     if node is None:
         node = _insert(tree, shown)
@@ -91,7 +91,7 @@ def _hold_out(scene: bpy.types.Scene) -> None:
         layer.layer_collection.children[name].holdout = True
 
 
-def _compositor(scene: bpy.types.Scene) -> tuple[bpy.types.NodeTree, bpy.types.NodeSocket]:
+def compositor(scene: bpy.types.Scene) -> tuple[bpy.types.NodeTree, bpy.types.NodeSocket]:
     """The scene's compositor, made if there is none, and the socket of its output."""
     if SINCE_5:
         tree = scene.compositing_node_group

@@ -8,6 +8,7 @@ from . import run, volume
 from .scene_file import box_of, clip_path, frame_rate
 from .smoke import active_smoke, migrate_soon, smokes
 from .take import takes
+from .undistort import is_distorted
 
 POINTS_A_LETTER = 6.5
 """Mean width of a letter in Blender's interface font at scale 1; Blender does not wrap labels."""
@@ -64,6 +65,10 @@ def _draw_clip(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bp
     row = layout.row(align=True)
     row.prop(settings, "first", text="Frames")
     row.prop(settings, "last", text="")
+    if is_distorted(clip):
+        column = layout.column(align=True)
+        _label(column, context, "The clip's lens bends lines; smoke is made for one that does not.", "INFO")
+        column.operator("smokelift.undistort")
     size = (scene.render.resolution_x, scene.render.resolution_y)
     other_rate = clip.source == "MOVIE" and abs(clip.fps - frame_rate(scene)) > 0.01
     if size != tuple(clip.size) or other_rate:

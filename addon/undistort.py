@@ -1,0 +1,108 @@
+"""A clip without its lens's distortion, written by Blender's own Movie Clip nodes.
+
+The engine's camera is a pinhole. Where the clip's lens was calibrated in the Movie Clip Editor, such a camera films the
+undistorted pictures.
+"""
+
+from pathlib import Path
+
+import bpy
+
+from . import run
+from .compositing import SINCE_5, compositor
+from .smoke import active_smoke
+
+COEFFICIENTS = {
+    "POLYNOMIAL": ("k1", "k2", "k3"),
+    "DIVISION": ("division_k1", "division_k2"),
+    "NUKE": ("nuke_k1", "nuke_k2"),
+    "BROWN": ("brown_k1", "brown_k2", "brown_k3", "brown_k4", "brown_p1", "brown_p2"),
+}
+"""Names of a lens's coefficients by its distortion model."""
+
+
+def is_distorted(clip: bpy.types.MovieClip) -> bool:
+    """Whether a clip's lens was calibrated, and bends lines."""
+    lens = clip.tracking.camera
+    return any(getattr(lens, name) != 0.0 for name in COEFFICIENTS.get(lens.distortion_model, ()))
+
+
+def undistorted(clip: bpy.types.MovieClip, folder: Path) -> bpy.types.MovieClip:
+    """Write a clip's undistorted pictures (PNG, 16 bits) into a folder; returns them as a clip of the same frames."""
+    scene = bpy.data.scenes.new("Smokelift Undistort")
+    try:
+        _write(scene, clip, folder)
+    finally:
+        tree = scene.compositing_node_group if SINCE_5 else None
+        bpy.data.objects.remove(scene.camera)
+        bpy.data.scenes.remove(scene)
+        if tree is not None:
+            bpy.data.node_groups.remove(tree)
+    made = bpy.data.movieclips.load(str(folder / f"undistorted_{clip.frame_start:04d}.png"))
+    made.name = f"{clip.name} undistorted"
+    made.frame_start = clip.frame_start
+    for name in ("sensor_width", "focal_length", "pixel_aspect"):
+        setattr(made.tracking.camera, name, getattr(clip.tracking.camera, name))
+    return made
+
+
+def _write(scene: bpy.types.Scene, clip: bpy.types.MovieClip, folder: Path) -> None:
+    render = scene.render
+    scene.camera = bpy.data.objects.new("Smokelift Undistort", bpy.data.cameras.new("Smokelift Undistort"))
+    scene.collection.objects.link(scene.camera)
+    render.resolution_x, render.resolution_y, render.resolution_percentage = *clip.size, 100
+    scene.frame_start, scene.frame_end = clip.frame_start, clip.frame_start + clip.frame_duration - 1
+    scene.view_settings.view_transform = "Standard"
+    render.filepath = str(folder / "undistorted_")
+    picture = render.image_settings
+    picture.file_format, picture.color_mode, picture.color_depth = "PNG", "RGB", "16"
+    tree, shown = compositor(scene)
+    source, lens = tree.nodes.new("CompositorNodeMovieClip"), tree.nodes.new("CompositorNodeMovieDistortion")
+    source.clip = lens.clip = clip
+    if "Type" in lens.inputs:  # since 5.0
+        lens.inputs["Type"].default_value = "Undistort"
+    else:
+        lens.distortion_type = "UNDISTORT"
+    tree.links.new(source.outputs["Image"], lens.inputs["Image"])
+    tree.links.new(lens.outputs["Image"], shown)
+    for node in [node for node in tree.nodes if node.type == "R_LAYERS"]:
+        tree.nodes.remove(node)
+    bpy.ops.render.render(animation=True, scene=scene.name)
+
+
+class SMOKELIFT_OT_undistort(bpy.types.Operator):
+    """Write the clip without its lens's distortion, and use that. Blender waits meanwhile"""
+
+    bl_idname = "smokelift.undistort"
+    bl_label = "Undistort Clip"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        smoke = active_smoke(context.scene)
+        if smoke is None or smoke.smokelift.clip is None or not is_distorted(smoke.smokelift.clip):
+            cls.poll_message_set("The clip's lens has no distortion: calibrate it in the Movie Clip Editor")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        smoke = active_smoke(context.scene)
+        settings = smoke.smokelift
+        if settings.plate_mode == "FILE":
+            self.report({"ERROR"}, "The clean plate is distorted too: choose Background: From the Clip first.")
+            return {"CANCELLED"}
+        clip, kept = settings.clip, {name: getattr(settings, name) for name in ("first", "last", "folder", "fps")}
+        folder = run.output_folder(smoke) / "undistorted"
+        try:
+            settings.clip = undistorted(clip, folder)
+        except RuntimeError:
+            self.report({"ERROR"}, f"{folder} cannot be written to: choose another Output.")
+            return {"CANCELLED"}
+        if clip.source == "MOVIE" and not kept["fps"]:
+            kept["fps"] = clip.fps  # pictures have no rate of their own
+        for name, value in kept.items():
+            setattr(settings, name, value)
+        return {"FINISHED"}
+
+
+register, unregister = bpy.utils.register_classes_factory((SMOKELIFT_OT_undistort,))
