@@ -3,9 +3,10 @@
 # make sanitize       tests of the compiled core with one that checks itself for accesses outside arrays and the like
 # make stability      damaged files and failing systems against the command line; CASES=300 of each kind take an hour
 # make extension      the Blender extension's zips in dist/; ENGINE_WHEELS=DIR adds platforms built elsewhere
+# make manual         the manual in build/manual/index.html; a link that leads nowhere fails
 # make test-blender   that zip in the bpy wheels and in a real Blender
-# All set up what they need in .venv first. Only Python 3.11 to 3.13 and a C++17 compiler are assumed; the last two
-# need Python 3.11 and 3.13 both, because Blender does.
+# All set up what they need in .venv first. Only Python 3.11 to 3.13 and a C++17 compiler are assumed; those of the
+# extension need Python 3.11 and 3.13 both, because Blender does.
 
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
@@ -23,7 +24,7 @@ QUIET_PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 CASES ?= 20
 HAS_VDB = $(shell $(BIN)/python -c 'import importlib.util as u; print("yes" if u.find_spec("bpy") else "")')
 
-.PHONY: demo test pytest lint sanitize stability extension test-blender clean
+.PHONY: demo test pytest lint sanitize stability manual extension test-blender clean
 
 demo: $(VENV)/engine.stamp
 	rm -rf demo/sequence
@@ -60,6 +61,13 @@ $(VENV)/tools.stamp: pyproject.toml
 # Installed as a wheel, not editable: what is tested is what is shipped.
 $(VENV)/engine.stamp: $(VENV)/tools.stamp $(ENGINE_SOURCES)
 	$(QUIET_PIP) '.[vdb]'
+	touch $@
+
+manual: $(VENV)/manual.stamp
+	NO_MKDOCS_2_WARNING=true $(BIN)/mkdocs build --strict
+
+$(VENV)/manual.stamp: $(VENV)/engine.stamp
+	$(QUIET_PIP) --group docs
 	touch $@
 
 extension: dist/extension.stamp

@@ -39,7 +39,7 @@ def run(arguments: Sequence[str], say: Reporter) -> None:
     DeviceError
         If a GPU is asked for and there is none.
     """
-    options = _parser().parse_args(arguments)
+    options = bench_parser().parse_args(arguments)
     chart: Path | None = getattr(options, "chart", None)
     for path in (options.json, chart):
         if path is not None and not path.absolute().parent.is_dir():
@@ -54,7 +54,8 @@ def run(arguments: Sequence[str], say: Reporter) -> None:
     options.run(options, say, save)
 
 
-def _parser() -> argparse.ArgumentParser:
+def bench_parser() -> argparse.ArgumentParser:
+    """Return the parser of the words after ``smokelift bench``."""
     parser = argparse.ArgumentParser(
         prog="smokelift bench", description="Measure speed and error, beside others on the same machine."
     )

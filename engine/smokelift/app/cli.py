@@ -47,7 +47,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             stream.reconfigure(errors="backslashreplace")
     try:
         try:
-            return _run(_parser().parse_args(arguments))
+            return _run(command_parser().parse_args(arguments))
         finally:
             try:
                 sys.stdout.flush()
@@ -112,7 +112,8 @@ def _passes(error: BaseException | None) -> bool:
     return False
 
 
-def _parser() -> argparse.ArgumentParser:
+def command_parser() -> argparse.ArgumentParser:
+    """Return the parser of the whole command line."""
     parser = _Parser(
         prog="smokelift", description="Turn a video of smoke into an OpenVDB sequence of density and velocity."
     )

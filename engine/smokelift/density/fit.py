@@ -190,6 +190,22 @@ def reconstruct_density(
     ValueError
         If a picture is not finite or has another size than its camera, if a camera moves, if the initial density is
         negative, not finite or of another shape than the domain, or if the scene lacks a camera or a domain.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import smokelift
+    >>> scene = smokelift.Scene(
+    ...     camera=smokelift.Camera.look_at((0, -3, 0.5), (0, 0, 0.5), fov_y_degrees=25, size=(24, 24)),
+    ...     domain=smokelift.Domain((-0.5, -0.5, 0), (0.5, 0.5, 1), (16, 16, 16)),
+    ...     lights=(smokelift.DirectionalLight((0, 0.6, -0.8), (3, 3, 3)),),
+    ... )
+    >>> x, y, z = scene.domain.offsets(scene.domain.centre)
+    >>> ball = np.exp(-(x**2 + y**2 + z**2) / 0.04)
+    >>> picture = smokelift.render(ball, scene)
+    >>> density = smokelift.reconstruct_density(picture, scene)
+    >>> bool(smokelift.metrics.psnr(smokelift.render(density.values, scene), picture) > 30)
+    True
     """
     complete = completed(scene)
     optics = scene_optics(complete)

@@ -10,10 +10,15 @@ from smokelift.scene.checks import SceneError, Vector, colour, file_path, set_fi
 
 @dataclass(frozen=True)
 class Background:
-    """What the camera sees behind the smoke: one linear colour, or a picture (a clean plate).
+    """What the camera sees behind the smoke: one colour or a clean plate; with neither it is estimated from the clip.
 
-    A video, or pictures written ``plate_####.png``, is a plate that changes: its frame n is behind the clip's frame
-    n. With neither, the background is estimated from the clip.
+    Attributes
+    ----------
+    color
+        One linear colour.
+    image
+        A clean plate: a picture. A video, or pictures written ``plate_####.png``, is a plate that changes: its frame n
+        is behind the clip's frame n.
     """
 
     color: Vector | None = None

@@ -104,6 +104,13 @@ class Camera:
         ------
         SceneError
             If the points coincide, or ``up`` is parallel to the line of sight.
+
+        Examples
+        --------
+        >>> from smokelift import Camera
+        >>> camera = Camera.look_at((0, -7, 1.5), (0, 0, 1.5), fov_y_degrees=30, size=(256, 384))
+        >>> camera.position
+        (0.0, -7.0, 1.5)
         """
         width, height = picture_size(size)
         focal = focal_length(fov_y_degrees, height)

@@ -45,7 +45,7 @@ class Scene:
     views
         Further cameras and their clips.
     closed
-        Sides of the domain that are walls: smoke and air pass freely through the others. A floor is ``("z-",)``.
+        Sides of the domain that are walls: smoke and air pass freely through the others. A floor is ``"z-"``.
     inlets
         All the places where smoke enters. If there is none, they are estimated.
     scattering

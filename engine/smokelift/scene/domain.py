@@ -33,6 +33,12 @@ class Domain:
     ------
     SceneError
         If the box is empty, or its voxels are not cubes to 0.1 %, too many, too large or too small.
+
+    Examples
+    --------
+    >>> from smokelift import Domain
+    >>> Domain((-1, -1, 0), (1, 1, 3), (64, 64, 96)).voxel_size
+    0.03125
     """
 
     min: Vector

@@ -13,9 +13,18 @@ MOST_DIRECTIONS = 4096
 
 @dataclass(frozen=True)
 class EnvironmentLight:
-    """Light from an equirectangular picture (.exr, .hdr), turned about Z, scaled by ``strength``.
+    """Light from all around, as an equirectangular picture gives it.
 
-    ``directions`` is the number of parallel lights that approximate it; None takes as many as the smoke needs.
+    Attributes
+    ----------
+    image
+        The picture, .exr or .hdr.
+    rotation_degrees
+        By which it is turned about Z.
+    strength
+        Factor of its radiance.
+    directions
+        Parallel lights that approximate it; None takes as many as the smoke needs.
     """
 
     image: Path

@@ -15,7 +15,15 @@ FARTHEST = 1e6
 
 @dataclass(frozen=True)
 class DirectionalLight:
-    """Parallel light; ``direction`` is the direction of travel, ``irradiance`` in W/m^2 per channel."""
+    """Parallel light, as the sun's.
+
+    Attributes
+    ----------
+    direction
+        Of travel: from the light towards the smoke. Its length does not count.
+    irradiance
+        Red, green and blue in W/m^2 on a surface across it.
+    """
 
     direction: Vector
     irradiance: Vector
@@ -44,7 +52,15 @@ class DirectionalLight:
 
 @dataclass(frozen=True)
 class PointLight:
-    """Light from a point; ``intensity`` in W/sr per channel."""
+    """Light from a point.
+
+    Attributes
+    ----------
+    position
+        In metres, outside the box.
+    intensity
+        Red, green and blue in W/sr.
+    """
 
     position: Vector
     intensity: Vector

@@ -65,6 +65,17 @@ def advect(
     The way back is one straight step, whatever its length. For an estimated velocity that is exact, since it is
     the displacement at arrival. A physical path bends, but neither a midpoint step nor two half steps predict baked
     scenes better (docs/experiments/transport-scheme.md).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from smokelift import Velocity, advect
+    >>> faces = np.zeros((9, 8, 8)), np.zeros((8, 9, 8)), np.ones((8, 8, 9))  # 1 m/s upwards
+    >>> wind = Velocity(faces, voxel_size=0.1)
+    >>> smoke = np.zeros((8, 8, 8))
+    >>> smoke[4, 4, 2] = 1
+    >>> float(advect(smoke, wind, dt=0.1)[4, 4, 3])
+    1.0
     """
     if scheme not in ("maccormack", "semi-lagrangian"):
         raise ValueError(f"unknown scheme {scheme!r}: expected 'maccormack' or 'semi-lagrangian'.")

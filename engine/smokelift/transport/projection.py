@@ -34,6 +34,16 @@ def project(velocity: Velocity, closed: Iterable[Side] | None = None) -> Velocit
     ------
     ValueError
         If a side is unknown.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from smokelift import Velocity, project
+    >>> faces = np.zeros((9, 8, 8)), np.zeros((8, 9, 8)), np.zeros((8, 8, 9))
+    >>> faces[2][4, 4, 4] = 1
+    >>> calm = project(Velocity(faces, voxel_size=0.1), closed=["z-"])
+    >>> bool(calm.figures["divergence"] < 1e-5)
+    True
     """
     if closed is not None:
         velocity = replace(velocity, closed=tuple(closed))

@@ -84,6 +84,18 @@ def estimate_velocity(
     ValueError
         If shapes differ, a density is negative or not finite, `dt` or `voxel_size` is not positive, a side is unknown
         or the steps of the primal-dual splitting do not converge.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from smokelift import Domain, estimate_velocity
+    >>> domain = Domain((-0.5, -0.5, 0), (0.5, 0.5, 1), (24, 24, 24))
+    >>> x, y, z = domain.offsets((0, 0, 0.4))
+    >>> before = np.exp(-(x**2 + y**2 + z**2) / 0.02)
+    >>> after = np.roll(before, 1, axis=2)  # a voxel up in a frame
+    >>> velocity = estimate_velocity(before, after, dt=1 / 24, voxel_size=domain.voxel_size)
+    >>> round(float(velocity.centres()[12, 12, 10, 2]), 1)  # m/s
+    1.0
     """
     return CoarseToFine(settings or VelocitySettings()).estimate(
         before, after, dt, voxel_size, closed=closed, inflow=inflow, prediction=prediction
