@@ -73,7 +73,7 @@ def choose_model(
         frame = coarse(number)
         return frame is not None and bool(matte(frame.picture, frame.plate).mask.any())
 
-    numbers = [number for number in _tried(smoky) if shows_smoke(number)]
+    numbers = [number for number in tried_frames(smoky) if shows_smoke(number)]
     frames = [frame for frame in map(coarse, numbers) if frame is not None]
     coarsened = choose_coarsening(scene.domain, settings.velocity, settings.selection.velocity_side)
     velocity = replace(settings.velocity, coarsening=coarsened.chosen)
@@ -131,7 +131,7 @@ def choose_model(
     return Model(lit, replace(velocity, levels=moved.chosen), choices)
 
 
-def _tried(smoky: Sequence[int]) -> tuple[int, ...]:
+def tried_frames(smoky: Sequence[int]) -> tuple[int, ...]:
     """Frames that models are tried on: the one with the most smoke, and one with a middling amount."""
     return tuple(dict.fromkeys((*smoky[:1], *smoky[len(smoky) // 2 : len(smoky) // 2 + 1])))
 

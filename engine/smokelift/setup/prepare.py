@@ -21,12 +21,13 @@ from smokelift.setup.choice import Choice
 from smokelift.setup.further_views import disagreement, open_view
 from smokelift.setup.geometry import clip_lens, find_geometry
 from smokelift.setup.light import ambient_sun, light_colour, richest_scattering
-from smokelift.setup.model import choose_model
+from smokelift.setup.model import choose_model, tried_frames
 from smokelift.setup.place import placed
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot, ShotView
 from smokelift.setup.smoke import sample_smoke
 from smokelift.setup.smoke_colour import smoke_colour
+from smokelift.setup.view_gain import balanced
 
 OPTICAL_DEPTH_AT_ONE = 5.0
 """Optical depth of smoke of density 1 across the domain when the medium is not given: thick, not solid."""
@@ -102,6 +103,12 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
     views = [ShotView(clip, camera, plates, _working(camera, domain))]
     for number in range(len(scene.views)):
         view, said = open_view(number, clip, complete)
+        if settings.selection.measure:
+            shows = tried_frames(samples.smoky)
+            tolerance = settings.selection.scattering_error
+            lit = bool(scene.lights)
+            view, gain = balanced(number + 1, views[0], view, complete, lit, shows, settings.density, tolerance)
+            choices = (*choices, *gain)
         views.append(view)
         notes += said
     shot = Shot(
