@@ -11,6 +11,7 @@ from typing import Any
 
 from smokelift.density.axis import SmokeAxis
 from smokelift.footage.clip import Clip
+from smokelift.footage.fire import fire_share, without_fire
 from smokelift.footage.plate import Plate
 from smokelift.footage.steady import steady
 from smokelift.footage.working_picture import CameraError, WorkingPicture, working_picture
@@ -58,6 +59,10 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
     plates = found.plates
     samples = sample_smoke(clip, plates, found.turns)
     clip = steady(clip, plates)
+    burning = fire_share(samples.colours, samples.behind)
+    if burning:
+        clip = without_fire(clip, plates)
+        samples = replace(sample_smoke(clip, plates, found.turns), exposure=samples.exposure)
     geometry = find_geometry(clip, scene, settings, plates, samples, found.turns)
     camera, domain = geometry.camera, geometry.domain
     doubts = smoke_in_plate(plates, samples)
@@ -65,6 +70,8 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
     if settings.axis_depth is not None:
         SmokeAxis.given(settings.axis_depth, camera, domain)  # refuse early what cannot be
     choices: tuple[Choice[Any], ...] = () if geometry.resolution is None else (geometry.resolution,)
+    if burning:
+        choices += (_fire(burning),)
     medium = scene.medium
     if medium is None:
         usual = _usual_medium(domain)
@@ -160,6 +167,14 @@ def _check(clip: Clip, scene: Scene) -> None:
             f"[camera] matrices are given for {len(scene.camera.matrices)} frames, and {len(clip)} frames of the clip "
             "are used; give one matrix for each."
         )
+
+
+def _fire(share: float) -> Choice[str]:
+    reason = (
+        f"Fire: {share:.1%} of the smoke's pixels shine by themselves. No flame is reconstructed; the smoke beside it "
+        "is continued over it."
+    )
+    return Choice("fire", f"{share:.3f}", reason, {"share": share})
 
 
 def _usual_medium(domain: Domain) -> Medium:

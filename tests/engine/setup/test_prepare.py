@@ -452,3 +452,23 @@ def test_a_camera_that_shakes_is_steadied(draft, tmp_path) -> None:
     np.testing.assert_allclose(where - where.mean(0), (offsets.mean(0) - offsets)[:, ::-1], atol=0.3)
     assert any(note.startswith("The camera moves, by up to") for note in shot.notes)
     assert shot.estimated_background is None
+
+
+def burning(number: int, picture: np.ndarray) -> np.ndarray:
+    """A picture with a small flame where most smoke is."""
+    rows, columns = np.indices(picture.shape[:2])
+    row, column = np.unravel_index(np.argmax(picture.sum(-1)), rows.shape)
+    flame = np.exp(-(((rows - row) / 2) ** 2) - ((columns - column) / 2) ** 2)[..., None]
+    return picture + np.float32((1, 0.4, 0.08)) * flame.astype(np.float32)
+
+
+def test_fire_is_said_and_does_not_light_the_smoke(plume, draft, tmp_path) -> None:
+    """Dark smoke with a flame in it, and the same without one."""
+    dim = replace(plume.scene, lights=(DirectionalLight((0.3, 0.5, -0.8), (0.6, 0.6, 0.6)),))
+    scene = replace(plume.write(tmp_path, plume.densities, dim), lights=())
+    with Clip.open(scene.clip) as clip:
+        without, with_fire = (prepare_shot(each, scene, draft) for each in (clip, clip.changed(burning)))
+    assert not any(choice.what == "fire" for choice in without.choices)
+    (said,) = [choice.reason for choice in with_fire.choices if choice.what == "fire"]
+    assert re.match(r"Fire: \d+\.\d% of the smoke's pixels shine by themselves", said)
+    assert with_fire.optics.unshadowed_source().max() < 3 * without.optics.unshadowed_source().max()

@@ -1,0 +1,70 @@
+"""Fire is told from coloured smoke, and smoke is continued over it."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from smokelift.footage.clip import Clip
+from smokelift.footage.fire import fire_share, without_fire
+from smokelift.footage.plate import known_plate
+from smokelift.output.images import write_image
+
+ROWS, COLUMNS = 48, 64
+FLAME, SMOKE = (1.0, 0.45, 0.08), 0.06
+
+
+def picture(number: int, flame=FLAME, smoke=(SMOKE,) * 3, behind=0.0) -> np.ndarray:
+    """A column of smoke, wavering, with a flame at its base."""
+    y, x = np.mgrid[:ROWS, :COLUMNS]
+    opacity = 0.9 * np.exp(-(((x - 32 - np.sin(number + y / 5)) / 9) ** 2))[..., None]
+    fire = np.exp(-(((x - 32) / 4) ** 2) - ((y - 46) / 8) ** 2)[..., None]
+    return np.asarray(behind * (1 - opacity) + opacity * smoke + 1.5 * fire * flame, np.float32).clip(0, 1)
+
+
+def pixels(**what):
+    """All pixels of a frame that show smoke, and black behind them."""
+    seen = picture(1, **what)
+    seen = seen[seen.max(-1) > 0.01]
+    return seen, np.zeros_like(seen)
+
+
+def test_a_flame_in_dark_smoke_is_fire() -> None:
+    assert 0.01 < fire_share(*pixels()) < 0.3
+
+
+@pytest.mark.parametrize(
+    "what",
+    [
+        {"flame": np.zeros(3)},
+        {"smoke": np.array((0.9, 0.45, 0.1)), "flame": np.zeros(3)},
+        {"smoke": np.array((0.5, 0.5, 0.5))},
+        {"flame": np.ones(3)},
+    ],
+    ids=["no flame", "orange smoke", "bright smoke", "white light"],
+)
+def test_what_is_no_fire(what) -> None:
+    assert fire_share(*pixels(**what)) == 0
+
+
+def test_a_bright_wall_behind_thin_smoke_is_no_fire() -> None:
+    wall = np.broadcast_to(np.float32((0.9, 0.5, 0.2)), (100, 3))
+    colours = np.concatenate([0.9 * wall + 0.006, np.full((50, 3), 0.06, np.float32)])
+    behind = np.concatenate([wall, np.zeros((50, 3), np.float32)])
+    assert fire_share(colours, behind) == 0
+
+
+def test_nothing_is_no_fire() -> None:
+    assert fire_share(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.float32)) == 0
+
+
+def test_smoke_is_continued_over_fire_and_stays_elsewhere(tmp_path: Path) -> None:
+    for number in range(4):
+        write_image(tmp_path / f"frame_{number:03d}.png", picture(number))
+    clip = Clip.open(tmp_path / "frame_###.png", fps=24)
+    dark = without_fire(clip, known_plate(np.zeros(3), clip))
+    seen, before = dark.frame(2), clip.frame(2)
+    assert before[40:, 28:36].max() > 0.9
+    assert seen.max() < 2 * SMOKE
+    assert seen[46, 32].min() > 0.2 * SMOKE
+    np.testing.assert_array_equal(seen[:20], before[:20])
