@@ -7,7 +7,8 @@ the settings. `scene_file` (Blender scene to scene file), `volume` (sequence to 
 `compositing` (smoke over the clip), both with the clean `plate`, and
 `undistort` (the clip without its lens's distortion) translate to Blender's data and back. The interface is
 thin: `properties`, `panel` with its sub-panels `look_panel`, `setup_panel` and `direct_panel`, and `operators`; `run`
-keeps the queue; `batch` is the command line.
+keeps the queue; `export` hands a smoke on; `drop`, `presets` and `preferences` are what Blender calls so; `batch` is
+the command line.
 """
 
 from types import ModuleType
@@ -30,10 +31,14 @@ def _modules() -> tuple[ModuleType, ...]:
     from . import (
         batch,
         direct_panel,
+        drop,
+        export,
         look,
         look_panel,
         operators,
         panel,
+        preferences,
+        presets,
         properties,
         run,
         setup_panel,
@@ -42,5 +47,5 @@ def _modules() -> tuple[ModuleType, ...]:
         volume,
     )
 
-    panels = (panel, look_panel, setup_panel, direct_panel)
-    return (properties, smoke, look, volume, run, operators, undistort, *panels, batch)
+    panels = (panel, look_panel, setup_panel, direct_panel, export)
+    return (preferences, properties, smoke, look, volume, run, operators, undistort, *panels, batch)

@@ -25,7 +25,7 @@ POLL_SECONDS = 0.05
 
 def main(words: Sequence[str]) -> int:
     """Make a smoke of the scene; returns the exit status."""
-    from . import run
+    from . import preferences, run
     from .contract import BAD_INPUT, CANCELLED, DONE
     from .job import EngineMissingError, Job, engine_command
     from .scene_file import ShotError
@@ -41,7 +41,7 @@ def main(words: Sequence[str]) -> int:
         if take is not None:
             run.find_again(smoke, take)
         take = take or run.write_take(smoke)
-        job = Job(engine_command(take.arguments()), take.log_file)
+        job = Job(engine_command(take.arguments() + preferences.thread_options()), take.log_file)
     except (ShotError, TakeError, EngineMissingError) as error:
         print(f"smokelift: {error}", file=sys.stderr, flush=True)
         return BAD_INPUT

@@ -16,6 +16,15 @@ MADE_UP = "made up"
 FRAME_FILE = "smoke_{:04d}.vdb"
 """In a sequence's directory, by frame number from 1."""
 
+EXPORT_FILE = "export.json"
+"""In a folder with an export: what was exported."""
+
+PROXY_FILE = "proxy_{:04d}.vdb"
+"""In a folder with an export, by frame number: the coarser sequence."""
+
+ASSET_FILE = "smoke.blend"
+"""In a folder with an export: the add-on's own file, which the engine leaves alone."""
+
 LONGEST_SIDE = {"draft": 64, "balanced": 96, "fine": 144}
 """Voxels along the box's longest side, at most, by quality."""
 

@@ -4,7 +4,7 @@ import textwrap
 
 import bpy
 
-from . import run, volume
+from . import presets, run, volume
 from .scene_file import box_of, clip_path, frame_rate
 from .smoke import active_smoke, migrate_soon, smokes
 from .take import takes
@@ -19,6 +19,9 @@ class _Main:
     bl_category = "Smokelift"
     bl_region_type = "UI"
 
+    def draw_header_preset(self, context: bpy.types.Context) -> None:
+        presets.draw_header(self.layout, context)
+
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split = True
@@ -27,7 +30,7 @@ class _Main:
         _draw_smokes(layout, context, smoke)
         if smoke is None:
             migrate_soon(context.scene)
-            _label(layout, context, "Choose a video or an image sequence of smoke. If its camera moves, track it.")
+            draw_text(layout, context, "Choose a video or an image sequence of smoke. If its camera moves, track it.")
             return
         settings = smoke.smokelift
         layout.template_ID(settings, "clip", open="clip.open")
@@ -61,7 +64,7 @@ def _draw_clip(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bp
     scene, settings = context.scene, smoke.smokelift
     clip = settings.clip
     if not clip_path(clip).is_file():
-        _label(layout, context, f"{clip_path(clip)} is not there: choose the clip again.", "ERROR")
+        draw_text(layout, context, f"{clip_path(clip)} is not there: choose the clip again.", "ERROR")
     row = layout.row(align=True)
     row.prop(settings, "first", text="Frames")
     row.prop(settings, "last", text="")
@@ -73,7 +76,7 @@ def _draw_clip(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bp
     other_rate = clip.source == "MOVIE" and abs(clip.fps - frame_rate(scene)) > 0.01
     if size != tuple(clip.size) or other_rate:
         column = layout.column(align=True)
-        _label(
+        draw_text(
             column,
             context,
             f"The clip has {clip.size[0]} x {clip.size[1]} pixels at {clip.fps:g} frames a second, "
@@ -106,13 +109,13 @@ def _draw_cost(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bp
         run.check_soon(context)
         return
     if state.check_error:
-        _label(layout, context, state.check_error, "ERROR")
+        draw_text(layout, context, state.check_error, "ERROR")
     elif state.check_done:
         column = layout.column(align=True)
         amounts = f"{state.memory:.1f} GB of memory, up to {size(state.disk)} on disk"
-        _label(column, context, f"About {duration(state.seconds)}, {amounts}", "TIME")
+        draw_text(column, context, f"About {duration(state.seconds)}, {amounts}", "TIME")
         if state.memory > state.memory_free:
-            _label(column, context, f"Only {state.memory_free:.1f} GB are free: choose a lower quality.", "ERROR")
+            draw_text(column, context, f"Only {state.memory_free:.1f} GB are free: choose a lower quality.", "ERROR")
     else:
         layout.label(text="Reading the clip", icon="TIME")
 
@@ -137,10 +140,10 @@ def _draw_run(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy
         data = smoke.data
         last = data.frame_start + data.frame_duration - 1
         if data.sequence_mode == "CLIP" and not data.frame_start <= context.scene.frame_current <= last:
-            _label(layout, context, f"The smoke is seen in frames {data.frame_start} to {last}.", "INFO")
+            draw_text(layout, context, f"The smoke is seen in frames {data.frame_start} to {last}.", "INFO")
         known = volume.provenance_note(smoke)
         if known:
-            _label(layout, context, known, "INFO")
+            draw_text(layout, context, known, "INFO")
         layout.operator("smokelift.vary", icon="MOD_NOISE")
         layout.operator("smokelift.set_up", icon="CAMERA_DATA")
 
@@ -157,12 +160,12 @@ def _draw_job(
     elif row.outcome == "running":
         box.progress(factor=row.done / row.total if row.total else 0.0, text=_progress(row))
     else:
-        _label(box, context, row.sentence, "ERROR" if row.outcome == "failed" else "INFO")
+        draw_text(box, context, row.sentence, "ERROR" if row.outcome == "failed" else "INFO")
     if row.icon:
         box.template_icon(icon_value=row.icon, scale=8.0)
     if row.outcome in run.ENDED:
         for warning in filter(None, row.warnings.split("\n")):
-            _label(box, context, warning, "ERROR")
+            draw_text(box, context, warning, "ERROR")
         box.operator("smokelift.open_log", icon="TEXT").take = row.take
     else:
         box.operator("smokelift.cancel", text="Cancel", icon="CANCEL").take = row.take
@@ -190,7 +193,7 @@ def size(megabytes: float) -> str:
     return f"{megabytes:.0f} MB" if megabytes < 1000.0 else f"{megabytes / 1000.0:.1f} GB"
 
 
-def _label(layout: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str = "NONE") -> None:
+def draw_text(layout: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str = "NONE") -> None:
     """A label, wrapped to the sidebar's width."""
     points = context.region.width / context.preferences.system.ui_scale - (50.0 if icon == "NONE" else 70.0)
     lines = textwrap.wrap(text, max(16, int(points / POINTS_A_LETTER)))
@@ -245,9 +248,9 @@ class _Advanced:
             column.prop(settings, name)
         state = context.window_manager.smokelift
         if state.check_smoke == smoke.session_uid and state.notes:
-            _label(layout, context, "{} x {} x {} voxels. Assumptions and choices:".format(*state.resolution))
+            draw_text(layout, context, "{} x {} x {} voxels. Assumptions and choices:".format(*state.resolution))
             for note in state.notes.split("\n"):
-                _label(layout, context, note)
+                draw_text(layout, context, note)
         layout.operator("smokelift.check", icon="VIEWZOOM")
         layout.operator("smokelift.show_page", icon="IMAGE_DATA")
 

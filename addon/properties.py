@@ -14,18 +14,16 @@ from bpy.props import (
 
 from . import volume
 from .contract import FASTEST, SLOWEST
+from .paths import PATH_OPTIONS
 from .smoke import free_folder
 
 SEEDS = 2**31
 """Numbers of variations: as many as Blender's whole numbers have from 0."""
 
-# Blender 4.5 and later need this option for // as the .blend's folder; older ones do not know it.
-_PATH_OPTIONS = {"ANIMATABLE"} | ({"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) else set())
-
 
 def _changed(_settings: "SmokeliftSettings", context: bpy.types.Context) -> None:
     """Check the shot again, if there is a window."""
-    if not bpy.app.background and context.window is not None:
+    if not bpy.app.background and context.window is not None and bpy.ops.smokelift.check.poll():
         bpy.ops.smokelift.check()
 
 
@@ -191,7 +189,7 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
             "with one image for each frame of the clip"
         ),
         subtype="FILE_PATH",
-        options=_PATH_OPTIONS,
+        options=PATH_OPTIONS,
         update=_changed,
     )
     camera_mode: EnumProperty(
@@ -264,7 +262,7 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
         name="Output",
         description="Folder for the results; by default beside the .blend file, or beside the clip if that is unsaved",
         subtype="DIR_PATH",
-        options=_PATH_OPTIONS,
+        options=PATH_OPTIONS,
     )
 
     longest_side: IntProperty(

@@ -7,7 +7,7 @@ from pathlib import Path
 import bpy
 import bpy.utils.previews
 
-from . import directing, scene_file, shot_setup, volume
+from . import directing, preferences, scene_file, shot_setup, volume
 from .job import ENDED, EngineMissingError, Job, Queue, engine_command
 from .paths import absolute
 from .smoke import active_smoke, part_duplicate, smokes
@@ -19,10 +19,13 @@ CHECK_TICKS = 4
 
 
 def output_folder(smoke: bpy.types.Object) -> Path:
-    """The folder of a smoke's takes: the chosen one, else beside the .blend, else beside the clip."""
+    """The folder of a smoke's takes: the chosen one, else in that of the preferences, beside the .blend or the clip."""
     settings = smoke.smokelift
     if settings.output:
         return absolute(settings.output)
+    common = preferences.output_folder()
+    if common is not None:
+        return common / settings.folder
     if bpy.data.filepath:
         return Path(bpy.data.filepath).parent / "smokelift" / settings.folder
     return scene_file.clip_path(settings.clip).parent / f"{settings.folder}_smokelift"
@@ -274,7 +277,7 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
     def _start(self, name: str, row: bpy.types.PropertyGroup) -> None:
         take = Take(Path(name))
         try:
-            job = Job(engine_command(take.arguments()), take.log_file)
+            job = Job(engine_command(take.arguments() + preferences.thread_options()), take.log_file)
         except (EngineMissingError, TakeError) as error:
             row.outcome, row.sentence = "failed", str(error)
             return
@@ -371,7 +374,7 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
             take = Take(folder / "smokelift_check")
             take.write(scene_file.shot_tables(smoke, quick=True), scene_file.options(smoke))
             words = ["inspect", str(take.scene_file), "--page", str(page_file()), "--progress", "json"]
-            words += scene_file.options(smoke)
+            words += scene_file.options(smoke) + preferences.thread_options()
             self._check = Job(engine_command(words), take.log_file)
         except (scene_file.ShotError, TakeError, EngineMissingError) as error:
             state.check_error = str(error)

@@ -9,6 +9,8 @@ import bpy
 from bpy.app.handlers import persistent
 from mathutils import Matrix
 
+from . import preferences
+
 GUESSED_CAMERA = "Smokelift Camera"
 """Name of a camera that stands where the engine assumed the clip's."""
 
@@ -26,7 +28,7 @@ def smokes(scene: bpy.types.Scene) -> list[bpy.types.Object]:
 
 
 def active_smoke(scene: bpy.types.Scene) -> bpy.types.Object | None:
-    """The smoke in the tab: the active object, else the one whose box, inlet or camera is active, else the first."""
+    """The smoke in the tab: the active object, else that whose box, inlet, camera or child it is, else the first."""
     active = _layer(scene).objects.active
     if is_smoke(active):
         return active
@@ -34,7 +36,7 @@ def active_smoke(scene: bpy.types.Scene) -> bpy.types.Object | None:
     if active is not None:
         for obj in found:
             settings = obj.smokelift
-            if active in (settings.box, settings.inlet, settings.assumed_camera):
+            if active in (settings.box, settings.inlet, settings.assumed_camera) or active.parent == obj:
                 return obj
     return found[0] if found else None
 
@@ -54,6 +56,7 @@ def new_smoke(scene: bpy.types.Scene, clip: bpy.types.MovieClip | None = None) -
     if clip is not None:
         obj.smokelift.clip = clip
     activate(obj, scene)
+    obj.smokelift.quality = preferences.quality() or obj.smokelift.quality
     return obj
 
 

@@ -33,6 +33,9 @@ from engine_wheels import PYTHONS, ROOT
 
 STAGE = ROOT / "build" / "extension"
 
+MANUAL = ROOT / "build" / "manual"
+"""The manual as web pages, which the preferences' button opens."""
+
 BLENDER_NUMPY = {"3.11": "1.26.4", "3.13": "2.2.0"}
 """The numpy that Blender has beside each Python; what is bundled has to work with it."""
 
@@ -254,6 +257,10 @@ def stage_add_on(manifest: Mapping[str, Any], platforms: Sequence[str]) -> None:
         target.parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(file, target)
     shutil.copy(ROOT / "LICENSE", STAGE)
+    if MANUAL.is_dir():
+        shutil.copytree(MANUAL, STAGE / MANUAL.name)
+    else:
+        print("The manual is left out: there is none in build/manual.")
     wheels = sorted(f"./wheels/{file.name}" for file in (STAGE / "wheels").iterdir())
     shutil.rmtree(STAGE / "downloads")
     complete = {**manifest, "platforms": list(platforms), "wheels": wheels}

@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from types import FrameType
 from typing import NoReturn
 
+from smokelift._core import set_threads
 from smokelift.app.commands import COMMANDS
 from smokelift.app.progress import OutputError, one_line, reporter
 from smokelift.output.index import DirectoryBusyError
@@ -29,6 +30,9 @@ _PASSING = {
     if hasattr(errno, name)  # some systems lack some
 }
 """Failures of a storage: it is full, or its server is away."""
+
+MOST_THREADS = 1024
+"""As a guard against a number that no processor has."""
 
 _HINT = " Finished frames stay, --resume goes on from them."
 
@@ -62,6 +66,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(options: argparse.Namespace) -> int:
     say = reporter(getattr(options, "progress", "text"))
+    set_threads(getattr(options, "threads", 0))
     terminated = False
 
     def terminate(_number: int, _frame: FrameType | None) -> None:
@@ -121,9 +126,20 @@ def command_parser() -> argparse.ArgumentParser:
     common = argparse.ArgumentParser(add_help=False)
     common.add_argument("--device", choices=("auto", "cpu", "gpu"), default="auto", help="where to render")
     common.add_argument("--progress", choices=("text", "json"), default="text", help="a bar, or one JSON object a line")
+    common.add_argument("--threads", type=_threads, default=0, metavar="N", help="of the processor; 0: all")
     for add_parser in COMMANDS:
         add_parser(commands, common)
     return parser
+
+
+def _threads(text: str) -> int:
+    try:
+        count = int(text)
+    except ValueError:
+        count = -1
+    if not 0 <= count <= MOST_THREADS:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected a whole number from 0 to {MOST_THREADS}")
+    return count
 
 
 if __name__ == "__main__":

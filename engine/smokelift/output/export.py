@@ -37,6 +37,9 @@ NOTE = "export.json"
 
 USD = "smoke.usda"
 
+ASSET = "smoke.blend"
+"""What the Blender extension adds; it stays when an export is replaced."""
+
 THIN = 1e-3
 """Share of the light that smoke may hide and yet be left out."""
 
@@ -145,7 +148,7 @@ def require_export(sequence: Sequence, out: Path) -> None:
     if out.exists() and not out.is_dir():
         raise SequenceError(f"{out}: is a file; choose a folder for the export.")
     names = [file.name for file in out.iterdir() if not file.name.startswith(".")] if out.is_dir() else []
-    foreign = [name for name in names if not (name in (NOTE, USD) or _OWN.fullmatch(name))]
+    foreign = [name for name in names if not (name in (NOTE, USD, ASSET) or _OWN.fullmatch(name))]
     if foreign or (names and NOTE not in names):
         other = INDEX if INDEX in names else sorted(foreign or names)[0]
         raise SequenceError(f"{out}: holds other files ({other}); nothing was overwritten, choose an empty folder.")
@@ -191,7 +194,7 @@ def _write_frame(sequence: Sequence, number: int, out: Path, settings: ExportSet
         velocity = None if velocity is None else _rounded(velocity, velocity_step(domain, _fps(sequence)))
     write_vdb(paths[0], rho, velocity, domain, sequence.settings)
     if settings.proxy > 1:
-        paths.append(out / _proxy_name(number))
+        paths.append(out / proxy_name(number))
         coarse, wide = coarser(density, domain, settings.proxy)
         coarse = _rounded(_thinned(coarse, wide, extinction), density_step(wide, extinction))
         write_vdb(paths[1], coarse, None, wide, sequence.settings)
@@ -253,7 +256,8 @@ def _medium(sequence: Sequence) -> dict[str, float]:
     return {"extinction": medium.extinction, "albedo": medium.albedo, "anisotropy": medium.anisotropy}
 
 
-def _proxy_name(number: int) -> str:
+def proxy_name(number: int) -> str:
+    """Return the name of the file of a proxy's frame."""
     return f"proxy_{number:04d}.vdb"
 
 
@@ -262,7 +266,7 @@ def _usd_volumes(sequence: Sequence, settings: ExportSettings) -> list[UsdVolume
     files = {number: frame_path(Path(), number, "vdb").name for number in numbers}
     if settings.proxy == 1:
         return [UsdVolume("Volume", "default", files, settings.grids, domain)]
-    proxies = {number: _proxy_name(number) for number in numbers}
+    proxies = {number: proxy_name(number) for number in numbers}
     return [
         UsdVolume("Volume", "render", files, settings.grids, domain),
         UsdVolume("Proxy", "proxy", proxies, ("density",), domain),

@@ -164,3 +164,14 @@ def test_the_command_loads_no_threads_of_openblas() -> None:
     unset = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
     said = subprocess.run([sys.executable, "-c", script], env=unset, capture_output=True, text=True, check=True).stdout
     assert "Threads:\t1\n" in said
+
+
+def test_threads_are_limited(tmp_path, capsys, monkeypatch) -> None:
+    """Before anything is computed; a number that no processor has is refused."""
+    given: list[int] = []
+    monkeypatch.setattr("smokelift.app.cli.set_threads", given.append)
+    assert command("doctor", "--threads", 2) == 0
+    assert command("doctor") == 0
+    assert given == [2, 0]
+    assert command("doctor", "--threads", "many") == 2
+    assert "whole number from 0 to 1024" in capsys.readouterr().err

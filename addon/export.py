@@ -1,0 +1,393 @@
+"""Hands a smoke on: an export of its files, a proxy of it in the viewport, an asset, and instances with their own time.
+
+An export changes nothing in the file, so it is no run of the queue: a timer of Blender polls the engine.
+"""
+
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, IntProperty, PointerProperty, StringProperty
+
+from . import preferences, run, volume
+from .contract import ASSET_FILE, EXPORT_FILE, FRAME_FILE, PROXY_FILE
+from .job import EngineMissingError, Job, engine_command
+from .panel import draw_text
+from .paths import PATH_OPTIONS, absolute, relative
+from .smoke import active_smoke, scene_of
+from .take import Take
+
+TICK_SECONDS = 0.1
+REST_SECONDS = 0.4
+"""Time without a change of settings before the size is estimated."""
+
+SHOWN_TAKE = "smokelift_take"
+"""Custom property of a proxy: the directory of the take that was exported."""
+
+
+def _changed(settings: "SmokeliftExport", _context: bpy.types.Context) -> None:
+    _session.ask_size(settings.id_data)
+
+
+class SmokeliftExport(bpy.types.PropertyGroup):
+    """What is exported of a smoke, on its object."""
+
+    folder: StringProperty(
+        name="Folder",
+        description="Folder for the export; by default the folder export beside the results",
+        subtype="DIR_PATH",
+        options=PATH_OPTIONS,
+        update=_changed,
+    )
+    precision: EnumProperty(
+        name="Precision",
+        description="Bits of each value. What is so thin that it does not show is left out either way",
+        items=[
+            ("half", "Half", "Floats of 16 bits"),
+            ("quantised", "Quantized", "As few bits as a picture of 8 bits needs: half the size"),
+        ],
+        update=_changed,
+    )
+    use_velocity: BoolProperty(
+        name="Velocity", description="Export the velocity, which motion blur needs", default=True, update=_changed
+    )
+    proxy: EnumProperty(
+        name="Proxy",
+        description="Second, coarser sequence for viewports",
+        items=[
+            ("1", "None", "No proxy"),
+            ("2", "1/2", "Half the resolution, an eighth of the voxels"),
+            ("4", "1/4", "A quarter of the resolution"),
+        ],
+        update=_changed,
+    )
+
+
+class _Session:
+    """The export or the estimate that the engine works on; never saved."""
+
+    def __init__(self) -> None:
+        self.job: Job | None = None
+        self.smoke = 0
+        self.size = ""
+        self.sentence = ""
+        self.exporting = False
+        self._asked = 0
+
+    def ask_size(self, smoke: bpy.types.Object) -> None:
+        """Estimate the size of an export once its settings rest. Drawing code may call this."""
+        if bpy.app.background or self.exporting:
+            return
+        self._asked, self.smoke, self.size = smoke.session_uid, smoke.session_uid, ""
+        _again(self._start_size, REST_SECONDS)
+
+    def start(self, smoke: bpy.types.Object, *, exporting: bool) -> None:
+        """Start the engine; EngineMissingError if there is none."""
+        self.stop()
+        self.smoke, self.exporting, self.sentence = smoke.session_uid, exporting, ""
+        words = arguments(smoke) + preferences.thread_options() + ([] if exporting else ["--size"])
+        self.job = Job(engine_command(words), Path(bpy.app.tempdir) / "smokelift_export.log")
+        self.job.start()
+        _again(self.poll, TICK_SECONDS)
+
+    def stop(self) -> None:
+        """End the engine at once."""
+        if self.job is not None:
+            self.job.kill()
+        self.job, self.exporting = None, False
+
+    def poll(self) -> float | None:
+        """Read what the engine says; a timer that ends with it."""
+        job = self.job
+        if job is None:
+            return None
+        if job.poll():
+            run.redraw(bpy.context.window_manager)
+        if not job.ended:
+            return TICK_SECONDS
+        if not self.exporting:
+            self.size = f"About {megabytes(job.details['size'])}" if job.outcome == "done" else job.sentence
+        else:
+            self.sentence = job.sentence
+            smoke = run.find_smoke(self.smoke)
+            if smoke is not None and job.outcome == "done":
+                write_asset(smoke, folder_of(smoke))
+        self.job, self.exporting = None, False
+        return None
+
+    def _start_size(self) -> None:
+        smoke = run.find_smoke(self._asked)
+        if smoke is None or self.exporting or volume.shown_take(smoke) is None:
+            return
+        try:
+            self.start(smoke, exporting=False)
+        except EngineMissingError as error:
+            self.size = str(error)
+
+
+def _again(timer: Any, seconds: float) -> None:
+    """Have Blender call a function, once, however often it is asked for."""
+    if bpy.app.timers.is_registered(timer):
+        bpy.app.timers.unregister(timer)
+    bpy.app.timers.register(timer, first_interval=seconds)
+
+
+_session = _Session()
+
+
+def folder_of(smoke: bpy.types.Object) -> Path:
+    """The folder for the export of a smoke."""
+    chosen = smoke.smokelift_export.folder
+    return absolute(chosen) if chosen else run.output_folder(smoke) / "export"
+
+
+def arguments(smoke: bpy.types.Object) -> list[str]:
+    """The engine's arguments for the export of the take that a smoke shows."""
+    settings, take = smoke.smokelift_export, volume.shown_take(smoke)
+    words = ["export", str(take.directory), "--out", str(folder_of(smoke)), "--progress", "json"]
+    words += ["--precision", settings.precision, "--proxy", settings.proxy]
+    return words if settings.use_velocity else [*words, "--no-velocity"]
+
+
+def megabytes(count: float) -> str:
+    """An amount of bytes in words."""
+    return f"{count / 1e6:.1f} MB" if count < 1e9 else f"{count / 1e9:.1f} GB"
+
+
+def write_asset(smoke: bpy.types.Object, folder: Path) -> None:
+    """Write a .blend beside an export that holds the smoke as an asset, with paths to the files beside it."""
+    copy = _copy(smoke, smoke.name)
+    copy.delta_location = (0.0, 0.0, 0.0)
+    copy.data.filepath = str(folder / FRAME_FILE.format(_first(folder)))
+    try:
+        copy.asset_mark()
+        copy.asset_data.description = volume.provenance_note(smoke)
+        # as it is when the asset is used; nothing of this file but its material goes with it
+        copy.location = (0.0, 0.0, 0.0)
+        bpy.data.libraries.write(str(folder / ASSET_FILE), {copy}, path_remap="RELATIVE_ALL", compress=True)
+    finally:
+        _remove(copy)
+
+
+def _copy(obj: bpy.types.Object, name: str) -> bpy.types.Object:
+    """A copy of a Volume object, with data of its own and the same material, which is no smoke to be made."""
+    copy = bpy.data.objects.new(name, obj.data.copy())
+    copy.matrix_basis, copy.delta_location = obj.matrix_basis, obj.delta_location
+    return copy
+
+
+def _remove(obj: bpy.types.Object) -> None:
+    bpy.data.volumes.remove(obj.data)  # takes the object with it
+
+
+def _read(data: bpy.types.Volume, file: Path) -> None:
+    """Have a Volume read a sequence of files that begins with another one."""
+    data.filepath = relative(file)
+
+
+def _first(folder: Path) -> int:
+    """Number of the first frame of an export."""
+    return int(json.loads((folder / EXPORT_FILE).read_text(encoding="utf-8"))["frames"][0])
+
+
+def proxy_of(smoke: bpy.types.Object) -> bpy.types.Object | None:
+    """The proxy of a smoke."""
+    return next((obj for obj in smoke.children if SHOWN_TAKE in obj), None)
+
+
+class _NeedsResult:
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        smoke = active_smoke(context.scene)
+        if smoke is None or volume.shown_take(smoke) is None:
+            cls.poll_message_set("Make smoke first")
+            return False
+        return True
+
+
+class SMOKELIFT_OT_export(_NeedsResult, bpy.types.Operator):
+    """Write small OpenVDB files of the smoke, a USD file of them, and an asset to be used in other files"""
+
+    bl_idname = "smokelift.export"
+    bl_label = "Export Smoke"
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        smoke = active_smoke(context.scene)
+        try:
+            _session.start(smoke, exporting=True)
+        except EngineMissingError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        if not bpy.app.background:
+            return {"FINISHED"}
+        job = _session.job
+        while _session.poll() is not None:
+            time.sleep(TICK_SECONDS)
+        if job.outcome != "done":
+            self.report({"ERROR"}, job.sentence)
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
+class SMOKELIFT_OT_cancel_export(bpy.types.Operator):
+    """Stop the export"""
+
+    bl_idname = "smokelift.cancel_export"
+    bl_label = "Cancel Export"
+    bl_options = {"INTERNAL"}
+
+    def execute(self, _context: bpy.types.Context) -> set[str]:
+        _session.stop()
+        return {"FINISHED"}
+
+
+class SMOKELIFT_OT_use_proxy(_NeedsResult, bpy.types.Operator):
+    """Show the proxy of the export in the viewport, and the smoke itself in renders only; again to undo that"""
+
+    bl_idname = "smokelift.use_proxy"
+    bl_label = "Proxy in Viewport"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        smoke = active_smoke(context.scene)
+        before = proxy_of(smoke)
+        if before is not None:
+            _remove(before)
+            smoke.hide_viewport = False
+            return {"FINISHED"}
+        folder = folder_of(smoke)
+        try:
+            file = folder / PROXY_FILE.format(_first(folder))
+        except (OSError, ValueError, LookupError, TypeError):
+            file = folder / PROXY_FILE.format(1)
+        if not file.is_file():
+            self.report({"ERROR"}, f"There is no proxy in {folder}: choose a proxy and export first.")
+            return {"CANCELLED"}
+        proxy = bpy.data.objects.new(f"{smoke.name} Proxy", smoke.data.copy())
+        scene_of(smoke).collection.objects.link(proxy)
+        proxy.parent = smoke
+        proxy.hide_render = True
+        proxy[SHOWN_TAKE] = str(volume.shown_take(smoke).directory)
+        _read(proxy.data, file)
+        smoke.hide_viewport = True
+        return {"FINISHED"}
+
+
+class SMOKELIFT_OT_add_instance(bpy.types.Operator):
+    """Add another object of the active Volume's files that plays later or earlier. The material is shared"""
+
+    bl_idname = "smokelift.add_instance"
+    bl_label = "Instance in Time"
+    bl_options = {"REGISTER", "UNDO"}
+
+    offset: IntProperty(name="Time Offset", description="Frames by which it plays later", default=12)
+    repeat: BoolProperty(name="Repeat", description="Play the frames again and again, as for a loop")
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        obj = context.object
+        if obj is None or obj.type != "VOLUME" or not obj.data.is_sequence:
+            cls.poll_message_set("Select a Volume that plays a sequence")
+            return False
+        if obj.data.animation_data is not None and obj.data.animation_data.drivers:
+            cls.poll_message_set("Set Speed to Frame by Frame first")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        obj = context.object
+        instance = _copy(obj, obj.name)
+        context.collection.objects.link(instance)
+        data = instance.data
+        _read(data, absolute(obj.data.filepath, obj.data.library))
+        data.frame_start += self.offset
+        data.sequence_mode = "REPEAT" if self.repeat else obj.data.sequence_mode
+        for other in context.selected_objects:
+            other.select_set(False)
+        instance.select_set(True)
+        context.view_layer.objects.active = instance
+        return {"FINISHED"}
+
+
+class _ExportPanel:
+    bl_label = "Export"
+    bl_category = "Smokelift"
+    bl_region_type = "UI"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        smoke = active_smoke(context.scene)
+        return smoke is not None and volume.shown_take(smoke) is not None
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        smoke = active_smoke(context.scene)
+        settings = smoke.smokelift_export
+        layout.prop(settings, "folder", placeholder=str(folder_of(smoke)))
+        for name in ("precision", "use_velocity", "proxy"):
+            layout.prop(settings, name)
+        if _session.smoke != smoke.session_uid:
+            _session.ask_size(smoke)
+        elif _session.size:
+            draw_text(layout, context, _session.size, "DISK_DRIVE")
+        if _session.exporting:
+            job = _session.job
+            layout.progress(factor=job.done / job.total if job.total else 0.0, text=f"{job.done} of {job.total}")
+            layout.operator("smokelift.cancel_export", text="Cancel", icon="CANCEL")
+        else:
+            layout.operator("smokelift.export", icon="EXPORT")
+        if _session.smoke == smoke.session_uid and _session.sentence:
+            draw_text(layout, context, _session.sentence, "INFO")
+        proxy = proxy_of(smoke)
+        layout.operator("smokelift.use_proxy", icon="VOLUME_DATA", depress=proxy is not None)
+        if proxy is not None and Take(Path(proxy[SHOWN_TAKE])) != volume.shown_take(smoke):
+            draw_text(layout, context, "The proxy shows another result: export again.", "ERROR")
+        layout.operator("smokelift.add_instance", icon="DUPLICATE")
+
+
+class SMOKELIFT_PT_view_export(_ExportPanel, bpy.types.Panel):
+    """In the 3D View."""
+
+    bl_space_type = "VIEW_3D"
+    bl_parent_id = "SMOKELIFT_PT_view"
+
+
+class SMOKELIFT_PT_clip_export(_ExportPanel, bpy.types.Panel):
+    """In the Movie Clip Editor."""
+
+    bl_space_type = "CLIP_EDITOR"
+    bl_parent_id = "SMOKELIFT_PT_clip"
+
+
+_CLASSES = (
+    SmokeliftExport,
+    SMOKELIFT_OT_export,
+    SMOKELIFT_OT_cancel_export,
+    SMOKELIFT_OT_use_proxy,
+    SMOKELIFT_OT_add_instance,
+    SMOKELIFT_PT_view_export,
+    SMOKELIFT_PT_clip_export,
+)
+
+_register, _unregister = bpy.utils.register_classes_factory(_CLASSES)
+
+
+def register() -> None:
+    """Register the settings, operators and panels."""
+    _register()
+    bpy.types.Object.smokelift_export = PointerProperty(type=SmokeliftExport)
+
+
+def unregister() -> None:
+    """Unregister them and end the engine."""
+    _session.stop()
+    for timer in (_session.poll, _session._start_size):
+        if bpy.app.timers.is_registered(timer):
+            bpy.app.timers.unregister(timer)
+    del bpy.types.Object.smokelift_export
+    _unregister()

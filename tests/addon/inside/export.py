@@ -1,0 +1,151 @@
+"""What is handed on: the files, the asset, the proxy in the viewport, and instances with their own time."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+from addon import export, run, volume
+from addon.take import Take
+from smokelift.output.export import ExportSettings, export_sequence
+from smokelift.output.sequence import Sequence
+from smokelift.output.writer import SequenceWriter
+from smokelift.scene import Camera, ClipSource, Domain, Medium, Scene, completed
+from tests.example_shot import EXAMPLE, smoke
+
+FRAMES = 3
+
+
+@pytest.fixture
+def made(scene, tmp_path) -> bpy.types.Object:
+    """A smoke with a result of a few frames that were written without a reconstruction."""
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+    obj = smoke(bpy.context.scene)
+    obj.smokelift.clip = bpy.data.movieclips.load(str(EXAMPLE / "clip.mp4"))
+    described = completed(
+        Scene(
+            clip=ClipSource(EXAMPLE / "clip.mp4", 24.0),
+            camera=Camera.look_at((0, -7, 1.5), (0, 0, 1.5), fov_y_degrees=30, size=(32, 48)),
+            domain=Domain((-1, -1, 0), (1, 1, 3), (8, 8, 12)),
+            medium=Medium(3.0),
+            scattering="unshadowed",
+        )
+    )
+    rho = np.zeros((8, 8, 12), np.float32)
+    rho[2:6, 2:6, 1:8] = 0.7
+    faces = [np.full(shape, 0.1, np.float32) for shape in ((9, 8, 12), (8, 9, 12), (8, 8, 13))]
+    take = Take(run.output_folder(obj) / "take_0001")
+    with SequenceWriter(take.directory, described, {"quality": "draft"}) as writer:
+        for number in range(1, FRAMES + 1):
+            writer.write(number, rho, faces)
+    run.present(obj, take)
+    return obj
+
+
+def exported(obj: bpy.types.Object, **settings: object) -> None:
+    """What the engine writes, in this process, which takes less long."""
+    list(
+        export_sequence(
+            Sequence.open(volume.shown_take(obj).directory), export.folder_of(obj), ExportSettings(**settings)
+        )
+    )
+
+
+def grids(data: bpy.types.Volume, frame: int) -> tuple[str, set[str]]:
+    """Name of the file that a Volume reads in a frame, and its grids."""
+    bpy.context.scene.frame_set(frame)
+    assert data.grids.load(), data.grids.error_message
+    return Path(data.grids.frame_filepath).name, {grid.name for grid in data.grids}
+
+
+def test_an_export_beside_the_results(made) -> None:
+    """All frames, a USD file that Blender reads, and an asset whose files lie beside it."""
+    export.folder_of(made).mkdir(parents=True)
+    for name in ("export.json", "smoke.blend", "smoke_0009.vdb"):
+        (export.folder_of(made) / name).write_text("of an earlier export")
+    made.smokelift_export.use_velocity = False
+    assert bpy.ops.smokelift.export() == {"FINISHED"}
+    folder = export.folder_of(made)
+    assert folder.parent == run.output_folder(made)
+    names = {path.name for path in folder.iterdir()}
+    frames = {f"smoke_{number:04d}.vdb" for number in range(1, FRAMES + 1)}
+    assert names == {*frames, "export.json", "smoke.usda", "smoke.blend"}
+    assert json.loads((folder / "export.json").read_text())["grids"] == ["density"]
+    assert [obj.type for obj in bpy.context.scene.objects].count("VOLUME") == 1
+
+    bpy.ops.wm.usd_import(filepath=str(folder / "smoke.usda"))
+    (data,) = [data for data in bpy.data.volumes if data != made.data]
+    assert (data.is_sequence, data.frame_start, data.frame_duration) == (True, 1, FRAMES)
+    assert grids(data, 2) == ("smoke_0002.vdb", {"density"})
+
+
+def test_the_asset_is_used_in_another_file(made, tmp_path) -> None:
+    """Appended with its material, its files found, also after the folder has moved."""
+    material = made.data.materials[0].name
+    exported(made)
+    export.write_asset(made, export.folder_of(made))
+    moved = tmp_path / "handed on"
+    export.folder_of(made).rename(moved)
+    bpy.ops.wm.read_homefile(use_empty=True)
+    with bpy.data.libraries.load(str(moved / "smoke.blend"), assets_only=True) as (there, here):
+        here.objects = there.objects
+    (obj,) = here.objects
+    assert obj.type == "VOLUME" and not obj.smokelift.is_smoke
+    assert obj.data.materials[0].name == material
+    assert volume.take_of(obj.data) == Take(moved)
+    bpy.context.scene.collection.objects.link(obj)
+    assert grids(obj.data, obj.data.frame_start + 1) == ("smoke_0002.vdb", {"density", "velocity"})
+
+
+def test_a_proxy_in_the_viewport(made) -> None:
+    """It follows the smoke, renders do not see it, and a second press takes it away."""
+    with pytest.raises(RuntimeError, match=r"no proxy in .*: choose a proxy and export first"):
+        bpy.ops.smokelift.use_proxy()
+    exported(made, proxy=2)
+    assert bpy.ops.smokelift.use_proxy() == {"FINISHED"}
+    proxy = export.proxy_of(made)
+    assert (made.hide_viewport, made.hide_render) == (True, False)
+    assert (proxy.hide_viewport, proxy.hide_render) == (False, True)
+    made.location.x = 2.0
+    bpy.context.view_layer.update()
+    assert proxy.matrix_world.translation.x == pytest.approx(made.matrix_world.translation.x)
+    assert grids(proxy.data, proxy.data.frame_start + 1) == ("proxy_0002.vdb", {"density"})
+    assert bpy.ops.smokelift.use_proxy() == {"FINISHED"}
+    assert export.proxy_of(made) is None and not made.hide_viewport
+
+
+def test_an_instance_plays_later(made) -> None:
+    """With its own time and the same material; it is no smoke to be made, and repeats if it shall."""
+    bpy.context.view_layer.objects.active = made
+    assert bpy.ops.smokelift.add_instance(offset=5, repeat=True) == {"FINISHED"}
+    instance = bpy.context.object
+    assert instance != made and not instance.smokelift.is_smoke
+    assert instance.data.materials[0] == made.data.materials[0]
+    start = made.data.frame_start
+    assert instance.data.frame_start == start + 5
+    assert grids(made.data, start + 1)[0] == "smoke_0002.vdb"
+    assert grids(instance.data, start + 6)[0] == "smoke_0002.vdb"
+    assert grids(instance.data, start + 5 + FRAMES)[0] == "smoke_0001.vdb"
+    assert bpy.ops.smokelift.add_instance(offset=2) == {"FINISHED"}, "no instance of an instance"
+
+
+def test_a_folder_with_other_files_is_left_alone(made, tmp_path) -> None:
+    """One sentence."""
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "holiday.jpg").touch()
+    made.smokelift_export.folder = "//other"
+    with pytest.raises(RuntimeError, match=r"holiday\.jpg.*choose an empty folder"):
+        bpy.ops.smokelift.export()
+    assert [path.name for path in (tmp_path / "other").iterdir()] == ["holiday.jpg"]
+
+
+def test_without_a_result_there_is_nothing_to_export(scene) -> None:
+    """The buttons are off."""
+    smoke(scene)
+    assert not bpy.ops.smokelift.export.poll()
+    assert not bpy.ops.smokelift.use_proxy.poll()
+    assert not bpy.ops.smokelift.add_instance.poll()

@@ -1,0 +1,108 @@
+"""What a user sets once: preferences, presets, and what is dropped into a window."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import bpy
+import pytest
+
+from addon import preferences, presets, run
+from addon.smoke import new_smoke, smokes
+from tests.example_shot import EXAMPLE
+
+
+@pytest.fixture
+def user(blender) -> Iterator[bpy.types.AddonPreferences]:
+    """The preferences of a user who has the add-on installed."""
+    entry = bpy.context.preferences.addons.new()
+    entry.module = preferences.__package__
+    yield entry.preferences
+    bpy.context.preferences.addons.remove(entry)
+
+
+@pytest.fixture
+def clip(blender) -> bpy.types.MovieClip:
+    """The example's."""
+    return bpy.data.movieclips.load(str(EXAMPLE / "clip.mp4"))
+
+
+def test_without_preferences_everything_is_as_usual(scene, clip) -> None:
+    """As where the add-on runs from its sources."""
+    obj = new_smoke(scene, clip)
+    assert obj.smokelift.quality == "balanced"
+    assert run.output_folder(obj) == EXAMPLE / "clip_smokelift"
+    assert preferences.thread_options() == []
+
+
+def test_new_smokes_follow_the_preferences(scene, clip, user, tmp_path) -> None:
+    """Those that are there keep their quality; a smoke's own output counts first."""
+    first = new_smoke(scene, clip)
+    user.quality, user.output, user.threads = "draft", str(tmp_path), 1
+    second = new_smoke(scene, clip)
+    assert [obj.smokelift.quality for obj in (first, second)] == ["balanced", "draft"]
+    assert [run.output_folder(obj) for obj in (first, second)] == [tmp_path / "clip", tmp_path / "clip_2"]
+    second.smokelift.output = str(tmp_path / "own")
+    assert run.output_folder(second) == tmp_path / "own"
+    assert preferences.thread_options() == ["--threads", "1"]
+
+
+def test_every_preference_has_a_name_and_a_tooltip(user) -> None:
+    """As Blender's rules ask."""
+    for setting in user.bl_rna.properties:
+        if setting.identifier in ("output", "quality", "threads"):
+            assert setting.name and setting.description and not setting.description.endswith(".")
+
+
+def test_the_manual_is_opened(scene, monkeypatch, tmp_path) -> None:
+    """The extension's own copy; without one a sentence says where it is."""
+    with pytest.raises(RuntimeError, match=r"docs/blender\.md"):
+        bpy.ops.smokelift.open_manual()
+    page = tmp_path / "a manual" / "index.html"
+    page.parent.mkdir()
+    page.touch()
+    opened: list[str] = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    monkeypatch.setattr(preferences, "MANUAL", page)
+    assert bpy.ops.smokelift.open_manual() == {"FINISHED"}
+    assert opened == [page.as_uri()]
+
+
+def test_settings_are_kept_as_a_preset(scene, clip, monkeypatch, tmp_path) -> None:
+    """And given to another smoke; clip and frames are its own."""
+
+    def folder(_kind: str, *, path: str = "", create: bool = False) -> str:
+        (tmp_path / path).mkdir(parents=True, exist_ok=create)
+        return str(tmp_path / path)
+
+    monkeypatch.setattr(bpy.utils, "user_resource", folder)
+    first = new_smoke(scene, clip)
+    first.smokelift.detail, first.smokelift.floor, first.smokelift.first = 0.25, True, 7
+    assert bpy.ops.smokelift.add_preset(name="My Smoke") == {"FINISHED"}
+    (file,) = (tmp_path / "presets" / presets.FOLDER).iterdir()
+    second = new_smoke(scene, clip)
+    bpy.ops.script.execute_preset(filepath=str(file), menu_idname="SMOKELIFT_PT_presets")
+    assert second.smokelift.detail == 0.25 and second.smokelift.floor
+    assert second.smokelift.first == 1
+
+
+def test_presets_are_of_a_smoke(scene) -> None:
+    """With another object active there is nothing to keep; every setting in a preset exists."""
+    assert not bpy.ops.smokelift.add_preset.poll()
+    known = bpy.types.Object.bl_rna.properties["smokelift"].fixed_type.properties
+    assert set(presets.SETTINGS) <= set(known.keys())
+
+
+@pytest.mark.parametrize("suffix", [".mp4", ".mov", ".mkv"])
+def test_a_dropped_video_becomes_a_smoke(scene, suffix, tmp_path) -> None:
+    """Blender calls the handler's operator with the path, and no file browser opens."""
+    handler = bpy.types.SMOKELIFT_FH_video
+    assert suffix in handler.bl_file_extensions.split(";")
+    dropped = tmp_path / f"my clip{suffix}"
+    dropped.write_bytes((EXAMPLE / "clip.mp4").read_bytes())
+    family, name = handler.bl_import_operator.split(".")
+    operator = getattr(getattr(bpy.ops, family), name)
+    assert operator("INVOKE_DEFAULT", filepath=str(dropped)) == {"FINISHED"}
+    (obj,) = smokes(scene)
+    assert Path(bpy.path.abspath(obj.smokelift.clip.filepath)) == dropped
