@@ -332,7 +332,7 @@ def test_scenes_have_their_own_smoke(shot, tmp_path) -> None:
 
 
 def test_an_hours_trial(shot, tmp_path) -> None:
-    """Two smokes, each with its clip: one made again after it was moved, one stopped and resumed from elsewhere."""
+    """Two smokes, each with its clip: one made again after it was moved, one deleted, undone and resumed elsewhere."""
     project = tmp_path / "root" / "project"
     shutil.copytree(EXAMPLE, project)
     (project / "clip.mp4").rename(project / "left.mp4")
@@ -340,7 +340,9 @@ def test_an_hours_trial(shot, tmp_path) -> None:
     bpy.ops.wm.save_as_mainfile(filepath=str(project / "shot.blend"))
     left = smoke(shot)
     left.smokelift.clip = bpy.data.movieclips.load(str(project / "left.mp4"))
-    assert bpy.ops.smokelift.add(filepath=str(project / "right.mp4")) == {"FINISHED"}
+    dropped = bpy.types.SMOKELIFT_FH_video.bl_import_operator
+    assert dropped == "smokelift.add"
+    assert bpy.ops.smokelift.add("INVOKE_DEFAULT", filepath=str(project / "right.mp4")) == {"FINISHED"}
     right = bpy.context.view_layer.objects.active
     for name in ("box", "camera_mode", "plate_mode", "plate", "light_mode", "quality"):
         setattr(right.smokelift, name, getattr(left.smokelift, name))
@@ -359,6 +361,19 @@ def test_an_hours_trial(shot, tmp_path) -> None:
     assert volume.shown_take(left) == Take(folders[0] / "take_0002")
     assert left.location.x == pytest.approx(2.0)
     assert volume.shown_take(right) == Take(folders[1] / "take_0001")
+
+    names = left.name, right.name
+    bpy.ops.ed.undo_push(message="Make Smoke")
+    left.location.x += 1.0
+    bpy.ops.ed.undo_push(message="Move")
+    bpy.data.objects.remove(right)
+    bpy.ops.ed.undo_push(message="Delete")
+    for _ in ("Delete", "Move"):
+        assert bpy.ops.ed.undo() == {"FINISHED"}
+    shot, (left, right) = bpy.context.scene, (bpy.data.objects[name] for name in names)  # undo makes all of them anew
+    assert left.location.x == pytest.approx(2.0)
+    shown = [volume.shown_take(obj).directory for obj in (left, right)]
+    assert shown == [folders[0] / "take_0002", folders[1] / "take_0001"]
 
     activate(right, shot)
     stopped = run.write_take(right)
