@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import bpy
+from bpy.app.translations import pgettext_iface as iface_
+from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import BoolProperty, EnumProperty, IntProperty, PointerProperty, StringProperty
 
 from . import preferences, run, volume
@@ -108,7 +110,8 @@ class _Session:
         if not job.ended:
             return TICK_SECONDS
         if not self.exporting:
-            self.size = f"About {megabytes(job.details['size'])}" if job.outcome == "done" else job.sentence
+            done = job.outcome == "done"
+            self.size = iface_("About {:s}").format(megabytes(job.details["size"])) if done else job.sentence
         else:
             self.sentence = job.sentence
             smoke = run.find_smoke(self.smoke)
@@ -263,7 +266,9 @@ class SMOKELIFT_OT_use_proxy(_NeedsResult, bpy.types.Operator):
         except (OSError, ValueError, LookupError, TypeError):
             file = folder / PROXY_FILE.format(1)
         if not file.is_file():
-            self.report({"ERROR"}, f"There is no proxy in {folder}: choose a proxy and export first.")
+            self.report(
+                {"ERROR"}, rpt_("There is no proxy in {:s}: choose a proxy and export first.").format(str(folder))
+            )
             return {"CANCELLED"}
         proxy = bpy.data.objects.new(f"{smoke.name} Proxy", smoke.data.copy())
         scene_of(smoke).collection.objects.link(proxy)
@@ -337,7 +342,8 @@ class _ExportPanel:
             draw_text(layout, context, _session.size, "DISK_DRIVE")
         if _session.exporting:
             job = _session.job
-            layout.progress(factor=job.done / job.total if job.total else 0.0, text=f"{job.done} of {job.total}")
+            text = iface_("{:d} of {:d}").format(job.done, job.total)
+            layout.progress(factor=job.done / job.total if job.total else 0.0, text=text, translate=False)
             layout.operator("smokelift.cancel_export", text="Cancel", icon="CANCEL")
         else:
             layout.operator("smokelift.export", icon="EXPORT")

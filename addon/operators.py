@@ -4,6 +4,7 @@ from contextlib import suppress
 from pathlib import Path
 
 import bpy
+from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import BoolProperty, StringProperty
 from mathutils import Vector
 
@@ -61,7 +62,8 @@ class SMOKELIFT_OT_add(bpy.types.Operator):
         try:
             clip = bpy.data.movieclips.load(self.filepath, check_existing=True)
         except RuntimeError:
-            self.report({"ERROR"}, f"{self.filepath} is no video and no picture that Blender can read: choose another.")
+            text = rpt_("{:s} is no video and no picture that Blender can read: choose another.")
+            self.report({"ERROR"}, text.format(self.filepath))
             return {"CANCELLED"}
         new_smoke(context.scene, clip)
         if not bpy.app.background:
@@ -294,7 +296,8 @@ class SMOKELIFT_OT_set_up(_NeedsClip, bpy.types.Operator):
         take = volume.shown_take(smoke)
         index = take.index()
         if index is None:
-            self.report({"ERROR"}, f"The files of the smoke in {take.directory} are missing: make it again.")
+            text = rpt_("The files of the smoke in {:s} are missing: make it again.")
+            self.report({"ERROR"}, text.format(str(take.directory)))
             return {"CANCELLED"}
         settings = smoke.smokelift
         if settings.set_up_camera and settings.camera_mode == "SCENE" and context.scene.camera is None:
@@ -316,7 +319,7 @@ class SMOKELIFT_OT_open_log(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         log = Take(Path(self.take)).log_file
         if not log.is_file():
-            self.report({"ERROR"}, f"There is no log at {log}: the engine never started.")
+            self.report({"ERROR"}, rpt_("There is no log at {:s}: the engine never started.").format(str(log)))
             return {"CANCELLED"}
         text = bpy.data.texts.get(LOG_TEXT) or bpy.data.texts.new(LOG_TEXT)
         text.from_string(log.read_text(encoding="utf-8", errors="replace"))
@@ -374,7 +377,7 @@ class SMOKELIFT_OT_show_smoke(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         found = next((obj for obj in smokes(context.scene) if obj.name == self.smoke), None)
         if found is None:
-            self.report({"ERROR"}, f"The scene has no smoke of the name {self.smoke}.")
+            self.report({"ERROR"}, rpt_("The scene has no smoke of the name {:s}.").format(self.smoke))
             return {"CANCELLED"}
         activate(found, context.scene)
         return {"FINISHED"}
@@ -392,7 +395,7 @@ class SMOKELIFT_OT_show_take(_NeedsClip, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         take = Take(Path(self.take))
         if not take.frames():
-            self.report({"ERROR"}, f"There is no finished frame in {take.directory}.")
+            self.report({"ERROR"}, rpt_("There is no finished frame in {:s}.").format(str(take.directory)))
             return {"CANCELLED"}
         run.present(active_smoke(context.scene), take)
         return {"FINISHED"}
@@ -432,7 +435,7 @@ class SMOKELIFT_OT_show_beside(NeedsResult, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         take = Take(Path(self.take))
         if volume.show_beside(active_smoke(context.scene), take) is None:
-            self.report({"ERROR"}, f"There is no finished frame in {take.directory}.")
+            self.report({"ERROR"}, rpt_("There is no finished frame in {:s}.").format(str(take.directory)))
             return {"CANCELLED"}
         return {"FINISHED"}
 

@@ -3,6 +3,7 @@
 import textwrap
 
 import bpy
+from bpy.app.translations import pgettext_iface as iface_
 
 from . import presets, run, volume
 from .scene_file import box_of, clip_path, frame_rate
@@ -64,7 +65,9 @@ def _draw_clip(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bp
     scene, settings = context.scene, smoke.smokelift
     clip = settings.clip
     if not clip_path(clip).is_file():
-        draw_text(layout, context, f"{clip_path(clip)} is not there: choose the clip again.", "ERROR")
+        draw_text(
+            layout, context, iface_("{:s} is not there: choose the clip again.").format(str(clip_path(clip))), "ERROR"
+        )
     row = layout.row(align=True)
     row.prop(settings, "first", text="Frames")
     row.prop(settings, "last", text="")
@@ -79,8 +82,9 @@ def _draw_clip(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bp
         draw_text(
             column,
             context,
-            f"The clip has {clip.size[0]} x {clip.size[1]} pixels at {clip.fps:g} frames a second, "
-            f"the scene {size[0]} x {size[1]} at {frame_rate(scene):g}.",
+            iface_("The clip has {:d} x {:d} pixels at {:g} frames a second, the scene {:d} x {:d} at {:g}.").format(
+                *clip.size, clip.fps, *size, frame_rate(scene)
+            ),
             "INFO",
         )
         column.operator("smokelift.match_clip")
@@ -112,10 +116,11 @@ def _draw_cost(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bp
         draw_text(layout, context, state.check_error, "ERROR")
     elif state.check_done:
         column = layout.column(align=True)
-        amounts = f"{state.memory:.1f} GB of memory, up to {size(state.disk)} on disk"
-        draw_text(column, context, f"About {duration(state.seconds)}, {amounts}", "TIME")
+        text = iface_("About {:s}, {:.1f} GB of memory, up to {:s} on disk")
+        draw_text(column, context, text.format(duration(state.seconds), state.memory, size(state.disk)), "TIME")
         if state.memory > state.memory_free:
-            draw_text(column, context, f"Only {state.memory_free:.1f} GB are free: choose a lower quality.", "ERROR")
+            text = iface_("Only {:.1f} GB are free: choose a lower quality.")
+            draw_text(column, context, text.format(state.memory_free), "ERROR")
     else:
         layout.label(text="Reading the clip", icon="TIME")
 
@@ -128,7 +133,8 @@ def _draw_run(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy
     if all(row.outcome in run.ENDED for row in own):
         begun = run.unfinished(smoke)
         if begun is not None and begun.frames():
-            column.operator("smokelift.resume", text=f"Resume after Frame {begun.frames()}", icon="FILE_REFRESH")
+            text = iface_("Resume after Frame {:d}").format(begun.frames())
+            column.operator("smokelift.resume", text=text, translate=False, icon="FILE_REFRESH")
             column.operator("smokelift.run", text="Start Again", icon="PLAY")
         else:
             column.operator("smokelift.run", text="Make Smoke", icon="PLAY")
@@ -140,7 +146,8 @@ def _draw_run(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy
         data = smoke.data
         last = data.frame_start + data.frame_duration - 1
         if data.sequence_mode == "CLIP" and not data.frame_start <= context.scene.frame_current <= last:
-            draw_text(layout, context, f"The smoke is seen in frames {data.frame_start} to {last}.", "INFO")
+            text = iface_("The smoke is seen in frames {:d} to {:d}.")
+            draw_text(layout, context, text.format(data.frame_start, last), "INFO")
         known = volume.provenance_note(smoke)
         if known:
             draw_text(layout, context, known, "INFO")
@@ -176,8 +183,8 @@ def _progress(row: bpy.types.PropertyGroup) -> str:
         return "Stopping"
     if not row.total:
         return "Reading the clip"
-    left = f", {duration(row.seconds_left)} left" if row.seconds_left >= 0.0 else ""
-    return f"{row.done} of {row.total}{left}"
+    text = iface_("{:d} of {:d}").format(row.done, row.total)
+    return text if row.seconds_left < 0.0 else iface_("{:s}, {:s} left").format(text, duration(row.seconds_left))
 
 
 def duration(seconds: float) -> str:
@@ -194,13 +201,14 @@ def size(megabytes: float) -> str:
 
 
 def draw_text(layout: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str = "NONE") -> None:
-    """A label, wrapped to the sidebar's width."""
+    """A label in the user's language, wrapped to the sidebar's width."""
+    text = iface_(text)
     points = context.region.width / context.preferences.system.ui_scale - (50.0 if icon == "NONE" else 70.0)
     lines = textwrap.wrap(text, max(16, int(points / POINTS_A_LETTER)))
     column = layout.column(align=True)
     column.scale_y = 0.8
     for number, line in enumerate(lines):
-        column.label(text=line, icon=icon if number == 0 or icon == "NONE" else "BLANK1")
+        column.label(text=line, translate=False, icon=icon if number == 0 or icon == "NONE" else "BLANK1")
 
 
 class SMOKELIFT_PT_view(_Main, bpy.types.Panel):
@@ -273,7 +281,7 @@ class _Results:
         column = layout.column(align=True)
         for take in found:
             row = column.row(align=True)
-            text = f"{take.title()}, {take.frames()} fr., {size(take.size())}"
+            text = iface_("{:s}, {:d} fr., {:s}").format(take.title(), take.frames(), size(take.size()))
             row.operator("smokelift.show_take", text=text, depress=take == shown).take = str(take.directory)
             row.operator("smokelift.name_take", text="", icon="GREASEPENCIL").take = str(take.directory)
             row.operator("smokelift.remove_take", text="", icon="TRASH").take = str(take.directory)
@@ -282,11 +290,12 @@ class _Results:
             column.operator("smokelift.switch_take", icon="FILE_REFRESH")
             other = volume.take_before(smoke)
             if other is not None:
-                text = f"Show {other.title()} Beside"
+                text = iface_("Show {:s} Beside").format(other.title())
                 column.operator("smokelift.show_beside", text=text, icon="MOD_MIRROR").take = str(other.directory)
         row = layout.row()
         row.active = len(found) > 1
-        row.operator("smokelift.remove_takes", text=f"Delete Earlier Results ({max(0, len(found) - 1)})", icon="TRASH")
+        text = iface_("Delete Earlier Results ({:d})").format(max(0, len(found) - 1))
+        row.operator("smokelift.remove_takes", text=text, translate=False, icon="TRASH")
 
 
 class SMOKELIFT_PT_view_results(_Results, bpy.types.Panel):
