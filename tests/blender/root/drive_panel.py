@@ -135,7 +135,7 @@ def drawing_alone(window: bpy.types.Window) -> float:
 
 def note_smoke(scene: bpy.types.Scene, drawn: list[float]) -> None:
     """Called after an area was drawn: the time of the first that has a Volume to show."""
-    if not drawn and any(obj.type == "VOLUME" and obj.data.filepath for obj in scene.objects):
+    if not drawn and any(obj.type == "VOLUME" and obj.data.filepath.endswith(".vdb") for obj in scene.objects):
         drawn.append(time.monotonic())
 
 
