@@ -48,4 +48,4 @@ def _modules() -> tuple[ModuleType, ...]:
     )
 
     panels = (panel, look_panel, setup_panel, direct_panel, export)
-    return (preferences, properties, smoke, look, volume, run, operators, undistort, *panels, batch)
+    return (preferences, properties, smoke, look, volume, run, operators, undistort, drop, presets, *panels, batch)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ast
 import html
+import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,6 +16,9 @@ ROOT = Path(__file__).resolve().parents[1]
 
 GAP = "…"
 """Stands for what a message fills in: a path, a number, a name."""
+
+_FIELD = re.compile(r"\{:[^{}]*\}")
+"""What `str.format` fills in, in sentences that are translated first."""
 
 SPEAKERS = {"fail", "note", "report", "error", "unexpected", "warn"}
 """Functions that say their first argument to the user; classes of exceptions do so as well."""
@@ -101,7 +105,7 @@ def _strings(node: ast.AST, said: bool, skipped: set[ast.AST]) -> Iterator[tuple
 def _text(node: ast.AST) -> str | None:
     """Return the text of a string, `GAP` in place of what it fills in; None for anything else."""
     if isinstance(node, ast.Constant):
-        return node.value if isinstance(node.value, str) else None
+        return _FIELD.sub(GAP, node.value) if isinstance(node.value, str) else None
     if isinstance(node, ast.JoinedStr):
         return "".join(_text(value) or GAP for value in node.values)
     if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add):
