@@ -1,0 +1,64 @@
+"""Make the picture of the presets and of the composite in docs/: ``python tests/blender/looks.py demo/sequence``.
+
+It takes a Python with bpy, and the example's sequence from `make demo`.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from pathlib import Path
+
+import bpy
+from pictures import beside, save
+from PIL import Image
+
+import addon
+from addon import compositing, look, volume
+from addon.take import Take
+from tests.example_shot import set_up_example, smoke
+
+FRAME = 30
+PERCENT, SAMPLES = 75, 48
+RIM = 0.3
+"""Metres from the floor to the bowl's rim, where the smoke's box begins."""
+
+
+def main() -> None:
+    """Render and write it."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    addon.register()
+    scene = set_up_example(bpy.context.scene)
+    obj = smoke(scene)
+    volume.show(obj, Take(Path(sys.argv[1]).absolute()))
+    scene.cycles.samples, scene.cycles.use_denoising = SAMPLES, False
+    scene.frame_set(FRAME)
+    with tempfile.TemporaryDirectory() as folder:
+        pictures = []
+        bpy.ops.smokelift.set_up()
+        for preset in look.PRESETS:
+            bpy.ops.smokelift.use_look(preset=preset)
+            pictures.append(rendered(scene, Path(folder)))
+        obj.smokelift.plate_place = "COMPOSITE"
+        bpy.ops.smokelift.set_up()
+        scene.objects[compositing.FLOOR].location.z -= RIM
+        bpy.ops.smokelift.use_look(preset="SMOKE")
+        pictures.append(rendered(scene, Path(folder)))
+        obj.location.x += 0.55
+        bpy.data.objects["Sun"].rotation_euler = (0.9, 0.0, 0.9)
+        bpy.ops.smokelift.use_look(preset="SOOT")
+        pictures.append(rendered(scene, Path(folder)))
+    save("blender_looks.png", beside(pictures))
+
+
+def rendered(scene: bpy.types.Scene, folder: Path) -> Image.Image:
+    """The current frame, small."""
+    scene.render.resolution_percentage = PERCENT
+    scene.render.image_settings.file_format = "PNG"
+    scene.render.filepath = str(folder / "render.png")
+    bpy.ops.render.render(write_still=True)
+    return Image.open(folder / "render.png").convert("RGB")
+
+
+if __name__ == "__main__":
+    main()
