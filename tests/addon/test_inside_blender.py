@@ -3,8 +3,8 @@
 bpy is one per process and a crash of it ends the process; so it stays out of this one. A single file, or a test of
 it, is run like any other: ``pytest tests/addon/inside/volume.py -k velocity``.
 
-Those that reconstruct whole clips are left to ``make test-blender``, which runs every file in every bpy: they take as
-long as a third of all other tests.
+Those that reconstruct clips, simulate, export or render are left to ``make test-blender``, which runs every file in
+every bpy: they take nearly as long as half of all other tests.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 
 INSIDE = Path(__file__).parent / "inside"
-LONG = ("batch.py", "whole.py")
+LONG = ("batch.py", "compositing.py", "directing.py", "export.py", "scene_file.py", "volume.py", "whole.py")
 FILES = sorted({path.name for path in INSIDE.glob("*.py")} - {"conftest.py", *LONG})
 SECONDS = 600
 
