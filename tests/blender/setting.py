@@ -16,6 +16,9 @@ ZIP = Path(os.environ.get("SMOKELIFT_ZIP", ROOT / "dist" / "missing"))
 WORK = ROOT / "build" / "test-blender"
 """Everything that the tests leave; pictures and figures are meant to be looked at."""
 
+LONGEST = 1200
+"""Seconds that a command may take: a Blender that hangs is a fault, not a reason to wait."""
+
 LIFECYCLE = ROOT / "tests" / "blender" / "inside" / "lifecycle.py"
 
 
@@ -56,6 +59,7 @@ def run(command: Sequence[str], environment: dict[str, str] | None = None) -> st
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
+        timeout=LONGEST,
     )
     assert done.returncode == 0, f"status {done.returncode} of {' '.join(command)}\n{done.stdout[-20_000:]}"
     return done.stdout

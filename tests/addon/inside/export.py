@@ -63,7 +63,7 @@ def grids(data: bpy.types.Volume, frame: int) -> tuple[str, set[str]]:
 
 
 def test_an_export_beside_the_results(made) -> None:
-    """All frames, a USD file that Blender reads, and an asset whose files lie beside it."""
+    """All frames, a USD file, and an asset whose files lie beside it."""
     export.folder_of(made).mkdir(parents=True)
     for name in ("export.json", "smoke.blend", "smoke_0009.vdb"):
         (export.folder_of(made) / name).write_text("of an earlier export")
@@ -77,7 +77,12 @@ def test_an_export_beside_the_results(made) -> None:
     assert json.loads((folder / "export.json").read_text())["grids"] == ["density"]
     assert [obj.type for obj in bpy.context.scene.objects].count("VOLUME") == 1
 
-    bpy.ops.wm.usd_import(filepath=str(folder / "smoke.usda"))
+
+@pytest.mark.skipif(bpy.app.version < (5, 0), reason="once it has imported USD, bpy 4.5 never ends")
+def test_blender_reads_the_usd_file(made) -> None:
+    """As a sequence of Volumes without velocity."""
+    exported(made, velocity=False)
+    bpy.ops.wm.usd_import(filepath=str(export.folder_of(made) / "smoke.usda"))
     (data,) = [data for data in bpy.data.volumes if data != made.data]
     assert (data.is_sequence, data.frame_start, data.frame_duration) == (True, 1, FRAMES)
     assert grids(data, 2) == ("smoke_0002.vdb", {"density"})
