@@ -22,6 +22,23 @@ FRAMES = 6
 """Of a take that `made` makes."""
 
 
+_status = 0
+
+
+def pytest_sessionfinish(exitstatus: int) -> None:
+    """Keep the status for the end."""
+    global _status
+    _status = int(exitstatus)
+
+
+def pytest_unconfigure() -> None:
+    """End without bpy 4.5's own end: it waits for ever to destroy what a thread of it waits on."""
+    if bpy.app.version[:2] == (4, 5):
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(_status)
+
+
 @pytest.fixture(autouse=True)
 def blender(tmp_path, monkeypatch) -> Iterator[Any]:
     """An empty file; Blender's own talk goes to a log."""

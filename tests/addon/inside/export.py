@@ -78,7 +78,6 @@ def test_an_export_beside_the_results(made) -> None:
     assert [obj.type for obj in bpy.context.scene.objects].count("VOLUME") == 1
 
 
-@pytest.mark.skipif(bpy.app.version < (5, 0), reason="once it has imported USD, bpy 4.5 never ends")
 def test_blender_reads_the_usd_file(made) -> None:
     """As a sequence of Volumes without velocity."""
     exported(made, velocity=False)
