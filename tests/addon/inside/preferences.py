@@ -57,14 +57,14 @@ def test_every_preference_has_a_name_and_a_tooltip(user) -> None:
 
 def test_the_manual_is_opened(scene, monkeypatch, tmp_path) -> None:
     """The extension's own copy; without one a sentence says where it is."""
+    page = tmp_path / "a manual" / "index.html"
+    monkeypatch.setattr(preferences, "MANUAL", page)
     with pytest.raises(RuntimeError, match=r"docs/blender\.md"):
         bpy.ops.smokelift.open_manual()
-    page = tmp_path / "a manual" / "index.html"
     page.parent.mkdir()
     page.touch()
     opened: list[str] = []
     monkeypatch.setattr("webbrowser.open", opened.append)
-    monkeypatch.setattr(preferences, "MANUAL", page)
     assert bpy.ops.smokelift.open_manual() == {"FINISHED"}
     assert opened == [page.as_uri()]
 

@@ -60,6 +60,7 @@ def end() -> Iterator[float]:
         "outcomes": [job.outcome for job in jobs()],
         "sentence": jobs()[-1].sentence,
         "volumes": len(volumes()),
+        "done": jobs()[-1].done,
         "frames": obj and obj.data.frame_duration,
         "file": obj and Path(bpy.path.abspath(obj.data.filepath)).is_file(),
     }
