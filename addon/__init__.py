@@ -6,7 +6,8 @@ the settings. `scene_file` (Blender scene to scene file), `volume` (sequence to 
 `directing` (what acts on the smoke after its clip), `shot_setup` (camera, world and light that match the clip) and
 `compositing` (smoke over the clip), both with the clean `plate`, and
 `undistort` (the clip without its lens's distortion) translate to Blender's data and back. The interface is
-thin: `properties`, `panel` with its sub-panels `look_panel`, `setup_panel` and `direct_panel`, and `operators`; `run`
+thin: `properties`, `panel` with its sub-panels `look_panel`, `setup_panel` and `direct_panel` (`subpanel` is what they
+share), and `operators`; `run`
 keeps the queue; `export` hands a smoke on; `drop`, `presets` and `preferences` are what Blender calls so; `batch` is
 the command line.
 """

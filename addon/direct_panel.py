@@ -2,10 +2,11 @@
 
 import bpy
 
-from . import run, volume
+from . import run
 from .operators import NeedsResult
 from .scene_file import ShotError
 from .smoke import active_smoke
+from .subpanel import OfResult
 from .take import TakeError
 
 
@@ -27,16 +28,8 @@ class SMOKELIFT_OT_direct(NeedsResult, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class _Direct:
+class _Direct(OfResult):
     bl_label = "Direct"
-    bl_category = "Smokelift"
-    bl_region_type = "UI"
-    bl_options = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        smoke = active_smoke(context.scene)
-        return smoke is not None and volume.shown_take(smoke) is not None
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout

@@ -19,6 +19,7 @@ from .job import EngineMissingError, Job, engine_command
 from .panel import draw_text
 from .paths import PATH_OPTIONS, absolute, relative
 from .smoke import active_smoke, scene_of
+from .subpanel import OfResult
 from .take import Take
 
 TICK_SECONDS = 0.1
@@ -316,16 +317,8 @@ class SMOKELIFT_OT_add_instance(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class _ExportPanel:
+class _ExportPanel(OfResult):
     bl_label = "Export"
-    bl_category = "Smokelift"
-    bl_region_type = "UI"
-    bl_options = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        smoke = active_smoke(context.scene)
-        return smoke is not None and volume.shown_take(smoke) is not None
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout

@@ -5,6 +5,7 @@ from bpy.props import EnumProperty
 
 from . import look, volume
 from .smoke import active_smoke
+from .subpanel import OfResult
 
 
 class SMOKELIFT_OT_use_look(bpy.types.Operator):
@@ -35,16 +36,8 @@ class SMOKELIFT_OT_use_look(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class _Look:
+class _Look(OfResult):
     bl_label = "Look"
-    bl_category = "Smokelift"
-    bl_region_type = "UI"
-    bl_options = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        smoke = active_smoke(context.scene)
-        return smoke is not None and volume.shown_take(smoke) is not None
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout

@@ -8,6 +8,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from . import presets, run, volume
 from .scene_file import box_of, clip_path, frame_rate
 from .smoke import active_smoke, migrate_soon, smokes
+from .subpanel import OfClip
 from .take import takes
 from .undistort import is_distorted
 
@@ -223,16 +224,8 @@ class SMOKELIFT_PT_clip(_Main, bpy.types.Panel):
     bl_space_type = "CLIP_EDITOR"
 
 
-class _Advanced:
+class _Advanced(OfClip):
     bl_label = "Advanced"
-    bl_category = "Smokelift"
-    bl_region_type = "UI"
-    bl_options = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        smoke = active_smoke(context.scene)
-        return smoke is not None and smoke.smokelift.clip is not None
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
@@ -263,15 +256,8 @@ class _Advanced:
         layout.operator("smokelift.show_page", icon="IMAGE_DATA")
 
 
-class _Results:
+class _Results(OfClip):
     bl_label = "Results"
-    bl_category = "Smokelift"
-    bl_region_type = "UI"
-    bl_options = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return _Advanced.poll(context)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout

@@ -3,21 +3,14 @@
 import bpy
 
 from .smoke import active_smoke
+from .subpanel import OfClip
 
 TICKS = ("set_up_range", "set_up_camera", "set_up_light", "set_up_colors", "set_up_plate")
 """Names of the settings."""
 
 
-class _SetUp:
+class _SetUp(OfClip):
     bl_label = "Shot Set-Up"
-    bl_category = "Smokelift"
-    bl_region_type = "UI"
-    bl_options = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        smoke = active_smoke(context.scene)
-        return smoke is not None and smoke.smokelift.clip is not None
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
