@@ -4,6 +4,7 @@ In a process of its own, because a client that lost its scheduler leaves sockets
 """
 
 import functools
+import signal
 import sys
 from pathlib import Path
 
@@ -29,4 +30,6 @@ def main(address: str, folder: Path) -> None:
 
 
 if __name__ == "__main__":
+    # a test run in the background may ignore SIGINT, which children inherit
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     main(sys.argv[1], Path(sys.argv[2]))
