@@ -23,11 +23,19 @@ def set_unless_changed(owner: bpy.types.ID, name: str, holder: Any, attribute: s
     value
         The value.
     """
-    key = f"smokelift_{name}"
-    before = owner.get(key)
+    before = owner.get(_key(name))
     if before is None or _same(_numbers(getattr(holder, attribute)), list(before)):
-        setattr(holder, attribute, value)
-        owner[key] = _numbers(getattr(holder, attribute))
+        set_and_remember(owner, name, holder, attribute, value)
+
+
+def set_and_remember(owner: bpy.types.ID, name: str, holder: Any, attribute: str, value: Any) -> None:
+    """Set a value, whatever it is, so that it follows the newest result from now on; parameters as above."""
+    setattr(holder, attribute, value)
+    owner[_key(name)] = _numbers(getattr(holder, attribute))
+
+
+def _key(name: str) -> str:
+    return f"smokelift_{name}"
 
 
 def _numbers(value: Any) -> list[float]:

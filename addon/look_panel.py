@@ -30,7 +30,12 @@ class SMOKELIFT_OT_use_look(bpy.types.Operator):
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        if not look.use_preset(active_smoke(context.scene).data, self.preset):
+        smoke = active_smoke(context.scene)
+        index = volume.shown_take(smoke).index()
+        if index is None:
+            self.report({"ERROR"}, "The smoke's files are missing: make it again.")
+            return {"CANCELLED"}
+        if not look.use_preset(smoke.data, self.preset, index["scene"]["medium"]["anisotropy"]):
             self.report({"ERROR"}, "The smoke's material is your own: remove it and show the result again for presets.")
             return {"CANCELLED"}
         return {"FINISHED"}

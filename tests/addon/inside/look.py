@@ -61,9 +61,9 @@ def as_before(obj: bpy.types.Object) -> bpy.types.ShaderNode:
 
 
 def test_presets_look_different(lit, tmp_path) -> None:
-    """In the sun before black: soot is dark, mist thin, dust red, steam white."""
+    """In the sun before black: soot is dark, mist thin, dust red, steam white and brightest against the light."""
     lit.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0.0
-    volume.show(smoke(lit), made(tmp_path, medium=MEDIUM))
+    volume.show(smoke(lit), made(tmp_path, medium=Medium(4.0, 0.8)))
     seen = {}
     for name in look.PRESETS:
         assert bpy.ops.smokelift.use_look(preset=name) == {"FINISHED"}
@@ -72,6 +72,12 @@ def test_presets_look_different(lit, tmp_path) -> None:
     assert seen["SOOT"].max() < seen["MIST"].min() < 0.9 * seen["STEAM"].min()
     assert seen["DUST"][0] > 1.3 * seen["DUST"][2]
     assert np.ptp(seen["STEAM"]) < 0.1 * seen["STEAM"].mean()
+    bpy.data.objects["Sun"].rotation_euler = (-1.4, 0.0, 0.0)
+    for name in ("SMOKE", "STEAM"):
+        bpy.ops.smokelift.use_look(preset=name)
+        against = rendered(lit, tmp_path / "against.exr")[2:6, 2:6].mean()
+        seen[name] = against / seen[name].mean()
+    assert seen["STEAM"] > 2.0 * seen["SMOKE"]
 
 
 def test_presets_keep_what_was_fitted_and_runs_keep_the_preset(lit, tmp_path) -> None:
@@ -85,6 +91,19 @@ def test_presets_keep_what_was_fitted_and_runs_keep_the_preset(lit, tmp_path) ->
     assert (found["Extinction"], found["Albedo"][0]) == (9.0, 0.5)
     bpy.ops.smokelift.use_look(preset="SMOKE")
     assert node(lit).inputs["Color"].default_value[:] == (1.0, 1.0, 1.0, 1.0)
+
+
+def test_a_preset_with_a_scattering_of_its_own_can_be_left(lit, tmp_path) -> None:
+    """Steam keeps its own when the smoke is made anew; the other presets have what was fitted to the newest result."""
+    volume.show(smoke(lit), made(tmp_path, medium=MEDIUM))
+    bpy.ops.smokelift.use_look(preset="STEAM")
+    node(lit).inputs["Anisotropy"].default_value = 0.5
+    volume.show(smoke(lit), made(tmp_path, medium=Medium(9.0, 0.5, -0.2), number=2))
+    assert node(lit).inputs["Anisotropy"].default_value == 0.5
+    bpy.ops.smokelift.use_look(preset="SMOKE")
+    assert node(lit).inputs["Anisotropy"].default_value == pytest.approx(-0.2)
+    volume.show(smoke(lit), made(tmp_path, medium=Medium(9.0, 0.5, 0.4), number=3))
+    assert node(lit).inputs["Anisotropy"].default_value == pytest.approx(0.4)
 
 
 def test_a_preset_needs_our_material(lit, tmp_path) -> None:
