@@ -3,8 +3,8 @@
 The library knows nothing of Blender: `take` is the files of a run, `job` the engine's process, `toml` the text of a
 scene file, `pace` a speed ramp, `contract` what the add-on repeats of the engine. `smoke` finds the objects that hold
 the settings. `scene_file` (Blender scene to scene file), `volume` (sequence to Volume object), `look` (its material),
-`directing` (what acts on the smoke after its clip), `shot_setup` (camera, world and light that match the clip) and
-`compositing` (smoke over the clip), both with the clean `plate`, and
+`directing` (what acts on the smoke after its clip), `shot_setup` (camera, world and light that match the clip),
+`compositing` (smoke over the clip) and `projection` (the clip's background on a card), all with the clean `plate`, and
 `undistort` (the clip without its lens's distortion) translate to Blender's data and back. The interface is
 thin: `properties`, `panel` with its sub-panels `look_panel`, `setup_panel` and `direct_panel` (`subpanel` is what they
 share), and `operators`; `run`

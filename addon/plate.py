@@ -1,10 +1,12 @@
 """The clean plate as a picture in Blender, in step with the clip."""
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import bpy
+from mathutils import Vector
 
 from .paths import relative
 from .take import Take
@@ -18,6 +20,46 @@ def plate_image(take: Take, path: str) -> bpy.types.Image:
     if image.filepath != relative(file):
         image.filepath = relative(file)
     return image
+
+
+def show_plate(
+    tree: bpy.types.NodeTree,
+    shader: bpy.types.ShaderNode,
+    place: Callable[[], bpy.types.NodeSocket],
+    take: Take,
+    background: dict[str, Any],
+) -> bpy.types.ShaderNode | None:
+    """Have a shader show the clean plate, or one color if the background is that.
+
+    Parameters
+    ----------
+    tree, shader
+        The shader, which has an input Color.
+    place
+        Makes coordinates in the plate; asked for them only if no texture is connected yet.
+    take, background
+        The take that the plate belongs to, and the table of its background.
+
+    Returns
+    -------
+    The texture node, or None for one color.
+    """
+    color = shader.inputs["Color"]
+    if "image" not in background:
+        for link in list(color.links):
+            tree.links.remove(link)
+        color.default_value = (*background.get("color", (0.0, 0.0, 0.0)), 1.0)
+        return None
+    if not color.links:
+        texture, coordinates = tree.nodes.new("ShaderNodeTexImage"), place()
+        texture.extension = "EXTEND"
+        tree.links.new(coordinates, texture.inputs["Vector"])
+        tree.links.new(texture.outputs["Color"], color)
+        for node, left in ((texture, 300.0), (coordinates.node, 500.0)):
+            node.location = shader.location - Vector((left, 0.0))
+    node = color.links[0].from_node
+    node.image = plate_image(take, background["image"])
+    return node
 
 
 def play_beside(image: bpy.types.Image, user: Any, clip: bpy.types.MovieClip, tracked: bool) -> None:

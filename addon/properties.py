@@ -380,6 +380,12 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
                 "Transparent film over the plate in the compositor, with the smoke's shadow on the floor, holdouts, "
                 "the clip's grain, and the clip in front of it all where a mask says so",
             ),
+            (
+                "PROJECTION",
+                "Projection",
+                "On a card behind the smoke, projected from where the clip was filmed, so that it stays in its place "
+                "when the camera of the render moves",
+            ),
         ],
     )
     assumed_camera: PointerProperty(

@@ -11,7 +11,8 @@ from mathutils import Matrix, Vector
 
 from .compositing import composite
 from .kept import set_unless_changed
-from .plate import plate_image, play_beside
+from .plate import play_beside, show_plate
+from .projection import project, show_card
 from .smoke import GUESSED_CAMERA, scene_of
 from .take import Take
 
@@ -53,14 +54,27 @@ def set_up(smoke: bpy.types.Object, take: Take, index: dict[str, Any]) -> None:
         if settings.light_mode == "ESTIMATE":
             _estimated_sun(scene, index)
     if settings.set_up_plate:
-        if settings.plate_place == "COMPOSITE":
-            composite(smoke, take, index)
-        else:
-            _set_world(scene, settings.clip, take, index["scene"])
+        _set_up_plate(smoke, take, index)
     if settings.set_up_colors:
         scene.view_settings.view_transform = "Standard"
         scene.view_settings.look = "None"
         scene.view_settings.exposure, scene.view_settings.gamma = 0.0, 1.0
+
+
+def _set_up_plate(smoke: bpy.types.Object, take: Take, index: dict[str, Any]) -> None:
+    """Show the clean plate where it was chosen to be, and no more where an earlier set-up put it in front of that."""
+    settings, scene = smoke.smokelift, scene_of(smoke)
+    place = settings.plate_place
+    if place == "COMPOSITE":
+        composite(smoke, take, index)
+    elif place == "PROJECTION":
+        project(smoke, take, index)
+    else:
+        _set_world(scene, settings.clip, take, index["scene"])
+    show_card(scene, place == "PROJECTION")
+    tree = scene.world.node_tree if scene.world is not None else None
+    if tree is not None and NAME in tree.nodes:
+        tree.nodes[NAME].mute = place == "PROJECTION"  # a muted Mix Shader shows what the world was before
 
 
 def assumed_camera(smoke: bpy.types.Object, index: dict[str, Any]) -> bpy.types.Object | None:
@@ -146,7 +160,8 @@ def _set_world(scene: bpy.types.Scene, clip: bpy.types.MovieClip, take: Take, ta
         for node, left in ((rays, 400.0), (background, 200.0)):
             node.location = mix.location - Vector((left, 200.0))
     background = mix.inputs[2].links[0].from_node
-    plate = _set_plate(world.node_tree, background, take, tables.get("background") or {})
+    tree = world.node_tree
+    plate = show_plate(tree, background, lambda: _window(tree), take, tables.get("background") or {})
     if plate is not None:
         play_beside(plate.image, plate.image_user, clip, "matrices" in tables["camera"])
 
@@ -158,24 +173,6 @@ def _remove_unused_worlds() -> None:
             bpy.data.worlds.remove(world)
 
 
-def _set_plate(
-    tree: bpy.types.NodeTree, shader: bpy.types.ShaderNode, take: Take, background: dict[str, Any]
-) -> bpy.types.ShaderNode | None:
-    """Connect the background shader with the clean plate, whose node it returns, or give it a colour."""
-    colour = shader.inputs["Color"]
-    if "image" not in background:
-        for link in list(colour.links):
-            tree.links.remove(link)
-        colour.default_value = (*background.get("color", (0.0, 0.0, 0.0)), 1.0)
-        return None
-    if not colour.links:
-        coordinates = tree.nodes.new("ShaderNodeTexCoord")
-        texture = tree.nodes.new("ShaderNodeTexImage")
-        texture.extension = "EXTEND"
-        tree.links.new(coordinates.outputs["Window"], texture.inputs["Vector"])
-        tree.links.new(texture.outputs["Color"], colour)
-        for node, left in ((texture, 300.0), (coordinates, 500.0)):
-            node.location = shader.location - Vector((left, 0.0))
-    node = colour.links[0].from_node
-    node.image = plate_image(take, background["image"])
-    return node
+def _window(tree: bpy.types.NodeTree) -> bpy.types.NodeSocket:
+    """Coordinates in the picture that is rendered."""
+    return tree.nodes.new("ShaderNodeTexCoord").outputs["Window"]

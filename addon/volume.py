@@ -196,7 +196,7 @@ def _set_time(smoke: bpy.types.Object, scene: bpy.types.Scene, index: dict[str, 
     direction = index.get("settings", {}).get("direct", {}).get("job")
     live = settings.directing.live and direction != "retime" and not _tracked(index)
     clip = settings.clip
-    before = _frames_before(settings, index)
+    before = frames_before(settings, index)
     start = (clip.frame_start if clip else 1) + (round(before * ratio) if real else before)
     set_unless_changed(volume, "start", volume, "frame_start", start)
     volume.frame_offset = numbers[0] - 1
@@ -239,7 +239,7 @@ def _real_time(smoke: bpy.types.Object, ratio: float, index: dict[str, Any]) -> 
     return smoke.smokelift.speed == "REAL" and not _tracked(index) and not math.isclose(ratio, 1.0, rel_tol=1e-3)
 
 
-def _frames_before(settings: bpy.types.PropertyGroup, index: dict[str, Any]) -> int:
+def frames_before(settings: bpy.types.PropertyGroup, index: dict[str, Any]) -> int:
     """Number of the clip's frames before the take's first, which settings for the next take do not change."""
     frames = index["scene"]["clip"].get("frames")
     return settings.first - 1 if frames is None or settings.clip is None else frames[0] - settings.clip.frame_offset

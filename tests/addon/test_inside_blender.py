@@ -17,7 +17,16 @@ from pathlib import Path
 import pytest
 
 INSIDE = Path(__file__).parent / "inside"
-LONG = ("batch.py", "compositing.py", "directing.py", "export.py", "scene_file.py", "volume.py", "whole.py")
+LONG = (
+    "batch.py",
+    "compositing.py",
+    "directing.py",
+    "export.py",
+    "projection.py",
+    "scene_file.py",
+    "volume.py",
+    "whole.py",
+)
 FILES = sorted({path.name for path in INSIDE.glob("*.py")} - {"conftest.py", *LONG})
 SECONDS = 600
 
