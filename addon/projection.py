@@ -180,7 +180,7 @@ def _new_material() -> bpy.types.Material:
 
 
 def _group() -> bpy.types.NodeTree:
-    """The node group that finds a point in the plate: the file's own, which the artist may have changed, else a new one."""
+    """The node group that finds a point in the plate: the own one of the file, which may be changed, else a new one."""
     for known in bpy.data.node_groups:
         if known.library is None and known.get(MARK):
             return known
