@@ -94,7 +94,9 @@ def bench_parser() -> argparse.ArgumentParser:
 
 
 def _add_shapes(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--sizes", type=_shapes, default=SHAPES, metavar="XxYxZ,...", help="voxels along x, y and z")
+    parser.add_argument(
+        "--sizes", type=read_shapes, default=SHAPES, metavar="XxYxZ,...", help="voxels along x, y and z"
+    )
 
 
 def _add_json(parser: argparse.ArgumentParser) -> None:
@@ -147,7 +149,8 @@ def _count(text: str) -> int:
     return int(text)
 
 
-def _shapes(text: str) -> tuple[tuple[int, ...], ...]:
+def read_shapes(text: str) -> tuple[tuple[int, ...], ...]:
+    """Read sizes of grids from XxYxZ,XxYxZ, the smallest first."""
     try:
         shapes = {tuple(int(count) for count in part.split("x")) for part in text.split(",")}
     except ValueError:

@@ -23,13 +23,23 @@ HEIGHT = 3.0
 """Longest side of the box (m)."""
 
 
-def write_clip(folder: Path, frames: int) -> Scene:
-    """Write some frames into a folder, and return their scene."""
+def write_clip(folder: Path, frames: int, extent: float = 1.0) -> Scene:
+    """Write some frames into a folder, and return their scene.
+
+    Parameters
+    ----------
+    folder
+        It exists.
+    frames
+        How many.
+    extent
+        Length of the smoke along each side of the box, in shares of the usual. Smaller smoke is as opaque.
+    """
     scene = Scene(
         clip=ClipSource(folder / "frame_####.exr", fps=24.0),
         camera=Camera.look_at((0.0, -7.0, 0.0), (0.0, 0.0, 0.0), fov_y_degrees=30, size=PIXELS),
-        domain=_box(SHAPE),
-        medium=Medium(extinction=5.0, albedo=0.9),
+        domain=_box(SHAPE, extent * HEIGHT),
+        medium=Medium(extinction=5.0 / extent, albedo=0.9),
         lights=(DirectionalLight((0.5, 0.5, -0.7), (8.0, 8.0, 8.0)),),
         background=Background(color=(0.0, 0.0, 0.0)),
     )
@@ -40,10 +50,10 @@ def write_clip(folder: Path, frames: int) -> Scene:
 
 def with_grid(scene: Scene, shape: tuple[int, int, int]) -> Scene:
     """Return the scene with a box of other voxels, with the same middle and height."""
-    return replace(scene, domain=_box(shape))
+    return replace(scene, domain=_box(shape, HEIGHT))
 
 
-def _box(shape: tuple[int, int, int]) -> Domain:
-    voxel = HEIGHT / max(shape)
+def _box(shape: tuple[int, int, int], height: float) -> Domain:
+    voxel = height / max(shape)
     x, y, z = (n * voxel / 2 for n in shape)
     return Domain((-x, -y, -z), (x, y, z), shape)

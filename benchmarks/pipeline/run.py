@@ -14,7 +14,7 @@ from typing import Any
 
 from benchmarks import machine
 from benchmarks.pipeline.clip import with_grid, write_clip
-from benchmarks.pipeline.worker import run_apart
+from benchmarks.pipeline.worker import Job, run_apart
 from benchmarks.tables import size_text
 from benchmarks.timing import UNTIMED
 from smokelift.scene import Scene
@@ -69,7 +69,7 @@ def run(
             path = folder / "scene.toml"
             (known if scene_path is not None else with_grid(known, shape)).save(path)
             for method in methods:
-                found = run_apart(path, shape, method, quality, frames, folder)
+                found = run_apart(Job(str(path), shape, method, quality, frames), folder)
                 results["runs"].append(asdict(found))
                 outcome = found.failure or f"{found.seconds:.3g} s a frame, {found.solves:.0f} solves"
                 say(f"{size_text(shape)}, {method}: {outcome}")

@@ -1,8 +1,8 @@
 """One run of the pipeline in a process of its own, so that its peak of memory is its own.
 
-    python -m benchmarks.pipeline.worker SCENE.toml XxYxZ METHOD QUALITY FRAMES FOLDER
+    python -m benchmarks.pipeline.worker JOB FOLDER
 
-writes run.json into the folder.
+reads the job, a `Job` as JSON, and writes run.json into the folder.
 """
 
 from __future__ import annotations
@@ -10,20 +10,50 @@ from __future__ import annotations
 import json
 import sys
 import tempfile
+import time
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import cast
+from typing import Literal
 
 import numpy as np
 
 from benchmarks.machine import peak_mib
 from benchmarks.process import run_module, why_it_ended
-from benchmarks.tables import size_text
 from benchmarks.timing import UNTIMED, FrameTimes, median
 from smokelift.footage.clip import Clip
 from smokelift.pipeline import reconstruct
 from smokelift.scene import Scene
 from smokelift.setup.settings import MethodName, Quality, Settings
+
+CLOCKS = {"wall": time.perf_counter, "processor": time.process_time}
+"""What a user waits; and the work of all cores, which is the same beside other work."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """What is run.
+
+    Attributes
+    ----------
+    scene
+        Path of a scene file with a clip.
+    size
+        Voxels along x, y and z.
+    method, quality, detail
+        As in `Settings`.
+    frames
+        How many are timed.
+    clock
+        Name in `CLOCKS`.
+    """
+
+    scene: str
+    size: tuple[int, int, int]
+    method: MethodName
+    quality: Quality
+    frames: int
+    detail: float = 1.0
+    clock: Literal["wall", "processor"] = "wall"
 
 
 @dataclass(frozen=True)
@@ -44,11 +74,13 @@ class Run:
         Peak of the process's memory; None where the system does not say.
     psnr
         Of the working picture, linear, mean over the frames (dB).
+    occupied
+        Share of the voxels that may hold smoke, mean over the frames.
     failure
         Why there are no figures, one sentence; else empty.
     """
 
-    size: tuple[int, ...]
+    size: tuple[int, int, int]
     method: str
     seconds: float = 0.0
     seconds_density: float = 0.0
@@ -56,63 +88,62 @@ class Run:
     solves: float = 0.0
     memory_mib: float | None = None
     psnr: float = 0.0
+    occupied: float = 0.0
     failure: str = ""
 
 
-def run_apart(
-    scene_path: Path, shape: tuple[int, int, int], method: MethodName, quality: Quality, frames: int, folder: Path
-) -> Run:
-    """Time a run in a process of its own."""
+def run_apart(job: Job, folder: Path) -> Run:
+    """Do a job in a process of its own, which leaves its result in a folder."""
     result = folder / "run.json"
     result.unlink(missing_ok=True)
-    ended = run_module(
-        "benchmarks.pipeline.worker", str(scene_path), size_text(shape), method, quality, str(frames), str(folder)
-    )
+    ended = run_module("benchmarks.pipeline.worker", json.dumps(asdict(job)), str(folder))
     if result.exists():
-        return Run(**json.loads(result.read_text()))
-    return Run(shape, method, failure=why_it_ended(ended))
+        found = json.loads(result.read_text())
+        return Run(**{**found, "size": tuple(found["size"])})
+    return Run(job.size, job.method, failure=why_it_ended(ended))
 
 
-def measure(scene_path: Path, shape: tuple[int, int, int], method: MethodName, quality: Quality, frames: int) -> Run:
-    """Time a run in this process.
+def measure(job: Job) -> Run:
+    """Do a job in this process.
 
     Raises
     ------
     ValueError
         If the scene, its clip or the resolution cannot be used.
     """
-    scene = Scene.load(scene_path)
+    scene = Scene.load(job.scene)
     if scene.clip is None:
-        raise ValueError(f"{scene_path}: has no [clip]; give the path of the video there.")
+        raise ValueError(f"{job.scene}: has no [clip]; give the path of the video there.")
     first = scene.clip.frames[0] if scene.clip.frames is not None else 0
-    source = replace(scene.clip, frames=(first, first + UNTIMED + frames - 1))
-    settings = Settings.preset(quality, method, shape)
-    times = FrameTimes(shape)
+    source = replace(scene.clip, frames=(first, first + UNTIMED + job.frames - 1))
+    settings = replace(Settings.preset(job.quality, job.method, job.size), detail=job.detail)
+    times = FrameTimes(job.size, CLOCKS[job.clock])
     with tempfile.TemporaryDirectory() as out, Clip.open(source) as clip:
         figures = [frame.figures for frame in times.over(reconstruct(clip, scene, settings, Path(out) / "smoke"))]
     return Run(
-        size=shape,
-        method=method,
+        size=job.size,
+        method=job.method,
         seconds=times.seconds,
         seconds_density=median([found["seconds_density"] for found in figures]),
         seconds_velocity=median([found["seconds_velocity"] for found in figures]),
         solves=times.solves,
         memory_mib=peak_mib(),
         psnr=float(np.mean([found["psnr"] for found in figures[UNTIMED:]])),
+        occupied=float(np.mean([found["hull_share"] for found in figures[UNTIMED:]])),
     )
 
 
 def main() -> None:
-    """Do the run that the command line names."""
-    scene_path, size, method, quality, frames, folder = sys.argv[1:]
-    x, y, z = (int(count) for count in size.split("x"))
+    """Do the job that the command line names."""
+    words = json.loads(sys.argv[1])
+    job = Job(**{**words, "size": tuple(words["size"])})
     try:
-        found = measure(Path(scene_path), (x, y, z), cast(MethodName, method), cast(Quality, quality), int(frames))
+        found = measure(job)
     except MemoryError as error:
-        found = Run((x, y, z), method, failure=str(error) or "Out of memory.")
+        found = Run(job.size, job.method, failure=str(error) or "Out of memory.")
     except ValueError as error:
-        found = Run((x, y, z), method, failure=str(error))
-    (Path(folder) / "run.json").write_text(json.dumps(asdict(found)))
+        found = Run(job.size, job.method, failure=str(error))
+    (Path(sys.argv[2]) / "run.json").write_text(json.dumps(asdict(found)))
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ import pytest
 from benchmarks.pipeline import clip, run
 from benchmarks.pipeline.clip import with_grid, write_clip
 from benchmarks.pipeline.table import text
-from benchmarks.pipeline.worker import Run, measure
+from benchmarks.pipeline.worker import Job, Run, measure
 from benchmarks.velocity.flow import built_in_densities, built_in_pair
 from smokelift.app.cli import main
 from smokelift.output.vdb import VdbUnavailable, vdb_module
@@ -74,7 +74,7 @@ def test_the_first_frames_are_not_clocked(tmp_path, monkeypatch):
     assert scene.clip is not None
     replace(scene, clip=replace(scene.clip, frames=(3, 9))).save(tmp_path / "scene.toml")
     with pytest.raises(ValueError, match="enough"):
-        measure(tmp_path / "scene.toml", SHAPE, "default", "balanced", 4)
+        measure(Job(str(tmp_path / "scene.toml"), SHAPE, "default", "balanced", 4))
     assert taken == [(3, 8)]
 
 
