@@ -6,10 +6,10 @@ the settings. `scene_file` (Blender scene to scene file), `volume` (sequence to 
 `directing` (what acts on the smoke after its clip), `shot_setup` (camera, world and light that match the clip),
 `compositing` (smoke over the clip) and `projection` (the clip's background on a card), all with the clean `plate`, and
 `undistort` (the clip without its lens's distortion) translate to Blender's data and back. The interface is
-thin: `properties`, `panel` with its sub-panels `look_panel`, `setup_panel` and `direct_panel` (`subpanel` is what they
-share), and `operators`; `run`
-keeps the queue; `export` hands a smoke on; `drop`, `presets` and `preferences` are what Blender calls so; `batch` is
-the command line.
+thin: `properties`; `panel` with the sub-panels `results_panel`, `advanced_panel`, `look_panel`, `setup_panel` and
+`direct_panel`, each with its buttons (`subpanel` is what they share); the other buttons in `operators`, `box` and
+`editors`, and what all of them need in `needs`. `run` keeps the queue; `export` hands a smoke on; `drop`, `presets` and
+`preferences` are what Blender calls so; `batch` is the command line.
 """
 
 from types import ModuleType
@@ -30,9 +30,12 @@ def unregister() -> None:
 def _modules() -> tuple[ModuleType, ...]:
     """Those with something to register, each after those it needs; panels in the order of the tab."""
     from . import (
+        advanced_panel,
         batch,
+        box,
         direct_panel,
         drop,
+        editors,
         export,
         look,
         look_panel,
@@ -41,6 +44,7 @@ def _modules() -> tuple[ModuleType, ...]:
         preferences,
         presets,
         properties,
+        results_panel,
         run,
         setup_panel,
         smoke,
@@ -48,5 +52,7 @@ def _modules() -> tuple[ModuleType, ...]:
         volume,
     )
 
-    panels = (panel, look_panel, setup_panel, direct_panel, export)
-    return (preferences, properties, smoke, look, volume, run, operators, undistort, drop, presets, *panels, batch)
+    data = (preferences, properties, smoke, look, volume, run)
+    buttons = (operators, box, editors, undistort, drop, presets)
+    panels = (panel, results_panel, advanced_panel, look_panel, setup_panel, direct_panel, export)
+    return (*data, *buttons, *panels, batch)

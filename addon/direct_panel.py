@@ -1,16 +1,17 @@
 """The sub-panel Direct: what is made of the result on show, and the button that does it."""
 
 import bpy
+from bpy.app.translations import pgettext_iface as iface_
 
 from . import run
-from .operators import NeedsResult
+from .needs import NeedsClipAndResult
 from .scene_file import ShotError
 from .smoke import active_smoke
 from .subpanel import OfResult
 from .take import TakeError
 
 
-class SMOKELIFT_OT_direct(NeedsResult, bpy.types.Operator):
+class SMOKELIFT_OT_direct(NeedsClipAndResult, bpy.types.Operator):
     """Make a new result of the one on show: longer, at another speed, or repeating. The one on show stays"""
 
     bl_idname = "smokelift.direct"
@@ -43,7 +44,8 @@ class _Direct(OfResult):
         label = settings.bl_rna.properties["direction"].enum_items[settings.direction].name
         row = layout.row()
         row.scale_y = 1.5
-        row.operator("smokelift.direct", text=f"{label} Smoke", icon="PLAY")
+        text = iface_("{:s} Smoke").format(iface_(label))
+        row.operator("smokelift.direct", text=text, translate=False, icon="PLAY")
 
 
 def _draw_continue(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:

@@ -16,6 +16,7 @@ from bpy.props import BoolProperty, EnumProperty, IntProperty, PointerProperty, 
 from . import preferences, run, volume
 from .contract import ASSET_FILE, EXPORT_FILE, FRAME_FILE, PROXY_FILE
 from .job import EngineMissingError, Job, engine_command
+from .needs import NeedsResult
 from .panel import draw_text
 from .paths import PATH_OPTIONS, absolute, relative
 from .smoke import active_smoke, scene_of
@@ -201,17 +202,7 @@ def proxy_of(smoke: bpy.types.Object) -> bpy.types.Object | None:
     return next((obj for obj in smoke.children if SHOWN_TAKE in obj), None)
 
 
-class _NeedsResult:
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        smoke = active_smoke(context.scene)
-        if smoke is None or volume.shown_take(smoke) is None:
-            cls.poll_message_set("Make smoke first")
-            return False
-        return True
-
-
-class SMOKELIFT_OT_export(_NeedsResult, bpy.types.Operator):
+class SMOKELIFT_OT_export(NeedsResult, bpy.types.Operator):
     """Write small OpenVDB files of the smoke, a USD file of them, and an asset to be used in other files"""
 
     bl_idname = "smokelift.export"
@@ -247,7 +238,7 @@ class SMOKELIFT_OT_cancel_export(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SMOKELIFT_OT_use_proxy(_NeedsResult, bpy.types.Operator):
+class SMOKELIFT_OT_use_proxy(NeedsResult, bpy.types.Operator):
     """Show the proxy of the export in the viewport, and the smoke itself in renders only; again to undo that"""
 
     bl_idname = "smokelift.use_proxy"

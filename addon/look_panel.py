@@ -4,11 +4,12 @@ import bpy
 from bpy.props import EnumProperty
 
 from . import look, volume
+from .needs import NeedsResult
 from .smoke import active_smoke
 from .subpanel import OfResult
 
 
-class SMOKELIFT_OT_use_look(bpy.types.Operator):
+class SMOKELIFT_OT_use_look(NeedsResult, bpy.types.Operator):
     """Set density, brightness, colors and edges of the smoke. What was fitted to the clip stays"""
 
     bl_idname = "smokelift.use_look"
@@ -20,14 +21,6 @@ class SMOKELIFT_OT_use_look(bpy.types.Operator):
         description="Kind of smoke",
         items=[(key, name, description) for key, (name, description, _) in look.PRESETS.items()],
     )
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        smoke = active_smoke(context.scene)
-        if smoke is None or volume.shown_take(smoke) is None:
-            cls.poll_message_set("Make smoke first")
-            return False
-        return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         smoke = active_smoke(context.scene)

@@ -8,8 +8,6 @@ from bpy.app.translations import pgettext_iface as iface_
 from . import presets, run, volume
 from .scene_file import box_of, clip_path, frame_rate
 from .smoke import active_smoke, migrate_soon, smokes
-from .subpanel import OfClip
-from .take import takes
 from .undistort import is_distorted
 
 POINTS_A_LETTER = 6.5
@@ -224,101 +222,4 @@ class SMOKELIFT_PT_clip(_Main, bpy.types.Panel):
     bl_space_type = "CLIP_EDITOR"
 
 
-class _Advanced(OfClip):
-    bl_label = "Advanced"
-
-    def draw(self, context: bpy.types.Context) -> None:
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
-        smoke = active_smoke(context.scene)
-        settings = smoke.smokelift
-        row = layout.row()
-        row.active = settings.camera_mode == "SCENE"
-        row.prop(settings, "longest_side")
-        row = layout.row(heading="Known Depth")
-        row.prop(settings, "use_axis_depth", text="")
-        value = row.row()
-        value.active = settings.use_axis_depth
-        value.prop(settings, "axis_depth", text="")
-        for name in ("fps", "transfer", "speed", "device", "use_medium"):
-            layout.prop(settings, name)
-        column = layout.column()
-        column.active = settings.use_medium
-        for name in ("extinction", "albedo", "anisotropy"):
-            column.prop(settings, name)
-        state = context.window_manager.smokelift
-        if state.check_smoke == smoke.session_uid and state.notes:
-            draw_text(layout, context, "{} x {} x {} voxels. Assumptions and choices:".format(*state.resolution))
-            for note in state.notes.split("\n"):
-                draw_text(layout, context, note)
-        layout.operator("smokelift.check", icon="VIEWZOOM")
-        layout.operator("smokelift.show_page", icon="IMAGE_DATA")
-
-
-class _Results(OfClip):
-    bl_label = "Results"
-
-    def draw(self, context: bpy.types.Context) -> None:
-        layout = self.layout
-        smoke = active_smoke(context.scene)
-        shown = volume.shown_take(smoke)
-        found = takes(run.output_folder(smoke))
-        column = layout.column(align=True)
-        for take in found:
-            row = column.row(align=True)
-            text = iface_("{:s}, {:d} fr., {:s}").format(take.title(), take.frames(), size(take.size()))
-            row.operator("smokelift.show_take", text=text, depress=take == shown).take = str(take.directory)
-            row.operator("smokelift.name_take", text="", icon="GREASEPENCIL").take = str(take.directory)
-            row.operator("smokelift.remove_take", text="", icon="TRASH").take = str(take.directory)
-        if len(found) > 1:
-            column = layout.column()
-            column.operator("smokelift.switch_take", icon="FILE_REFRESH")
-            other = volume.take_before(smoke)
-            if other is not None:
-                text = iface_("Show {:s} Beside").format(other.title())
-                column.operator("smokelift.show_beside", text=text, icon="MOD_MIRROR").take = str(other.directory)
-        row = layout.row()
-        row.active = len(found) > 1
-        text = iface_("Delete Earlier Results ({:d})").format(max(0, len(found) - 1))
-        row.operator("smokelift.remove_takes", text=text, translate=False, icon="TRASH")
-
-
-class SMOKELIFT_PT_view_results(_Results, bpy.types.Panel):
-    """In the 3D View."""
-
-    bl_space_type = "VIEW_3D"
-    bl_parent_id = "SMOKELIFT_PT_view"
-
-
-class SMOKELIFT_PT_clip_results(_Results, bpy.types.Panel):
-    """In the Movie Clip Editor."""
-
-    bl_space_type = "CLIP_EDITOR"
-    bl_parent_id = "SMOKELIFT_PT_clip"
-
-
-class SMOKELIFT_PT_view_advanced(_Advanced, bpy.types.Panel):
-    """In the 3D View."""
-
-    bl_space_type = "VIEW_3D"
-    bl_parent_id = "SMOKELIFT_PT_view"
-
-
-class SMOKELIFT_PT_clip_advanced(_Advanced, bpy.types.Panel):
-    """In the Movie Clip Editor."""
-
-    bl_space_type = "CLIP_EDITOR"
-    bl_parent_id = "SMOKELIFT_PT_clip"
-
-
-_CLASSES = (
-    SMOKELIFT_PT_view,
-    SMOKELIFT_PT_clip,
-    SMOKELIFT_PT_view_results,
-    SMOKELIFT_PT_clip_results,
-    SMOKELIFT_PT_view_advanced,
-    SMOKELIFT_PT_clip_advanced,
-)
-
-register, unregister = bpy.utils.register_classes_factory(_CLASSES)
+register, unregister = bpy.utils.register_classes_factory((SMOKELIFT_PT_view, SMOKELIFT_PT_clip))

@@ -1,12 +1,55 @@
-"""The sub-panel Shot Set-Up: what Set Up Shot sets up, each with a tick of its own."""
+"""The sub-panel Shot Set-Up: what Set Up Shot sets up, each with a tick of its own; and the buttons for that."""
 
 import bpy
+from bpy.app.translations import pgettext_rpt as rpt_
 
+from . import shot_setup, volume
+from .needs import NeedsClip, NeedsClipAndResult
 from .smoke import active_smoke
 from .subpanel import OfClip
 
 TICKS = ("set_up_range", "set_up_camera", "set_up_light", "set_up_colors", "set_up_plate")
 """Names of the settings."""
+
+
+class SMOKELIFT_OT_match_clip(NeedsClip, bpy.types.Operator):
+    """Set the scene's resolution, frame rate and length to the clip's"""
+
+    bl_idname = "smokelift.match_clip"
+    bl_label = "Match Scene to Clip"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        shot_setup.match_clip(active_smoke(context.scene))
+        return {"FINISHED"}
+
+
+class SMOKELIFT_OT_set_up(NeedsClipAndResult, bpy.types.Operator):
+    """Make a render from the camera match the clip."""
+
+    bl_idname = "smokelift.set_up"
+    bl_description = (
+        "Make a Cycles render from the camera match the clip: resolution, frame rate, background, estimated light "
+        "and colours. The old world stays in the file"
+    )
+    bl_label = "Set Up Shot"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        smoke = active_smoke(context.scene)
+        take = volume.shown_take(smoke)
+        index = take.index()
+        if index is None:
+            text = rpt_("The files of the smoke in {:s} are missing: make it again.")
+            self.report({"ERROR"}, text.format(str(take.directory)))
+            return {"CANCELLED"}
+        settings = smoke.smokelift
+        if settings.set_up_camera and settings.camera_mode == "SCENE" and context.scene.camera is None:
+            self.report({"ERROR"}, "The scene has no camera: choose the one that the smoke was made for.")
+            return {"CANCELLED"}
+        shot_setup.set_up(smoke, take, index)
+        volume.show(smoke, take)  # the frame rate may have changed
+        return {"FINISHED"}
 
 
 class _SetUp(OfClip):
@@ -40,4 +83,6 @@ class SMOKELIFT_PT_clip_set_up(_SetUp, bpy.types.Panel):
     bl_parent_id = "SMOKELIFT_PT_clip"
 
 
-register, unregister = bpy.utils.register_classes_factory((SMOKELIFT_PT_view_set_up, SMOKELIFT_PT_clip_set_up))
+_CLASSES = (SMOKELIFT_OT_match_clip, SMOKELIFT_OT_set_up, SMOKELIFT_PT_view_set_up, SMOKELIFT_PT_clip_set_up)
+
+register, unregister = bpy.utils.register_classes_factory(_CLASSES)

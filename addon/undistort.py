@@ -7,6 +7,7 @@ undistorted pictures.
 from pathlib import Path
 
 import bpy
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from . import run
 from .compositing import SINCE_5, compositor
@@ -96,7 +97,7 @@ class SMOKELIFT_OT_undistort(bpy.types.Operator):
         try:
             settings.clip = undistorted(clip, folder)
         except RuntimeError:
-            self.report({"ERROR"}, f"{folder} cannot be written to: choose another Output.")
+            self.report({"ERROR"}, rpt_("{:s} cannot be written to: choose another Output.").format(str(folder)))
             return {"CANCELLED"}
         if clip.source == "MOVIE" and not kept["fps"]:
             kept["fps"] = clip.fps  # pictures have no rate of their own

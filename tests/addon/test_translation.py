@@ -19,7 +19,7 @@ def calls(module: str) -> list[tuple[str, ast.Call]]:
     return [(getattr(node.func, "attr", getattr(node.func, "id", "")), node) for node in found]
 
 
-@pytest.mark.parametrize("module", ["panel.py", "operators.py", "export.py", "preferences.py"])
+@pytest.mark.parametrize("module", sorted(path.name for path in ADDON.glob("*.py")))
 def test_nothing_is_filled_in_before_it_is_translated(module) -> None:
     """No f-string goes to the user, and what is looked up is a constant."""
     for name, call in calls(module):

@@ -8,7 +8,8 @@ from typing import Any
 import bpy
 import pytest
 
-from addon import look_panel, panel, volume
+from addon import advanced_panel, direct_panel, export, look_panel, panel, results_panel, setup_panel, volume
+from addon.take import Take
 from conftest import made
 from tests.example_shot import smoke
 
@@ -61,8 +62,29 @@ def test_no_line_is_cut_off(shot) -> None:
         row = manager.smokelift.jobs.add()
         row.smoke_uid, row.outcome, row.sentence = smoke(shot).session_uid, outcome, "One word after the other. " * 5
         row.done, row.total, row.seconds_left, row.warnings = 1250, 2500, 80000.0, "This is a warning. " * 5
-    texts = drawn(shot, panel.SMOKELIFT_PT_view, panel.SMOKELIFT_PT_view_advanced)
+    texts = drawn(shot, panel.SMOKELIFT_PT_view, advanced_panel.SMOKELIFT_PT_view_advanced)
     assert any("112.4 GB" in text for text in texts)
+    assert [text for text in texts if len(text) > LETTERS] == []
+
+
+def test_no_line_of_a_result_is_cut_off(shot, tmp_path, monkeypatch) -> None:
+    """Nor of a sub-panel that is shown once there is one; files of terabytes."""
+    smoke(shot).smokelift.output = str(tmp_path)
+    for number in (1, 2):
+        volume.show(smoke(shot), made(tmp_path, number=number))
+    monkeypatch.setattr(Take, "size", lambda take: 888_888.8)
+    panels = (
+        results_panel.SMOKELIFT_PT_view_results,
+        look_panel.SMOKELIFT_PT_view_look,
+        setup_panel.SMOKELIFT_PT_view_set_up,
+        export.SMOKELIFT_PT_view_export,
+    )
+    texts = drawn(shot, *panels)
+    for direction in direct_panel._DIRECTIONS:
+        smoke(shot).smokelift.directing.direction = direction
+        texts += drawn(shot, direct_panel.SMOKELIFT_PT_view_direct)
+    assert "Delete Earlier Results: 888.9 GB" in texts
+    assert "Loop Smoke    " in texts
     assert [text for text in texts if len(text) > LETTERS] == []
 
 

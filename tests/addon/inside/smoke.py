@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import bpy
 import pytest
 
-from addon import run, volume
+from addon import results_panel, run, volume
 from addon.smoke import active_smoke, hide_default_cube, new_smoke, smokes
 from addon.take import Take, takes
 from conftest import quietly
@@ -150,6 +152,27 @@ def test_results_are_picked_named_and_deleted(shot, tmp_path) -> None:
     assert first.size() == pytest.approx(1e-3, rel=0.5)
     with pytest.raises(RuntimeError, match="no finished frame"):
         bpy.ops.smokelift.show_take(take=str(second.directory))
+
+
+def test_what_is_freed_is_said_before_it_is_deleted(shot, tmp_path) -> None:
+    """By the button and by the question; what a Volume shows is not counted, and deleted is what was said."""
+    found = with_takes(shot, tmp_path / "out", 4)
+    (found[0].directory / "smoke_0001.vdb").write_bytes(b"x" * 3_000_000)
+    bpy.ops.smokelift.show_take(take=str(found[3].directory))
+    asked = []
+    manager = SimpleNamespace(
+        smokelift=bpy.context.window_manager.smokelift,
+        invoke_confirm=lambda _operator, _event, **words: asked.append(words["message"]) or {"RUNNING_MODAL"},
+    )
+    context = SimpleNamespace(scene=shot, window_manager=manager)
+    assert results_panel.unused_takes(context) == found[:3]
+    assert results_panel.freed(found[:3]) == "3 MB"
+    results_panel.SMOKELIFT_OT_remove_takes.invoke(None, context, None)
+    results_panel.SMOKELIFT_OT_remove_take.invoke(SimpleNamespace(take=str(found[0].directory)), context, None)
+    assert asked == ["3 results free 3 MB.", "Take 1 frees 3 MB."]
+    assert takes(tmp_path / "out") == found
+    assert bpy.ops.smokelift.remove_takes() == {"FINISHED"}
+    assert takes(tmp_path / "out") == found[3:]
 
 
 # files of version 1.0

@@ -1,0 +1,56 @@
+"""The sub-panel Advanced: settings that most shots leave as they are, and what was assumed."""
+
+import bpy
+
+from .panel import draw_text
+from .smoke import active_smoke
+from .subpanel import OfClip
+
+
+class _Advanced(OfClip):
+    bl_label = "Advanced"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        smoke = active_smoke(context.scene)
+        settings = smoke.smokelift
+        row = layout.row()
+        row.active = settings.camera_mode == "SCENE"
+        row.prop(settings, "longest_side")
+        row = layout.row(heading="Known Depth")
+        row.prop(settings, "use_axis_depth", text="")
+        value = row.row()
+        value.active = settings.use_axis_depth
+        value.prop(settings, "axis_depth", text="")
+        for name in ("fps", "transfer", "speed", "device", "use_medium"):
+            layout.prop(settings, name)
+        column = layout.column()
+        column.active = settings.use_medium
+        for name in ("extinction", "albedo", "anisotropy"):
+            column.prop(settings, name)
+        state = context.window_manager.smokelift
+        if state.check_smoke == smoke.session_uid and state.notes:
+            draw_text(layout, context, "{} x {} x {} voxels. Assumptions and choices:".format(*state.resolution))
+            for note in state.notes.split("\n"):
+                draw_text(layout, context, note)
+        layout.operator("smokelift.check", icon="VIEWZOOM")
+        layout.operator("smokelift.show_page", icon="IMAGE_DATA")
+
+
+class SMOKELIFT_PT_view_advanced(_Advanced, bpy.types.Panel):
+    """In the 3D View."""
+
+    bl_space_type = "VIEW_3D"
+    bl_parent_id = "SMOKELIFT_PT_view"
+
+
+class SMOKELIFT_PT_clip_advanced(_Advanced, bpy.types.Panel):
+    """In the Movie Clip Editor."""
+
+    bl_space_type = "CLIP_EDITOR"
+    bl_parent_id = "SMOKELIFT_PT_clip"
+
+
+register, unregister = bpy.utils.register_classes_factory((SMOKELIFT_PT_view_advanced, SMOKELIFT_PT_clip_advanced))

@@ -1,0 +1,221 @@
+"""The sub-panel Results: the files of all runs, which are shown, compared, named and deleted there."""
+
+from pathlib import Path
+
+import bpy
+from bpy.app.translations import pgettext_iface as iface_
+from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.props import StringProperty
+
+from . import run, volume
+from .needs import NeedsClip, NeedsResult
+from .panel import size
+from .smoke import active_smoke
+from .subpanel import OfClip
+from .take import Take, TakeError, takes
+
+
+class SMOKELIFT_OT_show_take(NeedsClip, bpy.types.Operator):
+    """Show this result in the smoke. Its place and its material stay as they are"""
+
+    bl_idname = "smokelift.show_take"
+    bl_label = "Show Result"
+    bl_options = {"REGISTER", "UNDO"}
+
+    take: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        take = Take(Path(self.take))
+        if not take.frames():
+            self.report({"ERROR"}, rpt_("There is no finished frame in {:s}.").format(str(take.directory)))
+            return {"CANCELLED"}
+        run.present(active_smoke(context.scene), take)
+        return {"FINISHED"}
+
+
+class SMOKELIFT_OT_switch_take(NeedsResult, bpy.types.Operator):
+    """Show the result that was shown before; again to come back"""
+
+    bl_idname = "smokelift.switch_take"
+    bl_label = "Switch"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not super().poll(context):
+            return False
+        if volume.take_before(active_smoke(context.scene)) is None:
+            cls.poll_message_set("Show another result first")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        smoke = active_smoke(context.scene)
+        run.present(smoke, volume.take_before(smoke))
+        return {"FINISHED"}
+
+
+class SMOKELIFT_OT_show_beside(NeedsResult, bpy.types.Operator):
+    """Show this result beside the smoke, in a Volume object of its own that can be deleted like any other"""
+
+    bl_idname = "smokelift.show_beside"
+    bl_label = "Show Beside"
+    bl_options = {"REGISTER", "UNDO"}
+
+    take: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        take = Take(Path(self.take))
+        if volume.show_beside(active_smoke(context.scene), take) is None:
+            self.report({"ERROR"}, rpt_("There is no finished frame in {:s}.").format(str(take.directory)))
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
+class SMOKELIFT_OT_name_take(bpy.types.Operator):
+    """Give this result a name"""
+
+    bl_idname = "smokelift.name_take"
+    bl_label = "Name Result"
+
+    take: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
+    title: StringProperty(name="Name", options={"SKIP_SAVE"})
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        self.title = Take(Path(self.take)).title()
+        return context.window_manager.invoke_props_dialog(self)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        try:
+            Take(Path(self.take)).give_title(self.title)
+        except TakeError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        run.redraw(context.window_manager)
+        return {"FINISHED"}
+
+
+class SMOKELIFT_OT_remove_take(bpy.types.Operator):
+    """Delete the files of this result"""
+
+    bl_idname = "smokelift.remove_take"
+    bl_label = "Delete Result?"
+
+    take: StringProperty(options={"SKIP_SAVE", "HIDDEN"})
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        return _confirm(self, context, event, [Take(Path(self.take))])
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        take = Take(Path(self.take))
+        if take.directory.resolve() in _in_use(context):
+            self.report({"ERROR"}, "A Volume shows this result, or a run needs it: show another one first.")
+            return {"CANCELLED"}
+        take.remove()
+        return {"FINISHED"}
+
+
+class SMOKELIFT_OT_remove_takes(NeedsClip, bpy.types.Operator):
+    """Delete the files of all results in the output folder except those that a Volume of this file shows"""
+
+    bl_idname = "smokelift.remove_takes"
+    bl_label = "Delete Earlier Results?"
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        return _confirm(self, context, event, unused_takes(context))
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        for take in unused_takes(context):
+            take.remove()
+        return {"FINISHED"}
+
+
+def unused_takes(context: bpy.types.Context) -> list[Take]:
+    """The results in the active smoke's folder that no Volume of this file shows and no run needs."""
+    kept = _in_use(context)
+    return [
+        take for take in takes(run.output_folder(active_smoke(context.scene))) if take.directory.resolve() not in kept
+    ]
+
+
+def _in_use(context: bpy.types.Context) -> set[Path]:
+    """Directories of the takes that Volumes of this file show or that runs write; a link may lead to the same one."""
+    shown = {take.directory for data in bpy.data.volumes if (take := volume.take_of(data)) is not None}
+    rows = context.window_manager.smokelift.jobs
+    queued = {Take(Path(row.take)) for row in rows if row.outcome not in run.ENDED}
+    read = {source for take in queued if (source := take.source()) is not None}
+    return {directory.resolve() for directory in shown | {take.directory for take in queued | read}}
+
+
+def _confirm(
+    operator: bpy.types.Operator, context: bpy.types.Context, event: bpy.types.Event, doomed: list[Take]
+) -> set[str]:
+    """Ask before files are deleted; the question says how large they are."""
+    if len(doomed) == 1:
+        message = rpt_("{:s} frees {:s}.").format(doomed[0].title(), freed(doomed))
+    else:
+        message = rpt_("{:d} results free {:s}.").format(len(doomed), freed(doomed))
+    manager = context.window_manager
+    return manager.invoke_confirm(operator, event, message=message, confirm_text="Delete", icon="WARNING")
+
+
+def freed(doomed: list[Take]) -> str:
+    """How much disk takes occupy, in words."""
+    return size(sum(take.size() for take in doomed))
+
+
+class _Results(OfClip):
+    bl_label = "Results"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        smoke = active_smoke(context.scene)
+        shown = volume.shown_take(smoke)
+        found = takes(run.output_folder(smoke))
+        column = layout.column(align=True)
+        for take in found:
+            row = column.row(align=True)
+            text = iface_("{:s}, {:d} fr., {:s}").format(take.title(), take.frames(), size(take.size()))
+            row.operator("smokelift.show_take", text=text, depress=take == shown).take = str(take.directory)
+            row.operator("smokelift.name_take", text="", icon="GREASEPENCIL").take = str(take.directory)
+            row.operator("smokelift.remove_take", text="", icon="TRASH").take = str(take.directory)
+        if len(found) > 1:
+            column = layout.column()
+            column.operator("smokelift.switch_take", icon="FILE_REFRESH")
+            other = volume.take_before(smoke)
+            if other is not None:
+                text = iface_("Show {:s} Beside").format(other.title())
+                column.operator("smokelift.show_beside", text=text, icon="MOD_MIRROR").take = str(other.directory)
+        doomed = unused_takes(context)
+        row = layout.row()
+        row.enabled = bool(doomed)
+        text = iface_("Delete Earlier Results: {:s}").format(freed(doomed))
+        row.operator("smokelift.remove_takes", text=text, translate=False)
+
+
+class SMOKELIFT_PT_view_results(_Results, bpy.types.Panel):
+    """In the 3D View."""
+
+    bl_space_type = "VIEW_3D"
+    bl_parent_id = "SMOKELIFT_PT_view"
+
+
+class SMOKELIFT_PT_clip_results(_Results, bpy.types.Panel):
+    """In the Movie Clip Editor."""
+
+    bl_space_type = "CLIP_EDITOR"
+    bl_parent_id = "SMOKELIFT_PT_clip"
+
+
+_CLASSES = (
+    SMOKELIFT_OT_show_take,
+    SMOKELIFT_OT_switch_take,
+    SMOKELIFT_OT_show_beside,
+    SMOKELIFT_OT_name_take,
+    SMOKELIFT_OT_remove_take,
+    SMOKELIFT_OT_remove_takes,
+    SMOKELIFT_PT_view_results,
+    SMOKELIFT_PT_clip_results,
+)
+
+register, unregister = bpy.utils.register_classes_factory(_CLASSES)
