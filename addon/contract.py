@@ -38,7 +38,7 @@ PANORAMA_SUFFIXES = (".exr", ".hdr")
 """Pictures that the engine takes as an environment light."""
 
 DIRECTIONS = {
-    "continue": ("--frames", "--start", "--fade", "--wind", "--fan"),
+    "continue": ("--frames", "--start", "--fade", "--wind", "--turbulence", "--fan"),
     "retime": ("--speed",),
     "loop": ("--frames", "--overlap"),
 }

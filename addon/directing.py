@@ -1,7 +1,8 @@
 """What an artist does to a smoke after its clip, as the engine's options.
 
-Objects of the scene act on the smoke: meshes are obstacles, a Wind field is wind, other Empties are fans. The smoke may
-have been moved, rotated and scaled, so places and velocities are turned into those of its own space.
+Objects of the scene act on the smoke: meshes are obstacles, a Wind field is wind, a Turbulence field is turbulence,
+other Empties are fans. The smoke may have been moved, rotated and scaled, so places and velocities are turned into
+those of its own space.
 """
 
 import math
@@ -19,6 +20,9 @@ from .smoke import scene_of
 
 BLOWING = ("WIND", "FORCE")
 """Force fields that blow along their Z axis."""
+
+UNSIZED = 1.0
+"""What Blender takes for the size of turbulence that has none."""
 
 MESHES = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
 """Objects that have a surface."""
@@ -83,19 +87,27 @@ def _number(smoke: bpy.types.Object, numbers: list[int], frame: int) -> int:
 
 
 def _effects(smoke: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[list[str], bytes]:
-    """What the objects of the collection do: options for wind and fans, and a file of the obstacles."""
+    """What the objects of the collection do: options for wind, turbulence and fans, and a file of the obstacles."""
     settings = smoke.smokelift.directing
     to_smoke = _world_to_smoke(smoke.evaluated_get(depsgraph))
     scale = abs(to_smoke.to_3x3().determinant()) ** (1 / 3)
-    wind, fans, obstacles = Vector(), [], []
+    wind, others, obstacles = Vector(), [], []
     for obj in settings.effectors.all_objects if settings.effectors else ():
         if obj in (smoke, smoke.smokelift.box) or obj.hide_viewport:
             continue
         seen = obj.evaluated_get(depsgraph)
         field = seen.field
         kind = "NONE" if field is None else field.type
-        if kind not in ("NONE", *BLOWING):
-            raise ShotError(f"The force field of {obj.name} cannot be used: only Wind and Force blow smoke.")
+        if kind not in ("NONE", *BLOWING, "TURBULENCE"):
+            raise ShotError(
+                f"The force field of {obj.name} cannot be used: only Wind, Force and Turbulence move smoke."
+            )
+        if kind == "TURBULENCE":
+            if field.use_max_distance:
+                raise ShotError(f"Turbulence is everywhere: switch off Max Distance of {obj.name}.")
+            size = field.size or UNSIZED
+            others += ["--turbulence", *map(_word, (abs(field.strength) * scale, size * scale, field.seed))]
+            continue
         matrix = seen.matrix_world
         ahead = to_smoke.to_3x3() @ matrix.to_3x3().col[2].normalized()
         if kind == "WIND" and not field.use_max_distance:
@@ -104,11 +116,11 @@ def _effects(smoke: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[l
             own = field.distance_max if kind != "NONE" and field.use_max_distance else None
             radius = obj.empty_display_size * abs(matrix.to_3x3().determinant()) ** (1 / 3) if own is None else own
             blown = (settings.fan_speed if kind == "NONE" else field.strength) * ahead
-            fans += ["--fan", *map(_word, (*(to_smoke @ matrix.translation), radius * scale, *blown))]
+            others += ["--fan", *map(_word, (*(to_smoke @ matrix.translation), radius * scale, *blown))]
         elif obj.type in MESHES:
             obstacles.append(_triangles(seen, to_smoke @ matrix))
     words = ["--wind", *map(_word, wind)] if wind.length > 0.0 else []
-    return words + fans, _stl(obstacles)
+    return words + others, _stl(obstacles)
 
 
 def _world_to_smoke(smoke: bpy.types.Object) -> Matrix:

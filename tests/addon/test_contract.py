@@ -58,6 +58,7 @@ def test_directions() -> None:
     for module in (continue_, retime, loop):
         module.add_parser(commands, argparse.ArgumentParser(add_help=False))
     values = {"--frames": {"continue": "9", "loop": "1:9"}, "--wind": "1 2 -3", "--fan": "1 2 3 1 -4 5 6"}
+    values["--turbulence"] = "1 2 3"
     for direction, options in contract.DIRECTIONS.items():
         for option in options:
             value = values.get(option, "2")

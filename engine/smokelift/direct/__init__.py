@@ -1,4 +1,4 @@
-"""Smoke after its clip: continued, retimed, looped, and made to react to wind, fans and obstacles."""
+"""Smoke after its clip: continued, retimed, looped, and made to react to wind, turbulence, fans and obstacles."""
 
 from smokelift.direct.continuation import Simulation, learnt_simulation
 from smokelift.direct.continuing import Continuation, continue_sequence
@@ -7,6 +7,7 @@ from smokelift.direct.mesh import Mesh
 from smokelift.direct.moment import Moment, completed, read_moment
 from smokelift.direct.retiming import paced, retime_sequence
 from smokelift.direct.surroundings import Ball, Box, Fan
+from smokelift.direct.turbulence import Turbulence
 from smokelift.direct.writing import open_source
 
 __all__ = [
@@ -17,6 +18,7 @@ __all__ = [
     "Mesh",
     "Moment",
     "Simulation",
+    "Turbulence",
     "completed",
     "continue_sequence",
     "learnt_simulation",

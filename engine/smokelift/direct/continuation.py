@@ -3,8 +3,11 @@
 A step of dt from density rho and velocity u to rho' and u', in the convention of a sequence, whose velocity has carried
 the moment before to this one:
 
-    u'   = Project(advect(u, u) + dt (b rho up) + wind), in inlets and fans with their own velocity
+    u'   = Project(advect(u - a, u) + dt (b rho up) + a'), in inlets and fans with their own velocity
     rho' = exp(-d dt) advect(rho, u'), in inlets with their own density
+
+where a is the air's own motion: wind and turbulence, which all air has beside what moves it. Outside the box it is all
+there is.
 
 Buoyancy b and dissipation d are those of the clip (`smokelift.direct.physics`), as is what enters
 (`smokelift.direct.inflow`). Advection keeps the mass. There is no viscosity, and MacCormack's correction keeps the
@@ -24,7 +27,7 @@ from smokelift.direct.inflow import Inflow, find_inflow
 from smokelift.direct.moment import Moment
 from smokelift.direct.physics import Physics, fit_physics, lift
 from smokelift.direct.surroundings import Surroundings
-from smokelift.transport import Array, Velocity, advect
+from smokelift.transport import Array, Velocity, advect, on_faces
 
 TRACE = np.float32(1e-4)
 """Share of the largest density below which nothing is seen. Interpolation spreads such traces over the whole box."""
@@ -54,7 +57,7 @@ class Simulation:
     def next(self, moment: Moment, step: int) -> Moment:
         """Return the moment after one; the step that leads there is counted from 1 at the clip's last moment."""
         entering = self.inflow.at(step)
-        moved = advect(moment.velocity, moment.velocity, self.dt)
+        moved = self._moved(moment.velocity, step)
         velocity = self.surroundings.projected(moved.with_faces(self._driven(moved, moment, entering, step)))
         density = advect(moment.density, velocity, self.dt, conserve=True)
         density = self._tidied(density) * np.float32(math.exp(-self.physics.dissipation * self.dt))
@@ -63,15 +66,25 @@ class Simulation:
             Velocity(velocity.faces, velocity.voxel_size, velocity.closed),
         )
 
+    def _moved(self, velocity: Velocity, step: int) -> Velocity:
+        """The velocity that has carried itself along, without the air's own motion."""
+        air = self.surroundings.air(velocity, (step - 1) * self.dt)
+        calm = velocity.with_faces(u - a for u, a in zip(velocity.faces, air, strict=True))
+        moved = advect(calm, velocity, self.dt)
+        came = advect(np.ones(velocity.shape, np.float32), velocity, self.dt, scheme="semi-lagrangian")
+        inside = on_faces(np.stack([came] * 3, axis=-1))
+        return moved.with_faces(u * share for u, share in zip(moved.faces, inside, strict=True))
+
     def _driven(self, moved: Velocity, moment: Moment, entering: Moment, step: int) -> list[Array]:
         """The velocity on faces after forces, inlets and fans, before the projection."""
         rising = lift(moment.density, moved).faces
         faces = []
-        for axis, gained in enumerate(self.surroundings.gain(step, self.dt)):
-            driven = moved.faces[axis] + np.float32(self.dt * self.physics.buoyancy) * rising[axis] + np.float32(gained)
+        for axis, own in enumerate(self.surroundings.air(moved, step * self.dt)):
+            driven = moved.faces[axis] + np.float32(self.dt * self.physics.buoyancy) * rising[axis]
             for place, blown in self.surroundings.blown:
                 driven = np.where(place[axis], np.float32(blown[axis]), driven)
-            faces.append(np.where(self.inflow.faces[axis], entering.velocity.faces[axis], driven))
+            driven = np.where(self.inflow.faces[axis], entering.velocity.faces[axis], driven)
+            faces.append(driven + own)
         return faces
 
     def _tidied(self, density: Array) -> Array:

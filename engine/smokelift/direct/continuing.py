@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from smokelift.direct.continuation import learnt_simulation
 from smokelift.direct.mesh import Mesh
 from smokelift.direct.moment import Moment, read_moment
 from smokelift.direct.surroundings import Ball, Box, Fan, Surroundings
+from smokelift.direct.turbulence import Turbulence
 from smokelift.direct.writing import SHORTEST, Written, directed_writer, simulated_figures, time_step, write_copy
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
@@ -25,6 +26,9 @@ from smokelift.transport import Velocity
 LEARNT_FROM = 12
 """Moments of the clip, at most, that physics and inflow are taken from: half a second, in which the source of a clip is
 steady, and long enough for a replay that is not seen as such."""
+
+SMALLEST_EDDY = 3
+"""Voxels across an eddy, at least: fewer do not show that it turns."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +45,8 @@ class Continuation:
         Frames at the end in which the smoke fades to nothing.
     wind
         Velocity in m/s that all air gains after `start`.
+    turbulences
+        Eddies that all air gains after `start`.
     fans, obstacles
         What stands in the box after `start`.
     """
@@ -49,6 +55,7 @@ class Continuation:
     start: int | None = None
     fade: int = 0
     wind: Vector = (0.0, 0.0, 0.0)
+    turbulences: tuple[Turbulence, ...] = ()
     fans: tuple[Fan, ...] = ()
     obstacles: tuple[Ball | Box | Mesh, ...] = ()
 
@@ -76,8 +83,8 @@ def continue_sequence(
     Raises
     ------
     ValueError
-        If there is no such frame to start from, or too few before it, a fan or an obstacle is not in the box, or a file
-        cannot be read or written.
+        If there is no such frame to start from, or too few before it, a fan or an obstacle is not in the box, eddies
+        are too small for the voxels, or a file cannot be read or written.
     """
     start = sequence.frames[-1] if continuation.start is None else continuation.start
     kept = tuple(number for number in sequence.frames if number <= start)
@@ -93,6 +100,7 @@ def continue_sequence(
         "start": start,
         "fade": continuation.fade,
         "wind": continuation.wind,
+        "turbulences": [asdict(turbulence) for turbulence in continuation.turbulences],
         "fans": [vars(fan.place) | {"velocity": fan.velocity} for fan in continuation.fans],
         "obstacles": [_told(obstacle) for obstacle in continuation.obstacles],
     }
@@ -153,7 +161,13 @@ def _surroundings(continuation: Continuation, domain: Domain) -> Surroundings:
         solid = voxels if solid is None else solid | voxels
     if solid is not None and solid.all():
         raise ValueError("the obstacles fill the whole box; make them smaller.")
-    return Surroundings(continuation.wind, tuple(blown), solid)
+    for turbulence in continuation.turbulences:
+        if turbulence.size < SMALLEST_EDDY * domain.voxel_size:
+            raise ValueError(
+                f"turbulence of {turbulence.size:g} m is too small for voxels of {domain.voxel_size:.3g} m; make it "
+                f"{SMALLEST_EDDY * domain.voxel_size:.3g} m at least."
+            )
+    return Surroundings(continuation.wind, continuation.turbulences, tuple(blown), solid)
 
 
 def _told(obstacle: Ball | Box | Mesh) -> dict[str, Any]:

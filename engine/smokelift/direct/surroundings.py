@@ -1,4 +1,4 @@
-"""What an artist places around the smoke: wind, fans and obstacles."""
+"""What an artist places around the smoke: wind, turbulence, fans and obstacles."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from smokelift.direct.constraint import FaceMasks, Mask, faces_between, faces_of, without_divergence_given
+from smokelift.direct.turbulence import Turbulence
 from smokelift.scene import Domain
 from smokelift.scene.checks import Vector
-from smokelift.transport import Velocity, project
+from smokelift.transport import Array, Velocity, project
 
 RISE = 0.5
 """Seconds in which the air takes on most (1 - 1/e) of a wind that sets in: a gust, and not a blow."""
@@ -83,6 +84,8 @@ class Surroundings:
     ----------
     wind
         Velocity in m/s that all air gains, beside what moves it already.
+    turbulences
+        Eddies that all air gains, likewise.
     blown
         The faces of every fan's voxels, with its velocity in m/s.
     solid : (nx, ny, nz) bool
@@ -90,14 +93,18 @@ class Surroundings:
     """
 
     wind: Vector = (0.0, 0.0, 0.0)
+    turbulences: tuple[Turbulence, ...] = ()
     blown: tuple[tuple[FaceMasks, Vector], ...] = ()
     solid: Mask | None = None
 
-    def gain(self, step: int, dt: float) -> Vector:
-        """The velocity that the wind adds in a step, counted from 1."""
-        share = math.exp(-(step - 1) * dt / RISE) - math.exp(-step * dt / RISE)
-        x, y, z = (share * component for component in self.wind)
-        return x, y, z
+    def air(self, like: Velocity, time: float) -> list[Array]:
+        """The velocity in m/s that wind and turbulence have given to all air after a time in seconds, on faces."""
+        share = np.float32(1 - math.exp(-time / RISE))
+        faces = [np.full_like(component, speed) for component, speed in zip(like.faces, self.wind, strict=True)]
+        for turbulence in self.turbulences:
+            eddies = turbulence.velocity(like, time)
+            faces = [component + eddy for component, eddy in zip(faces, eddies, strict=True)]
+        return [share * component for component in faces]
 
     def projected(self, velocity: Velocity) -> Velocity:
         """The nearest velocity without divergence that goes through no obstacle, and is zero inside."""

@@ -188,6 +188,19 @@ def test_winds_and_fans(result, acting) -> None:
         directing.request(result)
 
 
+def test_turbulence(result, acting) -> None:
+    """In the smoke's own metres; a size of 0 is what Blender takes for it."""
+    field = placed(acting, "Stir", field="TURBULENCE").field
+    field.strength, field.size, field.seed = 0.4, 0.25, 7
+    assert words(directing.request(result)[1], "--turbulence") == [[0.4, 0.25, 7.0]]
+    result.scale, field.size = (2.0, 2.0, 2.0), 0.0
+    bpy.context.view_layer.update()
+    np.testing.assert_allclose(words(directing.request(result)[1], "--turbulence"), [[0.2, 0.5, 7.0]], atol=1e-5)
+    field.use_max_distance = True
+    with pytest.raises(ShotError, match="Max Distance of Stir"):
+        directing.request(result)
+
+
 def test_retime_and_loop(result) -> None:
     """One speed or three; the whole or a part."""
     settings = result.smokelift.directing

@@ -9,6 +9,7 @@ from command_line import command, events, names, refused
 def test_a_clip_goes_on(finished, tmp_path, capsys) -> None:
     out = tmp_path / "out"
     words = ("continue", finished, "--out", out, "--frames", 3, "--npz", "--fade", 1, "--wind", 0.2, -0.1, 0)
+    words += ("--turbulence", 0.3, 0.6, 1, "--turbulence", 0.1, 0.9, 2)
     assert command(*words, "--progress", "json") == 0
     said = events(capsys.readouterr().out)
     assert said[-1]["event"] == "done"
@@ -23,6 +24,9 @@ def test_mistakes_end_in_one_sentence(finished, tmp_path, capsys) -> None:
     assert "--fade 4" in refused(capsys, *start, "--frames", 3, "--fade", 4)
     assert "radius" in refused(capsys, *start, "--frames", 3, "--ball", 0, 0, 1, -1)
     assert "no voxel" in refused(capsys, *start, "--frames", 3, "--box", 50, 50, 50, 60, 60, 60)
+    assert "--turbulence 1 0 0" in refused(capsys, *start, "--frames", 3, "--turbulence", 1, 0, 0)
+    assert "--turbulence 1 1 0.5" in refused(capsys, *start, "--frames", 3, "--turbulence", 1, 1, 0.5)
+    assert "too small for voxels" in refused(capsys, *start, "--frames", 3, "--turbulence", 1, 0.001, 0)
     assert "cannot go on from frame 77" in refused(capsys, *start, "--frames", 3, "--start", 77)
     assert "the sequence itself" in refused(capsys, "continue", finished, "--out", finished, "--frames", 3)
     assert "holds no sequence" in refused(capsys, "continue", tmp_path, "--out", tmp_path / "out", "--frames", 3)

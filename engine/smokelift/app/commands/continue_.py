@@ -8,7 +8,7 @@ from typing import Any
 
 from smokelift.app.options import add_directed_options, finite, named_path, require_new
 from smokelift.app.progress import Reporter, say_frames
-from smokelift.direct import Ball, Box, Continuation, Fan, Mesh, continue_sequence, open_source
+from smokelift.direct import Ball, Box, Continuation, Fan, Mesh, Turbulence, continue_sequence, open_source
 
 
 def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
@@ -31,6 +31,16 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
         default=(0.0, 0.0, 0.0),
         metavar=("X", "Y", "Z"),
         help="wind that sets in, in m/s",
+    )
+    parser.add_argument(
+        "--turbulence",
+        type=finite,
+        nargs=3,
+        action="append",
+        default=[],
+        metavar=("SPEED", "SIZE", "SEED"),
+        help="eddies in all air: their speed in m/s, their size in metres, and a whole number (each makes others); may "
+        "be given again",
     )
     parser.add_argument(
         "--fan",
@@ -100,9 +110,19 @@ def _continuation(options: argparse.Namespace) -> Continuation:
         start=options.start,
         fade=options.fade,
         wind=tuple(options.wind),
+        turbulences=tuple(_turbulence(*values) for values in options.turbulence),
         fans=tuple(Fan(_ball("--fan", values[:4]), tuple(values[4:])) for values in options.fan),
         obstacles=(*balls, *boxes, *map(Mesh.read, options.mesh)),
     )
+
+
+def _turbulence(speed: float, size: float, seed: float) -> Turbulence:
+    if speed < 0 or size <= 0 or seed < 0 or seed != int(seed):
+        raise ValueError(
+            f"--turbulence {speed:g} {size:g} {seed:g}: expected a speed of 0 m/s or more, a size above 0 m, and "
+            "a whole number from 0."
+        )
+    return Turbulence(speed, size, int(seed))
 
 
 def _ball(option: str, values: list[float]) -> Ball:
