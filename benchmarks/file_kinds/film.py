@@ -19,6 +19,9 @@ Pictures = npt.NDArray[np.float32]
 FRAMES = 8
 FPS = 24
 
+BT709, BT2020 = (0.2126, 0.0722), (0.2627, 0.0593)
+"""Shares of red and blue in luma."""
+
 
 def film(width: int = 96, height: int = 64, frames: int = FRAMES) -> Pictures:
     """Grey smoke that rises before a wall with a red patch at the top left and a blue one at the top right."""
@@ -117,3 +120,16 @@ def wide(path: Path, signal: npt.NDArray[np.float32], bits: int, matrix: tuple[f
             out.mux(stream.encode(frame))
         out.mux(stream.encode())
     return path
+
+
+def to_bt2020(linear: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Bring linear colours [..., rgb] from BT.709 to BT.2020 (BT.2087)."""
+    matrix = np.array([[0.6274, 0.3293, 0.0433], [0.0691, 0.9195, 0.0114], [0.0164, 0.0880, 0.8956]])
+    return np.asarray(linear @ matrix.T)
+
+
+def hlg_signal(linear: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Encode linear light, diffuse white at 1, as hybrid log-gamma (BT.2100)."""
+    scene = linear * 0.26496  # of the peak: white is at 75 % of the signal
+    high = 0.17883277 * np.log(np.maximum(12 * scene - 0.28466892, 1e-9)) + 0.55991073
+    return np.where(scene <= 1 / 12, np.sqrt(3 * np.maximum(scene, 0)), high)

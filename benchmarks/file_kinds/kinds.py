@@ -14,14 +14,24 @@ import numpy.typing as npt
 import OpenEXR
 from PIL import Image
 
-from benchmarks.file_kinds.film import FPS, FRAMES, eight_bits, encode, film, smoke, wide
+from benchmarks.file_kinds.film import (
+    BT709,
+    BT2020,
+    FPS,
+    FRAMES,
+    eight_bits,
+    encode,
+    film,
+    hlg_signal,
+    smoke,
+    to_bt2020,
+    wide,
+)
 from benchmarks.file_kinds.judge import Kind
 from benchmarks.stability.mutations import damaged_bytes
 from smokelift.footage.images import linear_to_srgb, srgb_to_linear
 
 Make = Callable[[Path], Kind]
-
-BT709, BT2020 = (0.2126, 0.0722), (0.2627, 0.0593)
 
 
 def kinds(damaged: int = 4) -> Mapping[str, Mapping[str, Make]]:
@@ -167,16 +177,9 @@ def _colours() -> dict[str, Make]:
         def make(folder: Path) -> Kind:
             linear = np.maximum(srgb_to_linear(film()).astype(np.float64), 0)
             if primaries == 9:
-                linear = (
-                    linear @ np.array([[0.6274, 0.3293, 0.0433], [0.0691, 0.9195, 0.0114], [0.0164, 0.0880, 0.8956]]).T
-                )
+                linear = to_bt2020(linear)
             if transfer == 18:
-                scene = linear * 0.26496  # of the peak: white is at 75 % of the signal
-                signal = np.where(
-                    scene <= 1 / 12,
-                    np.sqrt(3 * scene),
-                    0.17883277 * np.log(np.maximum(12 * scene - 0.28466892, 1e-9)) + 0.55991073,
-                )
+                signal = hlg_signal(linear)
             elif transfer == 16:
                 power = (linear * 203 / 10000) ** 0.1593017578125
                 signal = ((0.8359375 + 18.8515625 * power) / (1 + 18.6875 * power)) ** 78.84375
