@@ -116,13 +116,15 @@ def _submitted(
 
     client.register_plugin(worker.EndShots())
     by_memory = bool(client.run_on_scheduler(_workers_have_memory))
-    of = {}
-    for shot, record in shots:
-        needed = {MEMORY: record.forecast.memory} if by_memory and record.forecast is not None else None
-        key = f"smokelift-{shot.name}-{uuid.uuid4().hex}"
-        future = client.submit(worker.work, shot, task, batch, key=key, retries=RETRIES, pure=False, resources=needed)
-        of[future] = shot
+    of: dict[Any, Shot] = {}
     try:
+        for shot, record in shots:
+            needed = {MEMORY: record.forecast.memory} if by_memory and record.forecast is not None else None
+            key = f"smokelift-{shot.name}-{uuid.uuid4().hex}"
+            submitted = client.submit(
+                worker.work, shot, task, batch, key=key, retries=RETRIES, pure=False, resources=needed
+            )
+            of[submitted] = shot
         for future in as_completed(list(of), loop=client.loop):
             shot = of[future]
             if future.status in ("cancelled", "lost"):
