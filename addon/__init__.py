@@ -8,8 +8,8 @@ the settings. `scene_file` (Blender scene to scene file), `volume` (sequence to 
 `undistort` (the clip without its lens's distortion) translate to Blender's data and back. The interface is
 thin: `properties`; `panel` with the sub-panels `results_panel`, `advanced_panel`, `look_panel`, `setup_panel` and
 `direct_panel`, each with its buttons (`subpanel` is what they share); the other buttons in `operators`, `box` and
-`editors`, and what all of them need in `needs`. `run` keeps the queue; `export` hands a smoke on; `drop`, `presets` and
-`preferences` are what Blender calls so; `batch` is the command line.
+`editors`, and what all of them need in `needs`. `run` keeps the queue; `export` hands a smoke on, and `instances` shows
+it at other times; `drop`, `presets` and `preferences` are what Blender calls so; `batch` is the command line.
 """
 
 from types import ModuleType
@@ -37,6 +37,7 @@ def _modules() -> tuple[ModuleType, ...]:
         drop,
         editors,
         export,
+        instances,
         look,
         look_panel,
         operators,
@@ -53,6 +54,6 @@ def _modules() -> tuple[ModuleType, ...]:
     )
 
     data = (preferences, properties, smoke, look, volume, run)
-    buttons = (operators, box, editors, undistort, drop, presets)
+    buttons = (operators, box, editors, instances, undistort, drop, presets)
     panels = (panel, results_panel, advanced_panel, look_panel, setup_panel, direct_panel, export)
     return (*data, *buttons, *panels, batch)

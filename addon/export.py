@@ -1,4 +1,4 @@
-"""Hands a smoke on: an export of its files, a proxy of it in the viewport, an asset, and instances with their own time.
+"""Hands a smoke on: an export of its files, a proxy of it in the viewport, and assets.
 
 An export changes nothing in the file, so it is no run of the queue: a timer of Blender polls the engine.
 """
@@ -11,10 +11,11 @@ from typing import Any
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.props import BoolProperty, EnumProperty, IntProperty, PointerProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, PointerProperty, StringProperty
 
 from . import preferences, run, volume
 from .contract import ASSET_FILE, EXPORT_FILE, FRAME_FILE, PROXY_FILE
+from .instances import copy_of, gather, scatter
 from .job import EngineMissingError, Job, engine_command
 from .needs import NeedsResult
 from .panel import draw_text
@@ -26,6 +27,9 @@ from .take import Take
 TICK_SECONDS = 0.1
 REST_SECONDS = 0.4
 """Time without a change of settings before the size is estimated."""
+
+ASSET_TIMES = 8
+"""Different times that the instances in the asset have at most, spread over the sequence."""
 
 SHOWN_TAKE = "smokelift_take"
 """Custom property of a proxy: the directory of the take that was exported."""
@@ -162,25 +166,23 @@ def megabytes(count: float) -> str:
 
 
 def write_asset(smoke: bpy.types.Object, folder: Path) -> None:
-    """Write a .blend beside an export that holds the smoke as an asset, with paths to the files beside it."""
-    copy = _copy(smoke, smoke.name)
+    """Write a .blend beside an export with paths to the files there: the smoke as an asset, and instances of it."""
+    copy = copy_of(smoke, smoke.name)
     copy.delta_location = (0.0, 0.0, 0.0)
     copy.data.filepath = str(folder / FRAME_FILE.format(_first(folder)))
+    # as it is when the asset is used; nothing of this file but its material goes with it
+    copy.location = (0.0, 0.0, 0.0)
+    frames = copy.data.frame_duration
+    times = min(ASSET_TIMES, frames)
+    points = scatter(copy, max(smoke.dimensions.xy), times, frames // times, True)
     try:
-        copy.asset_mark()
-        copy.asset_data.description = volume.provenance_note(smoke)
-        # as it is when the asset is used; nothing of this file but its material goes with it
-        copy.location = (0.0, 0.0, 0.0)
-        bpy.data.libraries.write(str(folder / ASSET_FILE), {copy}, path_remap="RELATIVE_ALL", compress=True)
+        for asset in (copy, points):
+            asset.asset_mark()
+            asset.asset_data.description = volume.provenance_note(smoke)
+        bpy.data.libraries.write(str(folder / ASSET_FILE), {copy, points}, path_remap="RELATIVE_ALL", compress=True)
     finally:
+        gather(points)
         _remove(copy)
-
-
-def _copy(obj: bpy.types.Object, name: str) -> bpy.types.Object:
-    """A copy of a Volume object, with data of its own and the same material, which is no smoke to be made."""
-    copy = bpy.data.objects.new(name, obj.data.copy())
-    copy.matrix_basis, copy.delta_location = obj.matrix_basis, obj.delta_location
-    return copy
 
 
 def _remove(obj: bpy.types.Object) -> None:
@@ -272,42 +274,6 @@ class SMOKELIFT_OT_use_proxy(NeedsResult, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SMOKELIFT_OT_add_instance(bpy.types.Operator):
-    """Add another object of the active Volume's files that plays later or earlier. The material is shared"""
-
-    bl_idname = "smokelift.add_instance"
-    bl_label = "Instance in Time"
-    bl_options = {"REGISTER", "UNDO"}
-
-    offset: IntProperty(name="Time Offset", description="Frames by which it plays later", default=12)
-    repeat: BoolProperty(name="Repeat", description="Play the frames again and again, as for a loop")
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        obj = context.object
-        if obj is None or obj.type != "VOLUME" or not obj.data.is_sequence:
-            cls.poll_message_set("Select a Volume that plays a sequence")
-            return False
-        if obj.data.animation_data is not None and obj.data.animation_data.drivers:
-            cls.poll_message_set("Set Speed to Frame by Frame first")
-            return False
-        return True
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        obj = context.object
-        instance = _copy(obj, obj.name)
-        context.collection.objects.link(instance)
-        data = instance.data
-        _read(data, absolute(obj.data.filepath, obj.data.library))
-        data.frame_start += self.offset
-        data.sequence_mode = "REPEAT" if self.repeat else obj.data.sequence_mode
-        for other in context.selected_objects:
-            other.select_set(False)
-        instance.select_set(True)
-        context.view_layer.objects.active = instance
-        return {"FINISHED"}
-
-
 class _ExportPanel(OfResult):
     bl_label = "Export"
 
@@ -338,6 +304,7 @@ class _ExportPanel(OfResult):
         if proxy is not None and Take(Path(proxy[SHOWN_TAKE])) != volume.shown_take(smoke):
             draw_text(layout, context, "The proxy shows another result: export again.", "ERROR")
         layout.operator("smokelift.add_instance", icon="DUPLICATE")
+        layout.operator("smokelift.scatter", icon="GEOMETRY_NODES")
 
 
 class SMOKELIFT_PT_view_export(_ExportPanel, bpy.types.Panel):
@@ -359,7 +326,6 @@ _CLASSES = (
     SMOKELIFT_OT_export,
     SMOKELIFT_OT_cancel_export,
     SMOKELIFT_OT_use_proxy,
-    SMOKELIFT_OT_add_instance,
     SMOKELIFT_PT_view_export,
     SMOKELIFT_PT_clip_export,
 )

@@ -22,6 +22,7 @@ LONG = (
     "compositing.py",
     "directing.py",
     "export.py",
+    "instances.py",
     "projection.py",
     "scene_file.py",
     "volume.py",

@@ -1,4 +1,4 @@
-"""What is handed on: the files, the asset, the proxy in the viewport, and instances with their own time."""
+"""What is handed on: the files, the assets, and the proxy in the viewport."""
 
 from __future__ import annotations
 
@@ -68,6 +68,7 @@ def test_an_export_beside_the_results(made) -> None:
     for name in ("export.json", "smoke.blend", "smoke_0009.vdb"):
         (export.folder_of(made) / name).write_text("of an earlier export")
     made.smokelift_export.use_velocity = False
+    before = len(bpy.data.node_groups)
     assert bpy.ops.smokelift.export() == {"FINISHED"}
     folder = export.folder_of(made)
     assert folder.parent == run.output_folder(made)
@@ -75,7 +76,8 @@ def test_an_export_beside_the_results(made) -> None:
     frames = {f"smoke_{number:04d}.vdb" for number in range(1, FRAMES + 1)}
     assert names == {*frames, "export.json", "smoke.usda", "smoke.blend"}
     assert json.loads((folder / "export.json").read_text())["grids"] == ["density"]
-    assert [obj.type for obj in bpy.context.scene.objects].count("VOLUME") == 1
+    assert [obj.type for obj in bpy.data.objects].count("VOLUME") == 1, "what was made for the asset is left"
+    assert len(bpy.data.node_groups) == before
 
 
 def test_blender_reads_the_usd_file(made) -> None:
@@ -97,12 +99,23 @@ def test_the_asset_is_used_in_another_file(made, tmp_path) -> None:
     bpy.ops.wm.read_homefile(use_empty=True)
     with bpy.data.libraries.load(str(moved / "smoke.blend"), assets_only=True) as (there, here):
         here.objects = there.objects
-    (obj,) = here.objects
+    obj, points = sorted(here.objects, key=lambda obj: obj.type == "MESH")
     assert obj.type == "VOLUME" and not obj.smokelift.is_smoke
     assert obj.data.materials[0].name == material
     assert volume.take_of(obj.data) == Take(moved)
     bpy.context.scene.collection.objects.link(obj)
-    assert grids(obj.data, obj.data.frame_start + 1) == ("smoke_0002.vdb", {"density", "velocity"})
+    start = obj.data.frame_start
+    assert grids(obj.data, start + 1) == ("smoke_0002.vdb", {"density", "velocity"})
+    bpy.context.scene.collection.objects.link(points)
+    bpy.context.scene.frame_set(start + 2)
+    numbers = []
+    for each in bpy.context.evaluated_depsgraph_get().object_instances:
+        if each.is_instance:
+            data = each.object.data
+            assert Path(bpy.path.abspath(data.filepath)).parent == moved
+            assert data.grids.load(), data.grids.error_message
+            numbers.append(data.grids.frame)
+    assert numbers == [3, 2, 1], "each instance plays a frame later"
 
 
 def test_a_proxy_in_the_viewport(made) -> None:
@@ -122,21 +135,6 @@ def test_a_proxy_in_the_viewport(made) -> None:
     assert export.proxy_of(made) is None and not made.hide_viewport
 
 
-def test_an_instance_plays_later(made) -> None:
-    """With its own time and the same material; it is no smoke to be made, and repeats if it shall."""
-    bpy.context.view_layer.objects.active = made
-    assert bpy.ops.smokelift.add_instance(offset=5, repeat=True) == {"FINISHED"}
-    instance = bpy.context.object
-    assert instance != made and not instance.smokelift.is_smoke
-    assert instance.data.materials[0] == made.data.materials[0]
-    start = made.data.frame_start
-    assert instance.data.frame_start == start + 5
-    assert grids(made.data, start + 1)[0] == "smoke_0002.vdb"
-    assert grids(instance.data, start + 6)[0] == "smoke_0002.vdb"
-    assert grids(instance.data, start + 5 + FRAMES)[0] == "smoke_0001.vdb"
-    assert bpy.ops.smokelift.add_instance(offset=2) == {"FINISHED"}, "no instance of an instance"
-
-
 def test_a_folder_with_other_files_is_left_alone(made, tmp_path) -> None:
     """One sentence."""
     (tmp_path / "other").mkdir()
@@ -152,4 +150,3 @@ def test_without_a_result_there_is_nothing_to_export(scene) -> None:
     smoke(scene)
     assert not bpy.ops.smokelift.export.poll()
     assert not bpy.ops.smokelift.use_proxy.poll()
-    assert not bpy.ops.smokelift.add_instance.poll()
