@@ -357,7 +357,8 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
     )
     set_up_light: BoolProperty(
         name="Light",
-        description="Render with Cycles, and add the light that was estimated from the clip",
+        description="Render with Cycles, scatter light in smoke as often as the engine did, and add the light that was "
+        "estimated from the clip",
         default=True,
     )
     set_up_plate: BoolProperty(

@@ -20,6 +20,9 @@ NAME = "Smokelift"
 SENSOR_WIDTH = 36.0
 """Millimetres; Blender's default."""
 
+BOUNCES = 128
+"""How often Cycles scatters light in smoke that was fitted with scattering of all orders."""
+
 
 def match_clip(smoke: bpy.types.Object) -> None:
     """Give the smoke's scene the clip's size, frame rate and length."""
@@ -51,6 +54,7 @@ def set_up(smoke: bpy.types.Object, take: Take, index: dict[str, Any]) -> None:
         _add_background_clip(scene.camera.data, settings.clip)
     if settings.set_up_light:
         scene.render.engine = "CYCLES"
+        _scatter_as_fitted(scene, index)
         if settings.light_mode == "ESTIMATE":
             _estimated_sun(scene, index)
     if settings.set_up_plate:
@@ -111,6 +115,20 @@ def _add_background_clip(camera: bpy.types.Camera, clip: bpy.types.MovieClip) ->
     image.display_depth = "BACK"
 
 
+def _scatter_as_fitted(scene: bpy.types.Scene, index: dict[str, Any]) -> None:
+    """As many bounces in smoke as the model has that the smoke was fitted with; Blender's default is one scattering."""
+    bounces = BOUNCES if _scattering(index) == "multiple" else 0
+    set_unless_changed(scene, "volume_bounces", scene.cycles, "volume_bounces", bounces)
+    if scene.cycles.volume_bounces == bounces:  # bounces of all kinds together end a path too
+        scene.cycles.max_bounces = max(scene.cycles.max_bounces, bounces)
+
+
+def _scattering(index: dict[str, Any]) -> str | None:
+    """The model of scattering that the smoke was fitted with, where the take says it."""
+    # sequences of version 1.0 keep it in their settings
+    return index["scene"]["medium"].get("scattering") or index["settings"].get("density", {}).get("scattering")
+
+
 def _estimated_sun(scene: bpy.types.Scene, index: dict[str, Any]) -> None:
     """The sun that the engine estimated; it casts shadows where the smoke was fitted with them."""
     table = index["scene"]["lights"][0]
@@ -122,9 +140,7 @@ def _estimated_sun(scene: bpy.types.Scene, index: dict[str, Any]) -> None:
     strongest = max(table["irradiance"]) or 1.0
     sun.data.energy = strongest
     sun.data.color = [part / strongest for part in table["irradiance"]]
-    # sequences of version 1.0 keep the model of scattering in their settings
-    scattering = index["scene"]["medium"].get("scattering") or index["settings"]["density"]["scattering"]
-    sun.data.use_shadow = scattering in ("multiple", "single")
+    sun.data.use_shadow = _scattering(index) in ("multiple", "single")
     sun.rotation_euler = Vector(table["direction"]).to_track_quat("-Z", "Y").to_euler()
 
 

@@ -1,12 +1,13 @@
 """Picture a baked scene with Mitsuba 3: its clip, and linear pictures from four sides that no reconstruction may see.
 
     python -m benchmarks.truth.picture plume-1/truth.npz OUT [--light point] [--background wall] [--check 20]
-        [--scattering multiple] [--linear] [--frames 24]
+        [--scattering multiple] [--linear] [--frames 24] [--smoke 18 0.9 6 front]
 
 Nothing of Smokelift takes part. The pictures are single scattering, integrated at half-voxel steps over Mitsuba's own
 sensor, emitters and trilinear grid, so they carry no noise; `--check` compares frames with `volpath`. Scattering is
 isotropic, so that one source function serves all cameras. With multiple scattering `volpath` makes the pictures itself,
-at half the size and with some noise.
+at half the size and with some noise. `--smoke` names the first frame, the albedo, the optical depth of the thickest
+column seen from the front, and whence a sun shines, 35 degrees above; the sun is as strong as the clip can show.
 """
 
 from __future__ import annotations
@@ -40,9 +41,14 @@ DISTANCE = 7.0  # of the camera from the axis (m)
 DIRECTIONS = (8, 16)  # of light from the surroundings: Gauss points in z, equal ones in azimuth
 CHECK_BLOCK = 16  # pixels; volpath's noise is averaged over such blocks
 CHECK_PASSES, CHECK_SAMPLES = 4, 4096  # a block
-BOUNCES, SAMPLES = 33, 512  # with multiple scattering
+ANY = -1  # number of bounces
+SAMPLES = 512  # with multiple scattering
+ROULETTE = 12  # bounces before paths end at random
 IRRADIANCE = 8.0  # of a light, at the middle of the box
 LIGHT_DISTANCE = 2.5  # of a point light from there (m)
+SUNS = {"front": (0.0, 0.819152, -0.573576), "back": (0.0, -0.819152, -0.573576)}  # directions of travel
+BRIGHTEST = 0.9  # radiance of a clip with a sun of `SUNS`,
+QUANTILE, THIN = 0.99, 0.99  # of the pixels that let less light through
 
 
 def lights(kind: str, rng: np.random.Generator, folder: Path) -> dict[str, Any]:
@@ -110,7 +116,7 @@ class Renderer:
             views = march(texture, source.eval_1, box, ray, voxel / 2, self.medium["extinction"])
             radiance, transmittance = (view.numpy().reshape(height, width) for view in views)
             if self.multiple:
-                radiance = self.path_traced(density, camera, 1, BOUNCES, 1, SAMPLES)
+                radiance = self.path_traced(density, camera, 1, ANY, 1, SAMPLES)
             found.append((radiance, transmittance))
         return found
 
@@ -131,7 +137,7 @@ class Renderer:
     ) -> np.ndarray:
         """A picture by `volpath` with paths of a depth, 2 for single scattering; pixels are blocks of the camera's."""
         scene = {
-            "integrator": {"type": "volpath", "max_depth": depth, "hide_emitters": True},
+            "integrator": {"type": "volpath", "max_depth": depth, "rr_depth": ROULETTE, "hide_emitters": True},
             "camera": sensor(camera, block),
             "domain": smoke(density, self.low, self.high, self.medium, {"type": "isotropic"}),
             "light": emitter(self.light),
@@ -154,16 +160,21 @@ def main() -> None:
     parser.add_argument("--scattering", choices=("single", "multiple"), default="single")
     parser.add_argument("--linear", action="store_true", help="the clip as linear EXR pictures instead of a video")
     parser.add_argument("--frames", type=int, help="how many, from the first")
+    parser.add_argument("--smoke", nargs=4, metavar=("FIRST", "ALBEDO", "DEPTH", "LIGHT"), help="instead of drawn ones")
     parser.add_argument("--check", type=int, nargs="*", default=[], help="frames to compare with volpath")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
 
     with np.load(options.truth) as file:
-        densities, voxel, fps = file["density"][: options.frames], float(file["voxel_size"]), float(file["fps"])
+        start = int(options.smoke[0]) if options.smoke else 0
+        densities = file["density"][start:][: options.frames]
+        voxel, fps = float(file["voxel_size"]), float(file["fps"])
         name = json.loads(str(file["made_by"]))["name"]
     nx, ny, nz = shape = densities.shape[1:]
     rng = np.random.default_rng(list(name.encode()))
     light = lights(options.light, rng, options.out)
+    if options.smoke:
+        light = {"type": "directional", "direction": list(SUNS[options.smoke[3]]), "irradiance": [IRRADIANCE] * 3}
     high = [nx * voxel / 2, ny * voxel / 2, nz * voxel]
     scene = {
         "domain": {"min": [-high[0], -high[1], 0.0], "max": high, "resolution": list(shape)},
@@ -174,6 +185,10 @@ def main() -> None:
         },
         "light": light,
     }
+    if options.smoke:
+        albedo, depth = float(options.smoke[1]), float(options.smoke[2])
+        column = float(densities.sum(2, dtype=np.float32).max()) * voxel
+        scene["medium"] |= {"extinction": round(depth / column, 2), "albedo": albedo}
     middle = high[2] / 2
     multiple = options.scattering == "multiple"
     pixels = PIXELS // 2 if multiple else PIXELS
@@ -197,13 +212,15 @@ def main() -> None:
     behind = wall(*camera["size"], len(name)) if walled else np.zeros((*camera["size"][::-1], 3))
     plate = srgb_encode(behind)
     stored: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {view: [] for view in views}
-    pictures = []
     for density in densities:
-        rendered = renderer.images(density.astype(np.float32))
-        for view, pair in zip(views, rendered, strict=True):
+        for view, pair in zip(views, renderer.images(density.astype(np.float32)), strict=True):
             stored[view].append(pair)
-        radiance, transmittance = (picture[..., None] for picture in rendered[0])
-        pictures.append(radiance + transmittance * srgb_decode(plate))
+    if options.smoke:
+        radiance, transmittance = (np.stack(half) for half in zip(*stored["front"], strict=True))
+        factor = BRIGHTEST / float(np.quantile(radiance[transmittance < THIN], QUANTILE))
+        light["irradiance"] = [round(factor * IRRADIANCE, 4)] * 3
+        stored = {view: [(factor * one, other) for one, other in pairs] for view, pairs in stored.items()}
+    pictures = [one[..., None] + other[..., None] * srgb_decode(plate) for one, other in stored["front"]]
     if options.linear:
         for number, picture in enumerate(pictures, 1):
             mi.Bitmap(picture.astype(np.float32)).write(str(options.out / f"front_{number:04d}.exr"))

@@ -130,6 +130,22 @@ def test_the_plate_of_a_moving_camera_plays_beside_the_clip(shot, tmp_path, kind
     assert places[0] == places[1]
 
 
+@pytest.mark.parametrize(("model", "bounces"), [("multiple", shot_setup.BOUNCES), ("single", 0), ("unshadowed", 0)])
+def test_cycles_scatters_light_as_often_as_what_was_fitted(shot, tmp_path, model, bounces) -> None:
+    """What the artist sets after that stays."""
+    take = made(tmp_path)
+    volume.show(smoke(shot), take)
+    index = take.index()
+    index["scene"]["medium"]["scattering"] = model
+    shot.cycles.volume_bounces, shot.cycles.max_bounces = 3, 4
+    shot_setup.set_up(smoke(shot), take, index)
+    assert shot.cycles.volume_bounces == bounces
+    assert shot.cycles.max_bounces == max(4, bounces)
+    shot.cycles.volume_bounces = shot.cycles.max_bounces = 7
+    shot_setup.set_up(smoke(shot), take, index)
+    assert (shot.cycles.volume_bounces, shot.cycles.max_bounces) == (7, 7)
+
+
 def test_changing_the_speed_acts_at_once_and_leaves_no_driver(shot, tmp_path) -> None:
     """What was right for one speed is not kept for another."""
     shot.render.fps = 48

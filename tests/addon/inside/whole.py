@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import shutil
 from pathlib import Path
@@ -485,6 +486,27 @@ def test_cycles_and_the_engine_agree_on_every_light(shot, kept, tmp_path, kind) 
     wanted = area_average(wanted, found.shape[1], found.shape[0])
     assert found.sum() == pytest.approx(wanted.sum(), rel=0.03)
     assert np.linalg.norm(found - wanted) / np.linalg.norm(wanted) < 0.15  # most of it noise
+
+
+def test_cycles_and_the_engine_agree_on_all_orders_of_scattering(shot, kept, tmp_path) -> None:
+    """The same thick white smoke by two renderers; scattered once it has hardly half the light."""
+    take = made(shot, tmp_path / "out", kept)
+    density = Sequence.open(take.directory).density(LAST - FIRST + 1)
+    index = take.index()
+    medium = index["scene"]["medium"] | {"extinction": 15.0, "albedo": 0.95, "scattering": "multiple"}
+    (take.directory / "sequence.json").write_text(json.dumps(index | {"scene": index["scene"] | {"medium": medium}}))
+    run.present(smoke(shot), take)
+    assert bpy.ops.smokelift.set_up() == {"FINISHED"}
+    tables = shot_tables(smoke(shot)) | {"background": {"color": [0.0, 0.0, 0.0]}}
+    known = [scene_from_dict(tables | {"medium": medium | {"scattering": model}}) for model in ("multiple", "single")]
+    shot.cycles.samples, shot.cycles.use_denoising = 64, False
+    shot.render.resolution_percentage = 25
+    shot.world.cycles_visibility.camera = False
+    shot.frame_set(LAST)
+    found = rendered(shot, tmp_path / "lit.exr")
+    wanted, once = (area_average(smokelift.render(density, one), *found.shape[1::-1]) for one in known)
+    assert found.sum() == pytest.approx(wanted.sum(), rel=0.05)
+    assert once.sum() < 0.6 * wanted.sum()
 
 
 def light_by_picture(scene: bpy.types.Scene, folder: Path) -> None:
