@@ -4,7 +4,7 @@
 # make stability      damaged files and failing systems against the command line; CASES=300 of each kind take an hour
 # make extension      the Blender extension's zips in dist/; ENGINE_WHEELS=DIR adds platforms built elsewhere
 # make manual         the manual in build/manual/index.html; a link that leads nowhere fails
-# make test-blender   that zip in the bpy wheels and in a real Blender
+# make test-blender   those zips in the bpy wheels and in a real Blender
 # All set up what they need in .venv first. Only Python 3.11 to 3.13 and a C++17 compiler are assumed; those of the
 # extension need Python 3.11 and 3.13 both, because Blender does.
 
@@ -60,7 +60,7 @@ $(VENV)/tools.stamp: pyproject.toml
 
 # Installed as a wheel, not editable: what is tested is what is shipped.
 $(VENV)/engine.stamp: $(VENV)/tools.stamp $(ENGINE_SOURCES)
-	$(QUIET_PIP) '.[vdb]'
+	$(QUIET_PIP) '.[vdb,gpu]'
 	touch $@
 
 manual: $(VENV)/manual.stamp
@@ -72,7 +72,7 @@ $(VENV)/manual.stamp: $(VENV)/engine.stamp
 
 extension: dist/extension.stamp
 
-dist/extension.stamp: build/engine-wheels/stamp tools/build_extension.py blender_manifest.toml LICENSE $(wildcard addon/*.py)
+dist/extension.stamp: build/engine-wheels/stamp tools/build_extension.py $(wildcard tools/bundle*.txt) blender_manifest.toml LICENSE $(wildcard addon/*.py)
 	$(BIN)/python tools/build_extension.py --engine-wheels build/engine-wheels $(ENGINE_WHEELS) --out dist
 	touch $@
 
@@ -85,8 +85,7 @@ $(VENV)/extension.stamp: $(VENV)/engine.stamp
 	touch $@
 
 test-blender: dist/extension.stamp
-	SMOKELIFT_ZIP=$$(ls "$$PWD"/dist/smokelift-*-linux_x64.zip) \
-		$(BIN)/python -m pytest -v -rP --durations=0 --durations-min=1 tests/blender/wheels.py tests/blender/debian.py
+	$(BIN)/python -m pytest -v -rP --durations=0 --durations-min=1 tests/blender/wheels.py tests/blender/debian.py
 
 clean:
 	rm -rf $(VENV) build dist demo

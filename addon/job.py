@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import os
 import queue
 import subprocess
 import sys
@@ -23,6 +24,12 @@ from .contract import CANCELLED
 
 Outcome = Literal["waiting", "running", "done", "failed", "cancelled"]
 ENDED: tuple[Outcome, ...] = ("done", "failed", "cancelled")
+
+HOME = Path(__file__).parent
+"""The extension; the one with Taichi for the GPU lies beside it."""
+
+LIBRARIES = f"python{sys.version_info.major}.{sys.version_info.minor}"
+"""Folder of an extension that the engine imports from: what is compiled is for one version of Python."""
 
 LINES_A_POLL = 500
 """Lines read in one poll, at most, so that many lines do not delay the caller."""
@@ -49,7 +56,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 threading.Thread(target=end_with_parent, daemon=True).start()
 if hasattr(os, "nice"):
     os.nice(10)
-sys.path.insert(0, sys.argv.pop(1))
+sys.path[:0] = sys.argv.pop(1).split(os.pathsep)
 runpy.run_module("smokelift", run_name="__main__", alter_sys=True)
 """
 
@@ -64,13 +71,22 @@ def engine_command(arguments: Sequence[str]) -> list[str]:
     Raises
     ------
     EngineMissingError
-        If the engine is not installed.
+        If the engine is not installed, or another Python's.
     """
+    shipped = [extension / LIBRARIES for extension in (HOME, HOME.with_name(f"{HOME.name}_gpu"))]
     found = importlib.util.find_spec("smokelift")
-    if found is None or found.origin is None:
+    if shipped[0].is_dir():
+        folders = [folder for folder in shipped if folder.is_dir()]
+    elif others := sorted(folder.name for folder in HOME.glob("python3.*")):
+        raise EngineMissingError(
+            f"This extension is for Blenders with {' and '.join(others)}, and this one has {LIBRARIES}: install the "
+            "zip that is named after this Blender."
+        )
+    elif found is not None and found.origin is not None:
+        folders = [Path(found.origin).parents[1]]
+    else:
         raise EngineMissingError("Smokelift's engine is missing: install the extension again.")
-    site = Path(found.origin).parents[1]
-    return [sys.executable, "-I", "-c", _START, str(site), *arguments]
+    return [sys.executable, "-I", "-c", _START, os.pathsep.join(map(str, folders)), *arguments]
 
 
 class Job:

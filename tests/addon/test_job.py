@@ -350,6 +350,24 @@ def test_no_engine(monkeypatch) -> None:
         engine_command([])
 
 
+def test_libraries_that_are_shipped_come_first(tmp_path, monkeypatch) -> None:
+    """The engine's own, and Taichi's where its extension lies beside."""
+    monkeypatch.setattr(module, "HOME", tmp_path / "smokelift")
+    own, gpu = (tmp_path / name / module.LIBRARIES for name in ("smokelift", "smokelift_gpu"))
+    own.mkdir(parents=True)
+    assert str(own) in engine_command([])
+    gpu.mkdir(parents=True)
+    assert os.pathsep.join(map(str, (own, gpu))) in engine_command([])
+
+
+def test_the_zip_for_another_blender(tmp_path, monkeypatch) -> None:
+    """It says which it is."""
+    (tmp_path / "python3.9").mkdir()
+    monkeypatch.setattr(module, "HOME", tmp_path)
+    with pytest.raises(EngineMissingError, match=r"Blenders with python3\.9, and this one has python3"):
+        engine_command([])
+
+
 # queues
 
 

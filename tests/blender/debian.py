@@ -21,11 +21,14 @@ from PIL import Image
 from engine_wheels import ROOT
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import area_average, linear_to_srgb
-from tests.blender.setting import LIFECYCLE, WORK, ZIP, pytest_words, run, unavailable, user_folder, variables
+from tests.blender.setting import LIFECYCLE, WORK, pytest_words, run, shipped, unavailable, user_folder, variables
 
 SCRIPTS = ROOT / "tests" / "blender" / "root"
 PLACE = Path(os.environ.get("SMOKELIFT_BLENDER_ROOT", Path.home() / ".cache" / "smokelift-tests" / "trixie"))
 """The Debian root; 1.2 GB."""
+
+PYTHON = "3.13"
+"""Of Debian, and so of its Blender; the official 4.3 has 3.11."""
 
 FIRST, LAST = 19, 30
 LONGEST_SIDE = 48
@@ -59,7 +62,7 @@ def root() -> Path:
 
 def inside(root: Path, folder: Path, *command: str | Path | int) -> str:
     """Run a command in the Debian root, with the repository at its own path; returns what it said."""
-    words = [f"{name}={value}" for name, value in variables(folder).items()]
+    words = [f"{name}={value}" for name, value in variables(folder, PYTHON).items()]
     return run([str(SCRIPTS / "enter.sh"), str(root), str(ROOT), "env", *words, *map(str, command)])
 
 
@@ -67,7 +70,7 @@ def inside(root: Path, folder: Path, *command: str | Path | int) -> str:
 def installed(root) -> Path:
     """The folder of a user who has installed the zip on the command line."""
     folder = user_folder("debian")
-    install = ("--command", "extension", "install-file", "--repo", "user_default", "--enable", ZIP)
+    install = ("--command", "extension", "install-file", "--repo", "user_default", "--enable", shipped(PYTHON))
     inside(root, folder, "blender", "-b", *install)
     return folder
 

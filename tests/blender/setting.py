@@ -10,9 +10,10 @@ from pathlib import Path
 
 import pytest
 
+from build_extension import NAMED
 from engine_wheels import ROOT
 
-ZIP = Path(os.environ.get("SMOKELIFT_ZIP", ROOT / "dist" / "missing"))
+DIST = ROOT / "dist"
 WORK = ROOT / "build" / "test-blender"
 """Everything that the tests leave; pictures and figures are meant to be looked at."""
 
@@ -20,6 +21,12 @@ LONGEST = 1200
 """Seconds that a command may take: a Blender that hangs is a fault, not a reason to wait."""
 
 LIFECYCLE = ROOT / "tests" / "blender" / "inside" / "lifecycle.py"
+
+
+def shipped(python: str, name: str = "smokelift") -> Path:
+    """The extension's zip for this system and a version of Python."""
+    (found,) = DIST.glob(f"{name}-*-{NAMED[python]}-linux_x64.zip")
+    return found
 
 
 def unavailable(reason: str) -> None:
@@ -38,9 +45,10 @@ def user_folder(name: str) -> Path:
     return folder
 
 
-def variables(folder: Path) -> dict[str, str]:
+def variables(folder: Path, python: str) -> dict[str, str]:
     """What a Blender and the tests in it need to know."""
-    return {"BLENDER_USER_RESOURCES": str(folder), "SMOKELIFT_ZIP": str(ZIP), "PYTHONDONTWRITEBYTECODE": "1"}
+    zips = {"SMOKELIFT_ZIP": str(shipped(python)), "SMOKELIFT_GPU_ZIP": str(shipped(python, "smokelift_gpu"))}
+    return {"BLENDER_USER_RESOURCES": str(folder), "PYTHONDONTWRITEBYTECODE": "1", **zips}
 
 
 def pytest_words(file: Path, folder: Path, imports: Sequence[Path] = (ROOT,)) -> list[str]:

@@ -9,10 +9,9 @@ import zipfile
 from dataclasses import dataclass
 
 import pytest
-from packaging.utils import parse_wheel_filename
 
 from engine_wheels import ROOT, find_python
-from tests.blender.setting import LIFECYCLE, ZIP, pytest_words, run, unavailable, user_folder, variables
+from tests.blender.setting import LIFECYCLE, pytest_words, run, shipped, unavailable, user_folder, variables
 
 ADD_ONS_TESTS = ROOT / "tests" / "addon" / "inside"
 
@@ -80,21 +79,17 @@ def offline() -> list[str]:
 def test_from_install_to_uninstall(wheel, python) -> None:
     """The whole story of `inside`."""
     folder = user_folder(f"bpy-{wheel.blender}")
-    run([*python, "-m", "pytest", *pytest_words(LIFECYCLE, folder)], variables(folder))
+    run([*python, "-m", "pytest", *pytest_words(LIFECYCLE, folder)], variables(folder, wheel.python))
 
 
 def test_add_ons_own_tests_on_what_is_shipped(wheel, python) -> None:
     """What `make test` asks of the sources with one bpy, asked of the zip's files with every bpy."""
     folder = user_folder(f"bpy-{wheel.blender}")
-    # unpacked without Blender's help: it takes the wheels away again with every reset to factory settings
-    add_on, site = folder / "shipped" / "addon", folder / "site"
-    with zipfile.ZipFile(ZIP) as archive:
+    add_on = folder / "shipped" / "addon"  # the name that its tests import it by
+    with zipfile.ZipFile(shipped(wheel.python)) as archive:
         archive.extractall(add_on)
-    names = {parse_wheel_filename(file.name)[0] for file in (add_on / "wheels").iterdir()}
-    pip = [*python, "-m", "pip", "--disable-pip-version-check", "install", "--quiet", "--no-index", "--no-deps"]
-    run([*pip, "--find-links", str(add_on / "wheels"), "--target", str(site), *sorted(names)])
-    imports = [add_on.parent, site]
-    environment = variables(folder) | {"PYTHONPATH": os.pathsep.join(map(str, imports))}
+    imports = [add_on.parent, add_on / f"python{wheel.python}"]
+    environment = variables(folder, wheel.python) | {"PYTHONPATH": os.pathsep.join(map(str, imports))}
     for file in sorted(ADD_ONS_TESTS.glob("*.py")):
         if file.name != "conftest.py":  # each in a process of its own, as there
             run([*python, "-m", "pytest", *pytest_words(file, folder, [*imports, ROOT])], environment)

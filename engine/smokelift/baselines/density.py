@@ -28,7 +28,7 @@ from smokelift.density import (
 )
 from smokelift.density.fit import fit_figures, without_traces
 from smokelift.density.hull import project_voxels
-from smokelift.render import Image, Volume
+from smokelift.render import DeviceError, Image, Volume, device
 from smokelift.scene import orbit
 
 if TYPE_CHECKING:
@@ -73,11 +73,21 @@ class FixedRateDescent:
         At most so many.
     least_loss
         Mean squared difference, in units of the pictures' mean square, at which to stop.
+
+    Raises
+    ------
+    DeviceError
+        If Taichi is not installed, which the paper's renderer runs on.
     """
 
     rate: float = 0.03
     iterations: int = 60
     least_loss: float = 1e-4
+
+    def __post_init__(self) -> None:
+        """Say what is missing before anything is done."""
+        if not device.has_taichi():
+            raise DeviceError(f"The paper's method cannot run, as {device.NO_TAICHI}.")
 
     def fit(self, views: ViewSet, depth: DepthEstimate, initial: Volume | None) -> Density:
         """Find a density anywhere in the domain; see `smokelift.density.DensityFit`."""

@@ -1,6 +1,6 @@
 """Which device renders: the processor with compiled code, or a GPU with Taichi.
 
-Taichi is only imported where a GPU driver is installed: that alone takes longer than a picture.
+Taichi may be missing. It is only imported where a GPU driver is installed: that alone takes longer than a picture.
 """
 
 from __future__ import annotations
@@ -8,6 +8,7 @@ from __future__ import annotations
 import ctypes
 import sys
 from importlib import import_module
+from importlib.util import find_spec
 from typing import Any, Literal, Protocol
 
 import numpy as np
@@ -29,6 +30,11 @@ _DRIVERS = {
 
 _running: str | None = None  # one device a process
 
+NO_TAICHI = (
+    "Taichi is not installed: install it (pip install 'smokelift[gpu]'; in Blender the extension's zip smokelift_gpu)"
+)
+"""What a sentence says where it is needed."""
+
 
 class DeviceError(RuntimeError):
     """The device that was asked for is not there."""
@@ -46,10 +52,15 @@ class Backend(Protocol):
 
 def available_gpu() -> str | None:
     """Name of the first GPU back end that Taichi can use here, or None."""
-    if not _driver_installed():
+    if not (driver_installed() and has_taichi()):
         return None
     name: str | None = _taichi().supported_gpu()
     return name
+
+
+def has_taichi() -> bool:
+    """Whether Taichi is installed; it is not looked at."""
+    return find_spec("taichi") is not None
 
 
 def start(device: DeviceName = "auto") -> str:
@@ -79,6 +90,8 @@ def start(device: DeviceName = "auto") -> str:
             )
         return _running
     gpu = None if device == "cpu" else available_gpu()
+    if device == "gpu" and not has_taichi():
+        raise DeviceError(f"A GPU cannot be used, as {NO_TAICHI}, or use --device cpu.")
     if device == "gpu" and gpu is None:
         raise DeviceError(
             "No GPU that Taichi can use was found (CUDA, Metal or Vulkan); use --device cpu or update the driver."
@@ -104,7 +117,8 @@ def _taichi() -> Any:
     return import_module("smokelift.render.gpu.taichi_runtime")
 
 
-def _driver_installed() -> bool:
+def driver_installed() -> bool:
+    """Whether a driver is there that Taichi could use."""
     if sys.platform not in _DRIVERS:
         return True
     for library in _DRIVERS[sys.platform]:

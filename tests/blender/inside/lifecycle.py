@@ -11,6 +11,7 @@ import os
 import re
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ from mathutils import Vector
 
 from tests.example_shot import EXAMPLE, set_up_example, smoke
 
-ZIP = Path(os.environ["SMOKELIFT_ZIP"])
+ZIP, GPU_ZIP = (Path(os.environ[name]) for name in ("SMOKELIFT_ZIP", "SMOKELIFT_GPU_ZIP"))
 MODULE = "bl_ext.user_default.smokelift"
 FIRST, LAST = 21, 32
 FRAMES = LAST - FIRST + 1
@@ -48,6 +49,21 @@ for number in sequence.frames:
 print(json.dumps(answer))
 """
 
+_IMPORT_ALL = """
+import sys
+sys.path.insert(0, sys.argv[1])
+import importlib, json, pkgutil
+import smokelift
+missing = {}
+for module in pkgutil.walk_packages(smokelift.__path__, "smokelift."):
+    if not module.name.endswith("__main__"):
+        try:
+            importlib.import_module(module.name)
+        except ModuleNotFoundError as error:
+            missing[module.name] = error.name
+print(json.dumps(missing))
+"""
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -55,19 +71,35 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("shot")
 
 
-def site() -> Path:
-    """Where Blender unpacks wheels."""
-    name = f"python{sys.version_info.major}.{sys.version_info.minor}"
-    return Path(os.environ["BLENDER_USER_RESOURCES"], "extensions", ".local", "lib", name, "site-packages")
+def extension(name: str = "smokelift") -> Path:
+    return Path(os.environ["BLENDER_USER_RESOURCES"], "extensions", "user_default", name)
 
 
-def extension() -> Path:
-    return Path(os.environ["BLENDER_USER_RESOURCES"], "extensions", "user_default", "smokelift")
+def libraries(name: str = "smokelift") -> Path:
+    """What the engine imports from."""
+    return extension(name) / f"python{sys.version_info.major}.{sys.version_info.minor}"
+
+
+def install(path: Path) -> None:
+    said = bpy.ops.extensions.package_install_files(filepath=str(path), repo="user_default", enable_on_install=True)
+    assert said == {"FINISHED"}
+
+
+def uninstall(name: str) -> None:
+    repositories = bpy.context.preferences.extensions.repos
+    place = next(i for i, repository in enumerate(repositories) if repository.module == "user_default")
+    assert bpy.ops.extensions.package_uninstall(repo_index=place, pkg_id=name) == {"FINISHED"}
+    assert not extension(name).exists()
+
+
+def size(folder: Path) -> int:
+    """Bytes of all files in a folder."""
+    return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
 
 
 def corners(take: Path) -> dict[int, Any]:
     """Lowest and highest corner of every frame's smoke (m) and its mass, as the engine reads its files."""
-    command = [sys.executable, "-I", "-c", _CORNERS, str(site()), str(take)]
+    command = [sys.executable, "-I", "-c", _CORNERS, str(libraries()), str(take)]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return {int(number): corner for number, corner in json.loads(done.stdout.splitlines()[-1]).items()}
@@ -98,20 +130,23 @@ sys.exit(batch.main(sys.argv[1:]))
 
 
 def test_installs_from_disk() -> None:
-    """The zip is all that is needed, and Blender's own numpy stays the only one."""
+    """The zip is all that is needed, Blender's own numpy stays the only one, and little of the disk is taken."""
     assert not extension().exists()
-    assert bpy.ops.extensions.package_install_files(filepath=str(ZIP), repo="user_default", enable_on_install=True) == {
-        "FINISHED"
-    }
+    began = time.perf_counter()
+    install(ZIP)
+    seconds = time.perf_counter() - began
     assert MODULE in bpy.context.preferences.addons
-    assert (site() / "taichi").is_dir()
-    assert not (site() / "numpy").exists()
+    assert not (libraries() / "taichi").exists()
+    assert not (libraries() / "numpy").exists()
     assert Path(extension(), "LICENSE").is_file()
+    zipped, everything = ZIP.stat().st_size, size(Path(os.environ["BLENDER_USER_RESOURCES"], "extensions"))
+    print(f"{ZIP.name}: {zipped / 1e6:.0f} MB, installed {everything / 1e6:.0f} MB in {seconds:.1f} s")
+    assert zipped < 100e6 and everything < 250e6
     bpy.ops.wm.save_userpref()
 
 
-def test_engine_runs_with_blenders_numpy() -> None:
-    """Started as the add-on starts it, the engine finds its libraries, an OpenVDB module and Blender's numpy."""
+def doctor() -> str:
+    """What the engine says of itself, started as the add-on starts it."""
     from bl_ext.user_default.smokelift.job import engine_command
 
     # it ends with its standard input, so that has to stay open
@@ -119,8 +154,36 @@ def test_engine_runs_with_blenders_numpy() -> None:
     with subprocess.Popen(engine_command(["doctor"]), text=True, **pipes) as engine:
         said = engine.stdout.read()
         assert engine.wait() == 0, said
+    return said
+
+
+def test_engine_runs_with_blenders_numpy() -> None:
+    """It finds its libraries, an OpenVDB module and Blender's numpy."""
+    said = doctor()
     assert f"numpy {np.__version__}" in said
     assert "OpenVDB: missing" not in said
+
+
+def test_every_module_of_the_engine_has_what_it_imports() -> None:
+    """What the build leaves out of libraries is not needed; Taichi is needed by name."""
+    command = [sys.executable, "-I", "-B", "-c", _IMPORT_ALL, str(libraries())]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    missing = dict(json.loads(done.stdout.splitlines()[-1]))
+    assert set(missing.values()) <= {"taichi", "distributed"}, missing
+    assert not any(name.startswith(("smokelift.app", "smokelift.pipeline")) for name in missing), missing
+
+
+def test_taichi_is_found_where_its_extension_is_installed() -> None:
+    """And gone with it."""
+    assert "taichi missing" in doctor()
+    install(GPU_ZIP)
+    everything = size(extension("smokelift_gpu"))
+    print(f"{GPU_ZIP.name}: {GPU_ZIP.stat().st_size / 1e6:.0f} MB, installed {everything / 1e6:.0f} MB")
+    assert GPU_ZIP.stat().st_size < 100e6 and everything < 250e6
+    assert re.search(r"taichi 1\.", doctor())
+    uninstall("smokelift_gpu")
+    assert "taichi missing" in doctor()
 
 
 def test_makes_smoke(folder) -> None:
@@ -254,11 +317,8 @@ def test_disabling_leaves_nothing() -> None:
 
 
 def test_uninstalling_leaves_nothing() -> None:
-    """Files and wheels are gone, and Blender still has its numpy."""
-    repositories = bpy.context.preferences.extensions.repos
-    place = next(i for i, repository in enumerate(repositories) if repository.module == "user_default")
-    assert bpy.ops.extensions.package_uninstall(repo_index=place, pkg_id="smokelift") == {"FINISHED"}
-    assert not extension().exists()
-    left = {path.name for path in site().iterdir()} if site().is_dir() else set()
-    assert not left & {"smokelift", "taichi", "scipy", "av"}, left
+    """All files are gone, and Blender still has its numpy."""
+    uninstall("smokelift")
+    left = list(Path(os.environ["BLENDER_USER_RESOURCES"], "extensions").rglob("*.so"))
+    assert not left
     assert np.zeros(1).size == 1

@@ -7,6 +7,7 @@ import subprocess
 from command_line import ENVIRONMENT, MODULE, command, events
 
 import smokelift
+from smokelift.render import device
 
 
 def test_doctor_in_a_process_of_its_own() -> None:
@@ -17,6 +18,15 @@ def test_doctor_in_a_process_of_its_own() -> None:
     for word in ("libraries: numpy ", "taichi ", "processor cores", "GiB free", "GPU: ", "OpenVDB"):
         assert word in done.stdout
     assert done.stderr == ""
+
+
+def test_doctor_without_taichi(capsys, monkeypatch) -> None:
+    """A GPU that is not used for lack of it is said, with what to install."""
+    monkeypatch.setattr(device, "has_taichi", lambda: False)
+    monkeypatch.setattr(device, "driver_installed", lambda: True)
+    monkeypatch.setattr(device, "_running", "cpu")
+    assert command("doctor") == 0
+    assert "GPU: not used, as Taichi is not installed: install it (pip" in capsys.readouterr().out
 
 
 def test_doctor_as_json(capsys) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from smokelift.baselines.density import AllCarried, FixedRateDescent, OrthogonalCopy
 from smokelift.density import Density, Observation, ViewSet
-from smokelift.render import render, scene_optics
+from smokelift.render import DeviceError, device, render, scene_optics
 from smokelift.scene import Scene, completed, orbit
 
 
@@ -26,6 +26,13 @@ def fitted(
     observations = [Observation(orbit(scene.camera, scene.domain, angle), image) for angle, image in images.items()]
     views = ViewSet.of(observations, scene_optics(completed(scene)))
     return FixedRateDescent(iterations=iterations).fit(views, OrthogonalCopy().estimate(views), initial)
+
+
+def test_without_taichi_the_fit_is_refused(monkeypatch) -> None:
+    """Before anything is done, with what to install."""
+    monkeypatch.setattr(device, "has_taichi", lambda: False)
+    with pytest.raises(DeviceError, match=r"The paper's method cannot run, as Taichi is not installed: "):
+        FixedRateDescent()
 
 
 def test_an_empty_picture_gives_zeros(small) -> None:

@@ -47,6 +47,17 @@ def test_one_process_has_one_device():
             device.start("gpu")
 
 
+def test_without_taichi(monkeypatch):
+    """The processor renders; who asks for a GPU learns what to install."""
+    monkeypatch.setattr(device, "_running", None)
+    monkeypatch.setattr(device, "find_spec", lambda name: None)
+    monkeypatch.setattr(device, "driver_installed", lambda: True)
+    with pytest.raises(DeviceError, match=r"Taichi is not installed: .*smokelift_gpu.*or use --device cpu\.$"):
+        device.start("gpu")
+    assert device.available_gpu() is None
+    assert device.start("auto") == "cpu"
+
+
 if __name__ == "__main__":
     name = device.start("gpu")
     loss, gradient, image = loss_gradient_and_image()

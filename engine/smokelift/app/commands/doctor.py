@@ -15,7 +15,7 @@ from smokelift.app.progress import Reporter
 from smokelift.output.vdb import VdbUnavailable, vdb_module
 from smokelift.render import device
 
-LIBRARIES = ("numpy", "scipy", "taichi", "av", "OpenEXR", "pillow")
+LIBRARIES = ("numpy", "scipy", "av", "OpenEXR", "pillow", "taichi")
 
 
 def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
@@ -33,19 +33,29 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
 def _report() -> list[str]:
     lines = [
         f"smokelift {__version__}, Python {platform.python_version()}, {platform.system()} {platform.machine()}",
-        "libraries: " + ", ".join(f"{name} {metadata.version(name)}" for name in LIBRARIES),
+        "libraries: " + ", ".join(f"{name} {_version(name)}" for name in LIBRARIES),
         f"core: {_core.__name__}, {os.cpu_count()} processor cores, "
         f"{psutil.virtual_memory().available / 2**30:.1f} of {psutil.virtual_memory().total / 2**30:.1f} GiB free",
     ]
-    running = device.start()
-    lines.append(
-        "GPU: none that Taichi can use well; the renderer runs on the processor"
-        if running == "cpu"
-        else f"GPU: {running}; the renderer runs on it"
-    )
+    lines.append(f"GPU: {_gpu(device.start())}")
     try:
         module = vdb_module()
         lines.append(f"OpenVDB: {module.__name__} {'.'.join(map(str, module.LIBRARY_VERSION))}")
     except VdbUnavailable as missing:
         lines.append(f"OpenVDB: missing. {missing}")
     return lines
+
+
+def _version(name: str) -> str:
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return "missing"
+
+
+def _gpu(running: str) -> str:
+    if running != "cpu":
+        return f"{running}; the renderer runs on it"
+    if device.driver_installed() and not device.has_taichi():
+        return f"not used, as {device.NO_TAICHI}; the renderer runs on the processor"
+    return "none that Taichi can use well; the renderer runs on the processor"
