@@ -31,12 +31,12 @@ STL_HEADER = 80
 """Bytes before the number of triangles."""
 
 
-def request(smoke: bpy.types.Object) -> tuple[str, list[str], bytes]:
+def request(smoke: bpy.types.Object) -> tuple[str, list[str], list[bytes]]:
     """What is done to the take that a smoke shows.
 
     Returns
     -------
-    The engine's command, its options, and obstacles as a binary STL file.
+    The engine's command, its options, and obstacles as a binary STL file, one for each frame if they move.
 
     Raises
     ------
@@ -48,7 +48,7 @@ def request(smoke: bpy.types.Object) -> tuple[str, list[str], bytes]:
     if len(numbers) < SHORTEST:
         raise ShotError(f"{SHORTEST} frames at least are needed to see how smoke moves: make the result longer first.")
     if settings.direction == "retime":
-        return "retime", ["--speed", *map(_word, settings.speeds())], b""
+        return "retime", ["--speed", *map(_word, settings.speeds())], []
     if settings.direction == "loop":
         words = ["--overlap", str(settings.overlap)] if settings.overlap else []
         if settings.use_part:
@@ -56,25 +56,26 @@ def request(smoke: bpy.types.Object) -> tuple[str, list[str], bytes]:
             if last - first + 1 < SHORTEST:
                 raise ShotError(f"A loop needs {SHORTEST} frames at least: choose a later last frame.")
             words = ["--frames", f"{first}:{last}", *words]
-        return "loop", words, b""
+        return "loop", words, []
     return _continued(smoke, numbers)
 
 
-def _continued(smoke: bpy.types.Object, numbers: list[int]) -> tuple[str, list[str], bytes]:
+def _continued(smoke: bpy.types.Object, numbers: list[int]) -> tuple[str, list[str], list[bytes]]:
     settings, scene = smoke.smokelift.directing, scene_of(smoke)
     if settings.fade > settings.frames:
         raise ShotError(f"The smoke fades in {settings.fade} frames, and only {settings.frames} are added.")
     words = ["--frames", str(settings.frames), "--fade", str(settings.fade)]
-    start = volume.scene_frame(smoke, numbers[-1])
+    last, start = numbers[-1], volume.scene_frame(smoke, numbers[-1])
     if settings.use_start:
         start = settings.start
-        number = _number(smoke, numbers, start)
-        if number < numbers[SHORTEST - 1]:
+        last = _number(smoke, numbers, start)
+        if last < numbers[SHORTEST - 1]:
             raise ShotError(f"{SHORTEST} frames are needed before the smoke reacts: choose a later frame.")
-        words += ["--start", str(number)]
+        words += ["--start", str(last)]
+    later = [volume.scene_frame(smoke, last + step) for step in range(1, settings.frames + 1)]
     with at_frame(scene, start) as depsgraph:
-        blown, meshes = _effects(smoke, depsgraph)
-    return "continue", words + blown, meshes
+        words += _blown(smoke, depsgraph)
+        return "continue", words, _obstacles(smoke, depsgraph, later)
 
 
 def _number(smoke: bpy.types.Object, numbers: list[int], frame: int) -> int:
@@ -86,41 +87,71 @@ def _number(smoke: bpy.types.Object, numbers: list[int], frame: int) -> int:
     return number
 
 
-def _effects(smoke: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[list[str], bytes]:
-    """What the objects of the collection do: options for wind, turbulence and fans, and a file of the obstacles."""
+def _blown(smoke: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> list[str]:
+    """Options for wind, turbulence and fans."""
     settings = smoke.smokelift.directing
     to_smoke = _world_to_smoke(smoke.evaluated_get(depsgraph))
     scale = abs(to_smoke.to_3x3().determinant()) ** (1 / 3)
-    wind, others, obstacles = Vector(), [], []
-    for obj in settings.effectors.all_objects if settings.effectors else ():
-        if obj in (smoke, smoke.smokelift.box) or obj.hide_viewport:
-            continue
+    wind, others = Vector(), []
+    for obj in _effectors(smoke):
         seen = obj.evaluated_get(depsgraph)
-        field = seen.field
-        kind = "NONE" if field is None else field.type
+        field, kind = seen.field, _kind(seen)
         if kind not in ("NONE", *BLOWING, "TURBULENCE"):
             raise ShotError(
                 f"The force field of {obj.name} cannot be used: only Wind, Force and Turbulence move smoke."
             )
+        matrix = seen.matrix_world
+        ahead = to_smoke.to_3x3() @ matrix.to_3x3().col[2].normalized()
         if kind == "TURBULENCE":
             if field.use_max_distance:
                 raise ShotError(f"Turbulence is everywhere: switch off Max Distance of {obj.name}.")
             size = field.size or UNSIZED
             others += ["--turbulence", *map(_word, (abs(field.strength) * scale, size * scale, field.seed))]
-            continue
-        matrix = seen.matrix_world
-        ahead = to_smoke.to_3x3() @ matrix.to_3x3().col[2].normalized()
-        if kind == "WIND" and not field.use_max_distance:
+        elif kind == "WIND" and not field.use_max_distance:
             wind += field.strength * ahead
         elif kind != "NONE" or obj.type == "EMPTY":
             own = field.distance_max if kind != "NONE" and field.use_max_distance else None
             radius = obj.empty_display_size * abs(matrix.to_3x3().determinant()) ** (1 / 3) if own is None else own
             blown = (settings.fan_speed if kind == "NONE" else field.strength) * ahead
             others += ["--fan", *map(_word, (*(to_smoke @ matrix.translation), radius * scale, *blown))]
-        elif obj.type in MESHES:
-            obstacles.append(_triangles(seen, to_smoke @ matrix))
-    words = ["--wind", *map(_word, wind)] if wind.length > 0.0 else []
-    return words + others, _stl(obstacles)
+    return (["--wind", *map(_word, wind)] if wind.length > 0.0 else []) + others
+
+
+def _obstacles(smoke: bpy.types.Object, depsgraph: bpy.types.Depsgraph, later: list[int]) -> list[bytes]:
+    """The meshes as a binary STL file, and as one more for each later frame of the scene as long as they move."""
+    meshes = [obj for obj in _effectors(smoke) if obj.type in MESHES and _kind(obj.evaluated_get(depsgraph)) == "NONE"]
+
+    def now() -> bytes:
+        to_smoke = _world_to_smoke(smoke.evaluated_get(depsgraph))
+        seen = [obj.evaluated_get(depsgraph) for obj in meshes]
+        return _stl([_triangles(obj, to_smoke @ obj.matrix_world) for obj in seen])
+
+    files = [now()]
+    if not files[0]:
+        return []
+    for frame in later:
+        scene_of(smoke).frame_set(frame)
+        content = now()
+        if len(content) != len(files[0]):
+            raise ShotError(
+                f"The obstacles change their number of triangles in frame {frame}: a mesh that moves has to keep them."
+            )
+        files.append(content)
+    while len(files) > 1 and files[-1] == files[-2]:
+        files.pop()
+    return files
+
+
+def _effectors(smoke: bpy.types.Object) -> list[bpy.types.Object]:
+    """The objects that act on a smoke."""
+    collection, own = smoke.smokelift.directing.effectors, (smoke, smoke.smokelift.box)
+    return [obj for obj in collection.all_objects if obj not in own and not obj.hide_viewport] if collection else []
+
+
+def _kind(obj: bpy.types.Object) -> str:
+    """The force field of an object, or NONE."""
+    kind: str = "NONE" if obj.field is None else obj.field.type
+    return kind
 
 
 def _world_to_smoke(smoke: bpy.types.Object) -> Matrix:

@@ -77,9 +77,9 @@ class SmokeliftDirecting(bpy.types.PropertyGroup):
     effectors: PointerProperty(
         name="Effectors",
         description=(
-            "Collection of what acts on the smoke: closed meshes are obstacles, Wind and Turbulence force fields are "
-            "wind and turbulence. An Empty, a Force field or a Wind field with Max Distance is a fan, which blows "
-            "along its Z axis. Strength is m/s"
+            "Collection of what acts on the smoke: closed meshes, which may be animated, are obstacles; Wind "
+            "and Turbulence force fields are wind and turbulence. An Empty, a Force field or a Wind field with "
+            "Max Distance is a fan, which blows along its Z axis. Strength is m/s"
         ),
         type=bpy.types.Collection,
     )

@@ -12,6 +12,7 @@ One that is made of another take, which goes on after its clip, has another pace
 
     take_0004.json    what is done, the other take, and the engine's further options
     take_0004.stl     the meshes that are obstacles, if there are any
+    take_0004_####.stl  the same where they move, for every frame
 """
 
 from __future__ import annotations
@@ -76,6 +77,14 @@ class Take:
         """The obstacles of a take that is made of another one."""
         return self.directory.with_suffix(".stl")
 
+    @property
+    def moving_mesh(self) -> Path:
+        """The same where they move: the pattern of numbered files."""
+        return self.directory.with_name(f"{self.directory.name}_####.stl")
+
+    def _moving_files(self) -> list[Path]:
+        return sorted(self.directory.parent.glob(f"{self.directory.name}_{'[0-9]' * 4}*.stl"))
+
     def write(self, tables: Mapping[str, Any], options: Sequence[str]) -> None:
         """Write the scene file from its tables, and the engine's further options.
 
@@ -87,7 +96,9 @@ class Take:
         text = json.dumps({"options": list(options)}) + "\n"
         self._write({self.scene_file: toml.dumps(tables).encode(), self.request_file: text.encode()})
 
-    def write_directed(self, direction: str, source: Take, options: Sequence[str], meshes: bytes = b"") -> None:
+    def write_directed(
+        self, direction: str, source: Take, options: Sequence[str], meshes: Sequence[bytes] = ()
+    ) -> None:
         """Write what is made of another take.
 
         Parameters
@@ -99,7 +110,7 @@ class Take:
         options
             The engine's, with those of its values that are numbers.
         meshes
-            Obstacles, as a binary STL file; none if empty.
+            Obstacles, as a binary STL file; one for each frame if they move.
 
         Raises
         ------
@@ -111,7 +122,10 @@ class Take:
         except ValueError:  # on another drive
             there = str(source.directory)
         request = {"direction": direction, "source": there, "options": list(options)}
-        files = {self.mesh_file: meshes} if meshes else {}
+        name = self.moving_mesh.name.replace("####", "{:04d}")
+        files = {self.directory.with_name(name.format(n)): content for n, content in enumerate(meshes)}
+        if len(meshes) == 1:
+            files = {self.mesh_file: meshes[0]}
         self._write({**files, self.request_file: (json.dumps(request) + "\n").encode()})
 
     def _write(self, files: Mapping[Path, bytes]) -> None:
@@ -189,7 +203,8 @@ class Take:
         run = ["--out", str(self.directory), "--resume", "--progress", "json", *options]
         if direction is None or source is None:
             return ["reconstruct", str(self.scene_file), "--thumbnail", str(self.thumbnail_file), *run]
-        meshes = ["--mesh", str(self.mesh_file)] if self.mesh_file.is_file() else []
+        there = [(self.mesh_file, self.mesh_file.is_file()), (self.moving_mesh, bool(self._moving_files()))]
+        meshes = [word for mesh, is_there in there if is_there for word in ("--mesh", str(mesh))]
         return [direction, str(source.directory), *run, *meshes]
 
     def index(self) -> dict[str, Any] | None:
@@ -245,7 +260,8 @@ class Take:
     def remove(self) -> None:
         """Delete all its files."""
         shutil.rmtree(self.directory, ignore_errors=True)
-        for file in (self.scene_file, self.request_file, self.log_file, self.thumbnail_file, self.mesh_file):
+        own = (self.scene_file, self.request_file, self.log_file, self.thumbnail_file, self.mesh_file)
+        for file in (*own, *self._moving_files()):
             file.unlink(missing_ok=True)
 
 

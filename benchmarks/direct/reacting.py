@@ -15,6 +15,7 @@ from benchmarks.direct.clips import true_moment
 from benchmarks.direct.continuation import tile
 from benchmarks.truth.scenes import BOX_MIN, BOX_SIZE
 from smokelift.direct import Ball, learnt_simulation
+from smokelift.direct.obstacles import Obstacles
 from smokelift.direct.surroundings import Surroundings
 from smokelift.output.sheet import write_sheet
 from smokelift.scene import Domain
@@ -42,10 +43,11 @@ def main() -> None:
     places = np.argwhere(moments[-1].density > 0) * truth.voxel_size
     weights = moments[-1].density[moments[-1].density > 0]
     x, y, _ = np.average(places, axis=0, weights=weights)
-    solid = Ball((x0 + float(x), y0 + float(y), HEIGHT), RADIUS).voxels(domain)
+    ball = Ball((x0 + float(x), y0 + float(y), HEIGHT), RADIUS)
+    solid = ball.voxels(domain)
     cases = {
         "free": Surroundings(),
-        "ball": Surroundings(solid=solid),
+        "ball": Surroundings(obstacles=Obstacles(domain, (ball,))),
         "wind": Surroundings(wind=(0.8, 0.0, 0.0)),
     }
     shown = [max(1, options.frames * part // 6) for part in (1, 3, 6)]

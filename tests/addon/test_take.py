@@ -93,7 +93,7 @@ def test_what_is_made_of_a_take(tmp_path) -> None:
     source = begun(tmp_path / "old" / "first")
     take = new_take(tmp_path / "old" / "second")
     assert (take.direction(), take.source()) == (None, None)
-    take.write_directed("continue", source, ["--frames", "5", "--wind", "-1.5", "0", "0"], b"mesh")
+    take.write_directed("continue", source, ["--frames", "5", "--wind", "-1.5", "0", "0"], [b"mesh"])
     (tmp_path / "old").rename(tmp_path / "new")
     take, source = (Take(tmp_path / "new" / t.directory.relative_to(tmp_path / "old")) for t in (take, source))
     assert (take.direction(), take.source(), take.title()) == ("continue", source, "Continued 1")
@@ -105,6 +105,19 @@ def test_what_is_made_of_a_take(tmp_path) -> None:
     assert take.resumable()
     take.give_title("Windy")
     assert (take.title(), take.direction()) == ("Windy", "continue")
+    take.remove()
+    assert list(take.directory.parent.iterdir()) == []
+
+
+def test_obstacles_that_move(tmp_path) -> None:
+    """A numbered file for each frame, which are no takes, and go with the take."""
+    source = begun(tmp_path / "first")
+    take = new_take(tmp_path / "second")
+    take.write_directed("continue", source, ["--frames", "2"], [b"one", b"two", b"three"])
+    arguments = take.arguments()
+    assert arguments[arguments.index("--mesh") + 1 :] == [str(take.directory) + "_####.stl"]
+    assert [path.read_bytes() for path in sorted(take.directory.parent.glob("*.stl"))] == [b"one", b"two", b"three"]
+    assert new_take(take.directory.parent).directory.name == "take_0002"
     take.remove()
     assert list(take.directory.parent.iterdir()) == []
 

@@ -5,8 +5,10 @@ from smokelift.direct.continuing import Continuation, continue_sequence
 from smokelift.direct.looping import loop_length, loop_sequence, usual_overlap
 from smokelift.direct.mesh import Mesh
 from smokelift.direct.moment import Moment, completed, read_moment
+from smokelift.direct.moving_mesh import MovingMesh
+from smokelift.direct.obstacles import Ball, Box
 from smokelift.direct.retiming import paced, retime_sequence
-from smokelift.direct.surroundings import Ball, Box, Fan
+from smokelift.direct.surroundings import Fan
 from smokelift.direct.turbulence import Turbulence
 from smokelift.direct.writing import open_source
 
@@ -17,6 +19,7 @@ __all__ = [
     "Fan",
     "Mesh",
     "Moment",
+    "MovingMesh",
     "Simulation",
     "Turbulence",
     "completed",

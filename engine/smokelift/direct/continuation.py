@@ -27,7 +27,7 @@ from smokelift.direct.inflow import Inflow, find_inflow
 from smokelift.direct.moment import Moment
 from smokelift.direct.physics import Physics, fit_physics, lift
 from smokelift.direct.surroundings import Surroundings
-from smokelift.transport import Array, Velocity, advect, on_faces
+from smokelift.transport import Array, Velocity, advect, on_faces, project
 
 TRACE = np.float32(1e-4)
 """Share of the largest density below which nothing is seen. Interpolation spreads such traces over the whole box."""
@@ -56,13 +56,16 @@ class Simulation:
 
     def next(self, moment: Moment, step: int) -> Moment:
         """Return the moment after one; the step that leads there is counted from 1 at the clip's last moment."""
-        entering = self.inflow.at(step)
+        entering, solid = self.inflow.at(step), self.surroundings.solid(step, self.dt)
         moved = self._moved(moment.velocity, step)
-        velocity = self.surroundings.projected(moved.with_faces(self._driven(moved, moment, entering, step)))
+        driven = moved.with_faces(self._driven(moved, moment, entering, step))
+        velocity = project(driven) if solid is None else solid.projected(driven)
         density = advect(moment.density, velocity, self.dt, conserve=True)
-        density = self._tidied(density) * np.float32(math.exp(-self.physics.dissipation * self.dt))
+        filled = None if solid is None else solid.voxels
+        density = _tidied(density, filled) * np.float32(math.exp(-self.physics.dissipation * self.dt))
+        inlets = self.inflow.voxels if filled is None else self.inflow.voxels & ~filled
         return Moment(
-            np.where(self.inflow.voxels, entering.density, density),
+            np.where(inlets, entering.density, density),
             Velocity(velocity.faces, velocity.voxel_size, velocity.closed),
         )
 
@@ -87,15 +90,6 @@ class Simulation:
             faces.append(driven + own)
         return faces
 
-    def _tidied(self, density: Array) -> Array:
-        """The same mass without traces, and without what interpolation lets into obstacles."""
-        kept = density > TRACE * density.max()
-        if self.surroundings.solid is not None:
-            kept &= ~self.surroundings.solid
-        tidied = np.where(kept, density, np.float32(0))
-        mass, left = (float(values.sum(dtype=np.float64)) for values in (density, tidied))
-        return tidied * np.float32(mass / left) if left > 0 else tidied
-
 
 def learnt_simulation(
     moments: Sequence[Moment], dt: float, marked: Mask | None = None, surroundings: Surroundings | None = None
@@ -113,6 +107,15 @@ def learnt_simulation(
     surroundings
         What is placed around the smoke.
     """
-    around = surroundings or Surroundings()
-    inflow = find_inflow(moments, dt, marked, around.solid)
-    return Simulation(fit_physics(moments, dt, inflow.voxels), inflow, around, dt)
+    inflow = find_inflow(moments, dt, marked)
+    return Simulation(fit_physics(moments, dt, inflow.voxels), inflow, surroundings or Surroundings(), dt)
+
+
+def _tidied(density: Array, solid: Mask | None) -> Array:
+    """The same mass without traces, and without what interpolation lets into obstacles."""
+    kept = density > TRACE * density.max()
+    if solid is not None:
+        kept &= ~solid
+    tidied = np.where(kept, density, np.float32(0))
+    mass, left = (float(values.sum(dtype=np.float64)) for values in (density, tidied))
+    return tidied * np.float32(mass / left) if left > 0 else tidied

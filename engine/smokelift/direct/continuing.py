@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from smokelift.direct.constraint import Mask, faces_of
+from smokelift.direct.constraint import faces_of
 from smokelift.direct.continuation import learnt_simulation
-from smokelift.direct.mesh import Mesh
 from smokelift.direct.moment import Moment, read_moment
-from smokelift.direct.surroundings import Ball, Box, Fan, Surroundings
+from smokelift.direct.obstacles import Ball, Box, Obstacle, Obstacles, outside
+from smokelift.direct.surroundings import Fan, Surroundings
 from smokelift.direct.turbulence import Turbulence
 from smokelift.direct.writing import SHORTEST, Written, directed_writer, simulated_figures, time_step, write_copy
 from smokelift.output.sequence import Sequence
@@ -57,7 +57,7 @@ class Continuation:
     wind: Vector = (0.0, 0.0, 0.0)
     turbulences: tuple[Turbulence, ...] = ()
     fans: tuple[Fan, ...] = ()
-    obstacles: tuple[Ball | Box | Mesh, ...] = ()
+    obstacles: tuple[Obstacle, ...] = ()
 
 
 def continue_sequence(
@@ -94,6 +94,7 @@ def continue_sequence(
             f"{sequence.frames[SHORTEST - 1]} to {sequence.frames[-1]}."
         )
     around = _surroundings(continuation, sequence.scene.domain)
+    around.solid(1, time_step(sequence))
     last = start + continuation.frames
     told = {
         "frames": continuation.frames,
@@ -141,8 +142,13 @@ def _simulated(
         began = time.perf_counter()
         moment = simulation.next(moment, step)
         shown = moment.density * np.float32(_share_left(step, continuation))
+        solid = around.solid(step, dt)
         figures = simulated_figures(
-            replace(moment, density=shown), began, "simulated", vars(simulation.physics), around.solid
+            replace(moment, density=shown),
+            began,
+            "simulated",
+            vars(simulation.physics),
+            None if solid is None else solid.voxels,
         )
         writer.write(number, shown, moment.velocity.faces, figures, {"unfaded": moment.density})
         yield number, figures
@@ -154,31 +160,21 @@ def _share_left(step: int, continuation: Continuation) -> float:
 
 
 def _surroundings(continuation: Continuation, domain: Domain) -> Surroundings:
-    blown = [(faces_of(_placed(fan.place, domain, "fan")), fan.velocity) for fan in continuation.fans]
-    solid = None
-    for obstacle in continuation.obstacles:
-        voxels = _placed(obstacle, domain, "obstacle")
-        solid = voxels if solid is None else solid | voxels
-    if solid is not None and solid.all():
-        raise ValueError("the obstacles fill the whole box; make them smaller.")
+    blown = []
+    for fan in continuation.fans:
+        voxels = fan.place.voxels(domain)
+        if not voxels.any():
+            raise ValueError(outside("fan", domain))
+        blown.append((faces_of(voxels), fan.velocity))
     for turbulence in continuation.turbulences:
         if turbulence.size < SMALLEST_EDDY * domain.voxel_size:
             raise ValueError(
                 f"turbulence of {turbulence.size:g} m is too small for voxels of {domain.voxel_size:.3g} m; make it "
                 f"{SMALLEST_EDDY * domain.voxel_size:.3g} m at least."
             )
-    return Surroundings(continuation.wind, continuation.turbulences, tuple(blown), solid)
+    obstacles = Obstacles(domain, continuation.obstacles) if continuation.obstacles else None
+    return Surroundings(continuation.wind, continuation.turbulences, tuple(blown), obstacles)
 
 
-def _told(obstacle: Ball | Box | Mesh) -> dict[str, Any]:
-    return obstacle.told() if isinstance(obstacle, Mesh) else vars(obstacle)
-
-
-def _placed(thing: Ball | Box | Mesh, domain: Domain, what: str) -> Mask:
-    """The voxels of a thing that has to be in the box."""
-    voxels = thing.voxels(domain)
-    if not voxels.any():
-        raise ValueError(
-            f"the {what} holds no voxel of the box from {domain.min} to {domain.max} m; move it in, or make it larger."
-        )
-    return voxels
+def _told(obstacle: Obstacle) -> dict[str, Any]:
+    return vars(obstacle) if isinstance(obstacle, Ball | Box) else obstacle.told()

@@ -57,7 +57,7 @@ class Inflow:
         return faces_of(self.voxels)
 
 
-def find_inflow(moments: Sequence[Moment], dt: float, marked: Mask | None = None, solid: Mask | None = None) -> Inflow:
+def find_inflow(moments: Sequence[Moment], dt: float, marked: Mask | None = None) -> Inflow:
     """Find the inlets of a clip from its last moments.
 
     Parameters
@@ -68,14 +68,10 @@ def find_inflow(moments: Sequence[Moment], dt: float, marked: Mask | None = None
         Time between them in seconds.
     marked : (nx, ny, nz) bool, optional
         Inlets that are known; otherwise they are found from what the velocities do not explain.
-    solid : (nx, ny, nz) bool, optional
-        Obstacles, which close the inlets that they cover.
     """
     voxels = _found(moments, dt) if marked is None else marked
     if voxels.any():
         voxels = ndimage.binary_dilation(voxels, ndimage.generate_binary_structure(3, 3), MARGIN)
-    if solid is not None:
-        voxels = voxels & ~solid
     return Inflow(voxels, moments)
 
 

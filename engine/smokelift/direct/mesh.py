@@ -8,10 +8,9 @@ majority. So parts may overlap, and a few holes do no harm (after Nooruddin and 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -21,12 +20,35 @@ from smokelift.scene import Domain
 from smokelift.scene.checks import LARGEST
 
 Values = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
 
 HEADER, RECORD = 84, np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 """Of a binary STL file: bytes before the triangles, the last four of them their number, and a triangle."""
 
 PAIRS_AT_ONCE = 2**20
 """Pairs of a triangle and a column that are looked at together, which bounds the memory."""
+
+ORDERS = [1, 2, 0], [2, 0, 1], [0, 1, 2]
+"""Axes of the columns along x, y and z: their own comes last."""
+
+
+class Crossings(NamedTuple):
+    """Where triangles cross columns of voxels' centres.
+
+    Attributes
+    ----------
+    column, face, side, triangle : (k,)
+        Number of the column; the face between two centres in it; 1 or -1 for the side the triangle is crossed from;
+        number of the triangle.
+    weights : (k, 3)
+        Of the triangle's corners at the crossing.
+    """
+
+    column: Integers
+    face: Integers
+    side: Integers
+    triangle: Integers
+    weights: Values
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,18 +98,12 @@ class Mesh:
         ValueError
             If it is open, such as a plane, so that it encloses nothing.
         """
+        return enclosed(self.crossings(domain), domain)
+
+    def crossings(self, domain: Domain) -> list[Crossings]:
+        """Where it crosses the columns of voxels' centres along x, y and z."""
         places = (self.triangles.astype(np.float64) - domain.min) / domain.voxel_size - 0.5
-        votes, crossed = np.zeros(domain.shape, np.int8), False
-        for axis in range(3):
-            order = [(axis + 1) % 3, (axis + 2) % 3, axis]
-            wound, open_columns = _wound(places[:, :, order], tuple(domain.shape[d] for d in order))
-            crossed |= bool(open_columns.any())
-            vote = np.where(open_columns[..., None], 0, np.where(wound, 1, -1)).astype(np.int8)
-            votes += vote.transpose(np.argsort(order))
-        enclosed: Mask = votes > 0
-        if crossed and not enclosed.any():
-            raise ValueError("the mesh of an obstacle is open and encloses nothing; close it, or give it a thickness.")
-        return enclosed
+        return [_crossings(places[:, :, order], tuple(domain.shape[d] for d in order)) for order in ORDERS]
 
     def told(self) -> dict[str, Any]:
         """What tells it from another, for the settings of a sequence."""
@@ -95,24 +111,31 @@ class Mesh:
         return {"triangles": len(self.triangles), "checksum": hashlib.sha256(content).hexdigest()}
 
 
-def _wound(places: Values, shape: tuple[int, ...]) -> tuple[Mask, Mask]:
-    """Around which voxels triangles wind, and in which columns along the last axis they are open.
+def enclosed(crossings: list[Crossings], domain: Domain) -> Mask:
+    """The voxels around whose centres a surface winds, by the majority of the axes.
 
-    The triangles, (n, 3, 3), are in voxels from the centre of the first.
+    Raises
+    ------
+    ValueError
+        If it is open, such as a plane, so that it encloses nothing.
     """
-    turns = np.zeros((shape[0] * shape[1], shape[2] + 1), np.int32)
-    for column, height, sign in _crossings(places, shape):
-        voxel = np.clip(np.ceil(height), 0, shape[2]).astype(np.int64)
-        np.add.at(turns, (column, voxel), sign)
-    wound: Mask = np.cumsum(turns[:, :-1], axis=1) != 0
-    open_columns: Mask = turns.sum(axis=1) != 0
-    return wound.reshape(shape), open_columns.reshape(shape[:2])
+    votes, crossed = np.zeros(domain.shape, np.int8), False
+    for order, found in zip(ORDERS, crossings, strict=True):
+        shape = tuple(domain.shape[d] for d in order)
+        turns = np.zeros((shape[0] * shape[1], shape[2] + 1), np.int32)
+        np.add.at(turns, (found.column, found.face), found.side)
+        open_columns = turns.sum(axis=1) != 0
+        crossed |= bool(open_columns.any())
+        vote = np.where(open_columns[:, None], 0, np.where(np.cumsum(turns[:, :-1], axis=1) != 0, 1, -1))
+        votes += vote.astype(np.int8).reshape(shape).transpose(np.argsort(order))
+    enclosed: Mask = votes > 0
+    if crossed and not enclosed.any():
+        raise ValueError("the mesh of an obstacle is open and encloses nothing; close it, or give it a thickness.")
+    return enclosed
 
 
-def _crossings(
-    places: Values, shape: tuple[int, ...]
-) -> Iterator[tuple[npt.NDArray[np.int64], Values, npt.NDArray[np.int32]]]:
-    """Where columns cross triangles: the column, the height, and 1 or -1 for the side it comes from."""
+def _crossings(places: Values, shape: tuple[int, ...]) -> Crossings:
+    """Where triangles (n, 3, 3), in voxels from the centre of the first, cross columns along the last axis."""
     limit = np.array(shape[:2]) - 1
     low = np.clip(np.ceil(places[:, :, :2].min(axis=1)), 0, limit + 1).astype(np.int64)
     high = np.clip(np.floor(places[:, :, :2].max(axis=1)), -1, limit).astype(np.int64)
@@ -120,6 +143,8 @@ def _crossings(
     counts = size.prod(axis=1)
     near = np.flatnonzero(counts)
     batch = np.cumsum(counts[near]) // PAIRS_AT_ONCE
+    none = np.empty(0, np.int64)
+    found = [Crossings(none, none, none, none, np.empty((0, 3)))]
     for number in np.unique(batch):
         some = near[batch == number]
         of = np.repeat(some, counts[some])
@@ -132,9 +157,18 @@ def _crossings(
         total = areas[0] + areas[1] + areas[2]
         same = (left[0] == left[1]) & (left[1] == left[2]) & (total != 0)
         # the area beside an edge is the weight of the corner opposite to it
-        weighted = sum(area * corners[:, (k + 2) % 3, 2] for k, area in enumerate(areas))
-        heights = np.asarray(weighted)[same] / total[same]
-        yield column[same] @ np.array([shape[1], 1]), heights, np.where(left[0][same], 1, -1).astype(np.int32)
+        weights = np.stack([areas[1], areas[2], areas[0]], axis=-1)[same] / total[same, None]
+        heights = (weights * corners[same, :, 2]).sum(axis=1)
+        found.append(
+            Crossings(
+                column[same] @ np.array([shape[1], 1]),
+                np.clip(np.ceil(heights), 0, shape[2]).astype(np.int64),
+                np.where(left[0][same], 1, -1),
+                of[same],
+                weights,
+            )
+        )
+    return Crossings(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
 
 
 def _side(start: Values, end: Values, point: npt.NDArray[np.int64]) -> tuple[Values, Mask]:

@@ -13,7 +13,7 @@ from smokelift.transport.grid import (
     require_positive,
     require_same_shape,
 )
-from smokelift.transport.projection import divergence, project, without_divergence
+from smokelift.transport.projection import divergence, outflow, project, without_divergence
 
 __all__ = [
     "Array",
@@ -27,6 +27,7 @@ __all__ = [
     "divergence",
     "face_shapes",
     "on_faces",
+    "outflow",
     "project",
     "require_positive",
     "require_same_shape",

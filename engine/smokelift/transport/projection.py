@@ -65,6 +65,25 @@ def without_divergence(field: StaggeredGrid, passes: int = 1) -> tuple[Staggered
     return StaggeredGrid((faces[0], faces[1], faces[2]), field.voxel_size, field.closed), largest
 
 
+def outflow(sources: Array, like: StaggeredGrid) -> StaggeredGrid:
+    """The field that is the gradient of something and has a given net outflow from every voxel.
+
+    Parameters
+    ----------
+    sources : (nx, ny, nz) float32
+        The sum over a voxel's six faces, outwards. With all sides closed its mean is left out, as it cannot get away.
+    like
+        Gives the grid.
+    """
+    pressure = _core.solve_poisson(sources, like.walls)
+    faces = []
+    for axis in range(3):
+        low, high = (np.float32(1 if wall else -1) for wall in like.walls[2 * axis : 2 * axis + 2])
+        ends = low * pressure.take([0], axis), high * pressure.take([-1], axis)
+        faces.append(-np.diff(np.concatenate([ends[0], pressure, ends[1]], axis), axis=axis))
+    return like.with_faces(faces)
+
+
 def divergence(field: StaggeredGrid) -> Array:
     """Net outflow of every voxel per volume, shape (nx, ny, nz); of a velocity in 1/s."""
     return _core.divergence(field.faces) / np.float32(field.voxel_size)

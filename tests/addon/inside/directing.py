@@ -102,7 +102,7 @@ def test_frames_are_those_of_the_scene(shot, result) -> None:
     """The take begins where the clip does, and may be moved in time."""
     settings = result.smokelift.directing
     settings.frames, settings.fade = 10, 4
-    assert directing.request(result) == ("continue", ["--frames", "10", "--fade", "4"], b"")
+    assert directing.request(result) == ("continue", ["--frames", "10", "--fade", "4"], [])
     result.data.frame_start = 101
     settings.use_start, settings.start = True, 105
     assert directing.request(result)[1][-2:] == ["--start", "5"]
@@ -130,18 +130,44 @@ def test_meshes_are_obstacles(result, acting, tmp_path) -> None:
     obj = placed(acting, "Crate", mesh, **place)
     acting.objects.link(result.smokelift.box)
     wanted = Box((-0.5, -0.5, 1.0), (0.5, 0.5, 2.0)).voxels(DOMAIN)
-    content = directing.request(result)[2]
+    (content,) = directing.request(result)[2]
     np.testing.assert_array_equal(solid(content, tmp_path), wanted)
     obj.scale.x = -0.5
     other, there = cube(0.25, (0.5, 0.0, 1.5))
     small = placed(acting, "Small", other, **there)
     both = wanted | Box((0.25, -0.25, 1.25), (0.75, 0.25, 1.75)).voxels(DOMAIN)
-    np.testing.assert_array_equal(solid(directing.request(result)[2], tmp_path), both)
+    np.testing.assert_array_equal(solid(*directing.request(result)[2], tmp_path), both)
     obj.hide_viewport = True
-    assert solid(directing.request(result)[2], tmp_path).sum() < both.sum()
+    assert solid(*directing.request(result)[2], tmp_path).sum() < both.sum()
     modifier = small.modifiers.new("Round", "SUBSURF")
     modifier.levels = 2
-    assert len(directing.request(result)[2]) > len(content)
+    assert len(directing.request(result)[2][0]) > len(content)
+
+
+def test_meshes_that_move(shot, result, acting, tmp_path) -> None:
+    """Are sampled in the frames of the scene that the new frames are shown in, as long as they move."""
+    mesh, place = cube(0.25)
+    obj = placed(acting, "Crate", mesh, **place)
+    result.smokelift.directing.frames = 5
+    last = volume.scene_frame(result, FRAMES)
+    for frame, x in ((last + 1, 0.0), (last + 3, 0.5)):
+        obj.location.x = x
+        obj.keyframe_insert("location", index=0, frame=frame)
+    before = shot.frame_current
+    files = directing.request(result)[2]
+    assert shot.frame_current == before
+    assert len(files) == 4  # at the start and 1, 2 and 3 frames later; then it stays
+    assert files[0] == files[1]
+    wanted = Box((0.25, -0.25, 1.25), (0.75, 0.25, 1.75)).voxels(DOMAIN)
+    np.testing.assert_array_equal(solid(files[-1], tmp_path), wanted)
+    assert bpy.ops.smokelift.direct() == {"FINISHED"}
+    (row,) = bpy.context.window_manager.smokelift.jobs
+    assert (row.outcome, row.done) == ("done", FRAMES + 5), row.sentence
+    assert not Sequence.open(volume.shown_take(result).directory).density(FRAMES + 5)[wanted].any()
+    build = obj.modifiers.new("Build", "BUILD")
+    build.frame_start, build.frame_duration = last, 10
+    with pytest.raises(ShotError, match="number of triangles"):
+        directing.request(result)
 
 
 def test_the_smokes_own_space_counts(result, acting, tmp_path) -> None:
@@ -157,7 +183,7 @@ def test_the_smokes_own_space_counts(result, acting, tmp_path) -> None:
     there = Matrix.Translation(result.location) @ result.rotation_euler.to_matrix().to_4x4() @ Matrix.Scale(2.0, 4)
     obj.matrix_basis, fan.matrix_basis = there @ obj.matrix_basis, there @ fan.matrix_basis
     after, found = (part for part in directing.request(result)[:0:-1])
-    np.testing.assert_array_equal(solid(after, tmp_path), solid(before, tmp_path))
+    np.testing.assert_array_equal(solid(*after, tmp_path), solid(*before, tmp_path))
     # one metre in the scene is half a metre of the smoke's own
     np.testing.assert_allclose(words(found, "--fan")[0][:4], words(options, "--fan")[0][:4], atol=1e-5)
     np.testing.assert_allclose(words(found, "--fan")[0][4:], [0.5, 0.0, 0.0], atol=1e-5)

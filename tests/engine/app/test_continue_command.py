@@ -42,4 +42,7 @@ def test_a_mesh_is_an_obstacle(finished, tmp_path, capsys) -> None:
         for number in range(4):
             file.write(bytes(12) + np.delete(corners, number, axis=0).tobytes() + bytes(2))
     assert "no voxel" in refused(capsys, *start, "--mesh", tmp_path / "mesh.stl")
+    assert "no such files" in refused(capsys, *start, "--mesh", tmp_path / "mesh_##.stl")
+    (tmp_path / "mesh.stl").rename(tmp_path / "mesh_01.stl")
+    assert "no voxel" in refused(capsys, *start, "--mesh", tmp_path / "mesh_##.stl")
     assert not (tmp_path / "out").exists()

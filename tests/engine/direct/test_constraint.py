@@ -6,7 +6,7 @@ import numpy as np
 
 from smokelift.direct import Ball, completed
 from smokelift.direct.constraint import faces_between, faces_of, without_divergence_given
-from smokelift.direct.surroundings import Surroundings
+from smokelift.direct.obstacles import Solid
 from smokelift.transport import Velocity, divergence, project
 from tests.engine.direct.rising import DOMAIN
 
@@ -18,7 +18,7 @@ def uniform(speed: float = 1.0) -> Velocity:
 
 def test_no_air_enters_an_obstacle_and_none_is_made_around_it():
     solid = Ball((0, 0, 1.5), 0.5).voxels(DOMAIN)
-    found = Surroundings(solid=solid).projected(uniform())
+    found = Solid(solid, None).projected(uniform())
     for mask, component in zip(faces_of(solid), found.faces, strict=True):
         assert not component[mask].any()
     assert np.abs(divergence(found)).max() * DOMAIN.voxel_size < 0.005

@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from smokelift.direct import Ball, Moment, learnt_simulation
+from smokelift.direct import Ball, Moment, Simulation, learnt_simulation
 from smokelift.direct.constraint import faces_of
+from smokelift.direct.inflow import Inflow
+from smokelift.direct.obstacles import Obstacles
 from smokelift.direct.physics import Physics
 from smokelift.direct.surroundings import Surroundings
 from smokelift.transport import Velocity, divergence
@@ -56,9 +58,10 @@ def test_wind_carries_the_smoke_along():
 
 
 def test_smoke_goes_round_an_obstacle():
-    solid = Ball((0.0, 0.0, 1.4), 0.35).voxels(DOMAIN)
+    ball = Ball((0.0, 0.0, 1.4), 0.35)
+    solid = ball.voxels(DOMAIN)
     start = at_rest(np.where(solid, np.float32(0), blob()))
-    moments = course(free(PHYSICS, Surroundings(solid=solid)), start, 36)
+    moments = course(free(PHYSICS, Surroundings(obstacles=Obstacles(DOMAIN, (ball,)))), start, 36)
     for moment in moments[1:]:
         assert not moment.density[solid].any()
         assert np.abs(divergence(moment.velocity))[~solid].max() * DOMAIN.voxel_size < 0.02
@@ -66,6 +69,15 @@ def test_smoke_goes_round_an_obstacle():
     assert moments[0].density[:, :, above:].sum() < 0.1 * mass(moments[0])
     assert moments[-1].density[:, :, above:].sum() > 0.3 * mass(moments[-1])
     assert mass(moments[-1]) / mass(moments[0]) == pytest.approx(np.exp(-0.3 * 36 * DT), rel=0.01)
+
+
+def test_an_obstacle_closes_the_inlet_that_it_covers():
+    inlet = Ball((0.0, 0.0, 1.4), 0.3)
+    inflow = Inflow(inlet.voxels(DOMAIN), (at_rest(blob()),))
+    around = Surroundings(obstacles=Obstacles(DOMAIN, (Ball(inlet.centre, 0.4),)))
+    nothing = at_rest(np.zeros(DOMAIN.shape, np.float32))
+    assert Simulation(PHYSICS, inflow, Surroundings(), DT).next(nothing, 1).density.any()
+    assert not Simulation(PHYSICS, inflow, around, DT).next(nothing, 1).density.any()
 
 
 def test_a_fan_blows():

@@ -56,9 +56,3 @@ def test_an_inlet_replays_its_moments_without_a_jump():
     places = [moments.index(inflow.at(step)) for step in range(9)]
     assert places == [3, 2, 1, 0, 1, 2, 3, 2, 1]
     assert Inflow(inflow.voxels, moments[:1]).at(5) is moments[0]
-
-
-def test_an_obstacle_closes_the_inlet_that_it_covers():
-    everywhere = np.ones(DOMAIN.shape, bool)
-    solid = Ball((0, 0, 0), 5).voxels(DOMAIN)
-    assert not find_inflow(plume()[:2], DT, everywhere, solid).voxels.any()

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import argparse
 import time
+from pathlib import Path
 from typing import Any
 
 from smokelift.app.options import add_directed_options, finite, named_path, require_new
 from smokelift.app.progress import Reporter, say_frames
-from smokelift.direct import Ball, Box, Continuation, Fan, Mesh, Turbulence, continue_sequence, open_source
+from smokelift.direct import Ball, Box, Continuation, Fan, Mesh, MovingMesh, Turbulence, continue_sequence, open_source
 
 
 def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
@@ -75,7 +76,8 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="FILE",
-        help="an obstacle of any shape: a closed mesh in a binary STL file, in metres, Z up; may be given again",
+        help="an obstacle of any shape: a closed mesh in a binary STL file, in metres, Z up; mesh_####.stl for one "
+        "that moves, with a file for the last frame that stays and for each after it; may be given again",
     )
     parser.set_defaults(run=run)
 
@@ -112,8 +114,12 @@ def _continuation(options: argparse.Namespace) -> Continuation:
         wind=tuple(options.wind),
         turbulences=tuple(_turbulence(*values) for values in options.turbulence),
         fans=tuple(Fan(_ball("--fan", values[:4]), tuple(values[4:])) for values in options.fan),
-        obstacles=(*balls, *boxes, *map(Mesh.read, options.mesh)),
+        obstacles=(*balls, *boxes, *map(_mesh, options.mesh)),
     )
+
+
+def _mesh(path: Path) -> Mesh | MovingMesh:
+    return MovingMesh.read(path) if "#" in path.name and not path.is_file() else Mesh.read(path)
 
 
 def _turbulence(speed: float, size: float, seed: float) -> Turbulence:

@@ -1,0 +1,164 @@
+"""Obstacles: what is solid at a step of a simulation, and how fast it moves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from smokelift.direct.constraint import Mask, faces_between, faces_of, without_divergence_given
+from smokelift.direct.mesh import Mesh
+from smokelift.direct.moving_mesh import MovingMesh
+from smokelift.scene import Domain
+from smokelift.scene.checks import Vector
+from smokelift.transport import Faces, Velocity, divergence, face_shapes, outflow
+
+
+@dataclass(frozen=True)
+class Ball:
+    """A round obstacle or, moving, a fan.
+
+    Attributes
+    ----------
+    centre
+        In metres.
+    radius
+        In metres, above 0.
+    """
+
+    centre: Vector
+    radius: float
+
+    def voxels(self, domain: Domain) -> Mask:
+        """The voxels whose centres lie in it, shape (nx, ny, nz)."""
+        x, y, z = domain.offsets(self.centre)
+        inside: Mask = x**2 + y**2 + z**2 <= self.radius**2
+        return inside
+
+
+@dataclass(frozen=True)
+class Box:
+    """A box as obstacle.
+
+    Attributes
+    ----------
+    low, high
+        Corners in metres.
+    """
+
+    low: Vector
+    high: Vector
+
+    def voxels(self, domain: Domain) -> Mask:
+        """The voxels whose centres lie in it, shape (nx, ny, nz)."""
+        above, below = domain.offsets(self.low), domain.offsets(self.high)
+        x, y, z = ((a >= 0) & (b <= 0) for a, b in zip(above, below, strict=True))
+        inside: Mask = x & y & z
+        return inside
+
+
+Obstacle = Ball | Box | Mesh | MovingMesh
+
+
+class Solid(NamedTuple):
+    """What is solid at a moment.
+
+    Attributes
+    ----------
+    voxels : (nx, ny, nz) bool
+    velocity
+        Of what they are made of, in m/s on all faces; None where all of it stands still.
+    """
+
+    voxels: Mask
+    velocity: Faces | None
+
+    def projected(self, velocity: Velocity) -> Velocity:
+        """The nearest velocity that is without divergence outside, and moves with the solid on its faces and inside.
+
+        Nothing goes through the solid's faces but what it pushes; one that swells pushes air away.
+        """
+        inside = faces_of(self.voxels)
+        wanted = velocity.with_faces(self.velocity or (np.float32(0) * component for component in velocity.faces))
+        if self.velocity is None:
+            field = without_divergence_given(velocity, faces_between(self.voxels), wanted.faces)
+        else:
+            swelling = np.where(self.voxels, divergence(wanted) * np.float32(velocity.voxel_size), np.float32(0))
+            away = outflow(swelling, velocity)
+            rest, given = (
+                field.with_faces(u - a for u, a in zip(field.faces, away.faces, strict=True))
+                for field in (velocity, wanted)
+            )
+            found = without_divergence_given(rest, faces_between(self.voxels), given.faces)
+            field = found.with_faces(u + a for u, a in zip(found.faces, away.faces, strict=True))
+        return velocity.with_faces(
+            np.where(mask, own, component)
+            for mask, own, component in zip(inside, wanted.faces, field.faces, strict=True)
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Obstacles:
+    """Everything in a box that smoke cannot go through.
+
+    Attributes
+    ----------
+    domain
+        The box.
+    things
+        In it, or on their way there.
+
+    Raises
+    ------
+    ValueError
+        If one holds no voxel of the box, or is a mesh that is open.
+    """
+
+    domain: Domain
+    things: tuple[Obstacle, ...]
+
+    def __post_init__(self) -> None:
+        for thing in self.things:
+            if not (thing.ever_in(self.domain) if isinstance(thing, MovingMesh) else thing.voxels(self.domain).any()):
+                raise ValueError(outside("obstacle", self.domain))
+
+    def at(self, step: int, dt: float) -> Solid | None:
+        """What is solid after so many steps, which last `dt` seconds each; None if nothing is.
+
+        Raises
+        ------
+        ValueError
+            If it fills the box, or a mesh that moves is open.
+        """
+        if not self.things:
+            return None
+        solid = Solid(self._still, None)
+        for thing in self.things:
+            if isinstance(thing, MovingMesh):
+                solid = _with(solid, *thing.solid(self.domain, step, dt))
+        if solid.voxels.all():
+            raise ValueError("the obstacles fill the whole box; make them smaller.")
+        return solid if solid.voxels.any() else None
+
+    @cached_property
+    def _still(self) -> Mask:
+        """The voxels of what does not move."""
+        still: Mask = np.zeros(self.domain.shape, bool)
+        for thing in self.things:
+            if not isinstance(thing, MovingMesh):
+                still |= thing.voxels(self.domain)
+        return still
+
+
+def _with(solid: Solid, voxels: Mask, velocity: Faces) -> Solid:
+    """What is solid with a thing that moves."""
+    before = solid.velocity or [np.zeros(shape, np.float32) for shape in face_shapes(voxels.shape)]
+    x, y, z = (np.where(mask, own, other) for mask, own, other in zip(faces_of(voxels), velocity, before, strict=True))
+    return Solid(solid.voxels | voxels, (x, y, z))
+
+
+def outside(what: str, domain: Domain) -> str:
+    """What is said of a thing that is not in the box."""
+    return f"the {what} holds no voxel of the box from {domain.min} to {domain.max} m; move it in, or make it larger."

@@ -1,0 +1,117 @@
+"""Meshes that move: how fast their surface does, what they do to smoke, and the files they come from."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from smokelift.direct import Continuation, Mesh, MovingMesh, continue_sequence, open_source
+from smokelift.direct.constraint import faces_between
+from smokelift.direct.obstacles import Obstacles
+from smokelift.direct.physics import Physics
+from smokelift.direct.surroundings import Surroundings
+from smokelift.output.index import SequenceError
+from smokelift.output.sequence import Sequence
+from smokelift.transport import divergence
+from tests.engine.direct.rising import DOMAIN, DT, at_rest, blob, course, free, write_plume
+from tests.engine.direct.test_mesh import ball, cube, written
+
+H = DOMAIN.voxel_size
+
+
+def along_x(triangles: np.ndarray, speed: float, frames: int) -> MovingMesh:
+    """A mesh that goes along x."""
+    way = speed * DT * np.arange(frames + 1)
+    return MovingMesh(tuple(Mesh((triangles + np.array([x, 0, 0])).astype(np.float32)) for x in way))
+
+
+def test_the_surface_has_the_speed_of_its_corners():
+    """Of a mesh that goes, and of one that turns, on every face between inside and outside."""
+    start = cube((-0.5, -0.3, 0.6), (0.5, 0.3, 1.4)).astype(float)
+    turn = 0.02
+    matrix = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
+    voxels, (x, y, z) = MovingMesh((Mesh(start), Mesh(start @ matrix.T))).solid(DOMAIN, 1, DT)
+    outer = faces_between(voxels)
+    rate = turn / DT
+    across = np.arange(16) * H + H / 2 - 1
+    np.testing.assert_allclose(x[outer[0]], np.broadcast_to(-rate * across[:, None], x.shape)[outer[0]], atol=0.01)
+    np.testing.assert_allclose(y[outer[1]], np.broadcast_to(rate * across[:, None, None], y.shape)[outer[1]], atol=0.01)
+    assert not z[outer[2]].any()
+    _, (x, y, z) = along_x(start, 0.7, 3).solid(DOMAIN, 2, DT)
+    np.testing.assert_allclose(x, 0.7, rtol=1e-4)
+    assert not y.any()
+    assert not z.any()
+    _, (x, _, _) = along_x(start, 0.7, 3).solid(DOMAIN, 4, DT)  # it has come to rest
+    assert not x.any()
+
+
+def test_a_ball_pushes_still_smoke_before_it():
+    """Nothing goes through its faces but with it, no smoke is lost, and the air has no divergence."""
+    moving = along_x(ball((-0.55, 0.0, 1.5), 0.3), 0.8, 12)
+    obstacles = Obstacles(DOMAIN, (moving,))
+    start = at_rest(blob((0.0, 0.0, 1.5), 0.2))
+    moments = course(free(Physics(0.0, 0.0), Surroundings(obstacles=obstacles)), start, 12)
+    for step, moment in enumerate(moments[1:], 1):
+        solid = obstacles.at(step, DT)
+        for mask, component, wanted in zip(
+            faces_between(solid.voxels), moment.velocity.faces, solid.velocity, strict=True
+        ):
+            np.testing.assert_array_equal(component[mask], wanted[mask])
+        assert not moment.density[solid.voxels].any()
+        assert np.abs(divergence(moment.velocity))[~solid.voxels].max() * H < 0.02 * 0.8
+    before, after = moments[0].density, moments[-1].density
+    assert after.sum() == pytest.approx(before.sum(), rel=0.02)
+    places = np.arange(16) * H + H / 2 - 1
+    # the ball's front comes from 0.25 m before the middle of the smoke to 0.15 m behind it
+    assert abs(np.average(places, weights=before.sum(axis=(1, 2)))) < 0.01
+    assert np.average(places, weights=after.sum(axis=(1, 2))) > 0.06
+
+
+def test_one_that_swells_pushes_air_away():
+    triangles = ball((0.0, 0.0, 0.0), 1.0)
+    grown = MovingMesh(tuple(Mesh(((0.3 + 0.02 * n) * triangles + [0, 0, 1.5]).astype(np.float32)) for n in range(3)))
+    solid = Obstacles(DOMAIN, (grown,)).at(2, DT)
+    found = solid.projected(at_rest(blob()).velocity)
+    assert np.abs(divergence(found))[~solid.voxels].max() * H < 0.02 * 0.02 / DT
+    # what the ball gains in a second leaves the box
+    out = sum(found.faces[axis].take(-1, axis).sum() - found.faces[axis].take(0, axis).sum() for axis in range(3))
+    assert out * H**2 == pytest.approx(4 * np.pi * 0.34**2 * 0.02 / DT, rel=0.15)
+
+
+def test_numbered_files_are_one_obstacle(tmp_path):
+    """A run that goes on has to have the same; what does not belong together is refused in one sentence."""
+    moving = along_x(cube((-0.9, -0.3, 1.2), (-0.4, 0.3, 1.7)), 2.0, 3)
+    pattern = tmp_path / "crate_####.stl"
+    with pytest.raises(ValueError, match="no such files"):
+        MovingMesh.read(pattern)
+    for number, place in enumerate(moving.places, 9):
+        written(tmp_path / f"crate_{number:04d}.stl", place.triangles)
+    read = MovingMesh.read(pattern)
+    for a, b in zip(read.places, moving.places, strict=True):
+        np.testing.assert_array_equal(a.triangles, b.triangles)
+    write_plume(tmp_path / "source")
+    source, out = open_source(tmp_path / "source"), tmp_path / "out"
+    for number, figures in continue_sequence(source, out, Continuation(3, obstacles=(read,)), npz=True):
+        assert number <= 10 or figures["divergence"] < 0.02
+        if number == 12:
+            break
+    still = Continuation(3, obstacles=(MovingMesh(moving.places[:1]),))
+    with pytest.raises(SequenceError, match="begun differently"):
+        next(continue_sequence(source, out, still, npz=True, resume=True))
+    assert len(list(continue_sequence(source, out, Continuation(3, obstacles=(read,)), npz=True, resume=True))) == 1
+    made = Sequence.open(out)
+    for step in (1, 2, 3):
+        assert not made.density(10 + step)[moving.at(step).voxels(DOMAIN)].any()
+    (tmp_path / "crate_0010.stl").unlink()
+    with pytest.raises(ValueError, match=r"crate_0010\.stl: is no file"):
+        MovingMesh.read(pattern)
+    written(tmp_path / "crate_0010.stl", moving.places[1].triangles[:-1])
+    with pytest.raises(ValueError, match="11 to 12 triangles"):
+        MovingMesh.read(pattern)
+
+
+def test_one_that_never_comes_into_the_box_is_refused():
+    far = cube((5.0, -0.3, 1.2), (5.5, 0.3, 1.7))
+    with pytest.raises(ValueError, match="holds no voxel"):
+        Obstacles(DOMAIN, (along_x(far, 0.1, 5),))
+    assert Obstacles(DOMAIN, (along_x(far, -24.0, 5),)).at(1, DT) is None
