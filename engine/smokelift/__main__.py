@@ -2,6 +2,6 @@
 
 import sys
 
-from smokelift.app.cli import main
+from smokelift_command import main
 
 sys.exit(main())

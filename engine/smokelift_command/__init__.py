@@ -5,21 +5,32 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from types import FrameType
+from types import FrameType, TracebackType
 
 CANCELLED = 130
 
 
-def main() -> int:
-    """Load the engine, run its command and return the exit status; see `smokelift.app.cli`."""
-    terminated = False
+class Termination:
+    """SIGTERM from a parent, which means the same as Ctrl-C on a terminal.
 
-    def terminate(_number: int, _frame: FrameType | None) -> None:
-        nonlocal terminated
-        terminated = True
+    Attributes
+    ----------
+    came
+        Whether it did: a library may turn the interrupt into an error of its own.
+    """
+
+    came = False
+
+    @classmethod
+    def handle(cls, _number: int, _frame: FrameType | None) -> None:
+        """Interrupt the program."""
+        cls.came = True
         raise KeyboardInterrupt
 
-    signal.signal(signal.SIGTERM, terminate)
+
+def main() -> int:
+    """Load the engine, run its command and return the exit status; see `smokelift.app.cli`."""
+    signal.signal(signal.SIGTERM, Termination.handle)
     # NumPy's OpenBLAS hangs where the system gives it no threads, and the engine computes in its own
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
@@ -29,7 +40,15 @@ def main() -> int:
     except KeyboardInterrupt:
         pass
     except Exception:
-        if not terminated:  # a library may turn the interrupt into an error of its own
+        if not Termination.came:
             raise
     print("Cancelled.", file=sys.stderr)
     return CANCELLED
+
+
+def cancelled(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+    """For ``sys.excepthook``: Ctrl-C is no fault that a traceback would explain."""
+    if issubclass(kind, KeyboardInterrupt):
+        print("Cancelled.", file=sys.stderr)
+    else:
+        sys.__excepthook__(kind, error, trace)

@@ -1,4 +1,4 @@
-"""The command line ``smokelift``: its parser, its signals and its exit status.
+"""The command line ``smokelift``: its parser and its exit status. `smokelift_command` has its signals.
 
 Exit status: 0 done, 2 bad input, 3 device or memory, 130 cancelled (and resumable).
 """
@@ -9,10 +9,8 @@ import argparse
 import errno
 import io
 import os
-import signal
 import sys
 from collections.abc import Sequence
-from types import FrameType
 from typing import NoReturn
 
 from smokelift._core import set_threads
@@ -21,6 +19,7 @@ from smokelift.app.progress import OutputError, one_line, reporter
 from smokelift.output.index import DirectoryBusyError
 from smokelift.output.vdb import VdbUnavailable
 from smokelift.render import DeviceError
+from smokelift_command import Termination
 
 DONE, BAD_INPUT, NO_DEVICE, CANCELLED = 0, 2, 3, 130
 
@@ -67,21 +66,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _run(options: argparse.Namespace) -> int:
     say = reporter(getattr(options, "progress", "text"))
     set_threads(getattr(options, "threads", 0))
-    terminated = False
-
-    def terminate(_number: int, _frame: FrameType | None) -> None:
-        nonlocal terminated
-        terminated = True
-        raise KeyboardInterrupt
-
-    # Ctrl-C on a terminal and SIGTERM from a parent mean the same.
-    signal.signal(signal.SIGTERM, terminate)
     try:
         try:
             with say:
                 options.run(options, say)
         except Exception as error:
-            if terminated:  # a library turned the interrupt into an error of its own
+            if Termination.came:  # a library turned the interrupt into an error of its own
                 raise KeyboardInterrupt from error
             raise
     except KeyboardInterrupt:

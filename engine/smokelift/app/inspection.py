@@ -12,15 +12,15 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from smokelift.app.cost import Cost
+from smokelift.app.page import TILE, Fact, Page, Panel, fitted
 from smokelift.footage.images import area_average, linear_to_srgb
 from smokelift.footage.matte import SMOKE_THRESHOLD, Matte, matte
 from smokelift.footage.plate import Plate
 from smokelift.output.images import eight_bit, write_image
-from smokelift.output.page import TILE, UNDETERMINED, Fact, Page, Panel, fitted
 from smokelift.scene import SHADOWED, Background, Camera, DirectionalLight, Domain, PointLight, Scene
 from smokelift.scene.projection import project
 from smokelift.setup.background import BLACK, UNKNOWN
-from smokelift.setup.choice import Choice
+from smokelift.setup.choice import UNDETERMINED, Choice
 from smokelift.setup.geometry import PICTURE_HEIGHT
 from smokelift.setup.shot import Shot
 

@@ -9,9 +9,9 @@ from typing import Any
 from smokelift.app.cost import estimate_cost
 from smokelift.app.inspection import facts, inspection, write_scene
 from smokelift.app.options import add_run_options, named_path, require_folder, scene_of, settings_of
+from smokelift.app.page import PAGE_KINDS, write_page
 from smokelift.app.progress import Reporter
 from smokelift.footage.clip import Clip
-from smokelift.output.page import PAGE_KINDS, write_page
 from smokelift.render import device
 from smokelift.scene import scene_to_dict
 from smokelift.setup.prepare import boundaries, prepare_shot

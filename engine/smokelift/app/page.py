@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from smokelift.output.atomic import atomic_path
+from smokelift.setup.choice import UNDETERMINED
 
 PAGE_KINDS = (".png", ".html")
 
@@ -32,8 +33,6 @@ _STARTS = (_GAP, 170, 520, 670)
 
 _PAPER, _INK, _FAINT, _UNKNOWN = (26, 26, 28), (232, 232, 232), (165, 165, 165), (255, 170, 70)
 """Colours, sRGB."""
-
-UNDETERMINED = "undetermined"
 
 
 @dataclass(frozen=True, eq=False)
