@@ -115,12 +115,20 @@ def test_light_and_background_from_the_clip(shot, tmp_path) -> None:
 
 
 def test_nothing_known_but_the_clip(scene, tmp_path) -> None:
-    """An empty scene and a clip."""
+    """A new file, whose cube would hide the smoke, and a clip: the smoke is active, and the playhead stays."""
+    bpy.ops.mesh.primitive_cube_add(size=2.0)
+    cube = scene.objects["Cube"]
+    scene.frame_set(7)
+    activate(smoke(scene), scene)
     smoke(scene).smokelift.clip = bpy.data.movieclips.load(str(EXAMPLE / "clip.mp4"))
     smoke(scene).smokelift.plate_mode, smoke(scene).smokelift.plate = "FILE", str(EXAMPLE / "plate.png")
     smoke(scene).smokelift.quality = "draft"
     row = make(scene, tmp_path / "out")
     assert row.outcome == "done"
+    assert cube.hide_render and cube.hide_viewport
+    assert scene.frame_current == 7
+    assert bpy.context.view_layer.objects.active == smoke(scene)
+    assert smoke(scene).select_get()
     assert "Camera not given" in Take(Path(row.take)).log_file.read_text()
     assert not row.warnings
     whole, within = look_alike(scene, tmp_path)
@@ -288,6 +296,35 @@ def test_going_on_with_what_was_stopped(shot, tmp_path) -> None:
     assert run.unfinished(smoke(shot)) is None
     with pytest.raises(RuntimeError, match="No stopped run to resume"):
         bpy.ops.smokelift.resume()
+
+
+@pytest.mark.parametrize("saved_first", [True, False])
+def test_going_on_where_the_output_is_not_beside_the_file(shot, tmp_path, saved_first) -> None:
+    """Blender writes the way to it with ``..``: from the start, or once an unsaved file is saved somewhere else."""
+    (tmp_path / "shot").mkdir()
+
+    def save() -> None:
+        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot" / "shot.blend"))
+
+    if saved_first:
+        save()
+    choose(shot, tmp_path / "out")
+    settings = smoke(shot).smokelift
+    settings.last, settings.longest_side, settings.plate_mode = FIRST + 1, 32, "ESTIMATE"
+    stopped = run.write_take(smoke(shot))
+    known = Scene.load(stopped.scene_file)
+    with Clip.open(known.clip) as clip:
+        frames = smokelift.reconstruct(clip, known, Settings.preset("draft"), stopped.directory)
+        next(frames)
+        frames.close()
+    run.present(smoke(shot), stopped)
+    save()
+    quietly(lambda: bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath))
+    assert smoke(bpy.context.scene).data.filepath.startswith("//..")
+    assert bpy.ops.smokelift.resume() == {"FINISHED"}
+    (row,) = bpy.context.window_manager.smokelift.jobs
+    assert (row.outcome, row.done) == ("done", 2), row.sentence
+    assert stopped.complete()
 
 
 def test_going_on_after_the_project_was_moved(shot, tmp_path) -> None:

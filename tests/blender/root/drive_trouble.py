@@ -148,7 +148,13 @@ def disable() -> Iterator[float]:
     index = Path(jobs()[-1].take) / "sequence.json"
     bpy.ops.preferences.addon_disable(module=MODULE)
     before = index.read_bytes()
-    yield 3.0
+    clip = next(iter(bpy.data.movieclips))  # what the add-on listened to
+    for owner, name in ((clip, "frame_start"), (scene().render, "fps"), (scene().objects["Box"].location, "x")):
+        value = getattr(owner, name)
+        setattr(owner, name, value + 1)
+        yield 0.5
+        setattr(owner, name, value)
+    yield 1.5
     report["disabled"] = {"known": hasattr(bpy.types.Scene, "smokelift"), "stopped": index.read_bytes() == before}
     bpy.ops.preferences.addon_enable(module=MODULE)
     yield 0.5
