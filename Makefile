@@ -2,7 +2,7 @@
 # make test   formatting, types and tests; nothing that needs a GPU
 # make sanitize       tests of the compiled core with one that checks itself for accesses outside arrays and the like
 # make stability      damaged files and failing systems against the command line; CASES=300 of each kind take an hour
-# make extension      the Blender extension's zips in dist/; ENGINE_WHEELS=DIR adds platforms built elsewhere
+# make extension      the Blender extension's zips in dist/, with the manual; ENGINE_WHEELS=DIR adds platforms built elsewhere
 # make manual         the manual in build/manual/index.html; a link that leads nowhere fails
 # make test-blender   those zips in the bpy wheels and in a real Blender
 # All set up what they need in .venv first. Only Python 3.11 to 3.13 and a C++17 compiler are assumed; those of the
@@ -23,6 +23,9 @@ QUIET_PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 # Of each kind: some four minutes for what runs with every change.
 CASES ?= 20
 HAS_VDB = $(shell $(BIN)/python -c 'import importlib.util as u; print("yes" if u.find_spec("bpy") else "")')
+
+# What a step that failed left behind is not taken for its result.
+.DELETE_ON_ERROR:
 
 .PHONY: demo test pytest lint sanitize stability manual extension test-blender clean
 
@@ -63,7 +66,12 @@ $(VENV)/engine.stamp: $(VENV)/tools.stamp $(ENGINE_SOURCES)
 	$(QUIET_PIP) '.[vdb,gpu]'
 	touch $@
 
-manual: $(VENV)/manual.stamp
+# Besides its pages it holds what tools/ read from the code: commands, scene files, messages.
+MANUAL_SOURCES := mkdocs.yml $(shell find docs examples tools addon -type f -not -name '*.pyc') $(wildcard *.md)
+
+manual: build/manual/index.html
+
+build/manual/index.html: $(VENV)/manual.stamp $(MANUAL_SOURCES)
 	NO_MKDOCS_2_WARNING=true $(BIN)/mkdocs build --strict
 
 $(VENV)/manual.stamp: $(VENV)/engine.stamp
@@ -72,7 +80,7 @@ $(VENV)/manual.stamp: $(VENV)/engine.stamp
 
 extension: dist/extension.stamp
 
-dist/extension.stamp: build/engine-wheels/stamp tools/build_extension.py $(wildcard tools/bundle*.txt) blender_manifest.toml LICENSE $(wildcard addon/*.py)
+dist/extension.stamp: build/engine-wheels/stamp build/manual/index.html tools/build_extension.py $(wildcard tools/bundle*.txt) blender_manifest.toml LICENSE $(wildcard addon/*.py)
 	$(BIN)/python tools/build_extension.py --engine-wheels build/engine-wheels $(ENGINE_WHEELS) --out dist
 	touch $@
 

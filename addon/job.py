@@ -43,21 +43,13 @@ GRACE_SECONDS = 8.0
 DRAIN_SECONDS = 1.0
 """Time for the last lines to arrive after the engine has ended; a child of its own may hold the pipe open."""
 
-# os.read, because a thread in a buffered reader holds its lock at the interpreter's end.
 _START = """
-import _thread, os, runpy, signal, sys, threading
+import os, runpy, sys
 
-def end_with_parent():
-    while os.read(0, 4096):
-        pass
-    _thread.interrupt_main()
-
-signal.signal(signal.SIGINT, signal.default_int_handler)
-threading.Thread(target=end_with_parent, daemon=True).start()
 if hasattr(os, "nice"):
     os.nice(10)
 sys.path[:0] = sys.argv.pop(1).split(os.pathsep)
-runpy.run_module("smokelift", run_name="__main__", alter_sys=True)
+runpy.run_module("smokelift_command.tethered", run_name="__main__", alter_sys=True)
 """
 
 

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from textwrap import indent
 
 import pytest
 
+import smokelift_command
 from addon import job as module
 from addon.job import EngineMissingError, Job, Queue, engine_command
 
@@ -63,14 +66,16 @@ def engine(log) -> Iterator[Callable[[str], Job]]:
 
 @pytest.fixture
 def own_engine(tmp_path, monkeypatch, log) -> Iterator[Callable[[str], Job]]:
-    """Makes jobs that start a package called smokelift as the add-on does."""
+    """Makes jobs that start a script in the engine's place as the add-on starts the engine."""
     made = []
 
     def make(script: str) -> Job:
         package = tmp_path / "site" / "smokelift"
-        package.mkdir(parents=True)
-        (package / "__init__.py").touch()
-        (package / "__main__.py").write_text(script)
+        (package / "app").mkdir(parents=True)
+        for folder in (package, package / "app"):
+            (folder / "__init__.py").touch()
+        (package / "app" / "cli.py").write_text(f"def main():\n{indent(script, '    ')}")
+        shutil.copytree(Path(smokelift_command.__file__).parent, tmp_path / "site" / "smokelift_command")
 
         class Found:
             origin = str(package / "__init__.py")

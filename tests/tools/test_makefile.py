@@ -1,0 +1,47 @@
+"""What `make extension` makes again after a change, and what it reuses."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+SOURCES = (
+    *("pyproject.toml", "CMakeLists.txt", "cpp/a.cpp", "engine/a.py", "LICENSE", "blender_manifest.toml"),
+    *("docs/a.md", "mkdocs.yml", "examples/a.toml", "addon/a.py"),
+    *("tools/build_extension.py", "tools/engine_wheels.py", "tools/bundle.txt"),
+)
+MADE = (
+    *(f".venv/{name}.stamp" for name in ("tools", "engine", "manual", "extension")),
+    *("build/engine-wheels/stamp", "build/manual/index.html", "dist/extension.stamp"),
+)
+STEPS = {"wheels": "engine_wheels.py", "manual": "mkdocs build", "zip": "build_extension.py"}
+
+
+@pytest.mark.skipif(shutil.which("make") is None, reason="needs make")
+@pytest.mark.parametrize(
+    ("changed", "steps"),
+    [
+        (None, set()),
+        ("addon/a.py", {"manual", "zip"}),
+        ("docs/a.md", {"manual", "zip"}),
+        ("tools/bundle.txt", {"manual", "zip"}),
+        ("cpp/a.cpp", {"wheels", "manual", "zip"}),
+    ],
+)
+def test_only_what_changed_is_made_again(tmp_path, changed, steps) -> None:
+    """And no zip without the manual as it is now."""
+    for seconds, names in ((1000, SOURCES), (2000, MADE)):
+        for name in names:
+            (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+            (tmp_path / name).touch()
+            os.utime(tmp_path / name, (seconds, seconds))
+    if changed:
+        os.utime(tmp_path / changed, (3000, 3000))
+    command = ["make", "--dry-run", "--directory", tmp_path, "--makefile", ROOT / "Makefile", "extension"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert {name for name, word in STEPS.items() if word in done.stdout} == steps
