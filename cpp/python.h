@@ -98,5 +98,6 @@ template <class Work> Array3 filled(const Box &box, const Work &work) {
 void register_transport(py::module_ &module);
 void register_velocity(py::module_ &module);
 void register_render(py::module_ &module);
+void register_pictures(py::module_ &module);
 
 } // namespace smokelift

@@ -8,7 +8,7 @@ frame. ``closed`` says which sides of the box are walls, in the order x-, x+, y-
 Functions raise ValueError for arrays whose shapes do not belong together.
 """
 
-from typing import TypedDict
+from typing import Any, TypedDict
 
 import numpy as np
 import numpy.typing as npt
@@ -399,3 +399,28 @@ def diffuse(means: Array, albedo: float, edge: float) -> Array:
 
 def diffuse_adjoint(means: Array, radiance: Array, of_radiance: Array, albedo: float, edge: float) -> Array:
     """Derivative by the means (1 + channels, bx, by, bz) from that by the radiance of `diffuse`."""
+
+# Pictures
+
+class PictureMap:
+    """Where the voxels of a grid lie in a picture.
+
+    ``to_pixel`` (3, 4) maps homogeneous points of the world to (x depth, y depth, depth) in pixels. ``centres`` are the
+    voxel centres' world coordinates (m) along x, y and z, ``size`` the picture's columns and rows.
+    """
+
+    def __init__(
+        self, to_pixel: npt.NDArray[np.float64], centres: list[npt.NDArray[np.float64]], size: tuple[int, int]
+    ) -> None: ...
+    def places(self, voxels: Mask) -> tuple[Array, Array, Mask]:
+        """Rows and columns (n,) of the marked voxels, pixel centres at integers; whether they are in the picture."""
+
+    def shown(self, picture: Mask) -> Mask:
+        """Voxels in the picture whose nearest pixel is marked (rows, columns)."""
+
+    @property
+    def nearest(self) -> float:
+        """Least depth (m) of the voxels before the camera; infinite if there are none."""
+
+def read_bilinearly(picture: npt.NDArray[np.floating[Any]], rows: Array, columns: Array) -> Array:
+    """A picture (rows, columns) at places (n,) in pixels; the nearest pixel's value outside."""

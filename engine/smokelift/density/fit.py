@@ -126,17 +126,18 @@ class GradientFit:
         if not hull.any():
             return empty_density(views)
         cameras = camera_terms(views, depth.inside)
-        imposed = [Term(each.view, _renderer(each, hull), each.weight) for each in depth.imposed]
         start = np.where(hull, depth.density if initial is None else initial, 0).astype(np.float32)
         # The terms take turns, so several cameras need as many times more iterations. Imposed pictures yield: the last
         # third of the iterations and the descent are the cameras' alone. What is carried along has met imposed pictures
         # before, so that it meets them in half as many rounds.
         iterations, rounds = settings.fit_iterations * len(cameras), 0
-        if imposed:
+        if depth.imposed:
             shared = 2 * iterations // 3
             iterations -= shared
             rounds = shared if initial is None else -(-shared // 2)
+            imposed = [Term(each.view, _renderer(each, hull), each.weight) for each in depth.imposed]
             start = take_turns([*imposed, *cameras], start, rounds)
+            del imposed  # renderers take most of the memory, and the descent needs more of it
         scaled = fit_multiplicative(cameras, start, iterations, settings.tolerance)
         final = descend(
             cameras,
@@ -148,7 +149,7 @@ class GradientFit:
             bound=float(max(settings.bound * depth.density.max(), start.max())),
         )
         figures = fit_figures(views, final.residuals, rounds + scaled.iterations + final.iterations)
-        steady = scaled.density if imposed else None
+        steady = scaled.density if depth.imposed else None
         return Density(without_traces(final.density), hull, figures, depth.smooth, steady)
 
 

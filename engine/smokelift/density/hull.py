@@ -4,45 +4,69 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+import smokelift._core as _core
 from smokelift.scene import Camera, Domain
-from smokelift.scene.projection import project
+from smokelift.scene.projection import world_to_pixel
 
 
 @dataclass(frozen=True, eq=False)
-class Projection:
-    """Where the voxels of a grid lie in a picture.
+class Places:
+    """Where some voxels lie in a picture.
 
     Attributes
     ----------
-    rows, columns : (nx, ny, nz) float32
-        Picture coordinates of the voxel centres, pixel centres at integers.
-    visible : (nx, ny, nz) bool
-        Voxels before the camera whose centre falls into the picture.
-    footprint : float
-        Largest width of a voxel in the picture, in pixels.
+    rows, columns : (n,) float32
+        Picture coordinates of their centres, pixel centres at integers.
+    visible : (n,) bool
+        Whether they are before the camera and their centre falls into the picture.
     """
 
     rows: NDArray[np.float32]
     columns: NDArray[np.float32]
     visible: NDArray[np.bool_]
+
+    def read(self, picture: NDArray[np.floating[Any]]) -> NDArray[np.float32]:
+        """The picture (rows, columns) read bilinearly there (n,); the nearest pixel's value outside."""
+        return _core.read_bilinearly(picture, self.rows, self.columns)
+
+
+@dataclass(frozen=True, eq=False)
+class Projection:
+    """Where the voxels of a grid lie in a picture. It is computed for the voxels that are asked for.
+
+    Attributes
+    ----------
+    footprint : float
+        Largest width of a voxel in the picture, in pixels.
+    """
+
     footprint: float
+    _map: _core.PictureMap
+    _size: tuple[int, int]
 
-    def read(self, picture: NDArray[np.float32], voxels: NDArray[np.bool_]) -> NDArray[np.float32]:
-        """The picture (rows, columns) read bilinearly at some voxels (n,); the nearest pixel's value outside."""
-        return read_bilinearly(picture, self.rows[voxels], self.columns[voxels])
+    @cached_property
+    def visible(self) -> NDArray[np.bool_]:
+        """Voxels (nx, ny, nz) before the camera whose centre falls into the picture."""
+        return self.shown(np.ones(self._size[::-1], np.bool_))
 
+    def places(self, voxels: NDArray[np.bool_]) -> Places:
+        """Where the marked voxels lie, in the order of `numpy.flatnonzero`."""
+        return Places(*self._map.places(voxels))
 
-def read_bilinearly(
-    picture: NDArray[np.float32], rows: NDArray[np.float32], columns: NDArray[np.float32]
-) -> NDArray[np.float32]:
-    """A picture (rows, columns) at places (n,) in pixels; the nearest pixel's value outside."""
-    return np.asarray(ndimage.map_coordinates(picture, (rows, columns), order=1, mode="nearest"), np.float32)
+    def shown(self, marked: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Visible voxels (nx, ny, nz) whose nearest pixel is marked (rows, columns)."""
+        return self._map.shown(marked)
+
+    def read(self, picture: NDArray[np.floating[Any]], voxels: NDArray[np.bool_]) -> NDArray[np.float32]:
+        """The picture (rows, columns) read bilinearly at the marked voxels (n,); see `Places.read`."""
+        return self.places(voxels).read(picture)
 
 
 def voxel_centres(domain: Domain) -> NDArray[np.float64]:
@@ -65,14 +89,11 @@ def _axes(domain: Domain) -> list[NDArray[np.float64]]:
 @lru_cache(maxsize=8)
 def project_voxels(camera: Camera, domain: Domain) -> Projection:
     """Project every voxel centre of a domain."""
-    pixels, depth = project(camera, voxel_centres(domain))
-    columns, rows = pixels[..., 0] - 0.5, pixels[..., 1] - 0.5
-    width, height = camera.size
-    inside = (columns > -0.5) & (columns < width - 0.5) & (rows > -0.5) & (rows < height - 0.5)
-    near = np.min(depth[depth > 0], initial=np.inf) if camera.type == "perspective" else 1.0
+    projected = _core.PictureMap(world_to_pixel(camera), _axes(domain), camera.size)
+    near = projected.nearest if camera.type == "perspective" else 1.0
     # the diagonal of a voxel is its largest width from any side
     footprint = max(camera.fx, camera.fy) * domain.voxel_size * np.sqrt(3) / near
-    return Projection(rows.astype(np.float32), columns.astype(np.float32), inside & (depth > 0), float(footprint))
+    return Projection(float(footprint), projected, camera.size)
 
 
 def reached(mask: NDArray[np.bool_], projection: Projection) -> NDArray[np.bool_]:
@@ -88,15 +109,14 @@ def _radius(projection: Projection) -> int:
 def visual_hull(mask: NDArray[np.bool_], projection: Projection) -> NDArray[np.bool_]:
     """Voxels (nx, ny, nz) whose footprint meets the mask (rows, columns) of a picture's smoke pixels."""
     grown = ndimage.binary_dilation(mask, iterations=_radius(projection))
-    height, width = mask.shape
-    rows = np.clip(np.rint(projection.rows), 0, height - 1).astype(np.intp)
-    columns = np.clip(np.rint(projection.columns), 0, width - 1).astype(np.intp)
-    return np.asarray(grown[rows, columns] & projection.visible)
+    return projection.shown(grown)
 
 
 def common_hull(masks: Sequence[NDArray[np.bool_]], projections: Sequence[Projection]) -> NDArray[np.bool_]:
     """Voxels (nx, ny, nz) that a picture shows, and that every picture which shows them allows to hold smoke."""
     allowed = [visual_hull(mask, projection) for mask, projection in zip(masks, projections, strict=True)]
+    if len(allowed) == 1:
+        return allowed[0]
     seen = np.any([projection.visible for projection in projections], axis=0)
     for part, projection in zip(allowed, projections, strict=True):
         seen &= part | ~projection.visible
@@ -111,10 +131,9 @@ def agreement(masks: Sequence[NDArray[np.bool_]], projections: Sequence[Projecti
     hull = common_hull(masks, projections)
     explained = shown = 0
     for mask, projection in zip(masks, projections, strict=True):
-        voxels = hull & projection.visible
+        places = projection.places(hull & projection.visible)
         covered = np.zeros(mask.shape, np.bool_)
-        pixels = (np.rint(part[voxels]).astype(np.intp) for part in (projection.rows, projection.columns))
-        covered[tuple(pixels)] = True
+        covered[np.rint(places.rows).astype(np.intp), np.rint(places.columns).astype(np.intp)] = True
         covered = ndimage.binary_dilation(covered, iterations=2 * _radius(projection))
         explained += np.count_nonzero(mask & covered)
         shown += np.count_nonzero(mask)

@@ -15,13 +15,13 @@ multiplicative algebraic reconstruction (Gordon, Bender and Herman 1970).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from smokelift.density.hull import Projection, read_bilinearly
+from smokelift.density.hull import Places
 from smokelift.density.objective import Fit, Term, noise_floor, objective
 from smokelift.render import Image, Volume
 
@@ -54,7 +54,7 @@ def fit_multiplicative(terms: Sequence[Term], density: Volume, iterations: int, 
     """
     best, current, done = Fit(density, np.inf, (), 0), density, 0
     filled, enough = np.flatnonzero(density), noise_floor(terms)
-    places = [_Places.of(filled, term.view.projection) for term in terms]
+    places = _places(density, terms)
     for done in range(iterations + 1):
         images = [term.renderer.image(current) for term in terms]
         residuals = tuple(image - term.view.image for term, image in zip(terms, images, strict=True))
@@ -82,33 +82,24 @@ def take_turns(terms: Sequence[Term], density: Volume, rounds: int) -> Volume:
     rounds
         Turns of each.
     """
-    filled = np.flatnonzero(density)
-    places = [_Places.of(filled, term.view.projection) for term in terms]
+    filled, places = np.flatnonzero(density), _places(density, terms)
     for _ in range(rounds):
         for term, place in zip(terms, places, strict=True):
             density = _scaled(density, filled, place, term, term.renderer.image(density))
     return density
 
 
-@dataclass(frozen=True, eq=False)
-class _Places:
-    """Where some voxels (n,) lie in a picture: rows, columns, and whether they are in it."""
-
-    rows: NDArray[np.float32]
-    columns: NDArray[np.float32]
-    visible: NDArray[np.bool_]
-
-    @staticmethod
-    def of(voxels: NDArray[np.intp], projection: Projection) -> _Places:
-        rows, columns = (values.ravel()[voxels] for values in (projection.rows, projection.columns))
-        return _Places(rows, columns, projection.visible.ravel()[voxels])
+def _places(density: Volume, terms: Sequence[Term]) -> list[Places]:
+    """Where the voxels that hold smoke lie in each term's picture."""
+    filled = density != 0
+    return [term.view.projection.places(filled) for term in terms]
 
 
-def _scaled(density: Volume, filled: NDArray[np.intp], places: _Places, term: Term, image: Image) -> Volume:
+def _scaled(density: Volume, filled: NDArray[np.intp], places: Places, term: Term, image: Image) -> Volume:
     """The density whose picture is nearer to a term's, from the one that renders to `image`."""
     transmittance = term.renderer.transmittance
     slope = _slope(density, term, image, transmittance)
-    step = read_bilinearly(_log_scale(image, transmittance, slope, term), places.rows, places.columns)
+    step = places.read(_log_scale(image, transmittance, slope, term))
     scaled = density.copy()
     scaled.ravel()[filled] *= np.exp(RELAXATION * np.where(places.visible, step, np.float32(0)))
     return scaled

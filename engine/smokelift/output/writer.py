@@ -63,7 +63,7 @@ class SequenceWriter:
     Attributes
     ----------
     state
-        Where to go on from; None before the first frame, and after the last.
+        Where a run that is resumed goes on from, until it writes; None if there is nothing to go on from.
 
     Raises
     ------
@@ -183,10 +183,9 @@ class SequenceWriter:
         if number < 0:
             raise ValueError(f"a frame's number must not be negative, as {number} is")
         rho, faces = _checked(density, velocity_faces, self._domain.shape)
-        # The caller may use its arrays again; what is kept here must not change with them.
-        kept = {name: np.array(value) for name, value in (extra or {}).items()}
-        x, y, z = (face.copy() for face in faces)
-        state = ResumeState(number, rho.copy(), (x, y, z), kept)
+        self.state = None  # a run has gone on by now, and the arrays are large
+        kept = {name: np.asarray(value) for name, value in (extra or {}).items()}
+        state = ResumeState(number, rho, faces, kept)
         try:
             paths = [frame_path(self.directory, number, kind) for kind in self._kinds]
             for kind, path in zip(self._kinds, paths, strict=True):
@@ -203,7 +202,6 @@ class SequenceWriter:
             state.write(self.directory / RESUME)
         except OSError as error:
             raise self._failed(f"frame {number}", error) from error
-        self.state = state
 
     def _write_arrays(self, path: Path, density: Array, faces: Faces) -> None:
         if path.suffix == ".npz":

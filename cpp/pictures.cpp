@@ -1,0 +1,137 @@
+#include "pictures.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace smokelift {
+namespace {
+
+constexpr std::size_t READS_PER_TASK = 1 << 16;
+
+// Homogeneous pixel coordinates along a row of voxels.
+struct PixelRow {
+    std::array<double, 3> start{}, along{}, end{};
+
+    SMOKELIFT_INLINE PixelRow(const PictureMap &map, int i, int j) {
+        for (int c = 0; c < 3; ++c) {
+            const auto &m = map.to_pixel[c];
+            start[c] = std::fma(map.centres[1][j], m[1], map.centres[0][i] * m[0]);
+            along[c] = m[2];
+            end[c] = m[3];
+        }
+    }
+    SMOKELIFT_INLINE double at(int c, double z) const { return (start[c] + z * along[c]) + end[c]; }
+};
+
+struct Place {
+    float row, column;
+    bool visible;
+};
+
+SMOKELIFT_INLINE Place place_of(const PictureMap &map, const PixelRow &line, int k) {
+    const double z = map.centres[2][k], depth = line.at(2, z);
+    const double safe = std::abs(depth) < 1e-12 ? 1e-12 : depth;
+    const double column = line.at(0, z) / safe - 0.5, row = line.at(1, z) / safe - 0.5;
+    const bool inside =
+        (column > -0.5) & (column < map.columns - 0.5) & (row > -0.5) & (row < map.rows - 0.5);
+    return {float(row), float(column), inside & (depth > 0)};
+}
+
+SMOKELIFT_INLINE int pixel(float place, int count) {
+    return static_cast<int>(std::clamp(std::nearbyint(place), 0.0f, float(count - 1)));
+}
+
+SMOKELIFT_CLONES
+void places_of_plane(const PictureMap &map, Mask voxels, int i, std::size_t at, const Places &places) {
+    for (int j = 0; j < voxels.n[1]; ++j) {
+        const PixelRow line(map, i, j);
+        const unsigned char *row = voxels.row(i, j);
+        for (int k = 0; k < voxels.n[2]; ++k) {
+            if (!row[k])
+                continue;
+            const Place found = place_of(map, line, k);
+            places.rows[at] = found.row;
+            places.columns[at] = found.column;
+            places.visible[at++] = found.visible;
+        }
+    }
+}
+
+SMOKELIFT_CLONES
+void mark_plane(const PictureMap &map, const unsigned char *picture, int i, bool *shown) {
+    const Shape n = map.shape();
+    for (int j = 0; j < n[1]; ++j) {
+        const PixelRow line(map, i, j);
+        for (int k = 0; k < n[2]; ++k) {
+            const Place found = place_of(map, line, k);
+            const std::size_t at =
+                std::size_t(pixel(found.row, map.rows)) * map.columns + pixel(found.column, map.columns);
+            shown[std::size_t(j) * n[2] + k] = found.visible && picture[at];
+        }
+    }
+}
+
+SMOKELIFT_CLONES
+double nearest_in_plane(const PictureMap &map, int i) {
+    const Shape n = map.shape();
+    double nearest = std::numeric_limits<double>::infinity();
+    for (int j = 0; j < n[1]; ++j) {
+        const PixelRow line(map, i, j);
+        for (int k = 0; k < n[2]; ++k) {
+            const double depth = line.at(2, map.centres[2][k]);
+            nearest = depth > 0 && depth < nearest ? depth : nearest;
+        }
+    }
+    return nearest;
+}
+
+} // namespace
+
+std::vector<std::size_t> count_marked(Mask voxels, Workers &workers) {
+    std::vector<std::size_t> first(voxels.n[0] + 1, 0);
+    workers.run(voxels.n[0], [&](int i) {
+        const unsigned char *plane = voxels.row(i, 0);
+        first[i + 1] = std::size_t(std::count(plane, plane + voxels.slab_size(), 1));
+    });
+    for (int i = 0; i < voxels.n[0]; ++i)
+        first[i + 1] += first[i];
+    return first;
+}
+
+void find_places(const PictureMap &map, Mask voxels, const std::vector<std::size_t> &first,
+                 const Places &places, Workers &workers) {
+    workers.run(voxels.n[0], [&](int i) { places_of_plane(map, voxels, i, first[i], places); });
+}
+
+void mark_shown(const PictureMap &map, const unsigned char *picture, bool *shown, Workers &workers) {
+    const Shape n = map.shape();
+    workers.run(n[0], [&](int i) { mark_plane(map, picture, i, shown + std::size_t(i) * n[1] * n[2]); });
+}
+
+double nearest_depth(const PictureMap &map, Workers &workers) {
+    std::vector<double> nearest(map.shape()[0]);
+    workers.run(map.shape()[0], [&](int i) { nearest[i] = nearest_in_plane(map, i); });
+    return *std::min_element(nearest.begin(), nearest.end());
+}
+
+void read_bilinearly(const double *picture, int rows, int columns, const float *at_rows,
+                     const float *at_columns, std::size_t count, float *values, Workers &workers) {
+    workers.run(int((count + READS_PER_TASK - 1) / READS_PER_TASK), [&](int task) {
+        const std::size_t begin = task * READS_PER_TASK, end = std::min(count, begin + READS_PER_TASK);
+        for (std::size_t n = begin; n < end; ++n) {
+            const double row = std::clamp(double(at_rows[n]), 0.0, double(rows - 1));
+            const double column = std::clamp(double(at_columns[n]), 0.0, double(columns - 1));
+            const int i = static_cast<int>(row), j = static_cast<int>(column);
+            const double f = row - i, g = column - j;
+            const double *upper = picture + std::size_t(i) * columns,
+                         *lower = i + 1 < rows ? upper + columns : upper;
+            const int next = std::min(j + 1, columns - 1);
+            const double near = (upper[j] * (1 - f)) * (1 - g), far = (upper[next] * (1 - f)) * g;
+            const double near_below = (lower[j] * f) * (1 - g), far_below = (lower[next] * f) * g;
+            values[n] = float(((near + far) + near_below) + far_below);
+        }
+    });
+}
+
+} // namespace smokelift

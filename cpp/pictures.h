@@ -1,0 +1,44 @@
+// Where voxels lie in a camera's picture, and what the picture shows there.
+#pragma once
+
+#include "grid.h"
+#include "threads.h"
+
+#include <array>
+#include <vector>
+
+namespace smokelift {
+
+// A camera before a grid.
+struct PictureMap {
+    std::array<std::array<double, 4>, 3> to_pixel{}; // from the world to (x depth, y depth, depth), pixels
+    std::array<std::vector<double>, 3> centres;      // of the voxels along x, y and z, m
+    int rows = 0, columns = 0;                       // of the picture
+
+    Shape shape() const { return {int(centres[0].size()), int(centres[1].size()), int(centres[2].size())}; }
+};
+
+// Places in a picture, pixel centres at integers, and whether they are in it and before the camera.
+struct Places {
+    float *rows, *columns;
+    bool *visible;
+};
+
+// The first of the marked voxels in each plane across x, and how many there are at the end.
+std::vector<std::size_t> count_marked(Mask voxels, Workers &workers);
+
+// The places of the marked voxels, in their order in memory; `first` is that of count_marked().
+void find_places(const PictureMap &map, Mask voxels, const std::vector<std::size_t> &first,
+                 const Places &places, Workers &workers);
+
+// Marks the voxels whose centre's nearest pixel is marked in a picture (rows, columns), and in it.
+void mark_shown(const PictureMap &map, const unsigned char *picture, bool *shown, Workers &workers);
+
+// Least depth of the voxels before the camera; infinite if there are none.
+double nearest_depth(const PictureMap &map, Workers &workers);
+
+// A picture (rows, columns) read bilinearly at some places; the nearest pixel's value outside.
+void read_bilinearly(const double *picture, int rows, int columns, const float *at_rows,
+                     const float *at_columns, std::size_t count, float *values, Workers &workers);
+
+} // namespace smokelift

@@ -1,0 +1,84 @@
+#include "pictures.h"
+#include "python.h"
+
+namespace smokelift {
+namespace {
+
+using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
+using Marks = py::array_t<bool, py::array::c_style | py::array::forcecast>;
+
+std::vector<double> values_of(const Doubles &a) {
+    require_fit(a.ndim() == 1 && a.size() > 0);
+    return {a.data(), a.data() + a.size()};
+}
+
+PictureMap map_of(const Doubles &to_pixel, const std::array<Doubles, 3> &centres,
+                  const std::array<int, 2> &size) {
+    require_fit(to_pixel.ndim() == 2 && to_pixel.shape(0) == 3 && to_pixel.shape(1) == 4);
+    PictureMap map;
+    for (int row = 0; row < 3; ++row) {
+        std::copy_n(to_pixel.data() + 4 * row, 4, map.to_pixel[row].begin());
+        map.centres[row] = values_of(centres[row]);
+    }
+    map.columns = size[0];
+    map.rows = size[1];
+    return map;
+}
+
+const unsigned char *bytes_of(const Marks &a) { return reinterpret_cast<const unsigned char *>(a.data()); }
+
+} // namespace
+
+void register_pictures(py::module_ &module) {
+    using namespace py::literals;
+
+    py::class_<PictureMap>(module, "PictureMap")
+        .def(py::init(&map_of), "to_pixel"_a, "centres"_a, "size"_a)
+        .def(
+            "places",
+            [](const PictureMap &map, const Marks &voxels) {
+                require_fit(voxels.ndim() == 3);
+                const Mask mask{bytes_of(voxels),
+                                {int(voxels.shape(0)), int(voxels.shape(1)), int(voxels.shape(2))}};
+                require_fit(mask.n == map.shape());
+                const auto first = released([&](Workers &workers) { return count_marked(mask, workers); });
+                const auto count = py::ssize_t(first.back());
+                Array rows(count), columns(count);
+                py::array_t<bool> visible(count);
+                const Places places{rows.mutable_data(), columns.mutable_data(), visible.mutable_data()};
+                released([&](Workers &workers) { find_places(map, mask, first, places, workers); });
+                return py::make_tuple(rows, columns, visible);
+            },
+            "voxels"_a)
+        .def(
+            "shown",
+            [](const PictureMap &map, const Marks &picture) {
+                require_fit(picture.ndim() == 2 && picture.shape(0) == map.rows &&
+                            picture.shape(1) == map.columns);
+                const Shape n = map.shape();
+                py::array_t<bool> result({n[0], n[1], n[2]});
+                bool *const shown = result.mutable_data();
+                released([&](Workers &workers) { mark_shown(map, bytes_of(picture), shown, workers); });
+                return result;
+            },
+            "picture"_a)
+        .def_property_readonly("nearest", [](const PictureMap &map) {
+            return released([&](Workers &workers) { return nearest_depth(map, workers); });
+        });
+
+    module.def(
+        "read_bilinearly",
+        [](const Doubles &picture, const Array &rows, const Array &columns) {
+            require_fit(picture.ndim() == 2 && picture.size() > 0 && rows.size() == columns.size());
+            Array values(rows.size());
+            float *const result = values.mutable_data();
+            released([&](Workers &workers) {
+                read_bilinearly(picture.data(), int(picture.shape(0)), int(picture.shape(1)), rows.data(),
+                                columns.data(), std::size_t(rows.size()), result, workers);
+            });
+            return values;
+        },
+        "picture"_a, "rows"_a, "columns"_a);
+}
+
+} // namespace smokelift

@@ -1,0 +1,91 @@
+"""Where voxels lie in pictures, computed for those that are asked for, against NumPy's and SciPy's own."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import ndimage
+
+from smokelift.density.hull import common_hull, project_voxels, visual_hull, voxel_centres
+from smokelift.scene import Camera, Domain
+from smokelift.scene.projection import project
+
+DOMAIN = Domain((-1.0, -1.0, 0.0), (1.0, 1.0, 3.0), (10, 10, 15))
+SIZE = (21, 17)
+
+CAMERAS = {
+    "in front": Camera.look_at((0.3, -6.0, 1.0), (0.0, 0.0, 1.5), fov_y_degrees=25, size=SIZE),
+    "close, some voxels behind it": Camera.look_at((0.0, -1.2, 1.0), (0.4, 0.0, 1.0), fov_y_degrees=70, size=SIZE),
+    "far away": Camera("orthographic", ((1, 0, 0, 0), (0, 0, -1, -9), (0, 1, 0, 1), (0, 0, 0, 1)), SIZE, 7, 7, 10, 8),
+}
+
+
+@pytest.fixture(params=CAMERAS.values(), ids=CAMERAS.keys())
+def camera(request):
+    return request.param
+
+
+def _expected(camera):
+    """Rows, columns and visibility of all voxels by NumPy alone."""
+    pixels, depth = project(camera, voxel_centres(DOMAIN))
+    columns, rows = pixels[..., 0] - 0.5, pixels[..., 1] - 0.5
+    width, height = SIZE
+    inside = (columns > -0.5) & (columns < width - 0.5) & (rows > -0.5) & (rows < height - 0.5)
+    return rows, columns, inside & (depth > 0)
+
+
+def test_places_are_those_of_the_projection(camera):
+    rows, columns, visible = _expected(camera)
+    some = np.random.default_rng(0).random(DOMAIN.resolution) < 0.3
+    places = project_voxels(camera, DOMAIN).places(some)
+    np.testing.assert_allclose(places.rows, rows[some], rtol=1e-6)
+    np.testing.assert_allclose(places.columns, columns[some], rtol=1e-6)
+    np.testing.assert_array_equal(places.visible, visible[some])
+    assert places.visible.any()
+
+
+def test_no_voxels_have_no_places(camera):
+    places = project_voxels(camera, DOMAIN).places(np.zeros(DOMAIN.resolution, np.bool_))
+    assert places.rows.size == places.read(np.ones((3, 3))).size == 0
+
+
+def test_a_voxel_is_shown_where_its_nearest_pixel_is_marked(camera):
+    rows, columns, visible = _expected(camera)
+    marked = np.random.default_rng(1).random(SIZE[::-1]) < 0.5
+    at = [np.clip(np.rint(places), 0, most - 1).astype(int) for places, most in ((rows, 17), (columns, 21))]
+    projection = project_voxels(camera, DOMAIN)
+    np.testing.assert_array_equal(projection.shown(marked), marked[at[0], at[1]] & visible)
+    np.testing.assert_array_equal(projection.visible, visible)
+
+
+def test_the_footprint_is_that_of_the_nearest_voxel():
+    camera = CAMERAS["in front"]
+    _, depth = project(camera, voxel_centres(DOMAIN))
+    assert project_voxels(camera, DOMAIN).footprint == pytest.approx(camera.fy * 0.2 * np.sqrt(3) / depth.min())
+
+
+def test_pictures_are_read_as_scipy_reads_them(camera):
+    everywhere = np.ones(DOMAIN.resolution, np.bool_)
+    picture = np.random.default_rng(2).normal(size=SIZE[::-1]).astype(np.float32)
+    places = project_voxels(camera, DOMAIN).places(everywhere)
+    expected = ndimage.map_coordinates(picture, (places.rows, places.columns), order=1, mode="nearest")
+    np.testing.assert_array_equal(places.read(picture), expected)
+
+
+def test_one_pictures_hull_is_the_common_one():
+    camera = CAMERAS["in front"]
+    mask = np.zeros(SIZE[::-1], np.bool_)
+    mask[5:9, 6:12] = True
+    projection = project_voxels(camera, DOMAIN)
+    hull = visual_hull(mask, projection)
+    assert 0 < hull.sum() < projection.visible.sum()
+    np.testing.assert_array_equal(common_hull([mask], [projection]), hull)
+    np.testing.assert_array_equal(common_hull([mask, mask], [projection, projection]), hull)
+
+
+def test_a_map_refuses_what_does_not_fit():
+    projection = project_voxels(CAMERAS["in front"], DOMAIN)
+    with pytest.raises(ValueError, match="belong together"):
+        projection.places(np.ones((3, 3, 3), np.bool_))
+    with pytest.raises(ValueError, match="belong together"):
+        projection.shown(np.ones((3, 3), np.bool_))
