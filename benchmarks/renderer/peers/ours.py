@@ -17,8 +17,10 @@ def prepare(scene: BenchScene) -> Iteration:
     background = np.array(scene.background, np.float32)
     renderer = Renderer(scene.camera, scene.domain, scene.medium, scene.lights, background, support=scene.support)
 
+    gradient = np.zeros(scene.density.shape, np.float32)
+
     def run(density: Volume) -> tuple[Volume, Volume]:
         image = renderer.image(density, keep_record=True)
-        return image, renderer.gradient(2 * (image - scene.target))
+        return image, renderer.gradient(2 * (image - scene.target), out=gradient)
 
     return Iteration(upload=np.asarray, run=run, download=lambda image, gradient: (image, gradient))

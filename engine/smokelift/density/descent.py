@@ -65,7 +65,7 @@ def descend(
         What no voxel may exceed; where the start does it is cut.
     """
     where = np.flatnonzero(hull)
-    volume = np.zeros_like(density)
+    volume, slopes = np.zeros_like(density), np.zeros_like(density)
     current = np.minimum(density.ravel()[where], np.float32(bound))
     scale = current + np.float32(FLOOR * (current.mean() if current.size else 0.0))
     enough = noise_floor(terms)
@@ -77,7 +77,7 @@ def descend(
     def gradient_of(residuals: tuple[Image, ...]) -> NDArray[np.float32]:
         """Derivative of the objective in units of the scale, for the last density evaluated."""
         parts = (
-            term.renderer.gradient(term.image_gradient(residual)).ravel()[where]
+            term.renderer.gradient(term.image_gradient(residual), out=slopes).ravel()[where]
             for term, residual in zip(terms, residuals, strict=True)
         )
         return functools.reduce(np.add, parts) * scale

@@ -69,7 +69,7 @@ class CpuBackend:
         _core.march(self._medium, self._support, self._rays, self._scattered, self._depth, record)
         return self._scattered, self._depth
 
-    def gradient(self, of_scattered: Floats, of_transmittance: Floats) -> Floats:
+    def gradient(self, of_scattered: Floats, of_transmittance: Floats, out: Floats | None = None) -> Floats:
         """Pull derivatives by the last recorded picture back to the density (nx, ny, nz); uses the record up."""
         plan = self._plan
         if self._gradient is None:
@@ -83,7 +83,7 @@ class CpuBackend:
             if self._scratch is None:
                 self._scratch = _core.zeros((*self._medium.shape[:3], 1))
             _core.shade_adjoint(self._medium, self._gradient, self._scratch, self._support, self._phase, self._lights)
-        result = _core.zeros(plan.domain.resolution)
+        result = _core.zeros(plan.domain.resolution) if out is None else out
         swapped = result.transpose(self._axes)
         _core.unpack(self._gradient, self._support, plan.medium.extinction, swapped, plan.corner)
         return result

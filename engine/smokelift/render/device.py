@@ -46,8 +46,13 @@ class Backend(Protocol):
     def image(self, density: NDArray[np.float32], keep_record: bool) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Scattered radiance (rows, columns, channels) and optical depth (rows, columns)."""
 
-    def gradient(self, of_scattered: NDArray[np.float32], of_transmittance: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Pull derivatives by the last recorded picture back to the density (nx, ny, nz)."""
+    def gradient(
+        self,
+        of_scattered: NDArray[np.float32],
+        of_transmittance: NDArray[np.float32],
+        out: NDArray[np.float32] | None = None,
+    ) -> NDArray[np.float32]:
+        """Pull derivatives by the last recorded picture back to the density (nx, ny, nz); see `Renderer.gradient`."""
 
 
 def available_gpu() -> str | None:

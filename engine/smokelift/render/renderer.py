@@ -92,13 +92,16 @@ class Renderer:
         """Transmittance (rows, columns) of the last image's rays."""
         return np.asarray(np.exp(-self._depth))
 
-    def gradient(self, image_gradient: Image) -> Volume:
+    def gradient(self, image_gradient: Image, out: Volume | None = None) -> Volume:
         """Pull the derivative of a loss back through the last `image` made with ``keep_record``; uses its record up.
 
         Parameters
         ----------
         image_gradient : (rows, columns, 3)
             dloss / dimage.
+        out : (nx, ny, nz) float32, optional
+            Written where there is support, and returned: new memory takes as long as a sweep. Zero elsewhere, as what
+            an earlier call has returned is.
 
         Returns
         -------
@@ -107,4 +110,4 @@ class Renderer:
         """
         of_image = np.asarray(image_gradient, np.float32)
         of_transmittance = np.einsum("...c,...c", of_image, np.broadcast_to(self._background, of_image.shape))
-        return self._backend.gradient(np.ascontiguousarray(of_image @ self._colour.T), of_transmittance)
+        return self._backend.gradient(np.ascontiguousarray(of_image @ self._colour.T), of_transmittance, out)

@@ -657,9 +657,9 @@ def test_a_descent_ends_whatever_the_gradient(small, plume, later) -> None:
         def image(self, density, *, keep_record):
             return self._renderer.image(density, keep_record=keep_record)
 
-        def gradient(self, image_gradient):
+        def gradient(self, image_gradient, out):
             self._left -= 1
-            return self._renderer.gradient(image_gradient) * (np.nan if self._left < 0 else 1)
+            return self._renderer.gradient(image_gradient, out) * (np.nan if self._left < 0 else 1)
 
     complete = completed(small)
     views = ViewSet.of([Observation(small.camera, render(plume.densities[1], small))], scene_optics(complete))

@@ -216,6 +216,23 @@ def test_gradient_stays_on_the_support(density, wall):
     assert not gradients[1][~support].any()
 
 
+def test_a_gradient_is_written_where_an_earlier_one_was(density, wall):
+    """The memory is the same and so are the values; memory of another type is refused."""
+    renderer = Renderer(
+        make_camera((2.5, -1.2, 2.4)), DOMAIN, medium_of_depth(density, 3), (SUN,), wall, support=density > 0.3
+    )
+    renderer.image(density, keep_record=True)
+    first = renderer.gradient(wall)
+    expected = first.copy()
+    for _ in range(2):
+        renderer.image(density, keep_record=True)
+        assert renderer.gradient(wall, out=first) is first
+    np.testing.assert_array_equal(first, expected)
+    renderer.image(density, keep_record=True)
+    with pytest.raises(TypeError):
+        renderer.gradient(wall, out=np.zeros(density.shape, np.float64))
+
+
 def test_a_point_light_inside_the_domain_is_refused():
     lamp = PointLight((0.7, 0.6, 0.8), (1, 1, 1))
     with pytest.raises(ValueError, match="inside the domain"):

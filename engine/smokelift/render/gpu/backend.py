@@ -67,7 +67,7 @@ class GpuBackend:
             )  # fmt: skip
         return taichi.download(self._scattered)[..., : self._channels], taichi.download(self._depth)
 
-    def gradient(self, of_scattered: Floats, of_transmittance: Floats) -> Floats:
+    def gradient(self, of_scattered: Floats, of_transmittance: Floats, out: Floats | None = None) -> Floats:
         """Pull derivatives by the last recorded picture back to the density (nx, ny, nz); uses the record up."""
         plan = self._plan
         if self._gradient is None:
@@ -91,7 +91,7 @@ class GpuBackend:
             self._shade_adjoint()
         in_box = taichi.zeros(plan.shape)
         camera.unpack(self._gradient, self._marked, in_box, plan.medium.extinction)
-        result = np.zeros(plan.domain.resolution, np.float32)
+        result = np.zeros(plan.domain.resolution, np.float32) if out is None else out
         result[self._box] = taichi.download(in_box)
         return result
 
