@@ -289,9 +289,13 @@ def _residual(points: Points, level: Level, turn: Rotation) -> tuple[Array, Arra
     """What differs at each point, and what it counts: nothing outside the second picture."""
     values, inside = points.seen_in(level, turn)
     residual = np.where(inside, values - points.values, 0.0)
+    return residual, robust_weights(residual, inside)
+
+
+def robust_weights(residual: Array, inside: NDArray[np.bool_]) -> Array:
+    """Return what each residual counts: nothing outside the second picture, and nothing of what moves by itself."""
     spread = max(DEVIATION * float(np.median(np.abs(residual[inside]))), LEAST_SPREAD) if inside.any() else 1.0
-    weight = np.where(inside, np.maximum(1 - (residual / (TUKEY * spread)) ** 2, 0) ** 2, 0.0)
-    return residual, weight
+    return np.where(inside, np.maximum(1 - (residual / (TUKEY * spread)) ** 2, 0) ** 2, 0.0)
 
 
 def cell_correlations(points: Points, values: Array, inside: NDArray[np.bool_]) -> Array:

@@ -8,8 +8,9 @@ from pathlib import Path
 
 from PIL import Image
 
-FILM_DIAGONAL = math.hypot(36, 24)
-"""Millimetres."""
+FILM_WIDTH = 36.0
+FILM_DIAGONAL = math.hypot(FILM_WIDTH, 24)
+"""Millimetres of 35 mm film."""
 
 BELIEVED = (4.0, 2000.0)
 """Focal lengths in millimetres that are; others, 0 above all, say that it is unknown."""

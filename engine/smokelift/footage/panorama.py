@@ -18,7 +18,7 @@ from smokelift.footage.images import Picture
 from smokelift.footage.noise import Noise, encode_sample, lasting_noise, sampled_count
 from smokelift.footage.plate import Plate, noise_before
 from smokelift.footage.plate_estimation import clear_picture
-from smokelift.footage.turning import Turns
+from smokelift.footage.turning import Turns, file_turns
 
 WIDEST = 3.0
 """Width and height of the wide picture over those of a frame, at most: beyond, what is far aside gets ever larger on a
@@ -140,7 +140,7 @@ class PanoramaPlate:
 
 
 def estimate_panorama(clip: Clip, turns: Turns, sample_count: int = 32) -> PanoramaPlate:
-    """Estimate the background of a clip whose camera turns.
+    """Estimate the background of a clip whose camera turns, from its shot in the file, whatever is trimmed.
 
     Parameters
     ----------
@@ -165,7 +165,7 @@ def estimate_panorama(clip: Clip, turns: Turns, sample_count: int = 32) -> Panor
 
 
 def wide_samples(clip: Clip, place: WidePicture, count: int) -> tuple[npt.NDArray[np.uint16], npt.NDArray[np.bool_]]:
-    """Return frames spread over a clip as parts of the wide picture, all of one exposure.
+    """Return frames spread over a clip's shot in its file as parts of the wide picture, all of one exposure.
 
     Returns
     -------
@@ -175,18 +175,21 @@ def wide_samples(clip: Clip, place: WidePicture, count: int) -> tuple[npt.NDArra
         What each frame shows.
     """
     columns, rows = place.size
-    numbers = clip.spread(sampled_count(count, columns, rows))
+    whole, of_file = clip.whole(), sorted(file_turns(clip, place.turns).items())
+    chosen = np.linspace(0, len(of_file) - 1, min(sampled_count(count, columns, rows), len(of_file))).round()
+    numbers, rotations = zip(*(of_file[int(n)] for n in chosen), strict=True)
+    place = replace(place, turns=replace(place.turns, rotations=Rotation.concatenate(rotations)))
     inside = np.ones(clip.size[::-1], np.float32)
-    seen = np.stack([place.spread_out(inside, number) > 0.5 for number in numbers])
+    seen = np.stack([place.spread_out(inside, n) > 0.5 for n in range(len(numbers))])
     tiny = []
-    for number, shown in zip(numbers, seen, strict=True):
-        wide = place.spread_out(clip.frame(number), number)
+    for n, (number, shown) in enumerate(zip(numbers, seen, strict=True)):
+        wide = place.spread_out(whole.frame(number), n)
         wide[~shown] = np.nan
         tiny.append(small(wide))
     gains = sample_gains(np.stack(tiny))
     samples = np.empty((len(numbers), rows, columns, 3), np.uint16)
-    for sample, number, gain in zip(samples, numbers, gains, strict=True):
-        sample[...] = encode_sample(place.spread_out(clip.frame(number), number, PADDING) / gain)
+    for n, (sample, number, gain) in enumerate(zip(samples, numbers, gains, strict=True)):
+        sample[...] = encode_sample(place.spread_out(whole.frame(number), n, PADDING) / gain)
     return samples, seen
 
 

@@ -7,18 +7,21 @@ A camera moves if some frames show the same as the key only once they are turned
 found is zero up to noise, so as much is the same with it as without it, however much smoke there is. The smoke's own
 motion is no turn, because smoke does not keep its shape from the middle of a clip to its ends. A camera that moves,
 but does not turn in its place, is refused (`smokelift.footage.parallax`).
+
+What the rest of the file shows around a clip is followed from its first and last frame, until the shot ends.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from smokelift.footage.alignment import Lens, align, judged, levels, points_of, shift
-from smokelift.footage.clip import Clip
+from smokelift.footage.clip import Clip, ClipError
 from smokelift.footage.parallax import travels
 from smokelift.scene import Camera, as_matrix
 
@@ -36,6 +39,9 @@ LEAST = 1.0
 
 IN_KEY = 0.6
 """Share of the key frame's points that have to be in a picture that is laid on it."""
+
+BEYOND = 24
+"""Frames of the file before a clip, and as many after it, that are looked at: the 32 of a plate are chosen of them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,15 +79,15 @@ class Turns:
         return replace(camera, matrix=matrices[0], matrices=tuple(matrices))
 
 
-def find_turns(clip: Clip, lens: Lens) -> Turns | None:
+def find_turns(clip: Clip, *lenses: Lens) -> Turns | None:
     """Find how the camera of a clip turned; None if it stood still or if nothing in the picture tells.
 
     Parameters
     ----------
     clip
         The footage.
-    lens
-        Of its frames.
+    lenses
+        Of its frames; of several that it may be, the first with which turns explain them is taken.
 
     Raises
     ------
@@ -92,10 +98,13 @@ def find_turns(clip: Clip, lens: Lens) -> Turns | None:
     """
     middle = len(clip) // 2
     ahead, back = range(middle + 1, len(clip)), range(middle - 1, -1, -1)
-    found = _followed(clip, lens, middle, ahead) | _followed(clip, lens, middle, back)
-    if not found:
+    if len(clip) == 1:
         return None
-    if np.median([each.same for each in found.values()]) < HELD:
+    for lens in lenses:
+        found = dict(_followed(clip, lens, middle, ahead)) | dict(_followed(clip, lens, middle, back))
+        if np.median([each.same for each in found.values()]) >= HELD:
+            break
+    else:
         if travels(clip, lens, {number for number, each in found.items() if each.same < HELD}):
             raise ValueError(
                 "The camera travels or zooms, so near and far move unlike each other and no turn steadies the clip; "
@@ -110,14 +119,43 @@ def find_turns(clip: Clip, lens: Lens) -> Turns | None:
     return turns if turns.farthest >= LEAST else None
 
 
+def file_turns(clip: Clip, turns: Turns) -> dict[int, Rotation]:
+    """Return how the camera turned in frames of a clip's file, by their numbers in it.
+
+    The clip's own are among them. Others are taken before and after it for as long as they show what it does, at which
+    the camera may look from anywhere in front of it.
+
+    Parameters
+    ----------
+    clip
+        The footage.
+    turns
+        Of its frames. The others' are into the same mean pose.
+    """
+    whole, first, last = clip.whole(), clip.first, clip.first + len(clip) - 1
+    found = {first + number: turn for number, turn in enumerate(turns.rotations)}
+    width, height = turns.lens.size
+    corners = turns.lens.rays(np.array([[0, 0], [width, 0], [0, height], [width, height]], np.float64))
+    sides = ((last, range(last + 1, len(whole))), (first, range(first - 1, -1, -1)))
+    for start, numbers in sides:
+        apart = -(-len(numbers) // BEYOND) or 1
+        with suppress(ClipError):  # what cannot be read ends the shot
+            for number, each in _followed(whole, turns.lens, start, numbers[::apart]):
+                turn = found[start] * each.turn
+                if each.same < HELD or (turn.apply(corners)[:, 2] <= 0).any():
+                    break
+                found[number] = turn
+    return found
+
+
 @dataclass(frozen=True, eq=False)
 class _Found:
-    """How a frame lies on the clip's middle one.
+    """How a frame lies on the one from which it was followed, the clip's middle one mostly.
 
     Attributes
     ----------
     turn
-        Of its directions into those of the middle frame.
+        Of its directions into those of that frame.
     same, as_it_stands
         Share of the cells that show the same once it is turned, and as it stands.
     """
@@ -127,12 +165,11 @@ class _Found:
     as_it_stands: float
 
 
-def _followed(clip: Clip, lens: Lens, middle: int, numbers: Iterable[int]) -> dict[int, _Found]:
-    """Lay frames that follow one another on the middle frame, or on those that succeed it as the key."""
-    found: dict[int, _Found] = {}
-    before = levels(clip.frame(middle), lens)
+def _followed(clip: Clip, lens: Lens, start: int, numbers: Iterable[int]) -> Iterator[tuple[int, _Found]]:
+    """Lay frames that follow one another on that from which they start, or on those that succeed it as the key."""
+    before = levels(clip.frame(start), lens)
     key = first = points_of(before)
-    of_key = onto = Rotation.identity()  # the key into the middle frame; the key into the frame before
+    of_key = onto = Rotation.identity()  # the key into the first one; the key into the frame before
     for number in numbers:
         picture = levels(clip.frame(number), lens)
         lain = align(key, picture, onto)
@@ -143,5 +180,4 @@ def _followed(clip: Clip, lens: Lens, middle: int, numbers: Iterable[int]) -> di
             lain = align(key, picture, Rotation.identity())
         onto, before = lain.turn, picture
         stands = judged(first[-1], picture[-1], Rotation.identity())
-        found[number] = _Found(of_key * onto.inv(), lain.same, stands.same)
-    return found
+        yield number, _Found(of_key * onto.inv(), lain.same, stands.same)

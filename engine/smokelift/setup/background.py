@@ -11,7 +11,9 @@ from smokelift.footage.background import given_plates
 from smokelift.footage.clip import Clip
 from smokelift.footage.evidence import evidence
 from smokelift.footage.exposure import largest_change
+from smokelift.footage.focal_length import FocalLength, focal_length
 from smokelift.footage.images import area_average
+from smokelift.footage.lens import FILM_WIDTH
 from smokelift.footage.panorama import estimate_panorama
 from smokelift.footage.plate import Plate, Plates, known_plate
 from smokelift.footage.plate_estimation import (
@@ -36,6 +38,10 @@ EXPOSURE_SAMPLES = 16
 
 UNKNOWN = 0.5
 """Confidence of a plate below which what is behind the smoke is unknown there."""
+
+TELEPHOTO = 3.0
+"""Focal length over the usual one that is supposed where no turn with the usual one explains the clip. The wider lens
+bends a pan more than the longer one does, so that either is found from one within a factor of about two."""
 
 MOSTLY = 0.5
 """Share of the smoke's pixels without a known background from which most of the smoke may be in the plate."""
@@ -85,6 +91,7 @@ def find_plates(
         If a camera moves before a background of more than one colour that is not given, or turns too far.
     """
     moves = camera is not None and camera.moves
+    told = camera is not None or clip.lens is not None
     if clip.backdrop is not None:
         grey = (clip.backdrop,) * 3
         name = "white" if clip.backdrop else "black"
@@ -95,7 +102,7 @@ def find_plates(
     if given is not None:
         return FoundPlates(given, background)
     if not moves:
-        return _estimated(clip, lens)
+        return _estimated(clip, lens, told)
     plate = estimate_plate(clip)
     colour = one_colour(plate)
     if colour is None:
@@ -138,14 +145,14 @@ def smoke_in_plate(plates: Plates, samples: SmokeSamples) -> tuple[str, ...]:
     )
 
 
-def _estimated(clip: Clip, lens: Lens | None) -> FoundPlates:
-    """The background of a clip whose camera stands still or, with a lens, turns."""
+def _estimated(clip: Clip, lens: Lens | None, told: bool) -> FoundPlates:
+    """The background of a clip whose camera stands still or, with a lens that is told or only supposed, turns."""
     samples = steady_samples(evidence(clip))
     noise = clip_noise(samples)
     backdrop = backdrop_plate(samples, noise)
     # one colour has nothing to hold on to, and is the same wherever the camera looks; in noise, texture may pass by
     plain = backdrop is not None and noise.total.max() <= ONE_COLOUR_NOISE
-    turns = None if plain or lens is None else find_turns(clip, lens)
+    turns, focal = (None, None) if plain or lens is None else _turned(clip, lens, told)
     if turns is None:
         plate = backdrop or estimated_plate(samples, noise)
         return FoundPlates(plate, None, (_found(plate),))
@@ -156,7 +163,31 @@ def _estimated(clip: Clip, lens: Lens | None) -> FoundPlates:
         f"The camera moves, by up to {turns.farthest:.0f} pixels: it is steadied against the background, as a camera "
         "that turns in its place, and has a matrix for every frame."
     )
-    return FoundPlates(panorama, None, (moved, _how(unknown)), turns)
+    return FoundPlates(panorama, None, (moved, *focal_notes(turns.lens, told, focal), _how(unknown)), turns)
+
+
+def _turned(clip: Clip, lens: Lens, told: bool) -> tuple[Turns | None, FocalLength | None]:
+    """How the camera turned, and the focal length where it is measured since it is not told."""
+    if told:
+        return find_turns(clip, lens), None
+    turns = find_turns(clip, lens, FocalLength(TELEPHOTO, 0.0).of(lens))
+    focal = None if turns is None else focal_length(clip, turns)
+    if turns is None or focal is None or not focal.determined:
+        return turns, None
+    return find_turns(clip, focal.of(turns.lens)) or turns, focal
+
+
+def focal_notes(lens: Lens, told: bool, focal: FocalLength | None) -> tuple[str, ...]:
+    """What is to be said of the focal length of a camera that turns, a sentence; nothing if it is told."""
+    if told:
+        return ()
+    if focal is None:
+        return ("Focal length undetermined: the camera turns too little, or too little stands still, to show it.",)
+    millimetres = FILM_WIDTH * lens.focal[0] / max(lens.size)
+    return (
+        f"Focal length measured on how the picture turns: {millimetres:.0f} mm on {FILM_WIDTH:g} mm film, "
+        f"{focal.deviation:.0%} more or less.",
+    )
 
 
 def _found(plate: Plate) -> str:

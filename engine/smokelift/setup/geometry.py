@@ -10,7 +10,7 @@ import numpy as np
 
 from smokelift.footage.alignment import Lens
 from smokelift.footage.clip import Clip
-from smokelift.footage.lens import FILM_DIAGONAL
+from smokelift.footage.lens import FILM_DIAGONAL, FILM_WIDTH
 from smokelift.footage.plate import Plates
 from smokelift.footage.turning import Turns
 from smokelift.footage.working_picture import CameraError, working_picture
@@ -26,7 +26,7 @@ Shape = tuple[int, int, int]
 PICTURE_HEIGHT = 2.0
 """Metres that an uncalibrated picture is taken to be high where the smoke is: the size of a person."""
 
-LENS = 50 / 36
+LENS = 50 / FILM_WIDTH
 """Focal length over the longer side of the picture of an uncalibrated camera whose file says none: Blender's default
 lens."""
 
@@ -93,7 +93,8 @@ def find_geometry(
         raise ValueError(
             "The scene marks an [[inlet]] but gives no [camera] and [domain]; give both to say where it is."
         )
-    camera, grids = _uncalibrated(clip, samples, settings)
+    focal = _focal(clip) if turns is None else turns.lens.focal[0]
+    camera, grids = _uncalibrated(clip, focal, samples, settings)
     camera = _turning(camera, turns)
     if isinstance(settings.resolution, tuple):
         domain, choice = grids[-1], _resolution_by_hand(grids[-1])
@@ -102,7 +103,9 @@ def find_geometry(
     else:
         domain, choice = grids[-1], None
     size = " x ".join(f"{high - low:.2f}" for low, high in zip(domain.min, domain.max, strict=True))
-    lens = "a level 50 mm lens on 36 mm film" if clip.lens is None else f"level, {clip.lens:g} mm as the file says"
+    millimetres = FILM_WIDTH * focal / max(clip.size)
+    usual = f"a level {millimetres:.0f} mm lens on {FILM_WIDTH:g} mm film"
+    lens = usual if clip.lens is None else f"level, {clip.lens:g} mm as the file says"
     notes = (
         f"Camera not given: {lens}, the picture taken to be {PICTURE_HEIGHT:g} m high where the smoke is.",
         f"Domain around the smoke: {size} m, {' x '.join(map(str, domain.resolution))} voxels.",
@@ -159,13 +162,14 @@ def _resolution_by_hand(domain: Domain) -> Choice[Shape]:
     return Choice("resolution", domain.resolution, f"Resolution by hand: {said} voxels.", by_hand=True)
 
 
-def _uncalibrated(clip: Clip, samples: SmokeSamples, settings: Settings) -> tuple[Camera, tuple[Domain, ...]]:
-    """A level camera that looks along +Y, and the box around the smoke at the picture's distance.
+def _uncalibrated(
+    clip: Clip, focal: float, samples: SmokeSamples, settings: Settings
+) -> tuple[Camera, tuple[Domain, ...]]:
+    """A level camera of a focal length in pixels that looks along +Y, and the box around the smoke at its distance.
 
     The box comes with every number of voxels that may be chosen, the fewest first.
     """
     width, height = clip.size
-    focal = _focal(clip)
     metres = PICTURE_HEIGHT / height
     distance = focal * metres
     matrix = np.array([[1, 0, 0, 0], [0, 0, -1, -distance], [0, 1, 0, PICTURE_HEIGHT / 2], [0, 0, 0, 1]], np.float64)

@@ -30,6 +30,22 @@ def test_every_frame_has_its_background(turns: Rotation) -> None:
         assert found[smoke < 10].mean() < 0.3
 
 
+def test_what_is_trimmed_shows_what_is_behind_the_smoke() -> None:
+    """Smoke that stands in the frames that are used leaves the rest of the file, before and after them."""
+    turns = shake(3)
+    frames, clear = pictures(wall(), turns)
+    for number in range(4, 8):
+        seen = frames[number, 30:80, 50:100]
+        seen[...] = 0.7 + 0.1 * number * (seen - 0.7)
+    own = Turns(LENS, turns[4:8])
+    apart = []
+    for clip in (clip_of(frames).part(4, 7), clip_of(frames[4:8])):
+        plate = estimate_panorama(clip, own).at(1)
+        apart.append(np.percentile(codes_apart(plate.image, clear[5])[35:75, 55:95], 90))
+    assert apart[0] < 6
+    assert apart[1] > 40
+
+
 def test_a_part_has_the_parts_plate() -> None:
     turns = shake(3)
     frames, _ = pictures(wall(), turns)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 from turning_camera import COUNT, LENS, clip_of, off, pan, pictures, shake, wall
 
-from smokelift.footage.turning import Turns, find_turns
+from smokelift.footage.turning import Turns, file_turns, find_turns
 from smokelift.scene import Camera
 from smokelift.scene.projection import project
 
@@ -35,6 +37,15 @@ def test_smoke_before_one_colour_is_no_camera() -> None:
     assert find_turns(clip_of(frames), LENS) is None
 
 
+def test_a_longer_lens_is_tried_where_the_first_explains_nothing() -> None:
+    turns = pan(60)
+    frames, _ = pictures(wall(), turns, smoke=0.9)
+    wide, long = (replace(LENS, focal=(scale * 200, scale * 200)) for scale in (0.4, 1.2))
+    found = find_turns(clip_of(frames), wide, long)
+    assert found is not None
+    assert found.lens == long
+
+
 def test_one_frame_shows_no_motion() -> None:
     frames, _ = pictures(wall(), Rotation.identity(1))
     assert find_turns(clip_of(frames), LENS) is None
@@ -51,3 +62,21 @@ def test_a_camera_carries_the_turns() -> None:
     for frame, turn in enumerate(turns.rotations):
         seen, _ = project(moving.at(frame), point)
         np.testing.assert_allclose(LENS.pixels(turn.apply(LENS.rays(seen))), where, atol=1e-6)
+
+
+def test_the_rest_of_the_file_is_followed_in_the_clips_pose() -> None:
+    """Before it and after it, to a tenth of a pixel."""
+    turns = pan(60)
+    frames, _ = pictures(wall(), turns, smoke=0.9)
+    clip, own = clip_of(frames).part(4, 7), turns[4:8]
+    found = file_turns(clip, Turns(LENS, own.mean().inv() * own))
+    assert sorted(found) == list(range(len(turns)))
+    assert off(Rotation.concatenate([found[n] for n in range(len(turns))]), own.mean().inv() * turns) < 0.1
+
+
+def test_a_cut_ends_what_is_followed() -> None:
+    turns = shake(3)
+    frames, _ = pictures(wall(), turns)
+    frames[9:] = frames[9:, ::-1]
+    found = file_turns(clip_of(frames).part(3, 6), Turns(LENS, turns[3:7]))
+    assert sorted(found) == list(range(9))

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import ndimage
+from scipy.spatial.transform import Rotation
 
+from smokelift.footage.alignment import Lens
 from smokelift.footage.clip import Clip
 from smokelift.footage.noise import EIGHT_BIT_NOISE
+from smokelift.footage.panorama import PanoramaPlate
 from smokelift.footage.plate import Plate
 from smokelift.output.images import write_image
-from smokelift.setup.background import find_plates, smoke_in_plate
+from smokelift.setup.background import find_plates, focal_notes, smoke_in_plate
+from smokelift.setup.geometry import clip_lens
 from smokelift.setup.smoke import SmokeSamples
 
 
@@ -48,3 +53,38 @@ def test_what_never_changes_before_one_colour_is_said(tmp_path) -> None:
     (note,) = find_plates(before(0.3, tmp_path), None, None).notes
     assert "it is black, but for" in note
     assert "If that is smoke" in note
+
+
+def panned(folder, lens: Lens, pixels: float) -> Clip:
+    """Pictures of a wall, from a camera that pans over so many pixels."""
+    width, height = lens.size
+    random = np.random.default_rng(0)
+    fine = sum(ndimage.gaussian_filter(random.standard_normal((2 * height, 2 * width)), s) * s for s in (1.0, 3.0))
+    y, x = np.mgrid[:height, :width] + 0.5
+    rays = lens.rays(np.column_stack([x.ravel(), y.ravel()]))
+    for n, along in enumerate(np.linspace(-0.5, 0.5, 8) * pixels / lens.focal[0]):
+        seen = (
+            lens.pixels(Rotation.from_rotvec([0, along, 0.2 * along]).apply(rays)) + np.array([width, height]) / 2 - 0.5
+        )
+        grey = ndimage.map_coordinates(0.25 + 0.08 * fine, seen.T[::-1].reshape(2, *y.shape), order=3)
+        write_image(folder / f"frame_{n:02d}.png", np.clip(grey, 0.01, 1).astype(np.float32))
+    return Clip.open(folder / "frame_##.png", fps=24)
+
+
+def test_pictures_of_a_panning_camera_tell_background_and_focal_length(tmp_path) -> None:
+    """Of a sequence of pictures as of a video; its lens is 34 mm, and 50 mm are supposed."""
+    true = Lens((160, 120), (150.0, 150.0), (80.0, 60.0))
+    clip = panned(tmp_path, true, 40)
+    supposed = clip_lens(None, clip)
+    assert supposed is not None
+    found = find_plates(clip, None, None, supposed)
+    assert isinstance(found.plates, PanoramaPlate)
+    assert found.turns is not None
+    assert found.turns.lens.focal[0] == pytest.approx(150, rel=0.03)
+    assert any("Focal length measured on how the picture turns: 34 mm" in note for note in found.notes)
+
+
+def test_a_focal_length_that_is_not_found_is_said() -> None:
+    lens = Lens((160, 120), (150.0, 150.0), (80.0, 60.0))
+    assert focal_notes(lens, True, None) == ()
+    assert "undetermined" in focal_notes(lens, False, None)[0]
