@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -49,7 +50,7 @@ def write(film: Film, folder: Path) -> Path:
     path = folder / "scene.toml"
     scene.save(path)
     # what is not told needs no key, which earlier states of the code may not know
-    path.write_text(path.read_text().replace("color = [1.0, 1.0, 1.0]\n", ""))
+    path.write_text(re.sub(r"color = \[\s*1\.0,\s*1\.0,\s*1\.0,?\s*\]\n", "", path.read_text()))
     return path
 
 

@@ -66,6 +66,7 @@ def test_a_clip_is_written_without_loss_and_tells_what_it_says(ball, tmp_path) -
     scene = Scene.load(write(film, tmp_path))
     assert scene.background is not None
     assert scene.medium == ball.scene.medium
+    assert "color" not in (tmp_path / "scene.toml").read_text()  # which earlier states of the code do not know
     with Clip.open(scene.clip) as clip:
         assert len(clip) == COUNT
         assert np.abs(linear_to_srgb(clip.frame(20)) - film.pictures[20]).max() < 0.51 / 255
