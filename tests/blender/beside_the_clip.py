@@ -1,8 +1,8 @@
 """Cycles' picture of a result beside the clip: ``python -m tests.blender.beside_the_clip OUT SCENE ...``.
 
-A SCENE is a folder of `benchmarks.truth.picture` whose clip shows its smoke in a sun, before black. Camera, box, sun
-and medium are given to Blender as its scene file has them; the rest is done by the add-on's own buttons. In OUT stay
-the takes, and every compared frame: the clip, Cycles and the difference. Needs bpy.
+A SCENE is a folder of `benchmarks.truth.picture` whose clip shows its smoke in a sun, before one colour. Camera, box,
+sun, medium and background are given to Blender as its scene file has them; the rest is done by the add-on's own
+buttons. In OUT stay the takes, and every compared frame: the clip, Cycles, the engine and the difference. Needs bpy.
 
 The table has decibels of displayed values where the clip's smoke covers more than 1 %: of Cycles against the clip, with
 one scattering in Cycles, of the engine's own picture of the same smoke, and of Cycles against that. The product of the
@@ -116,7 +116,11 @@ def shot(folder: Path, out: Path) -> bpy.types.Scene:
     settings.clip = bpy.data.movieclips.load(str(folder / tables["clip"]["path"].replace("####", "0001")))
     settings.fps = tables["clip"]["fps"]
     settings.box = add_box(scene, tables["domain"]["min"], tables["domain"]["max"])
-    settings.use_medium, settings.light_mode, settings.plate_mode = True, "SCENE", "ESTIMATE"
+    settings.use_medium, settings.light_mode = True, "SCENE"
+    out.mkdir(parents=True, exist_ok=True)
+    plate = np.broadcast_to(np.float32(tables["background"]["color"]), (*table["size"][::-1], 3))
+    write_image(out / "plate.png", plate)
+    settings.plate_mode, settings.plate = "FILE", str(out / "plate.png")
     for name in ("extinction", "albedo", "anisotropy"):
         setattr(settings, name, tables["medium"][name])
     settings.quality, settings.output = "balanced", str(out)
