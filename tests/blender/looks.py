@@ -19,7 +19,7 @@ from addon.take import Take
 from tests.example_shot import set_up_example, smoke
 
 FRAME = 30
-PERCENT, SAMPLES = 75, 48
+PERCENT, SAMPLES = 75, 24
 RIM = 0.3
 """Metres from the floor to the bowl's rim, where the smoke's box begins."""
 
@@ -31,7 +31,9 @@ def main() -> None:
     scene = set_up_example(bpy.context.scene)
     obj = smoke(scene)
     volume.show(obj, Take(Path(sys.argv[1]).absolute()))
-    scene.cycles.samples, scene.cycles.use_denoising = SAMPLES, False
+    scene.cycles.samples, scene.cycles.use_denoising = SAMPLES, True
+    if hasattr(scene.cycles, "volume_biased"):
+        scene.cycles.volume_biased = True  # marching through the volume is ten times as fast
     scene.frame_set(FRAME)
     with tempfile.TemporaryDirectory() as folder:
         pictures = []
