@@ -94,7 +94,7 @@ def continue_sequence(
             f"{sequence.frames[SHORTEST - 1]} to {sequence.frames[-1]}."
         )
     around = _surroundings(continuation, sequence.scene.domain)
-    around.solid(1, time_step(sequence))
+    around.solid(1, time_step(sequence))  # refuses what fills the box before anything is written
     last = start + continuation.frames
     told = {
         "frames": continuation.frames,

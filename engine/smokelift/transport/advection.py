@@ -42,7 +42,7 @@ def advect(
         ``"semi-lagrangian"`` is smooth and loses detail; ``"maccormack"`` (Selle et al. 2008) corrects the
         error of interpolation and keeps it. Both stay within the values around the point of origin.
     conserve
-        For a density: restore the mass, which a flow without divergence keeps. Mass that leaves through the sides is
+        For a density: restore the mass, which a flow without divergence keeps. Mass that leaves through open sides is
         gone; none comes in. The repair goes where interpolation is in doubt, that is, where the two schemes differ,
         and changes each voxel by no more than they differ there. All smoke shares the rest in proportion. The repair
         makes nothing negative and no smoke where there is none. docs/experiments/transport-scheme.md has the drift
@@ -123,10 +123,11 @@ def _with_mass(moved: Array, doubt: Array, mass: float) -> Array:
 
 
 def _share_inside(displacement: StaggeredGrid) -> Array:
-    """The part of every voxel that is still in the box after a step."""
+    """The part of every voxel that is still in the box after a step: nothing leaves through walls."""
     share = np.ones((), np.float32)
     for axis, along in enumerate(at_centres(displacement.faces)):
-        count = along.shape[axis]
+        count, (low_wall, high_wall) = along.shape[axis], displacement.walls[2 * axis : 2 * axis + 2]
         low = along + np.arange(count, dtype=np.float32).reshape([-1 if d == axis else 1 for d in range(3)])
-        share = share * np.clip(np.minimum(low + 1, count - low), 0, 1)
+        ends = np.float32(1) if low_wall else low + 1, np.float32(1) if high_wall else count - low
+        share = share * np.clip(np.minimum(*ends), 0, 1)
     return share

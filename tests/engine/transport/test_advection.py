@@ -138,6 +138,15 @@ def test_what_leaves_the_box_is_gone_and_nothing_comes_in(speed):
     assert not gone.any()
 
 
+def test_no_mass_leaves_through_walls():
+    """Also where smoke in the middle of the outermost voxels moves towards them."""
+    full = np.ones(SHAPE, np.float32)
+    flow = project(random_velocity(3), SIDES)
+    assert advect(full, flow, 1.0, conserve=True).sum(dtype=float) == pytest.approx(full.size, rel=1e-5)
+    half = project(random_velocity(3), SIDES[:5])
+    assert advect(full, half, 1.0, conserve=True).sum(dtype=float) < 0.999 * full.size
+
+
 def test_mass_is_repaired_where_smoke_moves():
     """Smoke at rest has no part in what the smoke beside it loses or gains."""
     density = np.concatenate([structured_blob(), structured_blob()], axis=2)
