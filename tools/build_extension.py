@@ -34,7 +34,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name, parse_wheel_filename
 from packaging.version import Version
 
-from engine_wheels import PYTHONS, ROOT
+from engine_wheels import PYTHONS, ROOT, VERSION
 
 STAGE = ROOT / "build" / "extension"
 
@@ -204,14 +204,13 @@ def build(engine_wheels: Sequence[Path], out: Path) -> list[Path]:
         If nothing can be built, or what was built is not sound.
     """
     manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
-    version = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
-    engines = find_engines(engine_wheels, version)
+    engines = find_engines(engine_wheels, VERSION)
     for platform in PLATFORMS:
         missing = [python for python in PYTHONS if (platform.name, python) not in engines]
         if missing:
             print(
                 f"{platform.name} is left out for Python {' and '.join(missing)}: it needs the engine's wheel of "
-                f"version {version}, built on such a machine and given with make extension ENGINE_WHEELS=DIR."
+                f"version {VERSION}, built on such a machine and given with make extension ENGINE_WHEELS=DIR."
             )
     if not engines:
         raise BuildError("there are no engine wheels at all.")
@@ -225,18 +224,16 @@ def build(engine_wheels: Sequence[Path], out: Path) -> list[Path]:
         for python in PYTHONS:
             if (platform.name, python) in engines:
                 engine = engines[platform.name, python]
-                zips += build_pair(manifest, version, platform, python, engine, out)
+                zips += build_pair(manifest, platform, python, engine, out)
     return zips
 
 
-def build_pair(
-    manifest: Mapping[str, Any], version: str, platform: Platform, python: str, engine: Path, out: Path
-) -> list[Path]:
+def build_pair(manifest: Mapping[str, Any], platform: Platform, python: str, engine: Path, out: Path) -> list[Path]:
     """Build the extension and the one for the GPU, for one platform and Python."""
     zips = []
     libraries: list[Path] = []
     for name in PINS:
-        product = Product(name, version, platform, python)
+        product = Product(name, VERSION, platform, python)
         print(f"{product.file}: gathering what the engine needs.", flush=True)
         gather(product, engine if name == "smokelift" else None)
         libraries.append(product.libraries)

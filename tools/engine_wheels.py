@@ -13,6 +13,7 @@ import argparse
 import importlib.util
 import os
 import platform
+import re
 import subprocess
 import sys
 import tempfile
@@ -23,6 +24,11 @@ ROOT = Path(__file__).resolve().parents[1]
 
 PYTHONS = ("3.11", "3.13")
 """Versions in Blender: 4.2 to 5.0, and 5.1 on."""
+
+VERSION = re.findall(
+    r'^__version__ = "(.+)"$', (ROOT / "engine/smokelift/__init__.py").read_text(encoding="utf-8"), re.M
+)[0]
+"""Of everything that is shipped; it stands nowhere else."""
 
 GLIBC = "2.28"
 """Oldest C library that Blender's own builds run with."""

@@ -1,0 +1,58 @@
+"""The checklist of a release refuses what is not ready."""
+
+from __future__ import annotations
+
+import re
+import zipfile
+
+import pytest
+
+import release
+import smokelift
+from engine_wheels import VERSION
+
+
+def test_the_version_stands_in_one_place() -> None:
+    """The build and the checklist read it where the engine has it."""
+    assert smokelift.__version__ == VERSION
+    for name in ("pyproject.toml", "blender_manifest.toml"):
+        assert not re.search("^version =", (release.ROOT / name).read_text(encoding="utf-8"), re.MULTILINE)
+
+
+def test_the_changelog_dates_the_version(tmp_path) -> None:
+    path = tmp_path / "CHANGELOG.md"
+    path.write_text(f"# Changelog\n\n## {VERSION} (2026-11-22)\n")
+    assert VERSION in release.changelog_has_the_version(path)
+    for heading in ("Unreleased", f"{VERSION} (unreleased)", "0.1.0 (2026-11-22)"):
+        path.write_text(f"# Changelog\n\n## {heading}\n\n## {VERSION} (2026-11-22)\n")
+        with pytest.raises(release.NotReadyError, match="begins with"):
+            release.changelog_has_the_version(path)
+
+
+def zipped(folder, names=("manual/index.html",), content=b"x") -> None:
+    with zipfile.ZipFile(
+        folder / f"smokelift-{VERSION}-blender5.1-linux_x64.zip", "w", zipfile.ZIP_DEFLATED
+    ) as archive:
+        for name in names:
+            archive.writestr(name, content)
+
+
+def test_zips_have_to_be_there_whole_and_small(tmp_path, monkeypatch) -> None:
+    with pytest.raises(release.NotReadyError, match="make extension"):
+        release.zips_are_small_and_whole(tmp_path)
+    zipped(tmp_path, names=("__init__.py",))
+    with pytest.raises(release.NotReadyError, match="has no manual"):
+        release.zips_are_small_and_whole(tmp_path)
+    zipped(tmp_path)
+    assert release.zips_are_small_and_whole(tmp_path).startswith("1 zips")
+    monkeypatch.setattr(release, "LARGEST_INSTALLED", 0)
+    with pytest.raises(release.NotReadyError, match="installed"):
+        release.zips_are_small_and_whole(tmp_path)
+
+
+def test_checksums_name_what_is_released(tmp_path) -> None:
+    zipped(tmp_path)
+    (tmp_path / "smokelift-0.0.1.tar.gz").touch()
+    release.checksums(tmp_path)
+    (line,) = (tmp_path / "SHA256SUMS").read_text().splitlines()
+    assert line.endswith(f"  smokelift-{VERSION}-blender5.1-linux_x64.zip") and len(line.split()[0]) == 64
