@@ -1,6 +1,7 @@
 """The buttons that add a smoke, choose one, make it and stop that."""
 
-from contextlib import suppress
+import functools
+import time
 
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
@@ -12,6 +13,9 @@ from .properties import SEEDS
 from .scene_file import ShotError
 from .smoke import activate, active_smoke, hide_default_cube, new_smoke, smokes
 from .take import TakeError
+
+LONGEST_OPENING = 5.0
+"""Seconds in which a sidebar is drawn for the first time."""
 
 
 class SMOKELIFT_OT_add(bpy.types.Operator):
@@ -50,9 +54,23 @@ def _open_tab(context: bpy.types.Context) -> None:
     if context.area is None or context.area.type != "VIEW_3D":
         return
     context.space_data.show_region_ui = True
-    sidebar = next(region for region in context.area.regions if region.type == "UI")
-    with suppress(AttributeError, TypeError):  # a sidebar that was never open has no tabs yet
+    choose = functools.partial(_choose_tab, context.area.as_pointer(), time.monotonic() + LONGEST_OPENING)
+    bpy.app.timers.register(choose)
+
+
+def _choose_tab(area_pointer: int, end: float) -> float | None:
+    """Choose the tab in the sidebar of an area; a timer, as one that was never open has no tabs before it is drawn."""
+    areas = [area for window in bpy.context.window_manager.windows for area in window.screen.areas]
+    area = next((area for area in areas if area.as_pointer() == area_pointer), None)
+    if area is None or time.monotonic() > end:
+        return None
+    sidebar = next(region for region in area.regions if region.type == "UI")
+    try:
         sidebar.active_panel_category = "Smokelift"
+    except (AttributeError, TypeError):
+        return run.TICK_SECONDS
+    area.tag_redraw()
+    return None
 
 
 def _draw_add(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:

@@ -190,6 +190,14 @@ def test_trouble_at_the_window(root, installed) -> None:
     assert 2 <= len(index["frames"]) == len(list(last.glob("smoke_*.vdb")))
 
 
+def test_a_video_is_dragged_into_the_view(root, installed) -> None:
+    """By a mouse, out of Blender's own File Browser; Blender asks what it shall become, and the tab is opened."""
+    blend = Path("/home/artist/plume/shot.blend")
+    report = story(root, installed, "drive_drop.py", WORK / "drop", (blend, FIRST, LAST, 32))
+    assert (report["type"], report["is_smoke"], report["clip"]) == ("VOLUME", True, "another.mp4")
+    assert report["active"]
+
+
 def story(root: Path, user: Path, script: str, pictures: Path, shot: tuple[Path, int, int, int]) -> Any:
     """Have an artist's story told at a window, on a shot as make_shot.py makes it; returns its report."""
     shutil.rmtree(pictures, ignore_errors=True)
