@@ -81,7 +81,8 @@ class Shot:
     smoky
         Numbers of the frames, of those looked at, that show smoke, those with the most first.
     place
-        Where in depth the smoke was found to stand; None where it is told, seen by several cameras or by a moving one.
+        Where in depth the smoke was found to stand; None where it is told, or seen by several cameras or one
+        that travels.
     """
 
     scene: CompleteScene

@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from smokelift.density.axis import AxisEstimate, Cue, SmokeAxis
-from smokelift.scene import Inlet
+from smokelift.scene import Inlet, as_matrix
 from smokelift.setup.place import place_choice
 from smokelift.setup.settings import Settings
 from tests.engine.setup.shots import shot_of
@@ -44,3 +45,20 @@ def test_a_shot_knows_where_its_smoke_stands(plume, draft: Settings) -> None:
         told = shot_of(blind, settings)
         assert told.place is None
         assert "axis depth" not in [choice.what for choice in told.choices]
+
+
+def test_a_camera_that_only_turns_tells_the_place_as_one_that_stands(plume, draft: Settings) -> None:
+    """What travels does not: it sees the smoke from elsewhere."""
+    blind = replace(plume.scene, inlets=())
+    count = len(plume.densities)
+    still = shot_of(blind, draft).place
+    assert still is not None
+    turning = replace(blind.camera, matrices=(blind.camera.matrix,) * count)
+    found = shot_of(replace(blind, camera=turning), draft).place
+    assert found is not None
+    assert found.cue == still.cue
+    assert found.depth == pytest.approx(still.depth, abs=0.1 * still.deviation)
+    matrices = np.repeat(np.array(blind.camera.matrix)[None], count, axis=0)
+    matrices[:, 0, 3] += np.linspace(0, 0.1, count)
+    travelling = replace(blind.camera, matrix=as_matrix(matrices[0]), matrices=tuple(map(as_matrix, matrices)))
+    assert shot_of(replace(blind, camera=travelling), draft).place is None
