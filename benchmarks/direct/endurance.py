@@ -1,0 +1,92 @@
+"""A hundred frames after a clip: does the smoke blow up, is its mass kept, and what does a frame cost?
+
+    python -m benchmarks.direct.endurance SCENES/plume-3 ... [--frames 100]
+
+Every scene is cut at two thirds and simulated on from its true densities and velocities. *Speed* is the largest in any
+frame over the largest of the clip's last twelve. *Mass* is that after all frames over that before, of the same smoke
+without inlets and dissipation in a box whose sides are closed, where none may come or go. *Solves* is the processor
+time of a frame over that of one projection, which is one Poisson solve.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.accuracy.scenes import baked_scene
+from benchmarks.direct.clips import true_moment
+from benchmarks.direct.continuation import largest_divergence
+from benchmarks.tables import markdown
+from smokelift.direct import Moment, Simulation, learnt_simulation
+from smokelift.direct.continuing import LEARNT_FROM
+from smokelift.direct.inflow import Inflow
+from smokelift.direct.physics import Physics
+from smokelift.evaluation.truth import Truth
+from smokelift.scene import SIDES
+from smokelift.transport import Velocity, project, without_divergence
+
+HEADER = ["scene", "speed", "divergence", "mass", "solves"]
+
+
+def fastest(moment: Moment) -> float:
+    """Return the largest speed on a face in m/s."""
+    return max(float(np.abs(component).max()) for component in moment.velocity.faces)
+
+
+def seconds(work: Callable[[], object]) -> float:
+    """Return the processor time of some work."""
+    began = time.process_time()
+    work()
+    return time.process_time() - began
+
+
+def sealed(simulation: Simulation, moment: Moment) -> tuple[Simulation, Moment]:
+    """Return the same without inlets and dissipation, in a box whose sides are closed."""
+    velocity = project(moment.velocity, closed=SIDES)
+    start = Moment(moment.density, Velocity(velocity.faces, velocity.voxel_size, velocity.closed))
+    nowhere = Inflow(np.zeros(moment.density.shape, bool), (start,))
+    return replace(simulation, physics=Physics(simulation.physics.buoyancy, 0.0), inflow=nowhere), start
+
+
+def row(name: str, truth: Truth, frames: int) -> list[str]:
+    """Return the figures of a scene."""
+    cut = 2 * truth.frames // 3
+    moments = [true_moment(truth, frame) for frame in range(max(1, cut - LEARNT_FROM), cut)]
+    simulation, moment = learnt_simulation(moments, truth.dt), moments[-1]
+    solve = min(seconds(lambda: without_divergence(moments[-1].velocity)) for _ in range(3))
+    before, speed, left, spent = max(map(fastest, moments)), 0.0, 0.0, 0.0
+    for step in range(1, frames + 1):
+        began = time.process_time()
+        moment = simulation.next(moment, step)
+        spent += time.process_time() - began
+        speed, left = max(speed, fastest(moment)), max(left, largest_divergence(moment))
+    shut, moment = sealed(simulation, moments[-1])
+    for step in range(1, frames + 1):
+        moment = shut.next(moment, step)
+    mass = moment.density.sum(dtype=float) / moments[-1].density.sum(dtype=float)
+    return [name, f"{speed / before:.2f}", f"{left:.0e}", f"{mass:.4f}", f"{spent / frames / solve:.1f}"]
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scenes", nargs="+", type=Path, metavar="SCENE")
+    parser.add_argument("--frames", type=int, default=100)
+    options = parser.parse_args()
+    rows = []
+    for scene in options.scenes:
+        truth = baked_scene(scene, 10**6).truth
+        if truth is None:
+            parser.error(f"{scene}: has no truth.npz")
+        rows.append(row(scene.name, truth, options.frames))
+        print(rows[-1], flush=True)
+    print(markdown(HEADER, rows), flush=True)
+
+
+if __name__ == "__main__":
+    main()
