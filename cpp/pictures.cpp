@@ -35,7 +35,7 @@ SMOKELIFT_INLINE Place place_of(const PictureMap &map, const PixelRow &line, int
     const double column = line.at(0, z) / safe - 0.5, row = line.at(1, z) / safe - 0.5;
     const bool inside =
         (column > -0.5) & (column < map.columns - 0.5) & (row > -0.5) & (row < map.rows - 0.5);
-    return {float(row), float(column), inside & (depth > 0)};
+    return {float(row), float(column), inside && depth > 0};
 }
 
 SMOKELIFT_INLINE int pixel(float place, int count) {
