@@ -8,6 +8,7 @@ import pytest
 
 from addon import look, volume
 from conftest import made, quietly, rendered
+from smokelift.output.vdb import vdb_module
 from smokelift.scene import Medium
 from tests.example_shot import add, add_camera, smoke
 
@@ -155,7 +156,7 @@ def test_fire_glows_where_a_file_has_it(lit, tmp_path, grid) -> None:
     volume.show(smoke(lit), made(tmp_path))
     assert rendered(lit, tmp_path / "dark.exr").max() == 0.0
     take = made(tmp_path, number=2)
-    openvdb = pytest.importorskip("openvdb")
+    openvdb = vdb_module()
     file = take.directory / "smoke_0003.vdb"
     grids, metadata = openvdb.readAll(str(file))
     density = next(each for each in grids if each.name == "density")
