@@ -84,7 +84,6 @@ def _projector(smoke: bpy.types.Object, index: dict[str, Any]) -> bpy.types.Obje
     lens.lens, lens.ortho_scale = table["fx"] * lens.sensor_width / longest, longest / table["fx"]
     lens.shift_x, lens.shift_y = (width / 2 - table["cx"]) / longest, (table["cy"] - height / 2) / longest
     poses = _poses(smoke, table)
-    poses = _poses(smoke, table)
     if len(poses) == 1:
         set_unless_changed(projector, "place", projector, "matrix_basis", poses[0])
     else:
