@@ -16,7 +16,7 @@ from benchmarks.stability.judge import files_of, verdict
 from benchmarks.stability.mutations import damaged_bytes, damaged_json, damaged_text, extreme_array
 from benchmarks.stability.recovery import recovered
 from benchmarks.stability.shot import TinyShot
-from smokelift_command import main
+from smokelift.app.cli import main
 
 INSPECT = ("inspect", "scene.toml", "--quality", "draft", "--device", "cpu")
 RENDER = ("render", "out", "--frame", "2", "--out", "new.png", "--device", "cpu")

@@ -53,7 +53,7 @@ def run(
     Parameters
     ----------
     command
-        Takes the words and returns the status; for example `smokelift_command.main`.
+        Takes the words and returns the status; for example `smokelift.app.cli.main`.
     words
         Of the command line.
     folder

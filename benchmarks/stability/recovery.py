@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import shutil
+import signal
 from collections.abc import Callable
+from collections.abc import Sequence as Words
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,10 +17,11 @@ from benchmarks.stability.environments import Environment
 from benchmarks.stability.forked import Ended, Limits, nothing, run
 from benchmarks.stability.judge import files_of, verdict
 from benchmarks.stability.shot import TinyShot
+from smokelift.app.cli import main
 from smokelift.output.index import SequenceError
 from smokelift.output.layout import INDEX
 from smokelift.output.sequence import Sequence
-from smokelift_command import main
+from smokelift_command import CANCELLED, Termination
 
 RECONSTRUCT = (
     *("reconstruct", "scene.toml", "--quality", "draft", "--device", "cpu"),
@@ -73,9 +76,18 @@ def recovered(
         return (again, wrong) if wrong else (ended, "")
 
 
+def _command(words: Words[str]) -> int:
+    """What `smokelift_command.main` does, but for loading the engine, which a failing system may not allow."""
+    signal.signal(signal.SIGTERM, Termination.handle)
+    try:
+        return main(words)
+    except KeyboardInterrupt:
+        return CANCELLED
+
+
 def _reconstruct(place: Path, begin: Callable[[], None], *words: str) -> Ended:
     """Run the command; what its events call an error counts as said on standard error."""
-    ended = run(main, (*RECONSTRUCT, *words), place, Limits(), begin)
+    ended = run(_command, (*RECONSTRUCT, *words), place, Limits(), begin)
     said = [event["text"] for event in _events(ended) if event["event"] == "error"]
     return replace(ended, errors="\n".join([*ended.errors.splitlines(), *said]))
 

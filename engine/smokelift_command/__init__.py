@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from collections.abc import Sequence
 from types import FrameType, TracebackType
 
 CANCELLED = 130
@@ -29,21 +28,15 @@ class Termination:
         raise KeyboardInterrupt
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Load the engine, run its command and return the exit status; see `smokelift.app.cli`.
-
-    Parameters
-    ----------
-    arguments
-        Words after the command; by default those of this process.
-    """
+def main() -> int:
+    """Load the engine, run its command and return the exit status; see `smokelift.app.cli`."""
     signal.signal(signal.SIGTERM, Termination.handle)
     # NumPy's OpenBLAS hangs where the system gives it no threads, and the engine computes in its own
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         from smokelift.app import cli
 
-        return cli.main(arguments)
+        return cli.main()
     except KeyboardInterrupt:
         pass
     except Exception:
