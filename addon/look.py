@@ -104,7 +104,7 @@ _INPUTS = (
     ("Albedo", "NodeSocketColor", (0.9, 0.9, 0.9, 1.0), None, None, "Scattered share of the extinction; fitted"),
     ("Edge Density", "NodeSocketFloat", 0.1, 1e-9, 1e9, "Density below which smoke is thin: an edge"),
     ("Flame Strength", "NodeSocketFloat", 1.0, 0.0, 1e6, "Light of the grid flame, if there is one"),
-    ("Flame Color", "NodeSocketColor", (1.0, 0.35, 0.08, 1.0), None, None, "Color of that light"),
+    ("Flame Color", "NodeSocketColor", (1.0, 0.35, 0.08, 1.0), None, None, "Color of that light; fitted to the clip"),
     ("Blackbody Intensity", "NodeSocketFloat", 1.0, 0.0, 1.0, "Glow of the grid temperature, if there is one"),
     ("Temperature", "NodeSocketFloat", BLACKBODY_KELVIN, 0.0, 1e5, "Kelvin that its value of 1 stands for"),
 )
@@ -139,6 +139,8 @@ def fit_look(volume: bpy.types.Volume, scene: dict[str, Any]) -> None:
         width = min(high - low for low, high in zip(domain["min"], domain["max"], strict=True))
         # smoke that could fill the box and would still let 1/e of the light through
         fitted["Edge Density"] = 1.0 / (medium["extinction"] * width)
+        if "flame_color" in medium:
+            fitted["Flame Color"] = (*medium["flame_color"], 1.0)
     else:
         fitted |= {"Density": medium["extinction"], "Color": albedo}
     for name, value in fitted.items():

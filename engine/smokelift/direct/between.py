@@ -38,17 +38,20 @@ def between(before: Moment, after: Moment, motion: Velocity, dt: float, share: f
     if share > 1 - RESOLVED:
         return after
     on_the_way = back(motion, motion, (1 - share) * dt)
-    densities = (
-        advect(before.density, on_the_way, share * dt, conserve=True),
-        back(after.density, on_the_way, (1 - share) * dt),
-    )
+
+    def carried(first: Array, second: Array) -> Array:
+        forwards = advect(first, on_the_way, share * dt, conserve=True)
+        return _mixed(forwards, back(second, on_the_way, (1 - share) * dt), share)
+
+    density = carried(before.density, after.density)
+    flame = None if before.flame is None or after.flame is None else carried(before.flame, after.flame)
     velocities = (
         advect(before.velocity, on_the_way, share * dt),
         back(after.velocity, on_the_way, (1 - share) * dt),
     )
     x, y, z = (_mixed(a, b, share) for a, b in zip(velocities[0].faces, velocities[1].faces, strict=True))
     velocity = project(before.velocity.with_faces((x, y, z)))
-    return Moment(_mixed(*densities, share), Velocity(velocity.faces, velocity.voxel_size, velocity.closed))
+    return Moment(density, Velocity(velocity.faces, velocity.voxel_size, velocity.closed), flame)
 
 
 def back(field: Carried, velocity: Velocity, dt: float) -> Carried:

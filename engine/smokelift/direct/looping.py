@@ -90,7 +90,7 @@ def loop_sequence(
                 start, end = read_moment(sequence, place), read_moment(sequence, place + length)
                 moment = seam(end, start, share, time_step(sequence) * (overlap + 1))
                 figures = simulated_figures(moment, began, "looped", {"place": place, "share": share})
-                writer.write(number, moment.density, moment.velocity.faces, figures)
+                writer.write(number, moment.density, moment.velocity.faces, figures, flame=moment.flame)
                 yield number, figures
             else:
                 yield write_copy(sequence, place, writer, number, {"place": place})

@@ -26,10 +26,13 @@ class Moment:
     density : (nx, ny, nz) float32
     velocity
         Without divergence, in m/s; it has carried the moment before to this one.
+    flame : (nx, ny, nz) float32, optional
+        Emission of fire; None without any.
     """
 
     density: Array
     velocity: Velocity
+    flame: Array | None = None
 
 
 def read_moment(sequence: Sequence, number: int) -> Moment:
@@ -41,7 +44,7 @@ def read_moment(sequence: Sequence, number: int) -> Moment:
         If there is no such frame, or its file is missing or damaged.
     """
     velocity = replace(sequence.staggered_velocity(number), closed=sequence.scene.closed)
-    return Moment(sequence.density(number), completed(velocity))
+    return Moment(sequence.density(number), completed(velocity), sequence.flame(number))
 
 
 def completed(velocity: Velocity) -> Velocity:

@@ -89,5 +89,5 @@ def retime_sequence(
             figures = simulated_figures(
                 replace(moment, velocity=faces), began, "retimed", {"place": place, "speed": speed}
             )
-            writer.write(number, moment.density, faces.faces, figures)
+            writer.write(number, moment.density, faces.faces, figures, flame=moment.flame)
             yield number, figures

@@ -99,7 +99,8 @@ def write_copy(
     """Write a frame of the clip as it is, under a number, with further figures."""
     figures = {**sequence.figures(place), "origin": "clip", **further}
     faces = sequence.staggered_velocity(place).faces
-    writer.write(number, sequence.density(place), faces, figures, ready=sequence.files(place))
+    density, flame = sequence.density(place), sequence.flame(place)
+    writer.write(number, density, faces, figures, ready=sequence.files(place), flame=flame)
     return number, {**figures, "seconds_density": 0.0, "seconds_velocity": 0.0}
 
 

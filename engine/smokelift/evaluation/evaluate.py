@@ -158,7 +158,7 @@ def _against_view(sequence: Sequence, view: ReferenceView, tiles: Tiles) -> Figu
     viewer = Viewer(sequence.scene, view.camera, view.background)
     means = PictureMeans(view.background)
     for number in sequence.frames:
-        pictures = view.picture(number), viewer.image(number, sequence.density(number))
+        pictures = view.picture(number), viewer.image(number, sequence.density(number), sequence.flame(number))
         means.add(pictures[1], pictures[0])
         if number in tiles:
             tiles[number] += [_fitted(eight_bit(picture)) for picture in pictures]

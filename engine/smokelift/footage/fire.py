@@ -15,7 +15,8 @@ from scipy import ndimage
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import Picture
 from smokelift.footage.matte import matte
-from smokelift.footage.plate import Plates
+from smokelift.footage.plate import Plate, Plates
+from smokelift.scene.checks import Vector
 
 BRIGHT = 0.5
 """Linear red that fire adds to what is behind it, at least: exposed for its surroundings it is clipped or nearly so."""
@@ -34,6 +35,12 @@ FAINTEST = 0.01
 
 GLOW = 0.01
 """Width of the edge that still glows, as a share of the picture's longer side."""
+
+CLIPPED = 0.95
+"""Linear value from which on a channel may have been larger."""
+
+COLOUR_FRAMES = 8
+"""Frames from which the colour of fire is taken, at most."""
 
 Mask = npt.NDArray[np.bool_]
 
@@ -67,20 +74,50 @@ def without_fire(clip: Clip, plates: Plates) -> Clip:
     plates
         Its backgrounds.
     """
+    return clip.changed(lambda number, picture: _doused(picture, plates.at(number)))
 
-    def doused(number: int, picture: Picture) -> Picture:
-        plate = plates.at(number)
-        smoke = matte(picture, plate).mask
-        fire = _fire(picture, plate.image, smoke)
-        if not fire.any():
-            return picture
-        beside = smoke & ~fire
-        if not beside.any():
-            return np.where(fire[..., None], plate.image, picture)
-        rows, columns = ndimage.distance_transform_edt(~beside, return_distances=False, return_indices=True)
-        return np.where(fire[..., None], picture[rows, columns], picture)
 
-    return clip.changed(doused)
+def firelight(clip: Clip, plates: Plates) -> Clip:
+    """Return a clip of the light that fire adds to `without_fire`; parameters as there.
+
+    A clipped pixel shows less than that.
+    """
+    return clip.changed(lambda number, picture: np.maximum(picture - _doused(picture, plates.at(number)), 0))
+
+
+def fire_colour(clip: Clip, light: Clip) -> Vector:
+    """Return the colour of the light of fire in a clip, the largest of red, green and blue 1.
+
+    That of the light in pixels that are not clipped (where there are none, in all), weighted by its brightness: what of
+    the smoke is mistaken for fire is as bright everywhere.
+
+    Parameters
+    ----------
+    clip, light
+        The clip, and its `firelight`, which is not zero everywhere.
+    """
+    whole, certain = np.zeros(3), np.zeros(3)
+    for number in clip.spread(COLOUR_FRAMES):
+        picture, added = clip.frame(number), light.frame(number)
+        weighted = added * added.max(-1, keepdims=True)
+        whole += weighted.sum((0, 1), dtype=np.float64)
+        certain += weighted[picture.max(-1) < CLIPPED].sum(0, dtype=np.float64)
+    total = certain if certain.any() else whole
+    red, green, blue = (float(value) for value in (total / total.max()).round(3))
+    return red, green, blue
+
+
+def _doused(picture: Picture, plate: Plate) -> Picture:
+    """A picture with the smoke beside fire continued over it; itself without any."""
+    smoke = matte(picture, plate).mask
+    fire = _fire(picture, plate.image, smoke)
+    if not fire.any():
+        return picture
+    beside = smoke & ~fire
+    if not beside.any():
+        return np.where(fire[..., None], plate.image, picture)
+    rows, columns = ndimage.distance_transform_edt(~beside, return_distances=False, return_indices=True)
+    return np.where(fire[..., None], picture[rows, columns], picture)
 
 
 def _hot(colours: Picture, behind: Picture) -> Mask:

@@ -25,6 +25,9 @@ LARGEST = 1e12
 VELOCITY = ("velocity_x", "velocity_y", "velocity_z")
 """Names of the components of a velocity on faces."""
 
+FLAME = "flame"
+"""Name of the emission of fire, which is there only where a clip shows fire."""
+
 MOST_VALUES = 2**32
 """Values of an array whose shape is not known before, at most."""
 

@@ -23,6 +23,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from smokelift.output.archive import FLAME
 from smokelift.output.atomic import atomic_path
 from smokelift.output.index import SequenceError
 from smokelift.output.layout import INDEX, frame_path
@@ -87,11 +88,6 @@ class ExportSettings:
         """Check the proxy."""
         if not 1 <= self.proxy <= 16:
             raise ValueError(f"the proxy must be 1 (none) to 16 times coarser, not {self.proxy}.")
-
-    @property
-    def grids(self) -> tuple[str, ...]:
-        """Names of the grids in the files."""
-        return ("density", "velocity") if self.velocity else ("density",)
 
 
 def export_sequence(sequence: Sequence, out: str | Path, settings: ExportSettings) -> Iterator[tuple[int, int]]:
@@ -192,13 +188,25 @@ def _write_frame(sequence: Sequence, number: int, out: Path, settings: ExportSet
     if settings.precision == "quantised":
         rho = _rounded(rho, density_step(domain, extinction))
         velocity = None if velocity is None else _rounded(velocity, velocity_step(domain, _fps(sequence)))
-    write_vdb(paths[0], rho, velocity, domain, sequence.settings)
+    flame = None
+    if FLAME in _grids(sequence, settings):
+        found = sequence.flame(number)
+        flame = np.zeros_like(rho) if found is None else found
+        if settings.precision == "quantised":
+            flame = _rounded(flame, density_step(domain, 1.0))  # radiance adds up along a ray as optical depth does
+    write_vdb(paths[0], rho, velocity, domain, sequence.settings, flame)
     if settings.proxy > 1:
         paths.append(out / proxy_name(number))
         coarse, wide = coarser(density, domain, settings.proxy)
         coarse = _rounded(_thinned(coarse, wide, extinction), density_step(wide, extinction))
         write_vdb(paths[1], coarse, None, wide, sequence.settings)
     return sum(path.stat().st_size for path in paths)
+
+
+def _grids(sequence: Sequence, settings: ExportSettings) -> tuple[str, ...]:
+    """Names of the grids in the files of all frames."""
+    burns = sequence.scene.medium.flame_color is not None
+    return ("density", *["velocity"] * settings.velocity, *[FLAME] * burns)
 
 
 def density_step(domain: Domain, extinction: float) -> float:
@@ -265,10 +273,10 @@ def _usd_volumes(sequence: Sequence, settings: ExportSettings) -> list[UsdVolume
     domain, numbers = sequence.scene.domain, sequence.frames
     files = {number: frame_path(Path(), number, "vdb").name for number in numbers}
     if settings.proxy == 1:
-        return [UsdVolume("Volume", "default", files, settings.grids, domain)]
+        return [UsdVolume("Volume", "default", files, _grids(sequence, settings), domain)]
     proxies = {number: proxy_name(number) for number in numbers}
     return [
-        UsdVolume("Volume", "render", files, settings.grids, domain),
+        UsdVolume("Volume", "render", files, _grids(sequence, settings), domain),
         UsdVolume("Proxy", "proxy", proxies, ("density",), domain),
     ]
 
@@ -277,7 +285,7 @@ def _note(sequence: Sequence, settings: ExportSettings) -> dict[str, Any]:
     domain = sequence.scene.domain
     return {
         "precision": settings.precision,
-        "grids": list(settings.grids),
+        "grids": list(_grids(sequence, settings)),
         "proxy": settings.proxy,
         "frames": [sequence.frames[0], sequence.frames[-1]],
         "fps": _fps(sequence),

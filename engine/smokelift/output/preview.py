@@ -54,8 +54,8 @@ def write_contact_sheet(path: Path, sequence: Sequence, clip: Clip, framing: Fra
     viewers = [Viewer(scene, orbit(camera, framing.box, angle), others if angle else own) for angle in SHEET_ANGLES]
     rows = []
     for number in numbers:
-        density = sequence.density(number)
-        rows.append([_filmed(clip, number, framing, camera), *(viewer.image(number, density) for viewer in viewers)])
+        volumes = sequence.density(number), sequence.flame(number)
+        rows.append([_filmed(clip, number, framing, camera), *(viewer.image(number, *volumes) for viewer in viewers)])
     titles = ["input", "reconstruction", *(_degrees(angle) for angle in SHEET_ANGLES[1:])]
     _write_pictures(path, rows, titles, [f"frame {number}" for number in numbers])
 
@@ -63,10 +63,11 @@ def write_contact_sheet(path: Path, sequence: Sequence, clip: Clip, framing: Fra
 def write_orbit(path: Path, sequence: Sequence, clip: Clip, framing: Framing) -> None:
     """Write one moment from twelve angles, as a PNG."""
     number = _late(sequence)
-    density, behind = sequence.density(number), _behind_others(sequence.scene, clip)
+    volumes = sequence.density(number), sequence.flame(number)
+    behind = _behind_others(sequence.scene, clip)
     camera = framing.camera(sequence.scene.camera.at(number - 1), SHEET_HEIGHT)
     viewers = [Viewer(sequence.scene, orbit(camera, framing.box, angle), behind) for angle in ORBIT_ANGLES]
-    pictures = [viewer.image(number, density) for viewer in viewers]
+    pictures = [viewer.image(number, *volumes) for viewer in viewers]
     firsts = range(0, len(pictures), ORBIT_COLUMNS)
     rows = [pictures[first : first + ORBIT_COLUMNS] for first in firsts]
     columns = [", ".join(map(_degrees, ORBIT_ANGLES[column::ORBIT_COLUMNS])) for column in range(ORBIT_COLUMNS)]
@@ -83,7 +84,7 @@ def write_strip(path: Path, sequence: Sequence, clip: Clip, framing: Framing) ->
     camera = framing.camera(scene.camera, SHEET_HEIGHT)
     viewer = Viewer(scene, orbit(camera, framing.box, SIDE), _behind_others(scene, clip))
     filmed = [_filmed(clip, number, framing, camera) for number in numbers]
-    turned = [viewer.image(number, sequence.density(number)) for number in numbers]
+    turned = [viewer.image(number, sequence.density(number), sequence.flame(number)) for number in numbers]
     titles = [f"frame {number}" for number in numbers]
     _write_pictures(path, [filmed, turned], titles, ["input", f"reconstruction from {_degrees(SIDE)}"])
 
@@ -102,9 +103,9 @@ def _turning(sequence: Sequence, clip: Clip, framing: Framing) -> Iterator[Image
     front = Viewer(scene, camera, _behind_own(scene, clip))
     around = Viewer(scene, turning, _behind_others(scene, clip))
     for number in frames:
-        density = sequence.density(number)
+        volumes = sequence.density(number), sequence.flame(number)
         filmed = _filmed(clip, number, framing, camera)
-        yield np.concatenate([filmed, front.image(number, density), around.image(number, density)], 1)
+        yield np.concatenate([filmed, front.image(number, *volumes), around.image(number, *volumes)], 1)
 
 
 def _behind_own(scene: CompleteScene, clip: Clip) -> Image | None:

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from smokelift.output.archive import VELOCITY, read_arrays
+from smokelift.output.archive import FLAME, VELOCITY, read_arrays
 from smokelift.output.checksum import checksum
 from smokelift.output.index import Index, SequenceError
 from smokelift.output.layout import INDEX, frame_path
-from smokelift.output.vdb import read_vdb
+from smokelift.output.vdb import read_flame, read_vdb
 from smokelift.output.viewer import Viewer
 from smokelift.render import Image
 from smokelift.scene import Camera, CompleteScene, Scene, completed, scene_from_dict
@@ -95,6 +95,21 @@ class Sequence:
             raise SequenceError(f"{self.directory}: frame {number} holds negative densities")
         return density
 
+    def flame(self, number: int) -> Array | None:
+        """Return the emission of fire in a frame, shape (nx, ny, nz), if its files hold one; else None.
+
+        It is radiance per metre, of the color ``scene.medium.flame_color``.
+
+        Raises
+        ------
+        SequenceError
+            If there is no such frame, its file is missing or damaged, or an emission is negative.
+        """
+        flame = self._read(number, FLAME).get(FLAME)
+        if flame is not None and flame.min() < 0:
+            raise SequenceError(f"{self.directory}: frame {number} holds a negative emission")
+        return flame
+
     def velocity(self, number: int) -> Array:
         """Return the velocity of a frame in m/s at voxel centres, shape (nx, ny, nz, 3).
 
@@ -166,7 +181,7 @@ class Sequence:
         SequenceError
             If there is no such frame, or its file is missing or damaged.
         """
-        return Viewer(self.scene, camera).image(number, self.density(number))
+        return Viewer(self.scene, camera).image(number, self.density(number), self.flame(number))
 
     def figures(self, number: int) -> Mapping[str, Any]:
         """Return what was noted about a frame.
@@ -190,7 +205,7 @@ class Sequence:
             raise SequenceError(f"{path}: is not the file that was written: it is damaged, or was changed since")
 
     def _read(self, number: int, *names: str) -> Mapping[str, Array]:
-        """The arrays of these names from a NumPy twin, or else density and velocity at centres from OpenVDB."""
+        """The arrays of these names from a NumPy twin, or else from OpenVDB; emission where it is there."""
         self._check(number)
         twin, grids = (frame_path(self.directory, number, kind) for kind in ("npz", "vdb"))
         shape = self.scene.domain.shape
@@ -201,7 +216,11 @@ class Sequence:
             self._check_sum(path)
             if path is twin:
                 shapes = {"density": shape, **dict(zip(VELOCITY, face_shapes(shape), strict=True))}
-                return read_arrays(path, {name: shapes[name] for name in names})
+                others = {FLAME: shape} if FLAME in names else None
+                return read_arrays(path, {name: shapes[name] for name in names if name != FLAME}, others=others)
+            if FLAME in names:
+                flame = read_flame(path, shape)
+                return {} if flame is None else {FLAME: flame}
             density, velocity = read_vdb(path, shape)
         except OSError as error:
             raise SequenceError(str(error)) from error

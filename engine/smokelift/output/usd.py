@@ -24,7 +24,7 @@ class UsdVolume:
     files
         Name of the OpenVDB file of every frame, by its number.
     grids
-        Names of the grids in the files, ``"density"`` and ``"velocity"`` if there is one.
+        Names of the grids in the files: ``"density"``, and ``"velocity"`` and ``"flame"`` if there are such.
     domain
         The box of the smoke.
     """

@@ -1,5 +1,7 @@
 """OpenVDB files as Blender expects them: a fog volume `density` and a vector grid `velocity` in m/s.
 
+Where a clip shows fire, a fog volume `flame` holds its emission, radiance per metre, in one channel.
+
 There is no standalone package of OpenVDB for Python. The vdb extra installs bpy, whose wheel contains one in a folder
 that is not on `sys.path`. bpy itself is never imported.
 
@@ -24,6 +26,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
+from smokelift.output.archive import FLAME
 from smokelift.output.atomic import atomic_path
 from smokelift.scene import Domain
 
@@ -92,11 +95,12 @@ def write_vdb(
     velocity_centres: npt.ArrayLike | None,
     domain: Domain,
     metadata: Mapping[str, Any] | None = None,
+    flame: npt.ArrayLike | None = None,
 ) -> None:
     """Write one frame; the file appears whole or not at all.
 
-    Values are stored as 16 bit floats, which have three digits; larger values are clipped. Density is stored where it
-    is not zero, velocity within `VELOCITY_MARGIN` voxels of that.
+    Values are stored as 16 bit floats, which have three digits; larger values are clipped. Density and emission are
+    stored where they are not zero, velocity within `VELOCITY_MARGIN` voxels of density.
 
     Parameters
     ----------
@@ -110,23 +114,20 @@ def write_vdb(
         Where the voxels lie.
     metadata
         Settings to keep with the density grid, as JSON can hold them.
+    flame
+        Emission, radiance per metre, shape (nx, ny, nz), not negative; None for a file without that grid.
 
     Raises
     ------
     ValueError
-        If a shape does not fit the domain, a value is not finite, or a density negative.
+        If a shape does not fit the domain, a value is not finite, or a density or an emission negative.
     VdbUnavailable
         If there is no OpenVDB module.
     OSError
         If the file cannot be written.
     """
     vdb = vdb_module()
-    # OpenVDB silently scrambles arrays of any other layout or type.
-    rho = np.ascontiguousarray(density, np.float32)
-    if rho.shape != domain.shape:
-        raise ValueError(f"density {rho.shape} does not fit the domain's {domain.shape} voxels")
-    if not np.isfinite(rho).all() or rho.min() < 0.0:
-        raise ValueError("density must be finite and not negative")
+    rho = checked_volume(density, domain.shape, "density")
     velocity = None if velocity_centres is None else np.ascontiguousarray(velocity_centres, np.float32)
     if velocity is not None and velocity.shape != (*domain.shape, 3):
         raise ValueError(f"velocity {velocity.shape} does not fit the domain's {domain.shape} voxels")
@@ -134,15 +135,15 @@ def write_vdb(
         raise ValueError("velocity must be finite")
 
     box = _around(rho > 0.0, VELOCITY_MARGIN)
-    corner = tuple(side.start for side in box)
-    rho = np.minimum(rho[box], _LIMIT)
-    density_grid = vdb.FloatGrid()
-    density_grid.copyFromArray(rho, ijk=corner)
-    density_grid.gridClass = vdb.GridClass.FOG_VOLUME
-    grids = {"density": density_grid}
+    rho_box, corner = rho[box], tuple(side.start for side in box)
+    grids = {"density": _fog(vdb, rho_box, corner)}
     if velocity is not None:
         grids["velocity"] = vdb.Vec3SGrid()
-        grids["velocity"].copyFromArray(_near(rho, velocity[box]), ijk=corner)
+        grids["velocity"].copyFromArray(_near(rho_box, velocity[box]), ijk=corner)
+    if flame is not None:
+        emission = checked_volume(flame, domain.shape, FLAME)
+        box = _around(emission > 0.0, 0)
+        grids[FLAME] = _fog(vdb, emission[box], tuple(side.start for side in box))
     h = domain.voxel_size
     x, y, z = (low + 0.5 * h for low in domain.min)
     for name, grid in grids.items():
@@ -153,13 +154,37 @@ def write_vdb(
         grid.prune(tolerance=grid.zeroValue)
         grid.transform = vdb.createLinearTransform([[h, 0, 0, 0], [0, h, 0, 0], [0, 0, h, 0], [x, y, z, 1]])
     if metadata is not None:
-        density_grid[SETTINGS] = json.dumps(dict(metadata), sort_keys=True)
+        grids["density"][SETTINGS] = json.dumps(dict(metadata), sort_keys=True)
     with atomic_path(path) as aside:
         try:
             vdb.write(str(aside), grids=list(grids.values()))
         except RuntimeError as error:
             raise OSError(f"{path}: cannot be written: {error}") from error
         _ensure_written(aside)
+
+
+def checked_volume(values: npt.ArrayLike, shape: tuple[int, int, int], name: str) -> Array:
+    """Return a volume as OpenVDB takes it, which silently scrambles arrays of any other layout or type.
+
+    Raises
+    ------
+    ValueError
+        With its name, if it has another shape, or holds values that are not finite or negative.
+    """
+    volume = np.ascontiguousarray(values, np.float32)
+    if volume.shape != shape:
+        raise ValueError(f"{name} {volume.shape} does not fit the domain's {shape} voxels")
+    if not np.isfinite(volume).all() or volume.min() < 0.0:
+        raise ValueError(f"{name} must be finite and not negative")
+    return volume
+
+
+def _fog(vdb: ModuleType, values: Array, corner: tuple[int, ...]) -> Any:
+    """A fog volume of values that begin at a voxel."""
+    grid = vdb.FloatGrid()
+    grid.copyFromArray(np.minimum(values, _LIMIT), ijk=corner)
+    grid.gridClass = vdb.GridClass.FOG_VOLUME
+    return grid
 
 
 def _near(rho: Array, velocity: Array) -> Array:
@@ -223,6 +248,27 @@ def read_vdb(path: str | Path, shape: tuple[int, int, int]) -> tuple[Array, Arra
     except (RuntimeError, LookupError, TypeError) as error:
         raise OSError(f"{path}: is damaged or lacks density or velocity: {error}") from error
     return density, velocity
+
+
+def read_flame(path: str | Path, shape: tuple[int, int, int]) -> Array | None:
+    """Read the emission that :func:`write_vdb` wrote, radiance per metre, shape (nx, ny, nz); None if it wrote none.
+
+    Raises
+    ------
+    OSError, VdbUnavailable
+        As :func:`read_vdb`.
+    """
+    vdb = vdb_module()
+    if not Path(path).is_file():
+        raise FileNotFoundError(f"{path}: no such file")
+    flame = np.zeros(shape, np.float32)
+    try:
+        if not any(grid.name == FLAME for grid in vdb.readAllGridMetadata(str(path))):
+            return None
+        vdb.read(str(path), gridname=FLAME).copyToArray(flame)
+    except (OSError, RuntimeError, LookupError, TypeError) as error:
+        raise OSError(f"{path}: is damaged: {error}") from error
+    return flame
 
 
 def read_settings(path: str | Path) -> dict[str, Any]:

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from functools import cached_property
 
+import numpy as np
+
 from smokelift.footage.background import background_picture, behind, open_plates
 from smokelift.render import Image, Renderer, Volume, scene_optics
+from smokelift.render.emission import emitted
 from smokelift.scene import Camera, CompleteScene, shared_part
 
 
@@ -33,13 +36,21 @@ class Viewer:
         self._moves = self._plates is not None or scene.camera.moves or self._camera.moves
         self._renderers: dict[int, Renderer] = {}
 
-    def image(self, number: int, density: Volume) -> Image:
-        """Render a density (nx, ny, nz) as a frame, from 1; linear radiance (rows, columns, 3)."""
+    def image(self, number: int, density: Volume, flame: Volume | None = None) -> Image:
+        """Render a density (nx, ny, nz) as a frame, from 1; linear radiance (rows, columns, 3).
+
+        The light of a flame (nx, ny, nz), radiance per metre, is added; that the smoke is lit by it is not shown.
+        """
         frame = number - 1 if self._moves else 0
         if frame not in self._renderers:
             renderer = self._optics.renderer(self._camera.at(frame), self._behind(frame))
             self._renderers = {frame: renderer}
-        return self._renderers[frame].image(density)
+        image = self._renderers[frame].image(density)
+        colour = self._scene.medium.flame_color
+        if flame is None or colour is None:
+            return image
+        light = emitted(flame, density, self._camera.at(frame), self._optics)
+        return np.asarray(image + light[..., None] * np.array(colour, np.float32))
 
     def background(self, number: int) -> Image:
         """What is behind the smoke in a frame, from 1; linear radiance (rows, columns, 3) or (3,)."""

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from smokelift.output.archive import VELOCITY, write_arrays
+from smokelift.output.archive import FLAME, VELOCITY, write_arrays
 from smokelift.output.atomic import atomic_path
 from smokelift.output.checksum import checksum
 from smokelift.output.images import write_image
@@ -27,7 +27,7 @@ from smokelift.output.index import DirectoryBusyError, Index, SequenceError, dif
 from smokelift.output.layout import BACKGROUND, INDEX, LOCK, RESUME, frame_path, is_foreign
 from smokelift.output.lock import Lock
 from smokelift.output.resume import ResumeState
-from smokelift.output.vdb import VdbUnavailable, vdb_module, write_vdb
+from smokelift.output.vdb import VdbUnavailable, checked_volume, vdb_module, write_vdb
 from smokelift.scene import Background, CompleteScene, scene_to_dict
 from smokelift.transport import Array, Faces, Velocity, face_shapes
 
@@ -152,6 +152,7 @@ class SequenceWriter:
         figures: Mapping[str, Any] | None = None,
         extra: Mapping[str, npt.ArrayLike] | None = None,
         ready: Mapping[str, Path] | None = None,
+        flame: npt.ArrayLike | None = None,
     ) -> None:
         """Write one frame and make it count.
 
@@ -169,12 +170,14 @@ class SequenceWriter:
             Further arrays that the next frame depends on, for :attr:`state`.
         ready
             Files that hold this frame already, by their kind ``"vdb"`` or ``"npz"``: they are copied.
+        flame : (nx, ny, nz), optional
+            Emission of fire, radiance per metre, not negative; None where there can be none.
 
         Raises
         ------
         ValueError
-            If a shape does not fit the domain, a value is not finite, a density negative, or the number out
-            of order.
+            If a shape does not fit the domain, a value is not finite, a density or an emission negative, or the
+            number out of order.
         SequenceError
             If the frame cannot be written; the finished ones stay.
         """
@@ -183,6 +186,7 @@ class SequenceWriter:
         if number < 0:
             raise ValueError(f"a frame's number must not be negative, as {number} is")
         rho, faces = _checked(density, velocity_faces, self._domain.shape)
+        fire = None if flame is None else checked_volume(flame, self._domain.shape, FLAME)
         self.state = None  # a run has gone on by now, and the arrays are large
         kept = {name: np.asarray(value) for name, value in (extra or {}).items()}
         state = ResumeState(number, rho, faces, kept)
@@ -193,7 +197,7 @@ class SequenceWriter:
                     with atomic_path(path) as aside:
                         shutil.copyfile(ready[kind], aside)
                 else:
-                    self._write_arrays(path, rho, faces)
+                    self._write_arrays(path, rho, faces, fire)
             frames = {**self._index.frames, str(number): plain(figures or {})}
             checksums = {**self._index.checksums, **{path.name: checksum([path]) for path in paths}}
             self._index = replace(self._index, frames=frames, checksums=checksums)
@@ -203,12 +207,13 @@ class SequenceWriter:
         except OSError as error:
             raise self._failed(f"frame {number}", error) from error
 
-    def _write_arrays(self, path: Path, density: Array, faces: Faces) -> None:
+    def _write_arrays(self, path: Path, density: Array, faces: Faces, flame: Array | None) -> None:
         if path.suffix == ".npz":
-            write_arrays(path, {"density": density, **dict(zip(VELOCITY, faces, strict=True))})
+            fire = {} if flame is None else {FLAME: flame}
+            write_arrays(path, {"density": density, **dict(zip(VELOCITY, faces, strict=True)), **fire})
         else:
             centres = Velocity(faces, self._domain.voxel_size).centres()
-            write_vdb(path, density, centres, self._domain, self._index.settings)
+            write_vdb(path, density, centres, self._domain, self._index.settings, flame)
 
     def _take_over(self) -> None:
         """Judge what is in the directory, and read what can be gone on from."""

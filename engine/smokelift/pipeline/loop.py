@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from smokelift.density import Density, ViewSet
+from smokelift.density.flame import flame_emission
 from smokelift.density.hull import project_voxels
 from smokelift.footage.clip import Clip
 from smokelift.output.resume import ResumeState
@@ -51,6 +52,9 @@ class Frame:
         it.
     steady : (nx, ny, nz) float32, optional
         What the next frame carries along, if not the density: see `smokelift.density.Density`.
+    flame : (nx, ny, nz) float32, optional
+        Emission of fire, radiance per metre of the color ``flame_color`` of the scene's medium; None where the clip
+        shows no fire.
     """
 
     number: int
@@ -59,6 +63,7 @@ class Frame:
     figures: Mapping[str, Any]
     smooth: Volume | None = None
     steady: Volume | None = None
+    flame: Volume | None = None
 
 
 def reconstruct(
@@ -124,7 +129,9 @@ def reconstruct(
         start = None if writer.state is None else _resumed(writer.state, shot)
         for frame in _frames(shot, method, start):
             if frame.number not in writer.finished:
-                writer.write(frame.number, frame.density, frame.velocity.faces, frame.figures, _kept(frame))
+                writer.write(
+                    frame.number, frame.density, frame.velocity.faces, frame.figures, _kept(frame), flame=frame.flame
+                )
                 yield frame
 
 
@@ -170,6 +177,7 @@ def _frame(index: int, before: Frame | None, shot: Shot, method: Method) -> Fram
         moved = before.density if before.steady is None else before.steady
         carried = advect(moved, predicted, dt, conserve=shot.moves)
     density, taken_over = _density(index, before, carried, shot, method)
+    flame = _flame(index, density.values, shot)
     fitted = time.perf_counter()
     velocity = Velocity.zero(domain.resolution, domain.voxel_size, shot.scene.closed)
     if before is not None:
@@ -190,7 +198,7 @@ def _frame(index: int, before: Frame | None, shot: Shot, method: Method) -> Fram
         "seconds_density": fitted - began,
         "seconds_velocity": done - fitted,
     }
-    return Frame(index + 1, density.values, velocity, figures, density.smooth, density.steady)
+    return Frame(index + 1, density.values, velocity, figures, density.smooth, density.steady, flame)
 
 
 def _measured(before: Frame, density: Density) -> tuple[Volume, Volume]:
@@ -218,6 +226,17 @@ def _density(
         visible = project_voxels(observations[0].camera, shot.optics.domain).visible
         density = replace(density, values=np.where(visible, density.values, carried), steady=None)
     return density, start.figures
+
+
+def _flame(index: int, density: Volume, shot: Shot) -> Volume | None:
+    """The emission in a frame; None for a clip without fire."""
+    if shot.fire is None:
+        return None
+    seen, colour = shot.observe_fire(index), np.array(shot.scene.medium.flame_color, np.float32)
+    if seen is None:
+        return np.zeros_like(density)
+    # least squares over the channels
+    return flame_emission(seen.image @ colour / (colour @ colour), seen.camera, density, shot.optics)
 
 
 def _unseen(domain: Domain, carried: Volume | None) -> Density:

@@ -31,12 +31,16 @@ class Medium:
     color
         Colour of the smoke itself, red, green and blue from 0 to 1: ``albedo`` times it is the albedo of each.
         Extinction is the same for all.
+    flame_color
+        Colour of the light of fire in the smoke, as ``color``: the emission in the grid ``flame`` times it is the
+        radiance per metre of each. Found in the clip where that shows fire; without fire it changes nothing.
     """
 
     extinction: float = 5.0
     albedo: float = 0.9
     anisotropy: float = 0.0
     color: Vector = (1.0, 1.0, 1.0)
+    flame_color: Vector | None = None
 
     def __post_init__(self) -> None:
         """Check every value."""
@@ -46,6 +50,7 @@ class Medium:
             albedo=number(self.albedo, "albedo", "a number from 0 to 1", lambda v: 0.0 <= v <= 1.0),
             anisotropy=number(self.anisotropy, "anisotropy", "a number between -1 and 1", lambda v: -1.0 < v < 1.0),
             color=_share(self.color, "color"),
+            flame_color=None if self.flame_color is None else _share(self.flame_color, "flame_color"),
         )
 
     @property

@@ -11,12 +11,13 @@ from typing import Any
 
 from smokelift.density.axis import SmokeAxis
 from smokelift.footage.clip import Clip
-from smokelift.footage.fire import fire_share, without_fire
+from smokelift.footage.fire import fire_colour, fire_share, firelight, without_fire
 from smokelift.footage.plate import Plate
 from smokelift.footage.steady import steady
 from smokelift.footage.working_picture import CameraError, WorkingPicture, working_picture
 from smokelift.render import scene_optics
 from smokelift.scene import Background, Camera, CompleteScene, Domain, Medium, Scene
+from smokelift.scene.checks import Vector
 from smokelift.setup.background import exposure_notes, find_plates, smoke_in_plate
 from smokelift.setup.choice import Choice
 from smokelift.setup.further_views import disagreement, open_view
@@ -60,7 +61,10 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
     samples = sample_smoke(clip, plates, found.turns)
     clip = steady(clip, plates)
     burning = fire_share(samples.colours, samples.behind)
+    fire = None
     if burning:
+        fire = firelight(clip, plates)
+        glow = fire_colour(clip, fire)
         clip = without_fire(clip, plates)
         samples = replace(sample_smoke(clip, plates, found.turns), exposure=samples.exposure)
     geometry = find_geometry(clip, scene, settings, plates, samples, found.turns)
@@ -70,8 +74,6 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
     if settings.axis_depth is not None:
         SmokeAxis.given(settings.axis_depth, camera, domain)  # refuse early what cannot be
     choices: tuple[Choice[Any], ...] = () if geometry.resolution is None else (geometry.resolution,)
-    if burning:
-        choices += (_fire(burning),)
     medium = scene.medium
     if medium is None:
         usual = _usual_medium(domain)
@@ -82,6 +84,10 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
             f"Medium not given: extinction {medium.extinction:.3g} 1/m (density 1 is thick smoke), "
             f"albedo {medium.albedo:g}, isotropic."
         )
+    if fire is not None:
+        told = medium.flame_color
+        medium = replace(medium, flame_color=told or glow)
+        choices += (_fire(burning, told or glow, told is not None),)
     asked = scene.scattering if settings.scattering == "auto" else settings.scattering
     lights, richest = scene.lights, richest_scattering(asked, scene.lights, medium)
     if not lights and richest != "absorption":
@@ -129,6 +135,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
         exposure=samples.exposure,
         smoky=samples.smoky,
         place=None,
+        fire=None if fire is None else replace(views[0], clip=fire),
     )
     return replace(shot, notes=(*notes, *disagreement(shot))) if scene.views else placed(shot)
 
@@ -169,12 +176,14 @@ def _check(clip: Clip, scene: Scene) -> None:
         )
 
 
-def _fire(share: float) -> Choice[str]:
+def _fire(share: float, colour: Vector, told: bool) -> Choice[str]:
+    red, green, blue = colour
     reason = (
-        f"Fire: {share:.1%} of the smoke's pixels shine by themselves. No flame is reconstructed; the smoke beside it "
-        "is continued over it."
+        f"Fire: {share:.1%} of the smoke's pixels shine by themselves. The grid flame holds their light, of the "
+        f"color {red:g}, {green:g}, {blue:g}{' that is given' if told else ''}; the smoke beside it is continued over "
+        "it."
     )
-    return Choice("fire", f"{share:.3f}", reason, {"share": share})
+    return Choice("fire", f"{share:.3f}", reason, {"share": share, "red": red, "green": green, "blue": blue})
 
 
 def _usual_medium(domain: Domain) -> Medium:

@@ -61,6 +61,15 @@ def provenance(shot: Shot) -> tuple[Provenance, ...]:
         ),
         Provenance("distribution along the rays", "assumed", _assumed(settings, cameras)),
     ]
+    if shot.fire is not None:
+        told.append(
+            Provenance(
+                "emission of fire",
+                "assumed",
+                "Along each ray of the camera it adds up to the light that fire adds to the picture; a flame is taken "
+                "to be as deep as it is wide, in the middle of the smoke, of one color.",
+            )
+        )
     if settings.detail > 0 and _unseen(shot):
         told.append(
             Provenance(

@@ -83,6 +83,8 @@ class Shot:
     place
         Where in depth the smoke was found to stand; None where it is told, or seen by several cameras or one
         that travels.
+    fire
+        The input with the light that fire adds to it as its clip, in the place of smoke; None where none was found.
     """
 
     scene: CompleteScene
@@ -95,6 +97,7 @@ class Shot:
     exposure: float
     smoky: tuple[int, ...]
     place: AxisEstimate | None
+    fire: ShotView | None = None
 
     @property
     def clip(self) -> Clip:
@@ -124,3 +127,7 @@ class Shot:
         """What the cameras saw in a frame, from 0, the input's first; empty if it shows nothing of the domain."""
         seen = [view.observe(frame, self.optics.domain) for view in self.views]
         return tuple(observation for observation in seen if observation is not None)
+
+    def observe_fire(self, frame: int) -> Observation | None:
+        """What the input's camera saw of fire in a frame, from 0, in place of smoke; None without fire or domain."""
+        return None if self.fire is None else self.fire.observe(frame, self.optics.domain)

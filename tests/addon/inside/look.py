@@ -167,6 +167,25 @@ def test_fire_glows_where_a_file_has_it(lit, tmp_path, grid) -> None:
     assert rendered(lit, tmp_path / "fire.exr").max() > 0.01
 
 
+def test_fire_is_as_bright_as_the_grid_says_in_the_color_of_the_clip(lit, tmp_path) -> None:
+    """Radiance per metre: 4 of it along 0.25 m are 1, in smoke that hides nothing."""
+    lit.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0.0
+    bpy.data.objects["Sun"].hide_render = True
+    take = made(tmp_path, medium=Medium(1e-4, 0.8, flame_color=(1.0, 0.4, 0.1)))
+    file = take.directory / "smoke_0003.vdb"
+    grids, metadata = vdb_module().readAll(str(file))
+    flame = next(each for each in grids if each.name == "density").deepCopy()
+    flame.name = "flame"
+    vdb_module().write(str(file), [*grids, flame], metadata)
+    volume.show(smoke(lit), take)
+    assert node(lit).inputs["Flame Color"].default_value[:] == pytest.approx((1.0, 0.4, 0.1, 1.0))
+    seen = rendered(lit, tmp_path / "fire.exr")
+    np.testing.assert_allclose(seen[3:5, 3:5].mean((0, 1)), (1.0, 0.4, 0.1), rtol=0.03)
+    node(lit).inputs["Flame Color"].default_value = (0.0, 0.0, 1.0, 1.0)
+    volume.show(smoke(lit), made(tmp_path, medium=Medium(1.0, 0.8, flame_color=(1.0, 0.5, 0.2)), number=2))
+    assert node(lit).inputs["Flame Color"].default_value[:] == (0.0, 0.0, 1.0, 1.0)
+
+
 def test_a_material_of_an_earlier_version_looks_the_same_with_our_group(lit, tmp_path) -> None:
     """It takes the group when its file is opened, with what the artist had changed."""
     obj = volume.show(smoke(lit), made(tmp_path, medium=MEDIUM))

@@ -78,3 +78,12 @@ def test_a_sequence_at_half_its_speed(tmp_path):
     masses = [slow.figures(number)["mass"] for number in (3, 4, 5)]
     assert masses[1] == pytest.approx((masses[0] + masses[2]) / 2, rel=0.02)
     assert max(slow.figures(number)["divergence"] for number in slow.frames) < 1e-3
+
+
+def test_a_flame_is_carried_as_the_smoke_is():
+    way = 2 * DOMAIN.voxel_size
+    velocity = moving(way / DT)
+    first, last = (Moment(blob((x, 0, 1)), velocity, 3 * blob((x, 0, 1))) for x in (-0.2, -0.2 + way))
+    found = between(first, last, velocity, DT, 0.5)
+    np.testing.assert_allclose(found.flame, 3 * found.density, rtol=1e-4, atol=1e-5)
+    assert between(first, Moment(last.density, velocity), velocity, DT, 0.5).flame is None

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from smokelift.footage.clip import Clip
-from smokelift.footage.fire import fire_share, without_fire
+from smokelift.footage.fire import fire_colour, fire_share, firelight, without_fire
 from smokelift.footage.plate import known_plate
 from smokelift.output.images import write_image
 
@@ -68,3 +68,22 @@ def test_smoke_is_continued_over_fire_and_stays_elsewhere(tmp_path: Path) -> Non
     assert seen.max() < 2 * SMOKE
     assert seen[46, 32].min() > 0.2 * SMOKE
     np.testing.assert_array_equal(seen[:20], before[:20])
+
+
+def test_the_light_of_fire_is_what_it_adds_to_the_smoke(tmp_path: Path) -> None:
+    """Where it is and nowhere else, in its own colour; the smoke that is continued is thinner than that in the fire."""
+    for number in range(3):
+        write_image(tmp_path / f"fire_{number:02d}.exr", picture(number))
+    with Clip.open(tmp_path / "fire_##.exr") as clip:
+        light = firelight(clip, known_plate(np.zeros(3), clip))
+        assert fire_colour(clip, light) == pytest.approx(FLAME, abs=0.04)
+        added = light.frame(1)
+        np.testing.assert_allclose(added[44, 32], picture(1)[44, 32] - SMOKE, atol=0.045)
+        assert not added[:20].any() and added.min() == 0
+
+
+def test_light_that_is_clipped_all_over_has_the_colour_that_is_seen(tmp_path: Path) -> None:
+    for name, level in (("clip", 1.0), ("light", 0.8)):
+        write_image(tmp_path / f"{name}.exr", np.full((4, 4, 3), level, np.float32) * np.float32((1, 0.5, 0.25)))
+    with Clip.open(tmp_path / "clip.exr") as clip, Clip.open(tmp_path / "light.exr") as light:
+        assert fire_colour(clip, light) == pytest.approx((1, 0.5, 0.25), abs=1e-3)

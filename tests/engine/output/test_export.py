@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -141,3 +142,19 @@ def test_without_a_module_it_is_said(sequence: Sequence, tmp_path: Path) -> None
 def test_a_proxy_is_coarser() -> None:
     with pytest.raises(ValueError, match=r"1 .none. to 16"):
         ExportSettings(proxy=0)
+
+
+@needs_vdb
+@pytest.mark.parametrize("precision", ["half", "quantised"])
+def test_fire_is_exported(tmp_path: Path, precision: str) -> None:
+    """In every frame of a clip with fire, also in those of which none is known."""
+    burning = replace(SCENE, medium=replace(SCENE.medium, flame_color=(1.0, 0.4, 0.1)))
+    flame = frame(7)[0]
+    with SequenceWriter(tmp_path / "smoke", burning, SETTINGS, npz=True) as writer:
+        writer.write(1, *frame(1), flame=flame)
+        writer.write(2, *frame(2))
+    exported(Sequence.open(tmp_path / "smoke"), tmp_path / "out", precision=precision)
+    np.testing.assert_allclose(vdb.read_flame(tmp_path / "out" / "smoke_0001.vdb", DOMAIN.shape), flame, atol=4e-3)
+    assert set(grids(tmp_path / "out" / "smoke_0002.vdb")) == {"density", "velocity", "flame"}
+    assert 'OpenVDBAsset "flame"' in (tmp_path / "out" / "smoke.usda").read_text()
+    assert json.loads((tmp_path / "out" / "export.json").read_text())["grids"] == ["density", "velocity", "flame"]

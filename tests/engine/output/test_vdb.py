@@ -57,6 +57,27 @@ def test_grids_are_what_blender_expects(tmp_path: Path) -> None:
 
 
 @needs_vdb
+def test_a_flame_comes_back(tmp_path: Path) -> None:
+    """Also where there is no smoke; a file without one says so."""
+    density, velocity = frame()
+    flame = np.roll(density, (8, 0, 7), (0, 1, 2))
+    vdb.write_vdb(tmp_path / "a.vdb", density, velocity, DOMAIN, flame=flame)
+    np.testing.assert_allclose(vdb.read_flame(tmp_path / "a.vdb", DOMAIN.shape), flame, rtol=1e-3, atol=1e-7)
+    np.testing.assert_allclose(vdb.read_vdb(tmp_path / "a.vdb", DOMAIN.shape)[0], density, rtol=1e-3, atol=1e-7)
+    vdb.write_vdb(tmp_path / "a.vdb", density, velocity, DOMAIN, flame=0 * flame)
+    assert not vdb.read_flame(tmp_path / "a.vdb", DOMAIN.shape).any()
+    vdb.write_vdb(tmp_path / "a.vdb", density, velocity, DOMAIN)
+    assert vdb.read_flame(tmp_path / "a.vdb", DOMAIN.shape) is None
+    with pytest.raises(ValueError, match="flame must be finite and not negative"):
+        vdb.write_vdb(tmp_path / "a.vdb", density, velocity, DOMAIN, flame=-flame)
+    with pytest.raises(FileNotFoundError, match="no such file"):
+        vdb.read_flame(tmp_path / "b.vdb", DOMAIN.shape)
+    (tmp_path / "a.vdb").write_bytes(b"nonsense")
+    with pytest.raises(OSError, match="is damaged"):
+        vdb.read_flame(tmp_path / "a.vdb", DOMAIN.shape)
+
+
+@needs_vdb
 def test_density_alone(tmp_path: Path) -> None:
     density, _ = frame()
     vdb.write_vdb(tmp_path / "a.vdb", density, None, DOMAIN)

@@ -70,3 +70,14 @@ def test_a_moving_camera_is_no_picture_of_its_own(plume, tracked) -> None:
     """Which frame's is meant has to be said."""
     with pytest.raises(ValueError, match=r"camera\.at\(frame\)"):
         render(plume.densities[0], tracked)
+
+
+def test_a_flame_adds_its_light(plume) -> None:
+    """In its color and behind the smoke; a scene without that color shows none."""
+    scene = completed(replace(plume.scene, medium=replace(plume.scene.medium, flame_color=(1.0, 0.5, 0.0))))
+    flame = 4 * np.roll(plume.densities[2], -4, 2)
+    dark, lit = (Viewer(scene).image(3, plume.densities[2], each) for each in (None, flame))
+    red, green, blue = np.moveaxis(lit - dark, -1, 0)
+    assert red.max() > 0.05 and not blue.any()
+    np.testing.assert_allclose(green, red / 2, atol=1e-6)
+    np.testing.assert_array_equal(Viewer(completed(plume.scene)).image(3, plume.densities[2], flame), dark)

@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 from small_sequence import SCENE, SETTINGS, frame, has_vdb, names, write
 
+from smokelift.output.archive import VELOCITY
 from smokelift.output.index import SequenceError
 from smokelift.output.resume import ResumeState
 from smokelift.output.sequence import Sequence
@@ -371,3 +372,29 @@ def test_frames_must_fit_and_follow(tmp_path: Path, no_vdb: None) -> None:
             with pytest.raises(ValueError, match=r"follow|negative|finite|shapes"):
                 writer.write(*bad)
     assert Sequence.open(tmp_path).frames == (5,)
+
+
+def test_a_flame_is_kept_and_read(tmp_path: Path, no_vdb: None) -> None:
+    """In the frames that have one; a bad one is refused."""
+    flame = frame(5)[0]
+    with SequenceWriter(tmp_path, SCENE, SETTINGS, npz=True) as writer:
+        writer.write(1, *frame(1), flame=flame)
+        writer.write(2, *frame(2))
+        for bad, reason in ((flame[1:], "does not fit"), (-flame, "not negative"), (flame * np.nan, "finite")):
+            with pytest.raises(ValueError, match=f"flame .*{reason}"):
+                writer.write(3, *frame(3), flame=bad)
+    sequence = Sequence.open(tmp_path)
+    np.testing.assert_array_equal(sequence.flame(1), flame)
+    assert sequence.flame(2) is None
+    np.testing.assert_array_equal(sequence.density(1), frame(1)[0])
+
+
+def test_a_negative_flame_is_not_read(tmp_path: Path, no_vdb: None) -> None:
+    write(tmp_path, [1])
+    rho, faces = frame(1)
+    arrays = {"density": rho, **dict(zip(VELOCITY, faces, strict=True)), "flame": -rho}
+    np.savez(tmp_path / "smoke_0001.npz", **arrays)
+    index = json.loads((tmp_path / "sequence.json").read_text())
+    (tmp_path / "sequence.json").write_text(json.dumps({**index, "checksums": {}}))
+    with pytest.raises(SequenceError, match="negative emission"):
+        Sequence.open(tmp_path).flame(1)

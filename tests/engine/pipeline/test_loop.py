@@ -25,12 +25,23 @@ from smokelift.output.sequence import Sequence
 from smokelift.output.vdb import VdbUnavailable, read_vdb, vdb_module
 from smokelift.pipeline import Frame, Method, compose, reconstruct
 from smokelift.render import render, scene_renderer
-from smokelift.scene import Background, ClipSource, Inlet, Medium, PointLight, Scene, completed, look_at_matrix
+from smokelift.scene import (
+    Background,
+    ClipSource,
+    DirectionalLight,
+    Inlet,
+    Medium,
+    PointLight,
+    Scene,
+    completed,
+    look_at_matrix,
+)
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
 from smokelift.transport import Velocity
 from smokelift.velocity import CoarseToFine
+from tests.engine.setup.shots import burning
 
 
 def frames_of(scene: Scene, settings: Settings, out: Path | None = None, **options: Any) -> list[Frame]:
@@ -592,3 +603,20 @@ def test_transport_keeps_the_mass_of_every_height(plume, draft) -> None:
     for one, other in zip(alone, carried, strict=True):
         expected, found = one.density.sum((0, 1)), other.density.sum((0, 1))
         assert np.abs(found - expected).sum() < 0.1 * expected.sum()
+
+
+def test_fire_is_a_second_grid(plume, draft, tmp_path) -> None:
+    """It shows what it adds to the pictures, and is written; without fire there is none."""
+    dim = replace(plume.scene, lights=(DirectionalLight((0.3, 0.5, -0.8), (0.6, 0.6, 0.6)),))
+    scene = replace(plume.write(tmp_path / "clip", plume.densities[:2], dim), lights=())
+    with Clip.open(scene.clip) as clip:
+        burnt = clip.changed(burning)
+        frames = list(reconstruct(burnt, scene, draft, tmp_path / "out", npz=True))
+        sequence = Sequence.open(tmp_path / "out")
+        for frame in frames:
+            np.testing.assert_array_equal(sequence.flame(frame.number), frame.flame)
+            fire = burnt.frame(frame.number - 1)[..., 0] > 0.5
+            error = np.abs(sequence.render(frame.number) - burnt.frame(frame.number - 1))[fire]
+            assert error.mean() < 0.1 * burnt.frame(frame.number - 1)[fire].mean()
+        assert all(part.flame is None for part in reconstruct(clip, scene, draft))
+    assert any(part["what"] == "emission of fire" for part in sequence.provenance)

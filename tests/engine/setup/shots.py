@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from smokelift.footage.clip import Clip
 from smokelift.scene import Scene
 from smokelift.setup.prepare import prepare_shot
@@ -14,3 +16,11 @@ def shot_of(scene: Scene, settings: Settings) -> Shot:
     assert scene.clip is not None
     with Clip.open(scene.clip) as clip:
         return prepare_shot(clip, scene, settings)
+
+
+def burning(number: int, picture: np.ndarray) -> np.ndarray:
+    """A picture with a small flame where most smoke is."""
+    rows, columns = np.indices(picture.shape[:2])
+    row, column = np.unravel_index(np.argmax(picture.sum(-1)), rows.shape)
+    flame = np.exp(-(((rows - row) / 2) ** 2) - ((columns - column) / 2) ** 2)[..., None]
+    return picture + np.float32((1, 0.4, 0.08)) * flame.astype(np.float32)

@@ -31,7 +31,7 @@ from smokelift.setup.geometry import COARSEST
 from smokelift.setup.prepare import boundaries, prepare_shot
 from smokelift.setup.settings import LONGEST_SIDE, Settings
 from smokelift.setup.shot import Shot
-from tests.engine.setup.shots import shot_of
+from tests.engine.setup.shots import burning, shot_of
 
 
 def bare(scene: Scene) -> Scene:
@@ -454,14 +454,6 @@ def test_a_camera_that_shakes_is_steadied(draft, tmp_path) -> None:
     assert shot.estimated_background is None
 
 
-def burning(number: int, picture: np.ndarray) -> np.ndarray:
-    """A picture with a small flame where most smoke is."""
-    rows, columns = np.indices(picture.shape[:2])
-    row, column = np.unravel_index(np.argmax(picture.sum(-1)), rows.shape)
-    flame = np.exp(-(((rows - row) / 2) ** 2) - ((columns - column) / 2) ** 2)[..., None]
-    return picture + np.float32((1, 0.4, 0.08)) * flame.astype(np.float32)
-
-
 def test_fire_is_said_and_does_not_light_the_smoke(plume, draft, tmp_path) -> None:
     """Dark smoke with a flame in it, and the same without one."""
     dim = replace(plume.scene, lights=(DirectionalLight((0.3, 0.5, -0.8), (0.6, 0.6, 0.6)),))
@@ -471,4 +463,20 @@ def test_fire_is_said_and_does_not_light_the_smoke(plume, draft, tmp_path) -> No
     assert not any(choice.what == "fire" for choice in without.choices)
     (said,) = [choice.reason for choice in with_fire.choices if choice.what == "fire"]
     assert re.match(r"Fire: \d+\.\d% of the smoke's pixels shine by themselves", said)
+    assert "of the color 1, 0.4" in said
+    assert without.fire is None and without.scene.medium.flame_color is None
+    assert with_fire.observe_fire(2).image.max() > 0.5 and without.observe_fire(2) is None
+    red, green, blue = with_fire.scene.medium.flame_color
+    assert (red, green) == (1, pytest.approx(0.4, abs=0.05)) and blue < 0.2
     assert with_fire.optics.unshadowed_source().max() < 3 * without.optics.unshadowed_source().max()
+
+
+def test_a_color_of_fire_that_is_given_is_taken(plume, draft, tmp_path) -> None:
+    dim = replace(plume.scene, lights=(DirectionalLight((0.3, 0.5, -0.8), (0.6, 0.6, 0.6)),))
+    told = replace(dim, medium=replace(dim.medium, flame_color=(1.0, 0.5, 0.2)))
+    scene = plume.write(tmp_path, plume.densities, told)
+    with Clip.open(scene.clip) as clip:
+        shot = prepare_shot(clip.changed(burning), scene, draft)
+    assert shot.scene.medium.flame_color == (1.0, 0.5, 0.2)
+    (said,) = [choice.reason for choice in shot.choices if choice.what == "fire"]
+    assert "of the color 1, 0.5, 0.2 that is given" in said

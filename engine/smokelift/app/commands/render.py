@@ -48,7 +48,8 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         numbers = sequence.frames if options.frame is None else (options.frame,)
         viewer = Viewer(scene, camera)
         fps = (scene.clip.fps if scene.clip else None) or USUAL_FPS
-        write_video(options.out, (viewer.image(number, sequence.density(number)) for number in numbers), fps)
+        volumes = ((number, sequence.density(number), sequence.flame(number)) for number in numbers)
+        write_video(options.out, (viewer.image(*each) for each in volumes), fps)
     else:
         number = sequence.frames[0] if options.frame is None else options.frame
         write_image(options.out, sequence.render(number, camera))

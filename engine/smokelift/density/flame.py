@@ -1,0 +1,103 @@
+"""Flame from one picture: where in the smoke its light comes from.
+
+The picture shows the integral of the emission along each ray, less what the smoke before it takes away. As with smoke
+it says nothing of the depth, so that the same is assumed: a flame is as deep as it is wide
+(`smokelift.density.profile`), about the middle of the smoke at its height. From there maximum likelihood expectation
+maximisation (Shepp and Vardi 1982) scales the emission until it shows the picture: what is not negative stays so, and
+the distribution along a ray stays about what it was. Figures: docs/experiments/fire.md.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage, sparse
+
+from smokelift.density.axis import SmokeAxis
+from smokelift.density.hull import project_voxels, visual_hull
+from smokelift.density.profile import DepthProfile
+from smokelift.density.screen import view_frame
+from smokelift.render import Optics, Volume
+from smokelift.render.emission import emission_matrix
+from smokelift.scene import Camera, Domain
+
+ITERATIONS = 30
+"""Of the scaling, at most."""
+
+EXACT = 0.01
+"""Difference from the picture, as a share of its sum, at which the scaling stops."""
+
+FAINTEST = 1e-3
+"""Share of a profile's peak below which nothing burns."""
+
+SMOOTHING = 2.0
+"""Standard deviation, in voxels, over which the middle of the smoke is averaged along its height."""
+
+
+def flame_emission(light: NDArray[np.float32], camera: Camera, density: Volume, optics: Optics) -> Volume:
+    """Reconstruct the emission of a flame.
+
+    Parameters
+    ----------
+    light : (rows, columns)
+        Radiance that it adds to the picture of the smoke, not negative.
+    camera
+        Of the picture; it stands still.
+    density : (nx, ny, nz)
+        Of the smoke, which takes light away.
+    optics
+        The grid's domain, and the smoke's extinction.
+
+    Returns
+    -------
+    (nx, ny, nz) float32
+        Emission, radiance per metre.
+    """
+    flame = np.zeros(optics.domain.resolution, np.float32)
+    projection = project_voxels(camera, optics.domain)
+    hull = visual_hull(light > 0, projection)
+    if not hull.any():
+        return flame
+    profile = DepthProfile(light, camera, optics.domain, _middle(density, camera, optics.domain))
+    flame[hull] = projection.read(light, hull) * profile.at(projection, hull)
+    burning = flame > 0
+    burning[hull] &= profile.shape(projection, hull) > FAINTEST
+    pixels = ndimage.binary_dilation(light > 0, iterations=2)
+    matrix = emission_matrix(density, camera, optics, pixels, burning)
+    flame = np.where(burning, flame, np.float32(0))
+    flame[burning] = _scaled(flame[burning].astype(np.float64), light[pixels].astype(np.float64), matrix)
+    return flame
+
+
+def _scaled(emission: NDArray[np.float64], light: NDArray[np.float64], matrix: sparse.csr_array) -> NDArray[np.float64]:
+    """Emission (voxels,) that shows the light (pixels,) by the matrix (pixels, voxels)."""
+    seen = matrix.sum(0)
+    emission = np.where(seen > 0, emission, 0)
+    for _ in range(ITERATIONS):
+        shown = matrix @ emission
+        if np.abs(shown - light).sum() < EXACT * light.sum():
+            break
+        ratio = np.divide(light, shown, out=np.zeros_like(light), where=shown > 0)
+        emission *= np.divide(matrix.T @ ratio, seen, out=np.zeros_like(seen), where=seen > 0)
+    return emission
+
+
+def _middle(density: Volume, camera: Camera, domain: Domain) -> SmokeAxis:
+    """How far behind the domain's centre the smoke's middle is, by height; below the smoke as at its base."""
+    where = np.nonzero(density)
+    if not where[0].size:
+        return SmokeAxis.upright()
+    _, along, up = view_frame(camera)
+    h = domain.voxel_size
+    offset = (np.stack(where, -1) + 0.5) * h + np.array(domain.min) - np.array(domain.centre)
+    level = np.rint(offset @ up / h).astype(int)
+    lowest = level.min()
+    amount = density[where].astype(np.float64)
+    total, moment = (
+        ndimage.gaussian_filter1d(np.bincount(level - lowest, weights), SMOOTHING)
+        for weights in (amount, amount * (offset @ along))
+    )
+    known = total > FAINTEST * total.max()
+    depths = moment[known] / total[known]
+    heights = (np.flatnonzero(known) + lowest) * h
+    return SmokeAxis(heights, depths, np.zeros_like(depths))

@@ -1,0 +1,143 @@
+"""Light that a flame gives off in smoke: its integral along the rays of a camera.
+
+    L = integral of T(s) e(s) ds,   T(s) the transmittance of the smoke before s,
+
+on the samples of `smokelift.render.camera_rays`, where the renderer's are: a sample stands for a step of length d with
+constant extinction kappa and emission e, which adds e (1 - exp(-kappa d)) / kappa to what reaches it. Emission is
+linear in the picture, so that a matrix says all of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from smokelift.render.camera_rays import LATERAL, camera_rays
+from smokelift.render.optics import Optics
+from smokelift.render.renderer import Image, Volume
+from smokelift.scene import Camera
+from smokelift.scene.projection import project
+
+Mask = NDArray[np.bool_]
+
+
+def emitted(flame: Volume, density: Volume, camera: Camera, optics: Optics) -> Image:
+    """The light of a flame as a camera sees it through smoke, without what the smoke scatters of it.
+
+    Parameters
+    ----------
+    flame : (nx, ny, nz)
+        Emission, radiance per metre, not negative.
+    density : (nx, ny, nz)
+        Of the smoke.
+    camera
+        That stands still.
+    optics
+        The grid's domain, and the smoke's extinction.
+
+    Returns
+    -------
+    (rows, columns) float32
+        Radiance.
+    """
+    width, height = camera.size
+    picture = np.zeros(width * height)
+    if flame.any():
+        pixels = np.flatnonzero(_shows(flame, camera, optics))
+        values = flame.ravel()
+        for rays, voxels, weights in _samples(density, camera, optics, pixels):
+            picture[pixels[rays]] += (weights * values[voxels]).sum(0)
+    return picture.reshape(height, width).astype(np.float32)
+
+
+def emission_matrix(density: Volume, camera: Camera, optics: Optics, pixels: Mask, voxels: Mask) -> sparse.csr_array:
+    """The matrix that turns the emission of some voxels into the light that some pixels get of it.
+
+    Parameters
+    ----------
+    density, camera, optics
+        As in `emitted`.
+    pixels : (rows, columns) bool
+        Those of the matrix's rows, in the order of `numpy.flatnonzero`.
+    voxels : (nx, ny, nz) bool
+        Those of its columns, in the same order.
+
+    Returns
+    -------
+    (number of pixels, number of voxels), in metres
+    """
+    shape = np.count_nonzero(pixels), np.count_nonzero(voxels)
+    number = np.full(voxels.size, -1)
+    number[voxels.ravel()] = np.arange(shape[1])
+    values, rows, columns = [np.zeros(0)], [np.zeros(0, np.intp)], [np.zeros(0, np.intp)]
+    for rays, corners, weights in _samples(density, camera, optics, np.flatnonzero(pixels)):
+        there = (number[corners] >= 0) & (weights > 0)
+        values.append(weights[there])
+        rows.append(np.broadcast_to(rays, corners.shape)[there])
+        columns.append(number[corners][there])
+    entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
+    return sparse.csr_array(entries, shape=shape)
+
+
+def _samples(
+    density: Volume, camera: Camera, optics: Optics, pixels: NDArray[np.intp]
+) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float64]]]:
+    """Which rays (n,) of the pixels cross a plane, the four voxels (4, n) about each place, and their weights (m).
+
+    Plane by plane from the camera on.
+    """
+    rays, shape = camera_rays(camera, optics.domain), optics.domain.resolution
+    strides = np.array([shape[1] * shape[2], shape[2], 1])
+    lines, planes = rays.lines.reshape(-1, 4)[pixels], rays.planes.reshape(-1, 4)[pixels]
+    length = rays.length.ravel()[pixels]
+    smoke, extinction = density.ravel(), optics.medium.extinction
+    clear = np.ones(len(pixels))
+    for axis in rays.axes:
+        b_axis, c_axis = LATERAL[axis]
+        for travel in (1, -1):
+            along = np.flatnonzero((planes[:, 0] == axis) & (planes[:, 1] == travel))
+            for k in range(shape[axis])[::travel]:
+                here = along[(planes[along, 2] <= k) & (k <= planes[along, 3])]
+                if not here.size:
+                    continue
+                b, c = (lines[here, n] + lines[here, n + 1] * k for n in (0, 2))
+                voxels, shares = [], []
+                for i, near_b in _neighbours(b, shape[b_axis]):
+                    for j, near_c in _neighbours(c, shape[c_axis]):
+                        voxels.append(k * strides[axis] + i * strides[b_axis] + j * strides[c_axis])
+                        shares.append(near_b * near_c)
+                places, share = np.array(voxels), np.array(shares)
+                depth = extinction * length[here] * (share * smoke[places]).sum(0)
+                step = clear[here] * length[here] * -np.expm1(-depth) / np.where(depth > 0, depth, 1)
+                step = np.where(depth > 0, step, clear[here] * length[here])
+                clear[here] *= np.exp(-depth)
+                yield here, places, share * step
+
+
+def _neighbours(place: NDArray[np.float32], count: int) -> Iterator[tuple[NDArray[np.intp], NDArray[np.float32]]]:
+    """The two voxels of a row beside some places, and their linear weights: 0 outside the grid."""
+    low = np.floor(place).astype(np.intp)
+    for index, weight in ((low, 1 - (place - low)), (low + 1, place - low)):
+        yield np.clip(index, 0, count - 1), np.where((index >= 0) & (index < count), weight, 0)
+
+
+def _shows(flame: Volume, camera: Camera, optics: Optics) -> Mask:
+    """Pixels (rows, columns) that may show a flame: those before the box of its voxels."""
+    width, height = camera.size
+    domain = optics.domain
+    burning = [np.flatnonzero(flame.any(axis)) for axis in ((1, 2), (0, 2), (0, 1))]
+    ends = [
+        low + (np.array((each[0] - 0.5, each[-1] + 1.5))) * domain.voxel_size
+        for low, each in zip(domain.min, burning, strict=True)
+    ]
+    corners = np.stack(np.meshgrid(*ends, indexing="ij"), -1).reshape(-1, 3)
+    seen, depth = project(camera, corners)
+    if (depth <= 0).any():
+        return np.ones((height, width), np.bool_)
+    low, high = seen.min(0), seen.max(0)
+    x, y = np.arange(width) + 0.5, np.arange(height) + 0.5
+    across, up = (x > low[0]) & (x < high[0]), (y > low[1]) & (y < high[1])
+    return np.asarray(up[:, None] & across)
