@@ -37,8 +37,11 @@ IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".exr", ".hdr")
 PANORAMA_SUFFIXES = (".exr", ".hdr")
 """Pictures that the engine takes as an environment light."""
 
+SIDES = ("x-", "y-", "z-", "x+", "y+", "z+")
+"""Sides of the box that can be closed, in the order of the panel."""
+
 DIRECTIONS = {
-    "continue": ("--frames", "--start", "--fade", "--wind", "--turbulence", "--fan"),
+    "continue": ("--frames", "--start", "--fade", "--closed", "--wind", "--turbulence", "--fan"),
     "retime": ("--speed",),
     "loop": ("--frames", "--overlap"),
 }

@@ -5,6 +5,7 @@ from bpy.app.translations import pgettext_iface as iface_
 
 from . import run
 from .needs import NeedsClipAndResult
+from .panel import draw_closed
 from .scene_file import ShotError
 from .smoke import active_smoke
 from .subpanel import OfResult
@@ -52,6 +53,7 @@ def _draw_continue(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup
     layout.prop(settings, "frames")
     layout.prop(settings, "fade")
     _draw_ticked(layout, settings, "use_start", "start")
+    draw_closed(layout, settings)
     layout.prop(settings, "effectors")
     row = layout.row()
     row.active = settings.effectors is not None

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from mathutils import Matrix, Vector
 
 from . import volume
-from .contract import SHORTEST
+from .contract import SHORTEST, SIDES
 from .scene_file import ShotError, at_frame
 from .smoke import scene_of
 
@@ -72,6 +72,8 @@ def _continued(smoke: bpy.types.Object, numbers: list[int]) -> tuple[str, list[s
         if last < numbers[SHORTEST - 1]:
             raise ShotError(f"{SHORTEST} frames are needed before the smoke reacts: choose a later frame.")
         words += ["--start", str(last)]
+    if settings.closed:
+        words += ["--closed", *(side for side in SIDES if side in settings.closed)]
     later = [volume.scene_frame(smoke, last + step) for step in range(1, settings.frames + 1)]
     with at_frame(scene, start) as depsgraph:
         words += _blown(smoke, depsgraph)

@@ -28,8 +28,8 @@ class _Main:
         layout.use_property_decorate = False
         smoke = active_smoke(context.scene)
         _draw_smokes(layout, context, smoke)
+        migrate_soon(context.scene)
         if smoke is None:
-            migrate_soon(context.scene)
             draw_text(layout, context, "Choose a video or an image sequence of smoke. If its camera moves, track it.")
             return
         settings = smoke.smokelift
@@ -100,8 +100,16 @@ def _draw_shot(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bp
         known = box_of(smoke) is not None
         layout.operator("smokelift.make_box", text="Frame Box" if known else "Make Box", icon="MESH_CUBE")
         layout.prop(settings, "inlet")
-    layout.prop(settings, "floor")
+    draw_closed(layout, settings)
     layout.prop(settings, "light_mode")
+
+
+def draw_closed(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+    """A button for each side of the box, below the name of the row: beside it their names would be cut off."""
+    column = layout.column(align=True)
+    column.use_property_split = False
+    column.label(text=settings.bl_rna.properties["closed"].name)
+    column.row(align=True).prop(settings, "closed")
 
 
 def _draw_cost(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:

@@ -13,7 +13,7 @@ SETTINGS = (
     "quality",
     "detail",
     "light_mode",
-    "floor",
+    "closed",
     "longest_side",
     "transfer",
     "speed",

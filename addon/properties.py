@@ -1,5 +1,7 @@
 """Settings of a smoke, saved with its object, and the state of this session, on the window manager."""
 
+from typing import Any
+
 import bpy
 from bpy.props import (
     BoolProperty,
@@ -13,9 +15,9 @@ from bpy.props import (
 )
 
 from . import volume
-from .contract import FASTEST, SLOWEST
+from .contract import FASTEST, SIDES, SLOWEST
 from .paths import PATH_OPTIONS
-from .smoke import free_folder
+from .smoke import close_floor, free_folder
 
 SEEDS = 2**31
 """Numbers of variations: as many as Blender's whole numbers have from 0."""
@@ -46,6 +48,19 @@ def _speed_chosen(_settings: "SmokeliftSettings", _context: bpy.types.Context) -
     volume.keep_step()
 
 
+def _floor_chosen(settings: "SmokeliftSettings", context: bpy.types.Context) -> None:
+    """A preset of an earlier version sets the floor."""
+    close_floor(settings)
+
+
+def _closed(description: str, **options: Any) -> Any:
+    """A row of buttons, one for each side of the box."""
+    items = [(side, f"{side[1]}{side[0].upper()}", "", 1 << place) for place, side in enumerate(SIDES)]
+    return EnumProperty(
+        name="Closed Sides", description=description, items=items, options={"ANIMATABLE", "ENUM_FLAG"}, **options
+    )
+
+
 def _is_mesh(_settings: "SmokeliftSettings", obj: bpy.types.Object) -> bool:
     return obj.type == "MESH"
 
@@ -74,6 +89,7 @@ class SmokeliftDirecting(bpy.types.PropertyGroup):
     start: IntProperty(
         name="Start", description="Frame of the scene, the last one that stays as it is", default=1, min=-1_000_000
     )
+    closed: _closed("Sides of the result's box, along its own axes, that are walls for the frames that are added")
     effectors: PointerProperty(
         name="Effectors",
         description=(
@@ -216,11 +232,11 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
         poll=_is_empty,
         update=_changed,
     )
-    floor: BoolProperty(
-        name="Floor",
-        description="The bottom of the box is solid: no air flows through it",
+    closed: _closed(
+        "Sides of the box, along its own axes, that are solid: no air flows through them. -Z is a floor",
         update=_changed,
     )
+    floor: BoolProperty(name="Floor", description="The floor of an earlier version's file", update=_floor_chosen)
     light_mode: EnumProperty(
         name="Light",
         description="What lights the smoke in the clip",

@@ -15,7 +15,7 @@ import bpy
 from bpy_extras.object_utils import world_to_camera_view
 from mathutils import Matrix, Vector
 
-from .contract import FEWEST_VOXELS, IMAGE_SUFFIXES, LONGEST_SIDE, PANORAMA_SUFFIXES
+from .contract import FEWEST_VOXELS, IMAGE_SUFFIXES, LONGEST_SIDE, PANORAMA_SUFFIXES, SIDES
 from .paths import absolute
 from .smoke import scene_of
 
@@ -65,8 +65,8 @@ def shot_tables(smoke: bpy.types.Object, quick: bool = False) -> dict[str, Any]:
         if settings.light_mode == "SCENE":
             tables["lights"] = light_tables(scene, depsgraph, rotation)
             _require_lights_outside(tables)
-        if settings.floor:
-            tables.setdefault("domain", {})["closed"] = ["z-"]
+        if settings.closed:
+            tables.setdefault("domain", {})["closed"] = [side for side in SIDES if side in settings.closed]
     if settings.plate_mode == "FILE":
         plate = _existing(settings.plate, "clean plate")
         if "matrices" in tables.get("camera", {}):

@@ -114,7 +114,7 @@ def hide_default_cube(scene: bpy.types.Scene) -> None:
 
 @persistent
 def migrate(_file: str = "") -> None:
-    """Give the settings of scenes, where version 1.0 kept them, to their smokes."""
+    """Give the settings of scenes, where version 1.0 kept them, to their smokes. A floor becomes a closed side."""
     for scene in bpy.data.scenes:
         old = scene.smokelift
         if scene.library is not None or (old.clip is None and old.volume is None):
@@ -129,11 +129,21 @@ def migrate(_file: str = "") -> None:
         if camera is not None and camera.type == "CAMERA":
             smoke.smokelift.assumed_camera = camera
         scene.property_unset("smokelift")
+    for smoke in filter(is_smoke, bpy.data.objects):
+        close_floor(smoke.smokelift)
+
+
+def close_floor(settings: Any) -> None:
+    """Close the bottom of a box whose settings say so in the way of earlier versions."""
+    if settings.floor:
+        settings.closed |= {"z-"}
+        settings.property_unset("floor")
 
 
 def migrate_soon(scene: bpy.types.Scene) -> None:
     """Migrate a file that was open before the add-on was enabled. Drawing code may call this."""
-    if scene.smokelift.clip is not None and not bpy.app.timers.is_registered(migrate):
+    old = scene.smokelift.clip is not None or any(smoke.smokelift.floor for smoke in smokes(scene))
+    if old and not bpy.app.timers.is_registered(migrate):
         bpy.app.timers.register(migrate)
 
 

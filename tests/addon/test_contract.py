@@ -15,7 +15,7 @@ from smokelift.direct import writing
 from smokelift.footage.images import READABLE
 from smokelift.output.export import ASSET, NOTE, proxy_name
 from smokelift.output.layout import INDEX, frame_path
-from smokelift.scene import EnvironmentLight, SceneError
+from smokelift.scene import SIDES, EnvironmentLight, SceneError
 from smokelift.setup.provenance import Origin
 from smokelift.setup.settings import LONGEST_SIDE, Settings
 
@@ -51,6 +51,11 @@ def test_resolutions() -> None:
         Settings.preset("draft", "default", (fewest, fewest, fewest - 1))
 
 
+def test_sides() -> None:
+    """Of the box, in another order."""
+    assert sorted(contract.SIDES) == sorted(SIDES)
+
+
 def test_directions() -> None:
     """Every option of a take that is made of another is the engine's, and the limits are."""
     parser = argparse.ArgumentParser()
@@ -58,7 +63,7 @@ def test_directions() -> None:
     for module in (continue_, retime, loop):
         module.add_parser(commands, argparse.ArgumentParser(add_help=False))
     values = {"--frames": {"continue": "9", "loop": "1:9"}, "--wind": "1 2 -3", "--fan": "1 2 3 1 -4 5 6"}
-    values["--turbulence"] = "1 2 3"
+    values |= {"--turbulence": "1 2 3", "--closed": "x- z+"}
     for direction, options in contract.DIRECTIONS.items():
         for option in options:
             value = values.get(option, "2")

@@ -19,7 +19,7 @@ from smokelift.direct.turbulence import Turbulence
 from smokelift.direct.writing import SHORTEST, Written, directed_writer, simulated_figures, time_step, write_copy
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
-from smokelift.scene import Domain
+from smokelift.scene import Domain, Side
 from smokelift.scene.checks import Vector
 from smokelift.transport import Velocity
 
@@ -49,6 +49,8 @@ class Continuation:
         Eddies that all air gains after `start`.
     fans, obstacles
         What stands in the box after `start`.
+    closed
+        Sides that are walls after `start`, besides those of the scene.
     """
 
     frames: int
@@ -58,6 +60,7 @@ class Continuation:
     turbulences: tuple[Turbulence, ...] = ()
     fans: tuple[Fan, ...] = ()
     obstacles: tuple[Obstacle, ...] = ()
+    closed: tuple[Side, ...] = ()
 
 
 def continue_sequence(
@@ -104,6 +107,7 @@ def continue_sequence(
         "turbulences": [asdict(turbulence) for turbulence in continuation.turbulences],
         "fans": [vars(fan.place) | {"velocity": fan.velocity} for fan in continuation.fans],
         "obstacles": [_told(obstacle) for obstacle in continuation.obstacles],
+        "closed": continuation.closed,
     }
     how = (
         f"Frames {start + 1} to {last} are a simulation that starts from frame {start}, with the buoyancy, the "
@@ -130,9 +134,10 @@ def _simulated(
     # the first frame has no velocity of its own
     moments = [read_moment(sequence, number) for number in kept[1:][-LEARNT_FROM:]]
     simulation = learnt_simulation(moments, dt, sequence.scene.inflow(), around)
+    closed = (*sequence.scene.closed, *continuation.closed)
     moment, state = moments[-1], writer.state
+    moment = replace(moment, velocity=replace(moment.velocity, closed=closed))
     if state is not None and state.number > start:
-        closed = sequence.scene.closed
         velocity = Velocity(state.velocity, sequence.scene.domain.voxel_size, closed)
         moment = Moment(np.asarray(state.extra["unfaded"], np.float32), velocity)
     for step in range(1, continuation.frames + 1):

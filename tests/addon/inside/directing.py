@@ -124,6 +124,15 @@ def test_frames_in_real_time(shot, result) -> None:
     assert [volume.scene_frame(result, number) - first for number in (1, 2, 6)] == [0, 2, 10]
 
 
+def test_sides_are_closed(result) -> None:
+    """From the frame on from which the smoke goes on, whatever the clip had."""
+    result.smokelift.closed = {"z-"}
+    settings = result.smokelift.directing
+    assert "--closed" not in directing.request(result)[1]
+    settings.closed = {"x-", "y+"}
+    assert directing.request(result)[1][-3:] == ["--closed", "x-", "y+"]
+
+
 def test_meshes_are_obstacles(result, acting, tmp_path) -> None:
     """With their modifiers, also mirrored ones; those outside and the smoke's box count for nothing."""
     mesh, place = cube()

@@ -78,13 +78,23 @@ def test_settings_are_kept_as_a_preset(scene, clip, monkeypatch, tmp_path) -> No
 
     monkeypatch.setattr(bpy.utils, "user_resource", folder)
     first = new_smoke(scene, clip)
-    first.smokelift.detail, first.smokelift.floor, first.smokelift.first = 0.25, True, 7
+    first.smokelift.detail, first.smokelift.closed, first.smokelift.first = 0.25, {"x-", "z-"}, 7
     assert bpy.ops.smokelift.add_preset(name="My Smoke") == {"FINISHED"}
     (file,) = (tmp_path / "presets" / presets.FOLDER).iterdir()
     second = new_smoke(scene, clip)
     bpy.ops.script.execute_preset(filepath=str(file), menu_idname="SMOKELIFT_PT_presets")
-    assert second.smokelift.detail == 0.25 and second.smokelift.floor
+    assert second.smokelift.detail == 0.25 and second.smokelift.closed == {"x-", "z-"}
     assert second.smokelift.first == 1
+
+
+def test_a_preset_of_an_earlier_version_closes_the_floor(scene, clip, tmp_path) -> None:
+    """And leaves the other sides alone."""
+    obj = new_smoke(scene, clip)
+    obj.smokelift.closed = {"x+"}
+    file = tmp_path / "old.py"
+    file.write_text("import bpy\nbpy.context.object.smokelift.floor = True\n")
+    bpy.ops.script.execute_preset(filepath=str(file), menu_idname="SMOKELIFT_PT_presets")
+    assert obj.smokelift.closed == {"x+", "z-"} and not obj.smokelift.floor
 
 
 def test_presets_are_of_a_smoke(scene) -> None:

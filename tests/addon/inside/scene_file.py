@@ -408,11 +408,12 @@ def add_inlet(scene: bpy.types.Scene) -> bpy.types.Object:
     return inlet
 
 
-def test_a_floor(shot, tmp_path) -> None:
+def test_closed_sides(shot, tmp_path) -> None:
     """Of the box that is given, and of one that is found, even where the scene's lights are used."""
     assert engines(shot, tmp_path).closed == ()
-    smoke(shot).smokelift.floor = True
-    assert engines(shot, tmp_path).closed == ("z-",)
+    smoke(shot).smokelift.closed = {"x+", "z-"}
+    assert engines(shot, tmp_path).closed == ("x+", "z-")
+    smoke(shot).smokelift.closed = {"z-"}
     smoke(shot).smokelift.camera_mode = "GUESS"
     add(shot, "Lamp", bpy.data.lights.new("Lamp", "POINT"))
     assert shot_tables(smoke(shot))["domain"] == {"closed": ["z-"]}

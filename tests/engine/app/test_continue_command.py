@@ -9,7 +9,7 @@ from command_line import command, events, names, refused
 def test_a_clip_goes_on(finished, tmp_path, capsys) -> None:
     out = tmp_path / "out"
     words = ("continue", finished, "--out", out, "--frames", 3, "--npz", "--fade", 1, "--wind", 0.2, -0.1, 0)
-    words += ("--turbulence", 0.3, 0.6, 1, "--turbulence", 0.1, 0.9, 2)
+    words += ("--turbulence", 0.3, 0.6, 1, "--turbulence", 0.1, 0.9, 2, "--closed", "z-", "x+")
     assert command(*words, "--progress", "json") == 0
     said = events(capsys.readouterr().out)
     assert said[-1]["event"] == "done"

@@ -55,6 +55,19 @@ def test_a_stopped_run_goes_on_to_the_same_result(source, tmp_path):
         run(source, tmp_path / "stopped", Continuation(6, start=8), resume=True)
 
 
+def test_sides_become_walls(source, tmp_path):
+    """No air goes through them any more, and a resumed run has them too."""
+    walls = ("x-", "x+", "y-", "y+", "z+")
+    for number, _ in continue_sequence(source, tmp_path / "shut", Continuation(4, closed=walls), npz=True):
+        if number == 12:
+            break
+    run(source, tmp_path / "shut", Continuation(4, closed=walls), resume=True)
+    run(source, tmp_path / "open", Continuation(4))
+    shut, open_ = (Sequence.open(tmp_path / name).staggered_velocity(14).faces for name in ("shut", "open"))
+    assert not any(np.take(shut[axis], (0, -1), axis).any() for axis in range(3))
+    assert all(np.take(open_[axis], (0, -1), axis).any() for axis in range(3))
+
+
 def test_what_cannot_be_is_refused(source, tmp_path):
     for continuation, reason in (
         (Continuation(5, start=99), "from 4 to 10"),

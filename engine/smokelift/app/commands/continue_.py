@@ -10,6 +10,7 @@ from typing import Any
 from smokelift.app.options import add_directed_options, finite, named_path, require_new
 from smokelift.app.progress import Reporter, say_frames
 from smokelift.direct import Ball, Box, Continuation, Fan, Mesh, MovingMesh, Turbulence, continue_sequence, open_source
+from smokelift.scene import SIDES
 
 
 def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
@@ -79,6 +80,14 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
         help="an obstacle of any shape: a closed mesh in a binary STL file, in metres, Z up; mesh_####.stl for one "
         "that moves, with a file for the last frame that stays and for each after it; may be given again",
     )
+    parser.add_argument(
+        "--closed",
+        nargs="+",
+        choices=SIDES,
+        default=[],
+        metavar="SIDE",
+        help=f"sides of the box that become walls, of {', '.join(SIDES)}; those of the clip stay walls",
+    )
     parser.set_defaults(run=run)
 
 
@@ -115,6 +124,7 @@ def _continuation(options: argparse.Namespace) -> Continuation:
         turbulences=tuple(_turbulence(*values) for values in options.turbulence),
         fans=tuple(Fan(_ball("--fan", values[:4]), tuple(values[4:])) for values in options.fan),
         obstacles=(*balls, *boxes, *map(_mesh, options.mesh)),
+        closed=tuple(side for side in SIDES if side in options.closed),
     )
 
 
