@@ -119,7 +119,7 @@ class BorrowedMoments:
         estimate = self.smooth.estimate(views)
         if self.moments is None or not views.hull.any():
             return estimate
-        start = np.where(views.hull, estimate.density, 0).astype(np.float32)
+        start = np.where(views.hull, estimate.density, 0).astype(np.float32, copy=False)
         smooth = fit_multiplicative(
             camera_terms(views, estimate.inside), start, SMOOTH_ITERATIONS, SMOOTH_TOLERANCE
         ).density
@@ -128,7 +128,7 @@ class BorrowedMoments:
             return estimate
         around = AROUND * min(1.0, 2 * self.detail)
         spread = (1 - around) * smooth + around * ndimage.gaussian_filter(smooth, SPREAD)
-        density = np.where(views.hull, spread, 0).astype(np.float32)
+        density = np.where(views.hull, spread, 0).astype(np.float32, copy=False)
         return replace(estimate, density=density, imposed=imposed, smooth=smooth)
 
     def _sides(self, moments: Moments, smooth: Volume, views: ViewSet) -> Iterator[ImposedView]:

@@ -77,10 +77,19 @@ def descend(
     def gradient_of(residuals: tuple[Image, ...]) -> NDArray[np.float32]:
         """Derivative of the objective in units of the scale, for the last density evaluated."""
         parts = (
-            term.renderer.gradient(term.image_gradient(residual), out=slopes).ravel()[where]
+            term.renderer.gradient(term.image_gradient(residual), out=slopes).ravel().take(where)
             for term, residual in zip(terms, residuals, strict=True)
         )
-        return functools.reduce(np.add, parts) * scale
+        found = functools.reduce(np.add, parts)
+        found *= scale
+        return found
+
+    def moved_by(trial: float) -> NDArray[np.float32]:
+        """Where a step of this length arrives. New memory takes as long as the arithmetic, so there is little of it."""
+        candidate = scale * np.float32(trial)
+        candidate *= gradient
+        np.subtract(current, candidate, out=candidate)
+        return np.asarray(np.clip(candidate, 0, bound, out=candidate))
 
     residuals = residuals_of(current)
     loss, gradient = objective(terms, residuals), gradient_of(residuals)
@@ -92,8 +101,9 @@ def descend(
             break
         trial = min(step or 0.1 * loss / slope, LONGEST)
         for _ in range(SHORTENINGS):
-            candidate = np.clip(current - np.float32(trial) * scale * gradient, 0, bound)
-            moved = (candidate - current) / scale
+            candidate = moved_by(trial)
+            moved = candidate - current
+            moved /= scale
             new_residuals = residuals_of(candidate)
             new_loss = objective(terms, new_residuals)
             if new_loss <= loss + SUFFICIENT * _dot(gradient, moved):
@@ -103,7 +113,7 @@ def descend(
             volume.ravel()[where] = current
             return Fit(volume, loss, residuals, done)
         new_gradient = gradient_of(new_residuals)
-        curvature = _dot(moved, new_gradient - gradient)
+        curvature = _dot(moved, np.subtract(new_gradient, gradient, out=gradient))
         step = _dot(moved, moved) / curvature if curvature > 0 else 4 * trial
         gained = loss - new_loss
         current, residuals, loss, gradient = candidate, new_residuals, new_loss, new_gradient

@@ -126,7 +126,7 @@ class GradientFit:
         if not hull.any():
             return empty_density(views)
         cameras = camera_terms(views, depth.inside)
-        start = np.where(hull, depth.density if initial is None else initial, 0).astype(np.float32)
+        start = np.where(hull, depth.density if initial is None else initial, 0).astype(np.float32, copy=False)
         # The terms take turns, so several cameras need as many times more iterations. Imposed pictures yield: the last
         # third of the iterations and the descent are the cameras' alone. What is carried along has met imposed pictures
         # before, so that it meets them in half as many rounds.

@@ -15,7 +15,6 @@ multiplicative algebraic reconstruction (Gordon, Bender and Herman 1970).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +23,9 @@ from scipy import ndimage
 from smokelift.density.hull import Places
 from smokelift.density.objective import Fit, Term, noise_floor, objective
 from smokelift.render import Image, Volume
+
+Values = NDArray[np.float32]
+"""Densities of some voxels, (n,)."""
 
 STEP_RANGE = (0.4, 2.5)
 """Largest change of a ray's smoke in one iteration."""
@@ -52,22 +54,25 @@ def fit_multiplicative(terms: Sequence[Term], density: Volume, iterations: int, 
     tolerance
         Stop when an iteration lowers the objective by less than this share.
     """
-    best, current, done = Fit(density, np.inf, (), 0), density, 0
-    filled, enough = np.flatnonzero(density), noise_floor(terms)
-    places = _places(density, terms)
+    smoke, enough = _Smoke(density), noise_floor(terms)
+    places = smoke.places(terms)
+    current = best = smoke.values()
+    least, done = np.inf, 0
+    left: tuple[Image, ...] = ()
     for done in range(iterations + 1):
-        images = [term.renderer.image(current) for term in terms]
+        volume = smoke.volume_of(current)
+        images = [term.renderer.image(volume) for term in terms]
         residuals = tuple(image - term.view.image for term, image in zip(terms, images, strict=True))
         loss = objective(terms, residuals)
-        gained = best.loss - loss
-        if loss < best.loss:
-            best = Fit(current, loss, residuals, done)
+        gained = least - loss
+        if loss < least:
+            best, least, left = current, loss, residuals
         if done == iterations or loss <= enough or (done > 2 and gained < tolerance * loss):
             break
         for turn, (term, place) in enumerate(zip(terms, places, strict=True)):
-            image = images[0] if turn == 0 else term.renderer.image(current)
-            current = _scaled(current, filled, place, term, image)
-    return replace(best, iterations=done)
+            image = images[0] if turn == 0 else term.renderer.image(smoke.volume_of(current))
+            current = _scaled(smoke, current, place, term, image)
+    return Fit(smoke.volume_of(best), least, left, done)
 
 
 def take_turns(terms: Sequence[Term], density: Volume, rounds: int) -> Volume:
@@ -82,34 +87,52 @@ def take_turns(terms: Sequence[Term], density: Volume, rounds: int) -> Volume:
     rounds
         Turns of each.
     """
-    filled, places = np.flatnonzero(density), _places(density, terms)
+    smoke = _Smoke(density)
+    places, values = smoke.places(terms), smoke.values()
     for _ in range(rounds):
         for term, place in zip(terms, places, strict=True):
-            density = _scaled(density, filled, place, term, term.renderer.image(density))
-    return density
+            values = _scaled(smoke, values, place, term, term.renderer.image(smoke.volume_of(values)))
+    return smoke.volume_of(values)
 
 
-def _places(density: Volume, terms: Sequence[Term]) -> list[Places]:
-    """Where the voxels that hold smoke lie in each term's picture."""
-    filled = density != 0
-    return [term.view.projection.places(filled) for term in terms]
+class _Smoke:
+    """The voxels of a density that hold smoke, which change while the others stay at zero.
+
+    Their values (n,) are what is computed with; one volume is filled with them again and again for the renderers.
+    """
+
+    def __init__(self, density: Volume) -> None:
+        self._filled = density != 0
+        self._where = np.flatnonzero(self._filled)
+        self._volume = density.copy()
+
+    def values(self) -> Values:
+        """Those of the density that the volume holds now."""
+        return self._volume.ravel()[self._where]
+
+    def volume_of(self, values: Values) -> Volume:
+        """The volume (nx, ny, nz) with these values, until the next call."""
+        self._volume.ravel()[self._where] = values
+        return self._volume
+
+    def places(self, terms: Sequence[Term]) -> list[Places]:
+        """Where the voxels lie in each term's picture."""
+        return [term.view.projection.places(self._filled) for term in terms]
 
 
-def _scaled(density: Volume, filled: NDArray[np.intp], places: Places, term: Term, image: Image) -> Volume:
-    """The density whose picture is nearer to a term's, from the one that renders to `image`."""
+def _scaled(smoke: _Smoke, values: Values, places: Places, term: Term, image: Image) -> Values:
+    """Values whose picture is nearer to a term's, from those that render to `image`."""
     transmittance = term.renderer.transmittance
-    slope = _slope(density, term, image, transmittance)
+    slope = _slope(smoke, values, term, image, transmittance)
     step = places.read(_log_scale(image, transmittance, slope, term))
-    scaled = density.copy()
-    scaled.ravel()[filled] *= np.exp(RELAXATION * np.where(places.visible, step, np.float32(0)))
-    return scaled
+    return np.asarray(values * np.exp(RELAXATION * np.where(places.visible, step, np.float32(0))))
 
 
-def _slope(density: Volume, term: Term, image: Image, transmittance: Image) -> Image:
+def _slope(smoke: _Smoke, values: Values, term: Term, image: Image, transmittance: Image) -> Image:
     """dL / d ln s (rows, columns, 3) of a density, whose image and transmittance are given."""
     if term.renderer.absorbs_only:  # L = T B and ln T is proportional to s
         return np.asarray(image * np.log(np.maximum(transmittance, 1e-30))[..., None])
-    return np.asarray((term.renderer.image(density * np.float32(PROBE)) - image) / np.log(PROBE))
+    return np.asarray((term.renderer.image(smoke.volume_of(values * np.float32(PROBE))) - image) / np.log(PROBE))
 
 
 def _log_scale(image: Image, transmittance: Image, slope: Image, term: Term) -> NDArray[np.float32]:

@@ -164,13 +164,15 @@ class GuidedSimulation:
         """
         if depth.smooth is None:
             return BlendCarried(self.largest).start(views, depth, carried, before)
-        wanted, have = (_core.blur(values, GUIDED, 3.0) for values in (depth.smooth, carried))
+        hull = views.hull
+        wanted, have = (_core.blur(values, GUIDED, 3.0)[hull] for values in (depth.smooth, carried))
         reached = np.float32(self.kept) * np.minimum(wanted, np.float32(LARGEST_GAIN) * have)
-        taken_over = carried * reached / np.maximum(have, TINY)
-        density = taken_over + (1 - reached / np.maximum(wanted, TINY)) * depth.density
-        density = np.where(views.hull, density, np.float32(0))
-        total = float(density.sum(dtype=np.float64))
-        share = float(taken_over.sum(dtype=np.float64, where=views.hull)) / total if total > 0 else 0.0
+        taken_over = carried[hull] * reached / np.maximum(have, TINY)
+        started = taken_over + (1 - reached / np.maximum(wanted, TINY)) * depth.density[hull]
+        total = float(started.sum(dtype=np.float64))
+        share = float(taken_over.sum(dtype=np.float64)) / total if total > 0 else 0.0
+        density = np.zeros_like(depth.density)
+        density[hull] = started
         return Start(density, {"share": share})
 
 

@@ -6,7 +6,7 @@ Harlow and Welch 1965), where its divergence and the pressure projection are exa
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple, Self
 
@@ -78,7 +78,11 @@ class StaggeredGrid:
 
     def centres(self) -> Array:
         """The vectors at voxel centres, shape (nx, ny, nz, 3): the mean of opposite faces."""
-        return np.stack(at_centres(self.faces), axis=-1)
+        result = np.empty((*self.shape, 3), np.float32)
+        for axis, (low, high) in enumerate(_opposite_sides(self.faces)):
+            np.add(high, low, out=result[..., axis])
+        result *= np.float32(0.5)
+        return result
 
     def with_faces(self, faces: Iterable[Array]) -> Self:
         """Other values on the same grid."""
@@ -161,9 +165,16 @@ def face_shapes(shape: tuple[int, ...]) -> tuple[tuple[int, int, int], ...]:
 
 def at_centres(faces: Faces) -> Faces:
     """The three components of a field on faces at voxel centres: the mean of opposite faces."""
-    half = np.float32(0.5)
+    x, y, z = (np.float32(0.5) * (high + low) for low, high in _opposite_sides(faces))
+    return x, y, z
+
+
+def _opposite_sides(faces: Faces) -> Iterator[tuple[Array, Array]]:
+    """For each axis views (nx, ny, nz) of the components on the low and on the high side of every voxel."""
     x, y, z = faces
-    return half * (x[1:] + x[:-1]), half * (y[:, 1:] + y[:, :-1]), half * (z[:, :, 1:] + z[:, :, :-1])
+    yield x[:-1], x[1:]
+    yield y[:, :-1], y[:, 1:]
+    yield z[:, :, :-1], z[:, :, 1:]
 
 
 def on_faces(centres: Array) -> Faces:

@@ -263,9 +263,11 @@ def test_the_multiplicative_fit_gets_better(plume, small) -> None:
     """More iterations never make the picture worse, and a start of half the density is nearly mended."""
     term = term_of(small, Observation(small.camera, render(plume.densities[1], small)))
     start = 0.5 * plume.densities[1]
-    losses = [fit_multiplicative([term], start, count, 0.0).loss for count in range(6)]
+    fits = [fit_multiplicative([term], start, count, 0.0) for count in range(6)]
+    losses = [fit.loss for fit in fits]
     assert all(after <= before for before, after in itertools.pairwise(losses))
     assert losses[-1] < 0.1 * losses[0]
+    assert [term.loss(term.renderer.image(fit.density) - term.view.image) for fit in fits] == losses
 
 
 @pytest.mark.parametrize(("scattering", "behind"), [("single", 0.0), ("absorption", 0.5)])

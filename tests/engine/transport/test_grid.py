@@ -7,13 +7,16 @@ import pytest
 
 from smokelift import _core
 from smokelift.transport import Velocity, advect, project
-from tests.engine.transport.random_fields import SHAPE, uniform
+from tests.engine.transport.random_fields import SHAPE, random_velocity, uniform
 
 
 def test_centres_are_means_of_faces():
     velocity = uniform((1, 2, 3))
     np.testing.assert_array_equal(velocity.centres(), np.broadcast_to(np.float32([1, 2, 3]), (*SHAPE, 3)))
     assert velocity.shape == SHAPE
+    x, y, z = random_velocity(0).faces
+    expected = np.stack([x[1:] + x[:-1], y[:, 1:] + y[:, :-1], z[:, :, 1:] + z[:, :, :-1]], -1) / 2
+    np.testing.assert_array_equal(random_velocity(0).centres(), expected)
 
 
 def test_bad_input_is_refused():
