@@ -118,13 +118,12 @@ def _submitted(
     by_memory = bool(client.run_on_scheduler(_workers_have_memory))
     of: dict[Any, Shot] = {}
     try:
-        for shot, record in shots:
+        for place, (shot, record) in enumerate(shots):
             needed = {MEMORY: record.forecast.memory} if by_memory and record.forecast is not None else None
             key = f"smokelift-{shot.name}-{uuid.uuid4().hex}"
-            submitted = client.submit(
-                worker.work, shot, task, batch, key=key, retries=RETRIES, pure=False, resources=needed
-            )
-            of[submitted] = shot
+            options = {"key": key, "retries": RETRIES, "pure": False, "resources": needed}
+            # without a priority a worker that comes later begins with either of those given within a tenth of a second
+            of[client.submit(worker.work, shot, task, batch, priority=-place, **options)] = shot
         for future in as_completed(list(of), loop=client.loop):
             shot = of[future]
             if future.status in ("cancelled", "lost"):
@@ -146,12 +145,14 @@ def _submitted(
 
 
 def _stop(client: Any, futures: Sequence[Any], batch: str) -> None:
-    """End the tasks that wait, and then those that run, which Dask cannot."""
+    """End the tasks that run, which Dask cannot, and then those that wait."""
     from smokelift.batch import worker
 
-    with suppress(Exception):  # without a scheduler there is nobody to tell; the workers end their tasks then
-        client.cancel(futures)
+    # without a scheduler there is nobody to tell; the workers end their tasks then
+    with suppress(Exception):
         client.run(worker.stop_batch, batch)
+    with suppress(Exception):
+        client.cancel(futures)
 
 
 def _workers_have_memory(dask_scheduler: Any) -> bool:
