@@ -4,7 +4,7 @@
 # make stability      damaged files and failing systems against the command line; CASES=300 of each kind take an hour
 # make extension      the Blender extension's zips in dist/, with the manual; ENGINE_WHEELS=DIR adds platforms built elsewhere
 # make manual         the manual in build/manual/index.html; a link that leads nowhere fails
-# make test-blender   those zips in the bpy wheels and in a real Blender
+# make test-blender   those zips in the bpy wheels and, beside them, in a real Blender
 # All set up what they need in .venv first. Only Python 3.11 to 3.13 and a C++17 compiler are assumed; those of the
 # extension need Python 3.11 and 3.13 both, because Blender does.
 
@@ -93,7 +93,8 @@ $(VENV)/extension.stamp: $(VENV)/engine.stamp
 	touch $@
 
 test-blender: dist/extension.stamp
-	$(BIN)/python -m pytest -v -rP --durations=0 --durations-min=1 tests/blender/wheels.py tests/blender/debian.py
+	$(BIN)/python -m pytest -n 2 --dist loadfile -v -rP --durations=0 --durations-min=1 \
+		tests/blender/wheels.py tests/blender/debian.py
 
 clean:
 	rm -rf $(VENV) build dist demo
