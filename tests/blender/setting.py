@@ -59,11 +59,13 @@ def pytest_words(file: Path, folder: Path, imports: Sequence[Path] = (ROOT,)) ->
 
 def run(command: Sequence[str], environment: dict[str, str] | None = None) -> str:
     """Run a command to its good end and return what it said."""
+    # a pytest in a Blender is nobody's worker, as the one that runs it may be
+    inherited = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST_XDIST")}
     # from elsewhere than the sources, which would be imported by accident
     done = subprocess.run(
         command,
         cwd=WORK,
-        env=os.environ | (environment or {}),
+        env=inherited | (environment or {}),
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
