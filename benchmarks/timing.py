@@ -40,6 +40,7 @@ class FrameTimes:
             self._seconds.append(self._clock() - began)
             self._units.append(poisson_seconds(self._shape, self._clock))
             yield frame
+            del frame  # while the next is made its memory is free
             began = self._clock()
 
     @property

@@ -12,6 +12,7 @@ import sys
 import tempfile
 import time
 from dataclasses import asdict, dataclass, replace
+from operator import attrgetter
 from pathlib import Path
 from typing import Literal
 
@@ -119,7 +120,8 @@ def measure(job: Job) -> Run:
     settings = replace(Settings.preset(job.quality, job.method, job.size), detail=job.detail)
     times = FrameTimes(job.size, CLOCKS[job.clock])
     with tempfile.TemporaryDirectory() as out, Clip.open(source) as clip:
-        figures = [frame.figures for frame in times.over(reconstruct(clip, scene, settings, Path(out) / "smoke"))]
+        frames = times.over(reconstruct(clip, scene, settings, Path(out) / "smoke"))
+        figures = list(map(attrgetter("figures"), frames))  # no name holds a frame while the next is made
     return Run(
         size=job.size,
         method=job.method,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import math
 import zipfile
 from collections.abc import Callable, Collection, Mapping
@@ -33,18 +32,19 @@ MOST_VALUES = 2**32
 
 
 def write_arrays(path: Path, arrays: Mapping[str, npt.NDArray[Any]], *, compressed: bool = True) -> None:
-    """Write arrays by name as a ``.npz``.
+    """Write arrays by name as a ``.npz``, one after the other: copies of all may not fit into memory.
 
     Raises
     ------
     OSError
         If the file cannot be written.
     """
-    # An interrupt while a zip file is open on disk raises a second error when the file is collected.
-    buffer = io.BytesIO()
-    (np.savez_compressed if compressed else np.savez)(buffer, **dict(arrays))
-    with atomic_path(path) as aside:
-        aside.write_bytes(buffer.getbuffer())
+    kind = zipfile.ZIP_DEFLATED if compressed else zipfile.ZIP_STORED
+    # not by NumPy, which an interrupt leaves with an open zip file that raises a second error when it is collected
+    with atomic_path(path) as aside, aside.open("wb") as file, zipfile.ZipFile(file, "w", kind) as archive:
+        for name, values in arrays.items():
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+                np.lib.format.write_array(member, np.asanyarray(values), allow_pickle=False)
 
 
 def read_arrays(

@@ -29,6 +29,7 @@ from scipy import ndimage
 from smokelift.output.archive import FLAME
 from smokelift.output.atomic import atomic_path
 from smokelift.scene import Domain
+from smokelift.transport import StaggeredGrid, at_centres
 
 Array = npt.NDArray[np.float32]
 
@@ -92,7 +93,7 @@ def _bpy_folders() -> list[Path]:
 def write_vdb(
     path: str | Path,
     density: npt.ArrayLike,
-    velocity_centres: npt.ArrayLike | None,
+    velocity: npt.ArrayLike | StaggeredGrid | None,
     domain: Domain,
     metadata: Mapping[str, Any] | None = None,
     flame: npt.ArrayLike | None = None,
@@ -108,8 +109,8 @@ def write_vdb(
         The ``.vdb`` file.
     density
         Shape (nx, ny, nz), not negative.
-    velocity_centres
-        m/s at voxel centres, shape (nx, ny, nz, 3); None for a file of the density alone.
+    velocity
+        m/s, on faces or at voxel centres, shape (nx, ny, nz, 3); None for a file of the density alone.
     domain
         Where the voxels lie.
     metadata
@@ -128,18 +129,13 @@ def write_vdb(
     """
     vdb = vdb_module()
     rho = checked_volume(density, domain.shape, "density")
-    velocity = None if velocity_centres is None else np.ascontiguousarray(velocity_centres, np.float32)
-    if velocity is not None and velocity.shape != (*domain.shape, 3):
-        raise ValueError(f"velocity {velocity.shape} does not fit the domain's {domain.shape} voxels")
-    if velocity is not None and not np.isfinite(velocity).all():
-        raise ValueError("velocity must be finite")
-
     box = _around(rho > 0.0, VELOCITY_MARGIN)
+    near = None if velocity is None else _part(velocity, box, domain)
     rho_box, corner = rho[box], tuple(side.start for side in box)
     grids = {"density": _fog(vdb, rho_box, corner)}
-    if velocity is not None:
+    if near is not None:
         grids["velocity"] = vdb.Vec3SGrid()
-        grids["velocity"].copyFromArray(_near(rho_box, velocity[box]), ijk=corner)
+        grids["velocity"].copyFromArray(_near(rho_box, near), ijk=corner)
     if flame is not None:
         emission = checked_volume(flame, domain.shape, FLAME)
         box = _around(emission > 0.0, 0)
@@ -185,6 +181,26 @@ def _fog(vdb: ModuleType, values: Array, corner: tuple[int, ...]) -> Any:
     grid.copyFromArray(np.minimum(values, _LIMIT), ijk=corner)
     grid.gridClass = vdb.GridClass.FOG_VOLUME
     return grid
+
+
+def _part(velocity: npt.ArrayLike | StaggeredGrid, box: tuple[slice, ...], domain: Domain) -> Array:
+    """The velocity at the voxel centres of a box, shape (x, y, z, 3); at those of the domain it may not fit memory."""
+    if isinstance(velocity, StaggeredGrid):
+        shape: tuple[int, ...] = (*velocity.shape, 3)
+        x, y, z = (
+            component[tuple(slice(side.start, side.stop + (axis == along)) for axis, side in enumerate(box))]
+            for along, component in enumerate(velocity.faces)
+        )
+        finite = all(np.isfinite(component).all() for component in velocity.faces)
+        part = np.stack(at_centres((x, y, z)), axis=-1)
+    else:
+        centres = np.ascontiguousarray(velocity, np.float32)
+        shape, finite, part = centres.shape, bool(np.isfinite(centres).all()), centres[box]
+    if shape != (*domain.shape, 3):
+        raise ValueError(f"velocity {shape} does not fit the domain's {domain.shape} voxels")
+    if not finite:
+        raise ValueError("velocity must be finite")
+    return part
 
 
 def _near(rho: Array, velocity: Array) -> Array:

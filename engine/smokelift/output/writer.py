@@ -212,8 +212,8 @@ class SequenceWriter:
             fire = {} if flame is None else {FLAME: flame}
             write_arrays(path, {"density": density, **dict(zip(VELOCITY, faces, strict=True)), **fire})
         else:
-            centres = Velocity(faces, self._domain.voxel_size).centres()
-            write_vdb(path, density, centres, self._domain, self._index.settings, flame)
+            velocity = Velocity(faces, self._domain.voxel_size)
+            write_vdb(path, density, velocity, self._domain, self._index.settings, flame)
 
     def _take_over(self) -> None:
         """Judge what is in the directory, and read what can be gone on from."""

@@ -32,6 +32,7 @@ from smokelift.setup.provenance import provenance
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
 from smokelift.transport import Array, ResidualMeans, Velocity, advect
+from smokelift.velocity.estimator import refined_to
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +65,29 @@ class Frame:
     smooth: Volume | None = None
     steady: Volume | None = None
     flame: Volume | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Past:
+    """What a frame needs of the one before, which is whoever's it was given to.
+
+    Attributes
+    ----------
+    density, smooth, steady
+        As in `Frame`.
+    velocity
+        On the grid of its estimate; see `VelocityEstimator.kept`.
+    """
+
+    density: Volume
+    velocity: Velocity
+    smooth: Volume | None
+    steady: Volume | None
+
+    @staticmethod
+    def of(frame: Frame, method: Method) -> Past:
+        """Keep it of a frame."""
+        return Past(frame.density, method.velocity_estimator.kept(frame.velocity), frame.smooth, frame.steady)
 
 
 def reconstruct(
@@ -126,13 +150,13 @@ def reconstruct(
     ) as writer:
         if writer.state is None and writer.finished:
             return
-        start = None if writer.state is None else _resumed(writer.state, shot)
-        for frame in _frames(shot, method, start):
+        for frame in _frames(shot, method, None if writer.state is None else _resumed(writer.state, shot)):
             if frame.number not in writer.finished:
                 writer.write(
                     frame.number, frame.density, frame.velocity.faces, frame.figures, _kept(frame), flame=frame.flame
                 )
                 yield frame
+            del frame  # before the next is computed: velocities take most of the memory
 
 
 def _kept(frame: Frame) -> dict[str, Array]:
@@ -155,27 +179,36 @@ def _frames(shot: Shot, method: Method, start: Frame | None) -> Iterator[Frame]:
     """Frames after ``start``; the first is held back until the second gives it a velocity."""
     count = len(shot.clip)
     method = replace(method, depth_prior=method.depth_prior.of_clip(shot))
-    before = start
-    for index in range(start.number if start else 0, count):
+    number, before = (0, None) if start is None else (start.number, Past.of(start, method))
+    del start
+    first: Frame | None = None
+    for index in range(number, count):
         frame = _frame(index, before, shot, method)
-        if index == 1 and before is not None:
-            yield replace(before, velocity=frame.velocity)
-        if index > 0 or count == 1:
-            yield frame
-        before = frame
+        before = Past.of(frame, method)
+        if index == 0 and count > 1:
+            first = frame
+            continue
+        if first is not None:
+            yield replace(first, velocity=frame.velocity)
+            first = None
+        yield frame
+        del frame  # velocities take most of the memory
 
 
-def _frame(index: int, before: Frame | None, shot: Shot, method: Method) -> Frame:
+def _frame(index: int, before: Past | None, shot: Shot, method: Method) -> Frame:
     """One frame, counted from 0, from its pictures and the frame before."""
     began = time.perf_counter()
     domain, dt = shot.optics.domain, 1.0 / shot.clip.fps
     predicted = carried = None
     # from where there was no smoke nothing is carried
     if before is not None and index >= 2 and before.density.any():
-        predicted = method.velocity_estimator.predict(before.velocity, dt)
+        estimator = method.velocity_estimator
+        fine = refined_to(estimator.predict(before.velocity, dt), domain.resolution)
         # what a moving camera does not see no picture corrects, so that its mass has to be kept
         moved = before.density if before.steady is None else before.steady
-        carried = advect(moved, predicted, dt, conserve=shot.moves)
+        carried = advect(moved, fine, dt, conserve=shot.moves)
+        predicted = estimator.kept(fine)
+        del fine  # three arrays as large as a density, before the fit takes more
     density, taken_over = _density(index, before, carried, shot, method)
     flame = _flame(index, density.values, shot)
     fitted = time.perf_counter()
@@ -201,7 +234,7 @@ def _frame(index: int, before: Frame | None, shot: Shot, method: Method) -> Fram
     return Frame(index + 1, density.values, velocity, figures, density.smooth, density.steady, flame)
 
 
-def _measured(before: Frame, density: Density) -> tuple[Volume, Volume]:
+def _measured(before: Past, density: Density) -> tuple[Volume, Volume]:
     """The densities of two frames, without what is made up if that is known of both: it shows no motion of its own."""
     if before.smooth is None or density.smooth is None:
         return before.density, density.values
@@ -209,7 +242,7 @@ def _measured(before: Frame, density: Density) -> tuple[Volume, Volume]:
 
 
 def _density(
-    index: int, before: Frame | None, carried: Volume | None, shot: Shot, method: Method
+    index: int, before: Past | None, carried: Volume | None, shot: Shot, method: Method
 ) -> tuple[Density, Mapping[str, float]]:
     """The density of a frame, and what was taken over of the carried one."""
     observations = shot.observe(index)

@@ -51,7 +51,8 @@ class CoarseToFine:
     ) -> Velocity:
         """See `smokelift.velocity.estimate_velocity`."""
         settings = self.settings
-        first, second = checked(before, after, dt, voxel_size, inflow, prediction)
+        # a prediction may be on the coarser grid already, where its shape is checked
+        first, second = checked(before, after, dt, voxel_size, inflow, None if settings.coarsening else prediction)
         rest = Velocity.zero(first.shape, voxel_size, closed)
         peaks = sorted(float(density.max()) for density in (first, second))
         if peaks[0] <= settings.smoke_threshold * peaks[1]:
@@ -67,7 +68,7 @@ class CoarseToFine:
                 2 * voxel_size,
                 closed=closed,
                 inflow=None if inflow is None else coarsen(inflow.astype(np.float32)) > 0,
-                prediction=None if prediction is None else coarsened(prediction),
+                prediction=coarsened(prediction) if prediction and prediction.shape == first.shape else prediction,
             )
             return refined(found, rest.shape)
         weight = motion_weight(first.shape, inflow)
@@ -78,9 +79,15 @@ class CoarseToFine:
         estimate = _estimate(finest, predicted, sources, pair, rest.closed, settings)
         return rest if estimate is None else estimate.velocity(dt, voxel_size)
 
+    def kept(self, velocity: Velocity) -> Velocity:
+        """The velocity on the grid of the estimate."""
+        for _ in range(self.settings.coarsening or 0):
+            velocity = coarsened(velocity)
+        return velocity
+
     def predict(self, velocity: Velocity, dt: float) -> Velocity:
-        """The velocity of the next frame if no force acts, carried along on the grid of the estimate."""
-        return predict_velocity(velocity, dt, coarsening=self.settings.coarsening or 0)
+        """The velocity of the next frame if no force acts, carried along on its grid."""
+        return predict_velocity(velocity, dt)
 
 
 def _estimate(

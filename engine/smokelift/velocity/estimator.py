@@ -49,12 +49,16 @@ class VelocityEstimator(Protocol):
         """Estimate the velocity that carries one density into the next: see `estimate_velocity`."""
         ...
 
+    def kept(self, velocity: Velocity) -> Velocity:
+        """What `predict` and `estimate` need of a velocity: it on the grid of the estimate, which may be coarser."""
+        ...
+
     def predict(self, velocity: Velocity, dt: float) -> Velocity:
-        """The velocity of the next frame if no force acts: see `predict_velocity`."""
+        """The velocity of the next frame if no force acts, on the grid of the one given: see `predict_velocity`."""
         ...
 
 
-def predict_velocity(velocity: Velocity, dt: float, *, coarsening: int = 0) -> Velocity:
+def predict_velocity(velocity: Velocity, dt: float) -> Velocity:
     """The velocity of the next frame if no force acts: carried along by itself, then projected.
 
     Parameters
@@ -63,16 +67,12 @@ def predict_velocity(velocity: Velocity, dt: float, *, coarsening: int = 0) -> V
         Velocity of one frame.
     dt
         Time between frames in seconds.
-    coarsening
-        Carry it on a coarser grid: see `VelocitySettings`.
 
     Returns
     -------
     Velocity
         Without divergence; `residual` stays as it is, because inlets stand still.
     """
-    if coarsening:
-        return refined(predict_velocity(coarsened(velocity), dt, coarsening=coarsening - 1), velocity.shape)
     return replace(project(advect(velocity, velocity, dt)), residual=velocity.residual)
 
 
@@ -80,6 +80,14 @@ def coarsened(velocity: Velocity) -> Velocity:
     """A velocity on a grid half as fine; the residual is on that already."""
     coarse = coarsen_faces(velocity)
     return Velocity(coarse.faces, coarse.voxel_size, coarse.closed, residual=velocity.residual)
+
+
+def refined_to(coarse: Velocity, shape: tuple[int, int, int]) -> Velocity:
+    """A velocity of a coarser grid, halved from one of so many voxels, on that; itself if it is on that already."""
+    if coarse.shape == shape:
+        return coarse
+    x, y, z = (-(-count // 2) for count in shape)
+    return refined(refined_to(coarse, (x, y, z)), shape)
 
 
 def refined(coarse: Velocity, shape: tuple[int, int, int]) -> Velocity:

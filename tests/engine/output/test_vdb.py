@@ -14,6 +14,7 @@ from small_sequence import needs_vdb
 
 from smokelift.output import vdb
 from smokelift.scene import Domain
+from smokelift.transport import StaggeredGrid, face_shapes
 
 DOMAIN = Domain((-1.0, 0.5, 2.0), (-0.5, 0.75, 2.75), (20, 10, 30))
 
@@ -75,6 +76,21 @@ def test_a_flame_comes_back(tmp_path: Path) -> None:
     (tmp_path / "a.vdb").write_bytes(b"nonsense")
     with pytest.raises(OSError, match="is damaged"):
         vdb.read_flame(tmp_path / "a.vdb", DOMAIN.shape)
+
+
+def test_a_velocity_on_faces_is_stored_at_centres(tmp_path: Path) -> None:
+    """The file holds what it holds of the centres of the whole domain."""
+    density, _ = frame()
+    random = np.random.default_rng(6)
+    x, y, z = (random.normal(size=shape).astype(np.float32) for shape in face_shapes(DOMAIN.shape))
+    velocity = StaggeredGrid((x, y, z), DOMAIN.voxel_size)
+    for name, given in (("faces", velocity), ("centres", velocity.centres())):
+        vdb.write_vdb(tmp_path / f"{name}.vdb", density, given, DOMAIN)
+    of_faces, of_centres = (vdb.read_vdb(tmp_path / f"{name}.vdb", DOMAIN.shape)[1] for name in ("faces", "centres"))
+    assert of_faces.any()
+    np.testing.assert_array_equal(of_faces, of_centres)
+    with pytest.raises(ValueError, match="does not fit the domain"):
+        vdb.write_vdb(tmp_path / "a.vdb", density, StaggeredGrid.zero((3, 3, 3), 1.0), DOMAIN)
 
 
 @needs_vdb

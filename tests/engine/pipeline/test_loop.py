@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import weakref
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -589,6 +590,26 @@ def test_the_loop_looks_for_motion_as_coarsely_as_was_chosen(plume, draft) -> No
     assert isinstance(estimator, CoarseToFine)
     assert estimator.settings.coarsening == 1
     assert shot.settings.as_dict()["velocity"]["coarsening"] == 1
+
+
+def test_a_frame_that_is_let_go_takes_no_memory(plume, draft, tmp_path) -> None:
+    """While a frame is computed nothing holds the ones before: at large grids they would not fit together."""
+    given: list[weakref.ref[Frame]] = []
+    alive = []
+
+    class Watched(CoarseToFine):
+        def predict(self, velocity: Velocity, dt: float) -> Velocity:
+            alive.append(sum(frame() is not None for frame in given))
+            return super().predict(velocity, dt)
+
+    with Clip.open(plume.scene.clip) as clip:
+        shot = prepare_shot(clip, plume.scene, draft)
+        method = replace(compose(shot.settings), velocity_estimator=Watched(shot.settings.velocity))
+        for frame in reconstruct(clip, plume.scene, out=tmp_path / "out", npz=True, shot=shot, method=method):
+            given.append(weakref.ref(frame))
+            del frame
+    assert len(given) == 5
+    assert alive == [0, 0, 0]
 
 
 def test_without_transport_every_picture_stands_alone(plume, draft) -> None:

@@ -14,6 +14,7 @@ from scipy import ndimage
 from smokelift.baselines.velocity import PaperVelocity
 from smokelift.transport import face_shapes
 from smokelift.velocity import CoarseToFine, ProjectedCG, Velocity, VelocitySettings, estimate_velocity
+from smokelift.velocity.estimator import refined_to
 from tests.engine.velocity.known_motions import (
     DT,
     LARGE,
@@ -313,3 +314,22 @@ def test_memory_is_a_few_times_the_densities(way):
         [sys.executable, "-c", PEAK, way], capture_output=True, text=True, env=environment, check=True
     )
     assert float(done.stdout) < 25
+
+
+def test_what_is_kept_of_a_velocity_is_enough() -> None:
+    """It is on the coarser grid, and guides the next estimate to the same bits as on the densities' grid."""
+    before, after, _ = translation(np.array((0.8, 0.4, 1.2)), (25, 24, 28), 10.0)
+    estimator = CoarseToFine(dataclasses.replace(SMOOTH, coarsening=1))
+    found = estimator.estimate(before, after, DT, VOXEL)
+    kept = estimator.kept(found)
+    assert kept.shape == (13, 12, 14)
+    assert kept.voxel_size == 2 * VOXEL
+    fine = refined_to(estimator.predict(kept, DT), found.shape)
+    assert fine.shape == found.shape
+    assert refined_to(fine, found.shape) is fine
+    fully, briefly = (
+        estimator.estimate(before, after, DT, VOXEL, prediction=prediction)
+        for prediction in (fine, estimator.kept(fine))
+    )
+    assert fully.figures["trust"] > 0.5
+    np.testing.assert_array_equal(briefly.centres(), fully.centres())

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import itertools
 import time
 from collections.abc import Mapping
 from collections.abc import Sequence as Rows
@@ -65,12 +64,15 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         for note in (*shot.notes, *(choice.reason for choice in shot.choices), *made_up(shot)):
             say.note(note)
         frames = reconstruct(clip, scene, settings, options.out, npz=options.npz, resume=options.resume, shot=shot)
-        for first in frames:
-            say.start(len(clip), first.number - 1)
-            for frame in itertools.chain([first], frames):
-                if options.thumbnail:
-                    _write_thumbnail(options.thumbnail, shot, frame)
-                say.frame(frame.number, frame.figures)
+        started = False
+        for frame in frames:
+            if not started:
+                say.start(len(clip), frame.number - 1)
+                started = True
+            if options.thumbnail:
+                _write_thumbnail(options.thumbnail, shot, frame)
+            say.frame(frame.number, frame.figures)
+            del frame  # while the next is computed its memory is free
     sequence = Sequence.open(options.out)
     figures = [sequence.figures(number) for number in sequence.frames]
     empty = sum(not (of_frame.get("hull_share") or 0) > 0 for of_frame in figures)
