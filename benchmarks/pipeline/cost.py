@@ -67,28 +67,20 @@ class Law:
         return (limit - self.base) / (self.a_voxel + occupied * self.an_occupied)
 
 
-def exponents(runs: Sequence[Run], costs: Sequence[float]) -> list[tuple[float, float]]:
-    """Return the mean occupied share and the exponent p of voxels^p, of each series of sizes that differ in them alone.
+def exponents(runs: Sequence[Run], costs: Sequence[float]) -> tuple[float, float]:
+    """Return the exponents a and b of voxels^a share^b, with the share of the voxels that may hold smoke.
 
     Parameters
     ----------
     runs
-        Series by series, the smallest size first in each.
+        At two sizes and two shares at least, all above 0.
     costs
-        One a run.
+        One a run, above 0.
     """
-    series: list[list[tuple[Run, float]]] = []
-    for run, cost in zip(runs, costs, strict=True):
-        if not series or math.prod(run.size) <= math.prod(series[-1][-1][0].size):
-            series.append([])
-        series[-1].append((run, cost))
-    found = []
-    for part in series:
-        if len(part) > 1:
-            voxels = np.log([math.prod(run.size) for run, _ in part])
-            slope = np.polyfit(voxels, np.log([cost for _, cost in part]), 1)[0]
-            found.append((float(np.mean([run.occupied for run, _ in part])), float(slope)))
-    return found
+    voxels, occupied = (np.log(values) for values in zip(*((math.prod(r.size), r.occupied) for r in runs), strict=True))
+    columns = np.stack([np.ones_like(voxels), voxels, occupied], -1)
+    (_, a, b), *_ = np.linalg.lstsq(columns, np.log(costs), rcond=None)
+    return float(a), float(b)
 
 
 def measure(sizes: Sequence[Shape], extents: Sequence[float], job: dict[str, Any], out: Path) -> list[Run]:
@@ -126,10 +118,13 @@ def text(runs: Sequence[Run], limit: float) -> str:
         f"Memory: {memory.base:.0f} MiB, {bytes_a_voxel:.0f} bytes a voxel, {bytes_more:.0f} more where smoke may be.",
         f"Time: {time.base:.2f} s, {nanoseconds:.0f} ns a voxel, {more:.0f} more where smoke may be.",
     ]
-    for occupied, power in exponents(done, seconds):
+    of_voxels, of_share = exponents(done, seconds)
+    lines.append(f"Time grows as voxels^{of_voxels:.2f} share^{of_share:.2f}.")
+    shares = [run.occupied for run in done]
+    for occupied in (min(shares), max(shares)):
         most = memory.most_voxels(1024 * limit, occupied)
         lines.append(
-            f"At {100 * occupied:.0f} %: time grows as voxels^{power:.2f}; {limit:g} GiB hold {most / 1e6:.0f} million."
+            f"{limit:g} GiB hold {most / 1e6:.0f} million voxels of which {100 * occupied:.0f} % may hold smoke."
         )
     return "\n".join([markdown(header, rows), "", *lines])
 

@@ -20,7 +20,7 @@ from scipy import ndimage
 
 from smokelift.density.borrowed_picture import borrowed_picture
 from smokelift.density.depth_prior import DepthEstimate, ImposedView, RoundDepth
-from smokelift.density.hull import project_voxels
+from smokelift.density.hull import box_around, inside, project_voxels
 from smokelift.density.moments import Moments
 from smokelift.density.multiplicative import fit_multiplicative
 from smokelift.density.objective import camera_terms
@@ -78,6 +78,9 @@ AROUND = 0.05
 SPREAD = 3.0
 """Standard deviation (voxels) of that spread."""
 
+REACH = 12
+"""Voxels that it reaches: four standard deviations."""
+
 ENDS = 3.0
 """Rows at the top and the bottom over which the sides' weight fades in: voxels there hold what the domain cuts off."""
 
@@ -119,7 +122,8 @@ class BorrowedMoments:
         estimate = self.smooth.estimate(views)
         if self.moments is None or not views.hull.any():
             return estimate
-        start = np.where(views.hull, estimate.density, 0).astype(np.float32, copy=False)
+        hull = views.hull
+        start = inside(hull, estimate.density)
         smooth = fit_multiplicative(
             camera_terms(views, estimate.inside), start, SMOOTH_ITERATIONS, SMOOTH_TOLERANCE
         ).density
@@ -127,8 +131,10 @@ class BorrowedMoments:
         if not imposed:
             return estimate
         around = AROUND * min(1.0, 2 * self.detail)
-        spread = (1 - around) * smooth + around * ndimage.gaussian_filter(smooth, SPREAD)
-        density = np.where(views.hull, spread, 0).astype(np.float32, copy=False)
+        box = box_around(hull, REACH)
+        spread = (1 - around) * smooth[box] + around * ndimage.gaussian_filter(smooth[box], SPREAD)
+        density = np.zeros(hull.shape, np.float32)
+        np.copyto(density[box], spread, where=hull[box])
         return replace(estimate, density=density, imposed=imposed, smooth=smooth)
 
     def _sides(self, moments: Moments, smooth: Volume, views: ViewSet) -> Iterator[ImposedView]:

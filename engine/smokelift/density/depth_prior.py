@@ -118,7 +118,9 @@ class RoundDepth:
             for view, axis in zip(views.views, axes, strict=True)
         ]
         extinction = np.float32(views.optics.medium.extinction)
-        return DepthEstimate(_spread(views, profiles) / extinction, tuple(p.share_inside() for p in profiles))
+        density = _spread(views, profiles)
+        np.divide(density, extinction, out=density, where=views.hull)
+        return DepthEstimate(density, tuple(p.share_inside() for p in profiles))
 
 
 def _spread(views: ViewSet, profiles: Sequence[DepthProfile]) -> Volume:

@@ -65,7 +65,7 @@ def descend(
         What no voxel may exceed; where the start does it is cut.
     """
     where = np.flatnonzero(hull)
-    volume, slopes = np.zeros_like(density), np.zeros_like(density)
+    volume, slopes = (np.zeros(hull.shape, np.float32) for _ in range(2))
     current = np.minimum(density.ravel()[where], np.float32(bound))
     scale = current + np.float32(FLOOR * (current.mean() if current.size else 0.0))
     enough = noise_floor(terms)

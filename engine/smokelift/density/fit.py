@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from smokelift.density.depth_prior import DepthEstimate, DepthPrior, ImposedView, RoundDepth
 from smokelift.density.descent import descend
+from smokelift.density.hull import inside
 from smokelift.density.multiplicative import fit_multiplicative, take_turns
 from smokelift.density.objective import Term, camera_terms
 from smokelift.density.observation import BLACK, Observation, ViewSet, eight_bit_plate
@@ -126,7 +127,7 @@ class GradientFit:
         if not hull.any():
             return empty_density(views)
         cameras = camera_terms(views, depth.inside)
-        start = np.where(hull, depth.density if initial is None else initial, 0).astype(np.float32, copy=False)
+        start = inside(hull, depth.density if initial is None else initial)
         # The terms take turns, so several cameras need as many times more iterations. Imposed pictures yield: the last
         # third of the iterations and the descent are the cameras' alone. What is carried along has met imposed pictures
         # before, so that it meets them in half as many rounds.
@@ -241,7 +242,7 @@ def empty_density(views: ViewSet) -> Density:
 
 def without_traces(density: Volume) -> Volume:
     """The density without what no picture can show; see `TRACE`."""
-    return np.where(density < TRACE, np.float32(0), density)
+    return inside(density >= TRACE, density)
 
 
 def fit_figures(views: ViewSet, residuals: Sequence[Image], iterations: int) -> dict[str, float]:

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from smokelift.density.hull import Places
+from smokelift.density.hull import Places, inside
 from smokelift.density.objective import Fit, Term, noise_floor, objective
 from smokelift.render import Image, Volume
 
@@ -104,7 +104,7 @@ class _Smoke:
     def __init__(self, density: Volume) -> None:
         self._filled = density != 0
         self._where = np.flatnonzero(self._filled)
-        self._volume = density.copy()
+        self._volume = inside(self._filled, density)
 
     def values(self) -> Values:
         """Those of the density that the volume holds now."""

@@ -28,6 +28,7 @@ from scipy import ndimage
 
 import smokelift._core as _core
 from smokelift.density.depth_prior import DepthEstimate
+from smokelift.density.hull import box_around
 from smokelift.density.observation import View, ViewSet
 from smokelift.render import Image, Volume
 
@@ -38,6 +39,9 @@ FAINT = 1e-3
 
 GUIDED = 5.0
 """Standard deviation (voxels) of the blur whose result the smooth answer decides; what is finer is the simulation's."""
+
+WIDTHS = 3.0
+"""Standard deviations that it reaches."""
 
 LARGEST_GAIN = 3.0
 """Bound of the factor by which carried smoke is made denser. Where that is too little the prior's smoke is added: there
@@ -162,17 +166,18 @@ class GuidedSimulation:
 
         Its figure ``share`` is the share of the smoke that is taken over.
         """
-        if depth.smooth is None:
+        if depth.smooth is None or not views.hull.any():
             return BlendCarried(self.largest).start(views, depth, carried, before)
-        hull = views.hull
-        wanted, have = (_core.blur(values, GUIDED, 3.0)[hull] for values in (depth.smooth, carried))
+        box = box_around(views.hull, round(WIDTHS * GUIDED))
+        hull = views.hull[box]
+        wanted, have = (_core.blur(values[box], GUIDED, WIDTHS)[hull] for values in (depth.smooth, carried))
         reached = np.float32(self.kept) * np.minimum(wanted, np.float32(LARGEST_GAIN) * have)
-        taken_over = carried[hull] * reached / np.maximum(have, TINY)
-        started = taken_over + (1 - reached / np.maximum(wanted, TINY)) * depth.density[hull]
+        taken_over = carried[box][hull] * reached / np.maximum(have, TINY)
+        started = taken_over + (1 - reached / np.maximum(wanted, TINY)) * depth.density[box][hull]
         total = float(started.sum(dtype=np.float64))
         share = float(taken_over.sum(dtype=np.float64)) / total if total > 0 else 0.0
-        density = np.zeros_like(depth.density)
-        density[hull] = started
+        density = np.zeros(views.hull.shape, np.float32)
+        density[box][hull] = started
         return Start(density, {"share": share})
 
 

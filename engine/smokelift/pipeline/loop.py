@@ -19,7 +19,7 @@ import numpy as np
 
 from smokelift.density import Density, ViewSet
 from smokelift.density.flame import flame_emission
-from smokelift.density.hull import project_voxels
+from smokelift.density.hull import inside, project_voxels
 from smokelift.footage.clip import Clip
 from smokelift.output.resume import ResumeState
 from smokelift.output.writer import SequenceWriter
@@ -207,6 +207,7 @@ def _frame(index: int, before: Past | None, shot: Shot, method: Method) -> Frame
         # what a moving camera does not see no picture corrects, so that its mass has to be kept
         moved = before.density if before.steady is None else before.steady
         carried = advect(moved, fine, dt, conserve=shot.moves)
+        carried = inside(carried > 0, carried)
         predicted = estimator.kept(fine)
         del fine  # three arrays as large as a density, before the fit takes more
     density, taken_over = _density(index, before, carried, shot, method)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from smokelift.density import BorrowedMoments, DensitySettings, GradientFit, RoundDepth, ViewSet
+from smokelift.density import BorrowedMoments, DensitySettings, GradientFit, RoundDepth, ViewSet, borrowed_moments
 from smokelift.footage.clip import Clip
 from smokelift.scene import Scene
 from smokelift.setup.prepare import prepare_shot
@@ -66,6 +66,17 @@ def test_the_side_gets_detail_and_the_front_stays(shot) -> None:
     assert sides[2] > 0.5 * detail(found[2][0], 1)
     assert min(psnr for _, psnr in found) > found[0][1] - 4
     assert min(psnr for _, psnr in found) > 38
+
+
+def test_smoke_is_spread_about_the_hull_alone(shot, monkeypatch) -> None:
+    """What the spread leaves there is what it leaves in the whole box, to the bit."""
+    views = ViewSet.of(shot.observe(2), shot.optics, 2)
+    views.hull[:, :, 8:] = False
+    prior = BorrowedMoments(RoundDepth()).of_clip(shot)
+    found = prior.estimate(views).density
+    monkeypatch.setattr(borrowed_moments, "box_around", lambda voxels, margin: (slice(None),) * 3)
+    np.testing.assert_array_equal(found, prior.estimate(views).density)
+    assert found.any()
 
 
 def test_no_detail_is_the_smooth_prior_itself(shot) -> None:

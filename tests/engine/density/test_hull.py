@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy import ndimage
 
-from smokelift.density.hull import common_hull, project_voxels, visual_hull, voxel_centres
+from smokelift.density.hull import box_around, common_hull, inside, project_voxels, visual_hull, voxel_centres
 from smokelift.scene import Camera, Domain
 from smokelift.scene.projection import project
 
 DOMAIN = Domain((-1.0, -1.0, 0.0), (1.0, 1.0, 3.0), (10, 10, 15))
 SIZE = (21, 17)
+STATM = Path("/proc/self/statm")
 
 CAMERAS = {
     "in front": Camera.look_at((0.3, -6.0, 1.0), (0.0, 0.0, 1.5), fov_y_degrees=25, size=SIZE),
@@ -89,3 +93,32 @@ def test_a_map_refuses_what_does_not_fit():
         projection.places(np.ones((3, 3, 3), np.bool_))
     with pytest.raises(ValueError, match="belong together"):
         projection.shown(np.ones((3, 3), np.bool_))
+
+
+def test_what_is_outside_the_marked_voxels_is_zero() -> None:
+    marked = np.random.default_rng(1).random((5, 6, 7)) < 0.4
+    values = np.random.default_rng(2).random(marked.shape)
+    found = inside(marked, values)
+    assert found.dtype == np.float32
+    np.testing.assert_array_equal(found, np.where(marked, values.astype(np.float32), 0))
+
+
+@pytest.mark.skipif(not STATM.exists(), reason="the system does not say how much memory is in use")
+def test_memory_follows_the_marked_voxels() -> None:
+    """An array of 256 MB with smoke in a hundredth of the box takes a tenth of that at most, read or not."""
+    values = np.broadcast_to(np.float32(1), (256, 512, 512))
+    marked = np.zeros(values.shape, np.bool_)
+    marked[100:112, 100:230, 100:230] = True
+    before = int(STATM.read_text().split()[1])
+    found = inside(marked, values)
+    assert found.max() == 1
+    taken = (int(STATM.read_text().split()[1]) - before) * os.sysconf("SC_PAGE_SIZE")
+    assert taken < 0.1 * found.nbytes
+
+
+def test_the_box_around_marked_voxels_ends_at_the_grid() -> None:
+    marked = np.zeros((9, 8, 7), np.bool_)
+    assert all(marked[box_around(marked, 2)].shape[axis] == 0 for axis in range(3))
+    marked[4, 1, 6] = marked[5, 3, 5] = True
+    assert box_around(marked, 0) == (slice(4, 6), slice(1, 4), slice(5, 7))
+    assert box_around(marked, 2) == (slice(2, 8), slice(0, 6), slice(3, 7))

@@ -17,6 +17,7 @@ from smokelift.density import (
     RoundDepth,
     Start,
     ViewSet,
+    temporal_prior,
 )
 from smokelift.density.temporal_prior import GUIDED, LARGEST_GAIN
 from smokelift.footage.noise import lasting_noise
@@ -154,6 +155,18 @@ def test_detail_is_born_where_nothing_is_carried(moment, guess) -> None:
     little = guided(moment, guess, np.float32(0.01) * moment.prior)
     assert 0 < little.figures["share"] <= 0.011 * LARGEST_GAIN
     np.testing.assert_allclose(little.density.sum(), guess.density[hull].sum(), rtol=0.02)
+
+
+def test_a_simulation_works_about_the_hull_alone(moment, guess, monkeypatch) -> None:
+    """What it finds there is what it finds in the whole box, to the bit."""
+    hull = moment.views.hull.copy()
+    hull[:, :, 3:] = False
+    low = replace(moment, views=replace(moment.views, hull=hull))
+    monkeypatch.setattr(temporal_prior, "GUIDED", 1.0)
+    found = guided(low, guess, moment.true).density
+    monkeypatch.setattr(temporal_prior, "box_around", lambda voxels, margin: (slice(None),) * 3)
+    np.testing.assert_array_equal(found, guided(low, guess, moment.true).density)
+    assert found.any()
 
 
 def test_without_anything_made_up_the_carried_density_is_judged(moment) -> None:
