@@ -103,9 +103,8 @@ def build_environment(python: str, folder: Path) -> Path:
     stamp = folder / "wanted"
     if not stamp.is_file() or stamp.read_text() != "\n".join([python, *wanted]):
         print(f"Installing what the build needs: {', '.join(wanted)}.", flush=True)
-        subprocess.run([python, "-m", "venv", "--clear", str(folder)], check=True)
-        pip = [str(programs / "python"), "-m", "pip", "--disable-pip-version-check", "install", "--quiet"]
-        subprocess.run([*pip, *wanted], check=True)
+        subprocess.run([python, "-m", "venv", "--clear", "--without-pip", str(folder)], check=True)
+        subprocess.run([*_pip(programs), "install", "--quiet", "--no-compile", *wanted], check=True)
         stamp.write_text("\n".join([python, *wanted]))
     return programs
 
@@ -130,13 +129,17 @@ def build(programs: Path, out: Path) -> None:
         # a build folder of its own: the one of `make` was made by another compiler
         wheel = ["wheel", "--quiet", "--no-deps", "--no-build-isolation", "-w", folder]
         wheel += ["-Cbuild-dir=build/portable/{wheel_tag}", str(ROOT)]
-        pip = [str(programs / "python"), "-m", "pip", "--disable-pip-version-check"]
-        subprocess.run([*pip, *wheel], env=environment, cwd=ROOT, check=True)
+        subprocess.run([*_pip(programs), *wheel], env=environment, cwd=ROOT, check=True)
         (built,) = Path(folder).glob("*.whl")
         if portable:
             _certify(built, out)
         else:
             (out / built.name).write_bytes(built.read_bytes())
+
+
+def _pip(programs: Path) -> list[str]:
+    """This interpreter's pip at work in another environment, which then needs none."""
+    return [sys.executable, "-m", "pip", "--disable-pip-version-check", "--python", str(programs / "python")]
 
 
 def _zig() -> Path:

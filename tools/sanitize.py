@@ -59,9 +59,7 @@ def build() -> Path:
         "-w",
         str(AREA),
     ]
-    # optimisation at link time takes minutes, and hides where something happens
-    wheel += ["-Ccmake.define.CMAKE_INTERPROCEDURAL_OPTIMIZATION=OFF", "-Cinstall.strip=false"]
-    wheel += ["-Ccmake.build-type=RelWithDebInfo", f"-Cbuild-dir={AREA / 'core'}"]
+    wheel += ["-Cinstall.strip=false", "-Ccmake.build-type=RelWithDebInfo", f"-Cbuild-dir={AREA / 'core'}"]
     wheel += ["-w", str(AREA), str(ROOT)]
     subprocess.run(wheel, cwd=ROOT, env={**os.environ, "CXXFLAGS": FLAGS}, check=True)
     built = max(AREA.glob("smokelift-*.whl"), key=lambda file: file.stat().st_mtime)

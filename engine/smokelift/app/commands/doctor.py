@@ -34,7 +34,7 @@ def _report() -> list[str]:
     lines = [
         f"smokelift {__version__}, Python {platform.python_version()}, {platform.system()} {platform.machine()}",
         "libraries: " + ", ".join(f"{name} {_version(name)}" for name in LIBRARIES),
-        f"core: {_core.__name__}, {os.cpu_count()} processor cores, "
+        f"core: {_core.__file__}, {os.cpu_count()} processor cores, "
         f"{psutil.virtual_memory().available / 2**30:.1f} of {psutil.virtual_memory().total / 2**30:.1f} GiB free",
     ]
     lines.append(f"GPU: {_gpu(device.start())}")
