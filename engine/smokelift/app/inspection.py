@@ -109,6 +109,7 @@ def facts(shot: Shot, given: Scene, cost: Cost) -> tuple[Fact, ...]:
         _known("medium", thick, given.medium is not None, _said(shot, "Medium")),
         _chosen(shot, "smoke colour", "smoke colour", tint, given.medium is not None),
         _light(shot, given),
+        _thickness(shot, given),
         _chosen(shot, "scattering", "scattering", scene.scattering, given.scattering is not None),
         _place(shot),
         Fact(
@@ -195,6 +196,15 @@ def _light(shot: Shot, given: Scene) -> Fact:
         return Fact("light", f"{strength.chosen} times as strong as given", "measured", strength.reason)
     colour = ", ".join(f"{v:.2g}" for v in shot.optics.unshadowed_source())
     return Fact("light", f"from everywhere, smoke of radiance {colour}", UNDETERMINED, _said(shot, "Light"))
+
+
+def _thickness(shot: Shot, given: Scene) -> Fact:
+    """The line of how much light the smoke takes away."""
+    choice = _choice(shot, "smoke thickness")
+    value = "as the light asks for"
+    if choice is not None and choice.chosen != UNDETERMINED:
+        value = f"hides {choice.measured['hidden']:.0%} of what it covers"
+    return _chosen(shot, "smoke thickness", "smoke thickness", value, bool(given.lights))
 
 
 def _place(shot: Shot) -> Fact:

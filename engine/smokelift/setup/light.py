@@ -59,20 +59,33 @@ def light_colour(lights: tuple[Light, ...], camera: Camera, domain: Domain, medi
     return source / source.max() if source.max() > 0 else np.ones(3)
 
 
-def ambient_sun(samples: SmokeSamples, medium: Medium) -> DirectionalLight:
-    """Uniform light whose source radiance is about the radiance of the clip's thickest smoke.
+def ambient_sun(samples: SmokeSamples, medium: Medium, told: NDArray[np.float64] | None = None) -> DirectionalLight:
+    """Uniform light whose source radiance is the one told, or about the radiance of the clip's thickest smoke.
 
     Thick smoke shows its source radiance J. It is the brightest smoke where smoke brightens its background, and the
     darkest where it darkens it.
+
+    Parameters
+    ----------
+    samples
+        Smoke pixels of the clip and what is behind them.
+    medium
+        Of the smoke.
+    told : (3,), optional
+        Source radiance, if the clip tells its mean (`thickness`). Smoke that is brighter than that mean, or
+        darker where it darkens, is still met.
     """
     if samples.colours.shape[0] == 0:
         source = np.ones(3)
     else:
         change = np.sum(samples.colours - samples.behind, -1)
-        if np.sum(np.maximum(change, 0)) >= np.sum(np.maximum(-change, 0)):
-            source = (1 + BEYOND) * np.percentile(samples.colours, 99, axis=0)
+        brightens = np.sum(np.maximum(change, 0)) >= np.sum(np.maximum(-change, 0))
+        changed = samples.colours if told is None else samples.colours[change >= 0 if brightens else change < 0]
+        bound = np.percentile(changed, 99 if brightens else 1, axis=0)
+        if told is not None:
+            source = np.maximum(told, bound) if brightens else np.minimum(told, bound)
         else:
-            source = (1 - BEYOND) * np.percentile(samples.colours, 1, axis=0)
+            source = (1 + BEYOND if brightens else 1 - BEYOND) * bound
     scattered = np.array(medium.albedos) / (4 * np.pi)
     irradiance = np.divide(source, scattered, out=np.zeros(3), where=scattered > 0)
     return DirectionalLight((0.0, 0.0, -1.0), (float(irradiance[0]), float(irradiance[1]), float(irradiance[2])))

@@ -29,6 +29,7 @@ from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot, ShotView
 from smokelift.setup.smoke import sample_smoke
 from smokelift.setup.smoke_colour import smoke_colour
+from smokelift.setup.thickness import smoke_thickness
 from smokelift.setup.view_gain import balanced
 
 OPTICAL_DEPTH_AT_ONE = 5.0
@@ -91,10 +92,13 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
     asked = scene.scattering if settings.scattering == "auto" else settings.scattering
     lights, richest = scene.lights, richest_scattering(asked, scene.lights, medium)
     if not lights and richest != "absorption":
-        sun = ambient_sun(samples, medium)
+        thickness = smoke_thickness(samples.textures)
+        choices += (thickness.choice,)
+        sun = ambient_sun(samples, medium, thickness.source)
         lights = (sun,)
+        shows = "the thickest smoke shows" if thickness.source is None else "the smoke adds for what it hides"
         notes.append(
-            "Light not given: as much from everywhere as the thickest smoke shows, "
+            f"Light not given: as much from everywhere as {shows}, "
             f"irradiance {', '.join(f'{v:.2f}' for v in sun.irradiance)}, without shadows."
         )
     complete = CompleteScene(

@@ -15,6 +15,7 @@ from smokelift.footage.panorama import WidePicture
 from smokelift.footage.plate import Plates
 from smokelift.footage.steady import exposures
 from smokelift.footage.turning import Turns
+from smokelift.setup.thickness import Texture, seen_texture
 
 SAMPLES = 16
 """Frames that are looked at."""
@@ -43,6 +44,8 @@ class SmokeSamples:
         Numbers of the frames with smoke, those with the most first.
     exposure
         Share by which the exposure of a sample differs from its background's at most; they are evened out.
+    textures
+        What the samples with smoke show of the texture behind it.
     """
 
     scale: float
@@ -52,6 +55,7 @@ class SmokeSamples:
     behind: NDArray[np.float32]
     smoky: tuple[int, ...]
     exposure: float
+    textures: tuple[Texture, ...] = ()
 
 
 def sample_smoke(clip: Clip, plates: Plates, turns: Turns | None = None) -> SmokeSamples:
@@ -61,7 +65,7 @@ def sample_smoke(clip: Clip, plates: Plates, turns: Turns | None = None) -> Smok
     columns, rows = max(1, round(width / scale)), max(1, round(height / scale))
     wide = None if turns is None else WidePicture.around(turns).resized(columns, rows)
     covered = np.zeros((rows, columns) if wide is None else wide.size[::-1], np.bool_)
-    colours, behind, gains = [], [], []
+    colours, behind, gains, textures = [], [], [], []
     gains_of = exposures(plates)
     amounts: dict[int, int] = {}
     for number in clip.spread(SAMPLES):
@@ -75,6 +79,7 @@ def sample_smoke(clip: Clip, plates: Plates, turns: Turns | None = None) -> Smok
         behind.append(plate.image[mask])
         if mask.any():
             amounts[number] = int(mask.sum())
+            textures.append(seen_texture(picture, plate, mask))
     smoky = tuple(sorted(amounts, key=lambda number: -amounts[number]))
     bounds = (0.0, 0.0, float(width), float(height))
     if wide is not None:
@@ -82,4 +87,5 @@ def sample_smoke(clip: Clip, plates: Plates, turns: Turns | None = None) -> Smok
         left, top, right, bottom = (scale * corner for corner in corners)
         bounds = (left, top, right, bottom)
     change = largest_change(gains)
-    return SmokeSamples(scale, bounds, covered, np.concatenate(colours), np.concatenate(behind), smoky, change)
+    shown = np.concatenate(colours), np.concatenate(behind)
+    return SmokeSamples(scale, bounds, covered, *shown, smoky, change, tuple(textures))
