@@ -98,7 +98,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
         lights = (sun,)
         shows = "the thickest smoke shows" if thickness.source is None else "the smoke adds for what it hides"
         notes.append(
-            f"Light not given: as much from everywhere as {shows}, "
+            f"Light not given: as much from everywhere as {amount}, "
             f"irradiance {', '.join(f'{v:.2f}' for v in sun.irradiance)}, without shadows."
         )
     complete = CompleteScene(
