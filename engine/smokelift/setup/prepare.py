@@ -96,7 +96,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
         choices += (thickness.choice,)
         sun = ambient_sun(samples, medium, thickness.source)
         lights = (sun,)
-        shows = "the thickest smoke shows" if thickness.source is None else "the smoke adds for what it hides"
+        amount = "the thickest smoke shows" if thickness.source is None else "the smoke adds for what it hides"
         notes.append(
             f"Light not given: as much from everywhere as {amount}, "
             f"irradiance {', '.join(f'{v:.2f}' for v in sun.irradiance)}, without shadows."
