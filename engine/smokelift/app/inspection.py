@@ -87,8 +87,9 @@ def facts(shot: Shot, given: Scene, cost: Cost) -> tuple[Fact, ...]:
     size = " x ".join(f"{high - low:.3g}" for low, high in zip(domain.min, domain.max, strict=True))
     calibrated = given.camera is not None
     medium = scene.medium
-    thick = f"extinction {medium.extinction:.3g} 1/m at density 1, albedo {medium.albedo:.3g}"
+    thick = f"{medium.extinction:.3g} 1/m at density 1"
     tint = "grey" if medium.is_grey else ", ".join(f"{v:.2f}" for v in medium.color)
+    told, know = given.medium is not None, "Give [medium] if you know it."
     taken = f"The picture is taken to be {PICTURE_HEIGHT:g} m high where the smoke is."
     around = "around the smoke of the whole clip"
     exposure = f"changes by up to {shot.exposure:.0%}, evened out" if shot.exposure > 0 else "steady"
@@ -106,10 +107,10 @@ def facts(shot: Shot, given: Scene, cost: Cost) -> tuple[Fact, ...]:
         _known("scale", f"box of {size} m", calibrated, f"{taken} Give [camera] and [domain] in metres."),
         Fact("box", "as given", "given") if calibrated else Fact("box", around, "estimated", _said(shot, "Domain")),
         _chosen(shot, "resolution", "grid", " x ".join(map(str, domain.resolution)), calibrated),
-        _known("medium", thick, given.medium is not None, _said(shot, "Medium")),
-        _chosen(shot, "smoke colour", "smoke colour", tint, given.medium is not None),
-        _light(shot, given),
-        _thickness(shot, given),
+        _known("extinction", thick, told, f"A picture shows it times the density only. {know}"),
+        _known("albedo", f"{medium.albedo:.3g}", told, f"A picture shows it times the light only. {know}"),
+        _chosen(shot, "smoke colour", "smoke colour", tint, told),
+        *_light(shot, given),
         _chosen(shot, "scattering", "scattering", scene.scattering, given.scattering is not None),
         _place(shot),
         Fact(
@@ -186,25 +187,26 @@ def _noise(plate: Plate) -> Fact:
     return Fact("noise", f"{kind}, {codes:.1f} of 255", "measured", f"{lasting:.1f} of it is shared by neighbours.")
 
 
-def _light(shot: Shot, given: Scene) -> Fact:
+def _light(shot: Shot, given: Scene) -> tuple[Fact, ...]:
+    """The lines of the light: how strong it is, and what of it one picture does not tell."""
     if shot.scene.scattering == "absorption":
-        return Fact("light", "none is needed", "estimated" if given.scattering is None else "given")
-    strength = _choice(shot, "light strength")
-    if given.lights and strength is None:
-        return Fact("light", "as given", "given")
+        return (Fact("light", "none is needed", "estimated" if given.scattering is None else "given"),)
+    strength, thickness = _choice(shot, "light strength"), _choice(shot, "smoke thickness")
     if strength is not None:
-        return Fact("light", f"{strength.chosen} times as strong as given", "measured", strength.reason)
+        return (Fact("light", f"{strength.chosen} times as strong as given", "measured", strength.reason),)
+    if given.lights or thickness is None:
+        return (Fact("light", "as given", "given"),)
     colour = ", ".join(f"{v:.2g}" for v in shot.optics.unshadowed_source())
-    return Fact("light", f"from everywhere, smoke of radiance {colour}", UNDETERMINED, _said(shot, "Light"))
-
-
-def _thickness(shot: Shot, given: Scene) -> Fact:
-    """The line of how much light the smoke takes away."""
-    choice = _choice(shot, "smoke thickness")
-    value = "as the light asks for"
-    if choice is not None and choice.chosen != UNDETERMINED:
-        value = f"hides {choice.measured['hidden']:.0%} of what it covers"
-    return _chosen(shot, "smoke thickness", "smoke thickness", value, bool(given.lights))
+    hides = "as the light asks for"
+    if thickness.chosen != UNDETERMINED:
+        hides = f"hides {thickness.measured['hidden']:.0%} of what it covers"
+    return (
+        _chosen(shot, "smoke thickness", "light strength", f"smoke of radiance {colour}", False),
+        _chosen(shot, "smoke thickness", "smoke thickness", hides, False),
+        _chosen(shot, "light direction", "sun's direction", "no sun", False),
+        _chosen(shot, "light direction", "sun's color", "that of all light", False),
+        _chosen(shot, "light direction", "ambient share", "all light is from everywhere", False),
+    )
 
 
 def _place(shot: Shot) -> Fact:

@@ -20,6 +20,7 @@ from smokelift.scene import (
     Medium,
     Scattering,
 )
+from smokelift.setup.choice import UNDETERMINED, Choice
 from smokelift.setup.smoke import SmokeSamples
 
 BEYOND = 0.1
@@ -57,6 +58,19 @@ def light_colour(lights: tuple[Light, ...], camera: Camera, domain: Domain, medi
     scene = CompleteScene(camera, domain, grey, few, Background(), "single")
     source = scene_optics(scene).unshadowed_source()
     return source / source.max() if source.max() > 0 else np.ones(3)
+
+
+def unknown_direction() -> Choice[str]:
+    """Say that a light that is not given stands nowhere: one view does not tell a sun reliably.
+
+    Source: docs/experiments/light-direction.md.
+    """
+    return Choice(
+        "light direction",
+        UNDETERMINED,
+        "Light direction: undetermined, and so are the colour of a sun and the share of light from everywhere; suns "
+        "from many sides explain one view alike. Give [[lights]] if you know them.",
+    )
 
 
 def ambient_sun(samples: SmokeSamples, medium: Medium, told: NDArray[np.float64] | None = None) -> DirectionalLight:

@@ -22,7 +22,7 @@ from smokelift.setup.background import exposure_notes, find_plates, smoke_in_pla
 from smokelift.setup.choice import Choice
 from smokelift.setup.further_views import disagreement, open_view
 from smokelift.setup.geometry import clip_lens, find_geometry
-from smokelift.setup.light import ambient_sun, light_colour, richest_scattering
+from smokelift.setup.light import ambient_sun, light_colour, richest_scattering, unknown_direction
 from smokelift.setup.model import choose_model, tried_frames
 from smokelift.setup.place import placed
 from smokelift.setup.settings import Settings
@@ -90,10 +90,11 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
         medium = replace(medium, flame_color=told or glow)
         choices += (_fire(burning, told or glow, told is not None),)
     asked = scene.scattering if settings.scattering == "auto" else settings.scattering
+    light_choices: tuple[Choice[Any], ...] = ()
     lights, richest = scene.lights, richest_scattering(asked, scene.lights, medium)
     if not lights and richest != "absorption":
         thickness = smoke_thickness(samples.textures)
-        choices += (thickness.choice,)
+        light_choices = (thickness.choice, unknown_direction())
         sun = ambient_sun(samples, medium, thickness.source)
         lights = (sun,)
         amount = "the thickest smoke shows" if thickness.source is None else "the smoke adds for what it hides"
@@ -117,6 +118,8 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
         model = choose_model(clip, complete, plates, samples.smoky, asked is not None, settings)
         complete, settings = model.scene, replace(settings, velocity=model.velocity)
         choices = (*choices, *model.choices)
+    if complete.scattering != "absorption":
+        choices += light_choices
     views = [ShotView(clip, camera, plates, _working(camera, domain))]
     for number in range(len(scene.views)):
         view, said = open_view(number, clip, complete)

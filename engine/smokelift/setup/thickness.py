@@ -6,8 +6,8 @@ neighbouring pixels are those of the background times T, and the rest of the smo
 
     source radiance = sum (I - T B) / sum (1 - T).
 
-What smoke-free parts of the same pictures show in place of T = 1, and what single frames differ by, says how well that
-is known. Figures: docs/experiments/smoke-thickness.md.
+What smoke-free parts of the same pictures show in place of T = 1, what single frames differ by, and how much of the
+background may be smoke, says how well that is known. Figures: docs/experiments/smoke-thickness.md.
 """
 
 from __future__ import annotations
@@ -49,14 +49,16 @@ class Texture:
     ----------
     hidden, added
         Share of light that the smoke takes away, and radiance (3,) that it adds, over its blocks.
-    smoke, clear, missing
-        Weight of the blocks with smoke and of those without, and the share that is missing from the latter, where none
-        should be.
+    smoke, unsure
+        Weight of its blocks, and how much of that has a background that may be smoke itself.
+    clear, missing
+        Weight of the blocks without smoke, and how much of the texture is missing from them, where all should be seen.
     """
 
     hidden: float
     added: Array
     smoke: float
+    unsure: float
     clear: float
     missing: float
 
@@ -93,9 +95,9 @@ def seen_texture(picture: NDArray[np.float32], plate: Plate, smoke: NDArray[np.b
     power, shared = _texture(behind, behind), _texture(before, behind)
     # the noise of two neighbours, down and across
     noise = 4 * _blocks(np.sum(np.square(noise_at(plate.image, plate), dtype=np.float64), -1))
-    covered = _blocks(smoke.astype(np.float64))
+    covered, confidence = (_blocks(values.astype(np.float64)) for values in (smoke, plate.confidence))
     # what was hardly ever free of smoke holds some of it
-    known = (power > CONTRAST**2 * noise) & (_blocks(plate.confidence.astype(np.float64)) > CONFIDENCE)
+    known = (power > CONTRAST**2 * noise) & (confidence > CONFIDENCE)
     smoky, clear = known & (covered > 0.5), known & (covered == 0)
     # one sharp edge would outweigh all else
     usual = float(np.median(power[smoky])) if smoky.any() else 0.0
@@ -106,6 +108,7 @@ def seen_texture(picture: NDArray[np.float32], plate: Plate, smoke: NDArray[np.b
         hidden=float(np.sum((weight * (1 - passed))[smoky])),
         added=np.asarray(np.sum((weight[..., None] * added)[smoky], axis=0)),
         smoke=float(np.sum(weight[smoky])),
+        unsure=float(np.sum((weight * (1 - confidence))[smoky])),
         clear=float(np.sum(weight[clear])),
         missing=float(np.sum((weight * (1 - passed))[clear])),
     )
@@ -114,15 +117,16 @@ def seen_texture(picture: NDArray[np.float32], plate: Plate, smoke: NDArray[np.b
 def smoke_thickness(frames: Sequence[Texture]) -> Thickness:
     """Say what frames together tell of the smoke's thickness."""
     frames = [frame for frame in frames if frame.smoke > 0]
-    hidden, smoke, clear = (float(sum(getattr(f, name) for f in frames)) for name in ("hidden", "smoke", "clear"))
+    sums = ("hidden", "smoke", "unsure", "clear", "missing")
+    hidden, smoke, unsure, clear, missing = (float(sum(getattr(f, name) for f in frames)) for name in sums)
     if len(frames) < FEWEST or not hidden > 0 or not clear > 0:
         return _undetermined("too little texture shows through it")
     added = np.sum([frame.added for frame in frames], axis=0)
     others = np.array([(added - frame.added).sum() / max(hidden - frame.hidden, 1e-12) for frame in frames])
     whole = max(float(added.sum() / hidden), 1e-12)
     spread = np.sqrt((len(frames) - 1) * np.mean((others - others.mean()) ** 2)) / whole
-    fault = sum(frame.missing for frame in frames) / clear * smoke / hidden
-    error = float(np.hypot(spread, fault))
+    # what a background of smoke hides is missing from what the smoke before it seems to hide
+    error = float(np.linalg.norm((spread, missing / clear * smoke / hidden, unsure / hidden)))
     if not error <= ERROR:
         return _undetermined("the texture behind it tells it no better than that", error)
     share = hidden / smoke

@@ -65,8 +65,13 @@ def test_a_page_shows_what_is_known(plume, tmp_path, capsys, kind) -> None:
     done = events(capsys.readouterr().out)[-1]
     assert done["files"] == [str(page)]
     known = {fact["what"]: fact for fact in done["facts"]}
-    for what in ("camera", "scale", "medium", "light"):
+    for what in ("camera", "scale", "extinction", "albedo", "light strength", "smoke thickness"):
         assert known[what]["origin"] == "undetermined"
+    for what in ("sun's direction", "sun's color", "ambient share"):
+        assert known[what]["origin"] == "undetermined"
+        assert "Give [[lights]]" in known[what]["how"]
+    if kind == ".html":
+        assert "sun&#x27;s direction" in page.read_text(encoding="utf-8")
     assert known["background"]["origin"] == known["box"]["origin"] == "estimated"
     assert known["scattering"]["origin"] == known["grid"]["origin"] == known["noise"]["origin"] == "measured"
     assert page.stat().st_size > 5000
@@ -76,7 +81,8 @@ def test_what_is_given_is_called_given(shot, capsys) -> None:
     """Camera, box, medium, light and background of a scene file."""
     assert command("inspect", shot, "--progress", "json", *QUICK) == 0
     known = {fact["what"]: fact["origin"] for fact in events(capsys.readouterr().out)[-1]["facts"]}
-    assert {known[what] for what in ("camera", "scale", "box", "medium", "light")} == {"given"}
+    assert {known[what] for what in ("camera", "scale", "box", "extinction", "albedo", "light")} == {"given"}
+    assert "sun's direction" not in known
 
 
 def test_a_page_of_a_moving_camera_has_its_path(tracked, tmp_path) -> None:
@@ -98,7 +104,7 @@ def test_a_scene_of_all_estimates_gives_the_same_smoke(plume, tmp_path, capsys) 
     clip, scene = plume.scene.clip.path, tmp_path / "scene.toml"
     words = ("--frames", "0:2", "--detail", "0", *QUICK)
     assert command("inspect", clip, "--write", scene, *words) == 0
-    assert "# light: from everywhere" in scene.read_text(encoding="utf-8")
+    assert "# ambient share: all light is from everywhere (undetermined)" in scene.read_text(encoding="utf-8")
     for name, source in (("own", clip), ("written", scene)):
         assert command("reconstruct", source, "--out", tmp_path / name, "--npz", *words) == 0
     own, written = (Sequence.open(tmp_path / name) for name in ("own", "written"))

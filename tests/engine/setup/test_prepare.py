@@ -27,6 +27,7 @@ from smokelift.scene import (
     look_at_matrix,
 )
 from smokelift.scene.projection import project
+from smokelift.setup.choice import UNDETERMINED
 from smokelift.setup.geometry import COARSEST
 from smokelift.setup.prepare import boundaries, prepare_shot
 from smokelift.setup.settings import LONGEST_SIDE, Settings
@@ -108,6 +109,14 @@ def test_a_clip_alone_gives_a_complete_scene(guessed, passing) -> None:
     assert scene.clip == passing.clip
     with Clip.open(passing.clip) as clip:
         assert scene.camera.size == clip.size
+
+
+def test_the_light_that_nothing_tells_is_called_undetermined(guessed) -> None:
+    """Before black neither its strength nor where it comes from, in choices that are said and kept."""
+    told = {choice.what: choice for choice in guessed.choices}
+    assert told["smoke thickness"].chosen == told["light direction"].chosen == UNDETERMINED
+    reason = told["light direction"].reason
+    assert all(part in reason for part in ("direction", "colour of a sun", "share of light from everywhere", "[["))
 
 
 def test_the_background_is_found(guessed) -> None:

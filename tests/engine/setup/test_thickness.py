@@ -73,6 +73,12 @@ def test_texture_that_is_lost_without_smoke_tells_nothing() -> None:
     assert thickness(fade=0.98).source is not None
 
 
+def test_a_background_that_may_be_smoke_tells_nothing_of_thin_smoke() -> None:
+    """What is unsure is held against what the smoke hides: thick smoke stands out from it."""
+    assert thickness(depth=0.3, confidence=0.95).source is None
+    assert thickness(depth=3.0, confidence=0.95).source is not None
+
+
 def test_thin_smoke_is_lit_as_strongly_as_it_hides() -> None:
     """Without texture the brightest thin smoke is taken for thick smoke."""
     clear = transmittance(0.3, 0)
