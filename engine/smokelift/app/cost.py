@@ -36,13 +36,15 @@ START_SECONDS = 5.0
 BYTES_A_VOXEL_ON_DISK = 8
 """Bytes of a density and three velocities at 16 bits, where smoke fills the box. A quarter is usual."""
 
-BYTES_A_VOXEL = 220
-"""Bytes of memory at a run's peak, where smoke fills much of the box: the velocity solver's arrays beside two
-densities, three velocities and a projection a view (docs/experiments/memory-and-time.md)."""
+BYTES_A_VOXEL = 85
+"""Bytes of memory at a run's peak, where half of the voxels may hold smoke: two velocities while a density is carried,
+and what a fit needs of the voxels that may hold smoke (docs/experiments/memory-and-time.md)."""
 
-BYTES_A_VOXEL_OF_DETAIL = 75
-"""Bytes that detail in depth adds: projections and records of three pictures more, the smooth answer of two frames, and
-what is carried on."""
+BYTES_A_VOXEL_OF_SOLVER = 145
+"""Bytes that a velocity adds whose estimate has the grid of the density: its solver's arrays."""
+
+BYTES_A_VOXEL_OF_DETAIL = 20
+"""Bytes that detail in depth adds: places and records of three pictures more, and the smooth answer of two frames."""
 
 BYTES_A_PIXEL_OF_DETAIL = 4
 """Bytes of a pixel of every frame on the turntable's screen, 16 bits that are held twice while they are gathered."""
@@ -98,6 +100,8 @@ def memory_needed(resolution: Resolution, frames: int, settings: Settings) -> in
     """Return the bytes that a run over so many frames takes at its peak."""
     voxels = math.prod(resolution)
     needed = BASE_BYTES + BYTES_A_VOXEL * voxels
+    if settings.method == "paper" or settings.velocity.coarsening == 0:
+        needed += BYTES_A_VOXEL_OF_SOLVER * voxels
     if settings.detail > 0:
         x, y, z = resolution
         needed += BYTES_A_VOXEL_OF_DETAIL * voxels + BYTES_A_PIXEL_OF_DETAIL * frames * math.ceil(math.hypot(x, y)) * z
