@@ -1,7 +1,7 @@
 """Make the picture of two smokes in a room in docs/: ``python tests/blender/room.py FIRST SECOND``.
 
-It takes a Python with bpy and two sequences: the example's from `make demo`, and what
-``smokelift continue demo/sequence --frames 24 --wind 1.2 0 0 --out SECOND`` makes of it.
+It takes a Python with bpy and two sequences: the example's from `make demo`, and one of a scene that
+`benchmarks/truth` makes: ``smokelift reconstruct SCENES/puff-1/scene.toml --quality draft --frames 14:18``.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from addon.take import Take
 from tests.example_shot import EXAMPLE, add, add_camera
 
 SIZE, SAMPLES = (640, 400), 32
-FRAME = 64
-LATER = 32
-"""Frames by which the first smoke plays later: it has fewer."""
+FRAME = 40
+SHOWN = (32, 5)
+"""Frames of the two sequences that are seen at once."""
 
 FLOOR, WALL = (0.1, 0.085, 0.07), (0.05, 0.06, 0.075)
 STAND = 0.3
@@ -45,12 +45,12 @@ def main() -> None:
         scene.cycles.volume_biased = True  # marching through the volume is ten times as fast
     scene.view_settings.view_transform = "Standard"
     make_room(scene)
-    clip = bpy.data.movieclips.load(str(EXAMPLE / "clip.mp4"))
-    for x, folder, preset, later in ((-1.3, sys.argv[1], "SMOKE", LATER), (0.5, sys.argv[2], "DUST", 0)):
+    clips = bpy.data.movieclips.load(str(EXAMPLE / "clip.mp4")), None
+    for clip, x, folder, preset, shown in zip(clips, (-1.3, 0.5), sys.argv[1:], ("SMOKE", "DUST"), SHOWN, strict=True):
         obj = new_smoke(scene, clip)
         volume.show(obj, Take(Path(folder).absolute()))
         obj.location = (x, 0.0, STAND)
-        obj.data.frame_start += later
+        obj.data.frame_start += FRAME - shown
         bpy.ops.smokelift.use_look(preset=preset)
         bpy.ops.mesh.primitive_cylinder_add(radius=STAND, depth=STAND, location=(x, 0.0, STAND / 2))
         bpy.context.object.data.materials.append(painted((0.04, 0.04, 0.04)))
