@@ -3,14 +3,17 @@
     python -m benchmarks.direct.endurance SCENES/plume-3 ... [--frames 100]
 
 Every scene is cut at two thirds and simulated on from its true densities and velocities. *Speed* is the largest in any
-frame over the largest of the clip's last twelve. *Mass* is that after all frames over that before, of the same smoke
-without inlets and dissipation in a box whose sides are closed, where none may come or go. *Solves* is the processor
-time of a frame over that of one projection, which is one Poisson solve.
+frame over the largest of the clip's last twelve. *Entered* and *left* are what the inlets put in and what the velocity
+takes through the open sides, over the mass before; *balance* is the mass after all frames over what these leave one to
+expect. *Mass* is that after all frames over that before, of the same smoke without inlets and dissipation in a box
+whose sides are closed, where none may come or go. *Solves* is the processor time of a frame over that of one
+projection, which is one Poisson solve.
 """
 
 from __future__ import annotations
 
 import argparse
+import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -28,9 +31,9 @@ from smokelift.direct.inflow import Inflow
 from smokelift.direct.physics import Physics
 from smokelift.evaluation.truth import Truth
 from smokelift.scene import SIDES
-from smokelift.transport import Velocity, project, without_divergence
+from smokelift.transport import Velocity, advect, project, without_divergence
 
-HEADER = ["scene", "speed", "divergence", "mass", "solves"]
+HEADER = ["scene", "speed", "divergence", "entered", "left", "balance", "mass", "solves"]
 
 
 def fastest(moment: Moment) -> float:
@@ -53,23 +56,54 @@ def sealed(simulation: Simulation, moment: Moment) -> tuple[Simulation, Moment]:
     return replace(simulation, physics=Physics(simulation.physics.buoyancy, 0.0), inflow=nowhere), start
 
 
+def entered(simulation: Simulation, before: Moment, after: Moment) -> float:
+    """Return what the inlets put in from one moment to the next: what is in them over what the flow brought there."""
+    inlets = simulation.inflow.voxels
+    brought = advect(before.density, after.velocity, simulation.dt, conserve=True) * kept(simulation)
+    return float((after.density - brought).sum(dtype=float, where=inlets))
+
+
+def left_box(simulation: Simulation, before: Moment, after: Moment) -> float:
+    """Return what the velocity takes through the open sides, at the mean of both densities beside them.
+
+    Not what the simulation holds for gone: it follows the smoke of every voxel.
+    """
+    mean, left = (before.density + after.density) / 2, 0.0
+    for axis, component in enumerate(after.velocity.faces):
+        way = np.moveaxis(component, axis, 0) * simulation.dt / after.velocity.voxel_size
+        for side, outwards in ((0, -way[0]), (-1, way[-1])):
+            left += float((np.maximum(outwards, 0) * np.moveaxis(mean, axis, 0)[side]).sum(dtype=float))
+    return left
+
+
+def kept(simulation: Simulation) -> float:
+    """Return the share of the smoke that does not dissolve in a step."""
+    return math.exp(-simulation.physics.dissipation * simulation.dt)
+
+
 def row(name: str, truth: Truth, frames: int) -> list[str]:
     """Return the figures of a scene."""
     cut = 2 * truth.frames // 3
     moments = [true_moment(truth, frame) for frame in range(max(1, cut - LEARNT_FROM), cut)]
     simulation, moment = learnt_simulation(moments, truth.dt), moments[-1]
     solve = min(seconds(lambda: without_divergence(moments[-1].velocity)) for _ in range(3))
-    before, speed, left, spent = max(map(fastest, moments)), 0.0, 0.0, 0.0
+    fast, speed, divergence, spent = max(map(fastest, moments)), 0.0, 0.0, 0.0
+    start = expected = float(moment.density.sum(dtype=float))
+    came = gone = 0.0
     for step in range(1, frames + 1):
-        began = time.process_time()
+        began, before = time.process_time(), moment
         moment = simulation.next(moment, step)
         spent += time.process_time() - began
-        speed, left = max(speed, fastest(moment)), max(left, largest_divergence(moment))
+        speed, divergence = max(speed, fastest(moment)), max(divergence, largest_divergence(moment))
+        more, less = entered(simulation, before, moment), left_box(simulation, before, moment)
+        came, gone, expected = came + more, gone + less, kept(simulation) * expected + more - less
+    balance = float(moment.density.sum(dtype=float)) / expected
     shut, moment = sealed(simulation, moments[-1])
     for step in range(1, frames + 1):
         moment = shut.next(moment, step)
     mass = moment.density.sum(dtype=float) / moments[-1].density.sum(dtype=float)
-    return [name, f"{speed / before:.2f}", f"{left:.0e}", f"{mass:.4f}", f"{spent / frames / solve:.1f}"]
+    flow = [f"{came / start:.2f}", f"{gone / start:.2f}", f"{balance:.3f}"]
+    return [name, f"{speed / fast:.2f}", f"{divergence:.0e}", *flow, f"{mass:.5f}", f"{spent / frames / solve:.1f}"]
 
 
 def main() -> None:
