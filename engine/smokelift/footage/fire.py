@@ -25,7 +25,7 @@ WARM = 0.75
 """Green over red, and blue over green, of fire at most; a black body of 2700 K has 0.5 and 0.3 in linear BT.709."""
 
 DARKER = 1 / 3
-"""Brightness of smoke that has another colour over the fire's, at most."""
+"""What smoke of another colour adds to the background over what the fire adds, at most."""
 
 LEAST_FIRE, LEAST_SMOKE = 0.002, 0.1
 """Shares of the smoke's pixels that are fire, and that have another colour, at least: fire lights the smoke near it."""
@@ -60,7 +60,8 @@ def fire_share(colours: Picture, behind: Picture) -> float:
     other = ~_warm(colours) & (brightest > FAINTEST)
     if fire.mean() < LEAST_FIRE or other.mean() < LEAST_SMOKE:
         return 0.0
-    smoke, flame = np.percentile(brightest[other], 95), np.median(brightest[fire])
+    added = (colours - behind).max(-1)
+    smoke, flame = np.percentile(added[other], 95), np.median(added[fire])
     return float(fire.mean()) if smoke < DARKER * flame else 0.0
 
 

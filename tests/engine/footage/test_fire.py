@@ -54,6 +54,14 @@ def test_a_bright_wall_behind_thin_smoke_is_no_fire() -> None:
     assert fire_share(colours, behind) == 0
 
 
+def test_fire_beside_dark_smoke_before_a_bright_sky_is_fire() -> None:
+    """What smoke adds counts, not what is behind it."""
+    sky, land = np.full((90, 3), 0.45, np.float32), np.full((10, 3), 0.02, np.float32)
+    flames = np.broadcast_to(np.float32((0.75, 0.25, 0.08)), (10, 3))
+    assert fire_share(np.concatenate([0.7 * sky + 0.02, flames]), np.concatenate([sky, land])) == pytest.approx(0.1)
+    assert fire_share(np.concatenate([sky + 0.4, flames]), np.concatenate([sky, land])) == 0
+
+
 def test_nothing_is_no_fire() -> None:
     assert fire_share(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.float32)) == 0
 

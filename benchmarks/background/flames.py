@@ -1,0 +1,225 @@
+"""Reconstruct fire in baked smoke whose emission is known.
+
+    python -m benchmarks.background.flames SCENES/plume-1 SCENES/two-1 ...
+
+A scene is a folder that `benchmarks.truth.bake` and `benchmarks.truth.picture` filled. The fire is what Mantaflow makes
+of a reactant: it enters with the smoke, goes where the true velocity carries it, is burnt up after `BURNING` seconds,
+and shines as its square root. It burns in the baked smoke, or beneath it: with less smoke the more of the reactant is
+left.
+One frame before black, at eight bits, with the camera and the box told. Pictures are integrated at half-voxel steps,
+without the renderer that is measured: smoke of one source radiance, and the fire's light behind it.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from unittest import mock
+
+import numpy as np
+import numpy.typing as npt
+from scipy import ndimage
+
+from benchmarks.background.clips import exposed, filmed
+from smokelift.evaluation.truth import Truth
+from smokelift.footage.clip import Clip
+from smokelift.pipeline import Frame, reconstruct
+from smokelift.render import scene_optics
+from smokelift.render.emission import emitted
+from smokelift.scene import CompleteScene, Scene, completed, orbit
+from smokelift.scene.projection import ray_through_pixels
+from smokelift.setup.prepare import prepare_shot
+from smokelift.setup.settings import Settings
+from smokelift.setup.shot import Shot
+
+Array = npt.NDArray[np.float32]
+
+FRAME = 32
+BURNING = 0.4
+"""Seconds until the reactant is burnt up."""
+
+SOURCE = 0.06
+"""Radiance of the thickest smoke: it is dark."""
+
+COLOUR = np.array((1.0, 0.4, 0.08), np.float32)
+HOT, COOL = np.array((1.0, 0.6, 0.25), np.float32), np.array((1.0, 0.25, 0.03), np.float32)
+"""Colours of reactant that has just entered, and that is nearly burnt up, in a flame of two colours."""
+
+RESOLUTION, THIRD = (32, 32, 48), 16
+"""Voxels, and those along z that are the box's lowest third."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """What is filmed, and what is told.
+
+    Attributes
+    ----------
+    level
+        Red that the fire adds to the picture, at most; above 1 it is clipped.
+    beneath
+        Whether it burns beneath the smoke.
+    coloured
+        Whether it has two colours.
+    told
+        Whether the smoke's depth is told.
+    smoke
+        Whether fire is taken for smoke, as it is without being looked for.
+    """
+
+    level: float = 0.9
+    beneath: bool = False
+    coloured: bool = False
+    told: bool = False
+    smoke: bool = False
+
+
+CASES = {
+    f"{name}, {where}": replace(case, beneath=beneath)
+    for where, beneath in (("in smoke", False), ("beneath smoke", True))
+    for name, case in {
+        "no fire": Case(0.0),
+        "read as smoke": Case(smoke=True),
+        "fire": Case(),
+        "clipped": Case(2.5),
+        "two colours": Case(coloured=True),
+        "depth told": Case(told=True),
+    }.items()
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Fire:
+    """Fire and smoke on the scene's grid, and their pictures (rows, columns)."""
+
+    density: Array
+    emission: Array
+    light: Array
+    young: Array
+    transmittance: Array
+
+    @staticmethod
+    def of(truth: Truth, scene: CompleteScene, beneath: bool) -> Fire:
+        """That of a scene."""
+        left = reactant(truth)
+        density = truth.densities[FRAME].astype(np.float32) * (1 - left * beneath)
+        emission = np.sqrt(left)
+        pictures = [integrated(each, density, scene) for each in (emission, emission * left)]
+        return Fire(density, emission, pictures[0][0], pictures[1][0], pictures[0][1])
+
+    def picture(self, case: Case) -> tuple[Array, Array]:
+        """The picture, and what the fire adds to it (rows, columns, 3)."""
+        gain = case.level / self.light.max()
+        hot, cool = (HOT, COOL) if case.coloured else (COLOUR, COLOUR)
+        added = gain * (self.young[..., None] * hot + (self.light - self.young)[..., None] * cool)
+        return SOURCE * (1 - self.transmittance)[..., None] + added, added
+
+
+def main() -> None:
+    """Print what is found, a scene and a case a row."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scenes", nargs="+", type=Path)
+    print("| scene | case | colour | front | amount | side | density: lowest third / above / largest | side |")
+    for folder in parser.parse_args().scenes:
+        scene = completed(Scene.load(folder / "scene.toml"))
+        width, height = scene.camera.size
+        scene = replace(scene, camera=scene.camera.resized(width // 2, height // 2))
+        truth = Truth.load(folder / "truth.npz")
+        fires = {beneath: Fire.of(truth, scene, beneath) for beneath in (False, True)}
+        for name, case in CASES.items():
+            print(f"| {folder.name} | {name} | {' | '.join(_measured(fires[case.beneath], case, scene))} |", flush=True)
+
+
+def _measured(fire: Fire, case: Case, scene: CompleteScene) -> Iterator[str]:
+    """The fire's colour, error in front, amount and side; sums of the density and its largest, and its side."""
+    picture, added = fire.picture(case)
+    clip = filmed(np.clip(exposed(picture[None], np.ones(1)), 0, 1), "fire")
+    density = coarser(fire.density)
+    places = scene.domain.min[1] + (np.arange(RESOLUTION[1]) + 0.5) * 2 / RESOLUTION[1]
+    depth = float(np.average(places, weights=density.sum((0, 2)))) if case.told else None
+    with mock.patch("smokelift.setup.prepare.fire_share", lambda *_: 0.0) if case.smoke else mock.MagicMock():
+        shot, frame = _reconstructed(clip, scene, depth)
+    sides = [orbit(scene.camera, scene.domain, 90).resized(32, 48)]
+    optics, clear = scene_optics(shot.scene), np.zeros(RESOLUTION, np.float32)
+    if frame.flame is None or shot.fire is None:
+        yield from ("-", "-", "-", "-")
+    else:
+        colour = np.array(shot.scene.medium.flame_color, np.float32)
+        yield ", ".join(f"{c:.2f}" for c in colour)
+        camera = shot.fire.working.camera
+        seen = emitted(frame.flame, frame.density, camera, optics)[..., None] * colour
+        true = shot.fire.working.cut(np.clip(added, 0, 1))
+        yield f"{np.abs(np.clip(seen, 0, 1) - true).sum() / true.sum():.1%}"
+        emission = coarser(fire.emission) * case.level / fire.light.max()
+        yield f"{frame.flame.sum() / emission.sum():.2f}"
+        yield _alike(*(emitted(each, clear, sides[0], optics) for each in (emission, frame.flame)))
+    depth_of = frame.density * shot.scene.medium.extinction
+    yield f"{depth_of[..., :THIRD].sum():.0f} / {depth_of[..., THIRD:].sum():.0f} / {depth_of.max():.1f}"
+    yield _alike(*(emitted(each, clear, sides[0], optics) for each in (density, frame.density)))
+
+
+def _alike(true: Array, found: Array) -> str:
+    return f"{np.corrcoef(true.ravel(), found.ravel())[0, 1]:.2f}"
+
+
+def _reconstructed(clip: Clip, scene: CompleteScene, depth: float | None) -> tuple[Shot, Frame]:
+    known = Scene(
+        camera=scene.camera,
+        domain=replace(scene.domain, resolution=RESOLUTION),
+        background=scene.background,
+    )
+    settings = replace(Settings.preset("draft"), detail=0.0, axis_depth=depth)
+    shot = prepare_shot(clip, known, settings)
+    (frame,) = reconstruct(clip, known, settings, shot=shot)
+    return shot, frame
+
+
+def reactant(truth: Truth) -> Array:
+    """What is left of the reactant in the frame, 0 to 1 (nx, ny, nz)."""
+    shape = truth.densities.shape[1:]
+    left, places = np.zeros(shape, np.float32), np.indices(shape, np.float32)
+    for number in range(FRAME):
+        entering = np.unpackbits(truth.inflow_packed[number], count=left.size).reshape(shape).astype(bool)
+        left = np.where(entering, np.float32(1), left)
+        faces = [component[number].astype(np.float32) for component in truth.faces]
+        velocity = np.stack(
+            [
+                (face.take(range(n), a) + face.take(range(1, n + 1), a)) / 2
+                for a, (face, n) in enumerate(zip(faces, shape, strict=True))
+            ]
+        )
+        came_from = places - velocity / np.float32(truth.fps * truth.voxel_size)
+        left = ndimage.map_coordinates(left, came_from, order=1, mode="constant")
+        left = np.maximum(left - np.float32(1 / (BURNING * truth.fps)), 0)
+    return left
+
+
+def integrated(emission: Array, density: Array, scene: CompleteScene) -> tuple[Array, Array]:
+    """The fire's light and the smoke's transmittance (rows, columns), by the midpoint rule at half-voxel steps."""
+    low, high = np.array(scene.domain.min), np.array(scene.domain.max)
+    voxel = scene.domain.voxel_size
+    origin, direction = ray_through_pixels(scene.camera)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        sides = np.stack([(low - origin) / direction, (high - origin) / direction])
+    near, far = sides.min(0).max(-1), sides.max(0).min(-1)
+    hit = far > near
+    light, clear = np.zeros(near.shape, np.float32), np.ones(near.shape, np.float32)
+    for distance in np.arange(near[hit].min(), far[hit].max(), voxel / 2):
+        place = np.moveaxis((origin + (distance + voxel / 4) * direction - low) / voxel - 0.5, -1, 0)
+        here = [ndimage.map_coordinates(each, place, order=1, mode="constant") for each in (emission, density)]
+        passed = np.exp(-scene.medium.extinction * here[1] * voxel / 2)
+        light += clear * np.sqrt(passed) * here[0] * voxel / 2
+        clear *= passed
+    return light, clear
+
+
+def coarser(values: Array) -> Array:
+    """Means over two voxels along each axis."""
+    x, y, z = (n // 2 for n in values.shape)
+    return np.asarray(values.reshape(x, 2, y, 2, z, 2).mean((1, 3, 5)))
+
+
+if __name__ == "__main__":
+    main()
