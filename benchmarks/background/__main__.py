@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from benchmarks.background.clips import Case, Smoke, cases
 from benchmarks.background.score import score
 from benchmarks.background.turning import panned, shaken
 from smokelift.footage.plate import Plates, known_plate
+from smokelift.footage.steady import without_noise_light
 from smokelift.setup.background import find_plates
 
 FIGURES = ("plate", "lost", "missed", "false", "unknown")
@@ -42,10 +44,12 @@ def main() -> None:
             began = time.process_time()
             if case.given:
                 plates: Plates = known_plate(case.plate, case.clip)
+                clip = without_noise_light(case.clip, plates)
             else:
-                plates = find_plates(case.clip, None, None, case.lens).plates
+                found = find_plates(case.clip, None, None, case.lens)
+                plates, clip = found.plates, found.clip
             seconds += time.process_time() - began
-            rows.append(score(case, plates))
+            rows.append(score(replace(case, clip=clip), plates))
         figures = {key: [row[key] for row in rows] for key in FIGURES}
         cells = [f"{np.mean(figures['plate']):.1f} ({np.max(figures['plate']):.1f})"]
         cells += [f"{np.mean(figures[key]):.1%} ({np.max(figures[key]):.1%})" for key in FIGURES[1:]]

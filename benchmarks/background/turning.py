@@ -43,6 +43,12 @@ def lens_of(smoke: Smoke) -> Lens:
     return Lens((columns, rows), (focal, focal), (columns / 2, rows / 2))
 
 
+def ahead(smoke: Smoke) -> Picture:
+    """What the camera sees of the wall of these clips, without smoke, where it looks straight ahead."""
+    _, rows, columns = smoke.radiance.shape
+    return wall((3 * rows, 3 * columns))[rows : 2 * rows, columns : 2 * columns]
+
+
 def seen_turning(smoke: Smoke, lens: Lens, turns: Rotation) -> Case:
     """The clip of a camera that turns, frame to mean pose, before a wall three times as wide and high as the picture.
 

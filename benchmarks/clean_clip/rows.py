@@ -22,7 +22,7 @@ from benchmarks.background.clips import (
     steps,
     wall,
 )
-from benchmarks.background.turning import panned, shaken
+from benchmarks.background.turning import ahead, panned, shaken
 from benchmarks.clean_clip.smoke import Baked
 from smokelift.footage.images import Picture, linear_to_srgb
 
@@ -87,6 +87,7 @@ class Clips:
     def rows(self) -> dict[str, Row]:
         """All of them, each after the clean one that it is compared with."""
         painted, black, clouds = wall(self.shape), backdrop(self.shape, 0), sky(self.shape)
+        wide = ahead(self.smoke.front)
         noises = {share: (lambda x, s=share: noisy(x, s)) for share in (0.02, 0.05, 0.1)}
         rates = {crf: (lambda x, c=crf: compressed(x, c)) for crf in (20, 32, 45)}
         front, dark = self.smoke.front, self.smoke.darkened()
@@ -94,17 +95,23 @@ class Clips:
             "wall, given": {
                 "wall, given": lambda: self._film(painted, painted),
                 "wall": lambda: self._film(painted),
-                "wall, shaken by 3 pixels": lambda: self._turning(shaken(front, 3)),
-                "wall, shaken by 10 pixels": lambda: self._turning(shaken(front, 10)),
-                "wall, panned by a third": lambda: self._turning(panned(front, 1 / 3)),
                 "wall, flash": lambda: self._film(painted, gains=flash(self.count)),
                 "wall, exposure steps": lambda: self._film(painted, gains=steps(self.count)),
                 **{f"wall, noise {n:.0%}": partial(self._film, painted, spoil=s) for n, s in noises.items()},
                 **{f"wall, crf {n}": partial(self._film, painted, spoil=s) for n, s in rates.items()},
                 "wall, 10 bit HLG": lambda: self._film(painted, hlg=True),
-                "wall, given, noise 5%": lambda: self._film(painted, painted, spoil=noises[0.05]),
-                "wall, given, noise 10%": lambda: self._film(painted, painted, spoil=noises[0.1]),
-                "wall, given, crf 45": lambda: self._film(painted, painted, spoil=rates[45]),
+                **{
+                    f"wall, given, noise {n:.0%}": partial(self._film, painted, painted, spoil=s)
+                    for n, s in noises.items()
+                },
+                **{f"wall, given, crf {n}": partial(self._film, painted, painted, spoil=s) for n, s in rates.items()},
+            },
+            "wide wall, given": {
+                "wide wall, given": lambda: self._film(wide, wide),
+                "wide wall": lambda: self._film(wide),
+                "wide wall, shaken by 3 pixels": lambda: self._turning(shaken(front, 3)),
+                "wide wall, panned by a third": lambda: self._turning(panned(front, 1 / 3)),
+                "wide wall, shaken by 10 pixels": lambda: self._turning(shaken(front, 10)),
             },
             "wall, column, given": {
                 "wall, column, given": lambda: self._film(painted, painted, of=self.standing),
