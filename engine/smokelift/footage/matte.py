@@ -72,7 +72,12 @@ def matte(frame: npt.ArrayLike, plate: Plate) -> Matte:
     width = smoothing(plate.noise)
     # as far as white noise goes, a Gaussian is a mean over so many pixels
     noise = plate.noise.averaged(4 * np.pi * width**2).total
-    difference = (linear_to_srgb(linear) - linear_to_srgb(plate.image)) / noise
+    shown, behind = linear, plate.image
+    if width > SMOOTHING:
+        # in much noise the sRGB value of light is too low on the mean; that of a mean of light is not
+        shown, behind = (ndimage.gaussian_filter(light, (SMOOTHING, SMOOTHING, 0.0)) for light in (shown, behind))
+        width = float(np.sqrt(width**2 - SMOOTHING**2))
+    difference = (linear_to_srgb(shown) - linear_to_srgb(behind)) / noise
     smooth = ndimage.gaussian_filter(difference, (width, width, 0.0))
     deviation = np.sqrt((smooth**2).mean(axis=2))
     deviation /= np.clip(np.median(deviation), 1.0, GLOBAL_DEVIATION)

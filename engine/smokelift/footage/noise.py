@@ -171,21 +171,43 @@ def clear_deviation(deviations: Picture) -> float:
     deviations : (frames, rows, columns)
         From the background.
     """
-    return float(np.median(_of_clear(deviations)))
+    return float(np.median(_of_clear(over_time(deviations))))
 
 
-def drift(deviations: Picture) -> float:
-    """Return the root mean square where `clear_deviation` returns the median: what a codec lets drift counts."""
-    return float(np.sqrt(np.mean(_of_clear(deviations) ** 2)))
+def drift(deviations: Picture, white: float) -> float:
+    """Return the root mean square where `clear_deviation` returns the median: what a codec lets drift counts.
+
+    White noise of a standard deviation is taken off first, lest smoke as thin as that noise counts.
+    """
+    squares = np.maximum(over_time(deviations) ** 2 - np.float32(white**2), 0)
+    return float(np.sqrt(np.mean(_of_clear(np.sqrt(squares)) ** 2)))
 
 
-def _of_clear(deviations: Picture) -> Picture:
-    """The noise of each pixel without smoke, (n,)."""
-    each = over_time(deviations)
+def _of_clear(each: Picture) -> Picture:
+    """Those of the pixels' deviations over time that no smoke explains, (n,)."""
     each = each[np.isfinite(each)]
     stillest = max(float(np.quantile(each, 0.1)), float(EIGHT_BIT_STEP))
     clear: Picture = each[each <= SMOKE_TO_NOISE * stillest]
     return clear
+
+
+def linear_excess(encoded: Picture, deviation: npt.ArrayLike) -> Picture:
+    """Return by how much noise of sRGB values makes linear light brighter on the mean, at sRGB values.
+
+    Light is a convex function of sRGB values, so that the mean of f(v + n) exceeds f(v) by half of the noise's variance
+    times the second derivative of f. At a noisy value the term has the same mean, up to the fourth order in the noise.
+
+    Parameters
+    ----------
+    encoded : (..., 3)
+        sRGB values, noisy or not.
+    deviation
+        Standard deviation of the noise, in sRGB values, one or one a channel.
+    """
+    # the second derivative of the curve of `srgb_to_linear`
+    curvature = 2.4 * 1.4 / 1.055**2 * ((np.maximum(encoded, 0.04) + 0.055) / 1.055) ** 0.4
+    excess = np.where(encoded > 0.04, 0.5 * np.square(deviation) * curvature, 0)
+    return np.asarray(excess, np.float32)
 
 
 def linear_per_srgb(encoded: Picture) -> Picture:

@@ -17,7 +17,7 @@ from smokelift.footage.exposure import sample_gains, small
 from smokelift.footage.images import Picture
 from smokelift.footage.noise import Noise, encode_sample, lasting_noise, sampled_count
 from smokelift.footage.plate import Plate, noise_before
-from smokelift.footage.plate_estimation import clear_picture
+from smokelift.footage.plate_estimation import clear_picture, clip_noise
 from smokelift.footage.turning import Turns, file_turns
 
 WIDEST = 3.0
@@ -159,7 +159,8 @@ def estimate_panorama(clip: Clip, turns: Turns, sample_count: int = 32) -> Panor
         If the camera turns too far for a flat picture.
     """
     place = WidePicture.around(turns)
-    image, known = clear_picture(*wide_samples(clip, place, sample_count))
+    samples, seen = wide_samples(clip, place, sample_count)
+    image, known = clear_picture(samples, clip_noise(samples, seen), seen)
     plates = PanoramaPlate(place, image, known.astype(np.float32), lasting_noise(0.0))
     return replace(plates, noise=noise_before(plates, clip))
 

@@ -109,6 +109,10 @@ class ChangingPlate:
 class Plates(Protocol):
     """The background of every frame of a clip."""
 
+    @property
+    def noise(self) -> Noise:
+        """Of the clip's pictures."""
+
     def at(self, frame: int) -> Plate:
         """Return the plate of a frame, counted from 0."""
 

@@ -30,7 +30,7 @@ from scipy import ndimage
 from smokelift.footage.clip import Clip
 from smokelift.footage.exposure import sample_gains, small
 from smokelift.footage.images import Picture, area_average, linear_to_srgb, srgb_to_linear
-from smokelift.footage.matte import SMOOTHING, matte
+from smokelift.footage.matte import matte, smoothing
 from smokelift.footage.noise import (
     BLOCK,
     NOISE_STRIDE,
@@ -147,7 +147,7 @@ def estimate_plate(clip: Clip, sample_count: int = 32) -> Plate:
 
 def estimated_plate(samples: npt.NDArray[np.uint16], noise: Noise) -> Plate:
     """Return the plate of a background of more than one colour, from `steady_samples`."""
-    image, known = clear_picture(samples)
+    image, known = clear_picture(samples, noise)
     return Plate(image, known.astype(np.float32), noise)
 
 
@@ -158,7 +158,7 @@ def backdrop_plate(samples: npt.NDArray[np.uint16], noise: Noise) -> Plate | Non
 
 
 def clear_picture(
-    samples: npt.NDArray[np.uint16], seen: npt.NDArray[np.bool_] | None = None
+    samples: npt.NDArray[np.uint16], noise: Noise, seen: npt.NDArray[np.bool_] | None = None
 ) -> tuple[Picture, npt.NDArray[np.bool_]]:
     """Return the background of samples, linear (rows, columns, 3), and which pixels of it are known (rows, columns).
 
@@ -166,10 +166,13 @@ def clear_picture(
     ----------
     samples : (frames, rows, columns, 3)
         Of one exposure, as of `steady_samples`.
+    noise
+        Of them.
     seen : (frames, rows, columns) bool, optional
         Which pixels each of them shows; without it all.
     """
-    grey = np.stack([_smooth_grey(sample) for sample in samples])
+    width = smoothing(noise)
+    grey = np.stack([_smooth_grey(sample, width) for sample in samples])
 
     def shown(*where: slice) -> Picture:
         values = decode_samples(grey[:, *where])
@@ -247,14 +250,22 @@ def steady_samples(clip: Clip, count: int = 32) -> npt.NDArray[np.uint16]:
     return samples
 
 
-def clip_noise(samples: npt.NDArray[np.uint16]) -> Noise:
-    """Return the noise of `steady_samples` before a background that is not known yet."""
-    single = decode_samples(samples[:, ::NOISE_STRIDE, ::NOISE_STRIDE])
-    blocks = np.concatenate([block_means(decode_samples(sample[None])) for sample in samples])
-    single, blocks = (each - np.median(each, axis=0) for each in (single, blocks))
+def clip_noise(samples: npt.NDArray[np.uint16], seen: npt.NDArray[np.bool_] | None = None) -> Noise:
+    """Return the noise of samples, as `clear_picture` takes them, before a background that is not known yet."""
+
+    def shown(number: int) -> Picture:
+        values = decode_samples(samples[number, None])
+        if seen is not None:
+            values[~seen[number, None]] = np.nan
+        return values
+
+    single = np.concatenate([shown(n)[:, ::NOISE_STRIDE, ::NOISE_STRIDE] for n in range(len(samples))])
+    blocks = np.concatenate([block_means(shown(n)) for n in range(len(samples))])
+    single, blocks = (each - median_of_seen(each) for each in (single, blocks))
     noise = temporal_noise(single, blocks)
     # what drifts differs from the one background that is found
-    drifting = np.array([drift(blocks[..., channel]) for channel in range(3)], np.float32)
+    left = noise.averaged(BLOCK**2).white
+    drifting = np.array([drift(blocks[..., channel], left[channel]) for channel in range(3)], np.float32)
     return replace(noise, lasting=np.maximum(noise.lasting, drifting))
 
 
@@ -298,9 +309,9 @@ def _mean(samples: npt.NDArray[np.uint16], seen: npt.NDArray[np.bool_] | None) -
     return np.asarray(total / np.maximum(seen.sum(0), 1)[..., None], np.float32)
 
 
-def _smooth_grey(sample: npt.NDArray[np.uint16]) -> npt.NDArray[np.uint16]:
-    """The grey of a sample, so smooth that most of its noise is gone."""
-    smooth: Picture = ndimage.gaussian_filter(sample.mean(-1, dtype=np.float32), SMOOTHING)
+def _smooth_grey(sample: npt.NDArray[np.uint16], width: float) -> npt.NDArray[np.uint16]:
+    """The grey of a sample, smoothed by so many pixels that most of its noise is gone."""
+    smooth: Picture = ndimage.gaussian_filter(sample.mean(-1, dtype=np.float32), width)
     return smooth.astype(np.uint16)
 
 

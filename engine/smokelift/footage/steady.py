@@ -1,14 +1,23 @@
-"""Clips whose exposure changes, brought to that of their backgrounds."""
+"""Clips brought to what their backgrounds are measured by: one exposure, and the brightness of light without noise."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
 
+import numpy as np
+
 from smokelift.footage.clip import Clip
 from smokelift.footage.exposure import gain_of, small
-from smokelift.footage.images import Picture
+from smokelift.footage.images import Picture, linear_to_srgb
+from smokelift.footage.noise import EIGHT_BIT_STEP, linear_excess, linear_per_srgb
 from smokelift.footage.plate import Plate, Plates
+
+MIDDLE = np.full(3, 0.5, np.float32)
+"""sRGB values at which it is judged whether noise brightens a clip."""
+
+UNCLIPPED = 2.0
+"""sRGB value, in standard deviations of the noise, from which hardly any noise is below black."""
 
 
 def steady(clip: Clip, plates: Plates) -> Clip:
@@ -28,6 +37,31 @@ def steady(clip: Clip, plates: Plates) -> Clip:
         return picture if (gains == 1).all() else picture / gains
 
     return clip.changed(balanced)
+
+
+def without_noise_light(clip: Clip, plates: Plates) -> Clip:
+    """Return a clip without the light that its noise adds to means (`linear_excess`).
+
+    A clip that is brightened by less than rounding to 8 bits may do is returned as it is. So is one before a background
+    that is mostly so dark that its noise is clipped, which is taken to be as bright as that makes it (`known_plate`).
+
+    Parameters
+    ----------
+    clip
+        The footage. It is read when the frames of the result are.
+    plates
+        Its backgrounds, with its noise.
+    """
+    noise = plates.noise.total
+    if (linear_excess(MIDDLE, noise) <= 0.5 * EIGHT_BIT_STEP * linear_per_srgb(MIDDLE)).all():
+        return clip
+    if (np.median(linear_to_srgb(plates.at(0).image), axis=(0, 1)) < UNCLIPPED * noise).any():
+        return clip
+
+    def lessened(_: int, picture: Picture) -> Picture:
+        return np.maximum(picture - linear_excess(linear_to_srgb(picture), noise), 0)
+
+    return clip.changed(lessened)
 
 
 def exposures(plates: Plates) -> Callable[[int, Picture], Picture]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -25,7 +26,7 @@ from smokelift.footage.plate_estimation import (
     one_colour,
     steady_samples,
 )
-from smokelift.footage.steady import exposures
+from smokelift.footage.steady import exposures, without_noise_light
 from smokelift.footage.turning import Turns, find_turns
 from smokelift.scene import Background, Camera
 from smokelift.setup.smoke import SmokeSamples
@@ -53,6 +54,8 @@ class FoundPlates:
 
     Attributes
     ----------
+    clip
+        Without the brightness that noise adds to it.
     plates
         Of the full pictures.
     background
@@ -63,6 +66,7 @@ class FoundPlates:
         Of the camera, if it was found to turn.
     """
 
+    clip: Clip
     plates: Plates
     background: Background | None
     notes: tuple[str, ...] = ()
@@ -90,6 +94,18 @@ def find_plates(
     ValueError
         If a camera moves before a background of more than one colour that is not given, or turns too far.
     """
+    found = _find_plates(clip, camera, background, lens)
+    quiet = without_noise_light(clip, found.plates)
+    if quiet is clip:
+        return found
+    again = _find_plates(quiet, camera, background, lens)
+    # noise is that of the pictures as they were filmed: sRGB values of the others are too low on the mean
+    plates: Any = again.plates
+    return replace(again, plates=replace(plates, noise=found.plates.noise))
+
+
+def _find_plates(clip: Clip, camera: Camera | None, background: Background | None, lens: Lens | None) -> FoundPlates:
+    """The plates of a clip as it is; see `find_plates`."""
     moves = camera is not None and camera.moves
     told = camera is not None or clip.lens is not None
     if clip.backdrop is not None:
@@ -97,10 +113,10 @@ def find_plates(
         name = "white" if clip.backdrop else "black"
         note = f"The clip has an alpha channel, which is the matte: the smoke is shown before {name}."
         unused = ("[background] is not used.",) if background is not None else ()
-        return FoundPlates(known_plate(grey, clip), Background(color=grey), (note, *unused))
+        return FoundPlates(clip, known_plate(grey, clip), Background(color=grey), (note, *unused))
     given = given_plates(background, camera, clip)
     if given is not None:
-        return FoundPlates(given, background)
+        return FoundPlates(clip, given, background)
     if not moves:
         return _estimated(clip, lens, told)
     plate = estimate_plate(clip)
@@ -111,7 +127,7 @@ def find_plates(
             "a picture for every frame (a video or plate_####.png), or a color, in [background]."
         )
     note = f"Background not given: one colour, {', '.join(f'{v:.2g}' for v in colour)} (linear)."
-    return FoundPlates(known_plate(colour, clip), Background(color=colour), (note,))
+    return FoundPlates(clip, known_plate(colour, clip), Background(color=colour), (note,))
 
 
 def exposure_change(clip: Clip, plates: Plates) -> float:
@@ -155,7 +171,7 @@ def _estimated(clip: Clip, lens: Lens | None, told: bool) -> FoundPlates:
     turns, focal = (None, None) if plain or lens is None else _turned(clip, lens, told)
     if turns is None:
         plate = backdrop or estimated_plate(samples, noise)
-        return FoundPlates(plate, None, (_found(plate),))
+        return FoundPlates(clip, plate, None, (_found(plate),))
     panorama = estimate_panorama(clip, turns)
     parts = [panorama.at(number) for number in clip.spread(EXPOSURE_SAMPLES)]
     unknown = float(np.mean([part.confidence < UNKNOWN for part in parts]))
@@ -163,7 +179,7 @@ def _estimated(clip: Clip, lens: Lens | None, told: bool) -> FoundPlates:
         f"The camera moves, by up to {turns.farthest:.0f} pixels: it is steadied against the background, as a camera "
         "that turns in its place, and has a matrix for every frame."
     )
-    return FoundPlates(panorama, None, (moved, *focal_notes(turns.lens, told, focal), _how(unknown)), turns)
+    return FoundPlates(clip, panorama, None, (moved, *focal_notes(turns.lens, told, focal), _how(unknown)), turns)
 
 
 def _turned(clip: Clip, lens: Lens, told: bool) -> tuple[Turns | None, FocalLength | None]:

@@ -55,9 +55,9 @@ def open_view(number: int, clip: Clip, scene: CompleteScene) -> tuple[ShotView, 
     axes = [np.array(each.matrix)[:3, 2] for each in (scene.camera, camera)]
     angle = np.degrees(np.arccos(np.clip(axes[0] @ axes[1], -1, 1)))
     frames = f"frames {opened.first} to {opened.first + len(opened) - 1}"
-    said = [*found.notes, *exposure_notes(exposure_change(opened, found.plates))]
+    said = [*found.notes, *exposure_notes(exposure_change(found.clip, found.plates))]
     notes.append(" ".join([f"{name}: {opened.path.name}, {angle:.0f} degrees from the input, {frames}.", *said]))
-    return ShotView(steady(opened, found.plates), camera, found.plates, working), notes
+    return ShotView(steady(found.clip, found.plates), camera, found.plates, working), notes
 
 
 def disagreement(shot: Shot) -> tuple[str, ...]:

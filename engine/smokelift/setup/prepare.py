@@ -58,7 +58,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
     # cameras that belong together are measured, and stand where they are said to
     lens = None if scene.views else clip_lens(scene.camera, clip)
     found = find_plates(clip, scene.camera, scene.background, lens)
-    plates = found.plates
+    clip, plates = found.clip, found.plates
     samples = sample_smoke(clip, plates, found.turns)
     clip = steady(clip, plates)
     burning = fire_share(samples.colours, samples.behind)

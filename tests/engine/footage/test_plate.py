@@ -12,6 +12,7 @@ from smokelift.footage.clip import Clip
 from smokelift.footage.matte import matte
 from smokelift.footage.plate import changing_plate, known_plate
 from smokelift.footage.plate_estimation import estimate_plate
+from smokelift.footage.steady import without_noise_light
 from smokelift.output.images import write_image
 
 
@@ -78,6 +79,7 @@ def test_smoke_is_found_before_a_noisy_black(tmp_path: Path, codes: float) -> No
     """Noise that is clipped at black raises its mean, which is neither smoke nor a lack of certainty."""
     clip = film(tmp_path, np.zeros((HEIGHT, WIDTH, 3), np.float32), puff, 0.5, codes)
     plate = known_plate((0.0, 0.0, 0.0), clip)
+    assert without_noise_light(clip, plate) is clip
     np.testing.assert_allclose(codes_apart(plate.image, np.zeros_like(plate.image)), 0.4 * codes, rtol=0.1)
     assert plate.noise.lasting.max() * 255 < 0.15 * codes
     for n in (8, 12):

@@ -51,6 +51,17 @@ def test_noise_is_measured(tmp_path: Path) -> None:
         np.testing.assert_allclose(plate.noise.lasting, 1 / 255, rtol=0.3)
 
 
+def test_smoke_is_found_in_much_noise_before_a_wall_that_is_not_told(tmp_path: Path) -> None:
+    """What differs from pixel to pixel is no lasting noise of blocks, which would hide the smoke from the matte."""
+    clip = film(tmp_path, wall(0.2, 0.5), puff, 0.6, 13.0)
+    plate = estimate_plate(clip)
+    assert plate.noise.lasting.max() * 255 < 1.5
+    for n in (8, 20):
+        mask = matte(clip.frame(n), plate).mask
+        assert mask[puff(n) > 0.3].mean() > 0.9
+        assert mask[puff(n) == 0.0].mean() < 0.08
+
+
 def test_pixels_that_are_never_clear_are_filled_and_marked(tmp_path: Path) -> None:
     truth = np.linspace(0.1, 0.3, WIDTH, dtype=np.float32)[None, :, None].repeat(HEIGHT, 0).repeat(3, 2)
     rows, columns = np.mgrid[:HEIGHT, :WIDTH]

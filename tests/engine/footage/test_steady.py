@@ -1,4 +1,4 @@
-"""Clips whose exposure changes."""
+"""Clips whose exposure changes, and clips brightened by their noise."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from smokelift.footage.clip import Clip
 from smokelift.footage.matte import matte
 from smokelift.footage.plate import known_plate
 from smokelift.footage.plate_estimation import estimate_plate
-from smokelift.footage.steady import steady
+from smokelift.footage.steady import steady, without_noise_light
 
 
 def unsteady(clip: Clip) -> Clip:
@@ -34,3 +34,19 @@ def test_the_smoke_of_no_frame_is_lost(tmp_path: Path) -> None:
     found = steady(changing, plate)
     for n in (4, 8, 20):
         assert overlap(matte(found.frame(n), plate).mask, puff(n) > 0.05) > 0.7
+
+
+def test_noise_does_not_brighten_a_clip(tmp_path: Path) -> None:
+    """The mean of noisy sRGB values is brighter in linear light, and what is brighter would count as smoke."""
+    truth = wall(0.2, 0.6)
+    noisy = film(tmp_path, truth, lambda n: np.zeros(truth.shape[:2]), 0.6, 25.0)
+    quiet = without_noise_light(noisy, known_plate(truth, noisy))
+    before, after = (np.mean(list(clip), axis=(0, 1, 2)) - truth.mean((0, 1)) for clip in (noisy, quiet))
+    assert before.min() > 0.005
+    assert np.abs(after).max() < 0.1 * before.min()
+
+
+def test_a_clip_with_little_noise_stays_as_it_is(tmp_path: Path) -> None:
+    truth = wall(0.2, 0.6)
+    clip = film(tmp_path, truth, puff, 0.6, 5.0)
+    assert without_noise_light(clip, known_plate(truth, clip)) is clip
