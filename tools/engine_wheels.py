@@ -4,7 +4,7 @@ A wheel is tied to one version of Python, and on Linux to the C library that it 
 by Zig, which brings older libraries along: the wheel then runs wherever Blender itself does.
 
 What a build needs is installed once for each Python and stays in build/portable, as do the compiled files: what has not
-changed is not compiled again.
+changed is not compiled again, and what knows no Python is compiled for the first of them alone.
 """
 
 from __future__ import annotations
@@ -21,6 +21,9 @@ import tomllib
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
+
+PORTABLE = ROOT / "build" / "portable"
+"""What is compiled, and with what; it stays."""
 
 PYTHONS = ("3.11", "3.13")
 """Versions in Blender: 4.2 to 5.0, and 5.1 on."""
@@ -48,6 +51,7 @@ def main() -> int:
     out.mkdir(parents=True, exist_ok=True)
     for old in out.glob("*.whl"):
         old.unlink()
+    compiled: Path | None = None
     for version in PYTHONS:
         python = find_python(version)
         if python is None:
@@ -58,7 +62,10 @@ def main() -> int:
             )
             return 2
         print(f"Building the engine's wheel for Python {version} (build/portable keeps what is compiled).", flush=True)
-        build(build_environment(python, ROOT / "build" / "portable" / f"python{version}"), out)
+        programs = build_environment(python, PORTABLE / f"python{version}")
+        folder = PORTABLE / f"compiled{version}"
+        build(programs, folder, out, compiled)
+        compiled = compiled or folder
     return 0
 
 
@@ -109,15 +116,19 @@ def build_environment(python: str, folder: Path) -> Path:
     return programs
 
 
-def build(programs: Path, out: Path) -> None:
-    """Build one wheel into a folder.
+def build(programs: Path, folder: Path, out: Path, compiled: Path | None) -> None:
+    """Build one wheel.
 
     Parameters
     ----------
     programs
         Folder of programs of the environment that builds it.
+    folder
+        Where it is compiled: not that of `make`, which has another compiler.
     out
-        The folder.
+        Folder for the wheel.
+    compiled
+        Where one was compiled for another Python, whose numerics are taken; None compiles them.
     """
     portable = platform.system() == "Linux" and platform.machine() == "x86_64"
     environment = os.environ | {"PATH": os.pathsep.join([str(programs), os.environ["PATH"]])}
@@ -125,12 +136,12 @@ def build(programs: Path, out: Path) -> None:
         environment["CXX"] = f"{_zig()} c++ -target x86_64-linux-gnu.{GLIBC}"
     elif platform.system() == "Darwin":
         environment["MACOSX_DEPLOYMENT_TARGET"] = "11.0"  # Blender's own
-    with tempfile.TemporaryDirectory() as folder:
-        # a build folder of its own: the one of `make` was made by another compiler
-        wheel = ["wheel", "--quiet", "--no-deps", "--no-build-isolation", "-w", folder]
-        wheel += ["-Cbuild-dir=build/portable/{wheel_tag}", str(ROOT)]
-        subprocess.run([*_pip(programs), *wheel], env=environment, cwd=ROOT, check=True)
-        (built,) = Path(folder).glob("*.whl")
+    with tempfile.TemporaryDirectory() as made:
+        wheel = ["wheel", "--quiet", "--no-deps", "--no-build-isolation", "-w", made, f"-Cbuild-dir={folder}"]
+        if compiled is not None:
+            wheel.append(f"-Ccmake.define.NUMERICS_FROM={compiled}")
+        subprocess.run([*_pip(programs), *wheel, str(ROOT)], env=environment, check=True)
+        (built,) = Path(made).glob("*.whl")
         if portable:
             _certify(built, out)
         else:
