@@ -78,6 +78,7 @@ def test_a_flame_comes_back(tmp_path: Path) -> None:
         vdb.read_flame(tmp_path / "a.vdb", DOMAIN.shape)
 
 
+@needs_vdb
 def test_a_velocity_on_faces_is_stored_at_centres(tmp_path: Path) -> None:
     """The file holds what it holds of the centres of the whole domain."""
     density, _ = frame()
