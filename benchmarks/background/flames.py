@@ -33,6 +33,8 @@ from smokelift.scene.projection import ray_through_pixels
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
+from smokelift.transport import at_centres
+from smokelift.velocity.pyramid import coarsen
 
 Array = npt.NDArray[np.float32]
 
@@ -136,7 +138,7 @@ def _measured(fire: Fire, case: Case, scene: CompleteScene) -> Iterator[str]:
     """The fire's colour, error in front, amount and side; sums of the density and its largest, and its side."""
     picture, added = fire.picture(case)
     clip = filmed(np.clip(exposed(picture[None], np.ones(1)), 0, 1), "fire")
-    density = coarser(fire.density)
+    density = coarsen(fire.density)
     places = scene.domain.min[1] + (np.arange(RESOLUTION[1]) + 0.5) * 2 / RESOLUTION[1]
     depth = float(np.average(places, weights=density.sum((0, 2)))) if case.told else None
     with mock.patch("smokelift.setup.prepare.fire_share", lambda *_: 0.0) if case.smoke else mock.MagicMock():
@@ -152,7 +154,7 @@ def _measured(fire: Fire, case: Case, scene: CompleteScene) -> Iterator[str]:
         seen = emitted(frame.flame, frame.density, camera, optics)[..., None] * colour
         true = shot.fire.working.cut(np.clip(added, 0, 1))
         yield f"{np.abs(np.clip(seen, 0, 1) - true).sum() / true.sum():.1%}"
-        emission = coarser(fire.emission) * case.level / fire.light.max()
+        emission = coarsen(fire.emission) * case.level / fire.light.max()
         yield f"{frame.flame.sum() / emission.sum():.2f}"
         yield _alike(*(emitted(each, clear, sides[0], optics) for each in (emission, frame.flame)))
     depth_of = frame.density * shot.scene.medium.extinction
@@ -183,13 +185,8 @@ def reactant(truth: Truth) -> Array:
     for number in range(FRAME):
         entering = np.unpackbits(truth.inflow_packed[number], count=left.size).reshape(shape).astype(bool)
         left = np.where(entering, np.float32(1), left)
-        faces = [component[number].astype(np.float32) for component in truth.faces]
-        velocity = np.stack(
-            [
-                (face.take(range(n), a) + face.take(range(1, n + 1), a)) / 2
-                for a, (face, n) in enumerate(zip(faces, shape, strict=True))
-            ]
-        )
+        x, y, z = (component[number].astype(np.float32) for component in truth.faces)
+        velocity = np.stack(at_centres((x, y, z)))
         came_from = places - velocity / np.float32(truth.fps * truth.voxel_size)
         left = ndimage.map_coordinates(left, came_from, order=1, mode="constant")
         left = np.maximum(left - np.float32(1 / (BURNING * truth.fps)), 0)
@@ -213,12 +210,6 @@ def integrated(emission: Array, density: Array, scene: CompleteScene) -> tuple[A
         light += clear * np.sqrt(passed) * here[0] * voxel / 2
         clear *= passed
     return light, clear
-
-
-def coarser(values: Array) -> Array:
-    """Means over two voxels along each axis."""
-    x, y, z = (n // 2 for n in values.shape)
-    return np.asarray(values.reshape(x, 2, y, 2, z, 2).mean((1, 3, 5)))
 
 
 if __name__ == "__main__":

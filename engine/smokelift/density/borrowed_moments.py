@@ -20,7 +20,7 @@ from scipy import ndimage
 
 from smokelift.density.borrowed_picture import borrowed_picture
 from smokelift.density.depth_prior import DepthEstimate, ImposedView, RoundDepth
-from smokelift.density.hull import box_around, inside, project_voxels
+from smokelift.density.hull import inside, project_voxels
 from smokelift.density.moments import Moments
 from smokelift.density.multiplicative import fit_multiplicative
 from smokelift.density.objective import camera_terms
@@ -31,6 +31,7 @@ from smokelift.footage.images import srgb_to_linear
 from smokelift.footage.noise import EIGHT_BIT_STEP, lasting_noise, linear_per_srgb
 from smokelift.render import Optics, Volume
 from smokelift.scene import Camera, Medium
+from smokelift.scene.domain import box_around
 
 
 @dataclass(frozen=True)

@@ -107,20 +107,6 @@ def inside(voxels: NDArray[np.bool_], values: NDArray[np.floating[Any]]) -> NDAr
     return result
 
 
-def box_around(voxels: NDArray[np.bool_], margin: int) -> tuple[slice, slice, slice]:
-    """The smallest box that holds the marked voxels and so many more on each side; an empty one without any."""
-    spans = []
-    for axis, count in enumerate(voxels.shape):
-        marked = np.flatnonzero(voxels.any(tuple(other for other in range(3) if other != axis)))
-        spans.append(
-            slice(max(int(marked[0]) - margin, 0), min(int(marked[-1]) + 1 + margin, count))
-            if marked.size
-            else slice(0)
-        )
-    x, y, z = spans
-    return x, y, z
-
-
 def reached(mask: NDArray[np.bool_], projection: Projection) -> NDArray[np.bool_]:
     """Pixels (rows, columns) that the voxels of the mask's hull can change."""
     return np.asarray(ndimage.binary_dilation(mask, iterations=2 * _radius(projection) + 1))

@@ -28,9 +28,9 @@ from scipy import ndimage
 
 import smokelift._core as _core
 from smokelift.density.depth_prior import DepthEstimate
-from smokelift.density.hull import box_around
 from smokelift.density.observation import View, ViewSet
 from smokelift.render import Image, Volume
+from smokelift.scene.domain import box_around
 
 TINY = np.finfo(np.float32).tiny
 

@@ -29,6 +29,7 @@ from scipy import ndimage
 from smokelift.output.archive import FLAME
 from smokelift.output.atomic import atomic_path
 from smokelift.scene import Domain
+from smokelift.scene.domain import box_around
 from smokelift.transport import StaggeredGrid, at_centres
 
 Array = npt.NDArray[np.float32]
@@ -212,14 +213,8 @@ def _near(rho: Array, velocity: Array) -> Array:
 
 
 def _around(marked: npt.NDArray[np.bool_], margin: int) -> tuple[slice, ...]:
-    """The smallest box that holds the marked voxels and so many more on each side; all of it without any."""
-    found = ndimage.find_objects(marked.astype(np.int8))
-    if not found:
-        return tuple(slice(0, n) for n in marked.shape)
-    return tuple(
-        slice(max(side.start - margin, 0), min(side.stop + margin, n))
-        for side, n in zip(found[0], marked.shape, strict=True)
-    )
+    """The box around the marked voxels; all of the grid without any, as OpenVDB takes no empty array."""
+    return box_around(marked, margin) if marked.any() else tuple(slice(0, n) for n in marked.shape)
 
 
 def _ensure_written(path: Path) -> None:

@@ -19,6 +19,7 @@ from smokelift.render.camera_rays import LATERAL, camera_rays
 from smokelift.render.optics import Optics
 from smokelift.render.renderer import Image, Volume
 from smokelift.scene import Camera
+from smokelift.scene.domain import box_around
 from smokelift.scene.projection import project
 
 Mask = NDArray[np.bool_]
@@ -128,10 +129,9 @@ def _shows(flame: Volume, camera: Camera, optics: Optics) -> Mask:
     """Pixels (rows, columns) that may show a flame: those before the box of its voxels."""
     width, height = camera.size
     domain = optics.domain
-    burning = [np.flatnonzero(flame.any(axis)) for axis in ((1, 2), (0, 2), (0, 1))]
     ends = [
-        low + (np.array((each[0] - 0.5, each[-1] + 1.5))) * domain.voxel_size
-        for low, each in zip(domain.min, burning, strict=True)
+        low + np.array((side.start - 0.5, side.stop + 0.5)) * domain.voxel_size
+        for low, side in zip(domain.min, box_around(flame > 0, 0), strict=True)
     ]
     corners = np.stack(np.meshgrid(*ends, indexing="ij"), -1).reshape(-1, 3)
     seen, depth = project(camera, corners)

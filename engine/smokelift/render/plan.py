@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from smokelift.render.camera_rays import Rays, camera_rays
 from smokelift.render.light_sweeps import Box, Lighting, lighting
 from smokelift.scene import SHADOWED, Camera, Domain, FiniteLight, Medium, Scattering
+from smokelift.scene.domain import box_around
 
 Slices = tuple[slice, slice, slice]
 
@@ -83,8 +84,9 @@ def plan_render(
         )
     if support is None:
         support = np.broadcast_to(np.True_, domain.resolution)
-    corner, part = _box_around(support)
-    box = _part_of(domain, part)
+    # with the neighbours of the voxels that may hold smoke; one voxel if none may
+    x, y, z = part = box_around(support, 1) if support.any() else (slice(0, 1),) * 3
+    corner, box = (x.start, y.start, z.start), _part_of(domain, part)
     scatters = () if scattering == "absorption" else lights
     # light that is scattered again takes on more of the smoke's colour
     split = scattering == "multiple" and not medium.is_grey
@@ -100,17 +102,6 @@ def plan_render(
         shadows=scattering in SHADOWED and found.channels > 0,
         diffuse=scattering == "multiple" and found.channels > 0,
     )
-
-
-def _box_around(support: NDArray[np.bool_]) -> tuple[Box, Slices]:
-    """First voxel and slices of the box around the marked voxels and their neighbours; one voxel if none is marked."""
-    spans = []
-    for axis in range(3):
-        marked = np.nonzero(support.any(tuple(other for other in range(3) if other != axis)))[0]
-        count = support.shape[axis]
-        spans.append((max(int(marked[0]) - 1, 0), min(int(marked[-1]) + 2, count)) if marked.size else (0, 1))
-    x, y, z = spans
-    return (x[0], y[0], z[0]), (slice(*x), slice(*y), slice(*z))
 
 
 def _part_of(domain: Domain, part: Slices) -> Domain:

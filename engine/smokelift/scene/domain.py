@@ -145,3 +145,17 @@ def checked_sides(value: Any) -> tuple[Side, ...]:
     if not isinstance(given, list) or any(name not in SIDES for name in given):
         raise unexpected(given, "closed", f"a list of sides of the box, of {one_of(SIDES)}", "domain")
     return tuple(side for side in SIDES if side in given)
+
+
+def box_around(voxels: NDArray[np.bool_], margin: int) -> tuple[slice, slice, slice]:
+    """The smallest box that holds the marked voxels and so many more on each side; an empty one without any."""
+    spans = []
+    for axis, count in enumerate(voxels.shape):
+        marked = np.flatnonzero(voxels.any(tuple(other for other in range(3) if other != axis)))
+        spans.append(
+            slice(max(int(marked[0]) - margin, 0), min(int(marked[-1]) + 1 + margin, count))
+            if marked.size
+            else slice(0, 0)
+        )
+    x, y, z = spans
+    return x, y, z

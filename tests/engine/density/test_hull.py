@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from smokelift.density.hull import box_around, common_hull, inside, project_voxels, visual_hull, voxel_centres
+from smokelift.density.hull import common_hull, inside, project_voxels, visual_hull, voxel_centres
 from smokelift.scene import Camera, Domain
 from smokelift.scene.projection import project
 
@@ -114,11 +114,3 @@ def test_memory_follows_the_marked_voxels() -> None:
     assert found.max() == 1
     taken = (int(STATM.read_text().split()[1]) - before) * os.sysconf("SC_PAGE_SIZE")
     assert taken < 0.1 * found.nbytes
-
-
-def test_the_box_around_marked_voxels_ends_at_the_grid() -> None:
-    marked = np.zeros((9, 8, 7), np.bool_)
-    assert all(marked[box_around(marked, 2)].shape[axis] == 0 for axis in range(3))
-    marked[4, 1, 6] = marked[5, 3, 5] = True
-    assert box_around(marked, 0) == (slice(4, 6), slice(1, 4), slice(5, 7))
-    assert box_around(marked, 2) == (slice(2, 8), slice(0, 6), slice(3, 7))

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from smokelift.scene import Domain, Inlet
+from smokelift.scene.domain import box_around
 
 
 def test_domain_helpers() -> None:
@@ -32,3 +33,11 @@ def test_an_inlet_is_the_voxels_in_its_ball() -> None:
 def test_a_small_inlet_is_the_nearest_voxel(centre, voxel) -> None:
     domain = Domain((-1, -1, 0), (1, 1, 3), (64, 64, 96))
     np.testing.assert_array_equal(np.argwhere(Inlet(centre, 0.006).voxels(domain)), [voxel])
+
+
+def test_the_box_around_marked_voxels_ends_at_the_grid() -> None:
+    marked = np.zeros((9, 8, 7), np.bool_)
+    assert all(marked[box_around(marked, 2)].shape[axis] == 0 for axis in range(3))
+    marked[4, 1, 6] = marked[5, 3, 5] = True
+    assert box_around(marked, 0) == (slice(4, 6), slice(1, 4), slice(5, 7))
+    assert box_around(marked, 2) == (slice(2, 8), slice(0, 6), slice(3, 7))
