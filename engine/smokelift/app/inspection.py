@@ -19,10 +19,11 @@ from smokelift.footage.plate import Plate
 from smokelift.output.images import eight_bit, write_image
 from smokelift.scene import SHADOWED, Background, Camera, DirectionalLight, Domain, PointLight, Scene
 from smokelift.scene.projection import project
-from smokelift.setup.background import BLACK, UNKNOWN
+from smokelift.setup.background import BLACK
 from smokelift.setup.choice import UNDETERMINED, Choice
 from smokelift.setup.geometry import PICTURE_HEIGHT
 from smokelift.setup.shot import Shot
+from smokelift.setup.smoke import UNKNOWN
 
 Tile = NDArray[np.uint8]
 

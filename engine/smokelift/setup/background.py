@@ -13,7 +13,6 @@ from smokelift.footage.clip import Clip
 from smokelift.footage.evidence import evidence
 from smokelift.footage.exposure import largest_change
 from smokelift.footage.focal_length import FocalLength, focal_length
-from smokelift.footage.images import area_average
 from smokelift.footage.lens import FILM_WIDTH
 from smokelift.footage.panorama import estimate_panorama
 from smokelift.footage.plate import Plate, Plates, known_plate
@@ -29,16 +28,13 @@ from smokelift.footage.plate_estimation import (
 from smokelift.footage.steady import exposures, without_noise_light
 from smokelift.footage.turning import Turns, find_turns
 from smokelift.scene import Background, Camera
-from smokelift.setup.smoke import SmokeSamples
+from smokelift.setup.smoke import UNKNOWN, SmokeSamples
 
 BLACK = 0.001
 """Linear radiance below which a background is called black."""
 
 EXPOSURE_SAMPLES = 16
 """Frames whose exposure is looked at before a run."""
-
-UNKNOWN = 0.5
-"""Confidence of a plate below which what is behind the smoke is unknown there."""
 
 TELEPHOTO = 3.0
 """Focal length over the usual one that is supposed where no turn with the usual one explains the clip. The wider lens
@@ -143,16 +139,9 @@ def exposure_notes(change: float) -> tuple[str, ...]:
     return (f"The exposure of the clip changes by up to {change:.0%}: every frame is brought to the background's.",)
 
 
-def unknown_share(plate: Plate, samples: SmokeSamples) -> float:
-    """Share of the pixels that show smoke, or may, whose background is unknown."""
-    rows, columns = samples.covered.shape
-    unknown = area_average(plate.confidence, columns, rows) < UNKNOWN
-    return float(unknown.sum() / max((unknown | samples.covered).sum(), 1))
-
-
-def smoke_in_plate(plates: Plates, samples: SmokeSamples) -> tuple[str, ...]:
+def smoke_in_plate(samples: SmokeSamples) -> tuple[str, ...]:
     """What is to be said of a background that may hold most of the smoke, a sentence; nothing of others."""
-    share = unknown_share(plates, samples) if isinstance(plates, Plate) else 0.0
+    share = samples.unknown.sum() / max((samples.unknown | samples.covered).sum(), 1)
     if share < MOSTLY:
         return ()
     return (

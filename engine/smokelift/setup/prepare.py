@@ -70,7 +70,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
         samples = replace(sample_smoke(clip, plates, found.turns), exposure=samples.exposure)
     geometry = find_geometry(clip, scene, settings, plates, samples, found.turns)
     camera, domain = geometry.camera, geometry.domain
-    doubts = smoke_in_plate(plates, samples)
+    doubts = smoke_in_plate(samples)
     notes = [*remarks, *found.notes, *doubts, *exposure_notes(samples.exposure), *geometry.notes]
     if settings.axis_depth is not None:
         SmokeAxis.given(settings.axis_depth, camera, domain)  # refuse early what cannot be

@@ -20,6 +20,9 @@ from smokelift.setup.thickness import Texture, seen_texture
 SAMPLES = 16
 """Frames that are looked at."""
 
+UNKNOWN = 0.5
+"""Confidence of a plate below which what is behind the smoke is unknown there."""
+
 LONGEST_SIDE = 320
 """Pixels along the longer side of the reduced pictures."""
 
@@ -36,6 +39,8 @@ class SmokeSamples:
         Left, top, right and bottom of ``covered`` in pixels of the camera's full picture.
     covered : (rows, columns) bool
         Pixels with smoke in at least one sample; of a camera that turns as its mean pose would see them.
+    unknown : (rows, columns) bool
+        Pixels whose background is unknown, likewise.
     colours : (n, 3)
         Radiance of all smoke pixels.
     behind : (n, 3)
@@ -51,6 +56,7 @@ class SmokeSamples:
     scale: float
     bounds: tuple[float, float, float, float]
     covered: NDArray[np.bool_]
+    unknown: NDArray[np.bool_]
     colours: NDArray[np.float32]
     behind: NDArray[np.float32]
     smoky: tuple[int, ...]
@@ -64,7 +70,7 @@ def sample_smoke(clip: Clip, plates: Plates, turns: Turns | None = None) -> Smok
     scale = max(1.0, max(width, height) / LONGEST_SIDE)
     columns, rows = max(1, round(width / scale)), max(1, round(height / scale))
     wide = None if turns is None else WidePicture.around(turns).resized(columns, rows)
-    covered = np.zeros((rows, columns) if wide is None else wide.size[::-1], np.bool_)
+    covered, unknown = np.zeros((2, *((rows, columns) if wide is None else wide.size[::-1])), np.bool_)
     colours, behind, gains, textures = [], [], [], []
     gains_of = exposures(plates)
     amounts: dict[int, int] = {}
@@ -74,7 +80,8 @@ def sample_smoke(clip: Clip, plates: Plates, turns: Turns | None = None) -> Smok
         gains.append(gains_of(number, frame))
         picture = area_average(frame, columns, rows) / gains[-1]
         mask = matte(picture, plate).mask
-        covered |= mask if wide is None else wide.spread_out(mask.astype(np.float32), number) > 0.5
+        for whole, part in ((covered, mask), (unknown, plate.confidence < UNKNOWN)):
+            whole |= part if wide is None else wide.spread_out(part.astype(np.float32), number) > 0.5
         colours.append(picture[mask])
         behind.append(plate.image[mask])
         if mask.any():
@@ -88,4 +95,4 @@ def sample_smoke(clip: Clip, plates: Plates, turns: Turns | None = None) -> Smok
         bounds = (left, top, right, bottom)
     change = largest_change(gains)
     shown = np.concatenate(colours), np.concatenate(behind)
-    return SmokeSamples(scale, bounds, covered, *shown, smoky, change, tuple(textures))
+    return SmokeSamples(scale, bounds, covered, unknown, *shown, smoky, change, tuple(textures))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import ndimage
@@ -9,13 +11,11 @@ from scipy.spatial.transform import Rotation
 
 from smokelift.footage.alignment import Lens
 from smokelift.footage.clip import Clip
-from smokelift.footage.noise import EIGHT_BIT_NOISE
 from smokelift.footage.panorama import PanoramaPlate
-from smokelift.footage.plate import Plate
 from smokelift.output.images import write_image
 from smokelift.setup.background import find_plates, focal_notes, smoke_in_plate
 from smokelift.setup.geometry import clip_lens
-from smokelift.setup.smoke import SmokeSamples
+from smokelift.setup.smoke import SmokeSamples, sample_smoke
 
 
 def before(floor: float, folder) -> Clip:
@@ -31,13 +31,11 @@ def before(floor: float, folder) -> Clip:
 @pytest.mark.parametrize(("unknown_rows", "said"), [(0, False), (20, False), (60, True)])
 def test_smoke_that_may_be_in_the_plate_is_said(unknown_rows, said) -> None:
     """Where most of the smoke has no background that was ever seen."""
-    confidence = np.ones((100, 50), np.float32)
-    confidence[:unknown_rows] = 0
-    covered = np.zeros((100, 50), np.bool_)
+    unknown, covered = np.zeros((2, 100, 50), np.bool_)
+    unknown[:unknown_rows] = True
     covered[10:80] = True
     colours = np.zeros((0, 3), np.float32)
-    plate = Plate(np.zeros((100, 50, 3), np.float32), confidence, EIGHT_BIT_NOISE)
-    notes = smoke_in_plate(plate, SmokeSamples(1.0, (0, 0, 50, 100), covered, colours, colours, (0,), 0.0))
+    notes = smoke_in_plate(SmokeSamples(1.0, (0, 0, 50, 100), covered, unknown, colours, colours, (0,), 0.0))
     assert bool(notes) is said
     assert not said or "75% of where smoke is or may be" in notes[0]
 
@@ -82,6 +80,10 @@ def test_pictures_of_a_panning_camera_tell_background_and_focal_length(tmp_path)
     assert found.turns is not None
     assert found.turns.lens.focal[0] == pytest.approx(150, rel=0.03)
     assert any("Focal length measured on how the picture turns: 34 mm" in note for note in found.notes)
+    assert not smoke_in_plate(sample_smoke(found.clip, found.plates, found.turns))
+    never_clear = replace(found.plates, confidence=np.zeros_like(found.plates.confidence))
+    (said,) = smoke_in_plate(sample_smoke(found.clip, never_clear, found.turns))
+    assert "may hold most of the smoke: 100%" in said
 
 
 def test_a_focal_length_that_is_not_found_is_said() -> None:

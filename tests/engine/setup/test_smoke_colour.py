@@ -18,7 +18,9 @@ def samples(source, behind, thickest=0.9):
     opacity = rng.random((500, 1)) * thickest
     behind = np.broadcast_to(behind, (500, 3))
     colours = (1 - opacity) * behind + opacity * source + 0.002 * rng.standard_normal((500, 3))
-    return SmokeSamples(1.0, (0, 0, 1, 1), np.ones((1, 1), bool), colours.astype("f4"), behind.astype("f4"), (0,), 0.0)
+    return SmokeSamples(
+        1.0, (0, 0, 1, 1), *np.ones((2, 1, 1), bool), colours.astype("f4"), behind.astype("f4"), (0,), 0.0
+    )
 
 
 def apart(one, other):
@@ -69,5 +71,7 @@ def test_thin_smoke_before_a_sky_is_taken_no_more_coloured_than_it_is():
 @pytest.mark.parametrize("colours", [np.ones((500, 3)), np.zeros((0, 3))], ids=["clipped", "none"])
 def test_pixels_without_a_colour_say_nothing(colours):
     empty = np.zeros_like(colours)
-    seen = SmokeSamples(1.0, (0, 0, 1, 1), np.ones((1, 1), bool), colours.astype("f4"), empty.astype("f4"), (0,), 0.0)
+    seen = SmokeSamples(
+        1.0, (0, 0, 1, 1), *np.ones((2, 1, 1), bool), colours.astype("f4"), empty.astype("f4"), (0,), 0.0
+    )
     assert smoke_colour(seen, WHITE).choice.chosen == UNDETERMINED
