@@ -96,7 +96,7 @@ class Sequence:
         return density
 
     def flame(self, number: int) -> Array | None:
-        """Return the emission of fire in a frame, shape (nx, ny, nz), if its files hold one; else None.
+        """Return the emission of fire in a frame, shape (nx, ny, nz); None where the clip or the file has none.
 
         It is radiance per metre, of the color ``scene.medium.flame_color``.
 
@@ -105,6 +105,9 @@ class Sequence:
         SequenceError
             If there is no such frame, its file is missing or damaged, or an emission is negative.
         """
+        self._check(number)
+        if self.scene.medium.flame_color is None:  # the clip shows no fire: the file need not be read again
+            return None
         flame = self._read(number, FLAME).get(FLAME)
         if flame is not None and flame.min() < 0:
             raise SequenceError(f"{self.directory}: frame {number} holds a negative emission")

@@ -135,3 +135,13 @@ def test_a_sequence_without_checksums_opens(tmp_path: Path, no_vdb: None) -> Non
     del index["checksums"], index["sources"]
     (tmp_path / "sequence.json").write_text(json.dumps(index))
     np.testing.assert_array_equal(Sequence.open(tmp_path).density(1), frame(1)[0])
+
+
+def test_the_file_of_a_frame_is_not_read_again_for_a_fire_that_no_clip_shows(tmp_path: Path, no_vdb: None) -> None:
+    """Whether the clip shows fire is said by the scene."""
+    write(tmp_path, [1])
+    sequence = Sequence.open(tmp_path)
+    (tmp_path / "smoke_0001.npz").write_bytes(b"damaged")
+    assert sequence.flame(1) is None
+    with pytest.raises(SequenceError, match="there is no frame 2"):
+        sequence.flame(2)

@@ -374,10 +374,13 @@ def test_frames_must_fit_and_follow(tmp_path: Path, no_vdb: None) -> None:
     assert Sequence.open(tmp_path).frames == (5,)
 
 
+BURNING = replace(SCENE, medium=replace(SCENE.medium, flame_color=(1.0, 0.4, 0.1)))
+
+
 def test_a_flame_is_kept_and_read(tmp_path: Path, no_vdb: None) -> None:
     """In the frames that have one; a bad one is refused."""
     flame = frame(5)[0]
-    with SequenceWriter(tmp_path, SCENE, SETTINGS, npz=True) as writer:
+    with SequenceWriter(tmp_path, BURNING, SETTINGS, npz=True) as writer:
         writer.write(1, *frame(1), flame=flame)
         writer.write(2, *frame(2))
         for bad, reason in ((flame[1:], "does not fit"), (-flame, "not negative"), (flame * np.nan, "finite")):
@@ -390,8 +393,9 @@ def test_a_flame_is_kept_and_read(tmp_path: Path, no_vdb: None) -> None:
 
 
 def test_a_negative_flame_is_not_read(tmp_path: Path, no_vdb: None) -> None:
-    write(tmp_path, [1])
     rho, faces = frame(1)
+    with SequenceWriter(tmp_path, BURNING, SETTINGS, npz=True) as writer:
+        writer.write(1, rho, faces)
     arrays = {"density": rho, **dict(zip(VELOCITY, faces, strict=True)), "flame": -rho}
     np.savez(tmp_path / "smoke_0001.npz", **arrays)
     index = json.loads((tmp_path / "sequence.json").read_text())
