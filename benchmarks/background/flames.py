@@ -13,6 +13,7 @@ without the renderer that is measured: smoke of one source radiance, and the fir
 from __future__ import annotations
 
 import argparse
+import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -105,7 +106,7 @@ class Fire:
     @staticmethod
     def of(truth: Truth, scene: CompleteScene, beneath: bool) -> Fire:
         """That of a scene."""
-        left = reactant(truth)
+        left = next(itertools.islice(reactants(truth), FRAME, None))
         density = truth.densities[FRAME].astype(np.float32) * (1 - left * beneath)
         emission = np.sqrt(left)
         pictures = [integrated(each, density, scene) for each in (emission, emission * left)]
@@ -178,11 +179,12 @@ def _reconstructed(clip: Clip, scene: CompleteScene, depth: float | None) -> tup
     return shot, frame
 
 
-def reactant(truth: Truth) -> Array:
-    """What is left of the reactant in the frame, 0 to 1 (nx, ny, nz)."""
+def reactants(truth: Truth) -> Iterator[Array]:
+    """Yield what is left of the reactant in every frame, 0 to 1 (nx, ny, nz)."""
     shape = truth.densities.shape[1:]
     left, places = np.zeros(shape, np.float32), np.indices(shape, np.float32)
-    for number in range(FRAME):
+    for number in range(truth.frames):
+        yield left
         entering = np.unpackbits(truth.inflow_packed[number], count=left.size).reshape(shape).astype(bool)
         left = np.where(entering, np.float32(1), left)
         x, y, z = (component[number].astype(np.float32) for component in truth.faces)
@@ -190,7 +192,6 @@ def reactant(truth: Truth) -> Array:
         came_from = places - velocity / np.float32(truth.fps * truth.voxel_size)
         left = ndimage.map_coordinates(left, came_from, order=1, mode="constant")
         left = np.maximum(left - np.float32(1 / (BURNING * truth.fps)), 0)
-    return left
 
 
 def integrated(emission: Array, density: Array, scene: CompleteScene) -> tuple[Array, Array]:

@@ -9,9 +9,9 @@ the moment before to this one:
 where a is the air's own motion: wind and turbulence, which all air has beside what moves it. Outside the box it is all
 there is.
 
-Buoyancy b and dissipation d are those of the clip (`smokelift.direct.physics`), as is what enters
-(`smokelift.direct.inflow`). Advection keeps the mass. There is no viscosity, and MacCormack's correction keeps the
-eddies that the clip has.
+Buoyancy b and dissipation d are those of the clip (`smokelift.direct.physics`), as are what enters
+(`smokelift.direct.inflow`) and how fire burns (`smokelift.direct.fire`), which lifts nothing beside what b has of it.
+Advection keeps the mass. There is no viscosity, and MacCormack's correction keeps the eddies that the clip has.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from smokelift.direct.constraint import Mask
+from smokelift.direct.fire import Fire, learnt_fire
 from smokelift.direct.inflow import Inflow, find_inflow
 from smokelift.direct.moment import Moment
 from smokelift.direct.physics import Physics, fit_physics, lift
@@ -47,12 +48,15 @@ class Simulation:
         What the artist has placed.
     dt
         Time of a step in seconds.
+    fire
+        Of the clip; None without any.
     """
 
     physics: Physics
     inflow: Inflow
     surroundings: Surroundings
     dt: float
+    fire: Fire | None = None
 
     def next(self, moment: Moment, step: int) -> Moment:
         """Return the moment after one; the step that leads there is counted from 1 at the clip's last moment."""
@@ -60,14 +64,21 @@ class Simulation:
         moved = self._moved(moment.velocity, step)
         driven = moved.with_faces(self._driven(moved, moment, entering, step))
         velocity = project(driven) if solid is None else solid.projected(driven)
-        density = advect(moment.density, velocity, self.dt, conserve=True)
         filled = None if solid is None else solid.voxels
-        density = _tidied(density, filled) * np.float32(math.exp(-self.physics.dissipation * self.dt))
+        density = self._carried(moment.density, velocity, filled)
+        density *= np.float32(math.exp(-self.physics.dissipation * self.dt))
         inlets = self.inflow.voxels if filled is None else self.inflow.voxels & ~filled
+        flame = None
+        if self.fire is not None and moment.flame is not None:
+            flame = self.fire.after(self._carried(moment.flame, velocity, filled), filled)
         return Moment(
             np.where(inlets, entering.density, density),
             Velocity(velocity.faces, velocity.voxel_size, velocity.closed),
+            flame,
         )
+
+    def _carried(self, values: Array, velocity: Velocity, solid: Mask | None) -> Array:
+        return _tidied(advect(values, velocity, self.dt, conserve=True), solid)
 
     def _moved(self, velocity: Velocity, step: int) -> Velocity:
         """The velocity that has carried itself along, without the air's own motion."""
@@ -108,7 +119,8 @@ def learnt_simulation(
         What is placed around the smoke.
     """
     inflow = find_inflow(moments, dt, marked)
-    return Simulation(fit_physics(moments, dt, inflow.voxels), inflow, surroundings or Surroundings(), dt)
+    physics = fit_physics(moments, dt, inflow.voxels)
+    return Simulation(physics, inflow, surroundings or Surroundings(), dt, learnt_fire(moments, dt))
 
 
 def _tidied(density: Array, solid: Mask | None) -> Array:

@@ -27,6 +27,9 @@ LEARNT_FROM = 12
 """Moments of the clip, at most, that physics and inflow are taken from: half a second, in which the source of a clip is
 steady, and long enough for a replay that is not seen as such."""
 
+UNFADED = ("unfaded", "unfaded_flame")
+"""Names under which the density and the emission are kept for a run that goes on, without the fading."""
+
 SMALLEST_EDDY = 3
 """Voxels across an eddy, at least: fewer do not show that it turns."""
 
@@ -111,7 +114,7 @@ def continue_sequence(
     }
     how = (
         f"Frames {start + 1} to {last} are a simulation that starts from frame {start}, with the buoyancy, the "
-        "dissipation and the inflow of the clip."
+        "dissipation and the inflow of the clip, and of its fire if it shows any."
     )
     places = [float(number) for number in range(kept[0], last + 1)]
     with directed_writer(sequence, out, "continue", told, how, places, npz=npz, resume=resume) as writer:
@@ -139,14 +142,16 @@ def _simulated(
     moment = replace(moment, velocity=replace(moment.velocity, closed=closed))
     if state is not None and state.number > start:
         velocity = Velocity(state.velocity, sequence.scene.domain.voxel_size, closed)
-        moment = Moment(np.asarray(state.extra["unfaded"], np.float32), velocity)
+        whole = [np.asarray(state.extra[name], np.float32) for name in UNFADED if name in state.extra]
+        moment = Moment(whole[0], velocity, *whole[1:])
     for step in range(1, continuation.frames + 1):
         number = start + step
         if number in writer.finished:
             continue
         began = time.perf_counter()
         moment = simulation.next(moment, step)
-        shown = moment.density * np.float32(_share_left(step, continuation))
+        left = np.float32(_share_left(step, continuation))
+        shown, flame = moment.density * left, None if moment.flame is None else moment.flame * left
         solid = around.solid(step, dt)
         figures = simulated_figures(
             replace(moment, density=shown),
@@ -155,7 +160,9 @@ def _simulated(
             vars(simulation.physics),
             None if solid is None else solid.voxels,
         )
-        writer.write(number, shown, moment.velocity.faces, figures, {"unfaded": moment.density})
+        there = [values for values in (moment.density, moment.flame) if values is not None]
+        unfaded = dict(zip(UNFADED, there, strict=False))
+        writer.write(number, shown, moment.velocity.faces, figures, unfaded, flame=flame)
         yield number, figures
 
 

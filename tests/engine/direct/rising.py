@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 
 from smokelift.direct import Ball, Moment, Simulation
+from smokelift.direct.fire import Fire
 from smokelift.direct.inflow import Inflow
 from smokelift.direct.physics import Physics
 from smokelift.direct.surroundings import Surroundings
@@ -18,6 +20,8 @@ from smokelift.transport import Velocity
 DOMAIN = Domain((-1, -1, 0), (1, 1, 3), (16, 16, 24))
 DT = 1 / 24
 PHYSICS = Physics(buoyancy=4.0, dissipation=0.3)
+LEFT = 0.8
+"""Of the plume's fire after a frame."""
 SCENE = completed(
     Scene(
         clip=ClipSource(Path("/footage/smoke.mp4"), 24.0),
@@ -57,18 +61,24 @@ def course(simulation: Simulation, moment: Moment, frames: int) -> list[Moment]:
 
 
 @cache
-def plume() -> tuple[Moment, ...]:
-    """Smoke from an inlet, 1 s after it has begun."""
+def plume(burning: bool = False) -> tuple[Moment, ...]:
+    """Smoke from an inlet, 1 s after it has begun; if it burns, with fire that is fed from there."""
     inlet = Ball((0.0, 0.0, 0.3), 0.3).voxels(DOMAIN)
     faces = Velocity.zero(DOMAIN.shape, DOMAIN.voxel_size, ("z-",)).faces
     faces[2][:, :, 1:] = 1.0
     entering = Moment(inlet.astype(np.float32), Velocity(faces, DOMAIN.voxel_size, ("z-",)))
-    simulation = Simulation(PHYSICS, Inflow(inlet, (entering,)), Surroundings(), DT)
-    return tuple(course(simulation, at_rest(inlet.astype(np.float32)), 38)[24:])
+    inflow = Inflow(inlet, (entering,))
+    simulation = Simulation(
+        PHYSICS, inflow, Surroundings(), DT, Fire(LEFT, 0.2 * entering.density) if burning else None
+    )
+    start = at_rest(inlet.astype(np.float32))
+    start = replace(start, flame=start.density) if burning else start
+    return tuple(course(simulation, start, 38)[24:])
 
 
-def write_plume(directory: Path, frames: int = 10) -> None:
+def write_plume(directory: Path, frames: int = 10, burning: bool = False) -> None:
     """The plume as a finished sequence with NumPy twins."""
-    with SequenceWriter(directory, SCENE, {"quality": "draft"}, npz=True) as writer:
-        for number, moment in enumerate(plume()[:frames], 1):
-            writer.write(number, moment.density, moment.velocity.faces, {"psnr": 30.0})
+    medium = replace(SCENE.medium, flame_color=(1.0, 0.4, 0.1) if burning else None)
+    with SequenceWriter(directory, replace(SCENE, medium=medium), {"quality": "draft"}, npz=True) as writer:
+        for number, moment in enumerate(plume(burning)[:frames], 1):
+            writer.write(number, moment.density, moment.velocity.faces, {"psnr": 30.0}, flame=moment.flame)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from smokelift.direct import Ball, Continuation, continue_sequence, open_source
+from smokelift.direct import Ball, Continuation, continue_sequence, loop_sequence, open_source, retime_sequence
 from smokelift.output.index import SequenceError
 from smokelift.output.sequence import Sequence
 from tests.engine.direct.rising import plume, write_plume
@@ -53,6 +53,29 @@ def test_a_stopped_run_goes_on_to_the_same_result(source, tmp_path):
     assert not whole.density(13).any()
     with pytest.raises(SequenceError, match="begun differently"):
         run(source, tmp_path / "stopped", Continuation(6, start=8), resume=True)
+
+
+def test_fire_goes_on_and_fades_with_the_smoke(tmp_path):
+    """A stopped run goes on with it; retimed and looped it stays too."""
+    write_plume(tmp_path / "source", 6, burning=True)
+    burning = open_source(tmp_path / "source")
+    continuation = Continuation(3, fade=2)
+    run(burning, tmp_path / "whole", continuation)
+    for number, _ in continue_sequence(burning, tmp_path / "stopped", continuation, npz=True):
+        if number == 8:
+            break
+    run(burning, tmp_path / "stopped", continuation, resume=True)
+    whole, stopped = (Sequence.open(tmp_path / name) for name in ("whole", "stopped"))
+    sums = [float(whole.flame(number).sum()) for number in whole.frames]
+    assert min(sums[:7]) > 0.5 * max(sums)
+    assert sums[7] == pytest.approx(0.5 * sums[6], rel=0.2)
+    assert sums[8] == 0.0
+    assert [float(stopped.flame(number).sum()) for number in stopped.frames] == sums
+    list(retime_sequence(burning, tmp_path / "slow", (0.8,), npz=True))
+    list(loop_sequence(burning, tmp_path / "loop", 1, 6, 2, npz=True))
+    for name in ("slow", "loop"):
+        made = Sequence.open(tmp_path / name)
+        assert all(0.5 * max(sums) < made.flame(n).sum() < 1.2 * max(sums) for n in made.frames)
 
 
 def test_sides_become_walls(source, tmp_path):
