@@ -85,9 +85,7 @@ def choose_model(
     # what single scattering lacks would be taken for light that is missing
     if scene.scattering == "multiple" or (scene.scattering == "single" and tries_multiple(scene) and not by_hand):
         alike = [frame.in_light_of(lit).scattered_by("multiple") for frame in frames]
-        factor, error_of_multiple, strength = choose_strength(
-            alike, settings.density, settings.selection.scattering_error
-        )
+        factor, error_of_multiple, strength = choose_strength(alike, settings.density)
         scene, lit = scaled(scene, factor), scaled(lit, factor)
     frames = [frame.in_light_of(lit) for frame in frames]
     if by_hand:

@@ -15,7 +15,7 @@ models meet is twice as dense in one as in the other (docs/experiments/multiple-
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -59,13 +59,13 @@ def choose_scattering(
     tolerance
         Error, as a share of what the smoke changes in the picture, that a cheaper model may add.
     error_of_multiple
-        `held_out_error` of multiple scattering, if it is known already.
+        `HeldOut.error` of multiple scattering, if it is known already.
     """
 
     def own_error(model: Scattering) -> float:
         if model == "multiple" and error_of_multiple is not None:
             return error_of_multiple
-        return held_out_error(frames, model, model, settings)
+        return held_out(frames, model, model, settings).error
 
     errors = {richest: own_error(richest)}
     if richest == "single" and tries_multiple(frames[0].scene):
@@ -77,7 +77,7 @@ def choose_scattering(
         if model == "absorption" and (brightened := _brightened(frames)) > errors[richest] + tolerance:
             errors[model] = brightened
             continue
-        errors[model] = held_out_error(frames, model, richest, settings)
+        errors[model] = held_out(frames, model, richest, settings).error
         if errors[model] <= errors[richest] + tolerance:
             chosen = model
             break
@@ -120,20 +120,39 @@ def _brightened(frames: Sequence[CoarseFrame]) -> float:
     return float(np.sqrt(brighter / max(change, 1e-30)))
 
 
-def held_out_error(
-    frames: Sequence[CoarseFrame], model: Scattering, judge: Scattering, settings: DensitySettings
-) -> float:
-    """Error of what the judge shows of a model's densities, in the other half of the pixels.
+@dataclass(frozen=True)
+class HeldOut:
+    """What the judge shows of a model's densities, beside the other half of the pixels.
 
-    Root mean square, in shares of what the smoke changes there.
+    Attributes
+    ----------
+    error
+        Root mean square of the difference, in shares of what the smoke changes there.
+    light
+        Strength of the light, in multiples of the scene's, that brings the same densities nearest to them: more than 1
+        where the densities are too dark. 1 without scattered light.
     """
-    wrong = change = 0.0
+
+    error: float
+    light: float
+
+
+def held_out(frames: Sequence[CoarseFrame], model: Scattering, judge: Scattering, settings: DensitySettings) -> HeldOut:
+    """Fit a model's densities to one half of the pixels, and let the judge show them to the other half."""
+    wrong = change = asked = power = 0.0
     for frame in frames:
         scene, plate = frame.scattered_by(model).scene, frame.plate
         density = reconstruct_density(frame.fitted, scene, settings=settings, plate=plate)
         optics = replace(scene_optics(scene), scattering=judge)
-        shown = optics.renderer(scene.camera, plate.image, density.hull).image(density.values)
+        renderer = optics.renderer(scene.camera, plate.image, density.hull)
+        shown = renderer.image(density.values)
         seen = reached(matte(frame.picture, plate).mask, project_voxels(scene.camera, scene.domain))
+        # the light that the smoke scatters itself, and what it should be beside what it lets through
+        behind = renderer.transmittance[..., None] * plate.image
+        own, wanted = ((image - behind)[seen].astype(np.float64) for image in (shown, frame.held_out))
         wrong += float(np.sum(np.square(shown - frame.held_out, dtype=np.float64)[seen]))
         change += float(np.sum(np.square(frame.held_out - plate.image, dtype=np.float64)[seen]))
-    return float(np.sqrt(wrong / max(change, 1e-30)))
+        asked += float(np.sum(own * wanted))
+        power += float(np.sum(np.square(own)))
+    light = asked / power if judge != "absorption" and power > 0 else 1.0
+    return HeldOut(float(np.sqrt(wrong / max(change, 1e-30))), light)

@@ -7,7 +7,9 @@ from dataclasses import replace
 import pytest
 
 from smokelift.scene import CompleteScene, Medium, Scene, completed
+from smokelift.setup import light_strength
 from smokelift.setup.light_strength import scaled
+from smokelift.setup.scattering import HeldOut
 from smokelift.setup.settings import Settings
 from tests.engine.setup.shots import shot_of
 
@@ -37,6 +39,22 @@ def test_a_light_that_is_too_weak_becomes_stronger(thick, draft) -> None:
     factor, said = strengths(replace(thick, lights=(sun.scaled(0.4),)), draft)
     assert 1.5 < factor < 3.2
     assert said[0].startswith(f"Light: {factor:.2f} times as strong as given")
+
+
+def test_a_light_is_not_blamed_because_thinner_smoke_fits_better(thick, draft, monkeypatch) -> None:
+    """The less smoke, the simpler its picture: only densities that are too dark speak against a light."""
+    (sun,) = thick.lights
+    asked: dict[float, float] = {}
+
+    def held_out(frames, *_) -> HeldOut:
+        factor = frames[0].scene.lights[0].irradiance[0] / sun.irradiance[0]
+        return HeldOut(0.08 / factor, asked.get(round(factor, 4), 1.0))
+
+    monkeypatch.setattr(light_strength, "held_out", held_out)
+    asked[1.0] = 1.02
+    assert strengths(thick, draft) == (1.0, [])
+    asked[1.0], asked[1.25] = 1.4, 1.1
+    assert strengths(thick, draft)[0] == pytest.approx(1.5625)
 
 
 def test_single_scattering_by_hand_blames_no_light(thick, draft) -> None:

@@ -34,6 +34,7 @@ from smokelift.setup import light_strength, scattering
 from smokelift.setup.choice import Choice
 from smokelift.setup.coarse import LONGEST, coarse_domain, coarse_frame
 from smokelift.setup.prepare import prepare_shot
+from smokelift.setup.scattering import HeldOut
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
 from smokelift.setup.velocity_grid import choose_coarsening, choose_levels, levels_for
@@ -111,7 +112,9 @@ def test_single_scattering_is_kept_where_both_meet_the_picture(plume, draft, mon
     """Multiple scattering has to be clearly nearer: it finds half as dense a smoke for the same picture."""
     own = {"single": 0.030, "multiple": 0.026}
     for module in (scattering, light_strength):
-        monkeypatch.setattr(module, "held_out_error", lambda _, model, judge, __: own[judge] if model == judge else 0.4)
+        monkeypatch.setattr(
+            module, "held_out", lambda _, model, judge, __: HeldOut(own[judge] if model == judge else 0.4, 1.0)
+        )
     choice = chosen(shot_of(plume.scene, draft), "scattering")
     assert choice.chosen == "single"
     own["single"] = 0.2
@@ -122,13 +125,13 @@ def test_no_model_is_measured_twice(plume, draft, monkeypatch) -> None:
     """What is known of multiple scattering from the light's strength decides on it too."""
     measured = []
 
-    def counted(frames, model, judge, settings) -> float:
+    def counted(frames, model, judge, settings) -> HeldOut:
         measured.append((frames[0].scene.lights, model, judge))
-        return held_out_error(frames, model, judge, settings)
+        return held_out(frames, model, judge, settings)
 
-    held_out_error = scattering.held_out_error
+    held_out = scattering.held_out
     for module in (scattering, light_strength):
-        monkeypatch.setattr(module, "held_out_error", counted)
+        monkeypatch.setattr(module, "held_out", counted)
     shot_of(plume.scene, draft)
     assert len(measured) == len(set(measured))
 
