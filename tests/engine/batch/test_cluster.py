@@ -10,13 +10,15 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
 import smokelift
-from smokelift.batch import run_on_cluster
+from smokelift.batch import Shot, read_record, run_on_cluster
 from smokelift.batch.cluster import ClusterError
+from smokelift.batch.record import Record
 
 needs_dask = pytest.mark.skipif(
     importlib.util.find_spec("distributed") is None, reason="Dask distributed is not installed"
@@ -127,6 +129,60 @@ def test_a_cancelled_batch_ends_on_its_workers(cluster, make_shot, ledger) -> No
     time.sleep(0.2)
     assert len(ledger(shot)) == there < 1000
     assert not (waiting.folder / "waiting.ledger").exists()
+
+
+@dataclass(frozen=True, eq=False)
+class Given:
+    """A task that a `LaterWorker` was given; done as soon as it is begun."""
+
+    record: Record
+    priority: int
+    status: str = "finished"
+
+    def exception(self) -> None:
+        """It has none."""
+
+    def result(self) -> Record:
+        return self.record
+
+
+class LaterWorker:
+    """Dask's client before a scheduler whose only worker comes after the tasks."""
+
+    loop = None
+
+    def __init__(self, *_: object, **__: object) -> None:
+        pass
+
+    def __enter__(self) -> LaterWorker:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def register_plugin(self, _: object) -> None:
+        pass
+
+    def run_on_scheduler(self, _: object) -> bool:
+        return False
+
+    def submit(self, _: object, shot: Shot, *__: object, priority: int = 0, **___: object) -> Given:
+        return Given(read_record(shot), priority)
+
+
+def begun(tasks: list[Given], loop: None) -> list[Given]:
+    """The order in which a worker begins them: by priority, and of those with the same one the last first."""
+    ordered = sorted(enumerate(tasks), key=lambda given: (given[1].priority, given[0]), reverse=True)
+    return [task for _, task in ordered]
+
+
+@needs_dask
+def test_a_worker_that_comes_later_begins_the_shots_in_their_order(make_shot, monkeypatch) -> None:
+    monkeypatch.setattr("distributed.Client", LaterWorker)
+    monkeypatch.setattr("distributed.as_completed", begun)
+    shots = [make_shot(name) for name in ("west", "east", "north")]
+    ended = run_on_cluster([(shot, read_record(shot)) for shot in shots], lambda shot, stop: None, "tcp://", print)
+    assert [shot.name for shot, _ in ended] == ["west", "east", "north"]
 
 
 def test_a_cluster_that_is_not_there_is_said(make_shot, monkeypatch) -> None:
