@@ -1,6 +1,6 @@
 """Reconstruct fire in baked smoke whose emission is known.
 
-    python -m benchmarks.background.flames SCENES/plume-1 SCENES/two-1 ...
+    python -m benchmarks.background.flames SCENES/plume-1 SCENES/two-1 ... [--clips FOLDER]
 
 A scene is a folder that `benchmarks.truth.bake` and `benchmarks.truth.picture` filled. The fire is what Mantaflow makes
 of a reactant: it enters with the smoke, goes where the true velocity carries it, is burnt up after `BURNING` seconds,
@@ -8,6 +8,7 @@ and shines as its square root. It burns in the baked smoke, or beneath it: with 
 left.
 One frame before black, at eight bits, with the camera and the box told. Pictures are integrated at half-voxel steps,
 without the renderer that is measured: smoke of one source radiance, and the fire's light behind it.
+With FOLDER nothing is reconstructed: the clips of that fire are written for `tests.blender.beside_the_clip`.
 """
 
 from __future__ import annotations
@@ -26,10 +27,11 @@ from scipy import ndimage
 from benchmarks.background.clips import exposed, filmed
 from smokelift.evaluation.truth import Truth
 from smokelift.footage.clip import Clip
+from smokelift.output.images import write_image
 from smokelift.pipeline import Frame, reconstruct
 from smokelift.render import scene_optics
 from smokelift.render.emission import emitted
-from smokelift.scene import CompleteScene, Scene, completed, orbit
+from smokelift.scene import ClipSource, CompleteScene, Scene, completed, orbit
 from smokelift.scene.projection import ray_through_pixels
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import Settings
@@ -124,13 +126,20 @@ def main() -> None:
     """Print what is found, a scene and a case a row."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scenes", nargs="+", type=Path)
-    print("| scene | case | colour | front | amount | side | density: lowest third / above / largest | side |")
-    for folder in parser.parse_args().scenes:
+    parser.add_argument("--clips", type=Path)
+    options = parser.parse_args()
+    if options.clips is None:
+        print("| scene | case | colour | front | amount | side | density: lowest third / above / largest | side |")
+    for folder in options.scenes:
         scene = completed(Scene.load(folder / "scene.toml"))
         width, height = scene.camera.size
         scene = replace(scene, camera=scene.camera.resized(width // 2, height // 2))
         truth = Truth.load(folder / "truth.npz")
         fires = {beneath: Fire.of(truth, scene, beneath) for beneath in (False, True)}
+        if options.clips is not None:
+            for beneath, fire in fires.items():
+                _write_clip(options.clips / f"{folder.name}-{'beneath' if beneath else 'in'}", fire, scene)
+            continue
         for name, case in CASES.items():
             print(f"| {folder.name} | {name} | {' | '.join(_measured(fires[case.beneath], case, scene))} |", flush=True)
 
@@ -161,6 +170,17 @@ def _measured(fire: Fire, case: Case, scene: CompleteScene) -> Iterator[str]:
     depth_of = frame.density * shot.scene.medium.extinction
     yield f"{depth_of[..., :THIRD].sum():.0f} / {depth_of[..., THIRD:].sum():.0f} / {depth_of.max():.1f}"
     yield _alike(*(emitted(each, clear, sides[0], optics) for each in (density, frame.density)))
+
+
+def _write_clip(folder: Path, fire: Fire, scene: CompleteScene) -> None:
+    """Two pictures of the moment with what is told of them, and where they show smoke and fire."""
+    folder.mkdir(parents=True, exist_ok=True)
+    picture, added = fire.picture(Case())
+    for number in (1, 2):
+        write_image(folder / f"front_{number:04d}.png", np.clip(picture, 0, 1))
+    clip = ClipSource(folder / "front_####.png", 24.0)
+    Scene(clip=clip, camera=scene.camera, domain=scene.domain, background=scene.background).save(folder / "scene.toml")
+    np.savez(folder / "front.npz", transmittance=np.stack([fire.transmittance] * 2), fire=np.stack([added] * 2))
 
 
 def _alike(true: Array, found: Array) -> str:

@@ -1,12 +1,15 @@
 """Cycles' picture of a result beside the clip: ``python -m tests.blender.beside_the_clip OUT SCENE ...``.
 
-A SCENE is a folder of `benchmarks.truth.picture` whose clip shows its smoke in a sun, before one colour. Camera, box,
-sun, medium and background are given to Blender as its scene file has them; the rest is done by the add-on's own
-buttons. In OUT stay the takes, and every compared frame: the clip, Cycles, the engine and the difference. Needs bpy.
+A SCENE is a folder of `benchmarks.truth.picture` whose clip shows its smoke in a sun, before one colour, or one of
+`benchmarks.background.flames` with fire. Camera, box, sun, medium and background are given to Blender as far as its
+scene file has them; the rest is done by the add-on's own buttons. In OUT stay the takes, and every compared frame: the
+clip, Cycles, the engine and the difference. Needs bpy.
 
-The table has decibels of displayed values where the clip's smoke covers more than 1 %: of Cycles against the clip, with
-one scattering in Cycles, of the engine's own picture of the same smoke, and of Cycles against that. The product of the
-differences of two renders with other noise keeps noise out of the error.
+The table has decibels of displayed values where the clip's smoke covers more than 1 % (its fire adds more than 5 %): of
+Cycles against the clip, with one scattering in Cycles, of the engine's own picture of the same smoke, and of Cycles
+against that. The product of the differences of two renders with other noise keeps noise out of the error.
+Brightness is the mean of Cycles' picture there over the clip's; of fire that of linear red, green and blue, and also
+the engine's.
 """
 
 from __future__ import annotations
@@ -29,11 +32,15 @@ from smokelift.footage.clip import Clip
 from smokelift.footage.images import linear_to_srgb, read_image, srgb_to_linear
 from smokelift.output.images import write_image
 from smokelift.output.sequence import Sequence
+from smokelift.scene import Scene
 from tests.example_shot import add, add_box, add_camera, smoke
 
 SAMPLES = 32
 THIN = 0.99
 """Transmittance from which on a pixel shows no smoke."""
+
+BURNING = 0.05
+"""Linear red that fire adds to a pixel that shows it."""
 
 
 def main() -> None:
@@ -67,7 +74,8 @@ def compared(folder: Path, out: Path, options: argparse.Namespace) -> list[str]:
     assert take is not None
     sequence = Sequence.open(take.directory)
     with np.load(folder / "front.npz") as file:
-        smoky = file["transmittance"] < THIN
+        burns = "fire" in file
+        there = file["fire"][..., 0] > BURNING if burns else file["transmittance"] < THIN
     rows = []
     for frame in options.frames:
         clip = filmed(sequence, frame)
@@ -76,7 +84,7 @@ def compared(folder: Path, out: Path, options: argparse.Namespace) -> list[str]:
         once = [rendered(scene, frame, seed, out) for seed in (0, 1)]
         scene.cycles.volume_bounces = bounces
         own = linear_to_srgb(sequence.render(frame))
-        inside = smoky[frame - 1]
+        inside = there[frame - 1]
         figures = [
             decibels(cycles, clip, inside),
             decibels(once, clip, inside),
@@ -84,8 +92,11 @@ def compared(folder: Path, out: Path, options: argparse.Namespace) -> list[str]:
             decibels(cycles, own, inside),
         ]
         mean = np.mean(cycles, 0)
-        share = float(mean[inside].mean() / clip[inside].mean())
-        cells = [folder.name, str(frame), str(bounces), *(f"{value:.1f}" for value in figures), f"{share:.3f}"]
+        if burns:
+            shown = " / ".join(colours(pictures, clip, inside) for pictures in (cycles, [own]))
+        else:
+            shown = f"{float(mean[inside].mean() / clip[inside].mean()):.3f}"
+        cells = [folder.name, str(frame), str(bounces), *(f"{value:.1f}" for value in figures), shown]
         rows.append(f"| {' | '.join(cells)} |")
         print(rows[-1], file=sys.stderr, flush=True)
         beside = np.concatenate([clip, mean, own, 0.5 + (mean - clip)], 1)
@@ -106,23 +117,24 @@ def shot(folder: Path, out: Path) -> bpy.types.Scene:
     camera = add_camera(scene, (0.0, 0.0, 0.0))
     camera.matrix_world = Matrix(table["matrix"])
     camera.data.sensor_fit = "VERTICAL"
-    camera.data.lens = camera.data.sensor_height / 2 / math.tan(math.radians(table["fov_y_degrees"]) / 2)
-    (light,) = tables["lights"]
-    sun = add(scene, "Sun", bpy.data.lights.new("Sun", "SUN"))
-    sun.data.energy = light["irradiance"][0]
-    sun.rotation_euler = Vector(light["direction"]).to_track_quat("-Z", "Y").to_euler()
+    camera.data.lens = camera.data.sensor_height * Scene.load(folder / "scene.toml").camera.fy / table["size"][1]
+    for light in tables.get("lights", ()):
+        sun = add(scene, "Sun", bpy.data.lights.new("Sun", "SUN"))
+        sun.data.energy = light["irradiance"][0]
+        sun.rotation_euler = Vector(light["direction"]).to_track_quat("-Z", "Y").to_euler()
     obj = smoke(scene)
     settings = obj.smokelift
     settings.clip = bpy.data.movieclips.load(str(folder / tables["clip"]["path"].replace("####", "0001")))
     settings.fps = tables["clip"]["fps"]
     settings.box = add_box(scene, tables["domain"]["min"], tables["domain"]["max"])
-    settings.use_medium, settings.light_mode = True, "SCENE"
+    settings.use_medium = "medium" in tables
+    settings.light_mode = "SCENE" if "lights" in tables else "ESTIMATE"
     out.mkdir(parents=True, exist_ok=True)
     plate = np.broadcast_to(np.float32(tables["background"]["color"]), (*table["size"][::-1], 3))
     write_image(out / "plate.png", plate)
     settings.plate_mode, settings.plate = "FILE", str(out / "plate.png")
-    for name in ("extinction", "albedo", "anisotropy"):
-        setattr(settings, name, tables["medium"][name])
+    for name, value in tables.get("medium", {}).items():
+        setattr(settings, name, value)
     settings.quality, settings.output = "balanced", str(out)
     scene.render.resolution_x, scene.render.resolution_y = table["size"]
     bpy.context.view_layer.update()
@@ -146,6 +158,12 @@ def rendered(scene: bpy.types.Scene, frame: int, seed: int, out: Path) -> Any:
     scene.render.filepath = str(out / "render.png")
     bpy.ops.render.render(write_still=True)
     return linear_to_srgb(read_image(out / "render.png"))
+
+
+def colours(pictures: list[Any], wanted: Any, inside: Any) -> str:
+    """Mean linear red, green and blue of displayed pictures over that of another."""
+    light = np.mean([srgb_to_linear(picture[inside]) for picture in pictures], (0, 1))
+    return ", ".join(f"{share:.2f}" for share in light / srgb_to_linear(wanted[inside]).mean(0))
 
 
 def decibels(pair: list[Any], wanted: Any, inside: Any) -> float:
