@@ -36,34 +36,40 @@ demo: $(VENV)/engine.stamp
 
 test: lint pytest
 
-pytest: $(VENV)/engine.stamp
+pytest: $(VENV)/tools.stamp
 	$(BIN)/python -m pytest -n 2 --dist worksteal
 
-sanitize: $(VENV)/engine.stamp
+sanitize: $(VENV)/tools.stamp
 	$(BIN)/python tools/sanitize.py
 
-stability: $(VENV)/engine.stamp
+stability: $(VENV)/tools.stamp
 	rm -rf build/stability
 	mkdir -p build
 	$(BIN)/python -m benchmarks.stability build/stability --cases $(CASES)
 
-lint: $(VENV)/engine.stamp
+lint: $(VENV)/tools.stamp
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/clang-format --dry-run --Werror cpp/*.cpp cpp/*.h
 
-$(VENV)/tools.stamp: pyproject.toml
+$(VENV)/pip.stamp: pyproject.toml
 	@[ -n "$(PYTHON)" ] || { echo "Smokelift needs Python 3.11, 3.12 or 3.13 with venv; install one, or say make PYTHON=/path/to/python3." >&2; exit 2; }
 	@[ -n "$(CXX_FOUND)" ] || { echo "Smokelift needs a C++17 compiler; install g++ or clang++ (Debian: apt install g++)." >&2; exit 2; }
 	$(PYTHON) -m venv $(VENV)
 	$(QUIET_PIP) --upgrade pip
-	$(QUIET_PIP) --group dev
 	touch $@
 
-# Installed as a wheel, not editable: what is tested is what is shipped.
-$(VENV)/engine.stamp: $(VENV)/tools.stamp $(ENGINE_SOURCES)
-	$(QUIET_PIP) '.[vdb,gpu]'
+# Installed as a wheel, not editable: what is tested is what is shipped, compiled once for both.
+$(VENV)/engine.stamp: $(VENV)/pip.stamp tools/engine_wheels.py $(ENGINE_SOURCES)
+	$(BIN)/python tools/engine_wheels.py --out $(VENV)/wheel
+	$(QUIET_PIP) --force-reinstall --no-deps $(VENV)/wheel/*.whl
+	$(QUIET_PIP) "$$(echo $(VENV)/wheel/*.whl)[vdb]"
+	touch $@
+
+# What only developers need, and the tests.
+$(VENV)/tools.stamp: $(VENV)/engine.stamp
+	$(QUIET_PIP) --group dev "$$(echo $(VENV)/wheel/*.whl)[gpu]"
 	touch $@
 
 # Besides its pages it holds what tools/ read from the code: commands, scene files, messages.
@@ -85,14 +91,14 @@ dist/extension.stamp: build/engine-wheels/stamp build/manual/index.html tools/bu
 	touch $@
 
 build/engine-wheels/stamp: $(VENV)/extension.stamp tools/engine_wheels.py $(ENGINE_SOURCES)
-	$(BIN)/python tools/engine_wheels.py --out build/engine-wheels
+	$(BIN)/python tools/engine_wheels.py --blender --out build/engine-wheels
 	touch $@
 
 $(VENV)/extension.stamp: $(VENV)/engine.stamp
 	$(QUIET_PIP) --group extension
 	touch $@
 
-test-blender: dist/extension.stamp
+test-blender: dist/extension.stamp $(VENV)/tools.stamp
 	$(BIN)/python -m pytest -n 2 --dist loadfile -v -rP --durations=0 --durations-min=1 \
 		tests/blender/wheels.py tests/blender/debian.py
 

@@ -11,15 +11,15 @@ namespace smokelift {
 namespace {
 
 using Floats = py::array_t<float, py::array::c_style>;
-using Marks = py::array_t<unsigned char, py::array::c_style | py::array::forcecast>;
+using SupportMarks = py::array_t<unsigned char, py::array::c_style | py::array::forcecast>;
 using Integers = py::array_t<int, py::array::c_style | py::array::forcecast>;
 
 // Where there can be smoke, and the ranges of rows around that.
 struct Support {
-    Marks marked;
+    SupportMarks marked;
     Spans spans;
 
-    explicit Support(const Marks &marks) : marked(marks) {
+    explicit Support(const SupportMarks &marks) : marked(marks) {
         require_fit(marks.ndim() == 3);
         spans = spans_around(marks.data(), shape());
     }
@@ -116,7 +116,7 @@ void register_render(py::module_ &module) {
 
     module.def("zeros", &zeros, "shape"_a);
 
-    py::class_<Support>(module, "Support").def(py::init<const Marks &>(), "marked"_a);
+    py::class_<Support>(module, "Support").def(py::init<const SupportMarks &>(), "marked"_a);
 
     py::class_<Phase>(module, "Phase")
         .def(py::init([](const std::array<std::array<float, 4>, 3> &to_eye, float albedo, float anisotropy) {

@@ -14,9 +14,9 @@
 namespace smokelift {
 namespace {
 
-using Marks = py::array_t<bool, py::array::c_style>;
+using SmokeMarks = py::array_t<bool, py::array::c_style>;
 
-Mask marked(const Marks &marks, const Shape &n) {
+Mask marked(const SmokeMarks &marks, const Shape &n) {
     require_fit(marks.ndim() == 3 && marks.shape(0) == n[0] && marks.shape(1) == n[1] &&
                 marks.shape(2) == n[2]);
     return {reinterpret_cast<const unsigned char *>(marks.data()), n};
@@ -43,7 +43,7 @@ void register_data_term(py::module_ &module) {
             Array3 direction = new_arrays({n, n, n});
             Array offset = new_array(n), residual = new_array(n), carried = new_array(n),
                   density = new_array(n);
-            Marks smoke(std::vector<py::ssize_t>{n[0], n[1], n[2]});
+            SmokeMarks smoke(std::vector<py::ssize_t>{n[0], n[1], n[2]});
             const Linearisation result{
                 out(direction), out(offset),  out(residual),
                 out(carried),   out(density), {reinterpret_cast<unsigned char *>(smoke.mutable_data()), n}};
@@ -56,7 +56,7 @@ void register_data_term(py::module_ &module) {
 
     module.def(
         "residual_sums",
-        [](const Array3 &direction, const Array &offset, const Array &weight, const Marks &smoke,
+        [](const Array3 &direction, const Array &offset, const Array &weight, const SmokeMarks &smoke,
            const Array3 &u) {
             const In r = view(offset), w = view(weight, r.n);
             const In3 g = view(direction, r.n);

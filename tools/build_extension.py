@@ -54,6 +54,9 @@ BLENDER_NUMPY = {"3.11": "1.26.4", "3.13": "2.2.0"}
 PINS = {"smokelift": "bundle.txt", "smokelift_gpu": "bundle_gpu.txt"}
 """The extensions, and the files in tools that pin their wheels."""
 
+LEVEL = 5
+"""Of compression: takes six tenths of the time of 6, which is usual, for 1 % more bytes."""
+
 GPU = {"name": "Smokelift GPU", "tagline": "Lets Smokelift render on the graphics card"}
 """What the manifest of `smokelift_gpu` says otherwise."""
 
@@ -398,11 +401,11 @@ def stage_add_on(product: Product, manifest: Mapping[str, Any]) -> None:
 def pack(folder: Path, built: Path) -> None:
     """Zip a folder so that the same files make the same bytes: in the order of their names, and without their dates."""
     files = {file.relative_to(folder).as_posix(): file for file in folder.rglob("*") if file.is_file()}
-    with zipfile.ZipFile(built, "w", zipfile.ZIP_DEFLATED) as archive:
+    with zipfile.ZipFile(built, "w") as archive:
         for name in sorted(files):
             entry = zipfile.ZipInfo(name)
             entry.external_attr = 0o644 << 16
-            archive.writestr(entry, files[name].read_bytes(), zipfile.ZIP_DEFLATED)
+            archive.writestr(entry, files[name].read_bytes(), zipfile.ZIP_DEFLATED, LEVEL)
 
 
 def run_validator(built: Path) -> None:

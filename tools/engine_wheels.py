@@ -1,7 +1,7 @@
-"""Build the engine's wheel for this machine's platform, once with every Python that a Blender carries.
+"""Build the engine's wheel for this machine's platform: for this Python, or for every one that a Blender carries.
 
-A wheel is tied to one version of Python, and on Linux to the C library that it was linked to. So there it is compiled
-by Zig, which brings older libraries along: the wheel then runs wherever Blender itself does.
+A wheel is tied to one version of Python, and on Linux to the C library that it was linked to. So there it takes of the
+C library only what the oldest has that Blender runs with (cpp/old_glibc.cpp), and runs wherever Blender itself does.
 
 What a build needs is installed once for each Python and stays in build/portable, as do the compiled files: what has not
 changed is not compiled again, and what knows no Python is compiled for the first of them alone.
@@ -10,7 +10,6 @@ changed is not compiled again, and what knows no Python is compiled for the firs
 from __future__ import annotations
 
 import argparse
-import importlib.util
 import os
 import platform
 import re
@@ -39,20 +38,28 @@ GLIBC = "2.28"
 _PROBE = """
 import pathlib, sys, sysconfig
 fits = f"{sys.version_info[0]}.{sys.version_info[1]}" == sys.argv[1]
+print(sys._base_executable)
 sys.exit(not (fits and pathlib.Path(sysconfig.get_path("include"), "Python.h").is_file()))
 """
+
+
+class NotPortableError(Exception):
+    """A wheel needs a newer system than Blender does."""
 
 
 def main() -> int:
     """Build the wheels; returns the exit status."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--out", type=Path, required=True, help="folder for the wheels; older ones in it are removed")
-    out: Path = parser.parse_args().out
+    parser.add_argument("--blender", action="store_true", help="for Blender's Pythons, not for this one")
+    options = parser.parse_args()
+    out: Path = options.out
     out.mkdir(parents=True, exist_ok=True)
     for old in out.glob("*.whl"):
         old.unlink()
     compiled: Path | None = None
-    for version in PYTHONS:
+    own = f"{sys.version_info[0]}.{sys.version_info[1]}"
+    for version in versions(own, options.blender):
         python = find_python(version)
         if python is None:
             print(
@@ -64,24 +71,40 @@ def main() -> int:
         print(f"Building the engine's wheel for Python {version} (build/portable keeps what is compiled).", flush=True)
         programs = build_environment(python, PORTABLE / f"python{version}")
         folder = PORTABLE / f"compiled{version}"
-        build(programs, folder, out, compiled)
+        try:
+            build(programs, folder, out, compiled, certified=options.blender)
+        except NotPortableError as error:
+            print(error, file=sys.stderr)
+            return 2
         compiled = compiled or folder
     return 0
 
 
+def versions(own: str, blender: bool) -> list[str]:
+    """Of Python, that wheels are built for: this one, or Blender's.
+
+    This one is the first of Blender's if it is one: what the tests had compiled then serves the others too.
+    """
+    return sorted(PYTHONS, key=lambda version: version != own) if blender else [own]
+
+
 def find_python(version: str) -> str | None:
-    """An interpreter of a version that can compile modules: this one, on the path, or pyenv's."""
+    """An interpreter of a version that can compile modules: this one, on the path, or pyenv's.
+
+    It is outside any environment, and so the same for all that are made of it.
+    """
     pyenv = Path(os.environ.get("PYENV_ROOT", Path.home() / ".pyenv"))
     candidates = [sys.executable, f"python{version}", *sorted(map(str, pyenv.glob(f"versions/{version}.*/bin/python")))]
-    return next((python for python in candidates if _fits(python, version)), None)
+    return next((found for python in candidates if (found := _fitting(python, version))), None)
 
 
-def _fits(python: str, version: str) -> bool:
+def _fitting(python: str, version: str) -> str | None:
     try:
         # asked rather than looked for: pyenv puts names on the path behind which there is nothing
-        return subprocess.run([python, "-c", _PROBE, version], capture_output=True).returncode == 0
+        asked = subprocess.run([python, "-c", _PROBE, version], capture_output=True, text=True)
     except OSError:
-        return False
+        return None
+    return asked.stdout.strip() if asked.returncode == 0 else None
 
 
 def build_environment(python: str, folder: Path) -> Path:
@@ -116,7 +139,7 @@ def build_environment(python: str, folder: Path) -> Path:
     return programs
 
 
-def build(programs: Path, folder: Path, out: Path, compiled: Path | None) -> None:
+def build(programs: Path, folder: Path, out: Path, compiled: Path | None, *, certified: bool) -> None:
     """Build one wheel.
 
     Parameters
@@ -124,25 +147,27 @@ def build(programs: Path, folder: Path, out: Path, compiled: Path | None) -> Non
     programs
         Folder of programs of the environment that builds it.
     folder
-        Where it is compiled: not that of `make`, which has another compiler.
+        Where it is compiled.
     out
         Folder for the wheel.
     compiled
         Where one was compiled for another Python, whose numerics are taken; None compiles them.
+    certified
+        Whether it is for other machines too, so that on Linux it is checked and named for those it runs on.
     """
-    portable = platform.system() == "Linux" and platform.machine() == "x86_64"
+    portable = platform.libc_ver()[0] == "glibc" and platform.machine() == "x86_64"
     environment = os.environ | {"PATH": os.pathsep.join([str(programs), os.environ["PATH"]])}
-    if portable:
-        environment["CXX"] = f"{_zig()} c++ -target x86_64-linux-gnu.{GLIBC}"
-    elif platform.system() == "Darwin":
+    if platform.system() == "Darwin":
         environment["MACOSX_DEPLOYMENT_TARGET"] = "11.0"  # Blender's own
     with tempfile.TemporaryDirectory() as made:
         wheel = ["wheel", "--quiet", "--no-deps", "--no-build-isolation", "-w", made, f"-Cbuild-dir={folder}"]
-        if compiled is not None:
-            wheel.append(f"-Ccmake.define.NUMERICS_FROM={compiled}")
+        if portable:
+            wheel.append("-Ccmake.define.OLD_GLIBC=ON")
+        # said even if there are none: CMake remembers those of the time before
+        wheel.append(f"-Ccmake.define.NUMERICS_FROM={compiled or ''}")
         subprocess.run([*_pip(programs), *wheel, str(ROOT)], env=environment, check=True)
         (built,) = Path(made).glob("*.whl")
-        if portable:
+        if portable and certified:
             _certify(built, out)
         else:
             (out / built.name).write_bytes(built.read_bytes())
@@ -153,12 +178,6 @@ def _pip(programs: Path) -> list[str]:
     return [sys.executable, "-m", "pip", "--disable-pip-version-check", "--python", str(programs / "python")]
 
 
-def _zig() -> Path:
-    found = importlib.util.find_spec("ziglang")
-    assert found is not None and found.origin is not None, "run by make extension, which installs it"
-    return Path(found.origin).with_name("zig")
-
-
 def _certify(wheel: Path, out: Path) -> None:
     """Check that a wheel needs no later C library, and name it accordingly."""
     tag = f"manylinux_{GLIBC.replace('.', '_')}_x86_64"
@@ -167,7 +186,11 @@ def _certify(wheel: Path, out: Path) -> None:
     repair = [sys.executable, "-m", "auditwheel", "repair", "--plat", tag, "--only-plat", "-w", str(out), str(wheel)]
     done = subprocess.run(repair, env=environment, capture_output=True, text=True)
     if done.returncode != 0:
-        raise RuntimeError(f"{wheel.name} would not run wherever Blender does: {done.stderr.strip()}")
+        raise NotPortableError(
+            f"{wheel.name} would not run wherever Blender does, as this system's compiler is newer: build the engine "
+            "with python -m cibuildwheel or on an older system, and the zips with tools/build_extension.py "
+            f"--engine-wheels DIR --out dist. auditwheel says: {done.stderr.strip()}"
+        )
 
 
 if __name__ == "__main__":

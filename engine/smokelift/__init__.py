@@ -4,17 +4,11 @@ The data flows footage -> setup -> density (render) <-> velocity (transport) -> 
 """
 
 import sys
-from pathlib import Path
 
 from smokelift_command import cancelled
 
 if sys.argv[:1] == ["-m"]:  # Python loads this for `python -m smokelift`, before its main program can take an interrupt
     sys.excepthook = cancelled
-
-from smokelift.processor import faster_core
-
-if folder := faster_core(Path(__file__).parent):  # before anything imports the core
-    __path__.insert(0, folder)
 
 from smokelift.density import Density, DensitySettings, Observation, reconstruct_density
 from smokelift.evaluation import metrics

@@ -16,10 +16,10 @@ SOURCES = (
     *("tools/build_extension.py", "tools/engine_wheels.py", "tools/bundle.txt"),
 )
 MADE = (
-    *(f".venv/{name}.stamp" for name in ("tools", "engine", "manual", "extension")),
+    *(f".venv/{name}.stamp" for name in ("pip", "engine", "manual", "extension")),
     *("build/engine-wheels/stamp", "build/manual/index.html", "dist/extension.stamp"),
 )
-STEPS = {"wheels": "engine_wheels.py", "manual": "mkdocs build", "zip": "build_extension.py"}
+STEPS = {"wheels": "engine_wheels.py --blender", "manual": "mkdocs build", "zip": "build_extension.py"}
 
 
 @pytest.mark.skipif(shutil.which("make") is None, reason="needs make")

@@ -1,0 +1,40 @@
+// What newer C libraries offer under newer versions, taken in the versions of the oldest one that Blender
+// runs with. A core with these definitions, and with the C++ library inside it, loads wherever Blender does.
+// That nothing else of a newer C library is needed is checked on the wheel (tools/engine_wheels.py).
+#include <pthread.h>
+
+#define OLD(name) __asm__(".symver old_" #name "," #name "@GLIBC_2.2.5")
+
+extern "C" {
+
+#pragma GCC visibility push(default)
+double old_exp(double);
+int old_pthread_create(pthread_t *, const pthread_attr_t *, void *(*)(void *), void *);
+int old_pthread_join(pthread_t, void **);
+int old_pthread_once(pthread_once_t *, void (*)());
+#pragma GCC visibility pop
+
+OLD(exp);
+OLD(pthread_create);
+OLD(pthread_join);
+OLD(pthread_once);
+
+#pragma GCC visibility push(hidden)
+// The C++ library asks whether it may leave out locks; the oldest C library cannot tell.
+extern char __libc_single_threaded;
+char __libc_single_threaded = 0;
+
+// under another name, as the compiler knows its own beforehand, as visible
+double hidden_exp(double) __asm__("exp");
+double hidden_exp(double x) { return old_exp(x); }
+
+int pthread_create(pthread_t *thread, const pthread_attr_t *attributes, void *(*run)(void *),
+                   void *argument) {
+    return old_pthread_create(thread, attributes, run, argument);
+}
+
+int pthread_join(pthread_t thread, void **result) { return old_pthread_join(thread, result); }
+
+int pthread_once(pthread_once_t *once, void (*run)()) { return old_pthread_once(once, run); }
+#pragma GCC visibility pop
+}
