@@ -74,9 +74,6 @@ LEAST_WINDOW = 3 / 255
 DRIFT = 8 / 255
 """Change in sRGB values by a codec or by the light, at most. The matte takes as much for smoke."""
 
-LIKE_SURROUNDINGS = 3 * DRIFT
-"""Difference in sRGB values from what the surroundings let expect, of a background."""
-
 LEAST_CHANGE = 1 / 4
 """Range of smoke over time, as a share of its difference from the background: what is steadier is a chair or a jacket.
 """
@@ -196,8 +193,9 @@ def clear_picture(
     if not known.all():
         # what changes by drift at most is no smoke if it is too little like its surroundings for smoke so steady
         known = _in_one_piece(known | (calm & (LEAST_CHANGE * _unlike(image, known) >= window + DRIFT)))
-        # or if it looks like them
-        known = _in_one_piece(known | (calm & (_unlike(image, known) <= LIKE_SURROUNDINGS)))
+        # or if drift explains how it differs from them as well. What differs by more may be faint smoke that hardly
+        # changes, and what is known at its rim is continued over all that is behind the rest
+        known = _in_one_piece(known | (calm & (_unlike(image, known) <= DRIFT)))
     mean = _mean(samples, seen)
     if seen is not None and not seen.any(0).all():
         never = ~seen.any(0)
