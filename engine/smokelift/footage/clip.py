@@ -8,19 +8,27 @@ from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
+from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from smokelift.footage.frame_source import ClipError, DamagedFrameError, FrameSource
 from smokelift.footage.image_sequence import ImageSequence
-from smokelift.footage.images import Picture, Transfer
+from smokelift.footage.images import CodedPicture, Picture, Transfer, Value
 from smokelift.footage.video import Video
 from smokelift.scene import ClipSource
 
 __all__ = ["Clip", "ClipError", "is_video"]
 
-CACHE_BYTES = 128 * 2**20
-"""Memory for the decoded frames of a clip that are kept: five of 1080p."""
+Image = TypeVar("Image", Picture, Picture | CodedPicture)
+
+CACHE_BYTES = 64 * 2**20
+"""Memory for the linear frames of a clip that are kept: two of 1080p."""
+
+KEPT_BYTES = 128 * 2**20
+"""Memory for the frames of a file that are kept as they are stored: twenty of 1080p at 8 bits, for what looks at the
+same ones spread over a clip."""
 
 
 class Clip:
@@ -104,7 +112,7 @@ class Clip:
             raise ClipError(f'{path}: transfer must be "srgb" or "linear", not "{transfer}"')
         source: FrameSource = Video(path, transfer) if is_video(path) else ImageSequence(path, transfer, fps)
         try:
-            return cls(path, source, fps, frames)
+            return cls(path, _Kept(source), fps, frames)
         except BaseException:
             source.close()
             raise
@@ -166,28 +174,59 @@ class Clip:
         ClipError
             If there is no such frame, or most frames of the clip are damaged.
         """
-        if not 0 <= n < self._count:
-            raise ClipError(f"{self.path}: there is no frame {n}; there are 0 to {self._count - 1}")
         if n in self._cache:
             self._cache.move_to_end(n)
             return self._cache[n]
-        image = self._read(n)
+        image = _linear(self._read(n, self._source.read))
         image.flags.writeable = False
         self._cache[n] = image
         while len(self._cache) > max(1, CACHE_BYTES // image.nbytes):
             self._cache.popitem(last=False)
         return image
 
-    def _read(self, n: int) -> Picture:
+    def frame_through(self, n: int, change: Callable[[Picture], NDArray[Value]]) -> NDArray[Value]:
+        """Return frame ``n`` with a function applied to every linear value by itself, which may be cheaper that way.
+
+        Raises
+        ------
+        ClipError
+            As `frame` does.
+        """
+        image = self._cache[n] if n in self._cache else self._read(n, self._source.read)
+        return image.through(change) if isinstance(image, CodedPicture) else change(image)
+
+    def glimpse(self, n: int, longest: int) -> Picture:
+        """Return frame ``n`` for a look, linear: it may be reduced while it is read, which is cheaper.
+
+        Parameters
+        ----------
+        n
+            As of `frame`.
+        longest
+            Pixels along the longer side that a reduced frame has at least.
+
+        Raises
+        ------
+        ClipError
+            As `frame` does.
+        """
+        divisor = max(self.size) // longest
+        if divisor < 2:
+            return self.frame(n)
+        return self._read(n, lambda number: self._source.glimpse(number, divisor))
+
+    def _read(self, n: int, read: Callable[[int], Image]) -> Image:
         """Return a frame from the file, or what stands in for it: the last sound one lasts on, as when one drops."""
+        if not 0 <= n < self._count:
+            raise ClipError(f"{self.path}: there is no frame {n}; there are 0 to {self._count - 1}")
         try:
-            return self._source.read(self.first + n)
+            return read(self.first + n)
         except DamagedFrameError as error:
             damage = error
         for other in (*reversed(range(n)), *range(n + 1, self._count)):
             if other not in self.damaged:
                 with suppress(DamagedFrameError):
-                    return self._source.read(self.first + other)
+                    return read(self.first + other)
         raise damage
 
     def __len__(self) -> int:
@@ -227,6 +266,40 @@ class Clip:
         self.close()
 
 
+class _Kept:
+    """The frames of a source, of which the last ones read are kept for all clips that share it."""
+
+    def __init__(self, source: FrameSource) -> None:
+        self._source = source
+        self._kept: OrderedDict[int, Picture | CodedPicture] = OrderedDict()
+        self.count, self.fps, self.warning = source.count, source.fps, source.warning
+        self.files, self.lens, self.backdrop = source.files, source.lens, source.backdrop
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        return self._source.notes
+
+    def read(self, n: int) -> Picture | CodedPicture:
+        if n in self._kept:
+            self._kept.move_to_end(n)
+            return self._kept[n]
+        image = self._source.read(n)
+        (image.codes if isinstance(image, CodedPicture) else image).flags.writeable = False
+        self._kept[n] = image
+        while len(self._kept) > max(1, KEPT_BYTES // image.nbytes):
+            self._kept.popitem(last=False)
+        return image
+
+    def glimpse(self, n: int, divisor: int) -> Picture:
+        return self._source.glimpse(n, divisor)
+
+    def damaged(self, first: int, last: int) -> tuple[int, ...]:
+        return self._source.damaged(first, last)
+
+    def close(self) -> None:
+        self._source.close()
+
+
 class _Changed:
     """The frames of a clip's source, each replaced; numbers count from the clip's first one."""
 
@@ -240,7 +313,10 @@ class _Changed:
         return self._source.notes
 
     def read(self, n: int) -> Picture:
-        return self._change(n - self._clip.first, self._source.read(n))
+        return self._change(n - self._clip.first, _linear(self._source.read(n)))
+
+    def glimpse(self, n: int, divisor: int) -> Picture:
+        return self.read(n)  # a change may be meant for the whole picture
 
     def damaged(self, first: int, last: int) -> tuple[int, ...]:
         clip = self._clip
@@ -250,6 +326,10 @@ class _Changed:
 
     def close(self) -> None:
         self._source.close()
+
+
+def _linear(image: Picture | CodedPicture) -> Picture:
+    return image.linear() if isinstance(image, CodedPicture) else image
 
 
 def numbered(frames: Sequence[int]) -> str:

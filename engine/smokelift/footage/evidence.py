@@ -6,11 +6,14 @@ import numpy as np
 import numpy.typing as npt
 
 from smokelift.footage.clip import Clip, ClipError
-from smokelift.footage.exposure import gain_of, small
+from smokelift.footage.exposure import LONGEST, gain_of, small
 from smokelift.footage.images import Picture, linear_to_srgb
 
 SAMPLES = 24
 """Frames of the file that are compared, and as many of the clip at most."""
+
+FINER = 4
+"""Pixels that are read, along each axis, for one that is compared: light is averaged over them."""
 
 STILL = 4 / 255
 """Change of a pixel, in sRGB values, up to which it has not changed."""
@@ -31,7 +34,7 @@ def evidence(clip: Clip) -> Clip:
     whole = clip.whole()
     if len(whole) == len(clip):
         return clip
-    own = np.stack([small(clip.frame(number)) for number in clip.spread(SAMPLES)])
+    own = np.stack([_small(clip, number) for number in clip.spread(SAMPLES)])
     reference = np.median(own, axis=0)
     still = np.quantile(np.abs(linear_to_srgb(own) - linear_to_srgb(reference)).max(-1), 0.9, axis=0) < STILL
     first, last = clip.first, clip.first + len(clip) - 1
@@ -40,17 +43,24 @@ def evidence(clip: Clip) -> Clip:
         if not _same(whole, number, reference, still):
             break
         last = number
-    for number in [n for n in numbers[::-1] if n < first]:
+    start = None
+    for number in [n for n in numbers if n < first]:  # backwards each would be decoded from the last key frame on
         if not _same(whole, number, reference, still):
-            break
-        first = number
-    return whole.part(first, last)
+            start = None
+        elif start is None:
+            start = number
+    return whole.part(first if start is None else start, last)
+
+
+def _small(clip: Clip, number: int) -> Picture:
+    """A frame at the size at which it is compared; it is read with a few pixels for each of that, which is cheap."""
+    return small(clip.glimpse(number, FINER * LONGEST))
 
 
 def _same(whole: Clip, number: int, reference: Picture, still: npt.NDArray[np.bool_]) -> bool:
     """Whether a frame of the file can be read and belongs to the shot."""
     try:
-        picture = small(whole.frame(number))
+        picture = _small(whole, number)
     except ClipError:
         return False
     if not still.any():

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Protocol
 
-from smokelift.footage.images import Picture
+from smokelift.footage.images import CodedPicture, Picture
 
 DEFAULT_FPS = 24.0
 """Frames a second where neither the file nor the user gives any: the rate of film."""
@@ -50,8 +50,12 @@ class FrameSource(Protocol):
         """How the pictures are read where that is not the usual way, a sentence each."""
         ...
 
-    def read(self, n: int) -> Picture:
-        """Return a frame, linear; raise `DamagedFrameError` if it cannot be decoded."""
+    def read(self, n: int) -> Picture | CodedPicture:
+        """Return a frame, linear or with its way to that; raise `DamagedFrameError` if it cannot be decoded."""
+        ...
+
+    def glimpse(self, n: int, divisor: int) -> Picture:
+        """Return a frame, linear, with sides that may be divided by up to a number if it is cheaper to read so."""
         ...
 
     def damaged(self, first: int, last: int) -> tuple[int, ...]:

@@ -13,8 +13,10 @@ import re
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, redirect_stdout
+from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -28,6 +30,7 @@ from smokelift.scene import LARGEST_PICTURE
 
 Picture = npt.NDArray[np.float32]
 Transfer = Literal["srgb", "linear"]
+Value = TypeVar("Value", np.float32, np.uint16)
 
 MOST_PIXELS = 2**28
 """Pixels of a picture, at most."""
@@ -41,6 +44,35 @@ READABLE = (".png", ".jpg", ".jpeg", ".exr", ".hdr")
 
 class ImageError(ValueError):
     """A picture that cannot be read or written."""
+
+
+@dataclass(frozen=True, eq=False)
+class CodedPicture:
+    """An opaque picture as the integers that it is stored in: a quarter of the memory, at 8 bits, of linear values.
+
+    Attributes
+    ----------
+    codes : (rows, columns, 3) uint8 or uint16
+        Row 0 at the top.
+    table : (n,) float32
+        Linear value of each code.
+    """
+
+    codes: npt.NDArray[np.uint8] | npt.NDArray[np.uint16]
+    table: Picture
+
+    @property
+    def nbytes(self) -> int:
+        """Memory that it takes; the table is that of many pictures."""
+        return self.codes.nbytes
+
+    def linear(self) -> Picture:
+        """Return the linear picture (rows, columns, 3)."""
+        return self.through(lambda values: values)
+
+    def through(self, change: Callable[[Picture], npt.NDArray[Value]]) -> npt.NDArray[Value]:
+        """Return the picture with a function applied to every linear value, which is called for each code once."""
+        return change(self.table)[self.codes]
 
 
 def srgb_to_linear(encoded: npt.ArrayLike) -> Picture:
@@ -85,14 +117,20 @@ def decode_integers(
     premultiplied
         Whether colours are over black as they are stored.
     """
-    top = np.iinfo(codes.dtype).max
-    steps = np.arange(top + 1, dtype=np.float32) / np.float32(top * white)
-    table = steps if encoding == "linear" else _DECODERS[encoding or "srgb"](steps)
-    linear: Picture = table[codes[..., :3]]
+    linear: Picture = code_values(np.iinfo(codes.dtype).max, encoding, white)[codes[..., :3]]
     alpha = decode_alpha(codes, white)
     if alpha is not None and not premultiplied:
         linear *= alpha[..., None]
     return linear
+
+
+@lru_cache
+def code_values(top: int, encoding: Encoding | None = None, white: float = 1.0) -> Picture:
+    """Return the linear values of all integers from 0 to one, read-only; the others are those of `decode_integers`."""
+    steps = np.arange(top + 1, dtype=np.float32) / np.float32(top * white)
+    values = steps if encoding == "linear" else _DECODERS[encoding or "srgb"](steps)
+    values.flags.writeable = False
+    return values
 
 
 def decode_alpha(codes: npt.NDArray[np.uint8] | npt.NDArray[np.uint16], white: float = 1.0) -> Picture | None:

@@ -8,7 +8,9 @@ All statistics are quantiles over time, so that a flash, a cut or a dropped fram
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -109,6 +111,35 @@ def block_means(pictures: Picture) -> Picture:
     lines = whole.reshape(frames, rows, size, columns * size * 3).sum(axis=2)  # along memory: several times faster
     means: Picture = lines.reshape(frames, rows, columns, size, 3).sum(axis=3) / np.float32(size**2)
     return means
+
+
+def sample_block_means(sample: npt.NDArray[np.uint16]) -> Picture:
+    """Return the `block_means` of a sample (rows, columns, 3) in sRGB values, (rows, columns, 3).
+
+    The sums are whole numbers below 2^24, which float32 holds exactly: as if the sample were decoded first.
+    """
+    size = min(BLOCK, *sample.shape[:2])
+    rows, columns = sample.shape[0] // size, sample.shape[1] // size
+    lines = sample[: rows * size, : columns * size].reshape(rows, size, columns * size * 3)
+    sums = _sum_of([lines[:, k] for k in range(size)]).reshape(rows, columns, size, 3)
+    total = _sum_of([sums[:, :, k] for k in range(size)])
+    return total.astype(np.float32) / np.float32(_FIXED_POINT) / np.float32(size**2)
+
+
+def whole_blocks(seen: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """Return which of the blocks of `block_means` are seen whole, of pixels (frames, rows, columns) that are seen."""
+    size = min(BLOCK, *seen.shape[1:])
+    frames, rows, columns = len(seen), seen.shape[1] // size, seen.shape[2] // size
+    whole = seen[:, : rows * size, : columns * size].reshape(frames, rows, size, columns, size)
+    return np.asarray(whole.all(axis=(2, 4)))
+
+
+def _sum_of(parts: Sequence[npt.NDArray[Any]]) -> npt.NDArray[np.uint32]:
+    """Whole numbers added up without a copy of them all."""
+    total = parts[0].astype(np.uint32)
+    for part in parts[1:]:
+        total += part
+    return total
 
 
 def temporal_noise(deviations: Picture, blocks: Picture) -> Noise:

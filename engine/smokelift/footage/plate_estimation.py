@@ -43,8 +43,10 @@ from smokelift.footage.noise import (
     encode_sample,
     linear_samples,
     over_time,
+    sample_block_means,
     sampled_count,
     temporal_noise,
+    whole_blocks,
 )
 from smokelift.footage.plate import Plate
 from smokelift.footage.seen import at_rank, count_of_seen, median_of_seen
@@ -240,7 +242,7 @@ def steady_samples(clip: Clip, count: int = 32) -> npt.NDArray[np.uint16]:
     samples = np.empty((len(numbers), height, width, 3), np.uint16)
     tiny = []
     for sample, number in zip(samples, numbers, strict=True):
-        sample[...] = encode_sample(clip.frame(number))
+        sample[...] = clip.frame_through(number, encode_sample)
         tiny.append(small(clip.frame(number)))
     for sample, gain in zip(samples, sample_gains(np.stack(tiny)), strict=True):
         if (gain != 1).any():
@@ -251,14 +253,11 @@ def steady_samples(clip: Clip, count: int = 32) -> npt.NDArray[np.uint16]:
 def clip_noise(samples: npt.NDArray[np.uint16], seen: npt.NDArray[np.bool_] | None = None) -> Noise:
     """Return the noise of samples, as `clear_picture` takes them, before a background that is not known yet."""
 
-    def shown(number: int) -> Picture:
-        values = decode_samples(samples[number, None])
-        if seen is not None:
-            values[~seen[number, None]] = np.nan
-        return values
-
-    single = np.concatenate([shown(n)[:, ::NOISE_STRIDE, ::NOISE_STRIDE] for n in range(len(samples))])
-    blocks = np.concatenate([block_means(shown(n)) for n in range(len(samples))])
+    single = decode_samples(samples[:, ::NOISE_STRIDE, ::NOISE_STRIDE])
+    blocks = np.stack([sample_block_means(sample) for sample in samples])
+    if seen is not None:
+        single[~seen[:, ::NOISE_STRIDE, ::NOISE_STRIDE]] = np.nan
+        blocks[~whole_blocks(seen)] = np.nan
     single, blocks = (each - median_of_seen(each) for each in (single, blocks))
     noise = temporal_noise(single, blocks)
     # what drifts differs from the one background that is found

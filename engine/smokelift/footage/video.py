@@ -28,14 +28,16 @@ from av.sidedata.sidedata import Type as SideData
 from av.video.reformatter import ColorRange, Interpolation
 
 from smokelift.footage import lens
-from smokelift.footage.colour import ENCODINGS, primaries_name, to_bt709
+from smokelift.footage.colour import ENCODINGS, Encoding, primaries_name, to_bt709
 from smokelift.footage.container import open_container
 from smokelift.footage.frame_source import DEFAULT_FPS, ClipError, DamagedFrameError
 from smokelift.footage.images import (
     MOST_PIXELS,
+    CodedPicture,
     Picture,
     Transfer,
     area_average,
+    code_values,
     decode_alpha,
     decode_integers,
     reduction,
@@ -242,9 +244,26 @@ class Video:
         """Close the file."""
         self._container.close()
 
-    def read(self, n: int) -> Picture:
+    def read(self, n: int) -> Picture | CodedPicture:
         """Return a frame, or raise `DamagedFrameError`."""
-        return self._layer(self._decode(self._shown[n])).before(self.backdrop)
+        return self._shown_by(self._decode(self._shown[n]))
+
+    def glimpse(self, n: int, divisor: int) -> Picture:
+        """Return a frame reduced by the converter, which takes means of codes and not of light, if it can be."""
+        shown = self._shown_by(self._decode(self._shown[n]), divisor)
+        return shown.linear() if isinstance(shown, CodedPicture) else shown
+
+    def _shown_by(self, frame: av.VideoFrame, divisor: int = 1) -> Picture | CodedPicture:
+        """What a frame shows; its sides are divided by a number if its pixels need no more than a table."""
+        if (
+            _has_alpha(frame)
+            or frame.interlaced_frame
+            or primaries_name(self._stream.codec_context.color_primaries) is not None
+        ):
+            return self._layer(frame).before(self.backdrop)
+        codes = self._codes(frame, divisor)
+        upright = np.ascontiguousarray(_upright(codes, frame))
+        return CodedPicture(upright, code_values(np.iinfo(codes.dtype).max, self._encoding(), _white(frame)))
 
     def damaged(self, first: int, last: int) -> tuple[int, ...]:
         """Return which frames from one to another cannot be decoded."""
@@ -323,7 +342,7 @@ class Video:
         for n in sample_numbers(self.count):
             with suppress(DamagedFrameError):
                 frame = self._decode(self._shown[n])
-                if not any(component.is_alpha for component in frame.format.components):
+                if not _has_alpha(frame):
                     return None
                 codes: npt.NDArray[Any] = frame.reformat(format="rgba", threads=1).to_ndarray()
                 # white that is multiplied by alpha in linear light is the brightest that there may be
@@ -332,28 +351,35 @@ class Video:
         self._premultiplied = bool(layers) and all(within for _, within in layers)
         return backdrop_of(self._layer(frame) for frame, _ in layers)
 
-    def _layer(self, frame: av.VideoFrame) -> Layer:
-        components = frame.format.components
-        wide = max(component.bits for component in components) > 8
-        alpha = any(component.is_alpha for component in components)
-        layout = {False: ("rgb24", "rgba"), True: ("rgb48le", "rgba64le")}[wide][alpha]
+    def _encoding(self) -> Encoding | None:
+        """How the codes stand for light; None is sRGB."""
+        return self._transfer or ENCODINGS.get(self._stream.codec_context.color_trc)
+
+    def _codes(self, frame: av.VideoFrame, divisor: int = 1) -> npt.NDArray[Any]:
+        """RGB, and alpha if there is any, in codes; of an interlaced frame the even lines."""
+        wide = max(component.bits for component in frame.format.components) > 8
+        layout = {False: ("rgb24", "rgba"), True: ("rgb48le", "rgba64le")}[wide][_has_alpha(frame)]
         size = (self._stream.width, self._stream.height)
         if (frame.width, frame.height) != size:
             raise ClipError(
                 f"{self._path}: changes its picture size from {size[0]} x {size[1]} to {frame.width} x {frame.height}"
             )
-        width, height = self._size()
+        width, height = (max(1, side // divisor) for side in self._size())
         interlaced = bool(frame.interlaced_frame)
         shown = self._field(frame) if interlaced else frame
         way = _SHRINKING if width < size[0] else _GROWING
         rows = shown.height if interlaced else height
         # in this thread: after a fork of a process that has read a video, the converter waits for its own for ever
         codes: npt.NDArray[Any] = shown.reformat(width, rows, layout, interpolation=way, threads=1).to_ndarray()
-        encoding = self._transfer or ENCODINGS.get(self._stream.codec_context.color_trc)
-        white = _white(frame)
-        linear, opacity = decode_integers(codes, encoding, white, self._premultiplied), decode_alpha(codes, white)
-        if interlaced:
+        return codes
+
+    def _layer(self, frame: av.VideoFrame) -> Layer:
+        codes, white = self._codes(frame), _white(frame)
+        linear = decode_integers(codes, self._encoding(), white, self._premultiplied)
+        opacity = decode_alpha(codes, white)
+        if frame.interlaced_frame:
             self._interlaced = True
+            width, height = self._size()
             linear = area_average(_between_lines(linear, frame.height), width, height)
             if opacity is not None:
                 opacity = area_average(_between_lines(opacity, frame.height), width, height)
@@ -368,6 +394,10 @@ class Video:
         graph.vpush(frame)
         field: av.VideoFrame = graph.vpull()
         return field
+
+
+def _has_alpha(frame: av.VideoFrame) -> bool:
+    return any(component.is_alpha for component in frame.format.components)
 
 
 def _white(frame: av.VideoFrame) -> float:

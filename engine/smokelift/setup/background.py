@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -90,18 +92,30 @@ def find_plates(
     ValueError
         If a camera moves before a background of more than one colour that is not given, or turns too far.
     """
-    found = _find_plates(clip, camera, background, lens)
+
+    @cache
+    def shot() -> tuple[int, int]:
+        part = evidence(clip)  # as filmed: what noise adds to light does not change which frames belong together
+        return part.first, part.first + len(part) - 1
+
+    found = _find_plates(clip, camera, background, lens, shot)
     quiet = without_noise_light(clip, found.plates)
     if quiet is clip:
         return found
-    again = _find_plates(quiet, camera, background, lens)
+    again = _find_plates(quiet, camera, background, lens, shot)
     # noise is that of the pictures as they were filmed: sRGB values of the others are too low on the mean
     plates: Any = again.plates
     return replace(again, plates=replace(plates, noise=found.plates.noise))
 
 
-def _find_plates(clip: Clip, camera: Camera | None, background: Background | None, lens: Lens | None) -> FoundPlates:
-    """The plates of a clip as it is; see `find_plates`."""
+def _find_plates(
+    clip: Clip,
+    camera: Camera | None,
+    background: Background | None,
+    lens: Lens | None,
+    shot: Callable[[], tuple[int, int]],
+) -> FoundPlates:
+    """The plates of a clip as it is, see `find_plates`; ``shot`` tells the frames of its file that are evidence."""
     moves = camera is not None and camera.moves
     told = camera is not None or clip.lens is not None
     if clip.backdrop is not None:
@@ -114,7 +128,7 @@ def _find_plates(clip: Clip, camera: Camera | None, background: Background | Non
     if given is not None:
         return FoundPlates(clip, given, background)
     if not moves:
-        return _estimated(clip, lens, told)
+        return _estimated(clip, clip.part(*shot()), lens, told)
     plate = estimate_plate(clip)
     colour = one_colour(plate)
     if colour is None:
@@ -150,9 +164,9 @@ def smoke_in_plate(samples: SmokeSamples) -> tuple[str, ...]:
     )
 
 
-def _estimated(clip: Clip, lens: Lens | None, told: bool) -> FoundPlates:
+def _estimated(clip: Clip, shot: Clip, lens: Lens | None, told: bool) -> FoundPlates:
     """The background of a clip whose camera stands still or, with a lens that is told or only supposed, turns."""
-    samples = steady_samples(evidence(clip))
+    samples = steady_samples(shot)
     noise = clip_noise(samples)
     backdrop = backdrop_plate(samples, noise)
     # one colour has nothing to hold on to, and is the same wherever the camera looks; in noise, texture may pass by

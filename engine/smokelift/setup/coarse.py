@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from smokelift.footage.images import area_average
 from smokelift.footage.plate import Plate
-from smokelift.footage.working_picture import CameraError, WorkingPicture, working_picture
+from smokelift.footage.working_picture import CameraError, working_picture
 from smokelift.render import Image
 from smokelift.scene import Camera, CompleteScene, Domain, Scattering
 from smokelift.scene.projection import voxel_width
@@ -101,18 +102,19 @@ def coarse_frame(frame: Image, camera: Camera, scene: CompleteScene, plate: Plat
         working = working_picture(camera, domain)
     except CameraError:
         return None
-    rows, columns = np.indices(frame.shape[:2])
-    odd = ((rows + columns) % 2).astype(np.float32)
+    shown = working.part(frame)
+    rows, columns = np.indices(shown.shape[:2])
+    odd = ((rows + columns + working.top + working.left) % 2).astype(np.float32)
     return CoarseFrame(
         replace(scene, camera=working.camera, domain=domain),
         plate.through(working.cut, working.pixels),
         working.cut(frame),
-        _part(frame, 1 - odd, working),
-        _part(frame, odd, working),
+        _some(shown, 1 - odd, working.camera.size),
+        _some(shown, odd, working.camera.size),
     )
 
 
-def _part(frame: Image, share: NDArray[np.float32], working: WorkingPicture) -> Image:
-    """The small picture from some of the full one's pixels."""
-    weight = np.maximum(working.cut(share), np.float32(1e-6))
-    return np.asarray(working.cut(frame * share[..., None]) / weight[..., None], np.float32)
+def _some(shown: Image, share: NDArray[np.float32], size: tuple[int, int]) -> Image:
+    """The small picture from some of the pixels that it shows."""
+    weight = np.maximum(area_average(share, *size), np.float32(1e-6))
+    return np.asarray(area_average(shown * share[..., None], *size) / weight[..., None], np.float32)

@@ -74,8 +74,9 @@ def sample_smoke(clip: Clip, plates: Plates, turns: Turns | None = None) -> Smok
     colours, behind, gains, textures = [], [], [], []
     gains_of = exposures(plates)
     amounts: dict[int, int] = {}
+    reduced = plates.through(lambda whole: area_average(whole, columns, rows), scale**2)
     for number in clip.spread(SAMPLES):
-        plate = plates.at(number).through(lambda whole: area_average(whole, columns, rows), scale**2)
+        plate = reduced.at(number)
         frame = clip.frame(number)
         gains.append(gains_of(number, frame))
         picture = area_average(frame, columns, rows) / gains[-1]

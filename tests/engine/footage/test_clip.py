@@ -12,7 +12,9 @@ import pytest
 from PIL import Image
 
 from smokelift.footage.clip import Clip, ClipError
-from smokelift.footage.images import linear_to_srgb, srgb_to_linear
+from smokelift.footage.images import CodedPicture, Picture, linear_to_srgb, srgb_to_linear
+from smokelift.footage.noise import encode_sample
+from smokelift.footage.video import Video
 from smokelift.output.images import write_image
 from smokelift.scene import ClipSource
 
@@ -194,6 +196,60 @@ def test_a_varying_rate_is_evened_out(tmp_path: Path) -> None:
         assert clip.fps == pytest.approx(240 / step)
         shown = [max(k for k, t in enumerate(times) if t <= n * step + 0.5) for n in range(10)]
         assert near(codes(clip), [LEVELS[k] for k in shown])
+
+
+def test_a_frame_through_a_function_is_the_function_of_the_frame(tmp_path: Path) -> None:
+    """Of a video, whose integers have a table, and of pictures with alpha, which have none."""
+    random = np.random.default_rng(0)
+    noisy = [random.integers(0, 256, (16, 32, 3), np.uint8) for _ in range(2)]
+    video = encode(tmp_path / "noisy.mp4", noisy)
+    Image.fromarray(random.integers(0, 256, (16, 32, 4), np.uint8)).save(tmp_path / "alpha.png")
+    for path in (video, tmp_path / "alpha.png"):
+        with Clip.open(path) as clip, Clip.open(path) as other:
+            last = len(clip) - 1
+            found = clip.frame_through(last, encode_sample)
+            assert found.dtype == np.uint16
+            assert np.array_equal(found, encode_sample(other.frame(last)))
+            with pytest.raises(ClipError, match="no frame"):
+                clip.frame_through(last + 1, encode_sample)
+
+
+def test_frames_are_decoded_once_for_all_clips_of_a_file(ramp: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    read: list[int] = []
+    own = Video.read
+
+    def counted(video: Video, n: int) -> Picture | CodedPicture:
+        read.append(n)
+        return own(video, n)
+
+    monkeypatch.setattr(Video, "read", counted)
+    with Clip.open(ramp) as clip:
+        brighter = clip.changed(lambda _, picture: picture + 1)
+        for shown in (clip, clip.part(2, 6), brighter, clip.whole()):
+            list(shown)
+        assert sorted(read) == list(range(len(clip)))
+        assert float(brighter.frame(3).min()) >= 1
+
+
+@pytest.mark.parametrize("rotation", [None, 90])
+def test_a_glimpse_is_a_smaller_picture_of_the_same(tmp_path: Path, rotation: int | None) -> None:
+    blocks = np.kron(np.random.default_rng(0).integers(30, 220, (9, 16, 3)), np.ones((16, 16, 1))).astype(np.uint8)
+    path = encode(tmp_path / "blocks.mp4", [blocks] * 3, pixels="yuv444p", rotation=rotation)
+    with Clip.open(path) as clip:
+        glimpse, whole = clip.glimpse(1, 100), clip.frame(1)
+        width, height = clip.size
+        assert glimpse.shape == (height // 2, width // 2, 3)
+        assert np.abs(linear_to_srgb(glimpse) - linear_to_srgb(whole[::2, ::2])).max() < 2 / 255
+        assert clip.glimpse(1, 1000) is whole
+        with pytest.raises(ClipError, match="no frame"):
+            clip.glimpse(3, 100)
+
+
+def test_a_glimpse_of_a_damaged_frame_is_of_what_stands_in(tmp_path: Path) -> None:
+    path = encode(tmp_path / "a.mov", [flat(v) for v in LEVELS[:6]], codec="png", pixels="rgb24")
+    with Clip.open(blanked(path, [3])) as clip:
+        assert clip.glimpse(3, 16).shape == (8, 16, 3)
+        assert np.array_equal(clip.glimpse(3, 16), clip.glimpse(2, 16))
 
 
 def test_a_range_of_frames(ramp: Path) -> None:

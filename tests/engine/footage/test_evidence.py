@@ -30,3 +30,13 @@ def test_another_shot_is_no_evidence(tmp_path: Path) -> None:
     clip = film(tmp_path, wall(0.2, 0.5), puff, 0.6)
     cut = clip.changed(lambda n, picture: picture if n < COUNT // 2 else np.ascontiguousarray(picture[::-1] + 0.3))
     assert len(evidence(cut.part(2, 8))) <= COUNT // 2
+
+
+def test_an_earlier_look_at_the_same_is_no_evidence_across_another_shot(tmp_path: Path) -> None:
+    clip = film(tmp_path, wall(0.2, 0.5), puff, 0.6)
+    cut = clip.changed(
+        lambda n, picture: np.ascontiguousarray(picture[::-1] + 0.3) if COUNT // 4 <= n < COUNT // 2 else picture
+    )
+    part = evidence(cut.part(COUNT - 6, COUNT - 3))
+    assert part.first == COUNT // 2
+    assert part.first + len(part) == COUNT

@@ -11,8 +11,10 @@ from scipy.spatial.transform import Rotation
 
 from smokelift.footage.alignment import Lens
 from smokelift.footage.clip import Clip
+from smokelift.footage.images import srgb_to_linear
 from smokelift.footage.panorama import PanoramaPlate
 from smokelift.output.images import write_image
+from smokelift.setup import background
 from smokelift.setup.background import find_plates, focal_notes, smoke_in_plate
 from smokelift.setup.geometry import clip_lens
 from smokelift.setup.smoke import SmokeSamples, sample_smoke
@@ -51,6 +53,19 @@ def test_what_never_changes_before_one_colour_is_said(tmp_path) -> None:
     (note,) = find_plates(before(0.3, tmp_path), None, None).notes
     assert "it is black, but for" in note
     assert "If that is smoke" in note
+
+
+def test_what_of_a_noisy_file_is_evidence_is_looked_for_once(tmp_path, monkeypatch) -> None:
+    """Its background is found twice: with the light that noise adds, and without."""
+    random, asked = np.random.default_rng(0), []
+    wall = np.kron(random.uniform(0.5, 0.7, (6, 5, 1)), np.ones((8, 8, 3)))
+    for n in range(8):
+        noisy = np.clip(wall + random.normal(0, 0.08, wall.shape), 0, 1)
+        write_image(tmp_path / f"frame_{n}.png", srgb_to_linear(noisy))
+    clip = Clip.open(tmp_path / "frame_#.png", fps=24)
+    monkeypatch.setattr(background, "evidence", lambda of: asked.append(of) or of)
+    assert find_plates(clip, None, None).clip is not clip
+    assert asked == [clip]
 
 
 def panned(folder, lens: Lens, pixels: float) -> Clip:
