@@ -1,6 +1,7 @@
 """Which device renders: the processor with compiled code, or a GPU with Taichi.
 
-Taichi may be missing. It is only imported where a GPU driver is installed: that alone takes longer than a picture.
+Taichi may be missing. It is only imported where a GPU driver is installed, and, unless a GPU is asked for, where a GPU
+is: that alone takes longer than all that is looked at before a run.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ import ctypes
 import sys
 from importlib import import_module
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Any, Literal, Protocol
 
 import numpy as np
@@ -27,6 +29,9 @@ _DRIVERS = {
     "win32": ("nvcuda.dll", "vulkan-1.dll"),
 }
 """Libraries of which one is there where Taichi can use a GPU; macOS always has Metal."""
+
+_NODES = ("dri/renderD*", "nvidia[0-9]*", "dxg")
+"""Files in /dev of which Linux has one for every GPU: by its own drivers, by NVIDIA's, and under Windows."""
 
 _running: str | None = None  # one device a process
 
@@ -94,7 +99,8 @@ def start(device: DeviceName = "auto") -> str:
                 f"The renderer already runs on {_running} in this process; start a new process for {device}."
             )
         return _running
-    gpu = None if device == "cpu" else available_gpu()
+    wanted = device == "gpu" or (device == "auto" and gpu_present())
+    gpu = available_gpu() if wanted else None
     if device == "gpu" and not has_taichi():
         raise DeviceError(f"A GPU cannot be used, as {NO_TAICHI}, or use --device cpu.")
     if device == "gpu" and gpu is None:
@@ -120,6 +126,11 @@ def backend(plan: RenderPlan) -> Backend:
 
 def _taichi() -> Any:
     return import_module("smokelift.render.gpu.taichi_runtime")
+
+
+def gpu_present() -> bool:
+    """Whether the system lists a GPU, whatever can be done with it; without that list, it is taken to have one."""
+    return sys.platform != "linux" or any(True for nodes in _NODES for _ in Path("/dev").glob(nodes))
 
 
 def driver_installed() -> bool:
