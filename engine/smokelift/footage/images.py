@@ -72,7 +72,13 @@ class CodedPicture:
 
     def through(self, change: Callable[[Picture], npt.NDArray[Value]]) -> npt.NDArray[Value]:
         """Return the picture with a function applied to every linear value, which is called for each code once."""
-        return change(self.table)[self.codes]
+        values = change(self.table)
+        if self.codes.itemsize > 1 or self.codes.size % 2:
+            return values[self.codes]
+        # two codes at once take half as many look-ups
+        pairs = values[np.arange(2**16, dtype=np.uint16).view(np.uint8)].view(f"u{2 * values.itemsize}")
+        found: npt.NDArray[Value] = pairs[self.codes.reshape(-1).view(np.uint16)].view(values.dtype)
+        return found.reshape(self.codes.shape)
 
 
 def srgb_to_linear(encoded: npt.ArrayLike) -> Picture:
@@ -310,6 +316,7 @@ def area_average(image: npt.ArrayLike, width: int, height: int) -> Picture:
     return np.ascontiguousarray(values)
 
 
+@lru_cache
 def _weights(old: int, new: int) -> scipy.sparse.csr_array:
     """Return the sparse (new, old) matrix whose rows are the weights of one new pixel."""
     if new > old:

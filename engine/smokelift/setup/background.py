@@ -17,6 +17,7 @@ from smokelift.footage.exposure import largest_change
 from smokelift.footage.focal_length import FocalLength, focal_length
 from smokelift.footage.lens import FILM_WIDTH
 from smokelift.footage.panorama import estimate_panorama
+from smokelift.footage.plain import plain_plate
 from smokelift.footage.plate import Plate, Plates, known_plate
 from smokelift.footage.plate_estimation import (
     ONE_COLOUR_NOISE,
@@ -166,6 +167,9 @@ def smoke_in_plate(samples: SmokeSamples) -> tuple[str, ...]:
 
 def _estimated(clip: Clip, shot: Clip, lens: Lens | None, told: bool) -> FoundPlates:
     """The background of a clip whose camera stands still or, with a lens that is told or only supposed, turns."""
+    plain_everywhere = plain_plate(shot)
+    if plain_everywhere is not None and plain_everywhere.noise.total.max() <= ONE_COLOUR_NOISE:
+        return FoundPlates(clip, plain_everywhere, None, (_found(plain_everywhere),))
     samples = steady_samples(shot)
     noise = clip_noise(samples)
     backdrop = backdrop_plate(samples, noise)
