@@ -15,6 +15,7 @@ from scipy import ndimage
 
 from smokelift.footage.alignment import Lens
 from smokelift.footage.clip import Clip
+from smokelift.footage.frame_source import Look
 from smokelift.footage.images import Picture, linear_to_srgb, srgb_to_linear
 
 FPS = 24.0
@@ -121,7 +122,7 @@ class Frames:
         """Return a frame whole."""
         return self.read(n)
 
-    def damaged(self, first: int, last: int) -> tuple[int, ...]:
+    def damaged(self, first: int, last: int, look: Look | None = None) -> tuple[int, ...]:
         """None."""
         return ()
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
@@ -13,7 +13,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.footage.frame_source import ClipError, DamagedFrameError, FrameSource
+from smokelift.footage.frame_source import ClipError, DamagedFrameError, FrameSource, Look
 from smokelift.footage.image_sequence import ImageSequence
 from smokelift.footage.images import CodedPicture, Picture, Transfer, Value
 from smokelift.footage.video import Video
@@ -21,6 +21,7 @@ from smokelift.scene import ClipSource
 
 __all__ = ["Clip", "ClipError", "is_video"]
 
+Key = TypeVar("Key", int, tuple[int, int])
 Image = TypeVar("Image", Picture, Picture | CodedPicture)
 
 CACHE_BYTES = 64 * 2**20
@@ -29,6 +30,9 @@ CACHE_BYTES = 64 * 2**20
 KEPT_BYTES = 128 * 2**20
 """Memory for the frames of a file that are kept as they are stored: twenty of 1080p at 8 bits, for what looks at the
 same ones spread over a clip."""
+
+GLIMPSE_BYTES = 64 * 2**20
+"""Memory for the glimpses of a file that are kept: a hundred at a third of 1080p."""
 
 
 class Clip:
@@ -54,7 +58,14 @@ class Clip:
         Linear grey that is shown behind pictures with an alpha channel; None behind opaque ones.
     """
 
-    def __init__(self, path: Path, source: FrameSource, fps: float | None, frames: tuple[int, int] | None) -> None:
+    def __init__(
+        self,
+        path: Path,
+        source: FrameSource,
+        fps: float | None,
+        frames: tuple[int, int] | None,
+        size: tuple[int, int] | None = None,
+    ) -> None:
         self.path = path
         self.fps = source.fps if fps is None else float(fps)
         self.warning = source.warning
@@ -67,8 +78,10 @@ class Clip:
         self.first = first
         self._count = last - first + 1
         self._cache: OrderedDict[int, Picture] = OrderedDict()
-        height, width = self.frame(0).shape[:2]
-        self.size = (width, height)
+        if size is None:
+            height, width = self.frame(0).shape[:2]
+            size = (width, height)
+        self.size = size
 
     @classmethod
     def open(
@@ -213,7 +226,24 @@ class Clip:
         divisor = max(self.size) // longest
         if divisor < 2:
             return self.frame(n)
-        return self._read(n, lambda number: self._source.glimpse(number, divisor))
+        return _linear(self._read(n, lambda number: self._source.glimpse(number, divisor)))
+
+    def expect(self, whole: Iterable[int], glimpses: Iterable[int], longest: int) -> None:
+        """Say which frames, and which glimpses, are asked for next: those met while `damaged` is found out are kept.
+
+        It has no effect on a clip whose frames are `changed`.
+
+        Parameters
+        ----------
+        whole, glimpses
+            Numbers of frames.
+        longest
+            As of `glimpse`.
+        """
+        divisor = max(self.size) // longest
+        if isinstance(self._source, _Kept):
+            small = [self.first + n for n in glimpses] if divisor > 1 else []
+            self._source.expect([self.first + n for n in whole], small, divisor)
 
     def _read(self, n: int, read: Callable[[int], Image]) -> Image:
         """Return a frame from the file, or what stands in for it: the last sound one lasts on, as when one drops."""
@@ -242,11 +272,11 @@ class Clip:
 
     def whole(self) -> Clip:
         """Return all of the file, whatever part of it this clip is. The two share the open file."""
-        return Clip(self.path, self._source, self.fps, None)
+        return Clip(self.path, self._source, self.fps, None, self.size)
 
     def part(self, first: int, last: int) -> Clip:
         """Return the frames of the file from one number to another, both included. The two share the open file."""
-        return Clip(self.path, self._source, self.fps, (first, last))
+        return Clip(self.path, self._source, self.fps, (first, last), self.size)
 
     def changed(self, change: Callable[[int, Picture], Picture]) -> Clip:
         """Return the clip with each frame, by its number, replaced. The two share the open file."""
@@ -272,6 +302,8 @@ class _Kept:
     def __init__(self, source: FrameSource) -> None:
         self._source = source
         self._kept: OrderedDict[int, Picture | CodedPicture] = OrderedDict()
+        self._glimpses: OrderedDict[tuple[int, int], Picture | CodedPicture] = OrderedDict()
+        self._expected: tuple[frozenset[int], frozenset[int], int] = frozenset(), frozenset(), 1
         self.count, self.fps, self.warning = source.count, source.fps, source.warning
         self.files, self.lens, self.backdrop = source.files, source.lens, source.backdrop
 
@@ -284,17 +316,31 @@ class _Kept:
             self._kept.move_to_end(n)
             return self._kept[n]
         image = self._source.read(n)
-        (image.codes if isinstance(image, CodedPicture) else image).flags.writeable = False
-        self._kept[n] = image
-        while len(self._kept) > max(1, KEPT_BYTES // image.nbytes):
-            self._kept.popitem(last=False)
+        _keep(self._kept, n, image, KEPT_BYTES)
         return image
 
-    def glimpse(self, n: int, divisor: int) -> Picture:
-        return self._source.glimpse(n, divisor)
+    def glimpse(self, n: int, divisor: int) -> Picture | CodedPicture:
+        if (n, divisor) not in self._glimpses:
+            _keep(self._glimpses, (n, divisor), self._source.glimpse(n, divisor), GLIMPSE_BYTES)
+        return self._glimpses[n, divisor]
 
-    def damaged(self, first: int, last: int) -> tuple[int, ...]:
-        return self._source.damaged(first, last)
+    def expect(self, whole: Sequence[int], glimpses: Sequence[int], divisor: int) -> None:
+        size = max((image.nbytes for image in self._kept.values()), default=0)
+        # of larger pictures the first would be gone before the last is there
+        self._expected = frozenset(whole if len(whole) * size <= KEPT_BYTES else ()), frozenset(glimpses), divisor
+
+    def damaged(self, first: int, last: int, look: Look | None = None) -> tuple[int, ...]:
+        whole, glimpses, divisor = self._expected
+
+        def keep(n: int, picture: Callable[[int], Picture | CodedPicture]) -> None:
+            if n in whole and n not in self._kept:
+                _keep(self._kept, n, picture(1), KEPT_BYTES)
+            if n in glimpses and (n, divisor) not in self._glimpses:
+                _keep(self._glimpses, (n, divisor), picture(divisor), GLIMPSE_BYTES)
+            if look is not None:
+                look(n, picture)
+
+        return self._source.damaged(first, last, keep)
 
     def close(self) -> None:
         self._source.close()
@@ -318,14 +364,22 @@ class _Changed:
     def glimpse(self, n: int, divisor: int) -> Picture:
         return self.read(n)  # a change may be meant for the whole picture
 
-    def damaged(self, first: int, last: int) -> tuple[int, ...]:
+    def damaged(self, first: int, last: int, look: Look | None = None) -> tuple[int, ...]:
         clip = self._clip
         if (first, last) == (clip.first, clip.first + len(clip) - 1):  # what the clip may know already
             return tuple(clip.first + n for n in clip.damaged)
-        return self._source.damaged(first, last)
+        return self._source.damaged(first, last, look)
 
     def close(self) -> None:
         self._source.close()
+
+
+def _keep(kept: OrderedDict[Key, Picture | CodedPicture], key: Key, image: Picture | CodedPicture, most: int) -> None:
+    """Put a picture, which is read-only from now on, beside the last ones in so many bytes."""
+    (image.codes if isinstance(image, CodedPicture) else image).flags.writeable = False
+    kept[key] = image
+    while len(kept) > max(1, most // image.nbytes):
+        kept.popitem(last=False)
 
 
 def _linear(image: Picture | CodedPicture) -> Picture:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 import numpy.typing as npt
 
@@ -12,8 +14,8 @@ from smokelift.footage.images import Picture, linear_to_srgb
 SAMPLES = 24
 """Frames of the file that are compared, and as many of the clip at most."""
 
-FINER = 4
-"""Pixels that are read, along each axis, for one that is compared: light is averaged over them."""
+GLIMPSE = 4 * LONGEST
+"""Pixels along the longer side of what is read, four for each one that is compared: light is averaged over them."""
 
 STILL = 4 / 255
 """Change of a pixel, in sRGB values, up to which it has not changed."""
@@ -52,9 +54,19 @@ def evidence(clip: Clip) -> Clip:
     return whole.part(first if start is None else start, last)
 
 
+def glimpses(clip: Clip, shot: Clip) -> Iterator[Picture]:
+    """Glimpse again at the frames from which `evidence` found that a clip belongs to a shot, linear."""
+    yield from (clip.glimpse(number, GLIMPSE) for number in clip.spread(SAMPLES))
+    if len(shot) > len(clip):
+        whole = clip.whole()
+        for number in whole.spread(SAMPLES):
+            if 0 <= number - shot.first < len(shot) and not 0 <= number - clip.first < len(clip):
+                yield whole.glimpse(number, GLIMPSE)
+
+
 def _small(clip: Clip, number: int) -> Picture:
-    """A frame at the size at which it is compared; it is read with a few pixels for each of that, which is cheap."""
-    return small(clip.glimpse(number, FINER * LONGEST))
+    """A frame at the size at which it is compared."""
+    return small(clip.glimpse(number, GLIMPSE))
 
 
 def _same(whole: Clip, number: int, reference: Picture, still: npt.NDArray[np.bool_]) -> bool:

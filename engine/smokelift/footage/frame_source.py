@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol
 
 from smokelift.footage.images import CodedPicture, Picture
+
+Look = Callable[[int, Callable[[int], Picture | CodedPicture]], None]
+"""What takes the number of a frame and a function that makes its picture, with sides divided by a number if it can."""
 
 DEFAULT_FPS = 24.0
 """Frames a second where neither the file nor the user gives any: the rate of film."""
@@ -54,12 +58,12 @@ class FrameSource(Protocol):
         """Return a frame, linear or with its way to that; raise `DamagedFrameError` if it cannot be decoded."""
         ...
 
-    def glimpse(self, n: int, divisor: int) -> Picture:
-        """Return a frame, linear, with sides that may be divided by up to a number if it is cheaper to read so."""
+    def glimpse(self, n: int, divisor: int) -> Picture | CodedPicture:
+        """Return a frame as `read` does, with sides divided by up to a number if it is cheaper to read so."""
         ...
 
-    def damaged(self, first: int, last: int) -> tuple[int, ...]:
-        """Return which frames from one to another, both included, raise `DamagedFrameError`."""
+    def damaged(self, first: int, last: int, look: Look | None = None) -> tuple[int, ...]:
+        """Return which frames from one to another, both included, raise `DamagedFrameError`; look at the others."""
         ...
 
     def close(self) -> None:

@@ -8,7 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from smokelift.footage import lens
-from smokelift.footage.frame_source import DEFAULT_FPS, ClipError, DamagedFrameError
+from smokelift.footage.frame_source import DEFAULT_FPS, ClipError, DamagedFrameError, Look
 from smokelift.footage.images import READABLE, ImageError, Picture, Transfer, area_average, read_layer, reduction
 from smokelift.footage.layer import Layer, backdrop_of, sample_numbers
 
@@ -72,8 +72,8 @@ class ImageSequence:
         return image if divisor == 1 else area_average(image, round(width / divisor), round(height / divisor))
 
     def glimpse(self, n: int, divisor: int) -> Picture:
-        """Return a picture whole: to reduce it is no cheaper."""
-        return self.read(n)
+        """Return a picture reduced after it is read."""
+        return _reduced(self.read(n), divisor)
 
     def _layer(self, n: int) -> Layer:
         try:
@@ -90,15 +90,17 @@ class ImageSequence:
                 if layer.alpha is None:
                     return
 
-    def damaged(self, first: int, last: int) -> tuple[int, ...]:
-        """Return which pictures from one to another are missing or cannot be read."""
-        return tuple(n for n in range(first, last + 1) if not self._readable(n))
+    def damaged(self, first: int, last: int, look: Look | None = None) -> tuple[int, ...]:
+        """Return which pictures from one to another are missing or cannot be read; look at the others."""
+        return tuple(n for n in range(first, last + 1) if not self._readable(n, look))
 
-    def _readable(self, n: int) -> bool:
+    def _readable(self, n: int, look: Look | None) -> bool:
         try:
-            self.read(n)
+            picture = self.read(n)
         except DamagedFrameError:
             return False
+        if look is not None:
+            look(n, lambda divisor: _reduced(picture, divisor))
         return True
 
     def close(self) -> None:
@@ -138,3 +140,8 @@ def _numbered(path: Path) -> list[Path]:
             "first picture of those that belong together"
         )
     return [found.get(n) or path.with_name(f"{prefix}{n:0{len(number)}d}{suffix}") for n in range(start, last + 1)]
+
+
+def _reduced(picture: Picture, divisor: int) -> Picture:
+    rows, columns = picture.shape[:2]
+    return picture if divisor == 1 else area_average(picture, max(1, columns // divisor), max(1, rows // divisor))

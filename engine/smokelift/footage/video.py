@@ -14,7 +14,7 @@ A video whose rate varies by more than 1 % is read at its mean rate: frame n is 
 from __future__ import annotations
 
 import bisect
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from fractions import Fraction
 from pathlib import Path
@@ -30,7 +30,7 @@ from av.video.reformatter import ColorRange, Interpolation
 from smokelift.footage import lens
 from smokelift.footage.colour import ENCODINGS, Encoding, primaries_name, to_bt709
 from smokelift.footage.container import open_container
-from smokelift.footage.frame_source import DEFAULT_FPS, ClipError, DamagedFrameError
+from smokelift.footage.frame_source import DEFAULT_FPS, ClipError, DamagedFrameError, Look
 from smokelift.footage.images import (
     MOST_PIXELS,
     CodedPicture,
@@ -248,10 +248,9 @@ class Video:
         """Return a frame, or raise `DamagedFrameError`."""
         return self._shown_by(self._decode(self._shown[n]))
 
-    def glimpse(self, n: int, divisor: int) -> Picture:
+    def glimpse(self, n: int, divisor: int) -> Picture | CodedPicture:
         """Return a frame reduced by the converter, which takes means of codes and not of light, if it can be."""
-        shown = self._shown_by(self._decode(self._shown[n]), divisor)
-        return shown.linear() if isinstance(shown, CodedPicture) else shown
+        return self._shown_by(self._decode(self._shown[n]), divisor)
 
     def _shown_by(self, frame: av.VideoFrame, divisor: int = 1) -> Picture | CodedPicture:
         """What a frame shows; its sides are divided by a number if its pixels need no more than a table."""
@@ -265,25 +264,35 @@ class Video:
         upright = np.ascontiguousarray(_upright(codes, frame))
         return CodedPicture(upright, code_values(np.iinfo(codes.dtype).max, self._encoding(), _white(frame)))
 
-    def damaged(self, first: int, last: int) -> tuple[int, ...]:
-        """Return which frames from one to another cannot be decoded."""
+    def damaged(self, first: int, last: int, look: Look | None = None) -> tuple[int, ...]:
+        """Return which frames from one to another cannot be decoded; look at the others, at some twice."""
         wanted = [self._times[self._shown[n]] for n in range(first, last + 1)]
         if not self._keys:
             return ()  # they were counted by decoding them
+        numbers: dict[int, list[int]] = {}
+        for n, time in enumerate(wanted, first):
+            numbers.setdefault(time, []).append(n)
+
+        def met(time: int, frame: av.VideoFrame) -> None:
+            for n in numbers.get(time, ()):
+                if look is not None:
+                    look(n, lambda divisor: self._shown_by(frame, divisor))
+
         self._container.seek(wanted[0], stream=self._stream)
-        good = self._good_times(wanted[-1])
+        good = self._good_times(wanted[-1], met)
         if not good.issuperset(wanted):  # as in `_decode`
             self._rewind()
-            good |= self._good_times(wanted[-1])
+            good |= self._good_times(wanted[-1], met)
         self._rewind()
         return tuple(first + n for n, time in enumerate(wanted) if time not in good)
 
-    def _good_times(self, last: int) -> set[int]:
-        """Times of the frames that can be decoded from where the container stands, up to one."""
+    def _good_times(self, last: int, met: Callable[[int, av.VideoFrame], None]) -> set[int]:
+        """Times of the frames that can be decoded from where the container stands, up to one; each of them is met."""
         good = set()
         for frame in self._frames():
             if frame.pts is not None and not frame.is_corrupt:
                 good.add(frame.pts)
+                met(frame.pts, frame)
             if frame.pts is not None and frame.pts >= last:
                 break
         return good

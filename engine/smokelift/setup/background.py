@@ -167,7 +167,7 @@ def smoke_in_plate(samples: SmokeSamples) -> tuple[str, ...]:
 
 def _estimated(clip: Clip, shot: Clip, lens: Lens | None, told: bool) -> FoundPlates:
     """The background of a clip whose camera stands still or, with a lens that is told or only supposed, turns."""
-    plain_everywhere = plain_plate(shot)
+    plain_everywhere = plain_plate(clip, shot)
     if plain_everywhere is not None and plain_everywhere.noise.total.max() <= ONE_COLOUR_NOISE:
         return FoundPlates(clip, plain_everywhere, None, (_found(plain_everywhere),))
     samples = steady_samples(shot)

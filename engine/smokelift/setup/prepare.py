@@ -10,6 +10,7 @@ from dataclasses import replace
 from typing import Any
 
 from smokelift.density.axis import SmokeAxis
+from smokelift.footage import evidence
 from smokelift.footage.clip import Clip
 from smokelift.footage.fire import fire_colour, fire_share, firelight, without_fire
 from smokelift.footage.plate import Plate
@@ -18,6 +19,7 @@ from smokelift.footage.working_picture import CameraError, WorkingPicture, worki
 from smokelift.render import scene_optics
 from smokelift.scene import Background, Camera, CompleteScene, Domain, Medium, Scene
 from smokelift.scene.checks import Vector
+from smokelift.setup import smoke
 from smokelift.setup.background import exposure_notes, find_plates, smoke_in_plate
 from smokelift.setup.choice import Choice
 from smokelift.setup.further_views import disagreement, open_view
@@ -54,6 +56,8 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
         If the scene contradicts the clip or itself, or lacks what cannot be estimated.
     """
     _check(clip, scene)
+    glimpses = clip.spread(evidence.SAMPLES) if scene.background is None else ()
+    clip.expect(clip.spread(smoke.SAMPLES), glimpses, evidence.GLIMPSE)
     remarks = clip.remarks()
     # cameras that belong together are measured, and stand where they are said to
     lens = None if scene.views else clip_lens(scene.camera, clip)

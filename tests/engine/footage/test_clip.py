@@ -231,6 +231,39 @@ def test_frames_are_decoded_once_for_all_clips_of_a_file(ramp: Path, monkeypatch
         assert float(brighter.frame(3).min()) >= 1
 
 
+def test_what_is_expected_is_kept_while_damage_is_looked_for(
+    tmp_path: Path, ramp: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with Clip.open(ramp) as clip:
+        frames, glimpse = [clip.frame(n) for n in (2, 5)], clip.glimpse(4, 12)
+    read: list[int] = []
+    decode = Video._decode
+    monkeypatch.setattr(Video, "_decode", lambda video, index: read.append(index) or decode(video, index))
+    with Clip.open(ramp) as clip:
+        first = clip.part(1, 7)
+        first.expect([1, 4], [3], 12)
+        assert first.damaged == ()
+        read.clear()
+        assert np.array_equal(first.frame(1), frames[0])
+        assert np.array_equal(clip.frame(5), frames[1])
+        assert np.array_equal(clip.glimpse(4, 12), glimpse)
+        assert read == []
+        clip.frame(6)
+        assert read == [6]
+
+
+def test_what_is_expected_of_pictures_is_kept(tmp_path: Path) -> None:
+    for n in range(3):
+        write_image(tmp_path / f"a{n}.png", np.full((8, 16, 3), 0.1 * n, np.float32))
+    with Clip.open(tmp_path / "a#.png", fps=24) as clip:
+        clip.expect([2], [1], 4)
+        assert clip.damaged == ()
+        for n in range(3):
+            (tmp_path / f"a{n}.png").unlink()
+        assert clip.frame(2).mean() == pytest.approx(0.2, abs=0.01)
+        assert clip.glimpse(1, 4).mean() == pytest.approx(0.1, abs=0.01)
+
+
 @pytest.mark.parametrize("rotation", [None, 90])
 def test_a_glimpse_is_a_smaller_picture_of_the_same(tmp_path: Path, rotation: int | None) -> None:
     blocks = np.kron(np.random.default_rng(0).integers(30, 220, (9, 16, 3)), np.ones((16, 16, 1))).astype(np.uint8)

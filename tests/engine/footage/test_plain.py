@@ -9,13 +9,14 @@ import pytest
 from films import wall
 
 from smokelift.footage.clip import Clip
+from smokelift.footage.evidence import GLIMPSE
 from smokelift.footage.images import Picture, linear_to_srgb, srgb_to_linear
-from smokelift.footage.plain import LONGEST, plain_plate
+from smokelift.footage.plain import plain_plate
 from smokelift.footage.plate_estimation import estimate_plate
 from smokelift.output.images import write_image
 
 COUNT = 8
-SIZE = (45, 2 * LONGEST + 3)
+SIZE = (45, 2 * GLIMPSE + 3)
 
 
 def clip(folder: Path, behind: Picture, noise: float = 1.0, flash: float = 1.0) -> Clip:
@@ -36,7 +37,7 @@ def test_one_colour_is_found_as_on_all_pixels(
     tmp_path: Path, colour: tuple[float, float, float], noise: float, flash: float
 ) -> None:
     shown = clip(tmp_path, np.array(colour, np.float32), noise, flash)
-    plain, whole = plain_plate(shown), estimate_plate(shown)
+    plain, whole = plain_plate(shown, shown), estimate_plate(shown)
     assert plain is not None
     assert plain.image.shape == (*SIZE, 3)
     assert (plain.confidence == 1).all()
@@ -47,14 +48,17 @@ def test_one_colour_is_found_as_on_all_pixels(
 def test_what_stands_before_one_colour_is_no_plain_background(tmp_path: Path) -> None:
     behind = np.full((*SIZE, 3), 0.1, np.float32)
     behind[33:40, 700:702] = 0.5
-    assert plain_plate(clip(tmp_path, behind)) is None
+    shown = clip(tmp_path, behind)
+    assert plain_plate(shown, shown) is None
 
 
 def test_a_wall_is_no_plain_background(tmp_path: Path) -> None:
     behind = np.tile(wall(0.2, 0.5), (1, 40, 1))[: SIZE[0], : SIZE[1]]
-    assert plain_plate(clip(tmp_path, behind)) is None
+    shown = clip(tmp_path, behind)
+    assert plain_plate(shown, shown) is None
 
 
 def test_small_pictures_are_looked_at_whole(tmp_path: Path) -> None:
-    write_image(tmp_path / "frame_0.png", np.zeros((8, 2 * LONGEST - 2, 3), np.float32))
-    assert plain_plate(Clip.open(tmp_path / "frame_#.png", fps=24)) is None
+    write_image(tmp_path / "frame_0.png", np.zeros((8, 2 * GLIMPSE - 2, 3), np.float32))
+    shown = Clip.open(tmp_path / "frame_#.png", fps=24)
+    assert plain_plate(shown, shown) is None
