@@ -76,6 +76,9 @@ LEAST_WINDOW = 3 / 255
 DRIFT = 8 / 255
 """Change in sRGB values by a codec or by the light, at most. The matte takes as much for smoke."""
 
+LIKE_SURROUNDINGS = 3 * DRIFT
+"""Difference in sRGB values from what the surroundings let expect, of a background."""
+
 LEAST_CHANGE = 1 / 4
 """Range of smoke over time, as a share of its difference from the background: what is steadier is a chair or a jacket.
 """
@@ -195,15 +198,17 @@ def clear_picture(
     if not known.all():
         # what changes by drift at most is no smoke if it is too little like its surroundings for smoke so steady
         known = _in_one_piece(known | (calm & (LEAST_CHANGE * _unlike(image, known) >= window + DRIFT)))
-        # or if drift explains how it differs from them as well. What differs by more may be faint smoke that hardly
-        # changes, and what is known at its rim is continued over all that is behind the rest
-        known = _in_one_piece(known | (calm & (_unlike(image, known) <= DRIFT)))
+    sure = known
+    if not known.all():
+        # or if it looks like them, too; that its difference is drift, and not faint smoke, is sure of a small one only
+        apart = _unlike(image, known)
+        sure, known = (_in_one_piece(known | (calm & (apart <= most))) for most in (DRIFT, LIKE_SURROUNDINGS))
     mean = _mean(samples, seen)
     if seen is not None and not seen.any(0).all():
         never = ~seen.any(0)
-        mean[never] = _filled(linear_to_srgb(image), known.astype(np.float32))[never]
+        mean[never] = _filled(linear_to_srgb(image), sure.astype(np.float32))[never]
         image[never] = srgb_to_linear(mean[never])
-    return _completed(image, known, mean, smoke.brightness, brightens), known
+    return _completed(image, known, sure, mean, smoke.brightness, brightens), known
 
 
 def one_colour(plate: Plate) -> tuple[float, float, float] | None:
@@ -404,23 +409,27 @@ def _in_one_piece(known: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
 def _completed(
     image: Picture,
     known: npt.NDArray[np.bool_],
+    sure: npt.NDArray[np.bool_],
     mean: Picture,
     brightness: float,
     brightens: npt.NDArray[np.bool_],
 ) -> Picture:
     """Return a linear plate with what is unknown filled in; ``mean`` is that of the samples in sRGB values.
 
+    What is unknown is continued from what is sure. Other pixels are known only because they look like their
+    surroundings: a few of them, at the rim of smoke that hardly changes, would spread over all that is behind it.
+
     Smoke of transmittance T and brightness J shows J + T (B - J) of a background B. The mean over time has T from its
     coarse part and that of the surroundings, and so what of its detail is the background's.
     """
     if known.all():
         return image
-    smooth = _filled(linear_to_srgb(image), known.astype(np.float32))
+    smooth = _filled(linear_to_srgb(image), sure.astype(np.float32))
     coarse = ndimage.gaussian_filter(mean, (DETAIL, DETAIL, 0))
     contrast = smooth.mean(-1) - brightness
     seen = (coarse.mean(-1) - brightness) / np.where(np.abs(contrast) > 0.02, contrast, np.inf)
     detail = mean - coarse
-    most = np.quantile(np.abs(detail[known]), MOST_DETAIL, axis=0) if known.any() else np.zeros(3, np.float32)
+    most = np.quantile(np.abs(detail[sure]), MOST_DETAIL, axis=0) if sure.any() else np.zeros(3, np.float32)
     detail = np.clip(detail / np.clip(seen, LEAST_TRANSMITTANCE, 1)[..., None], -most, most)
     filled = smooth + np.where(seen > LEAST_TRANSMITTANCE, 1, 0)[..., None] * detail
     # smoke has drawn the pixel towards its own brightness, never away from it
