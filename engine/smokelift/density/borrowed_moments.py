@@ -16,8 +16,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import ndimage
 
+import smokelift._core as _core
 from smokelift.density.borrowed_picture import borrowed_picture
 from smokelift.density.depth_prior import DepthEstimate, ImposedView, RoundDepth
 from smokelift.density.hull import inside, project_voxels
@@ -133,7 +133,7 @@ class BorrowedMoments:
             return estimate
         around = AROUND * min(1.0, 2 * self.detail)
         box = box_around(hull, REACH)
-        spread = (1 - around) * smooth[box] + around * ndimage.gaussian_filter(smooth[box], SPREAD)
+        spread = (1 - around) * smooth[box] + around * _core.blur(smooth[box], SPREAD, REACH / SPREAD)
         density = np.zeros(hull.shape, np.float32)
         np.copyto(density[box], spread, where=hull[box])
         return replace(estimate, density=density, imposed=imposed, smooth=smooth)

@@ -2,20 +2,29 @@
 
 Every voxel is measured in units of its own scale, start + floor: in these units the steepest descent changes a ray's
 smoke in proportion to what is there, so what the start assumes about depth survives where the pictures say nothing.
-The step length is Barzilai and Borwein's (1988), shortened until the objective falls sufficiently (Armijo, as in the
-spectral projected gradient method of Birgin, Martinez and Raydan, 2000), so the objective never rises.
+The direction is that of the limited-memory BFGS method (Nocedal 1980), among the voxels that no bound holds (two-metric
+projection: Bertsekas 1982). No voxel changes by more than a share of itself, and the step is shortened until the
+objective falls sufficiently (Armijo), so the objective never rises.
 """
 
 from __future__ import annotations
 
 import functools
+from collections import deque
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg.blas import saxpy
 
 from smokelift.density.objective import Fit, Term, noise_floor, objective
 from smokelift.render import Image, Volume
+
+Values = NDArray[np.float32]
+"""Numbers of the hull's voxels, (n,)."""
+
+MEMORY = 3
+"""Steps that the direction remembers: as good as six, for half the memory (docs/experiments/density-descent.md)."""
 
 FLOOR = 0.1
 """Scale of an empty voxel of the hull, in mean densities of the start: it may fill, but more slowly than others
@@ -24,8 +33,12 @@ FLOOR = 0.1
 SUFFICIENT = 1e-4
 """Armijo's constant: share of the linear prediction that a step has to gain."""
 
+LARGEST = np.float32(0.25)
+"""Largest change of a voxel in one step, as a share of what it holds and the floor. Without it density spikes grow
+where few rays pass, at floor and ceiling (docs/experiments/density-descent.md)."""
+
 LONGEST = 1e30
-"""Step that is tried, at most: a start of next to nothing asks for more than 32 bits hold."""
+"""First step, at most: a start of next to nothing asks for more than 32 bits hold."""
 
 SHORTEN = 0.3
 """Factor of a step that gains too little."""
@@ -59,22 +72,22 @@ def descend(
     tolerance
         Share of the objective that a step has to gain.
     patience
-        Stop after so many steps in a row that do not. Of Barzilai and Borwein's steps one may gain little and the next
-        much.
+        Stop after so many steps in a row that do not: one may gain little and the next much.
     bound
         What no voxel may exceed; where the start does it is cut.
     """
     where = np.flatnonzero(hull)
     volume, slopes = (np.zeros(hull.shape, np.float32) for _ in range(2))
     current = np.minimum(density.ravel()[where], np.float32(bound))
-    scale = current + np.float32(FLOOR * (current.mean() if current.size else 0.0))
+    floor = np.float32(FLOOR * (current.mean() if current.size else 0.0))
+    scale = current + floor
     enough = noise_floor(terms)
 
-    def residuals_of(candidate: NDArray[np.float32]) -> tuple[Image, ...]:
+    def residuals_of(candidate: Values) -> tuple[Image, ...]:
         volume.ravel()[where] = candidate
         return tuple(term.renderer.image(volume, keep_record=True) - term.view.image for term in terms)
 
-    def gradient_of(residuals: tuple[Image, ...]) -> NDArray[np.float32]:
+    def gradient_of(residuals: tuple[Image, ...]) -> Values:
         """Derivative of the objective in units of the scale, for the last density evaluated."""
         parts = (
             term.renderer.gradient(term.image_gradient(residual), out=slopes).ravel().take(where)
@@ -84,45 +97,81 @@ def descend(
         found *= scale
         return found
 
-    def moved_by(trial: float) -> NDArray[np.float32]:
+    def moved_by(direction: Values, trial: float) -> Values:
         """Where a step of this length arrives. New memory takes as long as the arithmetic, so there is little of it."""
-        candidate = scale * np.float32(trial)
-        candidate *= gradient
-        np.subtract(current, candidate, out=candidate)
-        return np.asarray(np.clip(candidate, 0, bound, out=candidate))
+        candidate = direction * np.float32(-trial)
+        candidate *= scale
+        candidate += current
+        return np.asarray(np.clip(candidate, lowest, highest, out=candidate))
 
     residuals = residuals_of(current)
-    loss, gradient = objective(terms, residuals), gradient_of(residuals)
-    step: float | None = None
+    loss = objective(terms, residuals)
+    curvature = _Curvature()
+    gradient: Values | None = None
+    moved: Values | None = None
     done = idle = 0
-    while done < iterations and loss > enough:
-        slope = _dot(gradient, gradient)
+    while done < iterations and loss > enough and idle < patience:
+        before, gradient = gradient, gradient_of(residuals)
+        if before is not None and moved is not None:
+            curvature.learn(moved, np.subtract(gradient, before, out=before))
+        held = ((current <= 0) & (gradient > 0)) | ((current >= bound) & (gradient < 0))
+        direction = curvature.newton(np.where(held, np.float32(0), gradient))
+        direction[held] = 0
+        slope = _dot(gradient, direction)
         if not slope > 0:
             break
-        trial = min(step or 0.1 * loss / slope, LONGEST)
+        reach = LARGEST * (current + floor)
+        lowest, highest = np.maximum(current - reach, 0), np.minimum(current + reach, np.float32(bound))
+        trial = 1.0 if curvature.known else min(0.1 * loss / slope, LONGEST)
         for _ in range(SHORTENINGS):
-            candidate = moved_by(trial)
+            candidate = moved_by(direction, trial)
             moved = candidate - current
             moved /= scale
             new_residuals = residuals_of(candidate)
             new_loss = objective(terms, new_residuals)
-            if new_loss <= loss + SUFFICIENT * _dot(gradient, moved):
+            # what the bounds leave of a long step need not lead down
+            if new_loss <= loss + SUFFICIENT * min(_dot(gradient, moved), 0.0):
                 break
             trial *= SHORTEN
         else:
             volume.ravel()[where] = current
             return Fit(volume, loss, residuals, done)
-        new_gradient = gradient_of(new_residuals)
-        curvature = _dot(moved, np.subtract(new_gradient, gradient, out=gradient))
-        step = _dot(moved, moved) / curvature if curvature > 0 else 4 * trial
-        gained = loss - new_loss
-        current, residuals, loss, gradient = candidate, new_residuals, new_loss, new_gradient
+        idle = idle + 1 if loss - new_loss < tolerance * new_loss else 0
+        current, residuals, loss = candidate, new_residuals, new_loss
         done += 1
-        idle = idle + 1 if gained < tolerance * loss else 0
-        if idle == patience:
-            break
     return Fit(volume, loss, residuals, done)
 
 
-def _dot(a: NDArray[np.float32], b: NDArray[np.float32]) -> float:
+class _Curvature:
+    """The objective's second derivatives, as far as its last steps show them."""
+
+    def __init__(self) -> None:
+        self._steps: deque[tuple[Values, Values, float]] = deque(maxlen=MEMORY)
+
+    @property
+    def known(self) -> bool:
+        """Whether a step has shown any."""
+        return bool(self._steps)
+
+    def learn(self, moved: Values, change: Values) -> None:
+        """Remember a step and what it changed in the gradient, unless the objective is not convex along it."""
+        product = _dot(moved, change)
+        if product > 0:
+            self._steps.append((moved, change, product))
+
+    def newton(self, gradient: Values) -> Values:
+        """Newton's step for a gradient, which is overwritten; where nothing is known, the gradient itself."""
+        shares = []
+        for moved, change, product in reversed(self._steps):
+            shares.append(_dot(moved, gradient) / product)
+            gradient = saxpy(change, gradient, a=-shares[-1])
+        if self._steps:
+            _, change, product = self._steps[-1]
+            gradient *= np.float32(product / _dot(change, change))
+        for (moved, change, product), share in zip(self._steps, reversed(shares), strict=True):
+            gradient = saxpy(moved, gradient, a=share - _dot(change, gradient) / product)
+        return gradient
+
+
+def _dot(a: Values, b: Values) -> float:
     return float(np.vdot(a, b))

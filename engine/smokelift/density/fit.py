@@ -57,7 +57,7 @@ class DensitySettings:
     """
 
     fit_iterations: int = 6
-    descent_iterations: int = 18
+    descent_iterations: int = 8
     tolerance: float = 0.02
     patience: int = 2
     bound: float = 3.0

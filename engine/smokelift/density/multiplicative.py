@@ -142,12 +142,12 @@ def _log_scale(image: Image, transmittance: Image, slope: Image, term: Term) -> 
     solid = np.maximum(1 - clear, 1e-6)
     source = (image - clear * background) / solid
     contrast = background - source
-    power = np.sum(contrast**2, -1)
-    floor = np.mean(term.view.noise**2, -1)
-    wanted = np.clip(np.sum((term.view.image - source) * contrast, -1) / (power + 1e-20), 1e-4, 1.0)
+    power = _over_channels(contrast, contrast)
+    floor = _over_channels(term.view.noise, term.view.noise) / 3
+    wanted = np.clip(_over_channels(term.view.image - source, contrast) / (power + 1e-20), 1e-4, 1.0)
     scale = np.log(wanted) / np.minimum(np.log(np.maximum(transmittance, 1e-30)), -1e-6)
-    change = np.sqrt(np.sum((image - background) ** 2, -1))
-    sensitivity = np.sqrt(np.sum(slope**2, -1)) / np.maximum(change, 1e-6)
+    change = image - background
+    sensitivity = np.sqrt(_over_channels(slope, slope)) / np.maximum(np.sqrt(_over_channels(change, change)), 1e-6)
     gain = share * sensitivity**2 / (sensitivity**2 + DAMPING**2)
     step = gain * np.log(np.clip(scale, *STEP_RANGE))
     trust = share * power / (power + floor)
@@ -155,3 +155,8 @@ def _log_scale(image: Image, transmittance: Image, slope: Image, term: Term) -> 
     return np.asarray(
         ndimage.gaussian_filter(trust * step, 0.7) / (ndimage.gaussian_filter(trust, 0.7) + 1e-3), np.float32
     )
+
+
+def _over_channels(a: Image, b: Image) -> Image:
+    """Sum of the channels' products (rows, columns)."""
+    return np.asarray(np.einsum("...c,...c", a, b))

@@ -75,10 +75,10 @@ def camera_terms(views: ViewSet, inside: Sequence[NDArray[np.float32]]) -> list[
     return [
         Term(
             view,
-            views.optics.renderer(view.camera, view.plate.image, views.hull),
+            renderer,
             view.counted * np.maximum(share, LEAST_SHARE) ** 2,
         )
-        for view, share in zip(views.views, inside, strict=True)
+        for view, renderer, share in zip(views.views, views.renderers, inside, strict=True)
     ]
 
 

@@ -15,7 +15,7 @@ from smokelift.density.hull import Projection, common_hull, project_voxels, reac
 from smokelift.footage.matte import matte
 from smokelift.footage.noise import EIGHT_BIT_NOISE
 from smokelift.footage.plate import Plate, noise_at
-from smokelift.render import Image, Optics
+from smokelift.render import Image, Optics, Renderer
 from smokelift.scene import Camera, Domain, Inlet
 from smokelift.scene.checks import LARGEST
 
@@ -147,6 +147,11 @@ class ViewSet:
     hull: NDArray[np.bool_]
     optics: Optics
     frame: int = 0
+
+    @cached_property
+    def renderers(self) -> tuple[Renderer, ...]:
+        """Of the views, for densities in the hull."""
+        return tuple(self.optics.renderer(view.camera, view.plate.image, self.hull) for view in self.views)
 
     @staticmethod
     def of(observations: Sequence[Observation], optics: Optics, frame: int = 0) -> ViewSet:

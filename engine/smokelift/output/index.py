@@ -87,9 +87,10 @@ class Index:
 
     def write(self, directory: Path) -> None:
         """Write the file; OSError if that fails."""
-        text = json.dumps({"format": FORMAT, **vars(self)}, indent=1, allow_nan=False)
+        parts = {name: _json(value) for name, value in {"format": FORMAT, **vars(self)}.items()}
+        parts["frames"] = _lines({number: _json(figures) for number, figures in self.frames.items()})
         with atomic_path(directory / INDEX) as aside:
-            aside.write_text(text + "\n", encoding="utf-8")
+            aside.write_text(_lines(parts) + "\n", encoding="utf-8")
 
     @staticmethod
     def read(directory: Path) -> Index:
@@ -131,6 +132,16 @@ class Index:
             if not re.fullmatch(r"0|[1-9][0-9]{0,8}", number) or not isinstance(figures, dict):
                 raise SequenceError(f"{path}: is damaged: there can be no frame {shown(number)} of {shown(figures)}")
         return Index(**{key: data[key] for key in kinds})
+
+
+def _json(value: Any) -> str:
+    """A value as JSON, in one line: with indents the encoder is many times slower, and every frame is written anew."""
+    return json.dumps(value, allow_nan=False)
+
+
+def _lines(values: Mapping[str, str]) -> str:
+    """The JSON object of values that are JSON already, each in a line of its own."""
+    return "{\n" + ",\n".join(f"{json.dumps(name)}: {value}" for name, value in values.items()) + "\n}"
 
 
 def plain(value: Any) -> Any:

@@ -30,7 +30,7 @@ from smokelift.output.archive import FLAME
 from smokelift.output.atomic import atomic_path
 from smokelift.scene import Domain
 from smokelift.scene.domain import box_around
-from smokelift.transport import StaggeredGrid, at_centres
+from smokelift.transport import StaggeredGrid, at_centres, faces_in
 
 Array = npt.NDArray[np.float32]
 
@@ -188,12 +188,8 @@ def _part(velocity: npt.ArrayLike | StaggeredGrid, box: tuple[slice, ...], domai
     """The velocity at the voxel centres of a box, shape (x, y, z, 3); at those of the domain it may not fit memory."""
     if isinstance(velocity, StaggeredGrid):
         shape: tuple[int, ...] = (*velocity.shape, 3)
-        x, y, z = (
-            component[tuple(slice(side.start, side.stop + (axis == along)) for axis, side in enumerate(box))]
-            for along, component in enumerate(velocity.faces)
-        )
         finite = all(np.isfinite(component).all() for component in velocity.faces)
-        part = np.stack(at_centres((x, y, z)), axis=-1)
+        part = np.stack(at_centres(faces_in(velocity.faces, box)), axis=-1)
     else:
         centres = np.ascontiguousarray(velocity, np.float32)
         shape, finite, part = centres.shape, bool(np.isfinite(centres).all()), centres[box]

@@ -24,7 +24,7 @@ LOST_DETAIL: Mapping[Quality, float] = {"draft": 0.02, "balanced": 0.01, "fine":
 """Share of the smoke's contrast that a chosen grid may lose: a quality loses half as much as the one before, for three
 to four times the voxels (docs/experiments/resolution-selection.md)."""
 
-ITERATIONS: Mapping[Quality, tuple[int, int]] = {"draft": (4, 6), "balanced": (6, 18), "fine": (8, 30)}
+ITERATIONS: Mapping[Quality, tuple[int, int]] = {"draft": (4, 4), "balanced": (6, 8), "fine": (8, 14)}
 """Multiplicative iterations and steps of descent at most (docs/experiments/density-descent.md)."""
 
 

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, Literal, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 import smokelift._core as _core
+from smokelift.scene.domain import box_around
 from smokelift.transport.grid import (
     Array,
     StaggeredGrid,
     Velocity,
     at_centres,
+    faces_in,
     require_same_shape,
 )
 
@@ -89,9 +92,9 @@ def advect(
         return Velocity((x, y, z), field.voxel_size, field.closed)
     if not np.isfinite(field).all():
         raise ValueError("the field holds values that are not finite.")
-    moved = _core.advect_cells(field, displacement.faces, corrected)
     if not conserve:
-        return moved
+        return _moved(field, displacement, corrected)
+    moved = _core.advect_cells(field, displacement.faces, corrected)
     if field.min() < 0:
         raise ValueError("mass can be kept of a density, not of negative values.")
     other = _core.advect_cells(field, displacement.faces, not corrected)
@@ -110,6 +113,17 @@ def advect_cells(field: Array, displacement: StaggeredGrid) -> Array:
         In voxels.
     """
     return _core.advect_cells(field, displacement.faces, False, True)
+
+
+def _moved(field: Array, displacement: StaggeredGrid, corrected: bool) -> Array:
+    """Carry a density along, computed where it can arrive alone."""
+    # what arrives was a step away, and the correction looks a step further
+    farthest = max(max(-float(along.min()), float(along.max())) for along in displacement.faces)
+    box = box_around(field != 0, 2 * (math.ceil(farthest) + 1))
+    result: Array = np.zeros(field.shape, np.float32)
+    if result[box].size:
+        result[box] = _core.advect_cells(field[box], faces_in(displacement.faces, box), corrected)
+    return result
 
 
 def _with_mass(moved: Array, doubt: Array, mass: float) -> Array:

@@ -163,6 +163,15 @@ def face_shapes(shape: tuple[int, ...]) -> tuple[tuple[int, int, int], ...]:
     return (nx + 1, ny, nz), (nx, ny + 1, nz), (nx, ny, nz + 1)
 
 
+def faces_in(faces: Faces, box: tuple[slice, ...]) -> Faces:
+    """Views of a field's components on the faces of a box of voxels."""
+    x, y, z = (
+        component[tuple(slice(side.start, side.stop + (axis == along)) for axis, side in enumerate(box))]
+        for along, component in enumerate(faces)
+    )
+    return x, y, z
+
+
 def at_centres(faces: Faces) -> Faces:
     """The three components of a field on faces at voxel centres: the mean of opposite faces."""
     x, y, z = (np.float32(0.5) * (high + low) for low, high in _opposite_sides(faces))

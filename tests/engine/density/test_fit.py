@@ -309,7 +309,7 @@ def test_descent_never_raises_the_loss(plume, small, thickness) -> None:
     term, hull, start = even_start(plume.densities[1], scene)
     losses = [descend([term], start, hull, steps, 0.0, 2).loss for steps in range(20)]
     assert all(after <= before for before, after in itertools.pairwise(losses))
-    assert losses[-1] < 0.2 * losses[0]
+    assert losses[-1] < 0.3 * losses[0]
 
 
 def test_descent_does_not_end_with_one_poor_step(plume, small) -> None:

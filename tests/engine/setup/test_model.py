@@ -372,7 +372,7 @@ def test_iterations_by_hand_are_said(plume, draft) -> None:
     """Those of the quality are not."""
     by_hand = replace(draft, density=replace(draft.density, descent_iterations=1))
     found = [chosen(shot_of(plume.scene, settings), "iterations") for settings in (draft, by_hand)]
-    assert [(choice.by_hand, choice.chosen) for choice in found] == [(False, 10), (True, 5)]
+    assert [(choice.by_hand, choice.chosen) for choice in found] == [(False, 8), (True, 5)]
 
 
 def test_frames_without_smoke_cost_nothing(plume, draft, tmp_path) -> None:
