@@ -110,14 +110,14 @@ def test_thick_white_smoke_scatters_light_many_times(white, plume, draft) -> Non
 
 def test_single_scattering_is_kept_where_both_meet_the_picture(plume, draft, monkeypatch) -> None:
     """Multiple scattering has to be clearly nearer: it finds half as dense a smoke for the same picture."""
-    own = {"single": 0.030, "multiple": 0.026}
+    own = {"single": 0.028, "multiple": 0.026}
     for module in (scattering, light_strength):
         monkeypatch.setattr(
             module, "held_out", lambda _, model, judge, __: HeldOut(own[judge] if model == judge else 0.4, 1.0)
         )
     choice = chosen(shot_of(plume.scene, draft), "scattering")
     assert choice.chosen == "single"
-    own["single"] = 0.2
+    own["single"] = 0.035  # by less than a cheaper model may add, which is no question here
     assert chosen(shot_of(plume.scene, draft), "scattering").chosen == "multiple"
 
 
