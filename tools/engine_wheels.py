@@ -36,9 +36,9 @@ GLIBC = "2.28"
 """Oldest C library that Blender's own builds run with."""
 
 _PROBE = """
-import pathlib, sys, sysconfig
+import os, pathlib, sys, sysconfig
 fits = f"{sys.version_info[0]}.{sys.version_info[1]}" == sys.argv[1]
-print(sys._base_executable)
+print(os.path.realpath(sys._base_executable))
 sys.exit(not (fits and pathlib.Path(sysconfig.get_path("include"), "Python.h").is_file()))
 """
 
