@@ -12,12 +12,14 @@ double old_exp(double);
 int old_pthread_create(pthread_t *, const pthread_attr_t *, void *(*)(void *), void *);
 int old_pthread_join(pthread_t, void **);
 int old_pthread_once(pthread_once_t *, void (*)());
+unsigned long old_strtoul(const char *, char **, int);
 #pragma GCC visibility pop
 
 OLD(exp);
 OLD(pthread_create);
 OLD(pthread_join);
 OLD(pthread_once);
+OLD(strtoul);
 
 #pragma GCC visibility push(hidden)
 // The C++ library asks whether it may leave out locks; the oldest C library cannot tell.
@@ -36,5 +38,10 @@ int pthread_create(pthread_t *thread, const pthread_attr_t *attributes, void *(*
 int pthread_join(pthread_t thread, void **result) { return old_pthread_join(thread, result); }
 
 int pthread_once(pthread_once_t *once, void (*run)()) { return old_pthread_once(once, run); }
+
+// what the headers of 2.38 and later make of strtoul
+unsigned long __isoc23_strtoul(const char *text, char **end, int base) {
+    return old_strtoul(text, end, base);
+}
 #pragma GCC visibility pop
 }

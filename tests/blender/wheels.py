@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import zipfile
@@ -10,7 +11,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from engine_wheels import ROOT, find_python
+from engine_wheels import GLIBC, ROOT, find_python
 from tests.blender.setting import LIFECYCLE, pytest_words, run, shipped, unavailable, user_folder, variables
 
 ADD_ONS_TESTS = ROOT / "tests" / "addon" / "inside"
@@ -74,6 +75,19 @@ def offline() -> list[str]:
     except OSError:
         allowed = False
     return words if allowed else []
+
+
+def test_the_core_needs_no_newer_system_than_blender(wheel, tmp_path) -> None:
+    """As the file itself says, whatever its wheel was called; its C++ library is inside it."""
+    with zipfile.ZipFile(shipped(wheel.python)) as archive:
+        (name,) = (name for name in archive.namelist() if re.search(r"/smokelift/_core\.[^/]+\.so$", name))
+        core = archive.extract(name, tmp_path)
+    words = ["readelf", "--wide", "--version-info", "--dynamic", core]
+    said = subprocess.run(words, capture_output=True, text=True, check=True).stdout
+    needed = {tuple(map(int, version.split("."))) for version in re.findall(r"Name: GLIBC_([\d.]+)", said)}
+    assert needed
+    assert max(needed) <= tuple(map(int, GLIBC.split(".")))
+    assert "libstdc++" not in said
 
 
 def test_from_install_to_uninstall(wheel, python) -> None:
