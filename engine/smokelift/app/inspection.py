@@ -198,11 +198,13 @@ def _light(shot: Shot, given: Scene) -> tuple[Fact, ...]:
     if given.lights or thickness is None:
         return (Fact("light", "as given", "given"),)
     colour = ", ".join(f"{v:.2g}" for v in shot.optics.unshadowed_source())
-    hides = "as the light asks for"
+    hides, origin = "as the light asks for", UNDETERMINED
+    how = "Light strength: as much as the thickest smoke shows; if none is thick, the light is stronger."
     if thickness.chosen != UNDETERMINED:
-        hides = f"hides {thickness.measured['hidden']:.0%} of what it covers"
+        hides, origin = f"hides {thickness.measured['hidden']:.0%} of what it covers", "measured"
+        how = "Light strength: what the smoke adds for what it hides of the texture behind it."
     return (
-        _chosen(shot, "smoke thickness", "light strength", f"smoke of radiance {colour}", False),
+        Fact("light strength", f"smoke of radiance {colour}", origin, how),
         _chosen(shot, "smoke thickness", "smoke thickness", hides, False),
         _chosen(shot, "light direction", "sun's direction", "no sun", False),
         _chosen(shot, "light direction", "sun's color", "that of all light", False),

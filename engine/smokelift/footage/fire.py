@@ -78,12 +78,9 @@ def without_fire(clip: Clip, plates: Plates) -> Clip:
     return clip.changed(lambda number, picture: _doused(picture, plates.at(number)))
 
 
-def firelight(clip: Clip, plates: Plates) -> Clip:
-    """Return a clip of the light that fire adds to `without_fire`; parameters as there.
-
-    A clipped pixel shows less than that.
-    """
-    return clip.changed(lambda number, picture: np.maximum(picture - _doused(picture, plates.at(number)), 0))
+def firelight(clip: Clip, doused: Clip) -> Clip:
+    """Return a clip of the light that fire adds to one `without_fire`; a clipped pixel shows less than that."""
+    return clip.changed(lambda number, picture: np.maximum(picture - doused.frame(number), 0))
 
 
 def fire_colour(clip: Clip, light: Clip) -> Vector:

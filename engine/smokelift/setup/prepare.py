@@ -68,9 +68,10 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
     burning = fire_share(samples.colours, samples.behind)
     fire = None
     if burning:
-        fire = firelight(clip, plates)
+        doused = without_fire(clip, plates)
+        fire = firelight(clip, doused)
         glow = fire_colour(clip, fire)
-        clip = without_fire(clip, plates)
+        clip = doused
         samples = replace(sample_smoke(clip, plates, found.turns), exposure=samples.exposure)
     geometry = find_geometry(clip, scene, settings, plates, samples, found.turns)
     camera, domain = geometry.camera, geometry.domain

@@ -67,6 +67,7 @@ def test_a_page_shows_what_is_known(plume, tmp_path, capsys, kind) -> None:
     known = {fact["what"]: fact for fact in done["facts"]}
     for what in ("camera", "scale", "extinction", "albedo", "light strength", "smoke thickness"):
         assert known[what]["origin"] == "undetermined"
+    assert known["light strength"]["how"] != known["smoke thickness"]["how"]
     for what in ("sun's direction", "sun's color", "ambient share"):
         assert known[what]["origin"] == "undetermined"
         assert "Give [[lights]]" in known[what]["how"]

@@ -5,8 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from smokelift.footage import fire
 from smokelift.footage.clip import Clip
 from smokelift.footage.fire import fire_colour, fire_share, firelight, without_fire
+from smokelift.footage.matte import matte
 from smokelift.footage.plate import known_plate
 from smokelift.output.images import write_image
 
@@ -83,11 +85,24 @@ def test_the_light_of_fire_is_what_it_adds_to_the_smoke(tmp_path: Path) -> None:
     for number in range(3):
         write_image(tmp_path / f"fire_{number:02d}.exr", picture(number))
     with Clip.open(tmp_path / "fire_##.exr") as clip:
-        light = firelight(clip, known_plate(np.zeros(3), clip))
+        light = firelight(clip, without_fire(clip, known_plate(np.zeros(3), clip)))
         assert fire_colour(clip, light) == pytest.approx(FLAME, abs=0.04)
         added = light.frame(1)
         np.testing.assert_allclose(added[44, 32], picture(1)[44, 32] - SMOKE, atol=0.045)
         assert not added[:20].any() and added.min() == 0
+
+
+def test_the_smoke_of_a_frame_is_looked_for_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run asks for what is left without the fire and for its light, frame by frame."""
+    for number in range(3):
+        write_image(tmp_path / f"fire_{number:02d}.exr", picture(number))
+    with Clip.open(tmp_path / "fire_##.exr") as clip:
+        dark = without_fire(clip, known_plate(np.zeros(3), clip))
+        light, asked = firelight(clip, dark), []
+        monkeypatch.setattr(fire, "matte", lambda *given: asked.append(given) or matte(*given))
+        dark.frame(2)
+        light.frame(2)
+        assert len(asked) == 1
 
 
 def test_light_that_is_clipped_all_over_has_the_colour_that_is_seen(tmp_path: Path) -> None:
