@@ -303,6 +303,7 @@ class _Kept:
         self._source = source
         self._kept: OrderedDict[int, Picture | CodedPicture] = OrderedDict()
         self._glimpses: OrderedDict[tuple[int, int], Picture | CodedPicture] = OrderedDict()
+        self._damaged: dict[tuple[int, int], tuple[int, ...]] = {}
         self._expected: tuple[frozenset[int], frozenset[int], int] = frozenset(), frozenset(), 1
         self.count, self.fps, self.warning = source.count, source.fps, source.warning
         self.files, self.lens, self.backdrop = source.files, source.lens, source.backdrop
@@ -340,7 +341,9 @@ class _Kept:
             if look is not None:
                 look(n, picture)
 
-        return self._source.damaged(first, last, keep)
+        if (first, last) not in self._damaged:
+            self._damaged[first, last] = self._source.damaged(first, last, keep)
+        return self._damaged[first, last]
 
     def close(self) -> None:
         self._source.close()

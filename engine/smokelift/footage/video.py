@@ -81,6 +81,7 @@ class Video:
         if not path.is_file():
             raise ClipError(f"{path}: is a pipe or a device, which cannot be read twice; save it as a file")
         self._failed = False  # whether decoding has
+        self._lost: set[int] = set()  # indices into _times of what is known to be damaged, lest it is tried again
         self._start()
         self._times, self._keys, broken = self._index()
         if not self._times:
@@ -284,7 +285,9 @@ class Video:
             self._rewind()
             good |= self._good_times(wanted[-1], met)
         self._rewind()
-        return tuple(first + n for n, time in enumerate(wanted) if time not in good)
+        damaged = tuple(first + n for n, time in enumerate(wanted) if time not in good)
+        self._lost.update(self._shown[n] for n in damaged)
+        return damaged
 
     def _good_times(self, last: int, met: Callable[[int, av.VideoFrame], None]) -> set[int]:
         """Times of the frames that can be decoded from where the container stands, up to one; each of them is met."""
@@ -301,6 +304,8 @@ class Video:
         """Return the decoded frame at an index into ``_times``."""
         if not self._keys:
             return self._decode_by_count(index)
+        if index in self._lost:
+            raise DamagedFrameError(f"{self._path}: frame {index} is damaged and cannot be decoded")
         wanted = self._times[index]
         reached = self._times[self._next] if self._next < len(self._times) else None
         key_between = reached is not None and any(reached < key <= wanted for key in self._keys)
@@ -314,6 +319,7 @@ class Video:
             frame = self._forward_to(wanted)
         if frame is None:
             self._rewind()
+            self._lost.add(index)
             raise DamagedFrameError(f"{self._path}: frame {index} is damaged and cannot be decoded")
         self._next = index + 1
         return frame
