@@ -20,7 +20,7 @@ from smokelift.setup.settings import Quality, Settings
 
 Resolution = tuple[int, int, int]
 
-SOLVES_A_FRAME: Mapping[Quality, float] = {"draft": 65.0, "balanced": 70.0, "fine": 76.0}
+SOLVES_A_FRAME: Mapping[Quality, float] = {"draft": 54.0, "balanced": 58.0, "fine": 63.0}
 """Poisson solves that take as long as a frame."""
 
 SHARE_A_VIEW = 0.5
