@@ -236,5 +236,6 @@ def _how(unknown: float) -> str:
         return "Background estimated from the clip, which shows every part of it free of smoke."
     return (
         f"Background estimated from the clip; {unknown:.0%} of the picture is hardly ever free of smoke, and what is "
-        "behind it there is continued from around it. A clean plate in [background] would show it."
+        "behind it there is continued from around it, so how thick the smoke is there is undetermined. A clean "
+        "plate in [background] would show it."
     )

@@ -42,6 +42,24 @@ def test_smoke_that_may_be_in_the_plate_is_said(unknown_rows, said) -> None:
     assert not said or "75% of where smoke is or may be" in notes[0]
 
 
+def test_smoke_before_a_wall_that_no_frame_shows_is_undetermined(tmp_path) -> None:
+    """A flatter wall behind thinner smoke gives the same pictures."""
+    random = np.random.default_rng(0)
+    tiles = np.kron(random.uniform(0.05, 0.3, (9, 7)), np.ones((8, 8)))
+    across = np.abs(np.arange(56) - 28)
+    opacity = [np.where(across < 6, random.uniform(0.4, 0.9), 0) for _ in range(12)]
+    colour, factor = 0.6, 1.5
+    flatter = colour + (tiles - colour) / factor
+    for n, each in enumerate(opacity):
+        shown = colour * each + tiles * (1 - each)
+        thinner = 1 - factor * (1 - each)
+        same = np.where(across < 6, colour * thinner + flatter * (1 - thinner), tiles)
+        np.testing.assert_allclose(shown, same)
+        write_image(tmp_path / f"frame_{n:02d}.png", shown)
+    (note,) = find_plates(Clip.open(tmp_path / "frame_##.png", fps=24), None, None).notes
+    assert "how thick the smoke is there is undetermined" in note
+
+
 def test_one_colour_is_said(tmp_path) -> None:
     """Behind a puff before black."""
     found = find_plates(before(0.0, tmp_path), None, None)
