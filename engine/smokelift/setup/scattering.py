@@ -34,8 +34,8 @@ MODELS: tuple[Scattering, ...] = ("absorption", "unshadowed", "single", "multipl
 
 NEARER = 0.9
 """Error of multiple scattering over that of single scattering, below which light is scattered many times. Where it is
-scattered once the ratio is 0.93 at least; path-traced smoke has 0.06 to 0.88, but for some that either model meets
-(docs/experiments/multiple-scattering.md)."""
+scattered once the ratio is near 1 or more; path-traced smoke has 0.06 to 0.88, but for some that either model meets and
+some that neither does (docs/experiments/multiple-scattering.md)."""
 
 _WORDS: Mapping[str, str] = {
     "absorption": "absorption only",
