@@ -16,9 +16,6 @@ from smokelift.footage.plate import Plate, Plates
 MIDDLE = np.full(3, 0.5, np.float32)
 """sRGB values at which it is judged whether noise brightens a clip."""
 
-UNCLIPPED = 2.0
-"""sRGB value, in standard deviations of the noise, from which hardly any noise is below black."""
-
 
 def steady(clip: Clip, plates: Plates) -> Clip:
     """Return a clip whose frames are all exposed as their backgrounds are.
@@ -42,8 +39,8 @@ def steady(clip: Clip, plates: Plates) -> Clip:
 def without_noise_light(clip: Clip, plates: Plates) -> Clip:
     """Return a clip without the light that its noise adds to means (`linear_excess`).
 
-    A clip that is brightened by less than rounding to 8 bits may do is returned as it is. So is one before a background
-    that is mostly so dark that its noise is clipped, which is taken to be as bright as that makes it (`known_plate`).
+    A clip that is brightened by less than rounding to 8 bits may do is returned as it is. Before black too little is
+    taken off: the noise is measured where there is no smoke, and there it is clipped.
 
     Parameters
     ----------
@@ -54,8 +51,6 @@ def without_noise_light(clip: Clip, plates: Plates) -> Clip:
     """
     noise = plates.noise.total
     if (linear_excess(MIDDLE, noise) <= 0.5 * EIGHT_BIT_STEP * linear_per_srgb(MIDDLE)).all():
-        return clip
-    if (np.median(linear_to_srgb(plates.at(0).image), axis=(0, 1)) < UNCLIPPED * noise).any():
         return clip
 
     def lessened(_: int, picture: Picture) -> Picture:
