@@ -41,6 +41,9 @@ LONGEST_SIDE = 4096
 
 READABLE = (".png", ".jpg", ".jpeg", ".exr", ".hdr")
 
+LOOK_UPS = 2**16
+"""Codes that are looked up at a time: their indices fit the cache."""
+
 
 class ImageError(ValueError):
     """A picture that cannot be read or written."""
@@ -72,13 +75,20 @@ class CodedPicture:
 
     def through(self, change: Callable[[Picture], npt.NDArray[Value]]) -> npt.NDArray[Value]:
         """Return the picture with a function applied to every linear value, which is called for each code once."""
-        values = change(self.table)
-        if self.codes.itemsize > 1 or self.codes.size % 2:
-            return values[self.codes]
-        # two codes at once take half as many look-ups
-        pairs = values[np.arange(2**16, dtype=np.uint16).view(np.uint8)].view(f"u{2 * values.itemsize}")
-        found: npt.NDArray[Value] = pairs[self.codes.reshape(-1).view(np.uint16)].view(values.dtype)
-        return found.reshape(self.codes.shape)
+        return look_up(change(self.table), self.codes)
+
+
+def look_up(values: npt.NDArray[Value], codes: npt.NDArray[np.uint8] | npt.NDArray[np.uint16]) -> npt.NDArray[Value]:
+    """Return the value of each code, in the shape of the codes.
+
+    ``values[codes]`` takes three times as long, and ends the process (NumPy 1.26) where memory for its buffers lacks.
+    """
+    flat = codes.reshape(-1)
+    found = np.empty(flat.shape, values.dtype)
+    for start in range(0, flat.size, LOOK_UPS):
+        part = slice(start, start + LOOK_UPS)
+        values.take(flat[part], out=found[part], mode="clip")  # no code is outside, and "raise" copies the result
+    return found.reshape(codes.shape)
 
 
 def srgb_to_linear(encoded: npt.ArrayLike) -> Picture:
@@ -123,7 +133,7 @@ def decode_integers(
     premultiplied
         Whether colours are over black as they are stored.
     """
-    linear: Picture = code_values(np.iinfo(codes.dtype).max, encoding, white)[codes[..., :3]]
+    linear = look_up(code_values(np.iinfo(codes.dtype).max, encoding, white), codes[..., :3])
     alpha = decode_alpha(codes, white)
     if alpha is not None and not premultiplied:
         linear *= alpha[..., None]

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from smokelift.footage.images import Picture, linear_to_srgb, srgb_to_linear
+from smokelift.footage.images import Picture, linear_to_srgb, look_up, srgb_to_linear
 from smokelift.footage.seen import quantile_of_seen
 
 EIGHT_BIT_STEP = np.float32(1 / 255)
@@ -100,7 +100,7 @@ def decode_samples(samples: npt.NDArray[np.uint16]) -> Picture:
 
 def linear_samples(samples: npt.NDArray[np.uint16]) -> Picture:
     """Return what `encode_sample` stored as float32 linear values."""
-    return _LINEAR[samples]
+    return look_up(_LINEAR, samples)
 
 
 def block_means(pictures: Picture) -> Picture:
