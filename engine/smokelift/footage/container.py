@@ -7,6 +7,9 @@ from pathlib import Path
 import av
 from av.container import InputContainer
 
+ENOUGH = 2**25
+"""Bytes that a file is opened with: the contexts of its decoders, and some frames to know them by."""
+
 
 def open_container(path: Path, form: str | None = None, **options: str) -> InputContainer:
     """Open a file, and whatever it refers to on this machine, but nothing on another.
@@ -24,7 +27,10 @@ def open_container(path: Path, form: str | None = None, **options: str) -> Input
     ------
     av.FFmpegError, ValueError
         If it is of no format that FFmpeg knows, or damaged.
+    MemoryError
+        If there is hardly any memory left, where PyAV would end the process.
     """
+    bytearray(ENOUGH)
     container: InputContainer = av.open(
         f"file:{path.absolute()}", format=form, options={"protocol_whitelist": "file", **options}
     )
