@@ -1,0 +1,113 @@
+"""Opening files with FFmpeg: names that it would take for something else, and nothing over a network."""
+
+from __future__ import annotations
+
+import os
+import socket
+import struct
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from smokelift.footage import container
+from smokelift.footage.clip import Clip, ClipError
+from smokelift.footage.images import ImageError, read_image
+from smokelift.output.images import write_image
+from smokelift.output.video import write_video
+
+FRAMES = [np.full((16, 32, 3), value, np.float32) for value in (0.1, 0.3, 0.5)]
+
+
+@pytest.fixture
+def server() -> Iterator[socket.socket]:
+    """Waits for connections that must not come."""
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        listening.setblocking(False)
+        yield listening
+        with pytest.raises(BlockingIOError):
+            listening.accept()
+
+
+def test_a_folder_named_like_a_server_is_a_folder(tmp_path: Path, server: socket.socket, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    name = Path(f"http:/127.0.0.1:{server.getsockname()[1]}/clip.mp4")
+    name.parent.mkdir(parents=True)
+    write_video(name, FRAMES, 24)
+    with Clip.open(name) as clip:
+        assert len(clip) == 3
+
+
+@pytest.mark.parametrize("kind", ["m3u8", "ffconcat"])
+def test_nothing_is_fetched_from_what_a_file_refers_to(tmp_path: Path, server: socket.socket, kind: str) -> None:
+    address = f"http://127.0.0.1:{server.getsockname()[1]}/clip.ts"
+    text = {
+        "m3u8": f"#EXTM3U\n#EXT-X-TARGETDURATION:9\n#EXTINF:9,\n{address}\n#EXT-X-ENDLIST\n",
+        "ffconcat": f"ffconcat version 1.0\nfile {address}\n",
+    }[kind]
+    (tmp_path / f"list.{kind}").write_text(text)
+    with pytest.raises(ClipError):
+        Clip.open(tmp_path / f"list.{kind}")
+
+
+@pytest.mark.parametrize("name", ["pipe:0.mp4", "concat:a|b.mp4", "a%03d.mp4", "-i.mp4", "crypto:x.mp4"])
+def test_any_name_is_that_of_a_file(tmp_path: Path, monkeypatch, name: str) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_video(Path(name), FRAMES, 24)
+    with Clip.open(name) as clip:
+        assert len(clip) == 3
+
+
+def png(width: int, height: int, depth: int) -> bytes:
+    """A PNG whose header lies, with a few pixels."""
+
+    def chunk(kind: bytes, content: bytes) -> bytes:
+        return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
+
+    header = struct.pack(">IIBBBBB", width, height, depth, 2, 0, 0, 0)
+    return (
+        b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(bytes(99))) + chunk(b"IEND", b"")
+    )
+
+
+def test_a_16_bit_png_with_a_pattern_for_a_name(tmp_path: Path) -> None:
+    """As FFmpeg understands it, it would be any picture but this."""
+    (tmp_path / "a%03d.png").write_bytes(png(2, 3, 16))
+    assert read_image(tmp_path / "a%03d.png").shape == (3, 2, 3)
+
+
+@pytest.mark.parametrize("depth", [8, 16])
+@pytest.mark.parametrize("size", [(100_000, 100_000), (30_000, 30_000), (2**31 - 1, 1)])
+def test_a_picture_that_says_it_is_huge_is_not_believed(tmp_path: Path, depth: int, size: tuple[int, int]) -> None:
+    (tmp_path / "plate.png").write_bytes(png(*size, depth))
+    with pytest.raises(ImageError, match=r"plate\.png: cannot be read: "):
+        read_image(tmp_path / "plate.png")
+
+
+@pytest.mark.parametrize("window", [b"displayWindow", b"dataWindow"])
+def test_an_exr_that_says_it_is_huge_is_not_believed(tmp_path: Path, window: bytes) -> None:
+    write_image(tmp_path / "a.exr", FRAMES[0])
+    content = bytearray((tmp_path / "a.exr").read_bytes())
+    at = content.index(window + b"\x00box2i\x00") + len(window) + 11
+    content[at : at + 16] = struct.pack("<4i", 0, 0, 2**30, 2**30)
+    (tmp_path / "a.exr").write_bytes(content)
+    with pytest.raises(ImageError, match=r"a\.exr: cannot be read: "):
+        read_image(tmp_path / "a.exr")
+
+
+@pytest.mark.parametrize("name", ["clip.mp4", "frame_0001.png", "plate.hdr"])
+def test_a_pipe_is_not_waited_for(tmp_path: Path, name: str) -> None:
+    os.mkfifo(tmp_path / name)
+    with pytest.raises(ValueError, match=r"is a pipe or a device|no such file"):
+        Clip.open(tmp_path / name)
+
+
+def test_memory_that_lacks_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "picture.png"
+    write_image(path, FRAMES[0])
+    container.open_container(path).close()
+    monkeypatch.setattr(container, "ENOUGH", 2**62)
+    with pytest.raises(MemoryError):
+        container.open_container(path)
