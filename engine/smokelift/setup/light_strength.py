@@ -24,7 +24,6 @@ optical depth."""
 MOST = 8.0
 """Largest strength that is tried. Light given in other units than the picture's is a mistake, not a measurement."""
 
-
 MISSING = 0.05
 """Light that may be missing before the given one is contradicted: blocks of multiple scattering are themselves up to as
 much too dark (docs/experiments/multiple-scattering.md)."""

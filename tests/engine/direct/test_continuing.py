@@ -39,14 +39,19 @@ def test_the_clip_stays_and_goes_on(source, tmp_path):
     assert "Frames 11 to 15" in made.provenance[-1]["how"]
 
 
+def run_twice(source, folder, continuation, last):
+    """Continue a sequence in one go, and in two: stopped after a frame, and gone on with."""
+    run(source, folder / "whole", continuation)
+    for number, _ in continue_sequence(source, folder / "stopped", continuation, npz=True):
+        if number == last:
+            break
+    run(source, folder / "stopped", continuation, resume=True)
+    return Sequence.open(folder / "whole"), Sequence.open(folder / "stopped")
+
+
 def test_a_stopped_run_goes_on_to_the_same_result(source, tmp_path):
     continuation = Continuation(5, start=8, fade=3, wind=(0.4, 0.0, 0.0), obstacles=(Ball((0, 0, 1.6), 0.3),))
-    run(source, tmp_path / "whole", continuation)
-    for number, _ in continue_sequence(source, tmp_path / "stopped", continuation, npz=True):
-        if number == 11:
-            break
-    run(source, tmp_path / "stopped", continuation, resume=True)
-    whole, stopped = (Sequence.open(tmp_path / name) for name in ("whole", "stopped"))
+    whole, stopped = run_twice(source, tmp_path, continuation, 11)
     assert whole.frames == stopped.frames == tuple(range(1, 14))
     for number in whole.frames:
         np.testing.assert_array_equal(whole.density(number), stopped.density(number))
@@ -59,13 +64,7 @@ def test_fire_goes_on_and_fades_with_the_smoke(tmp_path):
     """A stopped run goes on with it; retimed and looped it stays too."""
     write_plume(tmp_path / "source", 6, burning=True)
     burning = open_source(tmp_path / "source")
-    continuation = Continuation(3, fade=2)
-    run(burning, tmp_path / "whole", continuation)
-    for number, _ in continue_sequence(burning, tmp_path / "stopped", continuation, npz=True):
-        if number == 8:
-            break
-    run(burning, tmp_path / "stopped", continuation, resume=True)
-    whole, stopped = (Sequence.open(tmp_path / name) for name in ("whole", "stopped"))
+    whole, stopped = run_twice(burning, tmp_path, Continuation(3, fade=2), 8)
     sums = [float(whole.flame(number).sum()) for number in whole.frames]
     assert min(sums[:7]) > 0.5 * max(sums)
     assert sums[7] == pytest.approx(0.5 * sums[6], rel=0.2)
