@@ -142,7 +142,8 @@ def levels(picture: Picture, lens: Lens) -> tuple[Level, ...]:
     for halvings in range(LEVELS):
         columns, rows = (max(8, round(n / scale / 2**halvings)) for n in (width, height))
         picture = area_average(picture, columns, rows)
-        grey: Picture = linear_to_srgb(picture).mean(-1)
+        encoded = linear_to_srgb(picture)
+        grey: Picture = (encoded[..., 0] + encoded[..., 1] + encoded[..., 2]) / np.float32(3)  # faster than a mean
         detail = ndimage.gaussian_filter(grey, FINE) - ndimage.gaussian_filter(grey, COARSE)
         contrast = np.sqrt(ndimage.gaussian_filter(detail**2, AROUND) + FAINT**2)
         found.append(Level(lens.resized(columns, rows), (detail / contrast).astype(np.float32)))

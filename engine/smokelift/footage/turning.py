@@ -8,6 +8,9 @@ found is zero up to noise, so as much is the same with it as without it, however
 motion is no turn, because smoke does not keep its shape from the middle of a clip to its ends. A camera that moves,
 but does not turn in its place, is refused (`smokelift.footage.parallax`).
 
+Most cameras stand still, and a few frames prove it: where as much as can be the same is the same as it stands, no turn
+is looked for.
+
 What the rest of the file shows around a clip is followed from its first and last frame, until the shot ends.
 """
 
@@ -22,6 +25,7 @@ from scipy.spatial.transform import Rotation
 
 from smokelift.footage.alignment import Lens, align, judged, levels, points_of, shift
 from smokelift.footage.clip import Clip, ClipError
+from smokelift.footage.evidence import GLIMPSE, SAMPLES
 from smokelift.footage.parallax import travels
 from smokelift.scene import Camera, as_matrix
 
@@ -33,6 +37,10 @@ MOVED = 0.5
 
 MOVING_FRAMES = 0.1
 """Share of the frames that have to: a knock is not worth a mosaic."""
+
+LOOKS = slice(None, None, 2)
+"""Those of the frames that `smokelift.footage.evidence` looks at which are looked at first: less than `MOVING_FRAMES`
+lie between two of them."""
 
 LEAST = 1.0
 """Pixels that the picture has to be off its mean place in some frame: less blurs it no more than a lens does."""
@@ -96,10 +104,10 @@ def find_turns(clip: Clip, *lenses: Lens) -> Turns | None:
     ValueError
         If the camera travels or zooms.
     """
+    if len(clip) == 1 or _stands_still(clip, lenses[0]):
+        return None
     middle = len(clip) // 2
     ahead, back = range(middle + 1, len(clip)), range(middle - 1, -1, -1)
-    if len(clip) == 1:
-        return None
     for lens in lenses:
         found = dict(_followed(clip, lens, middle, ahead)) | dict(_followed(clip, lens, middle, back))
         if np.median([each.same for each in found.values()]) >= HELD:
@@ -146,6 +154,21 @@ def file_turns(clip: Clip, turns: Turns) -> dict[int, Rotation]:
                     break
                 found[number] = turn
     return found
+
+
+def _stands_still(clip: Clip, lens: Lens) -> bool:
+    """Whether none of the frames that are looked at shows more of the same once it is turned."""
+    looks = clip.spread(SAMPLES)[LOOKS]
+    key = levels(clip.glimpse(looks.pop(len(looks) // 2), GLIMPSE), lens)
+    first, same = points_of(key), []
+    for number in looks:
+        picture = levels(clip.glimpse(number, GLIMPSE), lens)
+        stands = judged(first[-1], picture[-1], Rotation.identity()).same
+        # a turn cannot make so much of more than all
+        same.append(stands if stands > MOVED else align(first, picture, Rotation.identity()).same)
+        if stands <= MOVED * same[-1]:
+            return False
+    return bool(np.median(same) >= HELD) if same else False
 
 
 @dataclass(frozen=True, eq=False)

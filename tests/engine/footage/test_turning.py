@@ -31,6 +31,24 @@ def test_a_still_camera_stays_still(smoke: float, noise: float) -> None:
     assert find_turns(clip_of(frames), LENS) is None
 
 
+def test_some_frames_prove_that_a_camera_stands_still(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Most are not looked at."""
+    frames, _ = pictures(wall(), Rotation.identity(COUNT), smoke=1.0)
+    clip, looks = clip_of(np.repeat(frames, 4, axis=0)), set[int]()
+    monkeypatch.setattr(clip, "frame", lambda n, frame=clip.frame: looks.add(n) or frame(n))
+    assert find_turns(clip, LENS) is None
+    assert len(looks) <= 12
+
+
+@pytest.mark.parametrize("first", [2, COUNT - 2])
+def test_a_camera_that_moves_for_a_moment_is_found(first: int) -> None:
+    """Whenever that is."""
+    angles = np.zeros((COUNT, 3))
+    angles[first : first + 2, 1] = 0.02
+    frames, _ = pictures(wall(), Rotation.from_rotvec(angles), smoke=0.9)
+    assert find_turns(clip_of(frames), LENS) is not None
+
+
 def test_smoke_before_one_colour_is_no_camera() -> None:
     """Its texture is all there is, and rises."""
     frames, _ = pictures(np.full_like(wall(), 0.02), shake(3), smoke=1.0)
