@@ -280,19 +280,23 @@ class Video:
                     look(n, lambda divisor: self._shown_by(frame, divisor))
 
         self._container.seek(wanted[0], stream=self._stream)
+        self._decoded = self._frames()
         good = self._good_times(wanted[-1], met)
         if not good.issuperset(wanted):  # as in `_decode`
             self._rewind()
             good |= self._good_times(wanted[-1], met)
-        self._rewind()
         damaged = tuple(first + n for n, time in enumerate(wanted) if time not in good)
+        if damaged or self._failed:
+            self._rewind()
+        else:  # what follows is decoded on from there
+            self._next = self._shown[last] + 1
         self._lost.update(self._shown[n] for n in damaged)
         return damaged
 
     def _good_times(self, last: int, met: Callable[[int, av.VideoFrame], None]) -> set[int]:
         """Times of the frames that can be decoded from where the container stands, up to one; each of them is met."""
         good = set()
-        for frame in self._frames():
+        for frame in self._decoded:
             if frame.pts is not None and not frame.is_corrupt:
                 good.add(frame.pts)
                 met(frame.pts, frame)

@@ -252,6 +252,17 @@ def test_what_is_expected_is_kept_while_damage_is_looked_for(
         assert read == [6]
 
 
+def test_decoding_goes_on_from_where_damage_was_looked_for(ramp: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What follows is the right frame, and no earlier one is decoded again."""
+    with Clip.open(ramp, frames=(0, 9)) as clip:
+        assert clip.damaged == ()
+        monkeypatch.setattr(Video, "_frames", None)
+        found = clip.whole().frame(13)
+    monkeypatch.undo()
+    with Clip.open(ramp) as other:
+        assert np.array_equal(found, other.frame(13))
+
+
 def test_what_is_expected_of_pictures_is_kept(tmp_path: Path) -> None:
     for n in range(3):
         write_image(tmp_path / f"a{n}.png", np.full((8, 16, 3), 0.1 * n, np.float32))
