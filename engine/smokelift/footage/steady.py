@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import lru_cache
+from types import MappingProxyType
 
 import numpy as np
 
@@ -17,7 +18,7 @@ MIDDLE = np.full(3, 0.5, np.float32)
 """sRGB values at which it is judged whether noise brightens a clip."""
 
 
-def steady(clip: Clip, plates: Plates) -> Clip:
+def steady(clip: Clip, plates: Plates, known: Mapping[int, Picture] = MappingProxyType({})) -> Clip:
     """Return a clip whose frames are all exposed as their backgrounds are.
 
     Parameters
@@ -26,11 +27,13 @@ def steady(clip: Clip, plates: Plates) -> Clip:
         The footage. It is read when the frames of the result are.
     plates
         Its backgrounds.
+    known
+        Gains (3,) of frames that are measured already, by their numbers.
     """
     gains_of = exposures(plates)
 
     def balanced(number: int, picture: Picture) -> Picture:
-        gains = gains_of(number, picture)
+        gains = known[number] if number in known else gains_of(number, picture)
         return picture if (gains == 1).all() else picture / gains
 
     return clip.changed(balanced)

@@ -64,7 +64,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
     found = find_plates(clip, scene.camera, scene.background, lens)
     clip, plates = found.clip, found.plates
     samples = sample_smoke(clip, plates, found.turns)
-    clip = steady(clip, plates)
+    clip = steady(clip, plates, samples.gains)
     burning = fire_share(samples.colours, samples.behind)
     fire = None
     if burning:
@@ -72,7 +72,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
         fire = firelight(clip, doused)
         glow = fire_colour(clip, fire)
         clip = doused
-        samples = replace(sample_smoke(clip, plates, found.turns), exposure=samples.exposure)
+        samples = replace(sample_smoke(clip, plates, found.turns), gains=samples.gains)
     geometry = find_geometry(clip, scene, settings, plates, samples, found.turns)
     camera, domain = geometry.camera, geometry.domain
     doubts = smoke_in_plate(samples)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,8 +48,8 @@ class SmokeSamples:
         Background radiance at the same pixels.
     smoky
         Numbers of the frames with smoke, those with the most first.
-    exposure
-        Share by which the exposure of a sample differs from its background's at most; they are evened out.
+    gains
+        By how much each sample is brighter than its background, (3,), by the number of its frame; they are evened out.
     textures
         What the samples with smoke show of the texture behind it.
     """
@@ -60,8 +61,13 @@ class SmokeSamples:
     colours: NDArray[np.float32]
     behind: NDArray[np.float32]
     smoky: tuple[int, ...]
-    exposure: float
+    gains: Mapping[int, NDArray[np.float32]]
     textures: tuple[Texture, ...] = ()
+
+    @property
+    def exposure(self) -> float:
+        """Share by which the exposure of a sample differs from its background's at most."""
+        return largest_change(list(self.gains.values()))
 
 
 def sample_smoke(clip: Clip, plates: Plates, turns: Turns | None = None) -> SmokeSamples:
@@ -71,15 +77,16 @@ def sample_smoke(clip: Clip, plates: Plates, turns: Turns | None = None) -> Smok
     columns, rows = max(1, round(width / scale)), max(1, round(height / scale))
     wide = None if turns is None else WidePicture.around(turns).resized(columns, rows)
     covered, unknown = np.zeros((2, *((rows, columns) if wide is None else wide.size[::-1])), np.bool_)
-    colours, behind, gains, textures = [], [], [], []
+    colours, behind, textures = [], [], []
+    gains: dict[int, NDArray[np.float32]] = {}
     gains_of = exposures(plates)
     amounts: dict[int, int] = {}
     reduced = plates.through(lambda whole: area_average(whole, columns, rows), scale**2)
     for number in clip.spread(SAMPLES):
         plate = reduced.at(number)
         frame = clip.frame(number)
-        gains.append(gains_of(number, frame))
-        picture = area_average(frame, columns, rows) / gains[-1]
+        gains[number] = gains_of(number, frame)
+        picture = area_average(frame, columns, rows) / gains[number]
         mask = matte(picture, plate).mask
         for whole, part in ((covered, mask), (unknown, plate.confidence < UNKNOWN)):
             whole |= part if wide is None else wide.spread_out(part.astype(np.float32), number) > 0.5
@@ -94,6 +101,5 @@ def sample_smoke(clip: Clip, plates: Plates, turns: Turns | None = None) -> Smok
         corners = (wide.left, wide.top, wide.left + wide.size[0], wide.top + wide.size[1])
         left, top, right, bottom = (scale * corner for corner in corners)
         bounds = (left, top, right, bottom)
-    change = largest_change(gains)
     shown = np.concatenate(colours), np.concatenate(behind)
-    return SmokeSamples(scale, bounds, covered, unknown, *shown, smoky, change, tuple(textures))
+    return SmokeSamples(scale, bounds, covered, unknown, *shown, smoky, gains, tuple(textures))

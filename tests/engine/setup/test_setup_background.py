@@ -37,7 +37,7 @@ def test_smoke_that_may_be_in_the_plate_is_said(unknown_rows, said) -> None:
     unknown[:unknown_rows] = True
     covered[10:80] = True
     colours = np.zeros((0, 3), np.float32)
-    notes = smoke_in_plate(SmokeSamples(1.0, (0, 0, 50, 100), covered, unknown, colours, colours, (0,), 0.0))
+    notes = smoke_in_plate(SmokeSamples(1.0, (0, 0, 50, 100), covered, unknown, colours, colours, (0,), {}))
     assert bool(notes) is said
     assert not said or "75% of where smoke is or may be" in notes[0]
 

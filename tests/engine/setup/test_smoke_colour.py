@@ -19,7 +19,7 @@ def samples(source, behind, thickest=0.9):
     behind = np.broadcast_to(behind, (500, 3))
     colours = (1 - opacity) * behind + opacity * source + 0.002 * rng.standard_normal((500, 3))
     return SmokeSamples(
-        1.0, (0, 0, 1, 1), *np.ones((2, 1, 1), bool), colours.astype("f4"), behind.astype("f4"), (0,), 0.0
+        1.0, (0, 0, 1, 1), *np.ones((2, 1, 1), bool), colours.astype("f4"), behind.astype("f4"), (0,), {}
     )
 
 
@@ -72,6 +72,6 @@ def test_thin_smoke_before_a_sky_is_taken_no_more_coloured_than_it_is():
 def test_pixels_without_a_colour_say_nothing(colours):
     empty = np.zeros_like(colours)
     seen = SmokeSamples(
-        1.0, (0, 0, 1, 1), *np.ones((2, 1, 1), bool), colours.astype("f4"), empty.astype("f4"), (0,), 0.0
+        1.0, (0, 0, 1, 1), *np.ones((2, 1, 1), bool), colours.astype("f4"), empty.astype("f4"), (0,), {}
     )
     assert smoke_colour(seen, WHITE).choice.chosen == UNDETERMINED
