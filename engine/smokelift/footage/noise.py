@@ -93,8 +93,8 @@ def encode_sample(linear: Picture) -> npt.NDArray[np.uint16]:
     return np.clip(linear_to_srgb(linear) * _FIXED_POINT + 0.5, 0, 65535).astype(np.uint16)
 
 
-def decode_samples(samples: npt.NDArray[np.uint16]) -> Picture:
-    """Return what `encode_sample` stored as float32 sRGB values."""
+def decode_samples(samples: npt.NDArray[np.uint16] | npt.NDArray[np.uint32]) -> Picture:
+    """Return what `encode_sample` stored, or sums of that, as float32 sRGB values."""
     return samples.astype(np.float32) / np.float32(_FIXED_POINT)
 
 

@@ -22,6 +22,7 @@ background has to be of one colour, or known frame by frame.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -75,6 +76,9 @@ LEAST_WINDOW = 3 / 255
 
 DRIFT = 8 / 255
 """Change in sRGB values by a codec or by the light, at most. The matte takes as much for smoke."""
+
+BAND = 2**14
+"""Pixels whose samples are compared at a time: they fit the cache."""
 
 LIKE_SURROUNDINGS = 3 * DRIFT
 """Difference in sRGB values from what the surroundings let expect, of a background."""
@@ -189,8 +193,9 @@ def clear_picture(
     height, width = samples.shape[1:3]
     image = np.empty((height, width, 3), np.float32)
     known, calm = np.empty((height, width), np.bool_), np.empty((height, width), np.bool_)
-    for row in range(0, height, 64):  # in bands, for the sake of memory
-        band = slice(row, row + 64)
+    rows = max(1, BAND // width)
+    for row in range(0, height, rows):
+        band = slice(row, row + rows)
         values = shown(band)
         away = np.where(brightens[band], values, -values)
         image[band], known[band], calm[band] = _clear_value(samples[:, band], away, window, smoke.likeness)
@@ -305,15 +310,15 @@ def _backdrop(samples: npt.NDArray[np.uint16], noise: Noise) -> Picture | None:
 def _mean(samples: npt.NDArray[np.uint16], seen: npt.NDArray[np.bool_] | None) -> Picture:
     """The mean of samples in sRGB values, as far as they are seen."""
     if seen is None:
-        whole: Picture = np.mean([decode_samples(sample) for sample in samples], axis=0, dtype=np.float32)
-        return whole
+        return decode_samples(samples.sum(0, np.uint32)) / np.float32(len(samples))
     total = sum(decode_samples(sample) * shown[..., None] for sample, shown in zip(samples, seen, strict=True))
     return np.asarray(total / np.maximum(seen.sum(0), 1)[..., None], np.float32)
 
 
 def _smooth_grey(sample: npt.NDArray[np.uint16], width: float) -> npt.NDArray[np.uint16]:
     """The grey of a sample, smoothed by so many pixels that most of its noise is gone."""
-    smooth: Picture = ndimage.gaussian_filter(sample.mean(-1, dtype=np.float32), width)
+    grey = (sample[..., 0].astype(np.float32) + sample[..., 1] + sample[..., 2]) / np.float32(3)  # faster than a mean
+    smooth: Picture = ndimage.gaussian_filter(grey, width)
     return smooth.astype(np.uint16)
 
 
@@ -372,28 +377,61 @@ def _clear_value(
     grey value of the samples, with its sign turned where smoke darkens: the less, the clearer.
     """
     unseen, number = np.isnan(away), count_of_seen(away)
-    alike, pairs = (np.abs(np.diff(away, axis=0)) <= window).sum(0), (~unseen[1:] & ~unseen[:-1]).sum(0)
+    some_unseen = bool(unseen.any())
+    alike = _count(np.abs(np.diff(away, axis=0)) <= window)
+    pairs = _count(~unseen[1:] & ~unseen[:-1])
     ordered, last = np.sort(away, axis=0), np.maximum(number - 1, 0)
     # one sample may be astray
     lowest, highest = at_rank(ordered, np.minimum(1, last)), at_rank(ordered, np.maximum(last - 1, 0))
     calm = highest - lowest <= window + DRIFT
+    least = _least_stay(len(away) - 1, likeness)[pairs, alike]
+    often = number >= LEAST_SEEN * len(away)
     best = np.full(away.shape[1:], np.inf, np.float32)
     for sample in away:
         inside = (away >= sample) & (away <= sample + window)
-        stays = (inside[1:] & inside[:-1]).sum(0)
-        share = (alike - stays + PRIOR_PAIRS * likeness) / (pairs - stays + PRIOR_PAIRS)
-        certain = stays * np.log(np.clip(share, 1e-6, 1 - 1e-6)) < np.log(FALSE_ALARM)
-        certain |= (inside | unseen).all(0) & (number >= LEAST_SEEN * len(away))
-        best = np.where(certain & (sample < best), sample, best)
+        stays = _count(inside[1:] & inside[:-1])
+        certain = stays >= least
+        # a pair is inside for certain if all samples are
+        always = (inside | unseen).all(0) if some_unseen or len(away) == 1 else stays == len(away) - 1
+        certain |= always & often
+        np.copyto(best, sample, where=certain & (sample < best))
     known = np.isfinite(best)
     centre = np.where(known, best, lowest) + np.float32(0.5 * window)
     centre = np.where(calm, at_rank(ordered, np.minimum(number // 2, last)), centre)
     for _ in range(3):  # the window starts at a sample; mean shift settles it around the mean of its samples
         inside = np.abs(away - centre) <= 0.5 * window * 1.001
-        within = np.maximum(inside.sum(axis=0), 1)
+        within = np.maximum(_count(inside), 1)
         centre = np.where(inside, away, 0).sum(axis=0) / within
     value = np.einsum("tyxc,tyx->yxc", linear_samples(samples), inside.astype(np.float32)) / within[..., None]
     return value.astype(np.float32), known, calm
+
+
+def _count(holds: npt.NDArray[np.bool_]) -> npt.NDArray[np.uint8]:
+    """How often something holds along the first axis, of fewer than 256."""
+    return np.asarray(holds.view(np.uint8).sum(0, np.uint8))
+
+
+@lru_cache(maxsize=1)
+def _least_stay(most: int, likeness: float) -> npt.NDArray[np.uint8]:
+    """For how many pairs of samples a pixel has to stay at a value that is its background.
+
+    Parameters
+    ----------
+    most
+        Pairs that there are.
+    likeness
+        As of `_Smoke`.
+
+    Returns
+    -------
+    (pairs, alike) uint8
+        By the number of a pixel's pairs, and of those that are alike; more than there are where none is enough.
+    """
+    pairs, alike, stays = np.ogrid[: most + 1, : most + 1, : most + 1]
+    rest = np.maximum(pairs - stays, 0) + PRIOR_PAIRS
+    share = (np.maximum(alike - stays, 0) + PRIOR_PAIRS * likeness) / rest
+    enough = stays * np.log(np.clip(share, 1e-6, 1 - 1e-6)) < np.log(FALSE_ALARM)
+    return np.where(enough.any(-1), enough.argmax(-1), most + 1).astype(np.uint8)
 
 
 def _in_one_piece(known: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
