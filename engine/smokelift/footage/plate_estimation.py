@@ -207,7 +207,9 @@ def clear_picture(
     if not known.all():
         # or if it looks like them, too; that its difference is drift, and not faint smoke, is sure of a small one only
         apart = _unlike(image, known)
-        sure, known = (_in_one_piece(known | (calm & (apart <= most))) for most in (DRIFT, LIKE_SURROUNDINGS))
+        alike = (_in_one_piece(known | (calm & (apart <= most))) for most in (DRIFT, LIKE_SURROUNDINGS))
+        # surroundings that are unknown themselves speak for nothing
+        sure, known = (_mostly_beside(each, known) for each in alike)
     mean = _mean(samples, seen)
     if seen is not None and not seen.any(0).all():
         never = ~seen.any(0)
@@ -441,6 +443,19 @@ def _in_one_piece(known: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
     large = np.bincount(islands.ravel(), minlength=count + 1) > ISLAND * known.size
     large[0] = False
     kept: npt.NDArray[np.bool_] = large[islands]
+    return kept
+
+
+def _mostly_beside(grown: npt.NDArray[np.bool_], known: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """Without patches that were added to what is known but border on less of it than of what stays unknown."""
+    patches, count = ndimage.label(grown & ~known, structure=np.ones((3, 3)))
+    beside = np.zeros(count + 1)
+    for along, across in ((patches, grown), (patches.T, grown.T)):
+        for one, other in ((np.s_[:-1], np.s_[1:]), (np.s_[1:], np.s_[:-1])):
+            border = (along[one] > 0) & (along[other] == 0)
+            sides = np.where(across[other][border], 1, -1)
+            beside += np.bincount(along[one][border], sides, count + 1)
+    kept: npt.NDArray[np.bool_] = grown & (beside >= 0)[patches]
     return kept
 
 

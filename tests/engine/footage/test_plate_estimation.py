@@ -96,6 +96,23 @@ def test_haze_that_looks_like_its_surroundings_is_not_continued_behind_the_smoke
     assert np.median(codes_apart(plate.image, truth)[behind]) < 16
 
 
+def test_what_hardly_changes_amid_smoke_is_not_background_for_looking_like_it(tmp_path: Path) -> None:
+    """Thin smoke that hardly changes, amid a jet that never goes away and beside it."""
+    truth = np.linspace(0.15, 0.25, WIDTH, dtype=np.float32)[None, :, None].repeat(HEIGHT, 0).repeat(3, 2)
+    rows, columns = np.mgrid[:HEIGHT, :WIDTH]
+    jet = np.abs(columns - 20) < 16
+    amid, aside = (np.hypot(rows - 36, columns - middle) < 8 for middle in (20, 43))
+
+    def opacity(n: int) -> np.ndarray:
+        random = np.random.default_rng(n)
+        thick, thin = random.uniform(0.3, 0.9), random.uniform(0.06, 0.1)
+        return np.where(amid | aside, thin, np.where(jet, thick, 0.0))
+
+    plate = estimate_plate(film(tmp_path, truth, opacity, 0.9, 0.5))
+    assert plate.confidence[amid].max() < 0.5
+    assert plate.confidence[np.hypot(rows - 36, columns - 43) < 5].min() == 1.0
+
+
 def test_what_hardly_changes_is_no_smoke_however_unlike_its_surroundings(tmp_path: Path) -> None:
     """A dark jacket before a bright wall that breathes by ten codes, beside a puff."""
     jacket = np.s_[40:, :12]
