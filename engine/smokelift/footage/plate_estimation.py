@@ -339,10 +339,12 @@ def _smoke(grey: Picture, window: float) -> _Smoke:
     likeness = float(alike[pairs].mean()) if pairs.any() else 0.5
     # what most samples agree on is the background for certain
     certain = (counts.max(0) > MOST * number) & (number >= LEAST_SEEN * len(values))
-    change = np.where(smoky & certain, away, 0.0)
+    # there, what a codec's drift may be says nothing of smoke
+    change = np.where((np.abs(away) > 0.5 * window + DRIFT) & certain, away, 0.0)
     if not change.any():
         return _Smoke(likeness, 1.0, np.ones(shape, np.bool_))
-    turn = _turn(background, np.maximum(change, 0).sum(0), np.maximum(-change, 0).sum(0))
+    brighter, darker = (np.square(np.maximum(each, 0)).sum(0) for each in (change, -change))
+    turn = _turn(background, brighter, darker)
     thickest = np.quantile(values[change != 0], [0.01, 0.99])
     brightness = float(np.clip(turn, *thickest))
     behind = _filled(background.reshape(*shape, 1), certain.reshape(shape).astype(np.float32))[..., 0]

@@ -29,7 +29,11 @@ def puff(n: float) -> np.ndarray:
 
 
 def film(
-    folder: Path, plate: np.ndarray, opacity: Callable[[int], np.ndarray], colour: float, noise: float = 1.0
+    folder: Path,
+    plate: np.ndarray,
+    opacity: Callable[[int], np.ndarray],
+    colour: float | np.ndarray,
+    noise: float = 1.0,
 ) -> Clip:
     """Write and open a clip of smoke of a colour before a plate, with sensor noise in 8 bit codes."""
     random = np.random.default_rng(1)

@@ -113,6 +113,25 @@ def test_what_hardly_changes_amid_smoke_is_not_background_for_looking_like_it(tm
     assert plate.confidence[np.hypot(rows - 36, columns - 43) < 5].min() == 1.0
 
 
+def test_what_a_codec_changes_is_no_sign_of_dark_smoke(tmp_path: Path) -> None:
+    """Bright smoke passes, or never goes away; beside it some frames are some codes too dark."""
+    truth = wall(0.45, 0.5)
+    truth[:24] = wall(0.2, 0.25)[:24]
+    columns = np.arange(WIDTH)
+    smoky = np.zeros((HEIGHT, WIDTH), np.bool_)
+    smoky[8:64, 12:44] = True
+
+    def opacity(n: int) -> np.ndarray:
+        cloud = np.random.default_rng(n).uniform(0.2, 0.9, (HEIGHT, 1)).repeat(WIDTH, 1)
+        cloud[8:24] = 0.2 * (n % 12 == 1)
+        return np.where(smoky, cloud, np.where(columns < 12, 0.15 * (n % 12 == 3), 0.15 * (n % 12 == 7)))
+
+    plate = estimate_plate(film(tmp_path, truth, opacity, np.where(smoky, 0.9, 0.0)[..., None], 0.5))
+    stays = np.s_[34:56, 20:36]
+    assert plate.confidence[stays].max() < 0.5
+    assert np.median(codes_apart(plate.image, truth)[stays]) < 15
+
+
 def test_what_hardly_changes_is_no_smoke_however_unlike_its_surroundings(tmp_path: Path) -> None:
     """A dark jacket before a bright wall that breathes by ten codes, beside a puff."""
     jacket = np.s_[40:, :12]
