@@ -31,6 +31,9 @@ _WIDTH = COLUMNS * TILE[0] + (COLUMNS + 1) * _GAP
 _STARTS = (_GAP, 170, 520, 670)
 """Left edges of the columns of the table, in pixels."""
 
+PACKED = 2
+"""Level of the PNG's compression: half of the time of the usual 6, for a seventh more bytes."""
+
 _PAPER, _INK, _FAINT, _UNKNOWN = (26, 26, 28), (232, 232, 232), (165, 165, 165), (255, 170, 70)
 """Colours, sRGB."""
 
@@ -83,7 +86,7 @@ def write_page(path: Path, page: Page) -> None:
         if path.suffix.lower() == ".html":
             aside.write_text(_as_html(page), encoding="utf-8")
         else:
-            _as_picture(page).save(aside, format="PNG")
+            _as_picture(page).save(aside, format="PNG", compress_level=PACKED)
 
 
 def fitted(width: int, height: int) -> tuple[int, int]:
@@ -171,5 +174,5 @@ def _as_html(page: Page) -> str:
 def _data(picture: NDArray[np.uint8]) -> str:
     """A picture as the address of itself."""
     file = io.BytesIO()
-    Image.fromarray(picture).save(file, format="PNG")
+    Image.fromarray(picture).save(file, format="PNG", compress_level=PACKED)
     return f"data:image/png;base64,{base64.b64encode(file.getvalue()).decode('ascii')}"
