@@ -279,10 +279,11 @@ class Video:
                 if look is not None:
                     look(n, lambda divisor: self._shown_by(frame, divisor))
 
+        from_start = self._failed and wanted[0] == self._times[0]  # and one frame at a time
         self._container.seek(wanted[0], stream=self._stream)
         self._decoded = self._frames()
         good = self._good_times(wanted[-1], met)
-        if not good.issuperset(wanted):  # as in `_decode`
+        if not (from_start or good.issuperset(wanted)):  # as in `_decode`
             self._rewind()
             good |= self._good_times(wanted[-1], met)
         damaged = tuple(first + n for n, time in enumerate(wanted) if time not in good)
