@@ -8,19 +8,20 @@ from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.footage.frame_source import ClipError, DamagedFrameError, FrameSource, Look
 from smokelift.footage.image_sequence import ImageSequence
-from smokelift.footage.images import CodedPicture, Picture, Transfer, Value
+from smokelift.footage.images import CodedPicture, Picture, Transfer, Value, area_average
 from smokelift.footage.video import Video
 from smokelift.scene import ClipSource
 
 __all__ = ["Clip", "ClipError", "is_video"]
 
+AnyPicture = NDArray[Any]
 Key = TypeVar("Key", int, tuple[int, int])
 Image = TypeVar("Image", Picture, Picture | CodedPicture)
 
@@ -31,8 +32,18 @@ KEPT_BYTES = 128 * 2**20
 """Memory for the frames of a file that are kept as they are stored: twenty of 1080p at 8 bits, for what looks at the
 same ones spread over a clip."""
 
+REDUCED = 320
+"""Pixels along the longer side of the frames on which smoke and exposure are looked at."""
+
+REDUCED_BYTES = 32 * 2**20
+"""Memory for such frames that are kept: twenty-five at least."""
+
 GLIMPSE_BYTES = 64 * 2**20
 """Memory for the glimpses of a file that are kept: a hundred at a third of 1080p."""
+
+
+def _whole(picture: AnyPicture) -> AnyPicture:
+    return picture
 
 
 class Clip:
@@ -78,6 +89,7 @@ class Clip:
         self.first = first
         self._count = last - first + 1
         self._cache: OrderedDict[int, Picture] = OrderedDict()
+        self._reduced: OrderedDict[int, Picture] = OrderedDict()
         if size is None:
             height, width = self.frame(0).shape[:2]
             size = (width, height)
@@ -197,8 +209,19 @@ class Clip:
             self._cache.popitem(last=False)
         return image
 
-    def frame_through(self, n: int, change: Callable[[Picture], NDArray[Value]]) -> NDArray[Value]:
+    def frame_through(
+        self, n: int, change: Callable[[Picture], NDArray[Value]], cut: Callable[[AnyPicture], AnyPicture] = _whole
+    ) -> NDArray[Value]:
         """Return frame ``n`` with a function applied to every linear value by itself, which may be cheaper that way.
+
+        Parameters
+        ----------
+        n
+            As of `frame`.
+        change
+            Of linear values.
+        cut
+            Takes some of the pixels (rows, columns, 3), whatever their values are; without it all are taken.
 
         Raises
         ------
@@ -206,7 +229,33 @@ class Clip:
             As `frame` does.
         """
         image = self._cache[n] if n in self._cache else self._read(n, self._source.read)
-        return image.through(change) if isinstance(image, CodedPicture) else change(image)
+        return _through(image, change, cut)
+
+    def glimpse_through(self, n: int, longest: int, change: Callable[[Picture], NDArray[Value]]) -> NDArray[Value]:
+        """Return `glimpse` with a function applied as by `frame_through`."""
+        divisor = max(self.size) // longest
+        if divisor < 2:
+            return self.frame_through(n, change)
+        return _through(self._read(n, lambda number: self._source.glimpse(number, divisor)), change, _whole)
+
+    def reduced(self, n: int) -> Picture:
+        """Return frame ``n`` as means of light, with `REDUCED` pixels along the longer side at most.
+
+        Raises
+        ------
+        ClipError
+            As `frame` does.
+        """
+        if n not in self._reduced:
+            _keep(self._reduced, n, area_average(self.frame(n), *self.reduced_size), REDUCED_BYTES)
+        return self._reduced[n]
+
+    @property
+    def reduced_size(self) -> tuple[int, int]:
+        """Width and height of a `reduced` frame."""
+        width, height = self.size
+        scale = max(1.0, max(self.size) / REDUCED)
+        return max(1, round(width / scale)), max(1, round(height / scale))
 
     def glimpse(self, n: int, longest: int) -> Picture:
         """Return frame ``n`` for a look, linear: it may be reduced while it is read, which is cheaper.
@@ -377,7 +426,7 @@ class _Changed:
         self._source.close()
 
 
-def _keep(kept: OrderedDict[Key, Picture | CodedPicture], key: Key, image: Picture | CodedPicture, most: int) -> None:
+def _keep(kept: OrderedDict[Key, Image], key: Key, image: Image, most: int) -> None:
     """Put a picture, which is read-only from now on, beside the last ones in so many bytes."""
     (image.codes if isinstance(image, CodedPicture) else image).flags.writeable = False
     kept[key] = image
@@ -387,6 +436,14 @@ def _keep(kept: OrderedDict[Key, Picture | CodedPicture], key: Key, image: Pictu
 
 def _linear(image: Picture | CodedPicture) -> Picture:
     return image.linear() if isinstance(image, CodedPicture) else image
+
+
+def _through(
+    image: Picture | CodedPicture, change: Callable[[Picture], NDArray[Value]], cut: Callable[[AnyPicture], AnyPicture]
+) -> NDArray[Value]:
+    if isinstance(image, CodedPicture):
+        return CodedPicture(cut(image.codes), image.table).through(change)
+    return change(cut(image))
 
 
 def numbered(frames: Sequence[int]) -> str:

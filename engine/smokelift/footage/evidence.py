@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
-import numpy.typing as npt
+from numpy.typing import NDArray
 
 from smokelift.footage.clip import Clip, ClipError
 from smokelift.footage.exposure import LONGEST, gain_of, small
-from smokelift.footage.images import Picture, linear_to_srgb
+from smokelift.footage.images import Picture, Value, linear_to_srgb
 
 SAMPLES = 24
 """Frames of the file that are compared, and as many of the clip at most."""
@@ -36,7 +36,7 @@ def evidence(clip: Clip) -> Clip:
     whole = clip.whole()
     if len(whole) == len(clip):
         return clip
-    own = np.stack([_small(clip, number) for number in clip.spread(SAMPLES)])
+    own = np.stack([small(clip.glimpse(number, GLIMPSE)) for number in clip.spread(SAMPLES)])
     reference = np.median(own, axis=0)
     still = np.quantile(np.abs(linear_to_srgb(own) - linear_to_srgb(reference)).max(-1), 0.9, axis=0) < STILL
     first, last = clip.first, clip.first + len(clip) - 1
@@ -54,25 +54,28 @@ def evidence(clip: Clip) -> Clip:
     return whole.part(first if start is None else start, last)
 
 
-def glimpses(clip: Clip, shot: Clip) -> Iterator[Picture]:
-    """Glimpse again at the frames from which `evidence` found that a clip belongs to a shot, linear."""
-    yield from (clip.glimpse(number, GLIMPSE) for number in clip.spread(SAMPLES))
+def glimpses(clip: Clip, shot: Clip, change: Callable[[Picture], NDArray[Value]]) -> Iterator[NDArray[Value]]:
+    """Glimpse again at the frames from which `evidence` found that a clip belongs to a shot.
+
+    ``change`` is applied to every linear value by itself; `linear` leaves it.
+    """
+    yield from (clip.glimpse_through(number, GLIMPSE, change) for number in clip.spread(SAMPLES))
     if len(shot) > len(clip):
         whole = clip.whole()
         for number in whole.spread(SAMPLES):
             if 0 <= number - shot.first < len(shot) and not 0 <= number - clip.first < len(clip):
-                yield whole.glimpse(number, GLIMPSE)
+                yield whole.glimpse_through(number, GLIMPSE, change)
 
 
-def _small(clip: Clip, number: int) -> Picture:
-    """A frame at the size at which it is compared."""
-    return small(clip.glimpse(number, GLIMPSE))
+def linear(values: Picture) -> Picture:
+    """Return linear values as they are."""
+    return values
 
 
-def _same(whole: Clip, number: int, reference: Picture, still: npt.NDArray[np.bool_]) -> bool:
+def _same(whole: Clip, number: int, reference: Picture, still: NDArray[np.bool_]) -> bool:
     """Whether a frame of the file can be read and belongs to the shot."""
     try:
-        picture = _small(whole, number)
+        picture = small(whole.glimpse(number, GLIMPSE))
     except ClipError:
         return False
     if not still.any():

@@ -6,16 +6,17 @@ more than all else that is looked at before a run.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from smokelift.footage.clip import Clip
-from smokelift.footage.evidence import GLIMPSE, glimpses
+from smokelift.footage.evidence import GLIMPSE, glimpses, linear
 from smokelift.footage.exposure import sample_gains, small
 from smokelift.footage.images import Picture, area_average
-from smokelift.footage.noise import BLOCK, Noise, encode_sample
+from smokelift.footage.noise import BLOCK, Noise, encode_sample, linear_samples
 from smokelift.footage.plate import Plate
 from smokelift.footage.plate_estimation import backdrop_plate, clip_noise
 
@@ -46,35 +47,35 @@ def plain_plate(clip: Clip, shot: Clip) -> Plate | None:
     if divisor < 2 or min(width, height) < APART * BLOCK:
         return None
     columns, rows = round(width / divisor), max(1, round(height / divisor))
-    seen = [area_average(glimpse, columns, rows) for glimpse in glimpses(clip, shot)]
-    if _colour(seen, [small(glimpse) for glimpse in seen]) is None:
+    shown = list(glimpses(clip, shot, linear))
+    fits = all(glimpse.shape[:2] == (rows, columns) for glimpse in shown)
+    seen = shown if fits else [area_average(glimpse, columns, rows) for glimpse in shown]
+    samples = glimpses(clip, shot, encode_sample) if fits else map(encode_sample, seen)
+    if _colour(samples, [small(glimpse) for glimpse in seen]) is None:
         return None
-    parts, whole = [], []
-    for number in clip.spread(SAMPLES):
-        frame = clip.frame(number)
-        parts.append(_some_blocks(frame))
-        whole.append(small(frame))
-    found = _colour(parts, whole)
+    numbers = clip.spread(SAMPLES)
+    parts = (clip.frame_through(number, encode_sample, _some_blocks) for number in numbers)
+    found = _colour(parts, [small(clip.reduced(number)) for number in numbers])
     if found is None:
         return None
     colour, noise = found
     return Plate(np.tile(colour, (height, width, 1)), np.ones((height, width), np.float32), noise)
 
 
-def _colour(pictures: Sequence[Picture], whole: Sequence[Picture]) -> tuple[Picture, Noise] | None:
+def _colour(encoded: Iterable[npt.NDArray[np.uint16]], whole: Sequence[Picture]) -> tuple[Picture, Noise] | None:
     """The linear colour (3,) of all of the background and the noise, or None if it has other colours.
 
     Parameters
     ----------
-    pictures
-        Linear, of one size.
+    encoded
+        Pictures of one size, as of `encode_sample`.
     whole
         What shows the exposure of each: the `small` picture of its frame.
     """
-    gains = sample_gains(np.stack(whole))
-    samples: npt.NDArray[np.uint16] = np.empty((len(pictures), *pictures[0].shape), np.uint16)
-    for sample, picture, gain in zip(samples, pictures, gains, strict=True):
-        sample[...] = encode_sample(picture / gain)
+    samples = np.stack(list(encoded))
+    for sample, gain in zip(samples, sample_gains(np.stack(whole)), strict=True):
+        if (gain != 1).any():
+            sample[...] = encode_sample(linear_samples(sample) / gain)
     noise = clip_noise(samples)
     found = backdrop_plate(samples, noise)
     if found is None or (found.image != found.image[0, 0]).any():
@@ -82,7 +83,7 @@ def _colour(pictures: Sequence[Picture], whole: Sequence[Picture]) -> tuple[Pict
     return found.image[0, 0], noise
 
 
-def _some_blocks(picture: Picture) -> Picture:
+def _some_blocks(picture: npt.NDArray[Any]) -> npt.NDArray[Any]:
     """A picture of some blocks, side by side, of those whose means tell the noise that lasts."""
     step = APART * BLOCK
     rows, columns = (n // step for n in picture.shape[:2])

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.footage.clip import Clip
+from smokelift.footage.clip import REDUCED, Clip
 from smokelift.footage.exposure import largest_change
 from smokelift.footage.images import area_average
 from smokelift.footage.matte import matte
@@ -23,9 +23,6 @@ SAMPLES = 16
 
 UNKNOWN = 0.5
 """Confidence of a plate below which what is behind the smoke is unknown there."""
-
-LONGEST_SIDE = 320
-"""Pixels along the longer side of the reduced pictures."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,20 +70,20 @@ class SmokeSamples:
 def sample_smoke(clip: Clip, plates: Plates, turns: Turns | None = None) -> SmokeSamples:
     """Find the smoke in frames spread over a clip, whose camera may turn and whose exposure may change."""
     width, height = clip.size
-    scale = max(1.0, max(width, height) / LONGEST_SIDE)
-    columns, rows = max(1, round(width / scale)), max(1, round(height / scale))
+    scale = max(1.0, max(width, height) / REDUCED)
+    columns, rows = clip.reduced_size
     wide = None if turns is None else WidePicture.around(turns).resized(columns, rows)
     covered, unknown = np.zeros((2, *((rows, columns) if wide is None else wide.size[::-1])), np.bool_)
     colours, behind, textures = [], [], []
     gains: dict[int, NDArray[np.float32]] = {}
-    gains_of = exposures(plates)
     amounts: dict[int, int] = {}
     reduced = plates.through(lambda whole: area_average(whole, columns, rows), scale**2)
+    gains_of = exposures(reduced)
     for number in clip.spread(SAMPLES):
         plate = reduced.at(number)
-        frame = clip.frame(number)
+        frame = clip.reduced(number)
         gains[number] = gains_of(number, frame)
-        picture = area_average(frame, columns, rows) / gains[number]
+        picture = frame / gains[number]
         mask = matte(picture, plate).mask
         for whole, part in ((covered, mask), (unknown, plate.confidence < UNKNOWN)):
             whole |= part if wide is None else wide.spread_out(part.astype(np.float32), number) > 0.5

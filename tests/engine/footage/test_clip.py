@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 
 from smokelift.footage.clip import Clip, ClipError
-from smokelift.footage.images import CodedPicture, Picture, linear_to_srgb, srgb_to_linear
+from smokelift.footage.images import CodedPicture, Picture, area_average, linear_to_srgb, srgb_to_linear
 from smokelift.footage.noise import encode_sample
 from smokelift.footage.video import Video
 from smokelift.output.images import write_image
@@ -210,8 +210,20 @@ def test_a_frame_through_a_function_is_the_function_of_the_frame(tmp_path: Path)
             found = clip.frame_through(last, encode_sample)
             assert found.dtype == np.uint16
             assert np.array_equal(found, encode_sample(other.frame(last)))
+            some = clip.frame_through(last, encode_sample, lambda picture: picture[3:9, ::2])
+            assert np.array_equal(some, found[3:9, ::2])
+            assert np.array_equal(clip.glimpse_through(last, 16, encode_sample), encode_sample(other.glimpse(last, 16)))
             with pytest.raises(ClipError, match="no frame"):
                 clip.frame_through(last + 1, encode_sample)
+
+
+def test_reduced_frames_are_means_of_light_and_kept(tmp_path: Path) -> None:
+    random = np.random.default_rng(4)
+    with Clip.open(encode(tmp_path / "wide.mp4", random.integers(0, 256, (2, 32, 700, 3), np.uint8))) as clip:
+        found = clip.reduced(1)
+        assert found.shape == (15, 320, 3)
+        assert np.array_equal(found, area_average(clip.frame(1), 320, 15))
+        assert clip.reduced(1) is found
 
 
 def test_frames_are_decoded_once_for_all_clips_of_a_file(ramp: Path, monkeypatch: pytest.MonkeyPatch) -> None:
