@@ -109,7 +109,7 @@ SMOKELIFT_INLINE void BlockTransport::follow(const Direction &d, const Sources &
     const float *const all_passed = classes_[class_of(d)].passed.data();
     const float *const all_sources = sources[class_of(d)].data();
     const auto place = [](int step, int along, int count) { return along > 0 ? step : count - 1 - step; };
-    const auto cross_row = [&](std::size_t first, const float *__restrict in, float *__restrict out)
+    const auto cross_row = [&, nz = nz](std::size_t first, const float *__restrict in, float *__restrict out)
                                SMOKELIFT_INLINE_LAMBDA {
                                    visit(first, nz, in);
                                    const float *__restrict passed = all_passed + first;

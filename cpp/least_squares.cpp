@@ -78,7 +78,7 @@ double LeastSquares::sweep(const StaggeredIn &u, In offset, const StaggeredOut &
                            Workers &workers) const {
     const int nx = box_.cells[0], slabs = nx + 1;
     const int size = std::clamp(nx / 8, 4, 16), blocks = (slabs + size - 1) / size;
-    const auto &[first_order, second_order, kinetic] = regularisation_;
+    const Regularisation &r = regularisation_;
 
     const auto stress = [&](Window &window, int i) {
         for (int c = 0; c < 3; ++c) {
@@ -94,7 +94,7 @@ double LeastSquares::sweep(const StaggeredIn &u, In offset, const StaggeredOut &
                 pointwise = window.irrotational(c);
             }
             smoothness_slab(window.vorticity(std::max(i - 1, low[0]))[c], window.vorticity(i)[c],
-                            window.vorticity(std::min(i + 1, nx - 1))[c], low, box_.cells, second_order,
+                            window.vorticity(std::min(i + 1, nx - 1))[c], low, box_.cells, r.second_order,
                             pointwise, out);
         }
     };
@@ -114,13 +114,13 @@ double LeastSquares::sweep(const StaggeredIn &u, In offset, const StaggeredOut &
             if (i < u[c].n[0]) {
                 const In a = slab(u[c], i);
                 out[c] = slab(result[c], i);
-                if (first_order > 0) {
+                if (r.first_order > 0) {
                     smoothness_slab(slab(u[c], std::max(i - 1, 0)), a,
                                     slab(u[c], std::min(i + 1, u[c].n[0] - 1)), {0, 0, 0}, u[c].n,
-                                    first_order, {}, out[c]);
-                    add_scaled(a.data, kinetic, out[c].data, a.slab_size());
+                                    r.first_order, {}, out[c]);
+                    add_scaled(a.data, r.kinetic, out[c].data, a.slab_size());
                 } else {
-                    scaled(a.data, kinetic, out[c].data, a.slab_size());
+                    scaled(a.data, r.kinetic, out[c].data, a.slab_size());
                 }
             }
         add_curl_transposed_slab(read(window.stress(i)), read(window.stress(i + 1)), out);

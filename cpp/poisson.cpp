@@ -66,7 +66,7 @@ void Poisson::solve(Out f, Workers &workers) const {
                 *p -= float(mean);
         });
     }
-    workers.run(nx, [&](int i) {
+    workers.run(nx, [&, ny = ny, nz = nz](int i) {
         thread_local std::vector<float> scratch;
         z_.rows_to_modes(f.row(i, 0), ny, f.row(i, 0), scratch);
         y_.columns_to_modes(f.row(i, 0), nz, nz, f.row(i, 0), nz, scratch);
@@ -92,7 +92,7 @@ void Poisson::solve(Out f, Workers &workers) const {
             pivots[std::size_t(nx - 1) * nz] = 0;
         tridiagonal(f.row(0, j), pivots.data(), nx, slab, nz);
     });
-    workers.run(nx, [&](int i) {
+    workers.run(nx, [&, ny = ny, nz = nz](int i) {
         thread_local std::vector<float> scratch;
         y_.columns_from_modes(f.row(i, 0), nz, nz, f.row(i, 0), nz, scratch);
         z_.rows_from_modes(f.row(i, 0), ny, f.row(i, 0), scratch);
