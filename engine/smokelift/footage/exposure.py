@@ -44,7 +44,8 @@ def gain_of(picture: Picture, background: Picture) -> Picture:
     """
     low, high = USABLE
     gains = np.ones(3, np.float32)
-    usable = ((background > low) & (background < high) & (picture > low) & (picture < high)).all(-1)
+    within = (background > low) & (background < high) & (picture > low) & (picture < high)
+    usable = within[..., 0] & within[..., 1] & within[..., 2]
     if usable.mean() < 0.01:
         return gains
     ratios = np.log(picture[usable] / background[usable])
@@ -76,7 +77,9 @@ def sample_gains(samples: npt.NDArray[np.float32]) -> Picture:
     gains = np.ones((len(samples), 3), np.float32)
     for _ in range(3):  # the median of unsteady frames is less certain than that of steady ones
         reference = median_of_seen(samples / gains[:, None, None])
-        gains = np.stack([gain_of(sample, reference) for sample in samples])
+        before, gains = gains, np.stack([gain_of(sample, reference) for sample in samples])
+        if (gains == before).all():  # as they would stay
+            break
     return gains
 
 
