@@ -86,7 +86,7 @@ def facts(shot: Shot, given: Scene, cost: Cost) -> tuple[Fact, ...]:
     scene, domain = shot.scene, shot.scene.domain
     plate = shot.views[0].plates.at(0)
     size = " x ".join(f"{high - low:.3g}" for low, high in zip(domain.min, domain.max, strict=True))
-    calibrated = given.camera is not None
+    calibrated, boxed = given.camera is not None, given.domain is not None
     medium = scene.medium
     thick = f"{medium.extinction:.3g} 1/m at density 1"
     tint = "grey" if medium.is_grey else ", ".join(f"{v:.2f}" for v in medium.color)
@@ -105,9 +105,9 @@ def facts(shot: Shot, given: Scene, cost: Cost) -> tuple[Fact, ...]:
             calibrated,
             _said(shot, "Camera"),
         ),
-        _known("scale", f"box of {size} m", calibrated, f"{taken} Give [camera] and [domain] in metres."),
-        Fact("box", "as given", "given") if calibrated else Fact("box", around, "estimated", _said(shot, "Domain")),
-        _chosen(shot, "resolution", "grid", " x ".join(map(str, domain.resolution)), calibrated),
+        _known("scale", f"box of {size} m", boxed, f"{taken} Give [camera] and [domain] in metres."),
+        Fact("box", "as given", "given") if boxed else Fact("box", around, "estimated", _said(shot, "Domain")),
+        _chosen(shot, "resolution", "grid", " x ".join(map(str, domain.resolution)), boxed),
         _known("extinction", thick, told, f"A picture shows it times the density only. {know}"),
         _known("albedo", f"{medium.albedo:.3g}", told, f"A picture shows it times the light only. {know}"),
         _chosen(shot, "smoke colour", "smoke colour", tint, told),

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from smokelift.footage.alignment import Lens
+from smokelift.density.screen import view_frame
+from smokelift.footage.alignment import Array, Lens
 from smokelift.footage.clip import Clip
 from smokelift.footage.lens import FILM_DIAGONAL, FILM_WIDTH
 from smokelift.footage.plate import Plates
@@ -73,13 +74,13 @@ def find_geometry(
     Raises
     ------
     ValueError
-        If the scene gives one of the two without the other, or an inlet without either.
+        If the scene gives a box without its camera or an inlet without its box, or no box for a camera that moves,
+        looks steeply up or down, or is orthographic.
     """
     tolerance = settings.selection.lost_detail
-    if scene.camera is not None:
-        camera = _turning(fitting(scene.camera, clip), turns)
-        if scene.domain is None:
-            raise ValueError("The scene gives a camera but no box in [domain]; give the one that holds the smoke.")
+    given = None if scene.camera is None else fitting(scene.camera, clip)
+    if given is not None and scene.domain is not None:
+        camera = _turning(given, turns)
         if settings.resolution == "auto":
             grids = _same_shape(scene.domain, LONGEST_SIDE[settings.quality])
             return Geometry(camera, *_resolved(clip, camera, grids, plates, samples.smoky, tolerance))
@@ -90,11 +91,15 @@ def find_geometry(
     if scene.domain is not None:
         raise ValueError("The scene gives a [domain] but no [camera]; give the camera that filmed it.")
     if scene.inlets:
+        raise ValueError("The scene marks an [[inlet]] but gives no [domain]; give camera and box to say where it is.")
+    if given is not None and not _boxes(given):
         raise ValueError(
-            "The scene marks an [[inlet]] but gives no [camera] and [domain]; give both to say where it is."
+            "The scene gives a camera but no box in [domain]; give the one that holds the smoke. It is found only for "
+            "a perspective camera that does not move or look steeply up or down."
         )
     focal = _focal(clip) if turns is None else turns.lens.focal[0]
-    camera, grids = _uncalibrated(clip, focal, samples, settings)
+    camera = given or _level(clip, focal)
+    grids = _around(camera, samples, settings)
     camera = _turning(camera, turns)
     if isinstance(settings.resolution, tuple):
         domain, choice = grids[-1], _resolution_by_hand(grids[-1])
@@ -103,11 +108,9 @@ def find_geometry(
     else:
         domain, choice = grids[-1], None
     size = " x ".join(f"{high - low:.2f}" for low, high in zip(domain.min, domain.max, strict=True))
-    millimetres = FILM_WIDTH * focal / max(clip.size)
-    usual = f"a level {millimetres:.0f} mm lens on {FILM_WIDTH:g} mm film"
-    lens = usual if clip.lens is None else f"level, {clip.lens:g} mm as the file says"
+    missing = "Box not given:" if given is not None else f"Camera not given: {_assumed_lens(clip, focal)},"
     notes = (
-        f"Camera not given: {lens}, the picture taken to be {PICTURE_HEIGHT:g} m high where the smoke is.",
+        f"{missing} the picture taken to be {PICTURE_HEIGHT:g} m high where the smoke is.",
         f"Domain around the smoke: {size} m, {' x '.join(map(str, domain.resolution))} voxels.",
     )
     return Geometry(camera, domain, choice, notes)
@@ -162,42 +165,74 @@ def _resolution_by_hand(domain: Domain) -> Choice[Shape]:
     return Choice("resolution", domain.resolution, f"Resolution by hand: {said} voxels.", by_hand=True)
 
 
-def _uncalibrated(
-    clip: Clip, focal: float, samples: SmokeSamples, settings: Settings
-) -> tuple[Camera, tuple[Domain, ...]]:
-    """A level camera of a focal length in pixels that looks along +Y, and the box around the smoke at its distance.
+def _assumed_lens(clip: Clip, focal: float) -> str:
+    """What is assumed of a camera that is not given, with its focal length in pixels."""
+    if clip.lens is not None:
+        return f"level, {clip.lens:g} mm as the file says"
+    return f"a level {FILM_WIDTH * focal / max(clip.size):.0f} mm lens on {FILM_WIDTH:g} mm film"
+
+
+def _level(clip: Clip, focal: float) -> Camera:
+    """A level camera of a focal length in pixels that looks along +Y at the world's origin."""
+    width, height = clip.size
+    distance = focal * PICTURE_HEIGHT / height
+    matrix = np.array([[1, 0, 0, 0], [0, 0, -1, -distance], [0, 1, 0, PICTURE_HEIGHT / 2], [0, 0, 0, 1]], np.float64)
+    return Camera("perspective", as_matrix(matrix), (width, height), focal, focal, width / 2, height / 2)
+
+
+def _boxes(camera: Camera) -> bool:
+    """Whether a box can be put around the smoke in a camera's picture: all of it shows what is ahead, not above."""
+    if camera.type != "perspective" or camera.moves:
+        return False
+    _, along, up = view_frame(camera)
+    width, height = camera.size
+    ahead = _ways(camera, np.array([0, 0, width, width]), np.array([0, height, 0, height])) @ along
+    return bool(up[2] == 1 and np.all(ahead > 0))
+
+
+def _ways(camera: Camera, x: Array, y: Array) -> Array:
+    """Directions (n, 3) in the world to what shows at some pixels; ``fy`` long along the way that the camera looks."""
+    turn = np.array(camera.matrix, np.float64)[:3, :3]
+    pixels = [(x - camera.cx) * camera.fy / camera.fx, camera.cy - y, np.full(x.shape, -camera.fy)]
+    return np.asarray(np.stack(pixels, -1) @ turn.T)
+
+
+def _around(camera: Camera, samples: SmokeSamples, settings: Settings) -> tuple[Domain, ...]:
+    """The box around the smoke before a camera, upright where the picture of a level one is `PICTURE_HEIGHT` high.
 
     The box comes with every number of voxels that may be chosen, the fewest first.
     """
-    width, height = clip.size
-    metres = PICTURE_HEIGHT / height
-    distance = focal * metres
-    matrix = np.array([[1, 0, 0, 0], [0, 0, -1, -distance], [0, 1, 0, PICTURE_HEIGHT / 2], [0, 0, 0, 1]], np.float64)
-    camera = Camera("perspective", as_matrix(matrix), (width, height), focal, focal, width / 2, height / 2)
+    metres = PICTURE_HEIGHT / camera.size[1]
+    distance = camera.fy * metres
+    lateral, along, _ = view_frame(camera)
+    eye = np.array(camera.matrix, np.float64)[:3, 3]
     left, right, top, bottom = _covered(samples)
-    across = max(right - left, NARROWEST * (bottom - top)) * metres
-    up = max(bottom - top, NARROWEST * (right - left)) * metres
+    ways = _ways(camera, np.array([left, left, right, right]), np.array([top, bottom, top, bottom]))
+    ways *= metres * (camera.fy / (ways @ along))[:, None]
+    aside, height = ways @ lateral, ways[:, 2]
+    across = max(np.ptp(aside), NARROWEST * np.ptp(height))
+    up = max(np.ptp(height), NARROWEST * np.ptp(aside))
     # the far side of the box has to fill the picture too
     across *= 1 + across / (2 * distance)
-    centre_x = ((left + right) / 2 - width / 2) * metres
-    bottom_z = PICTURE_HEIGHT / 2 - (bottom - height / 2) * metres
+    base = eye + distance * along + (aside.min() + aside.max()) / 2 * lateral
+    base[2] = eye[2] + height.min()
 
     def box(voxel: float, resolution: tuple[int, int, int]) -> Domain:
         size = np.array(resolution) * voxel
-        low = np.array([centre_x - size[0] / 2, -size[1] / 2, bottom_z])
+        low = base - size * (0.5, 0.5, 0)
         high = low + size
         return Domain(
             (float(low[0]), float(low[1]), float(low[2])), (float(high[0]), float(high[1]), float(high[2])), resolution
         )
 
     if isinstance(settings.resolution, tuple):
-        x, y, z = settings.resolution
-        return camera, (box(max(across / x, across / y, up / z), settings.resolution),)
+        nx, ny, nz = settings.resolution
+        return (box(max(across / nx, across / ny, up / nz), settings.resolution),)
     grids = []
     for longest in range(COARSEST, LONGEST_SIDE[settings.quality] + 1, 4):
         voxel = max(across, up) / longest
         grids.append(box(voxel, (_voxels(across, voxel), _voxels(across, voxel), _voxels(up, voxel))))
-    return camera, tuple(grids)
+    return tuple(grids)
 
 
 def _covered(samples: SmokeSamples) -> tuple[float, float, float, float]:

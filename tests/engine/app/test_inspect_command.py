@@ -86,6 +86,15 @@ def test_what_is_given_is_called_given(shot, capsys) -> None:
     assert "sun's direction" not in known
 
 
+def test_a_camera_that_is_given_without_its_box_has_a_box_that_is_found(plume, tmp_path, capsys) -> None:
+    """Only the camera is called given."""
+    replace(plume.scene, domain=None).save(tmp_path / "scene.toml")
+    assert command("inspect", tmp_path / "scene.toml", "--progress", "json", *QUICK) == 0
+    known = {fact["what"]: fact["origin"] for fact in events(capsys.readouterr().out)[-1]["facts"]}
+    assert known["camera"] == "given"
+    assert (known["scale"], known["box"], known["grid"]) == ("undetermined", "estimated", "measured")
+
+
 def test_a_page_of_a_moving_camera_has_its_path(tracked, tmp_path) -> None:
     """Where the box goes in the picture."""
     tracked.save(tmp_path / "scene.toml")
