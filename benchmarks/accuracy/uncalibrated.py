@@ -2,118 +2,152 @@
 
     python -m benchmarks.accuracy.uncalibrated --capture CAPTURE --wall WALL/scene.toml
 
-CAPTURE holds a scene.toml with camera and box, and camera00.toml of a camera that only scores. It is reconstructed as
-it is, and with the clip alone; each result is then laid where camera 00 sees it best: turned, moved, scaled where no
-length is told, and with one gain. WALL is a clip of smoke before something with a pattern.
+CAPTURE holds a scene.toml with camera, box and background, and camera00.toml of a camera that only scores. The clip is
+reconstructed with all of that, with nothing, and with every choice between of what of the camera and the box is told;
+each result is then laid where camera 00 sees it best (`laying`). WALL is a clip of smoke before something with a
+pattern.
+
+What is not told is estimated from the whole clip. Frames are then reconstructed one by one, as the first of a clip.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
-from scipy.optimize import minimize
-from scipy.spatial.transform import Rotation
 
-from benchmarks.accuracy.exposure import best_gain
+from benchmarks.accuracy.exchange import Told, partly
+from benchmarks.accuracy.laying import Result, Score, Seen, best_laid, scores, starts
 from benchmarks.accuracy.runs import run_settings
 from benchmarks.accuracy.scenes import REAL_SIZE, camera_of
-from smokelift import Camera, Clip, Scene, reconstruct
-from smokelift.evaluation.frame_means import eight_bit_values
+from smokelift import Clip, Scene, Settings, reconstruct
 from smokelift.evaluation.metrics import psnr
 from smokelift.footage.images import area_average, linear_to_srgb
-from smokelift.render import Image, scene_renderer
+from smokelift.render import Image, Volume, scene_renderer
 from smokelift.scene import CompleteScene
 from smokelift.setup.prepare import prepare_shot
-from smokelift.transport import Array
+from smokelift.setup.settings import SelectionSettings
 
 RUN = "balanced:detail=0"
 """The usual quality, without detail that is made up."""
 
+FRAMES = (30, 50, 70, 90)
+"""Frames of a capture that are scored."""
+
+WALL_STEP = 6
+"""Every such frame of the clip before a wall is looked at."""
+
 COVERED = 0.02
 """Share of the light behind that smoke takes away where the box of the smoke in a picture begins."""
 
-FINE = 6.0
+WIDE = 6.0
 """Pixels over which a pattern is taken as one: its mean over them is left out."""
-
-COARSE = 3
-"""Pixels along each side that are one while a result is laid."""
 
 AWAY = (-21, -14, -7, 7, 14, 21)
 """Pixels down and to the right by which a background is moved to tell what correlates by chance."""
 
-BLACK = np.zeros(3, np.float32)
-
-Matrix = npt.NDArray[np.float64]
+STRONGER = 2.0
+"""Ratio of lights that meet the clip about equally: how much it costs that the light is unknown."""
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
-    """A reconstruction of some frames.
+class FrontFigures:
+    """What a reconstructed frame shows where it was filmed from.
 
     Attributes
     ----------
-    scene
-        With all that was estimated.
-    densities
-        By the number of the frame.
     box
-        PSNR of each frame's input view in the box of the smoke in the picture, of displayed values (dB).
+        PSNR of the input view in the box of the smoke in the picture, of displayed values (dB).
     inside
         PSNR inside the smoke as the reconstruction says it (dB).
     pattern
-        Correlation of the optical depth along the pixels with what is behind, both without their means over `FINE`.
-    chance
-        Standard deviation of that correlation with the background of other places (`AWAY`), which no smoke can have.
+        Correlation of the optical depth along the pixels with what is behind, both without their means over `WIDE`.
+    elsewhere : (36,)
+        The same with the background of other places (`AWAY`), which no smoke can have.
     """
 
-    scene: CompleteScene
-    densities: dict[int, Array]
-    box: list[float]
-    inside: list[float]
-    pattern: list[float]
-    chance: list[float]
+    box: float
+    inside: float
+    pattern: float
+    elsewhere: npt.NDArray[np.float64]
 
 
-def found(scene: Scene, frames: range) -> Found:
-    """Reconstruct frames of a scene, and compare each with its picture."""
+def found(scene: Scene, settings: Settings, numbers: Iterable[int]) -> tuple[Result, list[FrontFigures]]:
+    """Reconstruct single frames of a scene, by their numbers; those without smoke have no figures."""
     assert scene.clip is not None
-    source = replace(scene.clip, frames=(frames[0], frames[-1]))
-    settings = run_settings(RUN)
-    densities, box, inside, pattern, chance = {}, [], [], [], []
-    with Clip.open(source) as clip:
+    densities: dict[int, Volume] = {}
+    figures = []
+    with Clip.open(scene.clip) as clip:
         shot = prepare_shot(clip, scene, settings)
-        for number, frame in enumerate(reconstruct(clip, scene, settings, shot=shot)):
-            seen = shot.views[0].observe(number, shot.scene.domain)
-            if seen is None or "psnr" not in frame.figures:
-                continue
-            behind = seen.plate.image
-            renderer = scene_renderer(shot.scene, seen.camera, behind)
-            shown = renderer.image(frame.density)
-            covered = renderer.transmittance < 1 - COVERED
-            if not covered.any():
-                continue
-            window = ndimage.find_objects(covered.astype(int))[0]
-            densities[frames[number]] = frame.density
-            box.append(psnr(linear_to_srgb(shown)[window], linear_to_srgb(seen.image)[window]))
-            inside.append(float(frame.figures["psnr"]))
-            depth = -np.log(np.maximum(renderer.transmittance, 1e-4))
-            grey = behind.mean(-1)
-            pattern.append(_correlation(depth, grey, covered))
-            elsewhere = (np.roll(grey, (down, right), (0, 1)) for down in AWAY for right in AWAY)
-            chance.append(float(np.std([_correlation(depth, each, covered) for each in elsewhere])))
-        return Found(shot.scene, densities, box, inside, pattern, chance)
+        for number in numbers:
+            view = replace(shot.views[0], clip=shot.clip.part(number, number))
+            one = replace(shot, views=(view,))
+            frame = next(reconstruct(view.clip, scene, settings, shot=one))
+            densities[number] = frame.density
+            seen = view.observe(0, shot.scene.domain)
+            if seen is not None and "psnr" in frame.figures:
+                behind = seen.plate.image
+                renderer = scene_renderer(shot.scene, seen.camera, behind)
+                shown = renderer.image(frame.density)
+                whole = front_figures(shown, seen.image, behind, renderer.transmittance, frame.figures["psnr"])
+                figures += [whole] if whole else []
+        return Result(shot.scene, densities), figures
+
+
+def front_figures(shown: Image, seen: Image, behind: Image, passed: Image, inside: float) -> FrontFigures | None:
+    """Compare what a density shows with what was seen; None where it covers nothing.
+
+    Parameters
+    ----------
+    shown, seen, behind : (rows, columns, 3)
+        Linear radiance.
+    passed : (rows, columns)
+        Share of the light behind that the smoke lets through.
+    inside
+        As in `FrontFigures`.
+    """
+    covered = passed < 1 - COVERED
+    if not covered.any():
+        return None
+    window = ndimage.find_objects(covered.astype(int))[0]
+    depth, grey = -np.log(np.maximum(passed, 1e-4)), behind.mean(-1)
+    elsewhere = [_correlation(depth, np.roll(grey, (down, right), (0, 1)), covered) for down in AWAY for right in AWAY]
+    box = psnr(linear_to_srgb(shown)[window], linear_to_srgb(seen)[window])
+    return FrontFigures(box, inside, _correlation(depth, grey, covered), np.array(elsewhere))
 
 
 def _correlation(depth: Image, behind: Image, where: npt.NDArray[np.bool_]) -> float:
     """Correlation of the fine parts of two pictures where the smoke is."""
-    fine = [(each - ndimage.gaussian_filter(each, FINE))[where] for each in (depth, behind)]
+    fine = [(each - ndimage.gaussian_filter(each, WIDE))[where] for each in (depth, behind)]
     return float(np.corrcoef(*fine)[0, 1]) if min(np.std(each) for each in fine) > 1e-6 else 0.0
+
+
+def pattern_figures(frames: Sequence[FrontFigures]) -> dict[str, float]:
+    """What frames say together of the pattern in the smoke.
+
+    Returns
+    -------
+    dict
+        ``mean`` of the correlations with their sign, its ``error`` by chance (deviation of the same mean over the
+        places of `AWAY`), ``deviation`` over the frames, ``chance`` in one frame; ``largest`` without its sign, and
+        ``largest_chance``, the same by chance (median over those places).
+    """
+    pattern = np.array([frame.pattern for frame in frames])
+    elsewhere = np.array([frame.elsewhere for frame in frames])
+    return {
+        "mean": float(pattern.mean()),
+        "error": float(elsewhere.mean(0).std()),
+        "deviation": float(pattern.std()),
+        "chance": float(elsewhere.std(1).mean()),
+        "largest": float(np.abs(pattern).max()),
+        "largest_chance": float(np.median(np.abs(elsewhere).max(0))),
+    }
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -121,136 +155,73 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--capture", type=Path)
     parser.add_argument("--wall", type=Path)
-    parser.add_argument(
-        "--frames", type=int, nargs=3, default=(40, 60, 5), help="first, last, and step of those scored"
-    )
+    parser.add_argument("--frames", type=int, nargs="+", default=FRAMES, help="those of CAPTURE that are scored")
     options = parser.parse_args(arguments)
-    first, last, step = options.frames
-    frames = range(first, last + 1)
     if options.wall:
-        _say("before a wall", found(Scene.load(options.wall), frames))
+        scene = Scene.load(options.wall)
+        assert scene.clip is not None
+        with Clip.open(scene.clip) as clip:
+            numbers = range(clip.first, clip.first + len(clip), WALL_STEP)
+        _say("before a wall", found(scene, run_settings(RUN), numbers)[1])
     if options.capture:
-        known = Scene.load(options.capture / "scene.toml")
-        told, alone = found(known, frames), found(Scene(clip=known.clip), frames)
-        _say("told", told)
-        _say("clip alone", alone)
-        _beside(options.capture, told, alone, frames[::step])
+        _beside(options.capture, options.frames)
 
 
-def _say(name: str, result: Found) -> None:
-    largest = max(map(abs, result.pattern))
-    print(
-        f"{name}: box {_range(result.box)} dB, inside the smoke {_range(result.inside)} dB, correlation with what is "
-        f"behind: mean {np.mean(result.pattern):+.2f}, largest {largest:.2f}, by chance {np.mean(result.chance):.2f}; "
-        f"{result.scene.domain.resolution}, "
-        f"{result.scene.scattering}, {len(result.densities)} frames",
-        flush=True,
-    )
+def _say(name: str, frames: Sequence[FrontFigures]) -> None:
+    said = ", ".join(f"{key} {value:+.3f}" for key, value in pattern_figures(frames).items())
+    box, inside = (_range([getattr(frame, key) for frame in frames]) for key in ("box", "inside"))
+    print(f"{name}: box {box} dB, inside the smoke {inside} dB, {len(frames)} frames; pattern: {said}", flush=True)
 
 
 def _range(values: Sequence[float]) -> str:
     return " / ".join(f"{each:.1f}" for each in (min(values), float(np.median(values)), max(values)))
 
 
-def _beside(folder: Path, told: Found, alone: Found, scored: range) -> None:
-    """Print what camera 00 sees of both, before and after each is laid best."""
-    side = Scene.load(folder / "camera00.toml")
+def _beside(folder: Path, numbers: Sequence[int]) -> None:
+    """Print what camera 00 sees of all that is told, of nothing, and of what is between."""
+    side, known = Scene.load(folder / "camera00.toml"), Scene.load(folder / "scene.toml")
     assert side.clip is not None
     with Clip.open(side.clip) as clip:
-        seen = {frame: area_average(clip.frame(frame), *REAL_SIZE) for frame in scored}
-    camera = camera_of(folder / "camera00.toml").resized(*REAL_SIZE)
-    for name, result in (("told", told), ("clip alone", alone)):
-        view = View(camera, laid_on(told.scene, result.scene), np.array(result.scene.domain.centre))
-        laid = best_laid(result, view, seen, scaled=result is alone)
-        for which, by in (
-            ("from the same side of the input's camera", np.zeros(7)),
-            (f"laid best {laid.round(3)}", laid),
-        ):
-            plain, gained = scores(result, view.moved(by), seen)
-            print(f"camera 00, {name}, {which}: {plain:.2f} dB, with a gain {gained:.2f}", flush=True)
+        pictures = {number: area_average(clip.frame(number), *REAL_SIZE) for number in numbers}
+    seen = Seen(camera_of(folder / "camera00.toml").resized(*REAL_SIZE), pictures)
+    told, figures = found(known, run_settings(RUN), numbers)
+    _say("all told", figures)
+    alone, figures = found(Scene(clip=known.clip), run_settings(RUN), numbers)
+    _say("nothing told", figures)
+    _say_laid("all told", told, told.scene, seen)
+    only = found(Scene(clip=known.clip, camera=known.camera), run_settings(RUN), numbers)[0]
+    _say_laid("the camera told, without a box", only, told.scene, seen)
+    _say_laid("nothing told", alone, told.scene, seen)
+    # the densities alone are looked at, and how light is scattered was the same on both sides
+    plain = replace(run_settings(RUN), selection=SelectionSettings(measure=False))
+    for focal, tilt, box in product((True, False), repeat=3):
+        parts = Told(focal, tilt, box)
+        camera, domain = partly(told.scene, alone.scene, parts)
+        scene = Scene(clip=known.clip, camera=camera, domain=domain)
+        result = found(scene, plain, numbers)[0]
+        _say_laid(str(parts), result, told.scene, seen)
+        if focal == tilt == box:
+            lit = tuple(light.scaled(STRONGER) for light in result.scene.lights)
+            stronger = replace(scene, lights=lit, scattering=result.scene.scattering)
+            result = found(stronger, plain, numbers)[0]
+            _say_laid(f"{parts}, light times {STRONGER:g}", result, told.scene, seen)
 
 
-@dataclass(frozen=True, eq=False)
-class View:
-    """A camera that looks at a result whose world is another one.
-
-    Attributes
-    ----------
-    camera
-        In the world that is told.
-    start : (4, 4)
-        From the world that is told to that of the result: turn, shift and one scale.
-    centre : (3,)
-        Of the result's box.
-    """
-
-    camera: Camera
-    start: Matrix
-    centre: Matrix
-
-    def moved(self, by: Matrix) -> Camera:
-        """The camera in the result's world.
-
-        Parameters
-        ----------
-        by : (7,)
-            Rotation vector about the centre, shift as a share of the distance to it, logarithm of a scale.
-        """
-        matrix = self.start @ np.array(self.camera.matrix)
-        matrix[:3, :3] /= np.cbrt(np.linalg.det(matrix[:3, :3]))
-        away = matrix[:3, 3] - self.centre
-        turn = Rotation.from_rotvec(by[:3]).as_matrix()
-        matrix[:3, :3] = turn @ matrix[:3, :3]
-        matrix[:3, 3] = self.centre + np.exp(by[6]) * turn @ away + np.linalg.norm(away) * by[3:6]
-        return replace(self.camera, matrix=tuple(map(tuple, matrix.tolist())))
+def _say_laid(name: str, result: Result, told: CompleteScene, seen: Seen) -> None:
+    """Print what camera 00 sees of a result, as it lies where that is told, and laid best."""
+    ways = starts(told, result.scene)
+    laid = best_laid(result, ways, seen)
+    best = scores(result, laid.camera, seen)
+    if result.scene is told:
+        _say_score(f"camera 00, {name}, as it lies", scores(result, seen.camera, seen))
+    ends = " ".join(f"{end:.2f}" for end in laid.ends)
+    _say_score(f"camera 00, {name}, laid best", best, f"; ends of the coarse searches {ends}")
 
 
-def best_laid(result: Found, view: View, seen: dict[int, Image], *, scaled: bool) -> Matrix:
-    """Return what `View.moved` takes so that the camera sees the result best, with one gain."""
-    free = 7 if scaled else 6
-    steps = np.array([0.1, 0.1, 0.1, 0.02, 0.02, 0.02, 0.1])[:free]
-
-    columns, rows = (side // COARSE for side in view.camera.size)
-    small = {frame: area_average(picture, columns, rows) for frame, picture in seen.items()}
-
-    def misfit(by: Matrix) -> float:
-        moved = view.moved(np.pad(by * steps, (0, 7 - free)))
-        return -scores(result, moved.resized(columns, rows), small)[1]
-
-    limits, options = [(-8.0, 8.0)] * free, {"maxfev": 250, "xtol": 0.02, "ftol": 1e-4}
-    best = minimize(misfit, np.zeros(free), method="Powell", bounds=limits, options=options)
-    return np.pad(best.x * steps, (0, 7 - free))
-
-
-def laid_on(told: CompleteScene, other: CompleteScene) -> Matrix:
-    """From the world that is told to the one that was found: what is up stays up.
-
-    The boxes' middles lie on each other, the input's cameras look there from the same side, and both see them equally
-    large.
-    """
-    middles = [np.array(scene.domain.centre) for scene in (told, other)]
-    aways = [np.array(scene.camera.matrix)[:3, 3] - at for scene, at in zip((told, other), middles, strict=True)]
-    ours, theirs = (np.arctan2(away[1], away[0]) for away in aways)
-    matrix = np.eye(4)
-    matrix[:3, :3] = Rotation.from_euler("z", theirs - ours).as_matrix()
-    matrix[:3, :3] *= np.linalg.norm(aways[1]) / np.linalg.norm(aways[0])
-    matrix[:3, 3] = middles[1] - matrix[:3, :3] @ middles[0]
-    return matrix
-
-
-def scores(result: Found, camera: Camera, seen: dict[int, Image]) -> tuple[float, float]:
-    """PSNR of displayed values over all of the picture before black, as it is and with one gain, mean of the frames."""
-    renderer = scene_renderer(result.scene, camera, BLACK)
-    shown = [renderer.image(result.densities[frame]) for frame in seen]
-    gain = best_gain(shown, list(seen.values()))
-    plain, gained = (
-        [
-            psnr(eight_bit_values(g * ours), eight_bit_values(true))
-            for ours, true in zip(shown, seen.values(), strict=True)
-        ]
-        for g in (1.0, gain)
-    )
-    return float(np.mean(plain)), float(np.mean(gained))
+def _say_score(name: str, score: Score, more: str = "") -> None:
+    plain, gained = (np.array(each) for each in (score.plain, score.gained))
+    frames = " ".join(f"{each:.2f}" for each in gained)
+    print(f"{name}: {plain.mean():.2f} dB, with a gain {gained.mean():.2f} ({frames}){more}", flush=True)
 
 
 if __name__ == "__main__":

@@ -1,57 +1,55 @@
-"""A result of which nothing was told, laid where a camera that only scores sees it best."""
+"""What a reconstruction shows where it was filmed from: the input view, and the pattern of a wall in the smoke."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
+from scipy import ndimage
 
-from benchmarks.accuracy.uncalibrated import Found, View, best_laid, laid_on, scores
-from smokelift import Camera, DirectionalLight, Domain, Scene
-from smokelift.render import scene_renderer
-from smokelift.scene import CompleteScene, completed
+from benchmarks.accuracy.uncalibrated import front_figures, pattern_figures
 
-GRID = (10, 10, 14)
+ROWS, COLUMNS = 90, 60
 
 
 @pytest.fixture(scope="module")
-def lopsided() -> np.ndarray:
-    """Smoke that looks another from every side."""
-    x, y, z = np.meshgrid(*((np.arange(n) + 0.5) / n - 0.5 for n in GRID), indexing="ij")
-    blobs = ((0.1, 0.15, -0.2, 0.03), (-0.2, -0.05, 0.2, 0.015))
-    return sum(np.exp(-((x - a) ** 2 + (y - b) ** 2 + (z - c) ** 2) / s) for a, b, c, s in blobs).astype(np.float32)
+def cloth() -> np.ndarray:
+    """A pattern with spots some pixels wide."""
+    noise = np.random.default_rng(4).standard_normal((ROWS, COLUMNS))
+    spots = ndimage.gaussian_filter(noise, 2.0)
+    return np.repeat((0.4 + 0.1 * spots / spots.std())[..., None], 3, -1).astype(np.float32)
 
 
-def scene(size: float) -> CompleteScene:
-    """A box so many metres wide with the input's camera before it."""
-    camera = Camera.look_at((0, -5 * size, 0), (0, 0, 0), fov_y_degrees=30, size=(24, 36))
-    box = Domain((-size / 2, -size / 2, -0.7 * size), (size / 2, size / 2, 0.7 * size), GRID)
-    lit = Scene(camera=camera, domain=box, lights=(DirectionalLight((0, 1, -1), (4, 4, 4)),))
-    return replace(completed(lit), scattering="unshadowed")
+def smoke(seed: int) -> np.ndarray:
+    """Share of the light that a blob of smoke with a structure of its own lets through."""
+    down, right = np.mgrid[:ROWS, :COLUMNS]
+    structure = ndimage.gaussian_filter(np.random.default_rng(seed).standard_normal((ROWS, COLUMNS)), 2.0)
+    blob = np.exp(-(((down - 45) / 20) ** 2) - ((right - 30) / 12) ** 2)
+    return np.exp(-np.maximum(blob * (1 + 3 * structure) - 0.05, 0)).astype(np.float32)
 
 
-def test_a_world_of_another_size_is_laid_on_the_one_that_is_told(lopsided: np.ndarray):
-    told, other = scene(1.0), scene(2.0)
-    side = Camera.look_at((5, 0, 0), (0, 0, 0), fov_y_degrees=30, size=(24, 36))
-    view = View(side, laid_on(told, other), np.zeros(3))
-    np.testing.assert_allclose(np.array(view.moved(np.zeros(7)).matrix)[:3, 3], (10, 0, 0), atol=1e-9)
-    # a scale moves the camera away, a turn goes about the centre, a shift is one of the distance
-    np.testing.assert_allclose(np.array(view.moved(np.array([0, 0, 0, 0, 0, 0, np.log(2)])).matrix)[0, 3], 20)
-    np.testing.assert_allclose(
-        np.array(view.moved(np.array([0, 0, np.pi / 2, 0, 0.1, 0, 0])).matrix)[:3, 3], (0, 11, 0), atol=1e-9
-    )
+def test_a_pattern_that_gets_into_the_smoke_is_told_from_one_that_is_there_by_chance(cloth: np.ndarray):
+    frames = {"own": [], "leaked": []}
+    for seed in range(10, 16):
+        passed = smoke(seed)
+        leaked = passed ** (1 + 2.0 * (cloth[..., 0] - 0.4))
+        for name, through in (("own", passed), ("leaked", leaked)):
+            shown = through[..., None] * cloth
+            figures = front_figures(shown, shown + 0.01, cloth, through, 40.0)
+            assert figures is not None and 30 < figures.box < 45
+            frames[name].append(figures)
+    own, leaked = (pattern_figures(each) for each in frames.values())
+    assert abs(own["mean"]) < 3 * own["error"]
+    assert leaked["mean"] > own["mean"] + 3 * own["error"]
+    # chance averages down over frames that differ
+    assert own["error"] < 0.8 * own["chance"]
+    assert own["largest"] < 1.5 * own["largest_chance"] < leaked["largest"]
 
 
-def test_a_result_that_is_turned_is_turned_back(lopsided: np.ndarray):
-    told = scene(1.0)
-    side = Camera.look_at((5, 0, 0), (0, 0, 0), fov_y_degrees=30, size=(24, 36))
-    view = View(side, laid_on(told, told), np.zeros(3))
-    truly = view.moved(np.array([0.0, 0, 0.15, 0, 0, 0.01, 0]))
-    picture = 0.5 * scene_renderer(told, truly, np.zeros(3, np.float32)).image(lopsided)
-    found = Found(told, {3: lopsided}, [], [], [], [])
-    before = scores(found, view.moved(np.zeros(7)), {3: picture})
-    laid = best_laid(found, view, {3: picture}, scaled=False)
-    after = scores(found, view.moved(laid), {3: picture})
-    assert after[1] > before[1] + 6 and after[1] > after[0] + 3  # another exposure is evened out by the gain
-    assert laid[6] == 0
+def test_a_frame_without_smoke_has_no_figures(cloth: np.ndarray):
+    assert front_figures(cloth, cloth, cloth, np.ones((ROWS, COLUMNS), np.float32), 0.0) is None
+
+
+def test_a_plain_background_has_no_pattern():
+    black = np.zeros((ROWS, COLUMNS, 3), np.float32)
+    figures = front_figures(black + 0.1, black + 0.1, black, smoke(0), 40.0)
+    assert figures is not None and figures.pattern == 0.0
