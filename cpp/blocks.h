@@ -15,19 +15,23 @@ struct Blocks {
     int size = 1;
     std::array<int, 3> offset{};
 
+    static constexpr int FIELDS = 4; // of what is linear across a block
+
     std::size_t count() const { return volume(n); }
 };
 
-// Arrays over blocks are [channel][x][y][z], one after the other, z fastest.
+// Arrays over blocks are [field][x][y][z], one after the other, z fastest. What is linear across a block has
+// four fields: the mean, and the slopes along x, y and z, which are the differences across a block.
 
-// Means over blocks: extinction kappa, then kappa J by channel.
+// Over blocks: the mean of the extinction kappa, then kappa J by channel, linear.
 void average(const Voxels &medium, const Spans &spans, const Blocks &blocks, float *means, Workers &workers);
 
-// Adds to `gradient` what the derivatives by these means say of kappa and J.
+// Adds to `gradient` what the derivatives by these fields say of kappa and J.
 void average_adjoint(const Voxels &medium, const Spans &spans, const Blocks &blocks, const float *of_means,
                      const Voxels &gradient, Workers &workers);
 
-// J += factor x values, trilinear between the centres of blocks.
+// J += factor x values, by channel linear across blocks: what the eight blocks around a voxel say of it,
+// weighted as between their centres.
 void add_interpolated(const float *values, float factor, const Blocks &blocks, const Voxels &medium,
                       const Spans &spans, Workers &workers);
 

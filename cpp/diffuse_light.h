@@ -1,7 +1,7 @@
 // Light that has been scattered: its mean radiance on blocks of smoke.
 #pragma once
 
-#include "grid.h"
+#include "blocks.h"
 
 #include "threads.h"
 
@@ -10,10 +10,14 @@
 
 namespace smokelift {
 
-// Smoke of one extinction and albedo a block. G takes emission (W/m^3/sr, the same in all directions) to mean
-// radiance (W/m^2/sr), both the means of blocks.
+// Smoke of one extinction and albedo a block. What a block emits and the radiance in it are linear across it:
+// four fields one after the other, each over all blocks: the mean, and the slopes along x, y and z, which are
+// the differences across a block. G takes emission (W/m^3/sr, the same in all directions) to mean radiance
+// over all directions (W/m^2/sr).
 class BlockTransport {
 public:
+    static constexpr int FIELDS = Blocks::FIELDS;
+
     // Extinction in 1/m; `edge` is that of a block (m).
     BlockTransport(const float *extinction, float albedo, const Shape &n, float edge);
 
@@ -28,38 +32,37 @@ private:
     using Direction = std::array<int, 3>;
 
     // What a block does to light that crosses it along a direction of the class, on a path of length l: depth
-    // t = kappa l, transmittance T = exp(-t), share P = (1 - T) / t of what it emits that leaves it, and P'
-    // by t.
+    // t = kappa l, transmittance T = exp(-t), share P = (1 - T) / t of what it emits that leaves it, share Q
+    // of the rise of the emission along the path; P' and Q' by t.
     struct Crossing {
         float length, weight; // m; of a direction of the class in the mean over all
-        std::vector<float> passed, escaped, of_escaped;
+        std::vector<float> passed, escaped, slanted, of_escaped, of_slanted;
     };
-    // By class, the source P l e of the beams.
-    using Sources = std::array<std::vector<float>, 2>;
-
-    static void cross(const float *extinction, int directions, Crossing &crossing, std::vector<float> &own,
-                      std::vector<float> &of_own);
-    Sources sources(const float *emission) const;
+    static void cross(const float *extinction, Crossing &crossing, float along, float across,
+                      std::array<std::vector<float>, 2> &own, std::array<std::vector<float>, 2> &of_own);
     template <class Visit>
-    void follow(const Direction &direction, const Sources &sources, const Visit &visit) const;
-    void add_arriving(const Direction &direction, const Sources &sources, float *sum) const;
-    void add_products(const Direction &direction, const Sources &forwards, const Sources &backwards,
-                      float *kept, float *products) const;
-    // Adds up, class by class, what work(direction, sum) adds for all directions, whatever the number of
-    // threads.
-    template <class Work> Sources sum_by_class(Workers &workers, const Work &work) const;
+    void follow(const Direction &direction, const float *passed, const float *source,
+                const Visit &visit) const;
+    const Crossing &crossing(int line) const;
+    void sources_along(int line, const float *emission, float *along, float *against) const;
+    void sources_across(int line, const float *slope, float *both) const;
+    void arriving(int line, const float *along, const float *against, float *sum, float *difference) const;
+    void arriving(int line, const float *both, float *sum) const;
+    void gather(const float *emission, const float *sums, float *mean) const;
+    void add_line_gradient(int line, const float *emission, const float *weights, float *result) const;
     void mean_radiance(const float *emission, float *mean, Workers &workers) const; // G
-    // result += derivative of  weights^T G emission  by the extinction.
+    // result += derivative of  <weights, G emission>  by the extinction.
     void add_extinction_gradient(const float *emission, const float *weights, float *result,
                                  Workers &workers) const;
+    double product(const std::vector<float> &a, const std::vector<float> &b) const;
 
     Shape n_;
     float albedo_;
     std::vector<float> scattering_;   // albedo x extinction
     std::array<Crossing, 2> classes_; // axes, diagonals
-    // Part of a block's emission that is its own mean radiance, over all directions, and the derivative by
-    // kappa.
-    std::vector<float> own_, of_own_;
+    // Part of a block's emission that is its own mean radiance over all directions, for the mean and for the
+    // slopes, and the derivative by kappa.
+    std::array<std::vector<float>, 2> own_, of_own_;
 };
 
 } // namespace smokelift

@@ -78,16 +78,22 @@ Strided<T> box_of(const py::array_t<float> &a, Data data, const Support &support
     return {data, stride};
 }
 
-// An array over blocks, [channel][x][y][z].
+// An array over blocks, [field][x][y][z].
 using OverBlocks = py::array_t<float, py::array::c_style>;
 
-OverBlocks over_blocks(int channels, const Shape &n) {
-    return OverBlocks({py::ssize_t(channels), py::ssize_t(n[0]), py::ssize_t(n[1]), py::ssize_t(n[2])});
+OverBlocks over_blocks(int fields, const Shape &n) {
+    return OverBlocks({py::ssize_t(fields), py::ssize_t(n[0]), py::ssize_t(n[1]), py::ssize_t(n[2])});
 }
 
-Shape blocks_shape(const OverBlocks &a, int channels) {
-    require_fit(a.ndim() == 4 && a.shape(0) == channels);
+Shape blocks_shape(const OverBlocks &a, int fields) {
+    require_fit(a.ndim() == 4 && a.shape(0) == fields);
     return {int(a.shape(1)), int(a.shape(2)), int(a.shape(3))};
+}
+
+// How many channels there are in means of extinction and emission.
+int channels_of(const OverBlocks &means) {
+    require_fit(means.ndim() == 4 && means.shape(0) > 1 && (means.shape(0) - 1) % Blocks::FIELDS == 0);
+    return static_cast<int>(means.shape(0) - 1) / Blocks::FIELDS;
 }
 
 // Blocks that reach around all voxels of a support.
@@ -272,7 +278,7 @@ void register_render(py::module_ &module) {
         [](Floats medium, const Support &support, const Blocks &blocks) {
             const Voxels voxels = voxels_of(medium, support);
             require_around(blocks, support);
-            OverBlocks means = over_blocks(voxels.width, blocks.n);
+            OverBlocks means = over_blocks(1 + (voxels.width - 1) * Blocks::FIELDS, blocks.n);
             float *const to = means.mutable_data();
             released([&](Workers &workers) { average(voxels, support.spans, blocks, to, workers); });
             return means;
@@ -285,7 +291,8 @@ void register_render(py::module_ &module) {
            Floats gradient) {
             const Voxels voxels = voxels_of(medium, support), slopes = voxels_of(gradient, support);
             require_around(blocks, support);
-            require_fit(slopes.width == voxels.width && blocks_shape(of_means, voxels.width) == blocks.n);
+            require_fit(slopes.width == voxels.width &&
+                        blocks_shape(of_means, 1 + (voxels.width - 1) * Blocks::FIELDS) == blocks.n);
             released([&](Workers &workers) {
                 average_adjoint(voxels, support.spans, blocks, of_means.data(), slopes, workers);
             });
@@ -298,7 +305,7 @@ void register_render(py::module_ &module) {
            const Support &support) {
             const Voxels voxels = voxels_of(medium, support);
             require_around(blocks, support);
-            require_fit(blocks_shape(values, voxels.width - 1) == blocks.n);
+            require_fit(blocks_shape(values, (voxels.width - 1) * Blocks::FIELDS) == blocks.n);
             released([&](Workers &workers) {
                 add_interpolated(values.data(), factor, blocks, voxels, support.spans, workers);
                 extend_into_border(voxels);
@@ -311,7 +318,7 @@ void register_render(py::module_ &module) {
         [](Floats gradient, const Support &support, float factor, const Blocks &blocks) {
             const Voxels slopes = voxels_of(gradient, support);
             require_around(blocks, support);
-            OverBlocks of_values = over_blocks(slopes.width - 1, blocks.n);
+            OverBlocks of_values = over_blocks((slopes.width - 1) * Blocks::FIELDS, blocks.n);
             float *const to = of_values.mutable_data();
             released([&](Workers &workers) {
                 fold_border(slopes);
@@ -324,16 +331,16 @@ void register_render(py::module_ &module) {
     module.def(
         "diffuse",
         [](const OverBlocks &means, float albedo, float edge) {
-            require_fit(means.ndim() == 4 && means.shape(0) > 1);
-            const int channels = static_cast<int>(means.shape(0)) - 1;
-            const Shape n = blocks_shape(means, channels + 1);
-            OverBlocks radiance = over_blocks(channels, n);
+            const int channels = channels_of(means), fields = channels * Blocks::FIELDS;
+            const Shape n = blocks_shape(means, 1 + fields);
+            OverBlocks radiance = over_blocks(fields, n);
             float *const phi = radiance.mutable_data();
             released([&](Workers &workers) {
                 const std::size_t count = volume(n);
                 const BlockTransport transport(means.data(), albedo, n, edge);
                 for (int channel = 0; channel < channels; ++channel)
-                    transport.solve(means.data() + (channel + 1) * count, phi + channel * count, workers);
+                    transport.solve(means.data() + (1 + channel * Blocks::FIELDS) * count,
+                                    phi + channel * Blocks::FIELDS * count, workers);
             });
             return radiance;
         },
@@ -343,21 +350,20 @@ void register_render(py::module_ &module) {
         "diffuse_adjoint",
         [](const OverBlocks &means, const OverBlocks &radiance, const OverBlocks &of_radiance, float albedo,
            float edge) {
-            require_fit(means.ndim() == 4 && means.shape(0) > 1);
-            const int channels = static_cast<int>(means.shape(0)) - 1;
-            const Shape n = blocks_shape(means, channels + 1);
-            require_fit(blocks_shape(radiance, channels) == n && blocks_shape(of_radiance, channels) == n);
-            OverBlocks of_means = over_blocks(channels + 1, n);
+            const int channels = channels_of(means), fields = channels * Blocks::FIELDS;
+            const Shape n = blocks_shape(means, 1 + fields);
+            require_fit(blocks_shape(radiance, fields) == n && blocks_shape(of_radiance, fields) == n);
+            OverBlocks of_means = over_blocks(1 + fields, n);
             float *const result = of_means.mutable_data();
             released([&](Workers &workers) {
                 const std::size_t count = volume(n);
                 const BlockTransport transport(means.data(), albedo, n, edge);
                 std::fill_n(result, count, 0.0f);
-                for (int channel = 0; channel < channels; ++channel)
-                    transport.solve_adjoint(means.data() + (channel + 1) * count,
-                                            radiance.data() + channel * count,
-                                            of_radiance.data() + channel * count,
-                                            result + (channel + 1) * count, result, workers);
+                for (int channel = 0; channel < channels; ++channel) {
+                    const std::size_t at = channel * Blocks::FIELDS * count;
+                    transport.solve_adjoint(means.data() + count + at, radiance.data() + at,
+                                            of_radiance.data() + at, result + count + at, result, workers);
+                }
             });
             return of_means;
         },

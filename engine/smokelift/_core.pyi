@@ -364,7 +364,8 @@ def march_adjoint(
     ``record`` is that of `march`; it is overwritten.
     """
 
-# Diffuse light: arrays over blocks of voxels are (channels, bx, by, bz)
+# Diffuse light: arrays over blocks of voxels are (fields, bx, by, bz). What is linear across a block has four fields:
+# the mean, and the slopes along x, y and z, which are the differences across a block.
 
 class Blocks:
     """Cubes of ``size`` voxels; every voxel of a support lies between the centres of eight.
@@ -375,30 +376,30 @@ class Blocks:
     def __init__(self, *, shape: tuple[int, int, int], size: int, offset: tuple[int, int, int]) -> None: ...
 
 def average(medium: Volume, support: Support, blocks: Blocks) -> Array:
-    """Means over blocks (1 + channels, bx, by, bz): extinction kappa, then kappa J by channel."""
+    """Over blocks (1 + 4 channels, bx, by, bz): the mean of the extinction kappa, then kappa J by channel, linear."""
 
 def average_adjoint(medium: Volume, support: Support, blocks: Blocks, of_means: Array, gradient: Volume) -> None:
-    """Add to the derivatives by kappa and J what those by the means say of them."""
+    """Add to the derivatives by kappa and J what those by the result of `average` say of them."""
 
 def add_interpolated(values: Array, factor: float, blocks: Blocks, medium: Volume, support: Support) -> None:
-    """J += factor x values (channels, bx, by, bz), trilinear between the centres of blocks."""
+    """J += factor x values (4 channels, bx, by, bz): what eight blocks say, weighted as between their centres."""
 
 def interpolate_adjoint(gradient: Volume, support: Support, factor: float, blocks: Blocks) -> Array:
-    """Derivative by the values of `add_interpolated` (channels, bx, by, bz) from that by J."""
+    """Derivative by the values of `add_interpolated` (4 channels, bx, by, bz) from that by J."""
 
 def diffuse(means: Array, albedo: float, edge: float) -> Array:
-    """Mean radiance (channels, bx, by, bz) after any number of scatterings, in W/m^2/sr.
+    """Mean radiance (4 channels, bx, by, bz) after any number of scatterings, in W/m^2/sr.
 
     Parameters
     ----------
-    means : (1 + channels, bx, by, bz)
+    means : (1 + 4 channels, bx, by, bz)
         Extinction in 1/m, then what is emitted by channel, in W/m^3/sr, the same in all directions.
     edge
         Of a block in metres.
     """
 
 def diffuse_adjoint(means: Array, radiance: Array, of_radiance: Array, albedo: float, edge: float) -> Array:
-    """Derivative by the means (1 + channels, bx, by, bz) from that by the radiance of `diffuse`."""
+    """Derivative by the means (1 + 4 channels, bx, by, bz) from that by the radiance of `diffuse`."""
 
 # Pictures
 

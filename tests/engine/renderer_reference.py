@@ -122,51 +122,84 @@ def inscatter_of(kappa, camera, domain, medium, lights, scattering):
 
 def diffuse_inscatter(kappa, inscatter, h, albedos):
     """What light that has been scattered adds to the in-scattered radiance, by a dense matrix over blocks of voxels."""
-    size = min(max(round(max(kappa.shape) / 32), 1), 3)
-    # the blocks reach around the voxels, so the first begins up to a block before the grid
+    size = min(max(round(max(kappa.shape) / 24), 2), 4)
+    # the blocks reach around the voxels, so the first begins a block before the grid
     indices = [np.arange(-size, n + size) // size + 1 for n in kappa.shape]
     blocks = [int(index[-1]) + 1 for index in indices]
-    inside = tuple(index[size:-size] for index in indices)
-    means = np.zeros((4, *blocks), inscatter.dtype)
-    for number, values in enumerate((kappa, *np.moveaxis(kappa[..., None] * inscatter, -1, 0))):
-        np.add.at(means[number], np.ix_(*inside), values / size**3)
-    extinction, emission = means[0], means[1:].reshape(3, -1)
-    transport = block_transport(extinction, h * size)
-    count = extinction.size
-    channels = [
-        np.linalg.solve(np.eye(count) - transport * (albedo * extinction).ravel(), transport @ emitted)
-        for albedo, emitted in zip(albedos, emission, strict=True)
-    ]
-    radiance = np.stack(channels, -1).reshape(*blocks, 3)
-    for axis, n in enumerate(kappa.shape):
-        at = (np.arange(n) + 0.5) / size - 0.5 + 1
-        low = np.floor(at).astype(int)
-        part = (at - low).reshape([-1 if a == axis else 1 for a in range(4)])
-        radiance = (1 - part) * radiance.take(low, axis) + part * radiance.take(low + 1, axis)
-    return np.array(albedos) * radiance
+    inside = np.ix_(*(index[size:-size] for index in indices))
+    places = [(np.arange(n) % size + 0.5) / size - 0.5 for n in kappa.shape]
+    spread = np.mean(((np.arange(size) + 0.5) / size - 0.5) ** 2)
+    weights = [np.ones(kappa.shape), *(place / spread for place in np.meshgrid(*places, indexing="ij"))]
+    extinction = np.zeros(blocks, inscatter.dtype)
+    np.add.at(extinction, inside, kappa / size**3)
+    emission = np.zeros((4, *blocks, 3), inscatter.dtype)
+    for field, weight in zip(emission, weights, strict=True):
+        np.add.at(field, inside, (kappa * weight)[..., None] * inscatter / size**3)
+    smoky = np.argwhere(extinction != 0)  # nothing else emits
+    transport = block_transport(extinction, h * size, smoky)
+    within = transport.reshape(4, *blocks, 4 * len(smoky))[(slice(None), *smoky.T)].reshape(4 * len(smoky), -1)
+    scattering, emitted = np.tile(extinction[tuple(smoky.T)], 4), emission[(slice(None), *smoky.T)].reshape(-1, 3)
+    channels = []
+    for albedo, source in zip(albedos, emitted.T, strict=True):
+        inner = np.linalg.solve(np.eye(len(within)) - within * (albedo * scattering), within @ source)
+        channels.append(transport @ (source + albedo * scattering * inner))
+    radiance = np.stack(channels, -1).reshape(4, *blocks, 3)
+    positions = [(np.arange(n) + 0.5) / size + 0.5 for n in kappa.shape]
+    total = np.zeros_like(inscatter)
+    for corner in np.ndindex(2, 2, 2):
+        numbers = [at.astype(int) + c for at, c in zip(positions, corner, strict=True)]
+        apart = np.meshgrid(*(at - n for at, n in zip(positions, numbers, strict=True)), indexing="ij")
+        near = radiance[(slice(None), *np.ix_(*numbers))]
+        linear = near[0] + sum(d[..., None] * slope for d, slope in zip(apart, near[1:], strict=True))
+        total += np.prod([1 - np.abs(d) for d in apart], axis=0)[..., None] * linear
+    return np.array(albedos) * total
 
 
-def block_transport(extinction, edge):
-    """Matrix from the emission of blocks to their mean radiance: every pair of blocks on a line of the lattice."""
-    transport = np.zeros((extinction.size,) * 2, extinction.dtype)
-    number = np.arange(extinction.size).reshape(extinction.shape)
+def block_transport(extinction, edge, smoky):
+    """Matrix from the emission of smoky blocks to radiance: the mean and three slopes, along the lattice's lines.
+
+    Along a beam the integrals over a block are sums at Gauss points.
+    """
+    blocks = extinction.shape
+    transport = np.zeros((4, *blocks, 4, len(smoky)), extinction.dtype)
+    points, shares = np.polynomial.legendre.leggauss(40)
+    points, shares = (points + 1) / 2, shares / 2
+    bases = np.stack([np.ones(40), points - 0.5])
     for direction in np.ndindex(3, 3, 3):
         step = np.array(direction) - 1
         axes = int(np.abs(step).sum())
         if axes not in (1, 3):
             continue
         weight, length = (1 / 15, edge) if axes == 1 else (3 / 40, edge * np.sqrt(3))
-        t = np.where(extinction == 0, 1e-9, extinction) * length
-        escaped = np.where(np.abs(t) < 1e-4, 1 - t / 2, -np.expm1(-t) / t)
-        own = np.where(np.abs(t) < 1e-4, 0.5 - t / 6, (1 - escaped) / t)
-        for begin in map(tuple, np.argwhere(extinction != 0)):  # nothing else emits
-            transport[number[begin], number[begin]] += weight * length * own[begin]
-            beam, at = length * escaped[begin], np.array(begin) + step
-            while np.all(at >= 0) and np.all(at < extinction.shape):
+        across = [axis for axis in range(3) if not step[axis]]
+        for number, begin in enumerate(map(tuple, smoky)):
+            t = extinction[begin] * length
+            leaving = length * (bases * shares) @ np.exp(-t * (1 - points))
+            # within the block, from each point to those that lie farther
+            farther = points[:, None] + (1 - points[:, None]) * points
+            reached = shares[:, None] * (1 - points[:, None]) * shares * np.exp(-t * (farther - points[:, None]))
+            own = length * np.stack([bases @ reached.sum(1), bases @ (reached * (farther - 0.5)).sum(1)])
+            _add_beam(transport, begin, number, weight, own, step)
+            for axis in across:
+                transport[(1 + axis, *begin, 1 + axis, number)] += weight * own[0, 0]
+            at = np.array(begin) + step
+            while np.all(at >= 0) and np.all(at < blocks):
                 to = tuple(at)
-                transport[number[to], number[begin]] += weight * escaped[to] * beam
-                beam, at = beam * np.exp(-t[to]), at + step
-    return transport
+                depth = extinction[to] * length
+                seen = (bases * shares) @ np.exp(-depth * points)
+                _add_beam(transport, to, number, weight, np.outer(seen, leaving), step)
+                for axis in across:
+                    transport[(1 + axis, *to, 1 + axis, number)] += weight * seen[0] * leaving[0]
+                leaving, at = leaving * np.exp(-depth), at + step
+    return transport.reshape(4 * extinction.size, -1)
+
+
+def _add_beam(transport, to, number, weight, moments, step):
+    """Add what a beam brings of mean and rise to mean and rise; a rise is that of the slopes along the beam."""
+    transport[(0, *to, 0, number)] += weight * moments[0, 0]
+    transport[(0, *to, slice(1, 4), number)] += weight * moments[0, 1] * step
+    transport[(slice(1, 4), *to, 0, number)] += 12 * weight * moments[1, 0] * step
+    transport[(slice(1, 4), *to, slice(1, 4), number)] += 12 * weight * moments[1, 1] * np.outer(step, step)
 
 
 def render(density, camera, domain, medium, lights, background, scattering="single"):

@@ -17,11 +17,15 @@ from smokelift.render.plan import RenderPlan
 
 Floats = NDArray[np.float32]
 
-BLOCKS = 32
+BLOCKS = 24
 """Blocks along the longest side of a domain, about: coarse grids show what fine ones show."""
 
-LARGEST = 3
-"""Voxels along the edge of a block, at most: larger ones are too dark (docs/experiments/multiple-scattering.md)."""
+SMALLEST, LARGEST = 2, 4
+"""Voxels along the edge of a block: one voxel says nothing of how its emission changes across it, and larger blocks are
+too dark (docs/experiments/multiple-scattering.md)."""
+
+FIELDS = 4
+"""Of what is linear across a block: the mean, and the slopes along x, y and z."""
 
 
 class DiffuseLight:
@@ -32,11 +36,11 @@ class DiffuseLight:
         albedos = plan.medium.albedos
         self._albedo = max(albedos)
         # grey smoke scatters all channels alike, whatever colours they are
-        whole = slice(0, plan.lighting.channels)
+        whole = slice(0, FIELDS * plan.lighting.channels)
         self._alike = [(self._albedo, whole)] if plan.medium.is_grey else _channels(albedos)
         shares = np.ones(plan.lighting.channels) if plan.medium.is_grey else np.array(albedos) / self._albedo
-        self._shares = shares.astype(np.float32)[:, None, None, None]
-        size = min(max(round(max(plan.domain.resolution) / BLOCKS), 1), LARGEST)
+        self._shares = shares.astype(np.float32).repeat(FIELDS)[:, None, None, None]
+        size = min(max(round(max(plan.domain.resolution) / BLOCKS), SMALLEST), LARGEST)
         self._edge = size * plan.domain.voxel_size
         # blocks lie alike in the domain whatever the box; their centres reach around all voxels of the box
         corner, count = np.array(plan.corner), np.array(plan.shape)
@@ -77,9 +81,9 @@ class DiffuseLight:
 
 
 def _channels(albedos: Sequence[float]) -> list[tuple[float, slice]]:
-    return [(albedo, slice(number, number + 1)) for number, albedo in enumerate(albedos)]
+    return [(albedo, slice(FIELDS * number, FIELDS * (number + 1))) for number, albedo in enumerate(albedos)]
 
 
 def _of(means: Floats, channels: slice) -> Floats:
-    """The means of the extinction, and of what some channels emit."""
+    """The mean extinction, and fields of what some channels emit."""
     return np.concatenate([means[:1], means[1:][channels]])

@@ -50,11 +50,11 @@ def test_coloured_smoke_in_white_light_is_deeper_in_colour_where_light_is_scatte
     image = renderer(medium=thick, background=np.zeros(3, np.float32)).image(density)
     black = np.zeros(3)
     sums = reference.render(density.astype(float), CAMERA, DOMAIN, thick, (SUN,), black, "multiple")
-    np.testing.assert_allclose(image, sums, rtol=5e-4, atol=1e-6)
+    np.testing.assert_allclose(image, sums, rtol=5e-4, atol=1e-5)
     once = Renderer(CAMERA, DOMAIN, thick, (SUN,), black.astype(np.float32)).image(density)
     lit = once.max(-1) > 0.1 * once.max()
     np.testing.assert_allclose(once[lit] / once[lit][:, :1], np.broadcast_to(thick.color, once[lit].shape), rtol=1e-5)
-    assert (image[lit][:, 2] / image[lit][:, 0]).max() < 0.48
+    assert (image[lit][:, 2] / image[lit][:, 0]).max() < 0.485
 
 
 @pytest.mark.parametrize(
@@ -87,9 +87,9 @@ def test_the_box_around_the_smoke_changes_nothing(density):
     np.testing.assert_allclose(part, whole, rtol=1e-4)
 
 
-@pytest.mark.parametrize(("extinction", "lost"), [(0.5, 0.02), (2.0, 0.08)])
+@pytest.mark.parametrize(("extinction", "lost"), [(0.5, 0.01), (2.0, 0.04), (8.0, 0.2)])
 def test_white_smoke_gives_back_the_light_of_a_white_room(extinction, lost):
-    """Where radiance 1 comes from everywhere, smoke that absorbs nothing can hardly be seen, and never shines."""
+    """Where radiance 1 comes from everywhere, smoke that absorbs nothing can hardly be seen, and hardly shines."""
     rng = np.random.default_rng(8)
     directions = rng.standard_normal((200, 3))
     directions = np.concatenate([directions, -directions])
@@ -100,7 +100,7 @@ def test_white_smoke_gives_back_the_light_of_a_white_room(extinction, lost):
     smoke[..., SMOKY] = 1
     image = room_renderer.image(smoke)
     assert image.min() > 1 - lost
-    assert image.max() < 1 + 3e-4
+    assert image.max() < 1 + 1e-3
 
 
 def test_thin_smoke_scatters_once(density):
