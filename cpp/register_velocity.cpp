@@ -5,6 +5,7 @@
 #include "operators.h"
 #include "primal_dual.h"
 #include "projected_cg.h"
+#include "prolongation.h"
 #include "python.h"
 #include "refinement.h"
 #include "vectors.h"
@@ -120,6 +121,17 @@ void register_motion(py::module_ &module) {
                           [&](const StaggeredOut &fine, Workers &workers) { refine(coarse, fine, workers); });
         },
         "u"_a, "shape"_a, "closed"_a);
+
+    module.def(
+        "prolong",
+        [](const Array3 &u) {
+            const StaggeredIn coarse = view(u);
+            const auto [x, y, z] = coarse.box.cells;
+            return filled(Box{{2 * x, 2 * y, 2 * z}, {}}, [&](const StaggeredOut &fine, Workers &workers) {
+                prolong(coarse, fine, workers);
+            });
+        },
+        "u"_a);
 
     module.def(
         "clamp_increment",

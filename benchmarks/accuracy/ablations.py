@@ -58,10 +58,6 @@ class WithoutHull:
 class UnprojectedPrediction(CoarseToFine):
     """The default velocity estimator, but its prediction keeps its divergence."""
 
-    def kept(self, velocity: Velocity) -> Velocity:
-        """Return the velocity as it is: on its way back from a coarser grid it would lose its divergence."""
-        return velocity
-
     def predict(self, velocity: Velocity, dt: float) -> Velocity:
         """Return the velocity carried along by itself."""
         return replace(advect(velocity, velocity, dt), residual=velocity.residual)

@@ -115,6 +115,9 @@ def add_momentum(
 def refine(u: Faces, shape: tuple[int, ...], closed: Closed) -> list[Array]:
     """A velocity in the cells of a grid that is twice as fine and has ``shape`` cells: linear, then projected."""
 
+def prolong(u: Faces) -> list[Array]:
+    """A velocity in the cells of a grid that is twice as fine, each with the divergence of its coarse one."""
+
 def clamp_increment(solution: Faces, u: Faces, largest: float, closed: Closed) -> list[Array]:
     """u + (solution - u, every component clamped to +- largest), projected; the solution where nothing exceeds that."""
 

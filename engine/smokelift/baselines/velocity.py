@@ -71,10 +71,6 @@ class PaperVelocity:
         nothing = np.zeros_like(second)
         return Estimate(u, measures, nothing + 1, nothing, None).velocity(dt, voxel_size)
 
-    def kept(self, velocity: Velocity) -> Velocity:
-        """The velocity as it is."""
-        return velocity
-
     def predict(self, velocity: Velocity, dt: float) -> Velocity:
         """The velocity of the next frame if no force acts."""
         return predict_velocity(velocity, dt)

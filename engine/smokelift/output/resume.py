@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from smokelift.output.archive import VELOCITY, read_arrays, write_arrays
-from smokelift.transport import Array, Faces, face_shapes
+from smokelift.output.archive import VELOCITY, Shape, read_arrays, write_arrays
+from smokelift.transport import Array, Faces, face_shapes, halved
 
 _EXTRA = "extra_"
 
@@ -26,7 +26,7 @@ class ResumeState:
         The last finished frame.
     density : (nx, ny, nz)
     velocity
-        On faces, m/s.
+        On faces, m/s; the grid may be coarser than that of the density.
     extra
         Further arrays by name, as they were given to `SequenceWriter.write`.
     """
@@ -54,11 +54,21 @@ class ResumeState:
         """
         if not path.is_file():
             return None
-        expected = {"number": (), "density": shape, **dict(zip(VELOCITY, face_shapes(shape), strict=True))}
+        expected: dict[str, Shape | None] = {"number": (), "density": shape, **dict.fromkeys(VELOCITY)}
         arrays = read_arrays(path, expected, others={_EXTRA: shape})
         number, density = arrays.pop("number"), arrays.pop("density")
         x, y, z = (arrays.pop(name) for name in VELOCITY)
         extra = {name.removeprefix(_EXTRA): value for name, value in arrays.items()}
         if number.dtype.kind != "i" or number < 0 or density.min() < 0:
             raise OSError(f"{path}: cannot be read: number or density is negative")
+        if (x.shape, y.shape, z.shape) not in _grids(shape):
+            raise OSError(f"{path}: cannot be read: its velocity is on no grid that the density's is halved to")
         return ResumeState(int(number), density, (x, y, z), extra)
+
+
+def _grids(shape: tuple[int, int, int]) -> list[tuple[tuple[int, int, int], ...]]:
+    """Shapes of a velocity on the grid of a density, and on those that are each half as fine."""
+    shapes = [shape]
+    while max(shapes[-1]) > 1:
+        shapes.append(halved(shapes[-1]))
+    return [face_shapes(coarser) for coarser in shapes]

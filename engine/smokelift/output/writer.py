@@ -153,6 +153,7 @@ class SequenceWriter:
         extra: Mapping[str, npt.ArrayLike] | None = None,
         ready: Mapping[str, Path] | None = None,
         flame: npt.ArrayLike | None = None,
+        next_needs: Faces | None = None,
     ) -> None:
         """Write one frame and make it count.
 
@@ -172,6 +173,8 @@ class SequenceWriter:
             Files that hold this frame already, by their kind ``"vdb"`` or ``"npz"``: they are copied.
         flame : (nx, ny, nz), optional
             Emission of fire, radiance per metre, not negative; None where there can be none.
+        next_needs
+            The velocity that the next frame depends on, for :attr:`state`, where it is on a coarser grid; m/s.
 
         Raises
         ------
@@ -189,7 +192,7 @@ class SequenceWriter:
         fire = None if flame is None else checked_volume(flame, self._domain.shape, FLAME)
         self.state = None  # a run has gone on by now, and the arrays are large
         kept = {name: np.asarray(value) for name, value in (extra or {}).items()}
-        state = ResumeState(number, rho, faces, kept)
+        state = ResumeState(number, rho, next_needs or faces, kept)
         try:
             paths = [frame_path(self.directory, number, kind) for kind in self._kinds]
             for kind, path in zip(self._kinds, paths, strict=True):

@@ -9,6 +9,7 @@ rho_1, rho_2 from their pictures alone; then for t = 3, 4, ...
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -27,12 +28,13 @@ from smokelift.pipeline.method import Method, compose
 from smokelift.pipeline.sources import sources
 from smokelift.render import Volume
 from smokelift.scene import Domain, Scene
+from smokelift.scene.domain import box_around
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.provenance import provenance
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
-from smokelift.transport import Array, ResidualMeans, Velocity, advect
-from smokelift.velocity.estimator import refined_to
+from smokelift.transport import Array, ResidualMeans, Velocity, VoxelBox, advect, faces_in, halved
+from smokelift.velocity.estimator import Mask, refined_in
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,9 +47,12 @@ class Frame:
         1 for the clip's first frame.
     density : (nx, ny, nz) float32
     velocity
-        In m/s, from the frame before to this one; the first frame has the second's.
+        In m/s, from the frame before to this one; the first frame has the second's. Zero where no smoke is near, if it
+        was estimated on a coarser grid.
     figures
         Measures of the fit and seconds spent.
+    estimated
+        The velocity on the grid of its estimate, all over the domain.
     smooth : (nx, ny, nz) float32, optional
         The density without what the depth prior makes up, which the velocity is estimated from; None if that is all of
         it.
@@ -62,6 +67,7 @@ class Frame:
     density: Volume
     velocity: Velocity
     figures: Mapping[str, Any]
+    estimated: Velocity
     smooth: Volume | None = None
     steady: Volume | None = None
     flame: Volume | None = None
@@ -73,21 +79,19 @@ class Past:
 
     Attributes
     ----------
-    density, smooth, steady
+    density, estimated, smooth, steady
         As in `Frame`.
-    velocity
-        On the grid of its estimate; see `VelocityEstimator.kept`.
     """
 
     density: Volume
-    velocity: Velocity
+    estimated: Velocity
     smooth: Volume | None
     steady: Volume | None
 
     @staticmethod
-    def of(frame: Frame, method: Method) -> Past:
+    def of(frame: Frame) -> Past:
         """Keep it of a frame."""
-        return Past(frame.density, method.velocity_estimator.kept(frame.velocity), frame.smooth, frame.steady)
+        return Past(frame.density, frame.estimated, frame.smooth, frame.steady)
 
 
 def reconstruct(
@@ -153,7 +157,13 @@ def reconstruct(
         for frame in _frames(shot, method, None if writer.state is None else _resumed(writer.state, shot)):
             if frame.number not in writer.finished:
                 writer.write(
-                    frame.number, frame.density, frame.velocity.faces, frame.figures, _kept(frame), flame=frame.flame
+                    frame.number,
+                    frame.density,
+                    frame.velocity.faces,
+                    frame.figures,
+                    _kept(frame),
+                    flame=frame.flame,
+                    next_needs=frame.estimated.faces,
                 )
                 yield frame
             del frame  # before the next is computed: velocities take most of the memory
@@ -161,7 +171,7 @@ def reconstruct(
 
 def _kept(frame: Frame) -> dict[str, Array]:
     """What the next frame needs of one besides density and velocity."""
-    memory = frame.velocity.residual
+    memory = frame.estimated.residual
     kept = {} if memory is None else {"residual_mean": memory.mean, "residual_magnitude": memory.magnitude}
     volumes = {"smooth": frame.smooth, "steady": frame.steady}
     return kept | {name: volume for name, volume in volumes.items() if volume is not None}
@@ -172,24 +182,28 @@ def _resumed(state: ResumeState, shot: Shot) -> Frame:
     mean, magnitude = state.extra.get("residual_mean"), state.extra.get("residual_magnitude")
     residual = None if mean is None or magnitude is None else ResidualMeans(mean, magnitude)
     velocity = Velocity(state.velocity, shot.optics.domain.voxel_size, shot.scene.closed, residual=residual)
-    return Frame(state.number, state.density, velocity, {}, state.extra.get("smooth"), state.extra.get("steady"))
+    shape = shot.optics.domain.resolution
+    while shape != velocity.shape:
+        shape, velocity = halved(shape), replace(velocity, voxel_size=2 * velocity.voxel_size)
+    smooth, steady = state.extra.get("smooth"), state.extra.get("steady")
+    return Frame(state.number, state.density, velocity, {}, velocity, smooth, steady)
 
 
 def _frames(shot: Shot, method: Method, start: Frame | None) -> Iterator[Frame]:
     """Frames after ``start``; the first is held back until the second gives it a velocity."""
     count = len(shot.clip)
     method = replace(method, depth_prior=method.depth_prior.of_clip(shot))
-    number, before = (0, None) if start is None else (start.number, Past.of(start, method))
+    number, before = (0, None) if start is None else (start.number, Past.of(start))
     del start
     first: Frame | None = None
     for index in range(number, count):
         frame = _frame(index, before, shot, method)
-        before = Past.of(frame, method)
+        before = Past.of(frame)
         if index == 0 and count > 1:
             first = frame
             continue
         if first is not None:
-            yield replace(first, velocity=frame.velocity)
+            yield replace(first, velocity=frame.velocity, estimated=frame.estimated)
             first = None
         yield frame
         del frame  # velocities take most of the memory
@@ -202,20 +216,17 @@ def _frame(index: int, before: Past | None, shot: Shot, method: Method) -> Frame
     predicted = carried = None
     # from where there was no smoke nothing is carried
     if before is not None and index >= 2 and before.density.any():
-        estimator = method.velocity_estimator
-        fine = refined_to(estimator.predict(before.velocity, dt), domain.resolution)
+        predicted = method.velocity_estimator.predict(before.estimated, dt)
         # what a moving camera does not see no picture corrects, so that its mass has to be kept
         moved = before.density if before.steady is None else before.steady
-        carried = advect(moved, fine, dt, conserve=shot.moves)
+        carried = _carried(moved, predicted, dt, domain, conserve=shot.moves)
         carried = inside(carried > 0, carried)
-        predicted = estimator.kept(fine)
-        del fine  # three arrays as large as a density, before the fit takes more
     density, taken_over = _density(index, before, carried, shot, method)
     flame = _flame(index, density.values, shot)
     fitted = time.perf_counter()
-    velocity = Velocity.zero(domain.resolution, domain.voxel_size, shot.scene.closed)
+    velocity = estimated = Velocity.zero(domain.resolution, domain.voxel_size, shot.scene.closed)
     if before is not None:
-        velocity = method.velocity_estimator.estimate(
+        estimated = method.velocity_estimator.estimate(
             *_measured(before, density),
             dt,
             domain.voxel_size,
@@ -223,6 +234,7 @@ def _frame(index: int, before: Past | None, shot: Shot, method: Method) -> Frame
             inflow=shot.scene.inflow(),
             prediction=predicted,
         )
+        velocity = _near((before.density > 0) | (density.values > 0), estimated, dt, domain)
     done = time.perf_counter()
     figures = {
         **density.figures,
@@ -232,7 +244,47 @@ def _frame(index: int, before: Past | None, shot: Shot, method: Method) -> Frame
         "seconds_density": fitted - began,
         "seconds_velocity": done - fitted,
     }
-    return Frame(index + 1, density.values, velocity, figures, density.smooth, density.steady, flame)
+    return Frame(index + 1, density.values, velocity, figures, estimated, density.smooth, density.steady, flame)
+
+
+def _carried(density: Volume, velocity: Velocity, dt: float, domain: Domain, *, conserve: bool) -> Volume:
+    """A density carried along by a velocity of its grid or a coarser one, computed where it can arrive alone."""
+    result: Array = np.zeros(domain.resolution, np.float32)
+    box = _reached(density > 0, velocity, dt / domain.voxel_size)
+    if result[box].size:
+        result[box] = advect(density[box], refined_in(velocity, domain.resolution, box), dt, conserve=conserve)
+    return result
+
+
+def _near(smoke: Mask, velocity: Velocity, dt: float, domain: Domain) -> Velocity:
+    """A velocity of a coarser grid on the domain's, where smoke can arrive; itself if it is on that already."""
+    if velocity.shape == domain.resolution:
+        return velocity
+    box = _reached(smoke, velocity, dt / domain.voxel_size)
+    near = Velocity.zero(domain.resolution, domain.voxel_size, velocity.closed)
+    if not smoke[box].size:
+        return near
+    part = refined_in(velocity, domain.resolution, box)
+    for component, found in zip(faces_in(near.faces, box), part.faces, strict=True):
+        component[...] = found
+    confidence, source = (_placed(values, box, domain) for values in (part.confidence, part.source))
+    return replace(near, figures=part.figures, confidence=confidence, source=source, residual=velocity.residual)
+
+
+def _placed(values: Array | None, box: VoxelBox, domain: Domain) -> Array | None:
+    """Values of a box in the whole domain, zero elsewhere."""
+    if values is None:
+        return None
+    result: Array = np.zeros(domain.resolution, np.float32)
+    result[box] = values
+    return result
+
+
+def _reached(smoke: Mask, velocity: Velocity, frames_a_voxel: float) -> VoxelBox:
+    """The box of the voxels where smoke can arrive in a frame."""
+    fastest = max(float(np.abs(component).max()) for component in velocity.faces) * frames_a_voxel
+    # what arrives was a step away, and the correction of advection looks a step further
+    return box_around(smoke, 2 * (math.ceil(fastest) + 1))
 
 
 def _measured(before: Past, density: Density) -> tuple[Volume, Volume]:

@@ -18,6 +18,7 @@ from smokelift.scene.checks import LARGEST, SMALLEST
 
 Array = npt.NDArray[np.float32]
 Faces = tuple[Array, Array, Array]
+VoxelBox = tuple[slice, slice, slice]
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,6 +164,12 @@ def face_shapes(shape: tuple[int, ...]) -> tuple[tuple[int, int, int], ...]:
     return (nx + 1, ny, nz), (nx, ny + 1, nz), (nx, ny, nz + 1)
 
 
+def halved(shape: tuple[int, int, int]) -> tuple[int, int, int]:
+    """Voxels of a grid half as fine; an odd last one counts as two."""
+    x, y, z = ((count + 1) // 2 for count in shape)
+    return x, y, z
+
+
 def faces_in(faces: Faces, box: tuple[slice, ...]) -> Faces:
     """Views of a field's components on the faces of a box of voxels."""
     x, y, z = (
@@ -170,6 +177,22 @@ def faces_in(faces: Faces, box: tuple[slice, ...]) -> Faces:
         for along, component in enumerate(faces)
     )
     return x, y, z
+
+
+def part_of(velocity: Velocity, box: VoxelBox) -> Velocity:
+    """A velocity in a box of its voxels, without the residual; sides that cut the domain are open."""
+    ends = [(side.start == 0, side.stop == count) for side, count in zip(box, velocity.shape, strict=True)]
+    outer = [end for pair in ends for end in pair]
+    closed = tuple(side for side, wall, shared in zip(SIDES, velocity.walls, outer, strict=True) if wall and shared)
+    confidence, source = (None if values is None else values[box] for values in (velocity.confidence, velocity.source))
+    return Velocity(
+        faces_in(velocity.faces, box),
+        velocity.voxel_size,
+        closed,
+        figures=velocity.figures,
+        confidence=confidence,
+        source=source,
+    )
 
 
 def at_centres(faces: Faces) -> Faces:

@@ -30,7 +30,7 @@ import numpy.typing as npt
 from smokelift.scene import Side
 from smokelift.transport import Velocity
 from smokelift.velocity.coarse_to_fine import CoarseToFine
-from smokelift.velocity.estimator import VelocityEstimator, predict_velocity
+from smokelift.velocity.estimator import VelocityEstimator, predict_velocity, refined_to
 from smokelift.velocity.settings import VelocitySettings
 from smokelift.velocity.solver import PrimalDual, ProjectedCG, Solver
 from smokelift.velocity.sources import SourceDetection
@@ -97,9 +97,11 @@ def estimate_velocity(
     >>> round(float(velocity.centres()[12, 12, 10, 2]), 1)  # m/s
     1.0
     """
-    return CoarseToFine(settings or VelocitySettings()).estimate(
+    found = CoarseToFine(settings or VelocitySettings()).estimate(
         before, after, dt, voxel_size, closed=closed, inflow=inflow, prediction=prediction
     )
+    x, y, z = before.shape
+    return refined_to(found, (x, y, z))
 
 
 __all__ = [

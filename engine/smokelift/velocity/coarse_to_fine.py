@@ -19,7 +19,6 @@ from smokelift.velocity.estimator import (
     coarsened,
     motion_weight,
     predict_velocity,
-    refined,
 )
 from smokelift.velocity.linearisation import Linearisation, Regularisation, least_squares, linearise
 from smokelift.velocity.momentum import Centre, Prediction, fit_centre
@@ -61,7 +60,7 @@ class CoarseToFine:
             return replace(rest, confidence=np.zeros_like(second), source=source)
         if settings.coarsening:
             coarser = CoarseToFine(replace(settings, coarsening=settings.coarsening - 1))
-            found = coarser.estimate(
+            return coarser.estimate(
                 coarsen(first),
                 coarsen(second),
                 dt,
@@ -70,7 +69,6 @@ class CoarseToFine:
                 inflow=None if inflow is None else coarsen(inflow.astype(np.float32)) > 0,
                 prediction=coarsened(prediction) if prediction and prediction.shape == first.shape else prediction,
             )
-            return refined(found, rest.shape)
         weight = motion_weight(first.shape, inflow)
         pair = prepare(first, second, settings)
         finest = Level(pair.before, pair.after, weight, past=None if prediction is None else prediction.residual)
@@ -78,12 +76,6 @@ class CoarseToFine:
         sources = settings.sources if inflow is None else None
         estimate = _estimate(finest, predicted, sources, pair, rest.closed, settings)
         return rest if estimate is None else estimate.velocity(dt, voxel_size)
-
-    def kept(self, velocity: Velocity) -> Velocity:
-        """The velocity on the grid of the estimate."""
-        for _ in range(self.settings.coarsening or 0):
-            velocity = coarsened(velocity)
-        return velocity
 
     def predict(self, velocity: Velocity, dt: float) -> Velocity:
         """The velocity of the next frame if no force acts, carried along on its grid."""

@@ -17,16 +17,22 @@ from smokelift.transport import (
     ResidualMeans,
     StaggeredGrid,
     Velocity,
+    VoxelBox,
     advect,
+    halved,
+    part_of,
     project,
     require_positive,
     require_same_shape,
     without_divergence,
 )
-from smokelift.velocity.pyramid import coarsen_faces, refine
+from smokelift.velocity.pyramid import coarsen_faces, prolonged
 
 Density = npt.NDArray[np.floating[Any]]
 Mask = npt.NDArray[np.bool_]
+
+REACH = 2
+"""Coarse voxels around a box that its fine velocity depends on: smoothing takes one and the formulas another."""
 
 LARGEST_DENSITY = 1e12
 """Above this, sums of fourth powers of densities are not finite in 32 bits."""
@@ -46,11 +52,10 @@ class VelocityEstimator(Protocol):
         inflow: Mask | None = None,
         prediction: Velocity | None = None,
     ) -> Velocity:
-        """Estimate the velocity that carries one density into the next: see `estimate_velocity`."""
-        ...
+        """Estimate the velocity that carries one density into the next: see `estimate_velocity`.
 
-    def kept(self, velocity: Velocity) -> Velocity:
-        """What `predict` and `estimate` need of a velocity: it on the grid of the estimate, which may be coarser."""
+        It may be on a coarser grid than the densities (`refined_to` leads back), and so may the prediction.
+        """
         ...
 
     def predict(self, velocity: Velocity, dt: float) -> Velocity:
@@ -83,29 +88,47 @@ def coarsened(velocity: Velocity) -> Velocity:
 
 
 def refined_to(coarse: Velocity, shape: tuple[int, int, int]) -> Velocity:
-    """A velocity of a coarser grid, halved from one of so many voxels, on that; itself if it is on that already."""
+    """A velocity of a coarser grid, halved from one of so many voxels, on that; itself if it is on that already.
+
+    It has no divergence there. The residual stays as it is.
+    """
     if coarse.shape == shape:
         return coarse
-    x, y, z = (-(-count // 2) for count in shape)
-    return refined(refined_to(coarse, (x, y, z)), shape)
+    x, y, z = (slice(0, count) for count in shape)
+    return replace(refined_in(coarse, shape, (x, y, z)), residual=coarse.residual)
 
 
-def refined(coarse: Velocity, shape: tuple[int, int, int]) -> Velocity:
-    """A velocity on a grid twice as fine, without divergence there; the residual stays as it is."""
-    faces = refine(coarse, shape).faces
-    for component in faces:
-        component *= np.float32(0.5)  # refine() counts in finer voxels and so doubles speeds, but m/s do not change
-    found = Velocity(faces, coarse.voxel_size / 2, coarse.closed, residual=coarse.residual)
+def refined_in(coarse: Velocity, shape: tuple[int, int, int], box: VoxelBox) -> Velocity:
+    """What `refined_to` gives in a box of its voxels, as the velocity of a box of its own, without a residual."""
+    part = _refined_in(coarse, shape, box)
     figures = dict(coarse.figures)
     if figures:
-        largest = max(float(np.abs(component).max()) for component in faces)
-        left = float(np.abs(_core.divergence(faces)).max())
+        largest = max(float(np.abs(component).max()) for component in part.faces)
+        left = float(np.abs(_core.divergence(part.faces)).max())
         figures["divergence"] = left / largest if largest > 0 else 0.0
-    confidence, source = (
-        None if values is None else values.repeat(2, 0).repeat(2, 1).repeat(2, 2)[: shape[0], : shape[1], : shape[2]]
-        for values in (coarse.confidence, coarse.source)
+    return replace(part, figures=figures)
+
+
+def _refined_in(coarse: Velocity, shape: tuple[int, int, int], box: VoxelBox) -> Velocity:
+    if coarse.shape == shape:
+        return part_of(coarse, box)
+    half = halved(shape)
+    x, y, z = (
+        slice(max(side.start // 2 - REACH, 0), min((side.stop + 1) // 2 + REACH, count))
+        for side, count in zip(box, half, strict=True)
     )
-    return replace(found, figures=figures, confidence=confidence, source=source)
+    part = _refined_in(coarse, half, (x, y, z))
+    counts = tuple(min(2 * side.stop, end) - 2 * side.start for side, end in zip((x, y, z), shape, strict=True))
+    confidence, source = (
+        None if values is None else values.repeat(2, 0).repeat(2, 1).repeat(2, 2)[tuple(map(slice, counts))]
+        for values in (part.confidence, part.source)
+    )
+    fine = Velocity(prolonged(part, counts), part.voxel_size / 2, part.closed, confidence=confidence, source=source)
+    i, j, k = (
+        slice(inner.start - 2 * outer.start, inner.stop - 2 * outer.start)
+        for inner, outer in zip(box, (x, y, z), strict=True)
+    )
+    return part_of(fine, (i, j, k))
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 import smokelift._core as _core
-from smokelift.transport import Array, ResidualMeans, StaggeredGrid
+from smokelift.transport import Array, Faces, ResidualMeans, StaggeredGrid, faces_in, without_divergence
+
+SMOOTHING = 1 / 12
+"""Weight of each neighbour: along three axes as much as linear interpolation to a finer grid smooths along two.
+
+What a coarse grid shows no better than that is most often wrong (docs/experiments/velocity-grid.md).
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +54,45 @@ def refine(u: StaggeredGrid, shape: Sequence[int]) -> StaggeredGrid:
     """A velocity in voxels a frame on the next finer grid, in its voxels, without divergence."""
     x, y, z = _core.refine(u.faces, tuple(shape), u.walls)
     return StaggeredGrid((x, y, z), u.voxel_size, u.closed)
+
+
+def prolonged(u: StaggeredGrid, shape: Sequence[int]) -> Faces:
+    """The faces of a velocity on the next finer grid, smoothed, in the same unit, without divergence.
+
+    Smoothing and the formulas for a coarse voxel (Toth and Roe 2002) are local and keep a divergence of zero. Along an
+    odd number of voxels the last coarse one is cut in half.
+    """
+    x, y, z = _core.prolong(_smoothed(u.faces))
+    faces = faces_in((x, y, z), tuple(slice(0, count) for count in shape))
+    cut = [wall and count % 2 == 1 for wall, count in zip(u.walls[1::2], shape, strict=True)]
+    if not any(cut):
+        return faces
+    # no formula of single voxels stops the flow at a wall that cuts them
+    return without_divergence(StaggeredGrid(faces, 1.0, u.closed))[0].faces
+
+
+def _smoothed(faces: Faces) -> Faces:
+    """A field with every component smoothed alike along all axes, which keeps a divergence of zero."""
+    x, y, z = (
+        _smoothed_along(_smoothed_along(_smoothed_along(component, 0, along), 1, along), 2, along)
+        for along, component in enumerate(faces)
+    )
+    return x, y, z
+
+
+def _smoothed_along(component: Array, axis: int, along: int) -> Array:
+    """A component smoothed along an axis; beyond the box it goes on such that its divergence does, too."""
+    values = np.moveaxis(component, axis, 0)
+    result = np.float32(1 - 2 * SMOOTHING) * component
+    near, drawn = np.moveaxis(result, axis, 0), np.float32(SMOOTHING) * values
+    near[1:] += drawn[:-1]
+    near[:-1] += drawn[1:]
+    for end in (0, -1):
+        if axis == along:  # linearly
+            near[end] = values[end]
+        else:  # as on the side
+            near[end] += drawn[end]
+    return result
 
 
 def coarsen(a: Array) -> Array:

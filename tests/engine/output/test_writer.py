@@ -22,6 +22,7 @@ from smokelift.output.index import SequenceError
 from smokelift.output.resume import ResumeState
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
+from smokelift.transport import face_shapes
 
 
 class CutOffError(Exception):
@@ -157,6 +158,20 @@ def test_a_run_goes_on_where_it_was_cut_off(tmp_path: Path) -> None:
     assert Sequence.open(tmp_path).frames == (1, 2, 3, 4)
 
 
+def test_a_coarser_velocity_is_kept_for_the_next_frame(tmp_path: Path, no_vdb: None) -> None:
+    """The files have the frame's own."""
+    coarse = tuple(np.full(shape, 2, np.float32) for shape in face_shapes((2, 2, 3)))
+    with pytest.raises(KeyboardInterrupt), SequenceWriter(tmp_path, SCENE, SETTINGS, npz=True) as writer:
+        writer.write(1, *frame(1)[:2], next_needs=coarse)
+        raise KeyboardInterrupt
+    with SequenceWriter(tmp_path, SCENE, SETTINGS, npz=True, resume=True) as writer:
+        assert writer.state is not None
+        for kept, given in zip(writer.state.velocity, coarse, strict=True):
+            np.testing.assert_array_equal(kept, given)
+    written = np.load(tmp_path / "smoke_0001.npz")
+    np.testing.assert_array_equal(written["velocity_x"], frame(1)[1][0])
+
+
 def test_resuming_a_complete_run_has_nothing_to_do(tmp_path: Path, no_vdb: None) -> None:
     write(tmp_path, [1, 2])
     with SequenceWriter(tmp_path, SCENE, SETTINGS, npz=True, resume=True) as writer:
@@ -244,6 +259,7 @@ def test_other_files_and_other_software_are_not_resumed(
         {"density": np.ones((8, 8, 13), np.float32)},
         {"density": np.ones((8, 8, 12), np.complex64)},
         {"velocity_x": np.ones((8, 8, 12), np.float32)},
+        dict(zip(VELOCITY, map(np.zeros, face_shapes((4, 4, 5))), strict=True)),
         {"number": np.array(-1)},
         {"number": np.array(1.5)},
         {"extra_smooth": np.zeros((800, 8, 12), np.float32)},

@@ -316,20 +316,22 @@ def test_memory_is_a_few_times_the_densities(way):
     assert float(done.stdout) < 25
 
 
-def test_what_is_kept_of_a_velocity_is_enough() -> None:
-    """It is on the coarser grid, and guides the next estimate to the same bits as on the densities' grid."""
+def test_estimate_on_a_coarser_grid_guides_the_next_one() -> None:
+    """It leads back to the densities' grid, and its prediction guides as the same one on that grid does."""
     before, after, _ = translation(np.array((0.8, 0.4, 1.2)), (25, 24, 28), 10.0)
     estimator = CoarseToFine(dataclasses.replace(SMOOTH, coarsening=1))
     found = estimator.estimate(before, after, DT, VOXEL)
-    kept = estimator.kept(found)
-    assert kept.shape == (13, 12, 14)
-    assert kept.voxel_size == 2 * VOXEL
-    fine = refined_to(estimator.predict(kept, DT), found.shape)
-    assert fine.shape == found.shape
-    assert refined_to(fine, found.shape) is fine
-    fully, briefly = (
-        estimator.estimate(before, after, DT, VOXEL, prediction=prediction)
-        for prediction in (fine, estimator.kept(fine))
+    assert found.shape == (13, 12, 14)
+    assert found.voxel_size == 2 * VOXEL
+    fine = refined_to(found, before.shape)
+    assert fine.shape == before.shape
+    assert fine.voxel_size == VOXEL
+    assert refined_to(fine, fine.shape) is fine
+    np.testing.assert_array_equal(
+        fine.centres(), estimate_velocity(before, after, DT, VOXEL, estimator.settings).centres()
     )
-    assert fully.figures["trust"] > 0.5
-    np.testing.assert_array_equal(briefly.centres(), fully.centres())
+    prediction = estimator.predict(found, DT)
+    finely = refined_to(prediction, before.shape)
+    for given in (prediction, finely):
+        guided = estimator.estimate(before, after, DT, VOXEL, prediction=given)
+        assert guided.figures["trust"] > 0.5
