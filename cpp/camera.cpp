@@ -328,13 +328,27 @@ void clip_run(const Voxels &medium, Rays &rays, const Run &run) {
     int first[LANES], last[LANES];
     std::fill_n(first, LANES, 0);
     std::fill_n(last, LANES, -1);
-    for (int k = run.first; k <= run.last; ++k) {
+    // from both ends, as far as the first samples that hold anything: what lies between them does not matter
+    int found = 0;
+    for (int k = run.first; k <= run.last && found < run.count; ++k) {
         if (!sample_lanes<1>(medium, lanes, k, sample))
             continue;
         for (int lane = 0; lane < run.count; ++lane) {
-            if (sample[0][lane] > 0) {
-                first[lane] = last[lane] < 0 ? k : first[lane];
+            if (last[lane] < 0 && sample[0][lane] > 0) {
+                first[lane] = last[lane] = k;
+                ++found;
+            }
+        }
+    }
+    bool ended[LANES] = {};
+    for (int k = run.last; k >= run.first && found > 0; --k) {
+        if (!sample_lanes<1>(medium, lanes, k, sample))
+            continue;
+        for (int lane = 0; lane < run.count; ++lane) {
+            if (!ended[lane] && sample[0][lane] > 0) {
                 last[lane] = k;
+                ended[lane] = true;
+                --found;
             }
         }
     }

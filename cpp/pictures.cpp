@@ -86,6 +86,25 @@ double nearest_in_plane(const PictureMap &map, int i) {
     return nearest;
 }
 
+SMOKELIFT_CLONES
+void read_range(const double *__restrict picture, int rows, int columns, const float *__restrict at_rows,
+                const float *__restrict at_columns, std::size_t begin, std::size_t end,
+                float *__restrict values) {
+    for (std::size_t n = begin; n < end; ++n) {
+        const double row = std::clamp(double(at_rows[n]), 0.0, double(rows - 1));
+        const double column = std::clamp(double(at_columns[n]), 0.0, double(columns - 1));
+        const int i = static_cast<int>(row), j = static_cast<int>(column);
+        const double f = row - i, g = column - j;
+        const int upper = i * columns, lower = std::min(i + 1, rows - 1) * columns;
+        const int next = std::min(j + 1, columns - 1);
+        const double near = (picture[upper + j] * (1 - f)) * (1 - g);
+        const double far = (picture[upper + next] * (1 - f)) * g;
+        const double near_below = (picture[lower + j] * f) * (1 - g);
+        const double far_below = (picture[lower + next] * f) * g;
+        values[n] = float(((near + far) + near_below) + far_below);
+    }
+}
+
 } // namespace
 
 std::vector<std::size_t> count_marked(Mask voxels, Workers &workers) {
@@ -119,18 +138,7 @@ void read_bilinearly(const double *picture, int rows, int columns, const float *
                      const float *at_columns, std::size_t count, float *values, Workers &workers) {
     workers.run(int((count + READS_PER_TASK - 1) / READS_PER_TASK), [&](int task) {
         const std::size_t begin = task * READS_PER_TASK, end = std::min(count, begin + READS_PER_TASK);
-        for (std::size_t n = begin; n < end; ++n) {
-            const double row = std::clamp(double(at_rows[n]), 0.0, double(rows - 1));
-            const double column = std::clamp(double(at_columns[n]), 0.0, double(columns - 1));
-            const int i = static_cast<int>(row), j = static_cast<int>(column);
-            const double f = row - i, g = column - j;
-            const double *upper = picture + std::size_t(i) * columns,
-                         *lower = i + 1 < rows ? upper + columns : upper;
-            const int next = std::min(j + 1, columns - 1);
-            const double near = (upper[j] * (1 - f)) * (1 - g), far = (upper[next] * (1 - f)) * g;
-            const double near_below = (lower[j] * f) * (1 - g), far_below = (lower[next] * f) * g;
-            values[n] = float(((near + far) + near_below) + far_below);
-        }
+        read_range(picture, rows, columns, at_rows, at_columns, begin, end, values);
     });
 }
 
