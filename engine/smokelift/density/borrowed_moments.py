@@ -29,7 +29,7 @@ from smokelift.density.row_shape import Array
 from smokelift.density.turntable import Turntable
 from smokelift.footage.images import srgb_to_linear
 from smokelift.footage.noise import EIGHT_BIT_STEP, lasting_noise, linear_per_srgb
-from smokelift.render import Optics, Volume
+from smokelift.render import Optics, Renderer, Sight, Volume
 from smokelift.scene import Camera, Medium
 from smokelift.scene.domain import box_around
 
@@ -142,13 +142,15 @@ class BorrowedMoments:
         """Borrowed pictures of the sides that no camera is near to."""
         for side in unseen_sides(moments.turntable, [view.camera for view in views.views], self.seed):
             camera = moments.turntable.camera(side.degrees)
-            seen = _optical_depth(smooth, camera, views)
+            renderer = _absorbing(views.optics).renderer(camera, WHITE, views.hull)
+            seen, sight = _optical_depth(smooth, renderer), renderer.sight
+            del renderer  # its voxels take much of the memory
             lent = moments.apart(views.frame, round(side.apart * moments.offset))
             picture = borrowed_picture(
                 seen, [(share, moment[:, ::-1] if side.mirrored else moment) for share, moment in lent]
             )
             if picture is not None:
-                yield _shadowgraph(picture, camera, side.strength * self.detail, views.optics)
+                yield _shadowgraph(picture, camera, side.strength * self.detail, views.optics, sight)
 
 
 def varied_sides(seed: int) -> list[BorrowedSide]:
@@ -175,15 +177,16 @@ def _apart(a: float, b: float) -> float:
     return abs((a - b + 90) % 180 - 90)
 
 
-def _optical_depth(density: Volume, camera: Camera, views: ViewSet) -> Array:
-    """Optical depth (rows, columns) of a density as a camera sees it."""
-    renderer = _absorbing(views.optics).renderer(camera, WHITE, views.hull)
+def _optical_depth(density: Volume, renderer: Renderer) -> Array:
+    """Optical depth (rows, columns) of a density as a renderer's camera sees it."""
     renderer.image(density)
     clear = np.maximum(renderer.transmittance, np.finfo(np.float32).tiny)
     return np.asarray(-np.log(clear), np.float64)
 
 
-def _shadowgraph(optical_depth: Array, camera: Camera, strength: float, optics: Optics) -> ImposedView:
+def _shadowgraph(
+    optical_depth: Array, camera: Camera, strength: float, optics: Optics, sight: Sight | None
+) -> ImposedView:
     """A picture of smoke that takes light away and scatters none: it says how much of it each ray meets."""
     thin = THIN / optical_depth.max()
     depth = (thin * optical_depth).astype(np.float32)
@@ -200,7 +203,7 @@ def _shadowgraph(optical_depth: Array, camera: Camera, strength: float, optics: 
     rows = np.arange(len(depth)) + 0.5
     fade = np.clip(np.minimum(rows, rows[::-1]) / ENDS, 0, 1)
     weight = np.broadcast_to((strength * fade[:, None]) ** 2, depth.shape).astype(np.float32)
-    return ImposedView(view, weight, _absorbing(optics, thin))
+    return ImposedView(view, weight, _absorbing(optics, thin), sight)
 
 
 def _absorbing(optics: Optics, share: float = 1.0) -> Optics:

@@ -22,7 +22,7 @@ from smokelift.density.hull import centres_of
 from smokelift.density.observation import ObservedClip, View, ViewSet
 from smokelift.density.profile import DepthProfile
 from smokelift.density.screen import view_frame
-from smokelift.render import Optics, Volume
+from smokelift.render import Optics, Sight, Volume
 
 LEAST_SHAPE = 0.05
 """With several views no profile is below this share of its peak inside the hull, since another view may see smoke there
@@ -44,11 +44,14 @@ class ImposedView:
         How much each pixel counts beside a camera's, from 0: the steps towards it are as long as its square root.
     optics
         How light travels in it: it need not be taken in the scene's own light.
+    sight
+        Of a renderer of its camera and the hull; None lets it be found.
     """
 
     view: View
     weight: NDArray[np.float32]
     optics: Optics
+    sight: Sight | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -56,6 +56,7 @@ def descend(
     patience: int,
     *,
     bound: float = np.inf,
+    recorded: tuple[Image, ...] = (),
 ) -> Fit:
     """Minimise the objective from a start.
 
@@ -75,10 +76,13 @@ def descend(
         Stop after so many steps in a row that do not: one may gain little and the next much.
     bound
         What no voxel may exceed; where the start does it is cut.
+    recorded
+        Of each term what is left of the start's picture, L - I, if the renderers hold the records of these pictures.
     """
     where = np.flatnonzero(hull)
     volume, slopes = (np.zeros(hull.shape, np.float32) for _ in range(2))
-    current = np.minimum(density.ravel()[where], np.float32(bound))
+    began = density.ravel()[where]
+    current = np.minimum(began, np.float32(bound))
     floor = np.float32(FLOOR * (current.mean() if current.size else 0.0))
     scale = current + floor
     enough = noise_floor(terms)
@@ -104,7 +108,11 @@ def descend(
         candidate += current
         return np.asarray(np.clip(candidate, lowest, highest, out=candidate))
 
-    residuals = residuals_of(current)
+    if recorded and np.array_equal(current, began):
+        volume.ravel()[where] = current
+        residuals = recorded
+    else:
+        residuals = residuals_of(current)
     loss = objective(terms, residuals)
     curvature = _Curvature()
     gradient: Values | None = None

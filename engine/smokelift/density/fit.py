@@ -139,7 +139,7 @@ class GradientFit:
             imposed = [Term(each.view, _renderer(each, hull), each.weight) for each in depth.imposed]
             start = take_turns([*imposed, *cameras], start, rounds)
             del imposed  # renderers take most of the memory, and the descent needs more of it
-        scaled = fit_multiplicative(cameras, start, iterations, settings.tolerance)
+        scaled = fit_multiplicative(cameras, start, iterations, settings.tolerance, recorded=True)
         final = descend(
             cameras,
             scaled.density,
@@ -148,6 +148,7 @@ class GradientFit:
             settings.tolerance,
             settings.patience,
             bound=float(max(settings.bound * depth.density.max(), start.max())),
+            recorded=scaled.recorded,
         )
         figures = fit_figures(views, final.residuals, rounds + scaled.iterations + final.iterations)
         steady = scaled.density if depth.imposed else None
@@ -231,7 +232,7 @@ def _with_plate(observation: Observation, scene: CompleteScene) -> Observation:
 
 def _renderer(imposed: ImposedView, hull: NDArray[np.bool_]) -> Renderer:
     """The renderer of an imposed picture, in its own light."""
-    return imposed.optics.renderer(imposed.view.camera, imposed.view.plate.image, hull)
+    return imposed.optics.renderer(imposed.view.camera, imposed.view.plate.image, hull, imposed.sight)
 
 
 def empty_density(views: ViewSet) -> Density:

@@ -40,7 +40,9 @@ PROBE = 1.05
 """Scale of the density for the difference quotient dL / d ln s."""
 
 
-def fit_multiplicative(terms: Sequence[Term], density: Volume, iterations: int, tolerance: float) -> Fit:
+def fit_multiplicative(
+    terms: Sequence[Term], density: Volume, iterations: int, tolerance: float, *, recorded: bool = False
+) -> Fit:
     """Scale the smoke of every ray until the pictures match; returns the best density seen.
 
     Parameters
@@ -53,26 +55,30 @@ def fit_multiplicative(terms: Sequence[Term], density: Volume, iterations: int, 
         At most so many, in each of which every term has a turn.
     tolerance
         Stop when an iteration lowers the objective by less than this share.
+    recorded
+        Keep the renderers' records of the last iteration's pictures, for a descent that goes on from there.
     """
     smoke, enough = _Smoke(density), noise_floor(terms)
     places = smoke.places(terms)
     current = best = smoke.values()
-    least, done = np.inf, 0
+    least, done, last = np.inf, 0, False
     left: tuple[Image, ...] = ()
     for done in range(iterations + 1):
         volume = smoke.volume_of(current)
-        images = [term.renderer.image(volume) for term in terms]
+        last = done == iterations
+        images = [term.renderer.image(volume, keep_record=recorded and last) for term in terms]
         residuals = tuple(image - term.view.image for term, image in zip(terms, images, strict=True))
         loss = objective(terms, residuals)
         gained = least - loss
         if loss < least:
             best, least, left = current, loss, residuals
-        if done == iterations or loss <= enough or (done > 2 and gained < tolerance * loss):
+        if last or loss <= enough or (done > 2 and gained < tolerance * loss):
             break
         for turn, (term, place) in enumerate(zip(terms, places, strict=True)):
             image = images[0] if turn == 0 else term.renderer.image(smoke.volume_of(current))
             current = _scaled(smoke, current, place, term, image)
-    return Fit(smoke.volume_of(best), least, left, done)
+    kept = left if recorded and last and best is current else ()
+    return Fit(smoke.volume_of(best), least, left, done, kept)
 
 
 def take_turns(terms: Sequence[Term], density: Volume, rounds: int) -> Volume:

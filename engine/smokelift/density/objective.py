@@ -95,12 +95,16 @@ class Fit:
         What is left of the pictures, L - I.
     iterations
         Steps that were made.
+    recorded : (rows, columns, 3), one a term
+        The residuals if the terms' renderers hold the records of this density's pictures, ready for their gradients;
+        else none.
     """
 
     density: Volume
     loss: float
     residuals: tuple[Image, ...]
     iterations: int
+    recorded: tuple[Image, ...] = ()
 
 
 def objective(terms: Sequence[Term], residuals: Sequence[Image]) -> float:

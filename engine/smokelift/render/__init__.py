@@ -9,6 +9,7 @@
 `render` and `render_gradient` go all the way from a density and a scene (``image``).
 """
 
+from smokelift.render.cpu_backend import Sight
 from smokelift.render.device import DeviceError, start
 from smokelift.render.image import render, render_gradient
 from smokelift.render.optics import Optics, scene_optics, scene_renderer
@@ -19,6 +20,7 @@ __all__ = [
     "Image",
     "Optics",
     "Renderer",
+    "Sight",
     "Volume",
     "render",
     "render_gradient",

@@ -7,7 +7,7 @@ light comes from above or below, y and z change places: the voxels are copied in
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,10 +20,43 @@ from smokelift.render.plan import RenderPlan
 Floats = NDArray[np.float32]
 
 
-class CpuBackend:
-    """Picture and derivative of one `RenderPlan` in channels; `Renderer` makes colours of them."""
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """Where a camera's rays meet the voxels that may hold smoke.
 
-    def __init__(self, plan: RenderPlan) -> None:
+    It takes as long to find as a picture, so that renderers of the same camera, domain, support and lights share it.
+
+    Attributes
+    ----------
+    support
+        The voxels.
+    rays
+        The rays, as far as voxels around them may hold smoke.
+    """
+
+    support: _core.Support
+    rays: _core.Rays
+
+    @staticmethod
+    def of(plan: RenderPlan) -> Sight:
+        """Find it for a plan."""
+        support = _core.Support(plan.marked)
+        rays = _core.Rays(plan.rays.lines, plan.rays.length, plan.rays.planes)
+        if not plan.everywhere:
+            x, y, z = plan.shape
+            mask = np.zeros((x + 2, y + 2, z + 2, 1), np.float32)
+            mask[1:-1, 1:-1, 1:-1, 0] = plan.marked
+            rays.clip(support, mask)
+        return Sight(support, rays)
+
+
+class CpuBackend:
+    """Picture and derivative of one `RenderPlan` in channels; `Renderer` makes colours of them.
+
+    `sight` is that of another backend, or found anew.
+    """
+
+    def __init__(self, plan: RenderPlan, sight: Sight | None = None) -> None:
         self._axes = (0, 1, 2)
         lights = plan.lighting.lights
         parallel = [light for light in lights if isinstance(light, ParallelSweep)]
@@ -34,23 +67,19 @@ class CpuBackend:
         self._plan = plan
         channels = plan.lighting.channels
         x, y, z = plan.shape
-        self._support = _core.Support(plan.marked)
+        self.sight = sight or Sight.of(plan)
+        self._support, self._rays = self.sight.support, self.sight.rays
         # what no sweep touches is never given memory
         self._medium = _core.zeros((x + 2, y + 2, z + 2, channels + 1))
         self._gradient: Floats | None = None
         self._scratch: Floats | None = None
         self._record: Floats | None = None
-        self._rays = _core.Rays(plan.rays.lines, plan.rays.length, plan.rays.planes)
         pixels = plan.rays.length.shape
         self._scattered = np.zeros((*pixels, channels), np.float32)
         self._depth = np.zeros(pixels, np.float32)
         self._phase = _core.Phase(to_eye=plan.to_eye, albedo=plan.medium.albedo, anisotropy=plan.medium.anisotropy)
         self._lights = [_compiled(light) for light in plan.lighting.lights]
         self._diffuse = DiffuseLight(plan, self._support) if plan.diffuse else None
-        if not plan.everywhere:
-            mask = np.zeros((x + 2, y + 2, z + 2, 1), np.float32)
-            mask[1:-1, 1:-1, 1:-1, 0] = plan.marked
-            self._rays.clip(self._support, mask)
         if channels and not plan.shadows:
             _core.shade(self._medium, self._support, self._phase, self._lights)
 

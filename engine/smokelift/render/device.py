@@ -16,7 +16,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.render.cpu_backend import CpuBackend
+from smokelift.render.cpu_backend import CpuBackend, Sight
 from smokelift.render.plan import RenderPlan
 
 DeviceName = Literal["auto", "cpu", "gpu"]
@@ -47,6 +47,10 @@ class DeviceError(RuntimeError):
 
 class Backend(Protocol):
     """Picture and derivative of one `RenderPlan`, in channels; `Renderer` makes colours of them."""
+
+    @property
+    def sight(self) -> Sight | None:
+        """What another backend of the same rays and voxels can take over."""
 
     def image(self, density: NDArray[np.float32], keep_record: bool) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Scattered radiance (rows, columns, channels) and optical depth (rows, columns)."""
@@ -116,10 +120,10 @@ def start(device: DeviceName = "auto") -> str:
     return _running
 
 
-def backend(plan: RenderPlan) -> Backend:
-    """What renders a plan on the device of this process."""
+def backend(plan: RenderPlan, sight: Sight | None = None) -> Backend:
+    """What renders a plan on the device of this process; a GPU needs no `Sight`."""
     if start() == "cpu":
-        return CpuBackend(plan)
+        return CpuBackend(plan, sight)
     on_gpu: Backend = import_module("smokelift.render.gpu.backend").GpuBackend(plan)
     return on_gpu
 

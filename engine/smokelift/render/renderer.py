@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.render import device
+from smokelift.render.cpu_backend import Sight
 from smokelift.render.plan import plan_render
 from smokelift.scene import Camera, Domain, FiniteLight, Medium, Scattering
 
@@ -40,6 +41,8 @@ class Renderer:
     support : (nx, ny, nz) bool, optional
         Voxels that may hold smoke: what the density says elsewhere does not count, the gradient is zero there, and
         the work follows their number.
+    sight
+        Of another renderer with the same camera, domain, support and lights, so that it is not found again.
 
     Raises
     ------
@@ -56,12 +59,13 @@ class Renderer:
         background: Image,
         scattering: Scattering = "single",
         support: NDArray[np.bool_] | None = None,
+        sight: Sight | None = None,
     ) -> None:
         self.camera, self.domain, self.medium = camera, domain, medium
         plan = plan_render(camera, domain, medium, lights, scattering, support)
         self._colour = np.asarray(plan.lighting.colour, np.float32)
         self._background = np.asarray(background, np.float32)
-        self._backend = device.backend(plan)
+        self._backend = device.backend(plan, sight)
         self._depth: Image = np.zeros(camera.size[::-1], np.float32)
 
     def image(self, density: Volume, *, keep_record: bool = False) -> Image:
@@ -81,6 +85,11 @@ class Renderer:
         """
         scattered, self._depth = self._backend.image(density, keep_record)
         return np.asarray(scattered @ self._colour + self.transmittance[..., None] * self._background)
+
+    @property
+    def sight(self) -> Sight | None:
+        """What another renderer of the same camera, domain, support and lights can take over; None on a GPU."""
+        return self._backend.sight
 
     @property
     def absorbs_only(self) -> bool:

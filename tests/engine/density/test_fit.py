@@ -312,6 +312,31 @@ def test_descent_never_raises_the_loss(plume, small, thickness) -> None:
     assert losses[-1] < 0.3 * losses[0]
 
 
+def test_descent_renders_no_recorded_start_again(plume, small, monkeypatch) -> None:
+    """It goes on from the last picture before it to the same result; a start that it has to cut is rendered."""
+    term, hull, start = even_start(plume.densities[1], small)
+    view = term.view  # multiplicative steps are weighted by the noise
+    term = replace(term, view=replace(view, plate=replace(view.plate, noise=lasting_noise(1e-4))))
+    pictures, image = [], term.renderer.image
+    monkeypatch.setattr(term.renderer, "image", lambda *a, **known: pictures.append(1) or image(*a, **known))
+
+    def descended(*, again: bool, **bound: float) -> tuple[np.ndarray, int]:
+        scaled = fit_multiplicative([term], start, 2, 0.0, recorded=True)
+        assert scaled.recorded
+        before = len(pictures)
+        recorded = () if again else scaled.recorded
+        found = descend([term], scaled.density, hull, 3, 0.0, 2, recorded=recorded, **bound)
+        return found.density, len(pictures) - before
+
+    (density, count), (anew, more) = descended(again=False), descended(again=True)
+    assert (density == anew).all()
+    assert count == more - 1
+    most = 0.5 * float(anew.max())
+    (cut, count), (cut_anew, more) = descended(again=False, bound=most), descended(again=True, bound=most)
+    assert (cut == cut_anew).all()
+    assert count == more
+
+
 def test_descent_does_not_end_with_one_poor_step(plume, small) -> None:
     """Where no step is good enough it takes two."""
     term, hull, start = even_start(plume.densities[1], small)

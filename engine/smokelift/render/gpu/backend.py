@@ -22,6 +22,8 @@ Floats = NDArray[np.float32]
 class GpuBackend:
     """Picture and derivative of one `RenderPlan` in channels; `Renderer` makes colours of them."""
 
+    sight = None
+
     def __init__(self, plan: RenderPlan) -> None:
         self._plan = plan
         self._channels = plan.lighting.channels
