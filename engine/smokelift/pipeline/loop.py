@@ -9,7 +9,6 @@ rho_1, rho_2 from their pictures alone; then for t = 3, 4, ...
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -28,13 +27,12 @@ from smokelift.pipeline.method import Method, compose
 from smokelift.pipeline.sources import sources
 from smokelift.render import Volume
 from smokelift.scene import Domain, Scene
-from smokelift.scene.domain import box_around
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.provenance import provenance
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
-from smokelift.transport import Array, ResidualMeans, Velocity, VoxelBox, advect, faces_in, halved
-from smokelift.velocity.estimator import Mask, refined_in
+from smokelift.transport import Array, ResidualMeans, Velocity, halved
+from smokelift.velocity.near_smoke import carry, near_smoke
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,7 +217,7 @@ def _frame(index: int, before: Past | None, shot: Shot, method: Method) -> Frame
         predicted = method.velocity_estimator.predict(before.estimated, dt)
         # what a moving camera does not see no picture corrects, so that its mass has to be kept
         moved = before.density if before.steady is None else before.steady
-        carried = _carried(moved, predicted, dt, domain, conserve=shot.moves)
+        carried = carry(moved, predicted, dt, domain.voxel_size, conserve=shot.moves)
         carried = inside(carried > 0, carried)
     density, taken_over = _density(index, before, carried, shot, method)
     flame = _flame(index, density.values, shot)
@@ -234,7 +232,7 @@ def _frame(index: int, before: Past | None, shot: Shot, method: Method) -> Frame
             inflow=shot.scene.inflow(),
             prediction=predicted,
         )
-        velocity = _near((before.density > 0) | (density.values > 0), estimated, dt, domain)
+        velocity = near_smoke(estimated, (before.density > 0) | (density.values > 0), dt, domain.voxel_size)
     done = time.perf_counter()
     figures = {
         **density.figures,
@@ -245,46 +243,6 @@ def _frame(index: int, before: Past | None, shot: Shot, method: Method) -> Frame
         "seconds_velocity": done - fitted,
     }
     return Frame(index + 1, density.values, velocity, figures, estimated, density.smooth, density.steady, flame)
-
-
-def _carried(density: Volume, velocity: Velocity, dt: float, domain: Domain, *, conserve: bool) -> Volume:
-    """A density carried along by a velocity of its grid or a coarser one, computed where it can arrive alone."""
-    result: Array = np.zeros(domain.resolution, np.float32)
-    box = _reached(density > 0, velocity, dt / domain.voxel_size)
-    if result[box].size:
-        result[box] = advect(density[box], refined_in(velocity, domain.resolution, box), dt, conserve=conserve)
-    return result
-
-
-def _near(smoke: Mask, velocity: Velocity, dt: float, domain: Domain) -> Velocity:
-    """A velocity of a coarser grid on the domain's, where smoke can arrive; itself if it is on that already."""
-    if velocity.shape == domain.resolution:
-        return velocity
-    box = _reached(smoke, velocity, dt / domain.voxel_size)
-    near = Velocity.zero(domain.resolution, domain.voxel_size, velocity.closed)
-    if not smoke[box].size:
-        return near
-    part = refined_in(velocity, domain.resolution, box)
-    for component, found in zip(faces_in(near.faces, box), part.faces, strict=True):
-        component[...] = found
-    confidence, source = (_placed(values, box, domain) for values in (part.confidence, part.source))
-    return replace(near, figures=part.figures, confidence=confidence, source=source, residual=velocity.residual)
-
-
-def _placed(values: Array | None, box: VoxelBox, domain: Domain) -> Array | None:
-    """Values of a box in the whole domain, zero elsewhere."""
-    if values is None:
-        return None
-    result: Array = np.zeros(domain.resolution, np.float32)
-    result[box] = values
-    return result
-
-
-def _reached(smoke: Mask, velocity: Velocity, frames_a_voxel: float) -> VoxelBox:
-    """The box of the voxels where smoke can arrive in a frame."""
-    fastest = max(float(np.abs(component).max()) for component in velocity.faces) * frames_a_voxel
-    # what arrives was a step away, and the correction of advection looks a step further
-    return box_around(smoke, 2 * (math.ceil(fastest) + 1))
 
 
 def _measured(before: Past, density: Density) -> tuple[Volume, Volume]:
