@@ -23,7 +23,7 @@ from smokelift.velocity.estimator import (
 from smokelift.velocity.linearisation import Linearisation, Regularisation, least_squares, linearise
 from smokelift.velocity.momentum import Centre, Prediction, fit_centre
 from smokelift.velocity.preparation import PreparedPair, prepare
-from smokelift.velocity.pyramid import Level, coarsen, pyramid, refine
+from smokelift.velocity.pyramid import Level, coarsen, pyramid, refine, smoothed
 from smokelift.velocity.settings import VelocitySettings
 from smokelift.velocity.sources import SourceDetection
 
@@ -60,7 +60,7 @@ class CoarseToFine:
             return replace(rest, confidence=np.zeros_like(second), source=source)
         if settings.coarsening:
             coarser = CoarseToFine(replace(settings, coarsening=settings.coarsening - 1))
-            return coarser.estimate(
+            found = coarser.estimate(
                 coarsen(first),
                 coarsen(second),
                 dt,
@@ -69,6 +69,7 @@ class CoarseToFine:
                 inflow=None if inflow is None else coarsen(inflow.astype(np.float32)) > 0,
                 prediction=coarsened(prediction) if prediction and prediction.shape == first.shape else prediction,
             )
+            return found if coarser.settings.coarsening else smoothed(found)
         weight = motion_weight(first.shape, inflow)
         pair = prepare(first, second, settings)
         finest = Level(pair.before, pair.after, weight, past=None if prediction is None else prediction.residual)
@@ -79,7 +80,8 @@ class CoarseToFine:
 
     def predict(self, velocity: Velocity, dt: float) -> Velocity:
         """The velocity of the next frame if no force acts, carried along on its grid."""
-        return predict_velocity(velocity, dt)
+        predicted = predict_velocity(velocity, dt)
+        return smoothed(predicted) if self.settings.coarsening else predicted
 
 
 def _estimate(

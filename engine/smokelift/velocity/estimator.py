@@ -31,8 +31,8 @@ from smokelift.velocity.pyramid import coarsen_faces, prolonged
 Density = npt.NDArray[np.floating[Any]]
 Mask = npt.NDArray[np.bool_]
 
-REACH = 2
-"""Coarse voxels around a box that its fine velocity depends on: smoothing takes one and the formulas another."""
+REACH = 1
+"""Coarse voxels around a box that its fine velocity depends on: see `prolonged`."""
 
 LARGEST_DENSITY = 1e12
 """Above this, sums of fourth powers of densities are not finite in 32 bits."""

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 import smokelift._core as _core
-from smokelift.transport import Array, Faces, ResidualMeans, StaggeredGrid, faces_in, without_divergence
+from smokelift.transport import Array, Faces, ResidualMeans, StaggeredGrid, Velocity, faces_in, without_divergence
 
-SMOOTHING = 1 / 12
-"""Weight of each neighbour: along three axes as much as linear interpolation to a finer grid smooths along two.
+SMOOTHING = 1 / 4
+"""Weight of each neighbour along an axis: nothing is left of what changes its sign from voxel to voxel.
 
-What a coarse grid shows no better than that is most often wrong (docs/experiments/velocity-grid.md).
+What a reconstruction's coarse grid shows of that is most often wrong (docs/experiments/velocity-grid.md).
 """
 
 
@@ -57,12 +57,12 @@ def refine(u: StaggeredGrid, shape: Sequence[int]) -> StaggeredGrid:
 
 
 def prolonged(u: StaggeredGrid, shape: Sequence[int]) -> Faces:
-    """The faces of a velocity on the next finer grid, smoothed, in the same unit, without divergence.
+    """The faces of a velocity on the next finer grid, in the same unit, without divergence.
 
-    Smoothing and the formulas for a coarse voxel (Toth and Roe 2002) are local and keep a divergence of zero. Along an
-    odd number of voxels the last coarse one is cut in half.
+    The formulas for a coarse voxel (Toth and Roe 2002) look at its neighbours alone. Along an odd number of voxels the
+    last coarse one is cut in half.
     """
-    x, y, z = _core.prolong(_smoothed(u.faces))
+    x, y, z = _core.prolong(u.faces)
     faces = faces_in((x, y, z), tuple(slice(0, count) for count in shape))
     cut = [wall and count % 2 == 1 for wall, count in zip(u.walls[1::2], shape, strict=True)]
     if not any(cut):
@@ -71,13 +71,12 @@ def prolonged(u: StaggeredGrid, shape: Sequence[int]) -> Faces:
     return without_divergence(StaggeredGrid(faces, 1.0, u.closed))[0].faces
 
 
-def _smoothed(faces: Faces) -> Faces:
-    """A field with every component smoothed alike along all axes, which keeps a divergence of zero."""
-    x, y, z = (
+def smoothed(velocity: Velocity) -> Velocity:
+    """A velocity with every component smoothed alike along all axes, which keeps a divergence of zero."""
+    return velocity.with_faces(
         _smoothed_along(_smoothed_along(_smoothed_along(component, 0, along), 1, along), 2, along)
-        for along, component in enumerate(faces)
+        for along, component in enumerate(velocity.faces)
     )
-    return x, y, z
 
 
 def _smoothed_along(component: Array, axis: int, along: int) -> Array:
