@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import ndimage
 
-from smokelift.density.row_shape import Array, coarse, middles_and_widths
+from smokelift.density.row_shape import Array, coarse, mean_width, middles_and_widths
 
 LARGEST = 2.5
 """Bound of the detail's ratio to the blurred picture: beyond it lies an edge, where the blurred picture is thin."""
@@ -47,8 +47,11 @@ def borrowed_picture(smooth: Array, others: Sequence[tuple[float, Array]]) -> Ar
     if not shown or not smooth.any():
         return None
     total = sum(share for share, _ in shown)
-    known = coarse(smooth, smooth)
-    details = [(share / total, _relative(_fitted(picture, smooth), smooth) - 1) for share, picture in shown]
+    middles, widths = middles_and_widths(smooth)
+    width = mean_width(smooth, widths)
+    known = coarse(smooth, width)
+    fitted = [(share / total, _fitted(picture, smooth, middles, widths)) for share, picture in shown]
+    details = [(share, _relative(picture, width) - 1) for share, picture in fitted]
     mean = sum(share * detail for share, detail in details)
     left, own = np.linalg.norm(known * mean), sum(share * np.sum((known * detail) ** 2) for share, detail in details)
     ratio = 1 + mean * (np.sqrt(own) / left if left > 0 else 1.0)
@@ -56,13 +59,12 @@ def borrowed_picture(smooth: Array, others: Sequence[tuple[float, Array]]) -> Ar
     return _with_rows(target, smooth.sum(1))
 
 
-def _fitted(other: Array, smooth: Array) -> Array:
+def _fitted(other: Array, smooth: Array, middles: Array, widths: Array) -> Array:
     """The other picture, its rows moved to where the smooth picture has theirs, as wide and with as much smoke."""
     rows = matching_rows(smooth.sum(1), other.sum(1))
-    middle, width = middles_and_widths(smooth)
-    other_middle, other_width = (np.interp(rows, np.arange(len(other)), of) for of in middles_and_widths(other))
+    other_middles, other_widths = (np.interp(rows, np.arange(len(other)), of) for of in middles_and_widths(other))
     columns = np.arange(smooth.shape[1])
-    at = other_middle[:, None] + (columns - middle[:, None]) * (other_width / width)[:, None]
+    at = other_middles[:, None] + (columns - middles[:, None]) * (other_widths / widths)[:, None]
     fitted = ndimage.map_coordinates(other, (np.broadcast_to(rows[:, None], at.shape), at), order=1, mode="constant")
     return _with_rows(ndimage.gaussian_filter(fitted, (0.6, 0.5)), smooth.sum(1))
 
@@ -93,9 +95,9 @@ def _ends(amounts: Array) -> tuple[float, float]:
     return float(first), float(last)
 
 
-def _relative(picture: Array, smooth: Array) -> Array:
-    """A picture in units of itself without the detail."""
-    blurred = coarse(picture, smooth)
+def _relative(picture: Array, width: float) -> Array:
+    """A picture in units of itself without the detail of smoke that is so many columns wide."""
+    blurred = coarse(picture, width)
     return np.asarray(picture / (blurred + FAINT * blurred.max()))
 
 

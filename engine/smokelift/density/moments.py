@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from smokelift.density.observation import ObservedClip, View
-from smokelift.density.row_shape import Array, coarse
+from smokelift.density.row_shape import Array, coarse, mean_width, middles_and_widths
 from smokelift.density.turntable import Turntable
 
 UNLIKE = 0.35
@@ -116,5 +116,5 @@ def _likeness(a: Array, b: Array) -> float:
 
 def _detail(picture: Array) -> Array:
     """What a blur takes away of a picture, at unit norm."""
-    detail = picture - coarse(picture, picture)
+    detail = picture - coarse(picture, mean_width(picture, middles_and_widths(picture)[1]))
     return np.asarray(detail / max(float(np.linalg.norm(detail)), 1e-30))

@@ -76,14 +76,15 @@ def inflated(mask: NDArray[np.bool_]) -> NDArray[np.float64]:
     About every pixel inside stands the largest ball whose outline stays inside; what a pixel shows of them all is as
     thick as the one that is thickest there.
     """
+    half = np.where(mask, THINNEST, 0.0)
     # smoke goes on beyond the picture's edge, unless it is everywhere
     inside = ndimage.distance_transform_edt(np.pad(mask, 1, mode="constant" if mask.all() else "edge"))[1:-1, 1:-1]
-    half = np.where(mask, THINNEST, 0.0)
-    radius = 1.5
-    while (centres := inside >= radius).any():
-        aside = ndimage.distance_transform_edt(~centres)
-        half = np.maximum(half, np.sqrt(np.maximum(radius**2 - aside**2, 0)))
-        radius *= 1.1
+    for part in ndimage.find_objects(mask.astype(np.uint8)):  # the box around it, as no ball reaches out of the outline
+        radius, balls = 1.5, half[part]
+        while (centres := inside[part] >= radius).any():
+            aside = ndimage.distance_transform_edt(~centres)
+            np.maximum(balls, np.sqrt(np.maximum(radius**2 - aside**2, 0)), out=balls)
+            radius *= 1.1
     return half
 
 

@@ -44,7 +44,11 @@ def middles_and_widths(picture: Array) -> tuple[Array, Array]:
     return smoothed(mean), np.sqrt(np.maximum(smoothed(variance), 1))
 
 
-def coarse(picture: Array, smoke: Array) -> Array:
-    """Return a picture without the detail of some smoke, both (rows, columns)."""
-    width = float(np.average(middles_and_widths(smoke)[1], weights=smoke.sum(1)))
+def mean_width(picture: Array, widths: Array) -> float:
+    """Return the mean of the rows' widths (columns), which count by their smoke in the picture (rows, columns)."""
+    return float(np.average(widths, weights=picture.sum(1)))
+
+
+def coarse(picture: Array, width: float) -> Array:
+    """Return a picture (rows, columns) without the detail of smoke that is so many columns wide."""
     return np.asarray(ndimage.gaussian_filter(picture, max(DETAIL * width, 1.0)))

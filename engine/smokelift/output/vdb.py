@@ -205,7 +205,8 @@ def _near(rho: Array, velocity: Array) -> Array:
     near = rho > 0.0
     if near.any():
         near = ndimage.maximum_filter(near, 2 * VELOCITY_MARGIN + 1, mode="constant")
-    return np.where(near[..., None], np.clip(velocity, -_LIMIT, _LIMIT), np.float32(0.0))
+    stored = np.where(near[..., None], velocity, np.float32(0.0))
+    return np.clip(stored, -_LIMIT, _LIMIT, out=stored)
 
 
 def _around(marked: npt.NDArray[np.bool_], margin: int) -> tuple[slice, ...]:
