@@ -25,7 +25,7 @@ def distribution(folder, name, version, requires=()) -> None:
 
 @pytest.mark.parametrize("python", PYTHONS)
 @pytest.mark.parametrize("platform", PLATFORMS, ids=lambda platform: platform.name)
-@pytest.mark.parametrize(("name", "count"), [("smokelift", 10), ("smokelift_gpu", 3)])
+@pytest.mark.parametrize(("name", "count"), [("smokelift", 11), ("smokelift_gpu", 3)])
 def test_every_wheel_has_a_version_and_hashes(name, count, platform, python) -> None:
     lines = requirements_of(platform, python, pins(PINS[name]))
     names = [line.partition("==")[0] for line in lines]

@@ -37,8 +37,8 @@ BYTES_A_VOXEL_ON_DISK = 8
 """Bytes of a density and three velocities at 16 bits, where smoke fills the box. A quarter is usual."""
 
 BYTES_A_VOXEL = 85
-"""Bytes of memory at a run's peak, where half of the voxels may hold smoke: two velocities while a density is carried,
-and what a fit needs of the voxels that may hold smoke (docs/experiments/memory-and-time.md)."""
+"""Bytes of memory at a run's peak, where two fifths of the voxels may hold smoke: what fills the box, and what a fit
+needs of the voxels that may hold smoke (docs/experiments/memory-and-time.md)."""
 
 BYTES_A_VOXEL_OF_SOLVER = 145
 """Bytes that a velocity adds whose estimate has the grid of the density: its solver's arrays."""
@@ -49,7 +49,7 @@ BYTES_A_VOXEL_OF_DETAIL = 20
 BYTES_A_PIXEL_OF_DETAIL = 4
 """Bytes of a pixel of every frame on the turntable's screen, 16 bits that are held twice while they are gathered."""
 
-BASE_BYTES = 350 * 2**20
+BASE_BYTES = 250 * 2**20
 """Bytes of memory for the interpreter, libraries, compiled kernels and decoded pictures."""
 
 LARGEST_TIMED = 64

@@ -24,6 +24,7 @@ from smokelift.density.observation import BLACK, Observation, ViewSet, eight_bit
 from smokelift.footage.background import background_picture
 from smokelift.footage.plate import Plate
 from smokelift.render import Image, Renderer, Volume, scene_optics
+from smokelift.render.blas import products_on_one_thread
 from smokelift.scene import CompleteScene, Domain, Scene, completed
 
 LARGEST_START = 1e12
@@ -218,8 +219,9 @@ def reconstruct_density(
     seen = ViewSet.of([_with_plate(each, complete) for each in (own, *views)], optics)
     if initial is not None:
         initial = _checked_initial(initial, optics.domain)
-    estimate = (depth_prior or RoundDepth()).estimate(seen)
-    return GradientFit(settings or DensitySettings()).fit(seen, estimate, initial)
+    with products_on_one_thread():
+        estimate = (depth_prior or RoundDepth()).estimate(seen)
+        return GradientFit(settings or DensitySettings()).fit(seen, estimate, initial)
 
 
 def _with_plate(observation: Observation, scene: CompleteScene) -> Observation:

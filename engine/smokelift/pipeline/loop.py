@@ -26,6 +26,7 @@ from smokelift.output.writer import SequenceWriter
 from smokelift.pipeline.method import Method, compose
 from smokelift.pipeline.sources import sources
 from smokelift.render import Volume
+from smokelift.render.blas import products_on_one_thread
 from smokelift.scene import Domain, Scene
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.provenance import provenance
@@ -195,7 +196,8 @@ def _frames(shot: Shot, method: Method, start: Frame | None) -> Iterator[Frame]:
     del start
     first: Frame | None = None
     for index in range(number, count):
-        frame = _frame(index, before, shot, method)
+        with products_on_one_thread():
+            frame = _frame(index, before, shot, method)
         before = Past.of(frame)
         if index == 0 and count > 1:
             first = frame

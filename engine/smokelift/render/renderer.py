@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.render import device
+from smokelift.render.blas import products_on_one_thread
 from smokelift.render.cpu_backend import Sight
 from smokelift.render.plan import plan_render
 from smokelift.scene import Camera, Domain, FiniteLight, Medium, Scattering
@@ -84,7 +85,9 @@ class Renderer:
             Linear radiance, row 0 at the top.
         """
         scattered, self._depth = self._backend.image(density, keep_record)
-        return np.asarray(scattered @ self._colour + self.transmittance[..., None] * self._background)
+        with products_on_one_thread():
+            coloured = scattered @ self._colour
+        return np.asarray(coloured + self.transmittance[..., None] * self._background)
 
     @property
     def sight(self) -> Sight | None:
@@ -119,4 +122,6 @@ class Renderer:
         """
         of_image = np.asarray(image_gradient, np.float32)
         of_transmittance = np.einsum("...c,...c", of_image, np.broadcast_to(self._background, of_image.shape))
-        return self._backend.gradient(np.ascontiguousarray(of_image @ self._colour.T), of_transmittance, out)
+        with products_on_one_thread():
+            of_scattered = np.ascontiguousarray(of_image @ self._colour.T)
+        return self._backend.gradient(of_scattered, of_transmittance, out)

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from threadpoolctl import ThreadpoolController, threadpool_limits
 
 from smokelift.baselines.density import FixedRateDescent
 from smokelift.density import GradientFit, RoundDepth, Start, ViewSet
@@ -42,6 +43,7 @@ from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
 from smokelift.transport import Velocity
 from smokelift.velocity import CoarseToFine
+from tests.engine.conftest import Plume
 from tests.engine.setup.shots import burning
 
 
@@ -641,3 +643,26 @@ def test_fire_is_a_second_grid(plume, draft, tmp_path) -> None:
             assert error.mean() < 0.1 * burnt.frame(frame.number - 1)[fire].mean()
         assert all(part.flame is None for part in reconstruct(clip, scene, draft))
     assert any(part["what"] == "emission of fire" for part in sequence.provenance)
+
+
+def test_a_frame_is_computed_on_one_thread_of_blas_which_gets_its_own_back(plume: Plume) -> None:
+    seen = []
+
+    class Noting:
+        def fit(self, *given: Any) -> Any:
+            seen.append(blas_threads())
+            return GradientFit().fit(*given)
+
+    with threadpool_limits(2, user_api="blas"):
+        before = blas_threads()
+        method = replace(compose(Settings.preset("draft")), density_fit=Noting())
+        assert plume.scene.clip is not None
+        with Clip.open(plume.scene.clip) as clip:
+            for _ in reconstruct(clip, plume.scene, Settings.preset("draft"), method=method):
+                assert blas_threads() == before
+    assert seen
+    assert all(threads == {1} for threads in seen)
+
+
+def blas_threads() -> set[int]:
+    return {library["num_threads"] for library in ThreadpoolController().select(user_api="blas").info()}
