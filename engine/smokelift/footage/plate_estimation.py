@@ -9,7 +9,7 @@ within the noise, and smoke, when it has any. Three facts tell them apart:
 - Smoke draws every background towards its own brightness. So of several such values, the background is the one that is
   farthest from the smoke's.
 - Stock footage stands before one colour, mostly black. Where the pixels that never change have one, it is behind all
-  that do.
+  that do. Where they have two, it is the one that all pixels have at some time: the other is ink that stays.
 
 A pixel that only drifts is clear as well if it looks like its surroundings, or so unlike them that smoke would
 change more. A pixel without a certain value (over the source, as a rule) is unknown. What is behind it follows smoothly
@@ -97,6 +97,9 @@ nozzle, a floor, a logo."""
 ONE_COLOUR_NOISE = np.float32(6 / 255)
 """Most noise of a background of one colour, in sRGB values: a pixel that varies more while the camera moves sees more
 than one colour."""
+
+AT_ONCE = 0.5
+"""Share of the blocks that smoke comes over between two samples, less than a fade or a cut changes at once."""
 
 ISLAND = 0.01
 """Share of the picture up to which what seems clear is taken for an accident."""
@@ -290,15 +293,26 @@ def _backdrop(samples: npt.NDArray[np.uint16], noise: Noise) -> Picture | None:
     still = (over_time(blocks - middle) <= limit).all(-1)
     if not still.any():
         return None
-    colour = np.median(middle[still], axis=0)
     # the median of many samples has less noise than they have, by pi / 2 more variance than their mean
     settled = SMOKE_TO_NOISE * noise.averaged(BLOCK**2 * max(1.0, len(samples) / (np.pi / 2))).total
-    alike = (np.abs(middle - colour) <= settled).all(-1)
-    if alike[still].mean() < ONE_COLOUR:
+    colours: list[Picture] = []
+    kinds: list[npt.NDArray[np.bool_]] = []
+    left = still
+    while left.any() and len(kinds) < 2:  # the backdrop, and what stays before it
+        colours.append(np.median(middle[left], axis=0))
+        kinds.append((np.abs(middle - colours[-1]) <= settled).all(-1))
+        left = left & ~kinds[-1]
+    if left.sum() > (1 - ONE_COLOUR) * still.sum():
         return None
+    seen = [(np.abs(blocks - colour) <= limit).all(-1) for colour in colours]
+    covered = next((n for n, shown in enumerate(seen) if (still & kinds[n]).any() and _comes_over(shown)), None)
+    if covered is None and kinds[0][still].mean() < ONE_COLOUR:
+        return None
+    alike = kinds[covered or 0]
+    bare = alike if covered is None else seen[covered].any(0)
     clear = np.median(linear, axis=0)
     low, high = np.quantile(blocks, [0.05, 0.95], axis=0)
-    fixed = still & ~alike & ((high - low) <= limit).all(-1)
+    fixed = still & ~alike & ~bare & ((high - low) <= limit).all(-1)
     picture = np.where(fixed[..., None], clear, clear[still & alike].mean(0))
     height, width = samples.shape[1:3]
     rows, columns = (np.minimum(np.arange(n) // size, m - 1) for n, m in zip((height, width), fixed.shape, strict=True))
@@ -307,6 +321,18 @@ def _backdrop(samples: npt.NDArray[np.uint16], noise: Noise) -> Picture | None:
     if own.any():
         whole[own] = np.median(linear_samples(samples[:, own]), axis=0)
     return whole
+
+
+def _comes_over(shown: npt.NDArray[np.bool_]) -> bool:
+    """Whether what has a colour in samples (frames, rows, columns) is what smoke comes over.
+
+    Ink that spreads and stays is as still as what it hides. But its own colour is never seen where it has not come to,
+    and what it hides is seen everywhere. A clip that fades in from black is black everywhere at a time, too: that
+    leaves all of the picture at once, and smoke comes over one part after the other.
+    """
+    changes = shown[:, ~shown.all(0)]
+    at_once = np.abs(np.diff(changes.mean(-1))).max(initial=0.0) if changes.size else 0.0
+    return bool(shown.any(0).mean() >= 1 - ISLAND and at_once < AT_ONCE)
 
 
 def _mean(samples: npt.NDArray[np.uint16], seen: npt.NDArray[np.bool_] | None) -> Picture:

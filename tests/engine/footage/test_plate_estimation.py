@@ -151,6 +151,34 @@ def test_what_hardly_changes_is_no_smoke_however_unlike_its_surroundings(tmp_pat
     assert not matte(clip.frame(12), plate).mask[inner].any()
 
 
+def spreading_ink(n: int) -> np.ndarray:
+    """Return the opacity of ink that spreads from above, faster at first, and stays."""
+    rows, columns = np.mgrid[:HEIGHT, :WIDTH]
+    return np.clip((62 * np.sqrt(n / COUNT) - rows - 6 * np.cos(columns / 4)) / 6, 0, 1) if n else 0.0 * rows
+
+
+@pytest.mark.parametrize(("colour", "ink"), [(1.0, 0.0), (0.2, 0.7)], ids=["black on white", "bright on grey"])
+def test_ink_that_stays_is_not_what_it_hides(tmp_path: Path, colour: float, ink: float) -> None:
+    """Ink is over more of the picture that never changes than what it spreads over."""
+    truth = np.full((HEIGHT, WIDTH, 3), colour)
+    clip = film(tmp_path, truth, spreading_ink, ink)
+    plate = estimate_plate(clip)
+    assert (plate.confidence == 1).all()
+    assert codes_apart(plate.image, truth).max() < 2
+    last = spreading_ink(COUNT - 1)
+    mask = matte(clip.frame(COUNT - 1), plate).mask
+    assert mask[last > 0.5].all()
+    assert mask.mean() < (last > 0).mean() + 0.1
+
+
+def test_a_clip_that_fades_in_from_black_is_not_before_black(tmp_path: Path) -> None:
+    """Its bar is black all the time, and all of it at first."""
+    truth = np.full((HEIGHT, WIDTH, 3), 0.4)
+    truth[:10] = 0
+    plate = estimate_plate(film(tmp_path, truth, lambda n: np.full((HEIGHT, WIDTH), max(1 - n / 2, 0)), 0.0))
+    assert np.median(codes_apart(plate.image, truth)) < 2
+
+
 def test_one_frame_is_its_own_plate(tmp_path: Path) -> None:
     write_image(tmp_path / "still.png", wall(0.2, 0.8))
     clip = Clip.open(tmp_path / "still.png")
