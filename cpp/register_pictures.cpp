@@ -1,3 +1,4 @@
+#include "codes.h"
 #include "pictures.h"
 #include "python.h"
 
@@ -5,6 +6,8 @@ namespace smokelift {
 namespace {
 
 using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
+using Codes = py::array_t<unsigned char, 0>;
+using Integers = py::array_t<int, py::array::c_style | py::array::forcecast>;
 using Marks = py::array_t<bool, py::array::c_style | py::array::forcecast>;
 
 std::vector<double> values_of(const Doubles &a) {
@@ -23,6 +26,22 @@ PictureMap map_of(const Doubles &to_pixel, const std::array<Doubles, 3> &centres
     map.columns = size[0];
     map.rows = size[1];
     return map;
+}
+
+CodedLines lines_of(const Codes &picture) {
+    require_fit(picture.ndim() == 3 && picture.strides(2) == 1 && picture.strides(1) == picture.shape(2));
+    return {picture.data(), picture.strides(0), int(picture.shape(0)),
+            int(picture.shape(1) * picture.shape(2))};
+}
+
+LineWeights weights_of(const Integers &first, const Integers &lines, const Array &weights, int count) {
+    const int *const begin = first.data();
+    require_fit(first.ndim() == 1 && first.size() > 0 && begin[0] == 0 &&
+                std::is_sorted(begin, begin + first.size()) && begin[first.size() - 1] == lines.size() &&
+                lines.size() == weights.size());
+    for (py::ssize_t n = 0; n < lines.size(); ++n)
+        require_fit(lines.data()[n] >= 0 && lines.data()[n] < count);
+    return {begin, lines.data(), weights.data(), int(first.size()) - 1};
 }
 
 const unsigned char *bytes_of(const Marks &a) { return reinterpret_cast<const unsigned char *>(a.data()); }
@@ -79,6 +98,23 @@ void register_pictures(py::module_ &module) {
             return values;
         },
         "picture"_a, "rows"_a, "columns"_a);
+
+    module.def(
+        "sum_lines",
+        [](const Codes &picture, const Array &table, const Integers &first, const Integers &lines,
+           const Array &weights) {
+            const CodedLines coded = lines_of(picture);
+            require_fit(table.size() == 256);
+            const LineWeights summed = weights_of(first, lines, weights, coded.lines);
+            Array sums({py::ssize_t(summed.count), picture.shape(1), picture.shape(2)});
+            float *const result = sums.mutable_data();
+            {
+                const py::gil_scoped_release unlocked;
+                sum_lines(coded, table.data(), summed, result);
+            }
+            return sums;
+        },
+        "picture"_a, "table"_a, "first"_a, "lines"_a, "weights"_a);
 }
 
 } // namespace smokelift

@@ -428,3 +428,16 @@ class PictureMap:
 
 def read_bilinearly(picture: npt.NDArray[np.floating[Any]], rows: Array, columns: Array) -> Array:
     """A picture (rows, columns) at places (n,) in pixels; the nearest pixel's value outside."""
+
+def sum_lines(
+    picture: npt.NDArray[np.uint8],
+    table: Array,
+    first: npt.NDArray[np.int32],
+    lines: npt.NDArray[np.int32],
+    weights: Array,
+) -> Array:
+    """Weighted sums (n, columns, channels) of lines of a picture (rows, columns, channels) whose values a table tells.
+
+    The ``n``-th is that of ``lines`` from ``first[n]`` to ``first[n + 1]``, as of a sparse matrix in rows, and the same
+    to the last bit. ``table`` has 256 values. Pixels lie one after the other in each line.
+    """

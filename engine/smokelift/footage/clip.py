@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
@@ -13,6 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from smokelift.footage.exposure import small, small_size
 from smokelift.footage.frame_source import ClipError, DamagedFrameError, FrameSource, Look
 from smokelift.footage.image_sequence import ImageSequence
 from smokelift.footage.images import CodedPicture, Picture, Transfer, Value, area_average
@@ -37,6 +39,10 @@ REDUCED = 320
 
 REDUCED_BYTES = 32 * 2**20
 """Memory for such frames that are kept: twenty-five at least."""
+
+DECODED_BYTES = 256 * 2**20
+"""Memory for the frames of a file that are kept as they were decoded, reckoned as if stored: what most videos decode to
+takes half of that."""
 
 GLIMPSE_BYTES = 64 * 2**20
 """Memory for the glimpses of a file that are kept: a hundred at a third of 1080p."""
@@ -199,10 +205,43 @@ class Clip:
         ClipError
             If there is no such frame, or most frames of the clip are damaged.
         """
+        image = self._kept_or_coded(n)
+        return self._remembered(n, image.linear()) if isinstance(image, CodedPicture) else image
+
+    def area_average(
+        self, n: int, width: int, height: int, cut: Callable[[AnyPicture], AnyPicture] = _whole
+    ) -> Picture:
+        """Return frame ``n``, or a part of it, as means of light: `images.area_average`, which may be cheaper that way.
+
+        Parameters
+        ----------
+        n
+            As of `frame`.
+        width, height
+            Of what is returned, in pixels.
+        cut
+            As of `frame_through`.
+
+        Raises
+        ------
+        ClipError
+            As `frame` does.
+        """
+        image = self._kept_or_coded(n)
+        if isinstance(image, CodedPicture):
+            return CodedPicture(cut(image.codes), image.table).averaged(width, height)
+        return area_average(cut(image), width, height)
+
+    def _kept_or_coded(self, n: int) -> Picture | CodedPicture:
+        """Frame ``n`` as it is stored, or linear if it is not stored in codes, or has been asked for lately."""
         if n in self._cache:
             self._cache.move_to_end(n)
             return self._cache[n]
-        image = _linear(self._read(n, self._source.read))
+        image = self._read(n, self._source.read)
+        return image if isinstance(image, CodedPicture) else self._remembered(n, image)
+
+    def _remembered(self, n: int, image: Picture) -> Picture:
+        """A linear frame, kept for the next caller."""
         image.flags.writeable = False
         self._cache[n] = image
         while len(self._cache) > max(1, CACHE_BYTES // image.nbytes):
@@ -238,6 +277,16 @@ class Clip:
             return self.frame_through(n, change)
         return _through(self._read(n, lambda number: self._source.glimpse(number, divisor)), change, _whole)
 
+    def glimpse_average(
+        self, n: int, longest: int, change: Callable[[Picture], Picture], width: int, height: int
+    ) -> Picture:
+        """Return the area averages of `glimpse_through`."""
+        divisor = max(self.size) // longest
+        image = self._read(n, lambda number: self._source.glimpse(number, divisor))
+        if isinstance(image, CodedPicture):
+            return CodedPicture(image.codes, change(image.table)).averaged(width, height)
+        return area_average(change(image), width, height)
+
     def reduced(self, n: int) -> Picture:
         """Return frame ``n`` as means of light, with `REDUCED` pixels along the longer side at most.
 
@@ -247,7 +296,7 @@ class Clip:
             As `frame` does.
         """
         if n not in self._reduced:
-            _keep(self._reduced, n, area_average(self.frame(n), *self.reduced_size), REDUCED_BYTES)
+            _keep(self._reduced, n, self.area_average(n, *self.reduced_size), REDUCED_BYTES)
         return self._reduced[n]
 
     @property
@@ -277,7 +326,9 @@ class Clip:
             return self.frame(n)
         return _linear(self._read(n, lambda number: self._source.glimpse(number, divisor)))
 
-    def expect(self, whole: Iterable[int], glimpses: Iterable[int], longest: int) -> None:
+    def expect(
+        self, whole: Iterable[int] = (), glimpses: Iterable[int] = (), longest: int = 1, perhaps: Iterable[int] = ()
+    ) -> None:
         """Say which frames, and which glimpses, are asked for next: those met while `damaged` is found out are kept.
 
         It has no effect on a clip whose frames are `changed`.
@@ -288,11 +339,15 @@ class Clip:
             Numbers of frames.
         longest
             As of `glimpse`.
+        perhaps
+            Numbers of frames of which some are asked for, whole or as glimpses: they are kept as they are decoded, in
+            `DECODED_BYTES` if that holds them all, until other frames are expected.
         """
         divisor = max(self.size) // longest
         if isinstance(self._source, _Kept):
             small = [self.first + n for n in glimpses] if divisor > 1 else []
-            self._source.expect([self.first + n for n in whole], small, divisor)
+            some = [self.first + n for n in perhaps if n < len(self)]
+            self._source.expect([self.first + n for n in whole], small, divisor, some)
 
     def _read(self, n: int, read: Callable[[int], Image]) -> Image:
         """Return a frame from the file, or what stands in for it: the last sound one lasts on, as when one drops."""
@@ -325,12 +380,19 @@ class Clip:
 
     def part(self, first: int, last: int) -> Clip:
         """Return the frames of the file from one number to another, both included. The two share the open file."""
+        if (first, last) == (self.first, self.first + len(self) - 1):
+            return self
         return Clip(self.path, self._source, self.fps, (first, last), self.size)
 
-    def changed(self, change: Callable[[int, Picture], Picture]) -> Clip:
-        """Return the clip with each frame, by its number, replaced. The two share the open file."""
+    def changed(
+        self, change: Callable[[int, Picture], Picture], keeps: Callable[[int, Picture], bool] | None = None
+    ) -> Clip:
+        """Return the clip with each frame, by its number, replaced. The two share the open file.
+
+        ``keeps`` says of a frame's number, and of its `small` picture, that ``change`` leaves it as it is.
+        """
         last = self.first + len(self) - 1
-        return Clip(self.path, _Changed(self, self._source, change), self.fps, (self.first, last))
+        return Clip(self.path, _Changed(self, self._source, change, keeps), self.fps, (self.first, last))
 
     def close(self) -> None:
         """Close the file."""
@@ -345,6 +407,16 @@ class Clip:
         self.close()
 
 
+@dataclass(frozen=True)
+class _Expected:
+    """Frames of a source that are asked for next: whole, as glimpses with sides divided by a number, or perhaps."""
+
+    whole: frozenset[int] = frozenset()
+    glimpses: frozenset[int] = frozenset()
+    divisor: int = 1
+    perhaps: frozenset[int] = frozenset()
+
+
 class _Kept:
     """The frames of a source, of which the last ones read are kept for all clips that share it."""
 
@@ -352,8 +424,9 @@ class _Kept:
         self._source = source
         self._kept: OrderedDict[int, Picture | CodedPicture] = OrderedDict()
         self._glimpses: OrderedDict[tuple[int, int], Picture | CodedPicture] = OrderedDict()
+        self._decoded: dict[int, Callable[[int], Picture | CodedPicture]] = {}
         self._damaged: dict[tuple[int, int], tuple[int, ...]] = {}
-        self._expected: tuple[frozenset[int], frozenset[int], int] = frozenset(), frozenset(), 1
+        self._expected = _Expected()
         self.count, self.fps, self.warning = source.count, source.fps, source.warning
         self.files, self.lens, self.backdrop = source.files, source.lens, source.backdrop
 
@@ -365,28 +438,38 @@ class _Kept:
         if n in self._kept:
             self._kept.move_to_end(n)
             return self._kept[n]
-        image = self._source.read(n)
+        image = self._decoded[n](1) if n in self._decoded else self._source.read(n)
         _keep(self._kept, n, image, KEPT_BYTES)
         return image
 
     def glimpse(self, n: int, divisor: int) -> Picture | CodedPicture:
         if (n, divisor) not in self._glimpses:
-            _keep(self._glimpses, (n, divisor), self._source.glimpse(n, divisor), GLIMPSE_BYTES)
+            image = self._decoded[n](divisor) if n in self._decoded else self._source.glimpse(n, divisor)
+            _keep(self._glimpses, (n, divisor), image, GLIMPSE_BYTES)
         return self._glimpses[n, divisor]
 
-    def expect(self, whole: Sequence[int], glimpses: Sequence[int], divisor: int) -> None:
+    def expect(self, whole: Sequence[int], glimpses: Sequence[int], divisor: int, perhaps: Sequence[int]) -> None:
         size = max((image.nbytes for image in self._kept.values()), default=0)
-        # of larger pictures the first would be gone before the last is there
-        self._expected = frozenset(whole if len(whole) * size <= KEPT_BYTES else ()), frozenset(glimpses), divisor
+        self._decoded.clear()
+        self._expected = _Expected(
+            # of larger pictures the first would be gone before the last is there
+            frozenset(whole if len(whole) * size <= KEPT_BYTES else ()),
+            frozenset(glimpses),
+            divisor,
+            frozenset(perhaps if len(perhaps) * size <= DECODED_BYTES else ()),
+        )
 
     def damaged(self, first: int, last: int, look: Look | None = None) -> tuple[int, ...]:
-        whole, glimpses, divisor = self._expected
+        expected = self._expected
+        divisor = expected.divisor
 
         def keep(n: int, picture: Callable[[int], Picture | CodedPicture]) -> None:
-            if n in whole and n not in self._kept:
+            if n in expected.whole and n not in self._kept:
                 _keep(self._kept, n, picture(1), KEPT_BYTES)
-            if n in glimpses and (n, divisor) not in self._glimpses:
+            if n in expected.glimpses and (n, divisor) not in self._glimpses:
                 _keep(self._glimpses, (n, divisor), picture(divisor), GLIMPSE_BYTES)
+            if n in expected.perhaps and n not in self._kept:
+                self._decoded[n] = picture
             if look is not None:
                 look(n, picture)
 
@@ -401,8 +484,14 @@ class _Kept:
 class _Changed:
     """The frames of a clip's source, each replaced; numbers count from the clip's first one."""
 
-    def __init__(self, clip: Clip, source: FrameSource, change: Callable[[int, Picture], Picture]) -> None:
-        self._clip, self._source, self._change = clip, source, change
+    def __init__(
+        self,
+        clip: Clip,
+        source: FrameSource,
+        change: Callable[[int, Picture], Picture],
+        keeps: Callable[[int, Picture], bool] | None,
+    ) -> None:
+        self._clip, self._source, self._change, self._keeps = clip, source, change, keeps
         self.count, self.fps, self.warning = source.count, source.fps, source.warning
         self.files, self.lens, self.backdrop = source.files, clip.lens, clip.backdrop
 
@@ -410,10 +499,13 @@ class _Changed:
     def notes(self) -> tuple[str, ...]:
         return self._source.notes
 
-    def read(self, n: int) -> Picture:
-        return self._change(n - self._clip.first, _linear(self._source.read(n)))
+    def read(self, n: int) -> Picture | CodedPicture:
+        image, number = self._source.read(n), n - self._clip.first
+        if self._keeps is not None and self._keeps(number, _small(image)):
+            return image
+        return self._change(number, _linear(image))
 
-    def glimpse(self, n: int, divisor: int) -> Picture:
+    def glimpse(self, n: int, divisor: int) -> Picture | CodedPicture:
         return self.read(n)  # a change may be meant for the whole picture
 
     def damaged(self, first: int, last: int, look: Look | None = None) -> tuple[int, ...]:
@@ -436,6 +528,13 @@ def _keep(kept: OrderedDict[Key, Image], key: Key, image: Image, most: int) -> N
 
 def _linear(image: Picture | CodedPicture) -> Picture:
     return image.linear() if isinstance(image, CodedPicture) else image
+
+
+def _small(image: Picture | CodedPicture) -> Picture:
+    if isinstance(image, CodedPicture):
+        rows, columns = image.codes.shape[:2]
+        return image.averaged(*small_size(columns, rows))
+    return small(image)
 
 
 def _through(

@@ -65,8 +65,13 @@ def largest_change(gains: Sequence[Picture]) -> float:
 def small(picture: Picture) -> Picture:
     """Return a picture at the size at which gains are measured."""
     rows, columns = picture.shape[:2]
-    scale = max(1.0, max(rows, columns) / LONGEST)
-    return area_average(picture, max(1, round(columns / scale)), max(1, round(rows / scale)))
+    return area_average(picture, *small_size(columns, rows))
+
+
+def small_size(width: int, height: int) -> tuple[int, int]:
+    """Return width and height of the `small` picture of one of a width and a height."""
+    scale = max(1.0, max(height, width) / LONGEST)
+    return max(1, round(width / scale)), max(1, round(height / scale))
 
 
 def sample_gains(samples: npt.NDArray[np.float32]) -> Picture:

@@ -24,6 +24,7 @@ import OpenEXR
 import scipy.sparse
 from PIL import Image, ImageOps
 
+import smokelift._core as _core
 from smokelift.footage.colour import Encoding, hlg_to_linear, pq_to_linear
 from smokelift.footage.container import open_container
 from smokelift.scene import LARGEST_PICTURE
@@ -76,6 +77,16 @@ class CodedPicture:
     def through(self, change: Callable[[Picture], npt.NDArray[Value]]) -> npt.NDArray[Value]:
         """Return the picture with a function applied to every linear value, which is called for each code once."""
         return look_up(change(self.table), self.codes)
+
+    def averaged(self, width: int, height: int) -> Picture:
+        """Return the `area_average` of the linear picture, which is not made as a whole where codes have 8 bits."""
+        rows = self.codes.shape[0]
+        if self.codes.dtype != np.uint8 or not 1 <= height < rows:
+            return area_average(self.linear(), width, height)
+        weights = _weights(rows, height)
+        codes = np.asarray(self.codes, np.uint8)
+        lines = _core.sum_lines(codes, self.table, weights.indptr, weights.indices, weights.data)
+        return area_average(lines, width, height)
 
 
 def look_up(values: npt.NDArray[Value], codes: npt.NDArray[np.uint8] | npt.NDArray[np.uint16]) -> npt.NDArray[Value]:

@@ -32,11 +32,13 @@ def steady(clip: Clip, plates: Plates, known: Mapping[int, Picture] = MappingPro
     """
     gains_of = exposures(plates)
 
-    def balanced(number: int, picture: Picture) -> Picture:
-        gains = known[number] if number in known else gains_of(number, picture)
-        return picture if (gains == 1).all() else picture / gains
+    def gains(number: int, picture: Picture) -> Picture:
+        return known[number] if number in known else gains_of(number, picture)
 
-    return clip.changed(balanced)
+    def balanced(number: int, picture: Picture) -> Picture:
+        return picture / gains(number, picture)
+
+    return clip.changed(balanced, lambda number, tiny: bool((gains(number, tiny) == 1).all()))
 
 
 def without_noise_light(clip: Clip, plates: Plates) -> Clip:

@@ -48,7 +48,8 @@ class ShotView:
             plate = self.plates.at(frame).through(working.cut, working.pixels)
         else:
             plate = self._still_plates.at(frame)
-        return Observation(working.camera, working.cut(self.clip.frame(frame)), plate)
+        image = self.clip.area_average(frame, *working.camera.size, working.part)
+        return Observation(working.camera, image, plate)
 
     @cached_property
     def _still_plates(self) -> Plates:

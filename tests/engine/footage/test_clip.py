@@ -264,6 +264,57 @@ def test_what_is_expected_is_kept_while_damage_is_looked_for(
         assert read == [6]
 
 
+def test_what_is_perhaps_asked_for_is_kept_as_it_was_decoded(ramp: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with Clip.open(ramp) as clip:
+        frame, glimpse = clip.frame(5), clip.glimpse(6, 12)
+    read: list[int] = []
+    decode = Video._decode
+    monkeypatch.setattr(Video, "_decode", lambda video, index: read.append(index) or decode(video, index))
+    with Clip.open(ramp) as clip:
+        first = clip.part(1, 7)
+        first.expect(perhaps=[4, 5, 6, 7], longest=12)
+        assert first.damaged == ()
+        read.clear()
+        assert np.array_equal(clip.frame(5), frame)
+        assert np.array_equal(clip.glimpse(6, 12), glimpse)
+        assert read == []
+        clip.frame(8)  # which the part does not have
+        first.expect()
+        clip.frame(6)
+        assert read == [8, 6]
+    monkeypatch.setattr("smokelift.footage.clip.DECODED_BYTES", 1)
+    with Clip.open(ramp) as clip:
+        clip.expect(perhaps=[5])
+        assert clip.damaged == ()
+        read.clear()
+        clip.frame(5)
+        assert read == [5]
+
+
+def test_a_part_is_averaged_as_of_the_linear_frame(tmp_path: Path) -> None:
+    random = np.random.default_rng(5)
+    path = encode(tmp_path / "noisy.mp4", random.integers(0, 256, (3, 32, 64, 3), np.uint8))
+    with Clip.open(path) as clip, Clip.open(path) as other:
+        whole = other.frame(1)
+        for shown in (clip, clip.changed(lambda _, picture: picture / 1, lambda n, _: n == 1), other):
+            found = shown.area_average(1, 9, 5, lambda picture: picture[3:20, 7:50])
+            assert np.array_equal(found, area_average(whole[3:20, 7:50], 9, 5))
+
+
+def test_a_frame_that_a_change_leaves_as_it_is_stays_so(tmp_path: Path) -> None:
+    with Clip.open(encode(tmp_path / "two.mp4", [flat(50), flat(90)])) as clip:
+        seen = []
+
+        def keeps(number: int, tiny: Picture) -> bool:
+            seen.append(tiny.shape)
+            return float(tiny.mean()) < 0.05
+
+        changed = clip.changed(lambda _, picture: 2 * picture, keeps)
+        assert np.array_equal(changed.frame(0), clip.frame(0))
+        assert np.array_equal(changed.frame(1), 2 * clip.frame(1))
+        assert set(seen) == {(16, 32, 3)}
+
+
 def test_decoding_goes_on_from_where_damage_was_looked_for(ramp: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What follows is the right frame, and no earlier one is decoded again."""
     with Clip.open(ramp, frames=(0, 9)) as clip:

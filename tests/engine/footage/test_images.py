@@ -12,9 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
+from smokelift import _core
 from smokelift.footage.images import (
+    CodedPicture,
     ImageError,
     area_average,
+    code_values,
     decode_integers,
     linear_to_srgb,
     read_image,
@@ -234,3 +237,25 @@ def test_a_damaged_exr_leaves_the_standard_streams_alone(tmp_path, capfd) -> Non
     with pytest.raises(ImageError, match="cannot be read"):
         read_image(path)
     assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("size", [(7, 5), (31, 40), (64, 48), (80, 40)])
+def test_averages_of_codes_are_those_of_the_linear_picture_to_the_last_bit(size: tuple[int, int]) -> None:
+    random = np.random.default_rng(0)
+    for dtype in (np.uint8, np.uint16):
+        top = np.iinfo(dtype).max
+        picture = CodedPicture(random.integers(0, top, (48, 64, 3), dtype, endpoint=True), code_values(top))
+        for part in (np.s_[:], np.s_[3:41, 5:60]):
+            some = CodedPicture(picture.codes[part], picture.table)
+            assert np.array_equal(some.averaged(*size), area_average(picture.linear()[part], *size))
+    with pytest.raises(ValueError, match="at least one pixel"):
+        picture.averaged(4, 0)
+
+
+def test_lines_are_summed_of_pictures_that_have_them_only() -> None:
+    codes, table = np.zeros((4, 2, 3), np.uint8), np.zeros(256, np.float32)
+    for lines in ([0, 4], [-1, 0]):
+        with pytest.raises(ValueError, match="belong together"):
+            _core.sum_lines(codes, table, np.array([0, 2], np.int32), np.array(lines, np.int32), table[:2])
+    with pytest.raises(ValueError, match="belong together"):
+        _core.sum_lines(codes[:, ::-1], table, np.array([0, 1], np.int32), np.zeros(1, np.int32), table[:1])
