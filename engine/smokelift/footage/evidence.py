@@ -14,6 +14,9 @@ from smokelift.footage.images import Picture, Value, linear_to_srgb
 SAMPLES = 24
 """Frames of the file that are compared, and as many of the clip at most."""
 
+SAMPLES_OF_LARGE = 16
+"""The same where pictures are large, as many as are looked at whole anyway."""
+
 GLIMPSE = 4 * LONGEST
 """Pixels along the longer side of what is read, four for each one that is compared: light is averaged over them."""
 
@@ -23,6 +26,16 @@ STILL = 4 / 255
 SAME_SHOT = 0.25
 """Share of the pixels that do not change within the clip which a frame of the same shot leaves as they are; smoke may
 be over the others."""
+
+
+def are_large(clip: Clip) -> bool:
+    """Return whether the pictures of a clip are larger than glimpses at them."""
+    return max(clip.size) >= 2 * GLIMPSE
+
+
+def looks(clip: Clip) -> list[int]:
+    """Return the numbers of the frames of a clip that are compared."""
+    return clip.spread(SAMPLES_OF_LARGE if are_large(clip) else SAMPLES)
 
 
 def evidence(clip: Clip) -> Clip:
@@ -36,11 +49,11 @@ def evidence(clip: Clip) -> Clip:
     whole = clip.whole()
     if len(whole) == len(clip):
         return clip
-    own = np.stack([small(clip.glimpse(number, GLIMPSE)) for number in clip.spread(SAMPLES)])
+    own = np.stack([small(clip.glimpse(number, GLIMPSE)) for number in looks(clip)])
     reference = np.median(own, axis=0)
     still = np.quantile(np.abs(linear_to_srgb(own) - linear_to_srgb(reference)).max(-1), 0.9, axis=0) < STILL
     first, last = clip.first, clip.first + len(clip) - 1
-    numbers = whole.spread(SAMPLES)
+    numbers = looks(whole)
     for number in [n for n in numbers if n > last]:
         if not _same(whole, number, reference, still):
             break
@@ -59,10 +72,10 @@ def glimpses(clip: Clip, shot: Clip, change: Callable[[Picture], NDArray[Value]]
 
     ``change`` is applied to every linear value by itself; `linear` leaves it.
     """
-    yield from (clip.glimpse_through(number, GLIMPSE, change) for number in clip.spread(SAMPLES))
+    yield from (clip.glimpse_through(number, GLIMPSE, change) for number in looks(clip))
     if len(shot) > len(clip):
         whole = clip.whole()
-        for number in whole.spread(SAMPLES):
+        for number in looks(whole):
             if 0 <= number - shot.first < len(shot) and not 0 <= number - clip.first < len(clip):
                 yield whole.glimpse_through(number, GLIMPSE, change)
 

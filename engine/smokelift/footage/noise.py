@@ -29,6 +29,10 @@ BLOCK = 5
 """Pixels along the blocks over whose means the lasting noise is measured; they hold about as many as `matte` averages
 over."""
 
+BLOCKS_APART = 3
+"""Blocks from one row or column of them to the next that tell the noise of large pictures: a median of so many needs no
+more."""
+
 STEADY_SHARE, STEADY_WIDTH = 0.9, 1.645
 """Share of a pixel's deviations over time that its noise is measured on, and how many standard deviations normal ones
 reach there. The others may be a flash, a cut or smoke; a smaller share would miss the drift of a codec."""
@@ -90,7 +94,12 @@ def sampled_count(count: int, width: int, height: int) -> int:
 
 def encode_sample(linear: Picture) -> npt.NDArray[np.uint16]:
     """Return a linear picture in sRGB values as fixed point."""
-    return np.clip(linear_to_srgb(linear) * _FIXED_POINT + 0.5, 0, 65535).astype(np.uint16)
+    return as_samples(linear_to_srgb(linear))
+
+
+def as_samples(encoded: Picture) -> npt.NDArray[np.uint16]:
+    """Return sRGB values as fixed point."""
+    return np.clip(encoded * _FIXED_POINT + 0.5, 0, 65535).astype(np.uint16)
 
 
 def decode_samples(samples: npt.NDArray[np.uint16] | npt.NDArray[np.uint32]) -> Picture:
@@ -124,6 +133,14 @@ def sample_block_means(sample: npt.NDArray[np.uint16]) -> Picture:
     sums = _sum_of([lines[:, k] for k in range(size)]).reshape(rows, columns, size, 3)
     total = _sum_of([sums[:, :, k] for k in range(size)])
     return total.astype(np.float32) / np.float32(_FIXED_POINT) / np.float32(size**2)
+
+
+def some_blocks(picture: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Return a picture of some blocks of another, side by side, `BLOCKS_APART`."""
+    step = BLOCKS_APART * BLOCK
+    rows, columns = (n // step for n in picture.shape[:2])
+    whole = picture[: rows * step, : columns * step].reshape(rows, step, columns, step, 3)
+    return np.ascontiguousarray(whole[:, :BLOCK, :, :BLOCK]).reshape(rows * BLOCK, columns * BLOCK, 3)
 
 
 def whole_blocks(seen: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:

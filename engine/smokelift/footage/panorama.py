@@ -160,8 +160,8 @@ def estimate_panorama(clip: Clip, turns: Turns, sample_count: int = 32) -> Panor
     """
     place = WidePicture.around(turns)
     samples, seen = wide_samples(clip, place, sample_count)
-    image, known = clear_picture(samples, clip_noise(samples, seen), seen)
-    plates = PanoramaPlate(place, image, known.astype(np.float32), lasting_noise(0.0))
+    found = clear_picture(samples, clip_noise(samples, seen), seen)
+    plates = PanoramaPlate(place, found.image, found.known.astype(np.float32), lasting_noise(0.0))
     return replace(plates, noise=noise_before(plates, clip))
 
 
@@ -171,7 +171,7 @@ def wide_samples(clip: Clip, place: WidePicture, count: int) -> tuple[npt.NDArra
     Returns
     -------
     samples : (frames, rows, columns, 3) uint16
-        As `smokelift.footage.plate_estimation.steady_samples`.
+        As of `smokelift.footage.plate_estimation.SteadySamples`.
     seen : (frames, rows, columns) bool
         What each frame shows.
     """

@@ -7,7 +7,6 @@ more than all else that is looked at before a run.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,15 +15,12 @@ from smokelift.footage.clip import Clip
 from smokelift.footage.evidence import GLIMPSE, glimpses, linear
 from smokelift.footage.exposure import sample_gains, small
 from smokelift.footage.images import Picture, area_average
-from smokelift.footage.noise import BLOCK, Noise, encode_sample, linear_samples
+from smokelift.footage.noise import BLOCK, BLOCKS_APART, Noise, encode_sample, linear_samples, some_blocks
 from smokelift.footage.plate import Plate
 from smokelift.footage.plate_estimation import backdrop_plate, clip_noise
 
 SAMPLES = 16
 """Frames from which the colour and the noise are taken."""
-
-APART = 3
-"""Blocks from one row or column of them to the next that tell both: a median of so many needs no more."""
 
 
 def plain_plate(clip: Clip, shot: Clip) -> Plate | None:
@@ -44,17 +40,20 @@ def plain_plate(clip: Clip, shot: Clip) -> Plate | None:
     """
     width, height = clip.size
     divisor = max(width, height) // GLIMPSE
-    if divisor < 2 or min(width, height) < APART * BLOCK:
+    if divisor < 2 or min(width, height) < BLOCKS_APART * BLOCK:
         return None
     columns, rows = round(width / divisor), max(1, round(height / divisor))
     shown = list(glimpses(clip, shot, linear))
     fits = all(glimpse.shape[:2] == (rows, columns) for glimpse in shown)
     seen = shown if fits else [area_average(glimpse, columns, rows) for glimpse in shown]
+    tiny = [small(glimpse) for glimpse in seen]
+    if _colour(map(encode_sample, tiny), tiny) is None:  # which most walls show
+        return None
     samples = glimpses(clip, shot, encode_sample) if fits else map(encode_sample, seen)
-    if _colour(samples, [small(glimpse) for glimpse in seen]) is None:
+    if _colour(samples, tiny) is None:
         return None
     numbers = clip.spread(SAMPLES)
-    parts = (clip.frame_through(number, encode_sample, _some_blocks) for number in numbers)
+    parts = (clip.frame_through(number, encode_sample, some_blocks) for number in numbers)
     found = _colour(parts, [small(clip.reduced(number)) for number in numbers])
     if found is None:
         return None
@@ -81,11 +80,3 @@ def _colour(encoded: Iterable[npt.NDArray[np.uint16]], whole: Sequence[Picture])
     if found is None or (found.image != found.image[0, 0]).any():
         return None
     return found.image[0, 0], noise
-
-
-def _some_blocks(picture: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """A picture of some blocks, side by side, of those whose means tell the noise that lasts."""
-    step = APART * BLOCK
-    rows, columns = (n // step for n in picture.shape[:2])
-    whole = picture[: rows * step, : columns * step].reshape(rows, step, columns, step, 3)
-    return np.ascontiguousarray(whole[:, :BLOCK, :, :BLOCK]).reshape(rows * BLOCK, columns * BLOCK, 3)

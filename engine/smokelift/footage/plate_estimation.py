@@ -22,14 +22,14 @@ background has to be of one colour, or known frame by frame.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
 from smokelift.footage.clip import Clip
-from smokelift.footage.exposure import sample_gains, small
+from smokelift.footage.exposure import sample_gains, small_size
 from smokelift.footage.images import Picture, area_average, linear_to_srgb, srgb_to_linear
 from smokelift.footage.matte import matte, smoothing
 from smokelift.footage.noise import (
@@ -133,6 +133,55 @@ class _Smoke:
     brightens: npt.NDArray[np.bool_]
 
 
+@dataclass(frozen=True, eq=False)
+class SteadySamples:
+    """Frames of a clip, all of one exposure.
+
+    Attributes
+    ----------
+    pictures : (frames, rows, columns, 3) uint16
+        sRGB values in fixed point; `decode_samples` reads them.
+    """
+
+    pictures: npt.NDArray[np.uint16]
+
+    @cached_property
+    def noise(self) -> Noise:
+        """Of them."""
+        return clip_noise(self.pictures)
+
+    def backdrop(self) -> Plate | None:
+        """Return the plate of a background of one colour, or None if it has more."""
+        return backdrop_plate(self.pictures, self.noise)
+
+    def plate(self) -> Plate:
+        """Return the plate of a background of more than one colour."""
+        found = clear_picture(self.pictures, self.noise)
+        return Plate(found.image, found.known.astype(np.float32), self.noise)
+
+
+@dataclass(frozen=True, eq=False)
+class ClearPicture:
+    """The background of samples of one exposure.
+
+    Attributes
+    ----------
+    image : (rows, columns, 3)
+        Linear.
+    known : (rows, columns) bool
+        Pixels that some of the samples show without smoke.
+    clear : (frames, rows, columns) bool
+        Where each of the samples shows the background that is known.
+    contrast : (rows, columns)
+        By what the detail of the samples' mean is multiplied to be that of the background; 0 where smoke hides it.
+    """
+
+    image: Picture
+    known: npt.NDArray[np.bool_]
+    clear: npt.NDArray[np.bool_]
+    contrast: Picture
+
+
 def estimate_plate(clip: Clip, sample_count: int = 32) -> Plate:
     """Estimate the background of a clip from its frames; the module says how.
 
@@ -149,36 +198,36 @@ def estimate_plate(clip: Clip, sample_count: int = 32) -> Plate:
         If a frame cannot be read.
     """
     samples = steady_samples(clip, sample_count)
-    noise = clip_noise(samples)
-    plate = backdrop_plate(samples, noise)
-    return plate or estimated_plate(samples, noise)
-
-
-def estimated_plate(samples: npt.NDArray[np.uint16], noise: Noise) -> Plate:
-    """Return the plate of a background of more than one colour, from `steady_samples`."""
-    image, known = clear_picture(samples, noise)
-    return Plate(image, known.astype(np.float32), noise)
+    return samples.backdrop() or samples.plate()
 
 
 def backdrop_plate(samples: npt.NDArray[np.uint16], noise: Noise) -> Plate | None:
-    """Return the plate of a background of one colour, or None if it has more; of `steady_samples`."""
+    """Return the plate of a background of one colour, or None if it has more.
+
+    ``samples`` (frames, rows, columns, 3) are of one exposure, as of `SteadySamples`.
+    """
     backdrop = _backdrop(samples, noise)
     return None if backdrop is None else Plate(backdrop, np.ones(backdrop.shape[:2], np.float32), noise)
 
 
 def clear_picture(
-    samples: npt.NDArray[np.uint16], noise: Noise, seen: npt.NDArray[np.bool_] | None = None
-) -> tuple[Picture, npt.NDArray[np.bool_]]:
-    """Return the background of samples, linear (rows, columns, 3), and which pixels of it are known (rows, columns).
+    samples: npt.NDArray[np.uint16],
+    noise: Noise,
+    seen: npt.NDArray[np.bool_] | None = None,
+    detail: float = DETAIL,
+) -> ClearPicture:
+    """Return the background of samples.
 
     Parameters
     ----------
     samples : (frames, rows, columns, 3)
-        Of one exposure, as of `steady_samples`.
+        Of one exposure, as of `SteadySamples`.
     noise
         Of them.
     seen : (frames, rows, columns) bool, optional
         Which pixels each of them shows; without it all.
+    detail
+        Standard deviation of the Gaussian as of `DETAIL`, in pixels of the samples.
     """
     width = smoothing(noise)
     grey = np.stack([_smooth_grey(sample, width) for sample in samples])
@@ -196,12 +245,15 @@ def clear_picture(
     height, width = samples.shape[1:3]
     image = np.empty((height, width, 3), np.float32)
     known, calm = np.empty((height, width), np.bool_), np.empty((height, width), np.bool_)
+    clear = np.empty(samples.shape[:3], np.bool_)
     rows = max(1, BAND // width)
     for row in range(0, height, rows):
         band = slice(row, row + rows)
         values = shown(band)
         away = np.where(brightens[band], values, -values)
-        image[band], known[band], calm[band] = _clear_value(samples[:, band], away, window, smoke.likeness)
+        image[band], known[band], calm[band] = _clear_value(
+            samples[:, band], away, window, smoke.likeness, clear[:, band]
+        )
     known = _in_one_piece(known)
     if not known.all():
         # what changes by drift at most is no smoke if it is too little like its surroundings for smoke so steady
@@ -218,7 +270,8 @@ def clear_picture(
         never = ~seen.any(0)
         mean[never] = _filled(linear_to_srgb(image), sure.astype(np.float32))[never]
         image[never] = srgb_to_linear(mean[never])
-    return _completed(image, known, sure, mean, smoke.brightness, brightens), known
+    completed, contrast = _completed(image, known, sure, mean, smoke.brightness, brightens, detail)
+    return ClearPicture(completed, known, clear, contrast)
 
 
 def one_colour(plate: Plate) -> tuple[float, float, float] | None:
@@ -232,8 +285,8 @@ def one_colour(plate: Plate) -> tuple[float, float, float] | None:
     return None if (differs & known).any() else (red, green, blue)
 
 
-def steady_samples(clip: Clip, count: int = 32) -> npt.NDArray[np.uint16]:
-    """Return frames spread evenly over a clip, all of one exposure, in fixed point; `decode_samples` reads them.
+def steady_samples(clip: Clip, count: int = 32) -> SteadySamples:
+    """Return frames spread evenly over a clip, all of one exposure.
 
     Parameters
     ----------
@@ -241,11 +294,6 @@ def steady_samples(clip: Clip, count: int = 32) -> npt.NDArray[np.uint16]:
         The footage.
     count
         How many frames; fewer are returned of a shorter clip, and of pictures so large that they need too much memory.
-
-    Returns
-    -------
-    (frames, rows, columns, 3) uint16
-        sRGB values.
 
     Raises
     ------
@@ -258,11 +306,11 @@ def steady_samples(clip: Clip, count: int = 32) -> npt.NDArray[np.uint16]:
     tiny = []
     for sample, number in zip(samples, numbers, strict=True):
         sample[...] = clip.frame_through(number, encode_sample)
-        tiny.append(small(clip.frame(number)))
+        tiny.append(clip.area_average(number, *small_size(width, height)))
     for sample, gain in zip(samples, sample_gains(np.stack(tiny)), strict=True):
         if (gain != 1).any():
             sample[...] = encode_sample(linear_samples(sample) / gain)
-    return samples
+    return SteadySamples(samples)
 
 
 def clip_noise(samples: npt.NDArray[np.uint16], seen: npt.NDArray[np.bool_] | None = None) -> Noise:
@@ -399,12 +447,17 @@ def _supports(ordered: Picture, window: float) -> npt.NDArray[np.int16]:
 
 
 def _clear_value(
-    samples: npt.NDArray[np.uint16], away: Picture, window: float, likeness: float
+    samples: npt.NDArray[np.uint16],
+    away: Picture,
+    window: float,
+    likeness: float,
+    clear: npt.NDArray[np.bool_],
 ) -> tuple[Picture, npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
     """Return the background of each pixel, linear, whether it is certain, and whether the pixel changes like drift.
 
     Where it is not certain it is the least smoky value. That of a pixel that drifts is its middle one. ``away`` is the
-    grey value of the samples, with its sign turned where smoke darkens: the less, the clearer.
+    grey value of the samples, with its sign turned where smoke darkens: the less, the clearer. ``clear`` is filled with
+    where each sample shows that background.
     """
     unseen, number = np.isnan(away), count_of_seen(away)
     some_unseen = bool(unseen.any())
@@ -432,6 +485,7 @@ def _clear_value(
         inside = np.abs(away - centre) <= 0.5 * window * 1.001
         within = np.maximum(_count(inside), 1)
         centre = np.where(inside, away, 0).sum(axis=0) / within
+    clear[...] = inside
     value = np.einsum("tyxc,tyx->yxc", linear_samples(samples), inside.astype(np.float32)) / within[..., None]
     return value.astype(np.float32), known, calm
 
@@ -494,8 +548,11 @@ def _completed(
     mean: Picture,
     brightness: float,
     brightens: npt.NDArray[np.bool_],
-) -> Picture:
-    """Return a linear plate with what is unknown filled in; ``mean`` is that of the samples in sRGB values.
+    finer_than: float,
+) -> tuple[Picture, Picture]:
+    """Return a linear plate with what is unknown filled in, and the ``contrast`` of `ClearPicture`.
+
+    ``mean`` is that of the samples in sRGB values.
 
     What is unknown is continued from what is sure. Other pixels are known only because they look like their
     surroundings: a few of them, at the rim of smoke that hardly changes, would spread over all that is behind it.
@@ -504,21 +561,23 @@ def _completed(
     coarse part and that of the surroundings, and so what of its detail is the background's.
     """
     if known.all():
-        return image
+        return image, np.ones(known.shape, np.float32)
     smooth = _filled(linear_to_srgb(image), sure.astype(np.float32))
-    coarse = ndimage.gaussian_filter(mean, (DETAIL, DETAIL, 0))
+    coarse = ndimage.gaussian_filter(mean, (finer_than, finer_than, 0))
     contrast = smooth.mean(-1) - brightness
     seen = (coarse.mean(-1) - brightness) / np.where(np.abs(contrast) > 0.02, contrast, np.inf)
     detail = mean - coarse
     most = np.quantile(np.abs(detail[sure]), MOST_DETAIL, axis=0) if sure.any() else np.zeros(3, np.float32)
-    detail = np.clip(detail / np.clip(seen, LEAST_TRANSMITTANCE, 1)[..., None], -most, most)
+    passed = np.clip(seen, LEAST_TRANSMITTANCE, 1)
+    detail = np.clip(detail / passed[..., None], -most, most)
     filled = smooth + np.where(seen > LEAST_TRANSMITTANCE, 1, 0)[..., None] * detail
     # smoke has drawn the pixel towards its own brightness, never away from it
     beyond = filled.mean(-1) - linear_to_srgb(image).mean(-1)
     beyond -= np.clip(beyond, -DRIFT, DRIFT)
     filled -= np.where(brightens, np.maximum(beyond, 0), np.minimum(beyond, 0))[..., None]
     filled = srgb_to_linear(np.maximum(filled, 0))
-    return np.where(known[..., None], image, filled)
+    contrast = np.where(known, 1, np.where(seen > LEAST_TRANSMITTANCE, 1 / passed, 0)).astype(np.float32)
+    return np.where(known[..., None], image, filled), contrast
 
 
 def _unlike(image: Picture, known: npt.NDArray[np.bool_]) -> Picture:

@@ -25,7 +25,8 @@ from scipy.spatial.transform import Rotation
 
 from smokelift.footage.alignment import Lens, align, judged, levels, points_of, shift
 from smokelift.footage.clip import Clip, ClipError
-from smokelift.footage.evidence import GLIMPSE, SAMPLES
+from smokelift.footage.evidence import GLIMPSE, looks
+from smokelift.footage.large_plate import large_frames
 from smokelift.footage.parallax import travels
 from smokelift.scene import Camera, as_matrix
 
@@ -38,9 +39,9 @@ MOVED = 0.5
 MOVING_FRAMES = 0.1
 """Share of the frames that have to: a knock is not worth a mosaic."""
 
-LOOKS = slice(None, None, 2)
-"""Those of the frames that `smokelift.footage.evidence` looks at which are looked at first: less than `MOVING_FRAMES`
-lie between two of them."""
+FIRST_LOOKS, FIRST_OF_LARGE = slice(None, None, 2), slice(None, None, 3)
+"""Those of the frames that `smokelift.footage.evidence` looks at which are looked at first, and of large pictures of
+those that `smokelift.footage.large_plate` does: less than `MOVING_FRAMES` lie between two of them."""
 
 LEAST = 1.0
 """Pixels that the picture has to be off its mean place in some frame: less blurs it no more than a lens does."""
@@ -158,10 +159,10 @@ def file_turns(clip: Clip, turns: Turns) -> dict[int, Rotation]:
 
 def _stands_still(clip: Clip, lens: Lens) -> bool:
     """Whether none of the frames that are looked at shows more of the same once it is turned."""
-    looks = clip.spread(SAMPLES)[LOOKS]
-    key = levels(clip.glimpse(looks.pop(len(looks) // 2), GLIMPSE), lens)
+    numbers = large_frames(clip)[FIRST_OF_LARGE] or looks(clip)[FIRST_LOOKS]
+    key = levels(clip.glimpse(numbers.pop(len(numbers) // 2), GLIMPSE), lens)
     first, same = points_of(key), []
-    for number in looks:
+    for number in numbers:
         picture = levels(clip.glimpse(number, GLIMPSE), lens)
         stands = judged(first[-1], picture[-1], Rotation.identity()).same
         # a turn cannot make so much of more than all

@@ -15,16 +15,14 @@ from smokelift.footage.clip import Clip
 from smokelift.footage.evidence import evidence
 from smokelift.footage.exposure import largest_change
 from smokelift.footage.focal_length import FocalLength, focal_length
+from smokelift.footage.large_plate import large_samples
 from smokelift.footage.lens import FILM_WIDTH
 from smokelift.footage.panorama import estimate_panorama
 from smokelift.footage.plain import plain_plate
 from smokelift.footage.plate import Plate, Plates, known_plate
 from smokelift.footage.plate_estimation import (
     ONE_COLOUR_NOISE,
-    backdrop_plate,
-    clip_noise,
     estimate_plate,
-    estimated_plate,
     one_colour,
     steady_samples,
 )
@@ -129,7 +127,7 @@ def _find_plates(
     if given is not None:
         return FoundPlates(clip, given, background)
     if not moves:
-        return _estimated(clip, clip.part(*shot()), lens, told)
+        return _estimated(clip, lambda: clip.part(*shot()), lens, told)
     plate = estimate_plate(clip)
     colour = one_colour(plate)
     if colour is None:
@@ -165,19 +163,23 @@ def smoke_in_plate(samples: SmokeSamples) -> tuple[str, ...]:
     )
 
 
-def _estimated(clip: Clip, shot: Clip, lens: Lens | None, told: bool) -> FoundPlates:
+def _estimated(clip: Clip, evidence_of: Callable[[], Clip], lens: Lens | None, told: bool) -> FoundPlates:
     """The background of a clip whose camera stands still or, with a lens that is told or only supposed, turns."""
-    plain_everywhere = plain_plate(clip, shot)
+    plain_everywhere = plain_plate(clip, clip)
+    # of one colour, no other frame of the file would tell more
+    shot = clip if plain_everywhere is not None else evidence_of()
+    if len(shot) > len(clip):
+        plain_everywhere = plain_plate(clip, shot)
     if plain_everywhere is not None and plain_everywhere.noise.total.max() <= ONE_COLOUR_NOISE:
         return FoundPlates(clip, plain_everywhere, None, (_found(plain_everywhere),))
-    samples = steady_samples(shot)
-    noise = clip_noise(samples)
-    backdrop = backdrop_plate(samples, noise)
+    shot = evidence_of()
+    samples = large_samples(shot) or steady_samples(shot)
+    backdrop, noise = samples.backdrop(), samples.noise
     # one colour has nothing to hold on to, and is the same wherever the camera looks; in noise, texture may pass by
     plain = backdrop is not None and noise.total.max() <= ONE_COLOUR_NOISE
     turns, focal = (None, None) if plain or lens is None else _turned(clip, lens, told)
     if turns is None:
-        plate = backdrop or estimated_plate(samples, noise)
+        plate = backdrop or samples.plate()
         return FoundPlates(clip, plate, None, (_found(plate),))
     panorama = estimate_panorama(clip, turns)
     parts = [panorama.at(number) for number in clip.spread(EXPOSURE_SAMPLES)]
@@ -216,9 +218,14 @@ def focal_notes(lens: Lens, told: bool, focal: FocalLength | None) -> tuple[str,
 def _found(plate: Plate) -> str:
     """How a background was estimated."""
     unknown = float(np.mean(plate.confidence < UNKNOWN))
-    colour = np.median(plate.image.reshape(-1, 3), axis=0)
-    other = float((plate.image != colour).any(-1).mean())
-    if unknown == 0 and other < MOSTLY:
+    if unknown > 0:
+        return _how(unknown)
+    colour = plate.image[0, 0]
+    other = 0.0
+    if not (plate.image == colour).all():
+        colour = np.median(plate.image.reshape(-1, 3), axis=0)
+        other = float((plate.image != colour).any(-1).mean())
+    if other < MOSTLY:
         said = ", ".join(f"{v:.2g}" for v in colour)
         found = f"Background not given: it is {'black' if colour.max() < BLACK else f'of one colour, {said} (linear)'}"
         if other == 0:

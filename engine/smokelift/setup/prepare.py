@@ -10,9 +10,10 @@ from dataclasses import replace
 from typing import Any
 
 from smokelift.density.axis import SmokeAxis
-from smokelift.footage import evidence
 from smokelift.footage.clip import Clip
+from smokelift.footage.evidence import GLIMPSE, looks
 from smokelift.footage.fire import fire_colour, fire_share, firelight, without_fire
+from smokelift.footage.large_plate import large_frames
 from smokelift.footage.plate import Plate
 from smokelift.footage.steady import steady
 from smokelift.footage.working_picture import CameraError, WorkingPicture, working_picture
@@ -56,8 +57,11 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
         If the scene contradicts the clip or itself, or lacks what cannot be estimated.
     """
     _check(clip, scene)
-    glimpses = clip.spread(evidence.SAMPLES) if scene.background is None else ()
-    clip.expect(clip.spread(smoke.SAMPLES), glimpses, evidence.GLIMPSE)
+    filmed, looked_at = clip, clip.spread(smoke.SAMPLES)
+    estimates = scene.background is None
+    # a velocity needs the frame after one with smoke, and a large background more frames than one colour does
+    perhaps = {n + 1 for n in looked_at} | set(large_frames(clip) if estimates else ())
+    clip.expect(looked_at, looks(clip) if estimates else (), GLIMPSE, perhaps.difference(looked_at))
     remarks = clip.remarks()
     # cameras that belong together are measured, and stand where they are said to
     lens = None if scene.views else clip_lens(scene.camera, clip)
@@ -136,6 +140,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
             choices = (*choices, *gain)
         views.append(view)
         notes += said
+    filmed.expect()
     shot = Shot(
         scene=complete,
         optics=scene_optics(complete),

@@ -11,8 +11,10 @@ from scipy.spatial.transform import Rotation
 
 from smokelift.footage.alignment import Lens
 from smokelift.footage.clip import Clip
+from smokelift.footage.evidence import GLIMPSE
 from smokelift.footage.images import srgb_to_linear
 from smokelift.footage.panorama import PanoramaPlate
+from smokelift.footage.plain import plain_plate
 from smokelift.output.images import write_image
 from smokelift.setup import background
 from smokelift.setup.background import find_plates, focal_notes, smoke_in_plate
@@ -123,3 +125,28 @@ def test_a_focal_length_that_is_not_found_is_said() -> None:
     lens = Lens((160, 120), (150.0, 150.0), (80.0, 60.0))
     assert focal_notes(lens, True, None) == ()
     assert "undetermined" in focal_notes(lens, False, None)[0]
+
+
+def test_one_colour_needs_no_frame_beyond_the_clip(tmp_path, monkeypatch) -> None:
+    """Of large pictures, which show it on a few glimpses."""
+    for n in range(8):
+        picture = np.zeros((45, 2 * GLIMPSE, 3), np.float32)
+        picture[10:30, 150 * n : 150 * n + 100] = 0.6
+        write_image(tmp_path / f"frame_{n}.png", picture)
+    trimmed = Clip.open(tmp_path / "frame_#.png", fps=24, frames=(2, 6))
+    monkeypatch.setattr(background, "evidence", None)
+    (note,) = find_plates(trimmed, None, None).notes
+    assert note == "Background not given: it is black."
+
+
+def test_one_colour_that_smoke_hides_is_found_on_frames_beyond_the_clip(tmp_path) -> None:
+    """Half of the file's pictures are free of what fills those of the clip."""
+    random = np.random.default_rng(0)
+    for n in range(24):
+        picture = np.full((45, 2 * GLIMPSE, 3), 0.02, np.float32)
+        if 8 <= n < 12:
+            picture[:, : 2 * GLIMPSE - 200] = random.uniform(0.1, 0.9, (9, 216, 1)).repeat(5, 0).repeat(5, 1)[:, :1080]
+        write_image(tmp_path / f"frame_{n:02d}.png", picture)
+    trimmed = Clip.open(tmp_path / "frame_##.png", fps=24, frames=(8, 11))
+    assert plain_plate(trimmed, trimmed) is None
+    assert "one colour" in find_plates(trimmed, None, None).notes[0]

@@ -1,0 +1,152 @@
+"""Backgrounds of large pictures, found on reduced ones."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from films import codes_apart
+
+from smokelift.footage.clip import Clip
+from smokelift.footage.evidence import GLIMPSE
+from smokelift.footage.frame_source import Look
+from smokelift.footage.images import CodedPicture, area_average, code_values, linear_to_srgb, srgb_to_linear
+from smokelift.footage.large_plate import large_frames, large_samples
+from smokelift.footage.plate import Plate
+from smokelift.footage.plate_estimation import steady_samples
+from smokelift.setup.background import find_plates
+
+COUNT = 16
+SIZE = (80, 2 * GLIMPSE)
+
+
+class Filmed:
+    """Frames in memory as a video's: a glimpse takes means of codes."""
+
+    warning: str | None = None
+    lens: float | None = None
+    backdrop: float | None = None
+    fps = 24.0
+    files: tuple[Path, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    def __init__(self, codes: np.ndarray) -> None:
+        self.codes, self.count = codes, len(codes)
+
+    def read(self, n: int) -> CodedPicture:
+        return CodedPicture(self.codes[n], code_values(255))
+
+    def glimpse(self, n: int, divisor: int) -> CodedPicture:
+        rows, columns = self.codes.shape[1:3]
+        reduced = area_average(self.codes[n], columns // divisor, rows // divisor)
+        return CodedPicture((reduced + 0.5).astype(np.uint8), code_values(255))
+
+    def damaged(self, first: int, last: int, look: Look | None = None) -> tuple[int, ...]:
+        return ()
+
+    def close(self) -> None:
+        pass
+
+
+def film(
+    behind: np.ndarray, gains: np.ndarray | None = None, column: bool = False, noise: float = 1.0, size=SIZE
+) -> Clip:
+    """A bright puff that goes by before a background, perhaps beside a column of smoke that stays; noise in codes."""
+    random = np.random.default_rng(1)
+    rows, columns = np.mgrid[: size[0], : size[1]].astype(np.float32)
+    codes = np.empty((COUNT, *size, 3), np.uint8)
+    for n in range(COUNT):
+        away = np.hypot(rows - size[0] / 2, columns - 75 * n)
+        alpha = 0.7 * np.clip(1.5 - away / 45, 0, 1) * (1 + 0.2 * np.sin(0.9 * n + rows / 12))
+        if column:
+            alpha = np.maximum(alpha, np.where(np.abs(columns - 640) < 40, random.uniform(0.3, 0.9), 0))
+        light = behind * (1 - alpha[..., None]) + 0.6 * alpha[..., None]
+        light = light * (1 if gains is None else gains[n])
+        encoded = linear_to_srgb(light) * 255 + np.float32(noise) * random.standard_normal(light.shape, np.float32)
+        codes[n] = np.clip(encoded + 0.5, 0, 255)
+    return Clip(Path("film"), Filmed(codes), 24.0, None)
+
+
+def wall(size: tuple[int, int] = SIZE) -> np.ndarray:
+    """Tiles with joints and a grain of single pixels, linear."""
+    random = np.random.default_rng(0)
+    rows, columns = np.mgrid[: size[0], : size[1]]
+    tiles = np.kron(random.uniform(0.3, 0.5, (size[0] // 20, -(-size[1] // 20), 3)), np.ones((20, 20, 1)))
+    encoded = tiles[:, : size[1]] + random.normal(0, 0.02, (*size, 1))
+    encoded[(rows % 20 < 2) | (columns % 20 < 2)] += 0.1
+    return srgb_to_linear(np.clip(encoded, 0, 1))
+
+
+def found(clip: Clip) -> Plate:
+    samples = large_samples(clip)
+    assert samples is not None
+    assert samples.backdrop() is None
+    return samples.plate()
+
+
+@pytest.mark.parametrize("steps", [False, True], ids=["steady", "exposure steps"])
+def test_a_wall_is_found_to_the_last_pixel(steps: bool) -> None:
+    truth = wall()
+    gains = np.repeat([1.0, 1.25, 0.8, 1.0], COUNT // 4) if steps else None
+    plate = found(film(truth, gains))
+    known = plate.confidence > 0.5
+    assert plate.image.shape == truth.shape
+    assert known.mean() > 0.9
+    apart = codes_apart(plate.image, truth)[known]
+    assert np.median(apart) < 0.8
+    assert np.percentile(apart, 95) < 3
+
+
+def test_a_side_that_no_reduction_divides_is_as_right() -> None:
+    size = (SIZE[0], SIZE[1] + 13)
+    truth = wall(size)
+    plate = found(film(truth, size=size))
+    assert plate.image.shape == truth.shape
+    assert np.median(codes_apart(plate.image, truth)[plate.confidence > 0.5]) < 0.8
+
+
+def test_what_smoke_never_leaves_keeps_the_detail_that_shows_through() -> None:
+    truth = wall()
+    plate = found(film(truth, column=True))
+    inside = np.s_[:, 615:665]
+    assert (plate.confidence[inside] < 0.5).mean() > 0.9
+    apart = codes_apart(plate.image, truth)[inside]
+    assert np.mean(apart) < 22
+    fine, wanted = (linear_to_srgb(image)[inside].mean(-1) for image in (plate.image, truth))
+    grain, true_grain = (each[1:, 1:] - each[:-1, :-1] for each in (fine, wanted))
+    assert np.corrcoef(grain.ravel(), true_grain.ravel())[0, 1] > 0.8
+    assert 0.6 < grain.std() / true_grain.std() < 1.2
+
+
+@pytest.mark.parametrize("codes", [1.0, 6.0])
+def test_noise_is_that_of_whole_pictures(codes: float) -> None:
+    clip = film(wall(), noise=codes)
+    samples = large_samples(clip)
+    assert samples is not None
+    np.testing.assert_allclose(samples.noise.total, steady_samples(clip).noise.total, rtol=0.15)
+
+
+def test_one_colour_is_told_with_what_stands_before_it() -> None:
+    behind = np.full((*SIZE, 3), 0.02, np.float32)
+    random = np.random.default_rng(2)
+    logo = np.s_[20:60, 1200:1280]
+    behind[logo] = random.uniform(0.1, 0.4, (40, 80, 3))
+    samples = large_samples(film(behind))
+    assert samples is not None
+    plate = samples.backdrop()
+    assert plate is not None
+    assert (plate.confidence == 1).all()
+    assert np.median(codes_apart(plate.image, behind)[logo]) < 2
+    colour = plate.image[0, 0]
+    assert codes_apart(colour[None, None], behind[:1, :1])[0, 0] < 0.5
+    assert (plate.image[:, :1150] == colour).all()
+
+
+def test_large_pictures_are_looked_at_so_and_small_ones_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+    large, small = film(wall()), film(wall()[:, :-2], size=(SIZE[0], SIZE[1] - 2))
+    assert len(large_frames(large)) == COUNT
+    assert large_frames(small) == []
+    assert large_samples(small) is None
+    monkeypatch.setattr("smokelift.setup.background.steady_samples", None)
+    assert find_plates(large, None, None).plates.at(0).image.shape == (*SIZE, 3)
