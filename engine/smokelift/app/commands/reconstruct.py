@@ -30,6 +30,10 @@ from smokelift.setup.shot import Shot
 UNEXPLAINED = 0.7
 """Root mean square of what a fit leaves, as a share of what the smoke changes: at 0.7 half of the change's energy."""
 
+DOUBTFUL = 0.3
+"""The same from which not all of the change may be smoke: good results leave less, those in which labels, leaves, a
+head or the light are taken for smoke more (docs/clips.md)."""
+
 
 def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
     """Add the command."""
@@ -97,12 +101,20 @@ def shortcomings(figures: Rows[Mapping[str, Any]], empty: int) -> list[str]:
     if empty:
         said.append(f"{empty} of {len(figures)} frames show no smoke and are empty.")
     left = [of_frame["relative_error"] for of_frame in figures if of_frame.get("relative_error") is not None]
-    if left and (typical := float(np.median(left))) > UNEXPLAINED:
+    typical = float(np.median(left)) if left else 0.0
+    if typical > UNEXPLAINED:
         said.append(
             f"Hardly any smoke was fitted: a typical frame still differs from the clip by {typical:.0%} of what its "
             "smoke changes there, and its psnr is as high as it is because the smoke is faint. Give the "
             "background, the light or the medium that the clip was filmed in in a scene file; `smokelift inspect` says "
             "what was taken."
+        )
+    elif typical > DOUBTFUL:
+        said.append(
+            "Not all that was taken for smoke may be smoke: a typical frame still differs from the clip by "
+            f"{typical:.0%} of what changes in it. What moves, light that changes and labels look like smoke, too; "
+            "`smokelift inspect` shows what was taken. Crop the clip, cut its frames out of a longer file in which the "
+            "light changes, or give a clean plate in [background]."
         )
     return said
 
