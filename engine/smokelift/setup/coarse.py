@@ -56,7 +56,7 @@ class CoarseFrame:
         return replace(self, scene=replace(self.scene, scattering=scattering))
 
 
-def coarse_domain(domain: Domain, pixels: float) -> Domain:
+def coarse_domain(domain: Domain, pixels: float, most_voxels: int = LONGEST) -> Domain:
     """The box with fewer voxels: a whole number of fine ones in each if that is possible, else a little less of it.
 
     Parameters
@@ -65,9 +65,11 @@ def coarse_domain(domain: Domain, pixels: float) -> Domain:
         The box with its own voxels.
     pixels
         Pixels of the clip along one of them.
+    most_voxels
+        Voxels along the longest side at most.
     """
     longest = max(domain.resolution)
-    most = min(LONGEST, int(longest * pixels / PIXELS))
+    most = min(most_voxels, int(longest * pixels / PIXELS))
     common = math.gcd(*domain.resolution)
     for times in (n for n in range(1, common + 1) if common % n == 0):
         counts = [n // times for n in domain.resolution]
@@ -83,7 +85,9 @@ def coarse_domain(domain: Domain, pixels: float) -> Domain:
     return domain.about_centre((x, y, z), voxel)
 
 
-def coarse_frame(frame: Image, camera: Camera, scene: CompleteScene, plate: Plate) -> CoarseFrame | None:
+def coarse_frame(
+    frame: Image, camera: Camera, scene: CompleteScene, plate: Plate, most_voxels: int = LONGEST
+) -> CoarseFrame | None:
     """Make a frame coarse; None if its camera does not see the domain.
 
     Parameters
@@ -96,9 +100,11 @@ def coarse_frame(frame: Image, camera: Camera, scene: CompleteScene, plate: Plat
         With the fine domain.
     plate
         Of the full picture.
+    most_voxels
+        Along the longest side of the coarse domain, at most.
     """
     try:
-        domain = coarse_domain(scene.domain, voxel_width(camera, scene.domain))
+        domain = coarse_domain(scene.domain, voxel_width(camera, scene.domain), most_voxels)
         working = working_picture(camera, domain)
     except CameraError:
         return None

@@ -15,10 +15,10 @@ from smokelift.footage.matte import matte
 from smokelift.footage.plate import Plates
 from smokelift.scene import CompleteScene
 from smokelift.setup.choice import Choice
-from smokelift.setup.coarse import CoarseFrame, coarse_frame
+from smokelift.setup.coarse import LONGEST, CoarseFrame, coarse_frame
 from smokelift.setup.directions import choose_directions
 from smokelift.setup.light_strength import choose_strength, scaled
-from smokelift.setup.scattering import choose_scattering, tries_multiple
+from smokelift.setup.scattering import choose_scattering, settled, tries_multiple, unclear
 from smokelift.setup.settings import Settings
 from smokelift.setup.velocity_grid import choose_coarsening, choose_levels
 from smokelift.velocity import VelocitySettings
@@ -66,8 +66,8 @@ def choose_model(
     """
 
     @cache
-    def coarse(number: int) -> CoarseFrame | None:
-        return coarse_frame(clip.frame(number), scene.camera.at(number), scene, plates.at(number))
+    def coarse(number: int, most_voxels: int = LONGEST) -> CoarseFrame | None:
+        return coarse_frame(clip.frame(number), scene.camera.at(number), scene, plates.at(number), most_voxels)
 
     def shows_smoke(number: int) -> bool:
         frame = coarse(number)
@@ -92,9 +92,15 @@ def choose_model(
         said = scene.scattering
         scattered: Choice[str] = Choice("scattering", said, f"Scattering by hand: {said}.", by_hand=True)
     else:
+        tolerance = settings.selection.scattering_error
         scattering, scattered = choose_scattering(
-            frames, scene.scattering, settings.density, settings.selection.scattering_error, error_of_multiple
+            frames, scene.scattering, settings.density, tolerance, error_of_multiple
         )
+        finer = coarse(numbers[0], 2 * LONGEST) if unclear(scattered) else None
+        if finer is not None and finer.scene.domain != frames[0].scene.domain:
+            scattering, scattered = choose_scattering(
+                [finer.in_light_of(lit)], scene.scattering, settled(settings.density), tolerance
+            )
         lit = replace(lit, scattering=scattering)
         if directions and scattering != scene.scattering:
             lit, directions = choose_directions(replace(scene, scattering=scattering), frames, settings.density)

@@ -32,10 +32,18 @@ from smokelift.setup.coarse import CoarseFrame
 MODELS: tuple[Scattering, ...] = ("absorption", "unshadowed", "single", "multiple")
 """From the cheapest to the richest."""
 
-NEARER = 0.9
-"""Error of multiple scattering over that of single scattering, below which light is scattered many times. Where it is
-scattered once the ratio is near 1 or more; path-traced smoke has 0.06 to 0.88, but for some that either model meets and
-some that neither does (docs/experiments/multiple-scattering.md)."""
+NEARER = 0.75
+"""Error of multiple scattering over that of single scattering, below which light is scattered many times: 0.01 to 0.63
+where paths were traced, but for smoke that either model meets, and 0.82 and more where light is scattered once
+(docs/experiments/scattering-selection.md)."""
+
+CLEAR = 0.5
+"""The same ratio, above which the errors may be those of the coarse grid: then either model seems to meet the smoke, or
+neither does (docs/experiments/scattering-selection.md)."""
+
+SETTLED = 24
+"""Steps of descent at least, where models are told apart that differ little: with fewer the ratio is that of the steps
+which each of them lacks (docs/experiments/scattering-selection.md)."""
 
 _WORDS: Mapping[str, str] = {
     "absorption": "absorption only",
@@ -89,6 +97,17 @@ def choose_scattering(
             chosen = model
             break
     return chosen, _choice(chosen, richest, errors, tolerance)
+
+
+def unclear(choice: Choice[str]) -> bool:
+    """Whether single and multiple scattering were so nearly alike that finer frames have to tell them apart."""
+    errors = choice.measured
+    return "error_multiple" in errors and errors["error_multiple"] > CLEAR * errors["error_single"]
+
+
+def settled(settings: DensitySettings) -> DensitySettings:
+    """Settings for fits that are compared with each other where they differ little."""
+    return replace(settings, descent_iterations=max(SETTLED, settings.descent_iterations))
 
 
 def tries_multiple(scene: CompleteScene) -> bool:
