@@ -75,8 +75,8 @@ inline Out3 out(Array3 &a) { return {out(a[0]), out(a[1]), out(a[2])}; }
 // Arrays are made while the lock is held; only the work itself runs without it.
 template <class Work> auto released(const Work &work) {
     py::gil_scoped_release release;
-    Workers workers;
-    return work(workers);
+    const BorrowedWorkers workers;
+    return work(*workers);
 }
 
 // A new array that work(values, workers) fills.

@@ -7,6 +7,9 @@
 #if defined(__linux__)
 #include <sched.h>
 #endif
+#if !defined(_WIN32)
+#include <pthread.h>
+#endif
 
 namespace smokelift {
 namespace {
@@ -22,12 +25,46 @@ int usable_cores() {
     return static_cast<int>(std::thread::hardware_concurrency());
 }
 
+// Those that no call has. They are not joined at exit, where Windows would wait for them for ever.
+std::mutex idle_mutex;
+Workers *idle = nullptr;
+
+std::unique_ptr<Workers> take_idle() {
+    std::lock_guard<std::mutex> lock(idle_mutex);
+    return std::unique_ptr<Workers>(std::exchange(idle, nullptr));
+}
+
+// A child of fork() has none of the threads, so that it forgets them; nobody may hold the lock meanwhile.
+void survive_fork() {
+#if !defined(_WIN32)
+    static const int registered = pthread_atfork([] { idle_mutex.lock(); }, [] { idle_mutex.unlock(); },
+                                                 [] {
+                                                     idle = nullptr;
+                                                     idle_mutex.unlock();
+                                                 });
+    (void)registered;
+#endif
+}
+
 } // namespace
 
 void set_threads(int count) { threads_set = count; }
 
-Workers::Workers() {
+BorrowedWorkers::BorrowedWorkers() {
+    survive_fork();
     const int threads = threads_set > 0 ? threads_set.load() : usable_cores();
+    workers_ = take_idle();
+    if (!workers_ || workers_->threads() != threads)
+        workers_ = std::make_unique<Workers>(threads);
+}
+
+BorrowedWorkers::~BorrowedWorkers() {
+    std::lock_guard<std::mutex> lock(idle_mutex);
+    if (!idle)
+        idle = workers_.release();
+}
+
+Workers::Workers(int threads) : wanted_(threads) {
     threads_.reserve(std::max(threads - 1, 0));
     try {
         for (int t = 1; t < threads; ++t)

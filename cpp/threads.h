@@ -1,10 +1,11 @@
-// A few worker threads that live as long as one call from Python, so that fork() stays safe.
+// A few worker threads, which calls from Python borrow.
 #pragma once
 
 #include <atomic>
 #include <condition_variable>
 #include <exception>
 #include <functional>
+#include <memory>
 #include <mutex>
 #include <thread>
 #include <vector>
@@ -17,7 +18,7 @@ void set_threads(int count);
 
 class Workers {
 public:
-    Workers();
+    explicit Workers(int threads); // with the one that calls run()
     ~Workers();
     Workers(const Workers &) = delete;
     Workers &operator=(const Workers &) = delete;
@@ -30,10 +31,13 @@ public:
     // The sum of partial(0) ... partial(count - 1), added in that order whatever the number of threads.
     double sum(int count, const std::function<double(int)> &partial);
 
+    int threads() const { return wanted_; }
+
 private:
     void serve();
     void work();
 
+    const int wanted_;
     std::vector<std::thread> threads_;
     std::mutex mutex_;
     std::condition_variable start_;
@@ -43,6 +47,20 @@ private:
     int count_ = 0;
     const std::function<void(int)> *task_ = nullptr;
     std::exception_ptr failure_; // what a task threw
+};
+
+// Workers for one call: those of the call before, since to start threads takes as long as a small loop, or
+// new ones if another call has them. After fork() the child starts its own.
+class BorrowedWorkers {
+public:
+    BorrowedWorkers();
+    ~BorrowedWorkers();
+    BorrowedWorkers(const BorrowedWorkers &) = delete;
+    BorrowedWorkers &operator=(const BorrowedWorkers &) = delete;
+    Workers &operator*() const { return *workers_; }
+
+private:
+    std::unique_ptr<Workers> workers_;
 };
 
 } // namespace smokelift

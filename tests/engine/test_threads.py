@@ -1,0 +1,77 @@
+"""The core's worker threads are kept from call to call, whatever a process does meanwhile."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from smokelift import _core
+from smokelift.transport import face_shapes
+
+FACES = tuple(np.random.default_rng(0).random(shape, np.float32) for shape in face_shapes((33, 16, 16)))
+"""Enough slabs for every thread, and so few voxels that a call is short."""
+
+
+TASKS = Path("/proc/self/task")
+
+
+def test_calls_at_the_same_time_have_threads_of_their_own(set_threads: Callable[[int], None]) -> None:
+    set_threads(3)
+    expected, wrong = _core.divergence(FACES), []
+
+    def call() -> None:
+        wrong.extend(n for n in range(300) if not np.array_equal(_core.divergence(FACES), expected))
+
+    callers = [threading.Thread(target=call) for _ in range(4)]
+    for caller in callers:
+        caller.start()
+    for caller in callers:
+        caller.join()
+    assert not wrong
+
+
+@pytest.mark.skipif(not TASKS.is_dir(), reason="Only Linux lists a process's threads.")
+def test_a_call_takes_the_threads_of_the_one_before(set_threads: Callable[[int], None]) -> None:
+    for wanted in (4, 2, 3):
+        set_threads(wanted)
+        _core.divergence(FACES)
+        first = set(TASKS.iterdir())
+        assert len(first) >= wanted
+        for _ in range(20):
+            _core.divergence(FACES)
+            assert set(TASKS.iterdir()) == first
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="This system cannot fork.")
+@pytest.mark.filterwarnings("ignore:.*multi-threaded.*fork:DeprecationWarning")
+def test_a_fork_computes_as_its_parent_does_even_amid_a_call(set_threads: Callable[[int], None]) -> None:
+    set_threads(2)
+    expected, ended = _core.divergence(FACES), threading.Event()
+
+    def call() -> None:
+        while not ended.is_set():
+            _core.divergence(FACES)
+
+    caller = threading.Thread(target=call)
+    caller.start()
+    try:
+        assert [_status_of_fork(expected) for _ in range(20)] == [0] * 20
+    finally:
+        ended.set()
+        caller.join()
+
+
+def _status_of_fork(expected: list[np.ndarray]) -> int:
+    """0 if a child computes what is expected, twice; the signal that ends it if it hangs."""
+    child = os.fork()
+    if child == 0:
+        signal.alarm(10)
+        same = all(np.array_equal(_core.divergence(FACES), expected) for _ in range(2))
+        os._exit(0 if same else 1)
+    return os.waitpid(child, 0)[1]
