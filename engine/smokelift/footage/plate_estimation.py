@@ -99,7 +99,8 @@ ONE_COLOUR_NOISE = np.float32(6 / 255)
 than one colour."""
 
 AT_ONCE = 0.5
-"""Share of the blocks that smoke comes over between two samples, less than a fade or a cut changes at once."""
+"""Share of the blocks that smoke comes over between two samples, less than a fade or a cut changes at once
+(docs/experiments/background.md)."""
 
 ISLAND = 0.01
 """Share of the picture up to which what seems clear is taken for an accident."""
