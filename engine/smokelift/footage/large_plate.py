@@ -15,6 +15,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from smokelift.footage.backdrop import backdrop_plate
+from smokelift.footage.behind_smoke import DETAIL, MOST_DETAIL
 from smokelift.footage.clip import Clip
 from smokelift.footage.evidence import GLIMPSE, are_large
 from smokelift.footage.exposure import sample_gains, small
@@ -31,7 +33,7 @@ from smokelift.footage.noise import (
     some_blocks,
 )
 from smokelift.footage.plate import Plate
-from smokelift.footage.plate_estimation import DETAIL, MOST_DETAIL, backdrop_plate, clear_picture, clip_noise
+from smokelift.footage.plate_estimation import clear_picture, clip_noise
 
 COARSER = 2
 """Pixels of a glimpse along one of the reduced pictures, which have 320 to 480 along the longer side then."""

@@ -11,13 +11,14 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 import numpy.typing as npt
 
+from smokelift.footage.backdrop import backdrop_plate
 from smokelift.footage.clip import Clip
 from smokelift.footage.evidence import GLIMPSE, glimpses, linear
 from smokelift.footage.exposure import sample_gains, small
 from smokelift.footage.images import Picture, area_average
 from smokelift.footage.noise import BLOCK, BLOCKS_APART, Noise, encode_sample, linear_samples, some_blocks
 from smokelift.footage.plate import Plate
-from smokelift.footage.plate_estimation import backdrop_plate, clip_noise
+from smokelift.footage.plate_estimation import clip_noise
 
 SAMPLES = 16
 """Frames from which the colour and the noise are taken."""

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from smokelift.footage.alignment import Lens
+from smokelift.footage.backdrop import ONE_COLOUR_NOISE, one_colour
 from smokelift.footage.background import given_plates
 from smokelift.footage.clip import Clip
 from smokelift.footage.evidence import evidence
@@ -20,12 +21,7 @@ from smokelift.footage.lens import FILM_WIDTH
 from smokelift.footage.panorama import estimate_panorama
 from smokelift.footage.plain import plain_plate
 from smokelift.footage.plate import Plate, Plates, known_plate
-from smokelift.footage.plate_estimation import (
-    ONE_COLOUR_NOISE,
-    estimate_plate,
-    one_colour,
-    steady_samples,
-)
+from smokelift.footage.plate_estimation import estimate_plate, steady_samples
 from smokelift.footage.steady import exposures, without_noise_light
 from smokelift.footage.turning import Turns, find_turns
 from smokelift.scene import Background, Camera

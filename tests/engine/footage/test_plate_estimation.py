@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from films import COUNT, HEIGHT, WIDTH, codes_apart, film, pan, passing_wall, puff, wall
+from films import HEIGHT, WIDTH, codes_apart, film, puff, wall
 
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import linear_to_srgb
 from smokelift.footage.matte import matte
-from smokelift.footage.plate_estimation import estimate_plate, one_colour
+from smokelift.footage.plate_estimation import estimate_plate
 from smokelift.output.images import write_image
 
 DATA = Path(__file__).parents[4] / "shared" / "data"
@@ -151,58 +151,12 @@ def test_what_hardly_changes_is_no_smoke_however_unlike_its_surroundings(tmp_pat
     assert not matte(clip.frame(12), plate).mask[inner].any()
 
 
-def spreading_ink(n: int) -> np.ndarray:
-    """Return the opacity of ink that spreads from above, faster at first, and stays."""
-    rows, columns = np.mgrid[:HEIGHT, :WIDTH]
-    return np.clip((62 * np.sqrt(n / COUNT) - rows - 6 * np.cos(columns / 4)) / 6, 0, 1) if n else 0.0 * rows
-
-
-@pytest.mark.parametrize(("colour", "ink"), [(1.0, 0.0), (0.2, 0.7)], ids=["black on white", "bright on grey"])
-def test_ink_that_stays_is_not_what_it_hides(tmp_path: Path, colour: float, ink: float) -> None:
-    """Ink is over more of the picture that never changes than what it spreads over."""
-    truth = np.full((HEIGHT, WIDTH, 3), colour)
-    clip = film(tmp_path, truth, spreading_ink, ink)
-    plate = estimate_plate(clip)
-    assert (plate.confidence == 1).all()
-    assert codes_apart(plate.image, truth).max() < 2
-    last = spreading_ink(COUNT - 1)
-    mask = matte(clip.frame(COUNT - 1), plate).mask
-    assert mask[last > 0.5].all()
-    assert mask.mean() < (last > 0).mean() + 0.1
-
-
-def test_a_clip_that_fades_in_from_black_is_not_before_black(tmp_path: Path) -> None:
-    """Its bar is black all the time, and all of it at first."""
-    truth = np.full((HEIGHT, WIDTH, 3), 0.4)
-    truth[:10] = 0
-    plate = estimate_plate(film(tmp_path, truth, lambda n: np.full((HEIGHT, WIDTH), max(1 - n / 2, 0)), 0.0))
-    assert np.median(codes_apart(plate.image, truth)) < 2
-
-
 def test_one_frame_is_its_own_plate(tmp_path: Path) -> None:
     write_image(tmp_path / "still.png", wall(0.2, 0.8))
     clip = Clip.open(tmp_path / "still.png")
     plate = estimate_plate(clip)
     assert codes_apart(plate.image, clip.frame(0)).max() < 0.1
     assert not matte(clip.frame(0), plate).mask.any()
-
-
-@pytest.mark.parametrize("colour", [(0.0, 0.0, 0.0), (0.1, 0.3, 0.05)], ids=["black", "green"])
-def test_one_colour_behind_a_moving_camera_is_found(tmp_path: Path, colour: tuple[float, float, float]) -> None:
-    wide = np.broadcast_to(colour, (HEIGHT, WIDTH + 2 * COUNT, 3))
-    found = one_colour(estimate_plate(pan(tmp_path, wide, 1.0)))
-    assert found == pytest.approx(colour, abs=0.003)
-
-
-@pytest.mark.parametrize("smoke", [0.0, 1.0])
-def test_more_than_one_colour_behind_a_moving_camera_is_noticed(tmp_path: Path, smoke: float) -> None:
-    assert one_colour(estimate_plate(pan(tmp_path, passing_wall(), smoke))) is None
-
-
-def test_a_slope_behind_a_moving_camera_is_not_one_colour(tmp_path: Path) -> None:
-    """It passes up and down, so no pixel changes, and yet there are many colours."""
-    wide = np.broadcast_to(np.linspace(0.1, 0.3, HEIGHT)[:, None, None], (HEIGHT, WIDTH + 2 * COUNT, 3))
-    assert one_colour(estimate_plate(pan(tmp_path, wide, 1.0))) is None
 
 
 @pytest.mark.skipif(not DATA.is_dir(), reason="needs the development data")

@@ -1,0 +1,105 @@
+"""Backgrounds of one colour, before which most stock footage stands.
+
+Where the pixels that never change have one colour, it is behind all that do. Where they have two, it is the one that
+all pixels have at some time: the other is ink that stays.
+
+A camera that moves shows another part of the background in every frame, so a pixel has no value of its own. One colour
+is known all the same.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from smokelift.footage.behind_smoke import ISLAND
+from smokelift.footage.images import Picture, linear_to_srgb
+from smokelift.footage.matte import matte
+from smokelift.footage.noise import BLOCK, SMOKE_TO_NOISE, Noise, block_means, linear_samples, over_time
+from smokelift.footage.plate import Plate
+
+ONE_COLOUR = 0.8
+"""Share of the pixels that never change which has to have one colour for it to be the backdrop's; the others are a
+nozzle, a floor, a logo."""
+
+ONE_COLOUR_NOISE = np.float32(6 / 255)
+"""Most noise of a background of one colour, in sRGB values: a pixel that varies more while the camera moves sees more
+than one colour."""
+
+AT_ONCE = 0.5
+"""Share of the blocks that smoke comes over between two samples, less than a fade or a cut changes at once
+(docs/experiments/background.md)."""
+
+
+def backdrop_plate(samples: npt.NDArray[np.uint16], noise: Noise) -> Plate | None:
+    """Return the plate of a background of one colour, or None if it has more.
+
+    ``samples`` (frames, rows, columns, 3) are of one exposure, as of `SteadySamples`.
+    """
+    backdrop = _backdrop(samples, noise)
+    return None if backdrop is None else Plate(backdrop, np.ones(backdrop.shape[:2], np.float32), noise)
+
+
+def one_colour(plate: Plate) -> tuple[float, float, float] | None:
+    """Return the linear colour of a plate that was estimated from a moving camera, or None if it has more than one."""
+    known = plate.confidence > 0.5
+    if known.mean() < 0.5 or plate.noise.total.max() > ONE_COLOUR_NOISE:
+        return None
+    red, green, blue = (float(v) for v in np.median(plate.image[known], axis=0))
+    colour = np.broadcast_to(np.array([red, green, blue], np.float32), plate.image.shape)
+    differs = matte(plate.image, Plate(colour, np.ones_like(plate.confidence), plate.noise)).mask
+    return None if (differs & known).any() else (red, green, blue)
+
+
+def _backdrop(samples: npt.NDArray[np.uint16], noise: Noise) -> Picture | None:
+    """The linear picture (rows, columns, 3) of a background of one colour, or None if it has more.
+
+    Whatever never changes and has another colour stands before the backdrop, and is part of the picture.
+    """
+    size = min(BLOCK, *samples.shape[1:3])
+    linear = np.concatenate([block_means(linear_samples(sample[None])) for sample in samples])
+    blocks = linear_to_srgb(linear)
+    middle, limit = np.median(blocks, axis=0), SMOKE_TO_NOISE * noise.averaged(BLOCK**2).total
+    still = (over_time(blocks - middle) <= limit).all(-1)
+    if not still.any():
+        return None
+    # the median of many samples has less noise than they have, by pi / 2 more variance than their mean
+    settled = SMOKE_TO_NOISE * noise.averaged(BLOCK**2 * max(1.0, len(samples) / (np.pi / 2))).total
+    colours: list[Picture] = []
+    kinds: list[npt.NDArray[np.bool_]] = []
+    left = still
+    while left.any() and len(kinds) < 2:  # the backdrop, and what stays before it
+        colours.append(np.median(middle[left], axis=0))
+        kinds.append((np.abs(middle - colours[-1]) <= settled).all(-1))
+        left = left & ~kinds[-1]
+    if left.sum() > (1 - ONE_COLOUR) * still.sum():
+        return None
+    seen = [(np.abs(blocks - colour) <= limit).all(-1) for colour in colours]
+    covered = next((n for n, shown in enumerate(seen) if (still & kinds[n]).any() and _comes_over(shown)), None)
+    if covered is None and kinds[0][still].mean() < ONE_COLOUR:
+        return None
+    alike = kinds[covered or 0]
+    bare = alike if covered is None else seen[covered].any(0)
+    clear = np.median(linear, axis=0)
+    low, high = np.quantile(blocks, [0.05, 0.95], axis=0)
+    fixed = still & ~alike & ~bare & ((high - low) <= limit).all(-1)
+    picture = np.where(fixed[..., None], clear, clear[still & alike].mean(0))
+    height, width = samples.shape[1:3]
+    rows, columns = (np.minimum(np.arange(n) // size, m - 1) for n, m in zip((height, width), fixed.shape, strict=True))
+    whole: Picture = picture[rows][:, columns].astype(np.float32)
+    own = fixed[rows][:, columns]
+    if own.any():
+        whole[own] = np.median(linear_samples(samples[:, own]), axis=0)
+    return whole
+
+
+def _comes_over(shown: npt.NDArray[np.bool_]) -> bool:
+    """Whether what has a colour in samples (frames, rows, columns) is what smoke comes over.
+
+    Ink that spreads and stays is as still as what it hides. But its own colour is never seen where it has not come to,
+    and what it hides is seen everywhere. A clip that fades in from black is black everywhere at a time, too: that
+    leaves all of the picture at once, and smoke comes over one part after the other.
+    """
+    changes = shown[:, ~shown.all(0)]
+    at_once = np.abs(np.diff(changes.mean(-1))).max(initial=0.0) if changes.size else 0.0
+    return bool(shown.any(0).mean() >= 1 - ISLAND and at_once < AT_ONCE)

@@ -1,0 +1,115 @@
+"""What is behind smoke that never clears: continued from what is known around it.
+
+It follows smoothly from its neighbours. Its detail is that of its samples, with the contrast that the smoke takes from
+it given back.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from scipy import ndimage
+
+from smokelift.footage.images import Picture, area_average, linear_to_srgb, srgb_to_linear
+
+DRIFT = 8 / 255
+"""Change in sRGB values by a codec or by the light, at most. The matte takes as much for smoke."""
+
+ISLAND = 0.01
+"""Share of the picture up to which what seems clear is taken for an accident."""
+
+DETAIL = 4.0
+"""Standard deviation in pixels of the Gaussian above which a background's detail is finer than that of smoke."""
+
+MOST_DETAIL = 0.95
+"""Quantile of the known background's detail that bounds that of the unknown; what is beyond it is smoke's."""
+
+LEAST_TRANSMITTANCE = 0.2
+"""Light let through by the smoke from which the detail behind it can be told from noise."""
+
+
+def completed(
+    image: Picture,
+    known: npt.NDArray[np.bool_],
+    sure: npt.NDArray[np.bool_],
+    mean: Picture,
+    brightness: float,
+    brightens: npt.NDArray[np.bool_],
+    finer_than: float,
+) -> tuple[Picture, Picture]:
+    """Return a linear plate with what is unknown filled in, and the ``contrast`` of `ClearPicture`.
+
+    ``mean`` is that of the samples in sRGB values.
+
+    What is unknown is continued from what is sure. Other pixels are known only because they look like their
+    surroundings: a few of them, at the rim of smoke that hardly changes, would spread over all that is behind it.
+
+    Smoke of transmittance T and brightness J shows J + T (B - J) of a background B. The mean over time has T from its
+    coarse part and that of the surroundings, and so what of its detail is the background's.
+    """
+    if known.all():
+        return image, np.ones(known.shape, np.float32)
+    smooth = push_pull(linear_to_srgb(image), sure.astype(np.float32))
+    coarse = ndimage.gaussian_filter(mean, (finer_than, finer_than, 0))
+    contrast = smooth.mean(-1) - brightness
+    seen = (coarse.mean(-1) - brightness) / np.where(np.abs(contrast) > 0.02, contrast, np.inf)
+    detail = mean - coarse
+    most = np.quantile(np.abs(detail[sure]), MOST_DETAIL, axis=0) if sure.any() else np.zeros(3, np.float32)
+    passed = np.clip(seen, LEAST_TRANSMITTANCE, 1)
+    detail = np.clip(detail / passed[..., None], -most, most)
+    filled = smooth + np.where(seen > LEAST_TRANSMITTANCE, 1, 0)[..., None] * detail
+    # smoke has drawn the pixel towards its own brightness, never away from it
+    beyond = filled.mean(-1) - linear_to_srgb(image).mean(-1)
+    beyond -= np.clip(beyond, -DRIFT, DRIFT)
+    filled -= np.where(brightens, np.maximum(beyond, 0), np.minimum(beyond, 0))[..., None]
+    filled = srgb_to_linear(np.maximum(filled, 0))
+    contrast = np.where(known, 1, np.where(seen > LEAST_TRANSMITTANCE, 1 / passed, 0)).astype(np.float32)
+    return np.where(known[..., None], image, filled), contrast
+
+
+def unlike(image: Picture, known: npt.NDArray[np.bool_]) -> Picture:
+    """By how much a linear picture differs from what is known around, in grey sRGB values (rows, columns)."""
+    encoded = linear_to_srgb(image)
+    return np.asarray(np.abs((encoded - push_pull(encoded, known.astype(np.float32))).mean(-1)))
+
+
+def push_pull(image: Picture, confidence: Picture) -> Picture:
+    """Blend pixels of low confidence with the smooth continuation of their surroundings.
+
+    The push-pull algorithm (Gortler et al., "The lumigraph", 1996): averages weighted by confidence over ever larger
+    blocks; each level keeps what it knows and takes the rest from the next coarser one.
+    """
+    height, width = confidence.shape
+    weight: Picture = confidence[..., None]
+    if min(height, width) == 1 or float(confidence.min()) >= 1.0:
+        return image
+    small_size = ((width + 1) // 2, (height + 1) // 2)
+    total = area_average(weight, *small_size)
+    mean = area_average(image * weight, *small_size) / np.maximum(total, 1e-6)
+    # A block of which a quarter is known is known: its mean is as good as any.
+    coarse = push_pull(mean, np.minimum(4.0 * total[..., 0], 1.0))
+    blend: Picture = image * weight + area_average(coarse, width, height) * (np.float32(1.0) - weight)
+    return blend
+
+
+def in_one_piece(known: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """Without specks: a clear island amid smoke, or an unknown one amid the clear, is an accident of the samples."""
+    smooth = ndimage.median_filter(known.astype(np.uint8), 7) > 0
+    islands, count = ndimage.label(smooth)
+    large = np.bincount(islands.ravel(), minlength=count + 1) > ISLAND * known.size
+    large[0] = False
+    kept: npt.NDArray[np.bool_] = large[islands]
+    return kept
+
+
+def mostly_beside(grown: npt.NDArray[np.bool_], known: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """Without patches that were added to what is known but border on less of it than of what stays unknown."""
+    patches, count = ndimage.label(grown & ~known, structure=np.ones((3, 3)))
+    beside = np.zeros(count + 1)
+    for along, across in ((patches, grown), (patches.T, grown.T)):
+        for one, other in ((np.s_[:-1], np.s_[1:]), (np.s_[1:], np.s_[:-1])):
+            border = (along[one] > 0) & (along[other] == 0)
+            sides = np.where(across[other][border], 1, -1)
+            beside += np.bincount(along[one][border], sides, count + 1)
+    kept: npt.NDArray[np.bool_] = grown & (beside >= 0)[patches]
+    return kept

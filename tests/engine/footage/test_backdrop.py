@@ -1,0 +1,59 @@
+"""Backgrounds of one colour."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from films import COUNT, HEIGHT, WIDTH, codes_apart, film, pan, passing_wall
+
+from smokelift.footage.backdrop import one_colour
+from smokelift.footage.matte import matte
+from smokelift.footage.plate_estimation import estimate_plate
+
+
+def spreading_ink(n: int) -> np.ndarray:
+    """Return the opacity of ink that spreads from above, faster at first, and stays."""
+    rows, columns = np.mgrid[:HEIGHT, :WIDTH]
+    return np.clip((62 * np.sqrt(n / COUNT) - rows - 6 * np.cos(columns / 4)) / 6, 0, 1) if n else 0.0 * rows
+
+
+@pytest.mark.parametrize(("colour", "ink"), [(1.0, 0.0), (0.2, 0.7)], ids=["black on white", "bright on grey"])
+def test_ink_that_stays_is_not_what_it_hides(tmp_path: Path, colour: float, ink: float) -> None:
+    """Ink is over more of the picture that never changes than what it spreads over."""
+    truth = np.full((HEIGHT, WIDTH, 3), colour)
+    clip = film(tmp_path, truth, spreading_ink, ink)
+    plate = estimate_plate(clip)
+    assert (plate.confidence == 1).all()
+    assert codes_apart(plate.image, truth).max() < 2
+    last = spreading_ink(COUNT - 1)
+    mask = matte(clip.frame(COUNT - 1), plate).mask
+    assert mask[last > 0.5].all()
+    assert mask.mean() < (last > 0).mean() + 0.1
+
+
+def test_a_clip_that_fades_in_from_black_is_not_before_black(tmp_path: Path) -> None:
+    """Its bar is black all the time, and all of it at first."""
+    truth = np.full((HEIGHT, WIDTH, 3), 0.4)
+    truth[:10] = 0
+    plate = estimate_plate(film(tmp_path, truth, lambda n: np.full((HEIGHT, WIDTH), max(1 - n / 2, 0)), 0.0))
+    assert np.median(codes_apart(plate.image, truth)) < 2
+
+
+@pytest.mark.parametrize("colour", [(0.0, 0.0, 0.0), (0.1, 0.3, 0.05)], ids=["black", "green"])
+def test_one_colour_behind_a_moving_camera_is_found(tmp_path: Path, colour: tuple[float, float, float]) -> None:
+    wide = np.broadcast_to(colour, (HEIGHT, WIDTH + 2 * COUNT, 3))
+    found = one_colour(estimate_plate(pan(tmp_path, wide, 1.0)))
+    assert found == pytest.approx(colour, abs=0.003)
+
+
+@pytest.mark.parametrize("smoke", [0.0, 1.0])
+def test_more_than_one_colour_behind_a_moving_camera_is_noticed(tmp_path: Path, smoke: float) -> None:
+    assert one_colour(estimate_plate(pan(tmp_path, passing_wall(), smoke))) is None
+
+
+def test_a_slope_behind_a_moving_camera_is_not_one_colour(tmp_path: Path) -> None:
+    """It passes up and down, so no pixel changes, and yet there are many colours."""
+    wide = np.broadcast_to(np.linspace(0.1, 0.3, HEIGHT)[:, None, None], (HEIGHT, WIDTH + 2 * COUNT, 3))
+    assert one_colour(estimate_plate(pan(tmp_path, wide, 1.0))) is None

@@ -1,0 +1,64 @@
+"""What is unknown is continued from what is known around it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from smokelift.footage.behind_smoke import in_one_piece, mostly_beside, push_pull, unlike
+
+HEIGHT, WIDTH = 40, 60
+
+
+def hole() -> np.ndarray:
+    """Return what is known: all but a block."""
+    known = np.ones((HEIGHT, WIDTH), np.bool_)
+    known[12:28, 20:40] = False
+    return known
+
+
+def test_what_is_known_stays_and_the_rest_is_between_it() -> None:
+    image = np.random.default_rng(1).uniform(0.2, 0.8, (HEIGHT, WIDTH, 3)).astype(np.float32)
+    known = hole()
+    spoilt = np.where(known[..., None], image, 100).astype(np.float32)
+    continued = push_pull(spoilt, known.astype(np.float32))
+    assert (continued[known] == image[known]).all()
+    assert continued.min() >= image.min()
+    assert continued.max() <= image.max()
+
+
+def test_a_slope_goes_on_behind_what_is_unknown() -> None:
+    slope = np.linspace(0, 1, WIDTH, dtype=np.float32)[None, :, None].repeat(HEIGHT, 0).repeat(3, 2)
+    known = hole()
+    continued = push_pull(np.where(known[..., None], slope, 0), known.astype(np.float32))
+    assert np.abs(continued - slope)[~known].mean() < 0.1
+    assert (np.diff(continued[20, 20:40, 0]) > -0.02).all()
+
+
+def test_what_differs_from_its_surroundings_is_told() -> None:
+    image = np.full((HEIGHT, WIDTH, 3), 0.3, np.float32)
+    image[16:24, 26:34] = 0.6
+    apart = unlike(image, hole())
+    assert apart[16:24, 26:34].min() > 0.2
+    assert apart[12:15, 20:25].max() < 1e-3
+
+
+def test_specks_are_accidents() -> None:
+    known = hole()
+    known[18:21, 28:31] = True
+    known[2:4, 2:4] = False
+    expected = hole()
+    found = in_one_piece(known)
+    assert not found[14:26, 22:38].any()
+    assert found[2:4, 2:4].all()
+    assert (found == expected).mean() > 0.98
+
+
+def test_a_patch_counts_if_it_borders_on_more_that_is_known() -> None:
+    known = hole()
+    grown = known.copy()
+    grown[12:15, 20:40] = True  # along the upper rim
+    grown[20:23, 28:31] = True  # amid the unknown
+    kept = mostly_beside(grown, known)
+    assert kept[12:15, 20:40].all()
+    assert not kept[20:23, 28:31].any()
+    assert kept[known].all()
