@@ -4,13 +4,13 @@
 
 #include <algorithm>
 #include <array>
+#include <vector>
 
 namespace smokelift {
 namespace {
 
 using Table = std::array<float, 256>;
 
-// The products are rounded in memory: added to at once, a compiler may leave them unrounded.
 SMOKELIFT_INLINE void multiply(const float *table, float weight, Table &product) {
     for (std::size_t code = 0; code < product.size(); ++code)
         product[code] = weight * table[code];
@@ -21,6 +21,41 @@ void add_line(const unsigned char *__restrict codes, const float *__restrict val
               float *__restrict sums) {
     for (int x = 0; x < width; ++x)
         sums[x] += values[codes[x]];
+}
+
+// `fixed` channels are those that there are, or 0 where that is not known before.
+template <int fixed>
+void sum_columns_of(const float *__restrict values, const Extent &picture, const LineWeights &weights,
+                    float *__restrict sums) {
+    const int channels = fixed ? fixed : picture.channels;
+    const std::ptrdiff_t width = std::ptrdiff_t(picture.columns) * channels;
+    for (int line = 0; line < picture.lines; ++line, values += width) {
+        for (int column = 0; column < weights.count; ++column, sums += channels) {
+            std::fill_n(sums, channels, 0.0f);
+            for (int n = weights.first[column]; n < weights.first[column + 1]; ++n) {
+                const float *__restrict added = values + std::ptrdiff_t(weights.lines[n]) * channels;
+                for (int c = 0; c < channels; ++c)
+                    sums[c] += weights.weights[n] * added[c];
+            }
+        }
+    }
+}
+
+SMOKELIFT_CLONES
+void add_weighted_line(const unsigned char *__restrict codes, const float *__restrict table,
+                       const float *__restrict weights, int width, float *__restrict sums) {
+    for (int x = 0; x < width; ++x)
+        sums[x] += table[codes[x]] * weights[x];
+}
+
+SMOKELIFT_CLONES
+void interleave_line(const unsigned char *__restrict red, const unsigned char *__restrict green,
+                     const unsigned char *__restrict blue, int width, unsigned char *__restrict codes) {
+    for (int x = 0; x < width; ++x) {
+        codes[3 * x] = red[x];
+        codes[3 * x + 1] = green[x];
+        codes[3 * x + 2] = blue[x];
+    }
 }
 
 } // namespace
@@ -36,6 +71,33 @@ void sum_lines(const CodedLines &picture, const float *table, const LineWeights 
             add_line(picture.codes + weights.lines[n] * picture.stride, product.data(), picture.width, sums);
         }
     }
+}
+
+void sum_columns(const float *values, const Extent &picture, const LineWeights &weights, float *sums) {
+    const auto sum = picture.channels == 3   ? sum_columns_of<3>
+                     : picture.channels == 1 ? sum_columns_of<1>
+                                             : sum_columns_of<0>;
+    sum(values, picture, weights, sums);
+}
+
+void add_weighted(const CodedLines &picture, const float *table, const PartWeights &weights, float *sums) {
+    std::vector<float> across(picture.width);
+    for (int row = 0; row < weights.rows; ++row) {
+        const float *weight = weights.weights + std::ptrdiff_t(row) * weights.columns * 3;
+        for (int column = 0; column < weights.columns; ++column, weight += 3)
+            for (int x = weights.first_column[column]; x < weights.first_column[column + 1]; ++x)
+                std::copy_n(weight, 3, &across[3 * std::size_t(x)]);
+        for (int line = weights.first_line[row]; line < weights.first_line[row + 1]; ++line)
+            add_weighted_line(picture.codes + line * picture.stride, table, across.data(), picture.width,
+                              sums + std::ptrdiff_t(line) * picture.width);
+    }
+}
+
+void interleave(const std::array<CodedLines, 3> &channels, unsigned char *codes) {
+    const auto [red, green, blue] = channels;
+    for (int line = 0; line < red.lines; ++line, codes += 3 * std::ptrdiff_t(red.width))
+        interleave_line(red.codes + line * red.stride, green.codes + line * green.stride,
+                        blue.codes + line * blue.stride, red.width, codes);
 }
 
 } // namespace smokelift

@@ -44,6 +44,12 @@ LineWeights weights_of(const Integers &first, const Integers &lines, const Array
     return {begin, lines.data(), weights.data(), int(first.size()) - 1};
 }
 
+void require_parts(const Integers &first, py::ssize_t parts, py::ssize_t whole) {
+    const int *const begin = first.data();
+    require_fit(first.ndim() == 1 && first.size() == parts + 1 && begin[0] == 0 && begin[parts] == whole &&
+                std::is_sorted(begin, begin + parts + 1));
+}
+
 const unsigned char *bytes_of(const Marks &a) { return reinterpret_cast<const unsigned char *>(a.data()); }
 
 } // namespace
@@ -115,6 +121,60 @@ void register_pictures(py::module_ &module) {
             return sums;
         },
         "picture"_a, "table"_a, "first"_a, "lines"_a, "weights"_a);
+
+    module.def(
+        "sum_columns",
+        [](const Array &values, const Integers &first, const Integers &columns, const Array &weights) {
+            require_fit(values.ndim() == 3);
+            const Extent extent{int(values.shape(0)), int(values.shape(1)), int(values.shape(2))};
+            const LineWeights summed = weights_of(first, columns, weights, extent.columns);
+            Array sums({values.shape(0), py::ssize_t(summed.count), values.shape(2)});
+            float *const result = sums.mutable_data();
+            {
+                const py::gil_scoped_release unlocked;
+                sum_columns(values.data(), extent, summed, result);
+            }
+            return sums;
+        },
+        "values"_a, "first"_a, "columns"_a, "weights"_a);
+
+    module.def(
+        "add_weighted",
+        [](const Codes &picture, const Array &table, const Array &weights, const Integers &lines,
+           const Integers &columns, py::array_t<float, py::array::c_style> &sums) {
+            const CodedLines coded = lines_of(picture);
+            require_fit(table.size() == 256 && weights.ndim() == 3 && picture.shape(2) == 3 &&
+                        weights.shape(2) == 3 && sums.ndim() == 3 &&
+                        std::equal(sums.shape(), sums.shape() + 3, picture.shape()));
+            require_parts(lines, weights.shape(0), coded.lines);
+            require_parts(columns, weights.shape(1), picture.shape(1));
+            const PartWeights parts{weights.data(), lines.data(), columns.data(), int(weights.shape(0)),
+                                    int(weights.shape(1))};
+            float *const result = sums.mutable_data();
+            const py::gil_scoped_release unlocked;
+            add_weighted(coded, table.data(), parts, result);
+        },
+        "picture"_a, "table"_a, "weights"_a, "lines"_a, "columns"_a, py::arg("sums").noconvert());
+
+    module.def(
+        "interleave",
+        [](const std::array<Codes, 3> &channels) {
+            std::array<CodedLines, 3> planes;
+            for (int c = 0; c < 3; ++c) {
+                const Codes &plane = channels[c];
+                require_fit(plane.ndim() == 2 && plane.strides(1) == 1 &&
+                            std::equal(plane.shape(), plane.shape() + 2, channels[0].shape()));
+                planes[c] = {plane.data(), plane.strides(0), int(plane.shape(0)), int(plane.shape(1))};
+            }
+            py::array_t<unsigned char> codes({channels[0].shape(0), channels[0].shape(1), py::ssize_t(3)});
+            unsigned char *const result = codes.mutable_data();
+            {
+                const py::gil_scoped_release unlocked;
+                interleave(planes, result);
+            }
+            return codes;
+        },
+        "channels"_a);
 }
 
 } // namespace smokelift

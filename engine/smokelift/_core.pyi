@@ -441,3 +441,25 @@ def sum_lines(
     The ``n``-th is that of ``lines`` from ``first[n]`` to ``first[n + 1]``, as of a sparse matrix in rows, and the same
     to the last bit. ``table`` has 256 values. Pixels lie one after the other in each line.
     """
+
+def sum_columns(values: Array, first: npt.NDArray[np.int32], columns: npt.NDArray[np.int32], weights: Array) -> Array:
+    """Weighted sums (rows, n, channels) of columns of values (rows, columns, channels), as of `sum_lines`."""
+
+def add_weighted(
+    picture: npt.NDArray[np.uint8],
+    table: Array,
+    weights: Array,
+    lines: npt.NDArray[np.int32],
+    columns: npt.NDArray[np.int32],
+    sums: Array,
+) -> None:
+    """Add the values of a picture (rows, columns, 3), times weights (m, n, 3) of its parts, to sums of its shape.
+
+    The ``n``-th part down has the lines from ``lines[n]`` to ``lines[n + 1]``; columns likewise. The rest is as of
+    `sum_lines`.
+    """
+
+def interleave(
+    channels: tuple[npt.NDArray[np.uint8], npt.NDArray[np.uint8], npt.NDArray[np.uint8]],
+) -> npt.NDArray[np.uint8]:
+    """Write three pictures (rows, columns), in each of which pixels lie one after the other, as (rows, columns, 3)."""

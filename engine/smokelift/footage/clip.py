@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from smokelift.footage.exposure import small, small_size
 from smokelift.footage.frame_source import ClipError, DamagedFrameError, FrameSource, Look
 from smokelift.footage.image_sequence import ImageSequence
-from smokelift.footage.images import CodedPicture, Picture, Transfer, Value, area_average
+from smokelift.footage.images import CodedPicture, Edges, Picture, Transfer, Value, add_weighted, area_average
 from smokelift.footage.video import Video
 from smokelift.scene import ClipSource
 
@@ -231,6 +231,20 @@ class Clip:
         if isinstance(image, CodedPicture):
             return CodedPicture(cut(image.codes), image.table).averaged(width, height)
         return area_average(cut(image), width, height)
+
+    def add_weighted(self, n: int, weights: Picture, edges: tuple[Edges, Edges], sums: Picture) -> None:
+        """Add frame ``n``, times weights of its parts, to sums: `images.add_weighted`, which may be cheaper that way.
+
+        Raises
+        ------
+        ClipError
+            As `frame` does.
+        """
+        image = self._kept_or_coded(n)
+        if isinstance(image, CodedPicture):
+            image.add_weighted(weights, edges, sums)
+        else:
+            add_weighted(image, weights, edges, sums)
 
     def _kept_or_coded(self, n: int) -> Picture | CodedPicture:
         """Frame ``n`` as it is stored, or linear if it is not stored in codes, or has been asked for lately."""

@@ -31,6 +31,7 @@ from smokelift.scene import LARGEST_PICTURE
 
 Picture = npt.NDArray[np.float32]
 Transfer = Literal["srgb", "linear"]
+Edges = npt.NDArray[np.int32]
 Value = TypeVar("Value", np.float32, np.uint16)
 
 MOST_PIXELS = 2**28
@@ -87,6 +88,30 @@ class CodedPicture:
         codes = np.asarray(self.codes, np.uint8)
         lines = _core.sum_lines(codes, self.table, weights.indptr, weights.indices, weights.data)
         return area_average(lines, width, height)
+
+    def add_weighted(self, weights: Picture, edges: tuple[Edges, Edges], sums: Picture) -> None:
+        """Add the linear picture, times weights of its parts, to sums.
+
+        Parameters
+        ----------
+        weights : (m, n, 3)
+            Of the parts.
+        edges : (m + 1,), (n + 1,)
+            Row, and column, where each part begins, and where the last ends.
+        sums : (rows, columns, 3)
+            Changed.
+        """
+        if self.codes.dtype == np.uint8:
+            _core.add_weighted(np.asarray(self.codes, np.uint8), self.table, weights, *edges, sums)
+        else:
+            add_weighted(self.linear(), weights, edges, sums)
+
+
+def add_weighted(picture: Picture, weights: Picture, edges: tuple[Edges, Edges], sums: Picture) -> None:
+    """Do to a linear picture what `CodedPicture.add_weighted` does."""
+    lines, columns = edges
+    for low, high, each in zip(lines[:-1], lines[1:], np.repeat(weights, np.diff(columns), axis=1), strict=True):
+        sums[low:high] += picture[low:high] * each
 
 
 def look_up(values: npt.NDArray[Value], codes: npt.NDArray[np.uint8] | npt.NDArray[np.uint16]) -> npt.NDArray[Value]:
@@ -331,9 +356,9 @@ def area_average(image: npt.ArrayLike, width: int, height: int) -> Picture:
     if rows != height:
         values = (_weights(rows, height) @ values.reshape(rows, -1)).reshape(height, *values.shape[1:])
     if columns != width:
-        turned = np.swapaxes(values, 0, 1)
-        turned = (_weights(columns, width) @ turned.reshape(columns, -1)).reshape(width, *turned.shape[1:])
-        values = np.swapaxes(turned, 0, 1)
+        weights, shape = _weights(columns, width), (height, width, *values.shape[2:])
+        channels = values.reshape(height, columns, -1)
+        values = _core.sum_columns(channels, weights.indptr, weights.indices, weights.data).reshape(shape)
     return np.ascontiguousarray(values)
 
 

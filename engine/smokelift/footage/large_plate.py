@@ -20,7 +20,7 @@ from smokelift.footage.behind_smoke import DETAIL, MOST_DETAIL
 from smokelift.footage.clip import Clip
 from smokelift.footage.evidence import GLIMPSE, are_large
 from smokelift.footage.exposure import sample_gains, small
-from smokelift.footage.images import Picture, area_average, linear_to_srgb, srgb_to_linear
+from smokelift.footage.images import Edges, Picture, area_average, linear_to_srgb, srgb_to_linear
 from smokelift.footage.noise import (
     BLOCK,
     BLOCKS_APART,
@@ -140,16 +140,13 @@ class LargeSamples:
 
     def _mean(self, shown: Mask) -> Picture:
         """The linear mean of whole frames over the times at which they are ``shown``, as ``clear`` of `_fine` says."""
-        width, height = self.clip.size
-        (_, rows, columns), total = shown.shape, np.zeros((height, 3 * width), np.float32)
-        edges, wide = _edges(rows, height), np.diff(_edges(columns, width))
+        sizes = zip(shown.shape[1:], self.clip.size[::-1], strict=True)
+        down, across = (_edges(*each) for each in sizes)
+        total = np.zeros((down[-1], across[-1], 3), np.float32)
         weights = shown[..., None] / (self.gains[WHOLE, None, None] * shown.sum(0, dtype=np.float32)[..., None])
         for number, weight in zip(self.numbers[WHOLE], weights, strict=True):
-            lines = self.clip.frame(number).reshape(height, 3 * width)
-            across = np.repeat(weight, wide, axis=1).reshape(rows, 3 * width)
-            for low, high, each in zip(edges[:-1], edges[1:], across, strict=True):
-                total[low:high] += lines[low:high] * each
-        return total.reshape(height, width, 3)
+            self.clip.add_weighted(number, weight, (down, across), total)
+        return total
 
     def _spread(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """Values (rows, columns) of reduced pixels, at the pixels of whole pictures that each stands for."""
@@ -196,9 +193,9 @@ def _divisor(clip: Clip) -> int:
     return COARSER * (max(clip.size) // GLIMPSE) if are_large(clip) and enough else 0
 
 
-def _edges(count: int, pixels: int) -> npt.NDArray[np.intp]:
+def _edges(count: int, pixels: int) -> Edges:
     """Where each of so many parts of a line of pixels begins, and the end of the last."""
-    return np.asarray(-(-np.arange(count + 1) * pixels // count), np.intp)
+    return np.asarray(-(-np.arange(count + 1) * pixels // count), np.int32)
 
 
 def _same(values: Picture) -> Picture:

@@ -9,6 +9,7 @@ from pathlib import Path
 import av
 import numpy as np
 import pytest
+from av.video.reformatter import Interpolation
 from PIL import Image
 
 from smokelift.footage.clip import Clip, ClipError
@@ -151,6 +152,25 @@ def test_the_colour_range_is_honoured_and_rounding_is_unbiased(tmp_path: Path, f
     exact = luma if full else (luma - 16.0) * 255 / 219
     assert np.abs(found - exact).max() < 0.51
     assert abs(np.mean(found - exact)) < 0.05
+
+
+@pytest.mark.parametrize(("name", "codec", "pixels"), [("c.mkv", "ffv1", "yuv420p"), ("c.mp4", "libx264", "yuvj422p")])
+def test_codes_are_those_that_ffmpeg_writes_as_pixels(tmp_path: Path, name: str, codec: str, pixels: str) -> None:
+    """They are taken from planes, which it writes in other code."""
+    random = np.random.default_rng(0)
+    pictures = [random.integers(0, 255, (50, 102, 3), np.uint8, endpoint=True)]
+    path = encode(tmp_path / name, pictures, codec=codec, pixels=pixels)
+    exact = Interpolation.ACCURATE_RND | Interpolation.FULL_CHR_H_INT | Interpolation.FULL_CHR_H_INP
+    with av.open(str(path)) as file:
+        frame = next(file.decode(video=0))
+    video = Video(path, None)
+    for divisor, way in ((1, Interpolation.BICUBIC), (3, Interpolation.AREA)):
+        size = 102 // divisor, 50 // divisor
+        expected = frame.reformat(*size, "rgb24", interpolation=int(way | exact)).to_ndarray()
+        picture = video.glimpse(0, divisor)
+        assert isinstance(picture, CodedPicture)
+        assert np.array_equal(picture.codes, expected)
+    video.close()
 
 
 def test_10_bits_are_kept(tmp_path: Path) -> None:

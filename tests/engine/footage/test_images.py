@@ -8,6 +8,7 @@ import av
 import numpy as np
 import OpenEXR
 import pytest
+import scipy.sparse
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
@@ -16,6 +17,7 @@ from smokelift import _core
 from smokelift.footage.images import (
     CodedPicture,
     ImageError,
+    add_weighted,
     area_average,
     code_values,
     decode_integers,
@@ -252,6 +254,55 @@ def test_averages_of_codes_are_those_of_the_linear_picture_to_the_last_bit(size:
         picture.averaged(4, 0)
 
 
+@pytest.mark.parametrize("channels", [1, 3, 7])
+def test_columns_are_summed_as_by_a_sparse_matrix_to_the_last_bit(channels: int) -> None:
+    random = np.random.default_rng(0)
+    values = random.random((9, 31, channels), np.float32)
+    dense = random.random((12, 31), np.float32)
+    weights = scipy.sparse.csr_array(np.where(dense < 0.3, dense, 0))
+    turned = np.ascontiguousarray(np.swapaxes(values, 0, 1)).reshape(31, -1)
+    expected = np.swapaxes((weights @ turned).reshape(12, 9, channels), 0, 1)
+    assert np.array_equal(_core.sum_columns(values, weights.indptr, weights.indices, weights.data), expected)
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+def test_codes_are_added_as_the_linear_picture_to_the_last_bit(dtype: type) -> None:
+    random, top = np.random.default_rng(0), np.iinfo(dtype).max
+    picture = CodedPicture(random.integers(0, top, (20, 36, 3), dtype, endpoint=True), code_values(top))
+    edges = np.array([0, 3, 3, 20], np.int32), np.array([0, 1, 18, 30, 36], np.int32)
+    weights, sums = random.random((3, 4, 3), np.float32), random.random((20, 36, 3), np.float32)
+    lines, columns = (np.diff(each) for each in edges)
+    expected = sums + picture.linear() * np.repeat(np.repeat(weights, lines, axis=0), columns, axis=1)
+    others = sums.copy()
+    picture.add_weighted(weights, edges, sums)
+    add_weighted(picture.linear(), weights, edges, others)
+    assert np.array_equal(sums, expected)
+    assert np.array_equal(others, expected)
+
+
+def test_channels_are_interleaved() -> None:
+    codes = np.random.default_rng(0).integers(0, 255, (5, 70, 4), np.uint8, endpoint=True)
+    planes = [np.pad(codes[..., c], ((0, 0), (0, 9)))[:, :70] for c in range(3)]
+    assert np.array_equal(_core.interleave(tuple(planes)), codes[..., :3])
+    for red in (codes[:4, :, 0].copy(), codes[..., 0]):
+        with pytest.raises(ValueError, match="belong together"):
+            _core.interleave((red, *planes[1:]))
+
+
+def test_what_is_added_to_sums_belongs_to_them() -> None:
+    codes, table, weights = np.zeros((4, 2, 3), np.uint8), np.zeros(256, np.float32), np.zeros((1, 2, 3), np.float32)
+    lines, columns, sums = np.array([0, 4], np.int32), np.array([0, 1, 2], np.int32), np.zeros((4, 2, 3), np.float32)
+    _core.add_weighted(codes, table, weights, lines, columns, sums)
+    for belonging in (
+        (np.array([0, 5], np.int32), columns, sums),
+        (lines, np.array([0, 3, 2], np.int32), sums),
+        (lines, columns[:2], sums),
+        (lines, columns, sums[:3]),
+    ):
+        with pytest.raises(ValueError, match="belong together"):
+            _core.add_weighted(codes, table, weights, *belonging)
+
+
 def test_lines_are_summed_of_pictures_that_have_them_only() -> None:
     codes, table = np.zeros((4, 2, 3), np.uint8), np.zeros(256, np.float32)
     for lines in ([0, 4], [-1, 0]):
@@ -259,3 +310,7 @@ def test_lines_are_summed_of_pictures_that_have_them_only() -> None:
             _core.sum_lines(codes, table, np.array([0, 2], np.int32), np.array(lines, np.int32), table[:2])
     with pytest.raises(ValueError, match="belong together"):
         _core.sum_lines(codes[:, ::-1], table, np.array([0, 1], np.int32), np.zeros(1, np.int32), table[:1])
+    with pytest.raises(ValueError, match="belong together"):
+        _core.sum_columns(
+            np.zeros((4, 2, 3), np.float32), np.array([0, 1], np.int32), np.array([2], np.int32), table[:1]
+        )
