@@ -178,10 +178,20 @@ def _group() -> bpy.types.NodeTree:
     tree[MARK] = True
     for name, kind, default, description in (
         ("Render", "NodeSocketColor", (0.0, 0.0, 0.0, 0.0), "The smoke on transparent film"),
-        ("Plate", "NodeSocketColor", (0.0, 0.0, 0.0, 1.0), "What is behind it: the clean plate, or another clip"),
-        ("Clip", "NodeSocketColor", (0.0, 0.0, 0.0, 1.0), "Gives the grain, and what is in front"),
+        (
+            "Plate",
+            "NodeSocketColor",
+            (0.0, 0.0, 0.0, 1.0),
+            "What is behind the smoke: the clean plate, or another clip",
+        ),
+        (
+            "Clip",
+            "NodeSocketColor",
+            (0.0, 0.0, 0.0, 1.0),
+            "The clip, from which the grain and the foreground are taken",
+        ),
         ("Foreground", "NodeSocketFloat", 0.0, "Mask of what is in front of the smoke in the clip"),
-        ("Grain", "NodeSocketFloat", 1.0, "Of the clip, added to plate and smoke; 0 is none"),
+        ("Grain", "NodeSocketFloat", 1.0, "Strength of the clip's grain on plate and smoke; 0 is none"),
     ):
         socket = tree.interface.new_socket(name, description=description, in_out="INPUT", socket_type=kind)
         if kind == "NodeSocketFloat":

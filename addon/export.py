@@ -44,14 +44,14 @@ class SmokeliftExport(bpy.types.PropertyGroup):
 
     folder: StringProperty(
         name="Folder",
-        description="Folder for the export; by default the folder export beside the results",
+        description="Folder for the export; by default a folder named export beside the results",
         subtype="DIR_PATH",
         options=PATH_OPTIONS,
         update=_changed,
     )
     precision: EnumProperty(
         name="Precision",
-        description="Bits of each value. What is so thin that it does not show is left out either way",
+        description="Bits of each value. Smoke too thin to be seen is left out either way",
         items=[
             ("half", "Half", "Floats of 16 bits"),
             ("quantised", "Quantized", "As few bits as a picture of 8 bits needs: half the size"),
@@ -241,7 +241,7 @@ class SMOKELIFT_OT_cancel_export(bpy.types.Operator):
 
 
 class SMOKELIFT_OT_use_proxy(NeedsResult, bpy.types.Operator):
-    """Show the proxy of the export in the viewport, and the smoke itself in renders only; again to undo that"""
+    """Show the proxy of the export in the viewport, and the smoke itself in renders only. Press again to undo this"""
 
     bl_idname = "smokelift.use_proxy"
     bl_label = "Proxy in Viewport"

@@ -113,12 +113,17 @@ def _group() -> bpy.types.NodeTree:
             "Points",
             "NodeSocketGeometry",
             None,
-            "Where instances stand; their attribute time_offset says when they begin",
+            "Where instances stand; the attribute time_offset says by how many frames each plays later",
         ),
         ("Times", "NodeSocketCollection", None, "Volumes that play the same files, each later than the one before"),
-        ("Frames Apart", "NodeSocketInt", 1, "Frames between two of them"),
-        ("Random Offset", "NodeSocketInt", 0, "Frames by which an instance plays later besides, at most"),
-        ("Seed", "NodeSocketInt", 0, "Of the random offset"),
+        ("Frames Apart", "NodeSocketInt", 1, "Frames from one of the times to the next"),
+        (
+            "Random Offset",
+            "NodeSocketInt",
+            0,
+            "Frames by which an instance plays later at random, at most; added to time_offset",
+        ),
+        ("Seed", "NodeSocketInt", 0, "Another seed makes other random offsets"),
     ):
         socket = tree.interface.new_socket(name, description=description, in_out="INPUT", socket_type=kind)
         if default is not None:
@@ -179,13 +184,15 @@ class _NeedsSequence:
 
 
 class SMOKELIFT_OT_add_instance(_NeedsSequence, bpy.types.Operator):
-    """Add another object of the active Volume's files that plays later or earlier. The material is shared"""
+    """Add another object that plays the active Volume's files later or earlier. The material is shared"""
 
     bl_idname = "smokelift.add_instance"
     bl_label = "Instance in Time"
     bl_options = {"REGISTER", "UNDO"}
 
-    offset: IntProperty(name="Time Offset", description="Frames by which it plays later", default=12)
+    offset: IntProperty(
+        name="Time Offset", description="Frames by which the new object plays later; below 0 earlier", default=12
+    )
     repeat: BoolProperty(name="Repeat", description="Play the frames again and again, as for a loop")
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -197,7 +204,7 @@ class SMOKELIFT_OT_add_instance(_NeedsSequence, bpy.types.Operator):
 
 
 class SMOKELIFT_OT_scatter(_NeedsSequence, bpy.types.Operator):
-    """Add an object that shows the active Volume at each of its points, by geometry nodes, each with its own time"""
+    """Add an object whose points each show the active Volume at a time of their own, by geometry nodes"""
 
     bl_idname = "smokelift.scatter"
     bl_label = "Scatter in Time"
@@ -211,7 +218,7 @@ class SMOKELIFT_OT_scatter(_NeedsSequence, bpy.types.Operator):
         soft_max=24,
         max=1000,
     )
-    step: IntProperty(name="Frames Apart", description="Frames between two of them", default=8, min=1)
+    step: IntProperty(name="Frames Apart", description="Frames from one of the times to the next", default=8, min=1)
     repeat: BoolProperty(name="Repeat", description="Play the frames again and again, as for a loop")
 
     def execute(self, context: bpy.types.Context) -> set[str]:

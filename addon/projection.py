@@ -186,10 +186,10 @@ def _group() -> bpy.types.NodeTree:
     tree = bpy.data.node_groups.new(MATERIAL, "ShaderNodeTree")
     tree[MARK] = True
     for name, kind, description in (
-        ("Point", "NodeSocketVector", "In the space of the camera that filmed"),
-        ("Focal Length", "NodeSocketVector", "Over the width and over the height of the picture"),
-        ("Center", "NodeSocketVector", "Of the lens in the picture, from 0 to 1"),
-        ("Perspective", "NodeSocketFloat", "0 for an orthographic camera"),
+        ("Point", "NodeSocketVector", "A point in the space of the camera that filmed"),
+        ("Focal Length", "NodeSocketVector", "Focal length over the width and over the height of the picture"),
+        ("Center", "NodeSocketVector", "Center of the lens in the picture, from 0 to 1"),
+        ("Perspective", "NodeSocketFloat", "1 for a perspective camera, 0 for an orthographic one"),
     ):
         tree.interface.new_socket(name, description=description, in_out="INPUT", socket_type=kind)
     tree.interface.new_socket("Vector", in_out="OUTPUT", socket_type="NodeSocketVector")

@@ -84,10 +84,10 @@ class SmokeliftDirecting(bpy.types.PropertyGroup):
     frames: IntProperty(name="Frames", description="Number of frames to add", default=48, min=1, max=100_000)
     fade: IntProperty(name="Fade", description="Frames at the end in which the smoke fades to nothing", min=0)
     use_start: BoolProperty(
-        name="Start", description="Simulate from a frame on, in place of the clip's own frames after it"
+        name="Start", description="Simulate from a frame of the clip on, in place of the frames that follow it"
     )
     start: IntProperty(
-        name="Start", description="Frame of the scene, the last one that stays as it is", default=1, min=-1_000_000
+        name="Start", description="Last frame that stays as it is, counted in the scene", default=1, min=-1_000_000
     )
     closed: _closed("Sides of the result's box, along its own axes, that are walls for the frames that are added")
     effectors: PointerProperty(
@@ -141,7 +141,7 @@ class SmokeliftDirecting(bpy.types.PropertyGroup):
     )
     live: BoolProperty(
         name="Preview",
-        description="Play the result on show at this speed now. Frames in between are made by Retime",
+        description="Play the result on show at this speed now. Only Retime Smoke makes the frames in between",
         update=_speed_chosen,
     )
     use_part: BoolProperty(name="Part", description="Loop a part of the result, in which the smoke is steady")
@@ -251,7 +251,7 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
         items=[
             ("draft", "Draft", "A quick look"),
             ("balanced", "Balanced", "Good for most shots"),
-            ("fine", "Fine", "The clip's full detail, several times slower"),
+            ("fine", "Fine", "More of the clip's detail, several times slower"),
         ],
         default="balanced",
         update=_changed,
@@ -270,7 +270,7 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
     )
     seed: IntProperty(
         name="Variation",
-        description="Which of the plausible smokes is made: all look alike from the camera, and differ from the side",
+        description="Number of the plausible smoke: all look alike from the camera, and differ from the side",
         default=0,
         min=0,
         max=SEEDS - 1,
@@ -284,7 +284,7 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
 
     longest_side: IntProperty(
         name="Resolution",
-        description="Voxels along the box's longest side; 0 measures the clip's detail",
+        description="Voxels along the box's longest side; 0 chooses by the detail that is measured in the clip",
         default=0,
         min=0,
         max=1024,
@@ -292,7 +292,7 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
     )
     use_axis_depth: BoolProperty(
         name="Known Depth",
-        description="Set the smoke's distance behind the middle of the box; else it is estimated",
+        description="Give the smoke's distance behind the middle of the box; otherwise it is estimated",
         update=_changed,
     )
     axis_depth: FloatProperty(
@@ -358,7 +358,7 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
         items=[
             ("auto", "Automatic", "The GPU if it is usable"),
             ("cpu", "CPU", "The CPU only"),
-            ("gpu", "GPU Compute", "The GPU, or fail"),
+            ("gpu", "GPU Compute", "The GPU only; without a usable one the run fails"),
         ],
     )
     set_up_range: BoolProperty(
@@ -384,7 +384,7 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
     )
     set_up_colors: BoolProperty(
         name="Color Management",
-        description="View transform Standard, in which the clip looks as it was filmed",
+        description="Set the view transform to Standard, in which the clip looks as it was filmed",
         default=True,
     )
     plate_place: EnumProperty(

@@ -34,7 +34,7 @@ class SMOKELIFT_OT_show_take(NeedsClip, bpy.types.Operator):
 
 
 class SMOKELIFT_OT_switch_take(NeedsResult, bpy.types.Operator):
-    """Show the result that was shown before; again to come back"""
+    """Show the result that was shown before. Press again to come back"""
 
     bl_idname = "smokelift.switch_take"
     bl_label = "Switch"

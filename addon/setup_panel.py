@@ -30,7 +30,7 @@ class SMOKELIFT_OT_set_up(NeedsClipAndResult, bpy.types.Operator):
     bl_idname = "smokelift.set_up"
     bl_description = (
         "Make a Cycles render from the camera match the clip: resolution, frame rate, background, estimated light "
-        "and colours. The old world stays in the file"
+        "and colors. The old world stays in the file"
     )
     bl_label = "Set Up Shot"
     bl_options = {"REGISTER", "UNDO"}

@@ -57,10 +57,11 @@ def _values(action: argparse.Action) -> str:
 
 def _meaning(action: argparse.Action) -> str:
     """Return what an argument is, and its default."""
-    parts = [(action.help or "").replace("|", "\\|").replace("%%", "%")]
-    if isinstance(action.default, str | int | float) and not isinstance(action.default, bool) and action.option_strings:
-        parts.append(f"default `{action.default}`")
-    return "; ".join(part for part in parts if part)
+    said = (action.help or "").replace("|", "\\|").replace("%%", "%")
+    usual = isinstance(action.default, str | int | float) and not isinstance(action.default, bool)
+    if usual and action.option_strings and "default" not in said:
+        return f"{said}; default `{action.default}`".removeprefix("; ")
+    return said
 
 
 if __name__ == "__main__":

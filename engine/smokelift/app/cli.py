@@ -114,9 +114,21 @@ def command_parser() -> argparse.ArgumentParser:
     )
     commands = parser.add_subparsers(dest="command", required=True)
     common = argparse.ArgumentParser(add_help=False)
-    common.add_argument("--device", choices=("auto", "cpu", "gpu"), default="auto", help="where to render")
-    common.add_argument("--progress", choices=("text", "json"), default="text", help="a bar, or one JSON object a line")
-    common.add_argument("--threads", type=_threads, default=0, metavar="N", help="of the processor; 0: all")
+    common.add_argument(
+        "--device",
+        choices=("auto", "cpu", "gpu"),
+        default="auto",
+        help="what renders; auto (default): a GPU if there is one that Taichi can use well, else the processor",
+    )
+    common.add_argument(
+        "--progress",
+        choices=("text", "json"),
+        default="text",
+        help="text (default): a progress bar; json: one JSON object a line",
+    )
+    common.add_argument(
+        "--threads", type=_threads, default=0, metavar="N", help="processor threads at most; 0 (default): all"
+    )
     for add_parser in COMMANDS:
         add_parser(commands, common)
     return parser

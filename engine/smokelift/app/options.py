@@ -26,36 +26,52 @@ def named_path(text: str) -> Path:
 def add_run_options(parser: argparse.ArgumentParser) -> None:
     """Add the clip or scene file, and all that decides how it is reconstructed."""
     parser.add_argument("input", type=named_path, help="scene.toml, or a video, or frame_####.png")
-    parser.add_argument("--quality", choices=QUALITIES, default="balanced")
-    parser.add_argument("--method", choices=METHODS, default="default", help="paper: the published loop")
+    parser.add_argument(
+        "--quality",
+        choices=QUALITIES,
+        default="balanced",
+        help="how much of the clip's detail is kept, and how long a run takes (default: balanced)",
+    )
+    parser.add_argument(
+        "--method",
+        choices=METHODS,
+        default="default",
+        help="paper: the published method, for comparison (needs the extra [gpu])",
+    )
     parser.add_argument(
         "--resolution",
         type=_resolution,
         metavar="X,Y,Z",
-        help="voxels along X, Y, Z (default: the scene's); auto: measured on the clip",
+        help="voxels along X, Y, Z; auto: measured on the clip (default: the scene's, else auto)",
     )
     parser.add_argument(
         "--scattering",
         choices=("auto", *SCATTERINGS),
         default="auto",
-        help="how light is scattered; auto measures which is needed",
+        help="how light is scattered; auto (default): what the scene says, else measured on the clip",
     )
-    parser.add_argument("--frames", type=frame_range, metavar="A:B", help="first and last frame, from 0")
+    parser.add_argument(
+        "--frames",
+        type=frame_range,
+        metavar="A:B",
+        help="first and last frame of the clip to use, counted from 0 (default: the scene's, else all)",
+    )
     parser.add_argument(
         "--axis-depth",
         type=float,
         metavar="METRES",
-        help="how far behind the middle of the box the smoke stands (before it: less than 0), if you know",
+        help="how far the smoke stands behind the middle of the box, away from the camera; negative: in front of it "
+        "(default: estimated)",
     )
     parser.add_argument(
         "--detail",
         type=float,
         metavar="0..1",
-        help="fine structure in depth, made up from other moments of the clip: 0 (smooth, best for measuring) to 1 "
-        "(default)",
+        help="how much fine structure in depth is made up from other moments of the clip: 0 (none: smooth, best for "
+        "measuring) to 1 (default; with --method paper 0)",
     )
     parser.add_argument(
-        "--seed", type=int, default=0, metavar="N", help="which of the plausible smokes of the clip, from 0 (default)"
+        "--seed", type=int, default=0, metavar="N", help="which of the plausible smokes is made, from 0 (default)"
     )
 
 
@@ -63,8 +79,8 @@ def add_directed_options(parser: argparse.ArgumentParser) -> None:
     """Add a sequence, and where what becomes of it is written to."""
     parser.add_argument("directory", type=named_path, help="of the sequence")
     parser.add_argument("--out", type=named_path, required=True, help="directory for the new sequence")
-    parser.add_argument("--npz", action="store_true", help="write NumPy twins as well")
-    parser.add_argument("--resume", action="store_true", help="go on from the frames that are there")
+    parser.add_argument("--npz", action="store_true", help="write NumPy files as well")
+    parser.add_argument("--resume", action="store_true", help="go on after the frames that are finished")
 
 
 def require_new(options: argparse.Namespace) -> None:
@@ -148,5 +164,5 @@ def frame_range(text: str) -> tuple[int, int]:
     try:
         first, last = (int(part) for part in text.split(":"))
     except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r}: expected the first and last frame A:B, from 0") from None
+        raise argparse.ArgumentTypeError(f"{text!r}: expected the first and last frame A:B") from None
     return first, last

@@ -22,7 +22,8 @@ class ClipSource:
     frames
         First and last frame, both included, counted from 0; None takes all.
     transfer
-        ``"srgb"`` or ``"linear"``; None takes srgb for 8 to 16 bit integers and linear for EXR.
+        ``"srgb"`` or ``"linear"``; None takes what the file says, else srgb for 8 to 16 bit integers and linear for
+        EXR.
     """
 
     path: Path

@@ -45,12 +45,12 @@ class Scene:
     views
         Further cameras and their clips.
     closed
-        Sides of the domain that are walls: smoke and air pass freely through the others. A floor is ``"z-"``.
+        Sides of the domain that are walls. Smoke and air pass freely through the others. A floor is ``"z-"``.
     inlets
         All the places where smoke enters. If there is none, they are estimated.
     scattering
-        How light is scattered: ``"multiple"`` times, ``"single"`` with self-shadowing, ``"unshadowed"`` or
-        ``"absorption"``.
+        How light is scattered: any number of times (``"multiple"``), once with self-shadowing (``"single"``), once
+        without (``"unshadowed"``) or not at all (``"absorption"``); None chooses by measurement.
 
     Raises
     ------

@@ -29,11 +29,11 @@ class Medium:
     anisotropy
         Henyey-Greenstein g, -1 < g < 1.
     color
-        Colour of the smoke itself, red, green and blue from 0 to 1: ``albedo`` times it is the albedo of each.
+        Colour of the smoke itself, red, green and blue from 0 to 1. Each channel's albedo is ``albedo`` times this.
         Extinction is the same for all.
     flame_color
-        Colour of the light of fire in the smoke, as ``color``: the emission in the grid ``flame`` times it is the
-        radiance per metre of each. Found in the clip where that shows fire; without fire it changes nothing.
+        Colour of the light of fire in the smoke, red, green and blue from 0 to 1. Times the emission in the grid
+        ``flame`` it is the radiance per metre. None takes what the clip shows; without fire it changes nothing.
     """
 
     extinction: float = 5.0

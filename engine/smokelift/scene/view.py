@@ -16,11 +16,11 @@ class View:
     Attributes
     ----------
     camera
-        Stands still.
+        Where it stands, and its lens. It does not move.
     clip
         Its ``frames`` show the same moments as those of the scene's clip; None takes the same numbers.
     background
-        Behind the smoke; None takes the scene's if that is one colour, and else estimates it.
+        What it sees behind the smoke; None takes the scene's if that is one colour, and estimates it otherwise.
     """
 
     camera: Camera

@@ -15,7 +15,7 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
     """Add the command."""
     parser = commands.add_parser("chart", parents=[common], help="speed against accuracy, from measured runs")
     parser.add_argument("csv", type=named_path, help="written by python -m benchmarks.accuracy")
-    parser.add_argument("--out", type=named_path, required=True, metavar="chart.png")
+    parser.add_argument("--out", type=named_path, required=True, metavar="chart.png", help="the picture, .png")
     parser.set_defaults(run=run)
 
 

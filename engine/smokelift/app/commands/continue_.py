@@ -21,7 +21,7 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
     add_directed_options(parser)
     parser.add_argument("--frames", type=int, required=True, metavar="N", help="frames to add")
     parser.add_argument(
-        "--start", type=int, metavar="FRAME", help="the last frame that stays as it is (default: the last there is)"
+        "--start", type=int, metavar="FRAME", help="the last frame that stays as it is (default: the sequence's last)"
     )
     parser.add_argument(
         "--fade", type=int, default=0, metavar="N", help="let the smoke fade to nothing in the last N frames"
@@ -32,7 +32,7 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
         nargs=3,
         default=(0.0, 0.0, 0.0),
         metavar=("X", "Y", "Z"),
-        help="wind that sets in, in m/s",
+        help="velocity in m/s that all air gains",
     )
     parser.add_argument(
         "--turbulence",

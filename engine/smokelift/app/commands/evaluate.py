@@ -17,9 +17,11 @@ from smokelift.render import device
 def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
     """Add the command."""
     parser = commands.add_parser(
-        "evaluate", parents=[common], help="whether its sides look like smoke; beside the truth or other views"
+        "evaluate",
+        parents=[common],
+        help="compare the smoke's sides with its front, with known volumes or with other cameras",
     )
-    parser.add_argument("directory", type=named_path)
+    parser.add_argument("directory", type=named_path, help="of the sequence")
     parser.add_argument("--truth", type=named_path, metavar="truth.npz", help="known densities and velocities")
     parser.add_argument(
         "--view",
@@ -28,13 +30,16 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar=("camera.toml", "clip.mp4"),
-        help="another camera and its clip; may be repeated",
+        help="another camera and its clip; may be given again",
     )
     parser.add_argument(
-        "--json", type=named_path, metavar="FILE", help="write the figures there, not on standard output"
+        "--json", type=named_path, metavar="FILE", help="write the figures into this file, not on standard output"
     )
     parser.add_argument(
-        "--picture", type=named_path, metavar="FILE.png", help="its sides; truth and sequence side by side"
+        "--picture",
+        type=named_path,
+        metavar="FILE.png",
+        help="draw the smoke's sides; with --truth, truth and sequence side by side",
     )
     parser.set_defaults(run=run)
 

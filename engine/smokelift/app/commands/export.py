@@ -28,11 +28,15 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
         "--precision",
         choices=get_args(Precision),
         default="half",
-        help="half: floats of 16 bits; quantised: as few bits as a picture of 8 bits needs",
+        help="half (default): floats of 16 bits; quantised: as few bits as a picture of 8 bits needs",
     )
     parser.add_argument("--no-velocity", action="store_true", help="leave out the velocity, which motion blur needs")
     parser.add_argument(
-        "--proxy", type=int, default=1, metavar="N", help="for viewports: a second sequence of N times larger voxels"
+        "--proxy",
+        type=int,
+        default=1,
+        metavar="N",
+        help="write a second sequence for viewports, with voxels N times as large (default 1: none)",
     )
     parser.add_argument("--size", action="store_true", help="say the size, and write nothing")
     parser.set_defaults(run=run)

@@ -21,7 +21,9 @@ from smokelift.setup.provenance import made_up
 def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
     """Add the command."""
     parser = commands.add_parser(
-        "inspect", parents=[common], help="what would be assumed, chosen and spent, before it is spent"
+        "inspect",
+        parents=[common],
+        help="what a run would assume and choose, and what it would cost, without running it",
     )
     add_run_options(parser)
     parser.add_argument(
@@ -30,10 +32,13 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="FILE",
-        help="show it with pictures on a page, .png or .html; may be repeated",
+        help="write a page with pictures of what was found, .png or .html; may be given again",
     )
     parser.add_argument(
-        "--write", type=named_path, metavar="scene.toml", help="write every estimate into a scene file, to be edited"
+        "--write",
+        type=named_path,
+        metavar="scene.toml",
+        help="write every estimate into a scene file that you can edit",
     )
     parser.set_defaults(run=run)
 

@@ -15,9 +15,17 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
     """Add the command."""
     parser = commands.add_parser("loop", parents=[common], help="a part of a sequence that repeats without a seam")
     add_directed_options(parser)
-    parser.add_argument("--frames", type=frame_range, metavar="A:B", help="its first and last frame, from 1")
     parser.add_argument(
-        "--overlap", type=int, metavar="N", help="frames in which the end becomes the start (default: a third)"
+        "--frames",
+        type=frame_range,
+        metavar="A:B",
+        help="first and last frame of the part, counted from 1 (default: all)",
+    )
+    parser.add_argument(
+        "--overlap",
+        type=int,
+        metavar="N",
+        help="frames in which the end becomes the start (default: a third of the part, 24 at most)",
     )
     parser.set_defaults(run=run)
 

@@ -18,10 +18,10 @@ from smokelift.render import device
 def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
     """Add the command."""
     parser = commands.add_parser(
-        "preview", parents=[common], help="a contact sheet, an orbit, a strip and a video that turns"
+        "preview", parents=[common], help="three pictures and a video that show the smoke from all sides"
     )
-    parser.add_argument("directory", type=named_path)
-    parser.add_argument("--out", type=named_path, help="directory for them; by default the sequence's own")
+    parser.add_argument("directory", type=named_path, help="of the sequence")
+    parser.add_argument("--out", type=named_path, help="directory for these files (default: the sequence's own)")
     parser.set_defaults(run=run)
 
 

@@ -40,11 +40,14 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
     parser = commands.add_parser("reconstruct", parents=[common], help="a clip or scene file to a VDB sequence")
     add_run_options(parser)
     parser.add_argument("--out", type=named_path, required=True, help="directory for the sequence")
-    parser.add_argument("--npz", action="store_true", help="write NumPy twins as well")
+    parser.add_argument("--npz", action="store_true", help="write NumPy files as well")
     parser.add_argument(
-        "--thumbnail", type=named_path, metavar="FILE.png", help="keep a small picture of the last frame there"
+        "--thumbnail",
+        type=named_path,
+        metavar="FILE.png",
+        help="keep a picture of the newest frame beside the clip in this file",
     )
-    parser.add_argument("--resume", action="store_true", help="go on from the frames that are there")
+    parser.add_argument("--resume", action="store_true", help="go on after the frames that are finished")
     parser.set_defaults(run=run)
 
 

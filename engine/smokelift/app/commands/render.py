@@ -25,9 +25,18 @@ USUAL_FPS = 24.0
 def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
     """Add the command."""
     parser = commands.add_parser("render", parents=[common], help="an image or video of a sequence")
-    parser.add_argument("directory", type=named_path)
-    parser.add_argument("--frame", type=int, help="one frame; the first for an image, all for a video by default")
-    parser.add_argument("--camera", default="front", help="front, side, YAW,PITCH in degrees, or camera.toml")
+    parser.add_argument("directory", type=named_path, help="of the sequence")
+    parser.add_argument(
+        "--frame",
+        type=int,
+        metavar="N",
+        help="the number of one frame (default: the first for an image, all for a video)",
+    )
+    parser.add_argument(
+        "--camera",
+        default="front",
+        help="front (default), side, YAW,PITCH in degrees from the front to the right and upwards, or camera.toml",
+    )
     parser.add_argument("--out", type=named_path, required=True, help="image.exr, image.png or video.mp4")
     parser.set_defaults(run=run)
 

@@ -24,7 +24,7 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
         nargs="+",
         required=True,
         metavar="S",
-        help="0.5 for half the speed; several lie evenly along the clip, with ramps in between",
+        help="0.5 for half the speed; several speeds are spread evenly over the clip, with ramps in between",
     )
     parser.set_defaults(run=run)
 
