@@ -62,7 +62,7 @@ def inspection(shot: Shot, given: Scene, known: Sequence[Fact], notes: Iterable[
     columns, rows = fitted(*shot.clip.size)
     pixels = shot.clip.size[0] * shot.clip.size[1] / (columns * rows)
     plate = shot.views[0].plates.at(number).through(lambda whole: area_average(whole, columns, rows), pixels)
-    picture = area_average(shot.clip.frame(number), columns, rows)
+    picture = shot.clip.area_average(number, columns, rows)
     seen = matte(picture, plate)
     camera = shot.scene.camera.at(number).resized(columns, rows)
     unknown = plate.confidence < UNKNOWN

@@ -399,11 +399,13 @@ class Clip:
         return Clip(self.path, self._source, self.fps, (first, last), self.size)
 
     def changed(
-        self, change: Callable[[int, Picture], Picture], keeps: Callable[[int, Picture], bool] | None = None
+        self,
+        change: Callable[[int, Picture], Picture],
+        keeps: Callable[[int, Callable[[], Picture]], bool] | None = None,
     ) -> Clip:
         """Return the clip with each frame, by its number, replaced. The two share the open file.
 
-        ``keeps`` says of a frame's number, and of its `small` picture, that ``change`` leaves it as it is.
+        ``keeps`` says of a frame's number, and of what makes its `small` picture, that ``change`` leaves it as it is.
         """
         last = self.first + len(self) - 1
         return Clip(self.path, _Changed(self, self._source, change, keeps), self.fps, (self.first, last))
@@ -503,7 +505,7 @@ class _Changed:
         clip: Clip,
         source: FrameSource,
         change: Callable[[int, Picture], Picture],
-        keeps: Callable[[int, Picture], bool] | None,
+        keeps: Callable[[int, Callable[[], Picture]], bool] | None,
     ) -> None:
         self._clip, self._source, self._change, self._keeps = clip, source, change, keeps
         self.count, self.fps, self.warning = source.count, source.fps, source.warning
@@ -515,7 +517,7 @@ class _Changed:
 
     def read(self, n: int) -> Picture | CodedPicture:
         image, number = self._source.read(n), n - self._clip.first
-        if self._keeps is not None and self._keeps(number, _small(image)):
+        if self._keeps is not None and self._keeps(number, lambda: _small(image)):
             return image
         return self._change(number, _linear(image))
 

@@ -32,11 +32,11 @@ def steady(clip: Clip, plates: Plates, known: Mapping[int, Picture] = MappingPro
     """
     gains_of = exposures(plates)
 
-    def gains(number: int, picture: Picture) -> Picture:
-        return known[number] if number in known else gains_of(number, picture)
+    def gains(number: int, shown: Callable[[], Picture]) -> Picture:
+        return known[number] if number in known else gains_of(number, shown())
 
     def balanced(number: int, picture: Picture) -> Picture:
-        return picture / gains(number, picture)
+        return picture / gains(number, lambda: picture)
 
     return clip.changed(balanced, lambda number, tiny: bool((gains(number, tiny) == 1).all()))
 

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from smokelift.footage.clip import Clip
+from smokelift.footage.evidence import linear
 from smokelift.footage.images import area_average
 from smokelift.footage.plate import Plate
-from smokelift.footage.working_picture import CameraError, working_picture
+from smokelift.footage.working_picture import CameraError, WorkingPicture, working_picture
 from smokelift.render import Image
 from smokelift.scene import Camera, CompleteScene, Domain, Scattering
 from smokelift.scene.projection import voxel_width
@@ -26,6 +29,41 @@ PIXELS = 2.0
 
 
 @dataclass(frozen=True, eq=False)
+class Halves:
+    """A frame as two small pictures, each from the pixels of one colour of a chequerboard; made once it is asked for.
+
+    Attributes
+    ----------
+    clip, number
+        Where the frame is from.
+    working
+        The small picture.
+    """
+
+    clip: Clip
+    number: int
+    working: WorkingPicture
+
+    @property
+    def fitted(self) -> Image:
+        """One of them, (rows, columns, 3)."""
+        return self._both[0]
+
+    @property
+    def held_out(self) -> Image:
+        """The other."""
+        return self._both[1]
+
+    @cached_property
+    def _both(self) -> tuple[Image, Image]:
+        working, size = self.working, self.working.camera.size
+        shown = self.clip.frame_through(self.number, linear, working.part)
+        rows, columns = np.indices(shown.shape[:2])
+        odd = ((rows + columns + working.top + working.left) % 2).astype(np.float32)
+        return _some(shown, 1 - odd, size), _some(shown, odd, size)
+
+
+@dataclass(frozen=True, eq=False)
 class CoarseFrame:
     """One frame before a coarse grid.
 
@@ -37,15 +75,14 @@ class CoarseFrame:
         Of the small picture.
     picture : (rows, columns, 3)
         The small picture, linear radiance.
-    fitted, held_out : (rows, columns, 3)
-        The same from one half of the clip's pixels each, those of one colour of a chequerboard.
+    halves
+        The same from one half of the clip's pixels each.
     """
 
     scene: CompleteScene
     plate: Plate
     picture: Image
-    fitted: Image
-    held_out: Image
+    halves: Halves
 
     def in_light_of(self, scene: CompleteScene) -> CoarseFrame:
         """The frame with the lights of a scene."""
@@ -86,14 +123,14 @@ def coarse_domain(domain: Domain, pixels: float, most_voxels: int = LONGEST) -> 
 
 
 def coarse_frame(
-    frame: Image, camera: Camera, scene: CompleteScene, plate: Plate, most_voxels: int = LONGEST
+    clip: Clip, number: int, camera: Camera, scene: CompleteScene, plate: Plate, most_voxels: int = LONGEST
 ) -> CoarseFrame | None:
     """Make a frame coarse; None if its camera does not see the domain.
 
     Parameters
     ----------
-    frame : (rows, columns, 3)
-        The full picture, linear radiance.
+    clip, number
+        The frame.
     camera
         Of the full picture, where it is in this frame.
     scene
@@ -108,15 +145,11 @@ def coarse_frame(
         working = working_picture(camera, domain)
     except CameraError:
         return None
-    shown = working.part(frame)
-    rows, columns = np.indices(shown.shape[:2])
-    odd = ((rows + columns + working.top + working.left) % 2).astype(np.float32)
     return CoarseFrame(
         replace(scene, camera=working.camera, domain=domain),
         plate.through(working.cut, working.pixels),
-        working.cut(frame),
-        _some(shown, 1 - odd, working.camera.size),
-        _some(shown, odd, working.camera.size),
+        clip.area_average(number, *working.camera.size, working.part),
+        Halves(clip, number, working),
     )
 
 

@@ -15,7 +15,7 @@ import scipy.fft
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from smokelift.footage.images import area_average, linear_to_srgb
+from smokelift.footage.images import linear_to_srgb
 from smokelift.footage.matte import matte
 from smokelift.footage.plate import Plate
 from smokelift.render.renderer import Image
@@ -61,20 +61,16 @@ def smoke_detail(frames: Iterable[tuple[Image, Plate, float]], finest: int) -> D
     ----------
     frames
         Of each: the part of the picture (rows, columns, 3) where the box is, linear; the plate behind it; and the
-        pixels along a voxel of the finest grid.
+        pixels along a voxel of the finest grid, 1 at most.
     finest
         Voxels along the longest side of the finest grid.
     """
     energy = np.zeros(RINGS)
     for picture, plate, pixels in frames:
-        rows, columns = (max(1, round(n / max(pixels, 1.0))) for n in picture.shape[:2])
-        image, behind = (area_average(whole, columns, rows) for whole in (picture, plate.image))
-        change = (linear_to_srgb(image) - linear_to_srgb(behind)).mean(-1, dtype=np.float64)
-        averaged = plate.noise.averaged(max(pixels, 1.0) ** 2)
-        smoke = matte(image, Plate(behind, area_average(plate.confidence, columns, rows), averaged)).mask
-        still = ~ndimage.binary_dilation(smoke, iterations=EDGE)
-        noise = _noise(change, still, float(averaged.total.mean()))
-        energy += _beyond_noise(change, noise, min(pixels, 1.0))
+        change = (linear_to_srgb(picture) - linear_to_srgb(plate.image)).mean(-1, dtype=np.float64)
+        still = ~ndimage.binary_dilation(matte(picture, plate).mask, iterations=EDGE)
+        noise = _noise(change, still, float(plate.noise.total.mean()))
+        energy += _beyond_noise(change, noise, pixels)
     return Detail(energy, finest)
 
 

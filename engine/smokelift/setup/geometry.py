@@ -283,9 +283,11 @@ def _detail(clip: Clip, camera: Camera, finest: Domain, plates: Plates, smoky: t
     frames = []
     for number in smoky[:DETAIL_FRAMES]:
         with suppress(CameraError):
-            now, plate = camera.at(number), plates.at(number)
-            working = working_picture(now, finest)
-            frames.append((working.part(clip.frame(number)), plate.through(working.part), voxel_width(now, finest)))
+            now = camera.at(number)
+            working, pixels = working_picture(now, finest), voxel_width(now, finest)
+            plate = plates.at(number).through(working.cut, max(pixels, 1.0) ** 2)
+            picture = clip.area_average(number, *working.camera.size, working.part)
+            frames.append((picture, plate, min(pixels, 1.0)))
     return smoke_detail(frames, max(finest.resolution))
 
 

@@ -67,7 +67,7 @@ def choose_model(
 
     @cache
     def coarse(number: int, most_voxels: int = LONGEST) -> CoarseFrame | None:
-        return coarse_frame(clip.frame(number), scene.camera.at(number), scene, plates.at(number), most_voxels)
+        return coarse_frame(clip, number, scene.camera.at(number), scene, plates.at(number), most_voxels)
 
     def shows_smoke(number: int) -> bool:
         frame = coarse(number)

@@ -140,7 +140,7 @@ def _brightened(frames: Sequence[CoarseFrame]) -> float:
     brighter = change = 0.0
     for frame in frames:
         smoke = matte(frame.picture, frame.plate).mask
-        difference = (frame.held_out - frame.plate.image)[smoke]
+        difference = (frame.halves.held_out - frame.plate.image)[smoke]
         brighter += float(np.sum(np.square(np.maximum(difference, 0), dtype=np.float64)))
         change += float(np.sum(np.square(difference, dtype=np.float64)))
     return float(np.sqrt(brighter / max(change, 1e-30)))
@@ -167,17 +167,17 @@ def held_out(frames: Sequence[CoarseFrame], model: Scattering, judge: Scattering
     """Fit a model's densities to one half of the pixels, and let the judge show them to the other half."""
     wrong = change = asked = power = 0.0
     for frame in frames:
-        scene, plate = frame.scattered_by(model).scene, frame.plate
-        density = reconstruct_density(frame.fitted, scene, settings=settings, plate=plate)
+        scene, plate, halves = frame.scattered_by(model).scene, frame.plate, frame.halves
+        density = reconstruct_density(halves.fitted, scene, settings=settings, plate=plate)
         optics = replace(scene_optics(scene), scattering=judge)
         renderer = optics.renderer(scene.camera, plate.image, density.hull)
         shown = renderer.image(density.values)
         seen = reached(matte(frame.picture, plate).mask, project_voxels(scene.camera, scene.domain))
         # the light that the smoke scatters itself, and what it should be beside what it lets through
         behind = renderer.transmittance[..., None] * plate.image
-        own, wanted = ((image - behind)[seen].astype(np.float64) for image in (shown, frame.held_out))
-        wrong += float(np.sum(np.square(shown - frame.held_out, dtype=np.float64)[seen]))
-        change += float(np.sum(np.square(frame.held_out - plate.image, dtype=np.float64)[seen]))
+        own, wanted = ((image - behind)[seen].astype(np.float64) for image in (shown, halves.held_out))
+        wrong += float(np.sum(np.square(shown - halves.held_out, dtype=np.float64)[seen]))
+        change += float(np.sum(np.square(halves.held_out - plate.image, dtype=np.float64)[seen]))
         asked += float(np.sum(own * wanted))
         power += float(np.sum(np.square(own)))
     light = asked / power if judge != "absorption" and power > 0 else 1.0

@@ -149,13 +149,13 @@ def balanced(
 
 def _moment(front: ShotView, view: ShotView, scene: CompleteScene, frame: int) -> _Moment | None:
     """A moment of two cameras; None if one of them shows nothing of the domain or no smoke."""
-    own = coarse_frame(front.clip.frame(frame), front.camera, scene, front.plates.at(frame))
+    own = coarse_frame(front.clip, frame, front.camera, scene, front.plates.at(frame))
     if own is None or not matte(own.picture, own.plate).mask.any():
         return None
     with suppress(CameraError):
         working = working_picture(view.camera, own.scene.domain)
         plate = view.plates.at(frame).through(working.cut, working.pixels)
-        picture = working.cut(view.clip.frame(frame))
+        picture = view.clip.area_average(frame, *working.camera.size, working.part)
         if matte(picture, plate).mask.any():
             return _Moment(own, Observation(working.camera, picture, plate))
     return None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from pathlib import Path
 
@@ -325,9 +325,9 @@ def test_a_frame_that_a_change_leaves_as_it_is_stays_so(tmp_path: Path) -> None:
     with Clip.open(encode(tmp_path / "two.mp4", [flat(50), flat(90)])) as clip:
         seen = []
 
-        def keeps(number: int, tiny: Picture) -> bool:
-            seen.append(tiny.shape)
-            return float(tiny.mean()) < 0.05
+        def keeps(number: int, tiny: Callable[[], Picture]) -> bool:
+            seen.append(tiny().shape)
+            return float(tiny().mean()) < 0.05
 
         changed = clip.changed(lambda _, picture: 2 * picture, keeps)
         assert np.array_equal(changed.frame(0), clip.frame(0))

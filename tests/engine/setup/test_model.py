@@ -263,19 +263,22 @@ def test_a_usual_box_keeps_its_corners() -> None:
     assert coarse_domain(domain, 4.0) == replace(domain, resolution=(16, 16, 24))
 
 
-def test_the_halves_of_a_picture_are_apart(plume) -> None:
+def test_the_halves_of_a_picture_are_apart(plume, tmp_path) -> None:
     """What is wrong in one pixel out of two is seen by one of them only, and both show what all show."""
     height, width = 112, 80
     rows, columns = np.indices((height, width))
     picture = np.repeat(np.where((rows + columns) % 2, 0.5, 0.2)[..., None], 3, -1).astype(np.float32)
     plate = Plate(np.zeros_like(picture), np.ones((height, width), np.float32), EIGHT_BIT_NOISE)
     scene = replace(plume.scene, camera=plume.scene.camera.resized(width, height))
-    frame = coarse_frame(picture, scene.camera, completed(scene), plate)
-    np.testing.assert_allclose(frame.fitted, 0.2, atol=1e-5)
-    np.testing.assert_allclose(frame.held_out, 0.5, atol=1e-5)
+    write_image(tmp_path / "frame_1.exr", picture, half=False)
+    clip = Clip.open(tmp_path / "frame_1.exr")
+    frame = coarse_frame(clip, 0, scene.camera, completed(scene), plate)
+    np.testing.assert_allclose(frame.halves.fitted, 0.2, atol=1e-5)
+    np.testing.assert_allclose(frame.halves.held_out, 0.5, atol=1e-5)
+    assert frame.in_light_of(frame.scene).halves is frame.halves  # which are made once
     assert 0.3 < frame.picture.mean() < 0.4
     away = plume.scene.camera.look_at((0, -4, 0.8), (0, -9, 0.8), fov_y_degrees=27, size=(width, height))
-    assert coarse_frame(picture, away, completed(scene), plate) is None
+    assert coarse_frame(clip, 0, away, completed(scene), plate) is None
 
 
 # velocity
