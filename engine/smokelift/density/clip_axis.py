@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from smokelift.density.axis import AxisEstimate, estimate_axis
 from smokelift.density.axis_from_light import coarse_domain, refine_axis
-from smokelift.density.observation import Observation, ObservedClip, unshadowed_optical_depth
+from smokelift.density.observation import Observation, ObservedClip, apparent_optical_depth
 from smokelift.density.screen import seen_at
 from smokelift.footage.matte import matte
 from smokelift.render import Optics
@@ -58,4 +58,4 @@ def clip_axis(clip: ObservedClip) -> AxisEstimate | None:
 def _optical_depth(observation: Observation, optics: Optics) -> NDArray[np.float32]:
     """Optical depth (rows, columns) that an observation shows."""
     image, plate = observation.image, observation.plate
-    return unshadowed_optical_depth(image, plate, matte(image, plate).mask, optics)
+    return apparent_optical_depth(image, plate, matte(image, plate).mask, optics)

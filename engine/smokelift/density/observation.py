@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from smokelift.density.axis import AxisEstimate
 from smokelift.density.hull import Projection, common_hull, project_voxels, reached
-from smokelift.footage.matte import matte
+from smokelift.footage.matte import SMOKE_THRESHOLD, matte
 from smokelift.footage.noise import EIGHT_BIT_NOISE
 from smokelift.footage.plate import Plate, noise_at
 from smokelift.render import Image, Optics, Renderer
-from smokelift.scene import Camera, Domain, Inlet
+from smokelift.scene import SHADOWED, Camera, Domain, Inlet
 from smokelift.scene.checks import LARGEST
 
 THINNEST_CLEAR = 0.05
@@ -95,7 +95,8 @@ class View:
     mask : (rows, columns) bool
         Pixels that show smoke.
     optical_depth : (rows, columns)
-        Of smoke without shadows that explains the picture, 0 outside the mask.
+        Of smoke without shadows that explains the picture, or as much as can be told where only smoke in its own shadow
+        does; 0 outside the mask.
     projection
         Where the voxels lie in the picture.
     counted : (rows, columns) bool
@@ -118,7 +119,7 @@ class View:
             plate = eight_bit_plate(np.zeros(3, np.float32), camera.size)
         mask = matte(image, plate).mask
         projection = project_voxels(camera, optics.domain)
-        depth = unshadowed_optical_depth(image, plate, mask, optics)
+        depth = apparent_optical_depth(image, plate, mask, optics)
         return View(camera, image, plate, mask, depth, projection, reached(mask, projection))
 
     @cached_property
@@ -170,13 +171,13 @@ class ViewSet:
         return ViewSet(views, hull, optics, frame)
 
 
-def unshadowed_optical_depth(
-    image: Image, plate: Plate, mask: NDArray[np.bool_], optics: Optics
-) -> NDArray[np.float32]:
-    """Optical depth (rows, columns) of unshadowed smoke that explains a picture: I = J (1 - T) + T B.
+def apparent_optical_depth(image: Image, plate: Plate, mask: NDArray[np.bool_], optics: Optics) -> NDArray[np.float32]:
+    """Optical depth (rows, columns) of smoke without shadows that explains a picture: I = J (1 - T) + T B.
 
     J is the source radiance of smoke in the middle of the domain, B the plate. Over the three channels T is the least
-    squares solution.
+    squares solution. None explains a pixel which the smoke makes darker although J is brighter than B. Only smoke in
+    its own shadow does so, and such a pixel counts as thick as can be told: a fit that starts from less thins it out
+    until nothing is left (docs/experiments/bright-background.md).
     """
     source = np.zeros(3)
     if optics.scattering != "absorption":
@@ -185,6 +186,9 @@ def unshadowed_optical_depth(
     power = np.sum(contrast**2, -1)
     clear = np.sum((image - source) * contrast, -1) / np.maximum(power, 1e-12)
     depth = -np.log(np.clip(clear, THINNEST_CLEAR, 1.0))
+    if optics.scattering in SHADOWED:
+        noise = np.sqrt(np.sum((noise_at(image, plate) * contrast) ** 2, -1))
+        depth[(clear - 1) * power > SMOKE_THRESHOLD * noise] = -np.log(THINNEST_CLEAR)
     return np.where(mask, depth, 0).astype(np.float32)
 
 

@@ -649,6 +649,18 @@ def test_density_holds_no_traces(plume):
     assert (values[values > 0] >= 1e-20).all()
 
 
+def test_thick_smoke_before_something_as_bright_as_its_lit_side(small) -> None:
+    """Its shadow is darker than the background and its light brighter: it was thinned out until nothing was left."""
+    x, y, z = small.domain.offsets(small.domain.centre)
+    smoke = np.float32(2) * (x**2 + y**2 + z**2 < 0.3**2)
+    lit = replace(small, lights=(DirectionalLight((-0.8, 0.4, -0.5), (9, 8, 7)),), medium=Medium(20.0, 0.9))
+    alone = render(smoke, replace(lit, background=Background(color=(0, 0, 0))))
+    scene = replace(lit, background=Background(color=tuple(np.percentile(alone[alone[..., 0] > 0.01], 90, axis=0))))
+    found = reconstruct_density(render(smoke, scene), scene)
+    assert found.figures["relative_error"] < 0.3
+    assert found.values.sum() > 0.5 * smoke.sum()
+
+
 @pytest.mark.parametrize("resolution", [(1, 1, 1), (1, 1, 2), (3, 1, 1), (1, 2, 3)])
 def test_a_grid_of_a_few_voxels(resolution) -> None:
     domain = Domain((0, 0, 0), tuple(0.5 * n for n in resolution), resolution)
