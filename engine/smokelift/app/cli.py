@@ -48,9 +48,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # a letter that the terminal's encoding lacks is no reason to stop
             stream.reconfigure(errors="backslashreplace")
+    hint = ""
     try:
         try:
-            return _run(command_parser().parse_args(arguments))
+            options = command_parser().parse_args(arguments)
+            hint = _HINT if hasattr(options, "resume") else ""
+            return _run(options, hint)
         finally:
             try:
                 sys.stdout.flush()
@@ -59,11 +62,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OutputError as error:
         # what is left in the buffer would fail again when the interpreter ends
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        print(f"{error}{_HINT}", file=sys.stderr)
+        print(f"{error}{hint}", file=sys.stderr)
         return CANCELLED if error.closed else BAD_INPUT
 
 
-def _run(options: argparse.Namespace) -> int:
+def _run(options: argparse.Namespace, hint: str) -> int:
     say = reporter(getattr(options, "progress", "text"))
     set_threads(getattr(options, "threads", 0))
     try:
@@ -75,7 +78,6 @@ def _run(options: argparse.Namespace) -> int:
                 raise KeyboardInterrupt from error
             raise
     except KeyboardInterrupt:
-        hint = _HINT if hasattr(options, "resume") else ""
         say.fail(f"Cancelled.{hint}", CANCELLED)
         return CANCELLED
     except OutputError:
@@ -93,9 +95,17 @@ def _run(options: argparse.Namespace) -> int:
             return NO_DEVICE
         if isinstance(error, RuntimeError) and not isinstance(error, VdbUnavailable):
             raise
-        say.fail(str(error), BAD_INPUT, later=_passes(error))
+        say.fail(_sentence(error), BAD_INPUT, later=_passes(error))
         return BAD_INPUT
     return DONE
+
+
+def _sentence(error: Exception) -> str:
+    """What an error says, without the number that the system gives it."""
+    if not isinstance(error, OSError) or error.filename is None or not error.strerror:
+        return str(error)
+    full = error.errno in (errno.ENOSPC, errno.EDQUOT)
+    return f"{error.filename}: {'cannot be written: the disk is full' if full else error.strerror}"
 
 
 def _passes(error: BaseException | None) -> bool:

@@ -78,7 +78,8 @@ def inspection(shot: Shot, given: Scene, known: Sequence[Fact], notes: Iterable[
     ]
     name = given.clip.path.name if given.clip is not None else "clip"
     frames = f"{shot.length} frames of {shot.clip.size[0]} x {shot.clip.size[1]} at {shot.clip.fps:.4g} a second"
-    return Page(f"{name}: {frames}", panels, known, tuple(notes))
+    others = tuple(note for note in notes if note not in shot.doubts)
+    return Page(f"{name}: {frames}", shot.doubts, panels, known, others)
 
 
 def facts(shot: Shot, given: Scene, cost: Cost) -> tuple[Fact, ...]:
@@ -92,7 +93,9 @@ def facts(shot: Shot, given: Scene, cost: Cost) -> tuple[Fact, ...]:
     tint = "grey" if medium.is_grey else ", ".join(f"{v:.2f}" for v in medium.color)
     told, know = given.medium is not None, "Give [medium] if you know it."
     taken = f"The picture is taken to be {PICTURE_HEIGHT:g} m high where the smoke is."
-    around = "around the smoke of the whole clip"
+    around, placed = "around the smoke of the whole clip", "estimated"
+    if not shot.smoky:
+        around, placed = "over all of the picture", UNDETERMINED
     exposure = f"changes by up to {shot.exposure:.0%}, evened out" if shot.exposure > 0 else "steady"
     spent = f"about {cost.seconds:.0f} s, {cost.memory / 2**30:.1f} GiB of memory, {cost.disk / 1e6:.0f} MB on disk"
     return (
@@ -106,7 +109,7 @@ def facts(shot: Shot, given: Scene, cost: Cost) -> tuple[Fact, ...]:
             _said(shot, "Camera"),
         ),
         _known("scale", f"box of {size} m", boxed, f"{taken} Give [camera] and [domain] in metres."),
-        Fact("box", "as given", "given") if boxed else Fact("box", around, "estimated", _said(shot, "Domain")),
+        Fact("box", "as given", "given") if boxed else Fact("box", around, placed, _said(shot, "Domain")),
         _chosen(shot, "resolution", "grid", " x ".join(map(str, domain.resolution)), boxed),
         _known("extinction", thick, told, f"A picture shows it times the density only. {know}"),
         _known("albedo", f"{medium.albedo:.3g}", told, f"A picture shows it times the light only. {know}"),
@@ -200,6 +203,8 @@ def _light(shot: Shot, given: Scene) -> tuple[Fact, ...]:
     colour = ", ".join(f"{v:.2g}" for v in shot.optics.unshadowed_source())
     hides, origin = "as the light asks for", UNDETERMINED
     how = "Light strength: as much as the thickest smoke shows; if none is thick, the light is stronger."
+    if not shot.smoky:
+        how = "Light strength: no smoke shows it."
     if thickness.chosen != UNDETERMINED:
         hides, origin = f"hides {thickness.measured['hidden']:.0%} of what it covers", "measured"
         how = "Light strength: what the smoke adds for what it hides of the texture behind it."
@@ -230,8 +235,8 @@ def _chosen(shot: Shot, what: str, name: str, value: str, is_given: bool) -> Fac
     choice = _choice(shot, what)
     if is_given or choice is None:
         return Fact(name, value, "given" if is_given else UNDETERMINED)
-    told = choice.chosen == UNDETERMINED
-    return Fact(name, value, UNDETERMINED if told else "by hand" if choice.by_hand else "measured", choice.reason)
+    untold = choice.chosen == UNDETERMINED or not (shot.smoky or choice.by_hand)
+    return Fact(name, value, UNDETERMINED if untold else "by hand" if choice.by_hand else "measured", choice.reason)
 
 
 def _choice(shot: Shot, what: str) -> Choice[Any] | None:

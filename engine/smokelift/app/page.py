@@ -72,9 +72,10 @@ class Fact:
 
 @dataclass(frozen=True, eq=False)
 class Page:
-    """A page: its title, pictures, a table, and sentences below it."""
+    """A page: its title, warnings below that, pictures, a table, and sentences below it."""
 
     title: str
+    warnings: Sequence[str]
     panels: Sequence[Panel]
     facts: Sequence[Fact]
     notes: Sequence[str]
@@ -101,15 +102,19 @@ def _as_picture(page: Page) -> Image.Image:
         [_wrapped(cell, text, right - left - _GAP) for cell, left, right in zip(row, _STARTS, _ENDS, strict=True)]
         for row in ((fact.what, fact.value, fact.origin, fact.how) for fact in page.facts)
     ]
-    notes = [_wrapped(note, text, _WIDTH - 2 * _GAP) for note in page.notes]
+    warnings, notes = (
+        [_wrapped(said, text, _WIDTH - 2 * _GAP) for said in sentences] for sentences in (page.warnings, page.notes)
+    )
     rows = [page.panels[first : first + COLUMNS] for first in range(0, len(page.panels), COLUMNS)]
     heights = [max(panel.picture.shape[0] for panel in row) + _LINE + _GAP for row in rows]
     lines = sum(max(map(len, cells)) for cells in table) + sum(map(len, notes))
-    above = 2 * _GAP + _TITLE
+    start = 2 * _GAP + _TITLE
+    above = start + sum(map(len, warnings)) * _LINE + len(warnings) * _LINE // 3 + _GAP * bool(warnings)
     below = (lines * _LINE) + (len(table) + len(notes)) * _LINE // 3 + 2 * _GAP
     whole = Image.new("RGB", (_WIDTH, above + sum(heights) + below), _PAPER)
     draw = ImageDraw.Draw(whole)
     draw.text((_GAP, _GAP), page.title, _INK, title)
+    _write(draw, warnings, start, text, _UNKNOWN)
     top = above
     for row, height in zip(rows, heights, strict=True):
         for column, panel in enumerate(row):
@@ -122,10 +127,21 @@ def _as_picture(page: Page) -> Image.Image:
         for cell, left, colour in zip(cells, _STARTS, colours, strict=True):
             draw.text((left, top), "\n".join(cell), colour, text, spacing=_LINE - _TEXT)
         top += max(map(len, cells)) * _LINE + _LINE // 3
-    for note in notes:
-        draw.text((_GAP, top), "\n".join(note), _FAINT, text, spacing=_LINE - _TEXT)
-        top += len(note) * _LINE + _LINE // 3
+    _write(draw, notes, top, text, _FAINT)
     return whole
+
+
+def _write(
+    draw: ImageDraw.ImageDraw,
+    sentences: Sequence[Sequence[str]],
+    top: int,
+    font: ImageFont.FreeTypeFont | ImageFont.ImageFont,
+    colour: tuple[int, int, int],
+) -> None:
+    """Sentences in lines, one below the other."""
+    for lines in sentences:
+        draw.text((_GAP, top), "\n".join(lines), colour, font, spacing=_LINE - _TEXT)
+        top += len(lines) * _LINE + _LINE // 3
 
 
 _ENDS = (*_STARTS[1:], _WIDTH)
@@ -148,7 +164,7 @@ body { background: #1a1a1c; color: #e8e8e8; font: 15px sans-serif; margin: 1.5em
 figure { display: inline-block; margin: 0 1em 1em 0; vertical-align: top }
 figcaption, .how, p { color: #a5a5a5 }
 td { padding: .25em 1em .25em 0; vertical-align: top }
-.undetermined { color: #ffaa46 }
+.undetermined, p.warning { color: #ffaa46 }
 """
 
 
@@ -165,9 +181,10 @@ def _as_html(page: Page) -> str:
         for fact in page.facts
     )
     notes = "".join(f"<p>{html.escape(note)}</p>\n" for note in page.notes)
+    warnings = "".join(f'<p class="warning">{html.escape(warning)}</p>\n' for warning in page.warnings)
     return (
         f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title><style>{_STYLE}</style>'
-        f"</head><body>\n<h1>{title}</h1>\n{figures}\n<table>\n{facts}</table>\n{notes}</body></html>\n"
+        f"</head><body>\n<h1>{title}</h1>\n{warnings}{figures}\n<table>\n{facts}</table>\n{notes}</body></html>\n"
     )
 
 

@@ -22,6 +22,8 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
         with aside.open("rb+") as file:  # else a power cut could leave the new name with nothing in it
             os.fsync(file.fileno())
         aside.replace(path)
-    except BaseException:
+    except BaseException as error:
         aside.unlink(missing_ok=True)
+        if isinstance(error, OSError) and error.filename in (None, str(aside)):  # the name that was asked for
+            error.filename = str(path)
         raise

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from pathlib import Path
 
 import numpy as np
@@ -34,6 +36,8 @@ def write_image(path: str | Path, image: npt.ArrayLike, *, half: bool = True) ->
     ------
     ImageError
         If the suffix or the shape is another, or a value is not finite.
+    OSError
+        If the file cannot be written.
     """
     path = Path(path)
     values = np.asarray(image, np.float32)
@@ -52,6 +56,16 @@ def write_image(path: str | Path, image: npt.ArrayLike, *, half: bool = True) ->
         pixels = np.clip(values, -limit, limit).astype(np.float16) if half else values
         header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
         with atomic_path(path) as aside:
-            OpenEXR.File(header, {"RGB": np.ascontiguousarray(pixels)}).write(str(aside))
+            try:
+                OpenEXR.File(header, {"RGB": np.ascontiguousarray(pixels)}).write(str(aside))
+            except RuntimeError as error:
+                raise _of_system(error) from error
     else:
         raise ImageError(f"{path}: can only write .exr and .png")
+
+
+def _of_system(error: RuntimeError) -> OSError:
+    """The error of the system that OpenEXR tells of in words only."""
+    known = (number for number in (errno.ENOSPC, errno.EDQUOT) if os.strerror(number) in str(error))
+    number = next(known, errno.EIO)
+    return OSError(number, os.strerror(number))

@@ -109,9 +109,10 @@ def find_geometry(
         domain, choice = grids[-1], None
     size = " x ".join(f"{high - low:.2f}" for low, high in zip(domain.min, domain.max, strict=True))
     missing = "Box not given:" if given is not None else f"Camera not given: {_assumed_lens(clip, focal)},"
+    where = "around the smoke" if samples.smoky else "over all of the picture"
     notes = (
         f"{missing} the picture taken to be {PICTURE_HEIGHT:g} m high where the smoke is.",
-        f"Domain around the smoke: {size} m, {' x '.join(map(str, domain.resolution))} voxels.",
+        f"Domain {where}: {size} m, {' x '.join(map(str, domain.resolution))} voxels.",
     )
     return Geometry(camera, domain, choice, notes)
 
@@ -267,6 +268,11 @@ def _resolved(
     clip: Clip, camera: Camera, grids: tuple[Domain, ...], plates: Plates, smoky: tuple[int, ...], tolerance: float
 ) -> tuple[Domain, Choice[Shape]]:
     """The coarsest grid of some that loses no more of the smoke's detail than tolerated, and why."""
+    if not smoky:
+        said = " x ".join(map(str, grids[0].resolution))
+        return grids[0], Choice(
+            "resolution", grids[0].resolution, f"Resolution: {said} voxels, since no smoke is seen."
+        )
     finest = max(grids[-1].resolution)
     detail = _detail(clip, camera, grids[-1], plates, smoky)
     domain = next((grid for grid in grids if detail.lost(max(grid.resolution)) <= tolerance), grids[-1])

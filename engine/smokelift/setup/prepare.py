@@ -27,6 +27,7 @@ from smokelift.setup.further_views import disagreement, open_view
 from smokelift.setup.geometry import clip_lens, find_geometry
 from smokelift.setup.light import ambient_sun, light_colour, richest_scattering, unknown_direction
 from smokelift.setup.model import choose_model, tried_frames
+from smokelift.setup.no_smoke import nothing_seen
 from smokelift.setup.place import placed
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot, ShotView
@@ -79,7 +80,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
         samples = replace(sample_smoke(clip, plates, found.turns), gains=samples.gains)
     geometry = find_geometry(clip, scene, settings, plates, samples, found.turns)
     camera, domain = geometry.camera, geometry.domain
-    doubts = smoke_in_plate(samples)
+    doubts = (*nothing_seen(clip, plates, samples, scene.background is not None), *smoke_in_plate(samples))
     notes = [*remarks, *found.notes, *doubts, *exposure_notes(samples.exposure), *geometry.notes]
     if settings.axis_depth is not None:
         SmokeAxis.given(settings.axis_depth, camera, domain)  # refuse early what cannot be
@@ -106,7 +107,9 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
         light_choices = (thickness.choice, unknown_direction())
         sun = ambient_sun(samples, medium, thickness.source)
         lights = (sun,)
-        amount = "the thickest smoke shows" if thickness.source is None else "the smoke adds for what it hides"
+        amount = "the thickest smoke shows" if samples.smoky else "makes thick smoke white"
+        if thickness.source is not None:
+            amount = "the smoke adds for what it hides"
         notes.append(
             f"Light not given: as much from everywhere as {amount}, "
             f"irradiance {', '.join(f'{v:.2f}' for v in sun.irradiance)}, without shadows."
@@ -148,6 +151,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
         settings=settings,
         estimated_background=plates.image if found.background is None and isinstance(plates, Plate) else None,
         notes=tuple(notes),
+        doubts=doubts,
         choices=choices,
         exposure=samples.exposure,
         smoky=samples.smoky,

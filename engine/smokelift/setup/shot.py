@@ -75,6 +75,8 @@ class Shot:
         Full picture behind the smoke where the scene does not give one.
     notes
         What was assumed or estimated, a sentence each.
+    doubts
+        Those of the notes that say why the result may be nothing, or wrong.
     choices
         What was chosen by measurement or by hand, with the figures that decided it.
     exposure
@@ -94,6 +96,7 @@ class Shot:
     settings: Settings
     estimated_background: Image | None
     notes: tuple[str, ...]
+    doubts: tuple[str, ...]
     choices: tuple[Choice[Any], ...]
     exposure: float
     smoky: tuple[int, ...]

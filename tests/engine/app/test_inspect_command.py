@@ -102,11 +102,19 @@ def test_a_page_of_a_moving_camera_has_its_path(tracked, tmp_path) -> None:
     assert "path of the box" in (tmp_path / "page.html").read_text(encoding="utf-8")
 
 
-def test_a_clip_without_smoke_has_a_page(plume, tmp_path) -> None:
-    """And nothing goes wrong."""
+def test_a_clip_without_smoke_has_a_page_that_says_so(plume, tmp_path, capsys) -> None:
+    """Nothing is called measured or put around the smoke."""
     plume.write(tmp_path / "clip", [np.zeros_like(plume.densities[0])] * 2)
-    clip = tmp_path / "clip" / "frame_####.png"
-    assert command("inspect", clip, "--page", tmp_path / "page.png", *QUICK) == 0
+    clip, page = tmp_path / "clip" / "frame_####.png", tmp_path / "page.html"
+    assert command("inspect", clip, "--page", page, "--progress", "json", *QUICK) == 0
+    *notes, done = events(capsys.readouterr().out)
+    said = " ".join(event["text"] for event in notes)
+    assert "No smoke found in the 2 frames that were looked at" in said
+    assert '<p class="warning">No smoke found' in page.read_text(encoding="utf-8")
+    assert "around the smoke" not in said + str(done["facts"])
+    assert "thickest smoke" not in said + str(done["facts"])
+    known = {fact["what"]: fact["origin"] for fact in done["facts"]}
+    assert known["box"] == known["grid"] == "undetermined"
 
 
 def test_a_scene_of_all_estimates_gives_the_same_smoke(plume, tmp_path, capsys) -> None:

@@ -14,6 +14,7 @@ from smokelift.app.page import COLUMNS, TILE, Fact, Page, Panel, fitted, write_p
 RED = np.zeros((50, 80, 3), np.uint8) + np.uint8([200, 10, 10])
 PAGE = Page(
     "clip <1>.mp4",
+    ["All may be < nothing."],
     [Panel(f"panel {n}", RED) for n in range(COLUMNS + 1)],
     [
         Fact("light", "from everywhere", "undetermined", "Give [[lights]] & all is well. " * 20),
@@ -29,6 +30,7 @@ def test_a_page_as_html_needs_no_other_file(tmp_path) -> None:
     text = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert "clip &lt;1&gt;.mp4" in text
     assert '<td class="undetermined">' in text
+    assert text.index('<p class="warning">All may be &lt; nothing.') < text.index("<img")
     assert "&amp; all is well" in text
     pictures = re.findall(r'src="([^"]*)"', text)
     assert len(pictures) == len(PAGE.panels)
@@ -48,6 +50,7 @@ def test_a_page_as_a_picture_shows_every_panel_and_line(tmp_path) -> None:
     assert red.sum() == len(PAGE.panels) * RED.shape[0] * RED.shape[1]
     orange = (page[..., 0] > 200) & (page[..., 2] < 120) & ~red
     assert orange.any()  # what is undetermined stands out
+    assert orange[: np.flatnonzero(red.any(1))[0]].any()  # and warnings do, above all pictures
     ink = np.abs(page - page[-1, -1]).max(-1) > 60
     assert not ink[:, -4:].any()
     below = ink[np.flatnonzero(red.any(1))[-1] + 1 :]

@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from command_line import ENVIRONMENT, MODULE, command, refused
+from command_line import ENVIRONMENT, MODULE, QUICK, command, refused
+from PIL import Image
 
 from smokelift.app.progress import printable
 from smokelift.output.index import SequenceError
@@ -35,6 +36,15 @@ def test_a_closed_pipe_cancels() -> None:
     status, lines = ended(*MISSING, "--progress", "json", stdout=write)
     os.close(write)
     assert status == 130
+    assert lines == ["Standard output cannot be written: Broken pipe."]
+
+
+def test_who_may_resume_is_told_so_of_a_closed_pipe(tmp_path) -> None:
+    read, write = os.pipe()
+    os.close(read)
+    words = ("reconstruct", "missing.toml", "--out", str(tmp_path / "out"), "--progress", "json")
+    _, lines = ended(*words, stdout=write)
+    os.close(write)
     assert lines == [
         "Standard output cannot be written: Broken pipe. Finished frames stay, --resume goes on from them."
     ]
@@ -147,6 +157,21 @@ def test_programs_are_told_what_may_pass(shot, capsys, monkeypatch, reason, late
     assert command("inspect", shot, "--progress", "json") == 2
     error = json.loads(capsys.readouterr().out.splitlines()[-1])
     assert error == {"event": "error", "text": "It could not be written.", "status": 2, "later": later}
+
+
+@pytest.mark.parametrize(
+    ("number", "said"), [(errno.ENOSPC, "cannot be written: the disk is full"), (errno.EACCES, "Permission denied")]
+)
+def test_an_error_of_the_system_is_a_sentence(shot, tmp_path, capsys, monkeypatch, number, said) -> None:
+    """Without its number, and with the path that was asked for."""
+
+    def fail(*_: object, **__: object) -> None:
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr(Image.Image, "save", fail)
+    page = tmp_path / "page.png"
+    assert refused(capsys, "inspect", shot, "--page", page, *QUICK) == f"{page}: {said}"
+    assert not list(tmp_path.glob("*page*"))
 
 
 def test_another_error_is_not_hidden(shot, monkeypatch) -> None:

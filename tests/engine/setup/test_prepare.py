@@ -405,7 +405,7 @@ def test_a_further_views_background(two_views, draft, tmp_path) -> None:
     pictured = shot_of(replace(two_views, background=wall), draft)
     assert behind(pictured, 0) == pytest.approx(0.5, abs=1e-2)
     assert behind(pictured, 1) < 0.2
-    assert "Background not given: it is black" in pictured.notes[0]
+    assert "Background not given: it is black" in " ".join(pictured.notes)
     for n in range(6):
         write_image(tmp_path / f"wall_{n}.exr", np.full((56, 40, 3), n / 10, np.float32))
     changing = replace(view, background=Background(image=tmp_path / "wall_#.exr"))

@@ -23,6 +23,7 @@ from smokelift.output.sequence import Sequence
 from smokelift.output.writer import check_directory, written_kinds
 from smokelift.pipeline import Frame, reconstruct
 from smokelift.render import device
+from smokelift.setup.no_smoke import what_helps
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.provenance import made_up
 from smokelift.setup.shot import Shot
@@ -86,8 +87,8 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     if empty == len(figures):
         raise ValueError(
             f"No smoke found: in no frame does a patch differ from the background by {2 * SMOKE_THRESHOLD:g} times the "
-            f"clip's noise, so all frames in {options.out} are empty. Give a clean plate ([background] in a scene "
-            "file, Clean Plate in Blender), or check the one that is given."
+            f"clip's noise, so all frames in {options.out} are empty. "
+            f"{what_helps(shot.clip, shot.views[0].plates, scene.background is not None)}"
         )
     for note in shortcomings(figures, empty):
         say.note(note)
