@@ -143,7 +143,7 @@ def smoke_thickness(frames: Sequence[Texture]) -> Thickness:
 
 
 def _undetermined(why: str, error: float | None = None) -> Thickness:
-    known = "" if error is None else f" (error {min(error, 9.99):.0%}, at most {ERROR:.0%} is told)"
+    known = "" if error is None else f" (error {min(error, 9.99):.0%}, {ERROR:.0%} at most would do)"
     reason = (
         f"Smoke thickness: undetermined, {why}{known}; thinner smoke in stronger light looks the same. "
         "Give [[lights]] if you know the light."

@@ -39,7 +39,7 @@ def choose_coarsening(domain: Domain, settings: VelocitySettings, finest: int) -
     coarsening, longest, shortest = 0, max(domain.resolution), min(domain.resolution)
     while longest > finest and shortest >= 16:
         coarsening, longest, shortest = coarsening + 1, -(-longest // 2), -(-shortest // 2)
-    reason = f"Velocity grid: {longest} voxels along the longest side, because the depth of the smoke is a guess."
+    reason = f"Velocity grid: {longest} voxels along the longest side, because the depth of the smoke is uncertain."
     return Choice(what, coarsening, reason, {"voxels": float(longest)}, finest)
 
 
