@@ -139,21 +139,25 @@ def _render(smoke: bpy.types.Object, path: Path) -> None:
 def _parser() -> argparse.ArgumentParser:
     known = bpy.types.Object.bl_rna.properties["smokelift"].fixed_type.properties
     parser = argparse.ArgumentParser(prog="smokelift", description="Turn the scene's clip into a volume of smoke.")
-    parser.add_argument("--smoke", metavar="NAME", help="smoke to make, if the scene has several; else the active one")
-    parser.add_argument("--clip", type=Path, help="clip in place of the smoke's")
-    parser.add_argument("--frames", type=_frames, metavar="A:B", help="first and last frame of the clip, from 0")
-    parser.add_argument("--quality", choices=known["quality"].enum_items.keys())
+    parser.add_argument("--smoke", metavar="NAME", help="smoke to make, if the scene has several (default: the active)")
+    parser.add_argument("--clip", type=Path, help="clip to use in place of the smoke's")
     parser.add_argument(
-        "--detail", type=_within(known["detail"], float), metavar="0..1", help="depth detail: 0 (smooth) to 1"
+        "--frames", type=_frames, metavar="A:B", help="first and last frame of the clip to use, counted from 0"
     )
     parser.add_argument(
-        "--seed", type=_within(known["seed"], int), metavar="N", help="variation of the depth detail, from 0"
+        "--quality", choices=known["quality"].enum_items.keys(), help="how much of the clip's detail is kept"
+    )
+    parser.add_argument(
+        "--detail", type=_within(known["detail"], float), metavar="0..1", help="Depth Detail: 0 (smooth) to 1"
+    )
+    parser.add_argument(
+        "--seed", type=_within(known["seed"], int), metavar="N", help="Variation: number of the plausible smoke, from 0"
     )
     parser.add_argument(
         "--axis-depth",
         type=float,
         metavar="METRES",
-        help="distance of the smoke behind the middle of the box",
+        help="how far the smoke stands behind the middle of the box; negative: in front of it",
     )
     parser.add_argument("--output", type=Path, help="folder for the results")
     parser.add_argument("--resume", action="store_true", help="resume the last unfinished run")

@@ -80,15 +80,15 @@ def unlike_offset(pictures: NDArray[np.float16]) -> int:
 
     Where it never does, as few frames as leave it nearly as unlike as it gets.
     """
-    likeness: dict[int, float] = {}
+    correlation: dict[int, float] = {}
     for offset in _steps(len(pictures) // 2):
-        alike = [_likeness(a, b) for a, b in _pairs(pictures, offset)]
+        alike = [_detail_correlation(a, b) for a, b in _pairs(pictures, offset)]
         if alike:
-            likeness[offset] = float(np.mean(alike))
-            if likeness[offset] < UNLIKE:
+            correlation[offset] = float(np.mean(alike))
+            if correlation[offset] < UNLIKE:
                 return offset
-    least = min(likeness.values(), default=0.0)
-    return next((offset for offset, value in likeness.items() if value <= least + NEARLY), len(pictures) // 2)
+    least = min(correlation.values(), default=0.0)
+    return next((offset for offset, value in correlation.items() if value <= least + NEARLY), len(pictures) // 2)
 
 
 def _steps(longest: int) -> Iterator[int]:
@@ -107,7 +107,7 @@ def _pairs(pictures: NDArray[np.float16], offset: int) -> Iterator[tuple[Array, 
             yield a, b
 
 
-def _likeness(a: Array, b: Array) -> float:
+def _detail_correlation(a: Array, b: Array) -> float:
     """Correlation of two pictures' detail under the best shift: smoke that only moves on is a copy."""
     shape = [fft.next_fast_len(2 * n, real=True) for n in a.shape]
     product = np.conj(fft.rfft2(_detail(a), shape)) * fft.rfft2(_detail(b), shape)
