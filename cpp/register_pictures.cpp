@@ -1,4 +1,5 @@
 #include "codes.h"
+#include "picture_blur.h"
 #include "pictures.h"
 #include "python.h"
 
@@ -155,6 +156,23 @@ void register_pictures(py::module_ &module) {
             add_weighted(coded, table.data(), parts, result);
         },
         "picture"_a, "table"_a, "weights"_a, "lines"_a, "columns"_a, py::arg("sums").noconvert());
+
+    module.def(
+        "blur_picture",
+        [](const Array &picture, const Doubles &weights) {
+            require_fit((picture.ndim() == 2 || picture.ndim() == 3) && picture.size() > 0);
+            const int channels = picture.ndim() == 3 ? int(picture.shape(2)) : 1;
+            const Extent extent{int(picture.shape(0)), int(picture.shape(1)), channels};
+            const std::vector<double> outwards = values_of(weights);
+            Array blurred(std::vector<py::ssize_t>(picture.shape(), picture.shape() + picture.ndim()));
+            float *const result = blurred.mutable_data();
+            {
+                const py::gil_scoped_release unlocked;
+                blur_picture(picture.data(), extent, outwards, result);
+            }
+            return blurred;
+        },
+        "picture"_a, "weights"_a);
 
     module.def(
         "interleave",

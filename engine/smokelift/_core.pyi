@@ -463,3 +463,10 @@ def interleave(
     channels: tuple[npt.NDArray[np.uint8], npt.NDArray[np.uint8], npt.NDArray[np.uint8]],
 ) -> npt.NDArray[np.uint8]:
     """Write three pictures (rows, columns), in each of which pixels lie one after the other, as (rows, columns, 3)."""
+
+def blur_picture(picture: Array, weights: npt.NDArray[np.floating[Any]]) -> Array:
+    """A picture (rows, columns) or (rows, columns, channels), smoothed down and across.
+
+    ``weights`` are those of a pixel itself and of its neighbours on either side, outwards. Beyond its edges the picture
+    is its own mirror image.
+    """

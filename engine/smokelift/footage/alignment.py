@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy import fft, ndimage
 from scipy.spatial.transform import Rotation
 
-from smokelift.footage.images import Picture, area_average, linear_to_srgb
+from smokelift.footage.images import Picture, area_average, blurred, linear_to_srgb
 
 Array = NDArray[np.float64]
 
@@ -134,18 +134,18 @@ class Level:
         return values.astype(np.float64), inside
 
 
-def levels(picture: Picture, lens: Lens) -> tuple[Level, ...]:
-    """Return a linear picture (rows, columns, 3) at all resolutions, the coarsest first."""
+def levels(picture: Picture, lens: Lens, count: int = LEVELS) -> tuple[Level, ...]:
+    """Return a linear picture (rows, columns, 3) at all resolutions or the finest of them, the coarsest first."""
     width, height = lens.size
     scale = max(1.0, max(width, height) / LONGEST)
     found = []
-    for halvings in range(LEVELS):
+    for halvings in range(count):
         columns, rows = (max(8, round(n / scale / 2**halvings)) for n in (width, height))
         picture = area_average(picture, columns, rows)
         encoded = linear_to_srgb(picture)
         grey: Picture = (encoded[..., 0] + encoded[..., 1] + encoded[..., 2]) / np.float32(3)  # faster than a mean
-        detail = ndimage.gaussian_filter(grey, FINE) - ndimage.gaussian_filter(grey, COARSE)
-        contrast = np.sqrt(ndimage.gaussian_filter(detail**2, AROUND) + FAINT**2)
+        detail = blurred(grey, FINE) - blurred(grey, COARSE)
+        contrast = np.sqrt(blurred(detail**2, AROUND) + FAINT**2)
         found.append(Level(lens.resized(columns, rows), (detail / contrast).astype(np.float32)))
     return tuple(found[::-1])
 

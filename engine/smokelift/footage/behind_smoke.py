@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
-from smokelift.footage.images import Picture, area_average, linear_to_srgb, srgb_to_linear
+from smokelift.footage.images import Picture, area_average, blurred, linear_to_srgb, srgb_to_linear
 
 DRIFT = 8 / 255
 """Change in sRGB values by a codec or by the light, at most. The matte takes as much for smoke."""
@@ -50,7 +50,7 @@ def completed(
     if known.all():
         return image, np.ones(known.shape, np.float32)
     smooth = push_pull(linear_to_srgb(image), sure.astype(np.float32))
-    coarse = ndimage.gaussian_filter(mean, (finer_than, finer_than, 0))
+    coarse = blurred(mean, finer_than)
     contrast = smooth.mean(-1) - brightness
     seen = (coarse.mean(-1) - brightness) / np.where(np.abs(contrast) > 0.02, contrast, np.inf)
     detail = mean - coarse

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
-from smokelift.footage.images import Picture, linear_to_srgb
+from smokelift.footage.images import Picture, blurred, linear_to_srgb
 from smokelift.footage.noise import Noise
 from smokelift.footage.plate import Plate
 
@@ -75,10 +75,10 @@ def matte(frame: npt.ArrayLike, plate: Plate) -> Matte:
     shown, behind = linear, plate.image
     if width > SMOOTHING:
         # in much noise the sRGB value of light is too low on the mean; that of a mean of light is not
-        shown, behind = (ndimage.gaussian_filter(light, (SMOOTHING, SMOOTHING, 0.0)) for light in (shown, behind))
+        shown, behind = (blurred(light, SMOOTHING) for light in (shown, behind))
         width = float(np.sqrt(width**2 - SMOOTHING**2))
     difference = (linear_to_srgb(shown) - linear_to_srgb(behind)) / noise
-    smooth = ndimage.gaussian_filter(difference, (width, width, 0.0))
+    smooth = blurred(difference, width)
     deviation = np.sqrt((smooth**2).mean(axis=2))
     deviation /= np.clip(np.median(deviation), 1.0, GLOBAL_DEVIATION)
     certain = 2.0 * SMOKE_THRESHOLD

@@ -16,14 +16,13 @@ from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
-from scipy import ndimage
 
 from smokelift.footage.backdrop import backdrop_plate
 from smokelift.footage.behind_smoke import DETAIL, DRIFT, completed, in_one_piece, mostly_beside, push_pull, unlike
 from smokelift.footage.clear_values import STRIDE, clear_values, smoke_of
 from smokelift.footage.clip import Clip
 from smokelift.footage.exposure import sample_gains, small_size
-from smokelift.footage.images import Picture, linear_to_srgb, srgb_to_linear
+from smokelift.footage.images import Picture, blurred, linear_to_srgb, srgb_to_linear
 from smokelift.footage.matte import smoothing
 from smokelift.footage.noise import (
     BLOCK,
@@ -246,5 +245,4 @@ def _mean(samples: npt.NDArray[np.uint16], seen: npt.NDArray[np.bool_] | None) -
 def _smooth_grey(sample: npt.NDArray[np.uint16], width: float) -> npt.NDArray[np.uint16]:
     """The grey of a sample, smoothed by so many pixels that most of its noise is gone."""
     grey = (sample[..., 0].astype(np.float32) + sample[..., 1] + sample[..., 2]) / np.float32(3)  # faster than a mean
-    smooth: Picture = ndimage.gaussian_filter(grey, width)
-    return smooth.astype(np.uint16)
+    return blurred(grey, width).astype(np.uint16)

@@ -163,10 +163,10 @@ def _stands_still(clip: Clip, lens: Lens) -> bool:
     key = levels(clip.glimpse(numbers.pop(len(numbers) // 2), GLIMPSE), lens)
     first, same = points_of(key), []
     for number in numbers:
-        picture = levels(clip.glimpse(number, GLIMPSE), lens)
-        stands = judged(first[-1], picture[-1], Rotation.identity()).same
+        picture = clip.glimpse(number, GLIMPSE)
+        stands = judged(first[-1], levels(picture, lens, 1)[0], Rotation.identity()).same
         # a turn cannot make so much of more than all
-        same.append(stands if stands > MOVED else align(first, picture, Rotation.identity()).same)
+        same.append(stands if stands > MOVED else align(first, levels(picture, lens), Rotation.identity()).same)
         if stands <= MOVED * same[-1]:
             return False
     return bool(np.median(same) >= HELD) if same else False

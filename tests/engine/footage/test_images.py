@@ -12,6 +12,7 @@ import scipy.sparse
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
+from scipy import ndimage
 
 from smokelift import _core
 from smokelift.footage.images import (
@@ -19,6 +20,7 @@ from smokelift.footage.images import (
     ImageError,
     add_weighted,
     area_average,
+    blurred,
     code_values,
     decode_integers,
     linear_to_srgb,
@@ -278,6 +280,14 @@ def test_codes_are_added_as_the_linear_picture_to_the_last_bit(dtype: type) -> N
     add_weighted(picture.linear(), weights, edges, others)
     assert np.array_equal(sums, expected)
     assert np.array_equal(others, expected)
+
+
+@pytest.mark.parametrize("shape", [(20, 41), (9, 30, 3), (3, 5, 2), (1, 1)])
+@pytest.mark.parametrize("deviation", [0.8, 1.5, 6.0])
+def test_pictures_are_smoothed_as_by_scipy(shape: tuple[int, ...], deviation: float) -> None:
+    picture = np.random.default_rng(0).standard_normal(shape).astype(np.float32)
+    expected = ndimage.gaussian_filter(picture, (deviation, deviation, 0)[: len(shape)])
+    np.testing.assert_allclose(blurred(picture, deviation), expected, rtol=1e-6, atol=1e-7)
 
 
 def test_channels_are_interleaved() -> None:
