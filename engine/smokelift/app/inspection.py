@@ -13,6 +13,7 @@ from PIL import Image, ImageDraw
 
 from smokelift.app.cost import Cost
 from smokelift.app.page import TILE, Fact, Page, Panel, fitted
+from smokelift.footage.exposure import shows_exposure, small
 from smokelift.footage.images import area_average, linear_to_srgb
 from smokelift.footage.matte import SMOKE_THRESHOLD, Matte, matte
 from smokelift.footage.plate import Plate
@@ -96,11 +97,10 @@ def facts(shot: Shot, given: Scene, cost: Cost) -> tuple[Fact, ...]:
     around, placed = "around the smoke of the whole clip", "estimated"
     if not shot.smoky:
         around, placed = "over all of the picture", UNDETERMINED
-    exposure = f"changes by up to {shot.exposure:.0%}, evened out" if shot.exposure > 0 else "steady"
     spent = f"about {cost.seconds:.0f} s, {cost.memory / 2**30:.1f} GiB of memory, {cost.disk / 1e6:.0f} MB on disk"
     return (
         _background(shot, given, plate),
-        Fact("exposure", exposure, "measured", "Of what does not move, against the background."),
+        _exposure(shot, plate),
         _noise(plate),
         _known(
             "camera",
@@ -182,6 +182,14 @@ def _background(shot: Shot, given: Scene, plate: Plate) -> Fact:
         "estimated",
         _said(shot, "Background"),
     )
+
+
+def _exposure(shot: Shot, plate: Plate) -> Fact:
+    if not shows_exposure(small(plate.image)):
+        how = "The background is too dark or too bright to show it: what flickers is taken for smoke."
+        return Fact("exposure", "taken to be steady", UNDETERMINED, how)
+    value = f"changes by up to {shot.exposure:.0%}, evened out" if shot.exposure > 0 else "steady"
+    return Fact("exposure", value, "measured", "Of what does not move, against the background.")
 
 
 def _noise(plate: Plate) -> Fact:

@@ -10,6 +10,9 @@ from av.container import InputContainer
 ENOUGH = 2**25
 """Bytes that a file is opened with: the contexts of its decoders, and some frames to know them by."""
 
+MOST_BOXES = 1000
+"""Boxes of an MP4 file that are looked at; a whole one has a handful, one in fragments its index among the first."""
+
 
 def open_container(path: Path, form: str | None = None, **options: str) -> InputContainer:
     """Open a file, and whatever it refers to on this machine, but nothing on another.
@@ -35,3 +38,26 @@ def open_container(path: Path, form: str | None = None, **options: str) -> Input
         f"file:{path.absolute()}", format=form, options={"protocol_whitelist": "file", **options}
     )
     return container
+
+
+def lacks_index(path: Path) -> bool:
+    """Return whether a file is an MP4 or QuickTime one without its whole index, as a recording that was cut short is.
+
+    Such a file is a row of boxes: eight bytes with size and name, and what it holds (ISO/IEC 14496-12, 4.2).
+    """
+    with path.open("rb") as file:
+        end, start = path.stat().st_size, 0
+        for number in range(MOST_BOXES):
+            file.seek(start)
+            head = file.read(16)
+            if number == 0 and head[4:8] != b"ftyp":
+                return False
+            size = int.from_bytes(head[:4], "big")
+            if head[4:8] == b"moov" and start + size <= end:
+                return False
+            if size == 1:  # the true size follows the name
+                size = int.from_bytes(head[8:], "big")
+            start += size
+            if size < 8 or start + 8 > end:  # 0: up to the end of the file
+                return True
+    return False

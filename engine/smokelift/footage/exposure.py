@@ -21,6 +21,9 @@ LONGEST = 160
 USABLE = (0.005, 0.9)
 """Linear values between which a ratio says anything: below is noise, above is clipped."""
 
+FEWEST = 0.01
+"""Share of the picture that has to be usable."""
+
 AGREEING = 1 / 3
 """Share of the usable pixels that has to show one gain."""
 
@@ -46,7 +49,7 @@ def gain_of(picture: Picture, background: Picture) -> Picture:
     gains = np.ones(3, np.float32)
     within = (background > low) & (background < high) & (picture > low) & (picture < high)
     usable = within[..., 0] & within[..., 1] & within[..., 2]
-    if usable.mean() < 0.01:
+    if usable.mean() < FEWEST:
         return gains
     ratios = np.log(picture[usable] / background[usable])
     if (np.abs(ratios).max(1) < SAME).mean() >= UNCHANGED:
@@ -55,6 +58,12 @@ def gain_of(picture: Picture, background: Picture) -> Picture:
     if max(spread) > SPREAD:
         return gains
     return np.exp(np.array(middle, np.float32))
+
+
+def shows_exposure(background: Picture) -> bool:
+    """Return whether a linear background (rows, columns, 3) is bright enough somewhere, and not too bright, to tell."""
+    low, high = USABLE
+    return bool(((background > low) & (background < high)).all(-1).mean() >= FEWEST)
 
 
 def largest_change(gains: Sequence[Picture]) -> float:

@@ -31,7 +31,7 @@ from av.video.reformatter import ColorRange, Interpolation
 import smokelift._core as _core
 from smokelift.footage import lens
 from smokelift.footage.colour import ENCODINGS, Encoding, primaries_name, to_bt709
-from smokelift.footage.container import open_container
+from smokelift.footage.container import lacks_index, open_container
 from smokelift.footage.frame_source import DEFAULT_FPS, ClipError, DamagedFrameError, Look
 from smokelift.footage.images import (
     MOST_PIXELS,
@@ -105,10 +105,10 @@ class Video:
         try:
             self._container = open_container(self._path)
         except (av.FFmpegError, ValueError) as error:
-            raise ClipError(f"{self._path}: is not a video, or is damaged: {_reason(error)}") from error
+            raise _unreadable(self._path, error) from error
         if not self._container.streams.video:
             self._container.close()
-            raise ClipError(f"{self._path}: holds no video stream")
+            raise _unreadable(self._path, None)
         self._stream = self._container.streams.video[0]
         if self._stream.codec_context is None:
             self._container.close()
@@ -466,6 +466,20 @@ def _upright(pixels: npt.NDArray[Any], frame: av.VideoFrame) -> npt.NDArray[Any]
     if abs(a) < abs(c):
         pixels, a, d = np.swapaxes(pixels, 0, 1), c, b
     return pixels[:: -1 if d < 0 else 1, :: -1 if a < 0 else 1]
+
+
+def _unreadable(path: Path, error: Exception | None) -> ClipError:
+    """Why FFmpeg cannot open a file, or finds no video in it, and what to do where that is known."""
+    if path.stat().st_size == 0:
+        return ClipError(f"{path}: is empty; copy or export it again")
+    if lacks_index(path):
+        return ClipError(
+            f"{path}: breaks off before its index is complete, without which no frame is found; copy it again, or "
+            "repair it"
+        )
+    if error is None:
+        return ClipError(f"{path}: holds no video stream")
+    return ClipError(f"{path}: is not a video, or is damaged: {_reason(error)}")
 
 
 def _reason(error: Exception) -> str:

@@ -401,7 +401,7 @@ def test_what_is_no_video_is_named(tmp_path: Path) -> None:
     with pytest.raises(ClipError, match=r"junk\.mp4: is not a video, or is damaged"):
         Clip.open(tmp_path / "junk.mp4")
     (tmp_path / "empty.mp4").write_bytes(b"")
-    with pytest.raises(ClipError, match=r"empty\.mp4: is not a video, or is damaged"):
+    with pytest.raises(ClipError, match=r"empty\.mp4: is empty; copy or export it again"):
         Clip.open(tmp_path / "empty.mp4")
     with pytest.raises(ClipError, match="is a folder"):
         Clip.open(tmp_path)

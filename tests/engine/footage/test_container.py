@@ -111,3 +111,24 @@ def test_memory_that_lacks_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(container, "ENOUGH", 2**62)
     with pytest.raises(MemoryError):
         container.open_container(path)
+
+
+@pytest.mark.parametrize("left", [0.2, 0.6])
+def test_a_recording_that_was_cut_short_is_told_from_what_is_no_video(tmp_path: Path, left: float) -> None:
+    """Its index is at its end."""
+    clip = tmp_path / "clip.mp4"
+    write_video(clip, FRAMES, 24)
+    assert not container.lacks_index(clip)
+    content = clip.read_bytes()
+    clip.write_bytes(content[: int(left * len(content))])
+    with pytest.raises(ClipError, match=r"clip\.mp4: breaks off before its index is complete"):
+        Clip.open(clip)
+
+
+@pytest.mark.parametrize(
+    "content", [b"x", bytes(16) * 9, b"\0\0\0\x08free" * 3, b"\0\0\0\x10ftypisom\0\0\0\0" + b"\0\0\0\x08free" * 2000]
+)
+def test_what_has_no_boxes_lacks_no_index(tmp_path: Path, content: bytes) -> None:
+    """Whatever its length."""
+    (tmp_path / "clip.mp4").write_bytes(content)
+    assert not container.lacks_index(tmp_path / "clip.mp4")

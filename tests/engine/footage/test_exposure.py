@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from films import HEIGHT, WIDTH, puff, wall
 
-from smokelift.footage.exposure import gain_of, sample_gains
+from smokelift.footage.exposure import gain_of, sample_gains, shows_exposure
 
 GAINS = np.array([1.3, 1.0, 0.8], np.float32)
 
@@ -34,3 +35,12 @@ def test_a_flash_has_its_own_gain() -> None:
     gains = sample_gains(frames)
     np.testing.assert_allclose(gains[4], 3, rtol=0.01)
     assert (np.delete(gains, 4, 0) == 1).all()
+
+
+@pytest.mark.parametrize(("value", "shown"), [(0.0, False), (0.002, False), (0.2, True), (1.0, False)])
+def test_black_and_white_show_no_exposure(value: float, shown: bool) -> None:
+    """A logo in a corner does."""
+    background = np.full((40, 60, 3), value, np.float32)
+    assert shows_exposure(background) is shown
+    background[:6, :6] = 0.3
+    assert shows_exposure(background)
