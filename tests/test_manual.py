@@ -232,6 +232,16 @@ def test_the_command_reference_has_every_option() -> None:
                 assert action.option_strings[-1] in text, (command, action.option_strings)
 
 
+def test_every_argument_says_what_it_is_and_its_default_once() -> None:
+    for command, parser in command_reference.subcommands().items():
+        for action in parser._actions:
+            assert command == "bench" or action.help, (command, action.dest)
+            if action.option_strings and isinstance(action.default, str | int | float) and action.default is not False:
+                meaning = command_reference._meaning(action)
+                said = re.findall(r"default(?: `|\)|:| \d|;)", meaning)
+                assert action.default == argparse.SUPPRESS or len(said) == 1, (command, meaning)
+
+
 def test_the_first_page_is_short() -> None:
     assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 120
 
