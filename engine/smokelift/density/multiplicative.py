@@ -3,7 +3,9 @@
 For one ray with scattered radiance S and transmittance T the effective source is J = S / (1 - T). If all smoke on
 the ray is scaled by s, the picture becomes J (1 - T^s) + T^s B; the transmittance that explains the target I best is
 
-    t = <I - J, B - J> / |B - J|^2,   s = ln t / ln T.
+    t = <I - J, B - J> / <B - J, B - J>,   s = ln t / ln T,
+
+with the colours as much as they count in the objective.
 
 Where shadows or thickness make the picture insensitive to s, the step is damped by the true sensitivity dL / d ln s,
 and where smoke and background look alike the picture says little, so the neighbours' step counts instead.
@@ -148,9 +150,11 @@ def _log_scale(image: Image, transmittance: Image, slope: Image, term: Term) -> 
     solid = np.maximum(1 - clear, 1e-6)
     source = (image - clear * background) / solid
     contrast = background - source
+    counted = term.view.weighted(contrast)
     power = _over_channels(contrast, contrast)
     floor = _over_channels(term.view.noise, term.view.noise) / 3
-    wanted = np.clip(_over_channels(term.view.image - source, contrast) / (power + 1e-20), 1e-4, 1.0)
+    explained = _over_channels(term.view.image - source, counted) / (_over_channels(contrast, counted) + 1e-20)
+    wanted = np.clip(explained, 1e-4, 1.0)
     scale = np.log(wanted) / np.minimum(np.log(np.maximum(transmittance, 1e-30)), -1e-6)
     change = image - background
     sensitivity = np.sqrt(_over_channels(slope, slope)) / np.maximum(np.sqrt(_over_channels(change, change)), 1e-6)

@@ -1,14 +1,16 @@
 """What a density fit minimises: one form of objective for both of its optimisers and for where they stop.
 
-    E(rho) = sum over terms, pixels, channels of  w (L(rho) - I)^2,    0 <= rho <= bound,  rho = 0 outside the hull
+    E(rho) = sum over terms, pixels of  w (L(rho) - I) C (L(rho) - I),    0 <= rho <= bound,  rho = 0 outside the hull
 
-A term is a picture I with the weight w of its pixels. There is one term a camera. The pictures that a depth prior
-imposes (soft observations) are no part of it: before, the start is scaled towards them in turn with the cameras'
-pictures, and what is left of them is what those allow. A prior has no penalty term. Beyond its pictures it acts through
-the start and, with it, the preconditioner of the descent.
+A term is a picture I with the weight w of its pixels and C of their colours (3 x 3, the identity before a background
+that is known; `colour_weight`). Both stay as they are during a fit. There is one term a camera. The pictures that a
+depth prior imposes (soft observations) are no part of it: before, the start is scaled towards them in turn with the
+cameras' pictures, and what is left of them is what those allow. A prior has no penalty term. Beyond its pictures it
+acts through the start and, with it, the preconditioner of the descent.
 
-Noise of standard deviation s leaves E = sum w s^2 at the true density. Below that a fit reproduces noise, so it stops
-there (discrepancy principle: Morozov 1966). The figures that a fit reports are plain: unweighted, of the cameras alone.
+Noise of standard deviation s leaves E = sum w c s^2 at the true density, c of C's diagonal. Below that a fit reproduces
+noise, so it stops there (discrepancy principle: Morozov 1966). The figures that a fit reports are plain: unweighted, of
+the cameras alone.
 """
 
 from __future__ import annotations
@@ -48,15 +50,19 @@ class Term:
 
     def loss(self, residual: Image) -> float:
         """The term's part of the objective, of L - I (rows, columns, 3)."""
-        return float(np.sum(self.weight[..., None] * np.square(residual, dtype=np.float64)))
+        power = np.multiply(residual, self.view.weighted(residual), dtype=np.float64)
+        return float(np.sum(self.weight[..., None] * power))
 
     def image_gradient(self, residual: Image) -> Image:
         """Derivative of the term's part by the rendered picture."""
-        return 2 * self.weight[..., None] * residual
+        return 2 * self.weight[..., None] * self.view.weighted(residual)
 
     def noise_floor(self) -> float:
         """What the picture's noise leaves of the objective at the true density."""
-        return self.loss(self.view.noise)
+        power = np.square(self.view.noise, dtype=np.float64)
+        if self.view.colours is not None:
+            power *= self.view.colours.of_channels()
+        return float(np.sum(self.weight[..., None] * power))
 
 
 def camera_terms(views: ViewSet, inside: Sequence[NDArray[np.float32]]) -> list[Term]:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.density.axis import AxisEstimate
+from smokelift.density.colour_weight import ColourWeight
 from smokelift.density.hull import Projection, common_hull, project_voxels, reached
 from smokelift.footage.matte import SMOKE_THRESHOLD, matte
 from smokelift.footage.noise import EIGHT_BIT_NOISE
@@ -21,6 +22,9 @@ from smokelift.scene.checks import LARGEST
 
 THINNEST_CLEAR = 0.05
 """Transmittance at least: optical depth above 3 cannot be told from a brightness."""
+
+ROUNDS = 2
+"""Times that optical depth and the weight of the colours are found from each other."""
 
 
 def eight_bit_plate(background: Image, size: tuple[int, int]) -> Plate:
@@ -101,6 +105,8 @@ class View:
         Where the voxels lie in the picture.
     counted : (rows, columns) bool
         Pixels that the voxels behind the mask can change: those that a fit is judged by.
+    colours
+        How much each combination of the colours counts; None if all do alike, as before a background that is known.
     """
 
     camera: Camera
@@ -110,6 +116,7 @@ class View:
     optical_depth: NDArray[np.float32]
     projection: Projection
     counted: NDArray[np.bool_]
+    colours: ColourWeight | None = None
 
     @staticmethod
     def of(observation: Observation, optics: Optics) -> View:
@@ -120,7 +127,16 @@ class View:
         mask = matte(image, plate).mask
         projection = project_voxels(camera, optics.domain)
         depth = apparent_optical_depth(image, plate, mask, optics)
-        return View(camera, image, plate, mask, depth, projection, reached(mask, projection))
+        colours = ColourWeight.of(image, plate, depth)
+        if colours is not None:  # each depends on the other
+            for _ in range(ROUNDS):
+                depth = apparent_optical_depth(image, plate, mask, optics, colours)
+                colours = ColourWeight.of(image, plate, depth)
+        return View(camera, image, plate, mask, depth, projection, reached(mask, projection), colours)
+
+    def weighted(self, colours: Image) -> Image:
+        """Colours (rows, columns, 3) as much as they count."""
+        return colours if self.colours is None else self.colours.weighted(colours)
 
     @cached_property
     def noise(self) -> Image:
@@ -171,13 +187,15 @@ class ViewSet:
         return ViewSet(views, hull, optics, frame)
 
 
-def apparent_optical_depth(image: Image, plate: Plate, mask: NDArray[np.bool_], optics: Optics) -> NDArray[np.float32]:
+def apparent_optical_depth(
+    image: Image, plate: Plate, mask: NDArray[np.bool_], optics: Optics, colours: ColourWeight | None = None
+) -> NDArray[np.float32]:
     """Optical depth (rows, columns) of smoke without shadows that explains a picture: I = J (1 - T) + T B.
 
-    J is the source radiance of smoke in the middle of the domain, B the plate. Over the three channels T is the least
-    squares solution. None explains a pixel which the smoke makes darker although J is brighter than B. Only smoke in
-    its own shadow does so, and such a pixel counts as thick as can be told: a fit that starts from less thins it out
-    until nothing is left (docs/experiments/bright-background.md).
+    J is the source radiance of smoke in the middle of the domain, B the plate. Over the three channels, or their
+    combinations as much as they count, T is the least squares solution. None explains a pixel which the smoke makes
+    darker although J is brighter than B. Only smoke in its own shadow does so, and such a pixel counts as thick as can
+    be told: a fit that starts from less thins it out until nothing is left (docs/experiments/bright-background.md).
     """
     source = np.zeros(3)
     if optics.scattering != "absorption":
@@ -185,10 +203,14 @@ def apparent_optical_depth(image: Image, plate: Plate, mask: NDArray[np.bool_], 
     contrast = plate.image - source
     power = np.sum(contrast**2, -1)
     clear = np.sum((image - source) * contrast, -1) / np.maximum(power, 1e-12)
+    noise = np.sqrt(np.sum((noise_at(image, plate) * contrast) ** 2, -1))
+    in_shadow = (clear - 1) * power > SMOKE_THRESHOLD * noise
+    if colours is not None:
+        counted = colours.weighted(contrast)
+        clear = np.sum((image - source) * counted, -1) / np.maximum(np.sum(contrast * counted, -1), 1e-12)
     depth = -np.log(np.clip(clear, THINNEST_CLEAR, 1.0))
     if optics.scattering in SHADOWED:
-        noise = np.sqrt(np.sum((noise_at(image, plate) * contrast) ** 2, -1))
-        depth[(clear - 1) * power > SMOKE_THRESHOLD * noise] = -np.log(THINNEST_CLEAR)
+        depth[in_shadow] = -np.log(THINNEST_CLEAR)
     return np.where(mask, depth, 0).astype(np.float32)
 
 

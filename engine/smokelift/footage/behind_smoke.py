@@ -1,7 +1,7 @@
 """What is behind smoke that never clears: continued from what is known around it.
 
 It follows smoothly from its neighbours. Its detail is that of its samples, with the contrast that the smoke takes from
-it given back.
+it given back. How wrong the continuation is, is measured where the background is known.
 """
 
 from __future__ import annotations
@@ -26,6 +26,12 @@ MOST_DETAIL = 0.95
 
 LEAST_TRANSMITTANCE = 0.2
 """Light let through by the smoke from which the detail behind it can be told from noise."""
+
+SHIFTS = (-1 / 2, -1 / 3, -1 / 6, 1 / 6, 1 / 3, 1 / 2)
+"""Where the outline of the unknown is laid on what is known, to the right, in widths of the picture."""
+
+LARGEST = 480
+"""Pixels along the longer side at most of the picture that errors are measured on; larger ones are reduced to it."""
 
 
 def completed(
@@ -92,6 +98,34 @@ def push_pull(image: Picture, confidence: Picture) -> Picture:
     return blend
 
 
+def continuation_errors(image: Picture, known: npt.NDArray[np.bool_]) -> Picture:
+    """Return the covariance (3, 3) of the colours' errors where a linear picture is continued from what is known.
+
+    The outline of the unknown is laid on what is known, which is continued there as if it were unknown. The mean error
+    is not taken off: it says nothing of that behind the smoke (docs/experiments/disturbed-clips.md). 0 where nothing is
+    unknown, or so much that nothing can be left out.
+    """
+    if known.all():
+        return np.zeros((3, 3), np.float32)
+    height, width = known.shape
+    if max(height, width) > LARGEST:
+        height, width = (max(1, round(LARGEST * side / max(height, width))) for side in (height, width))
+        image, known = area_average(image, width, height), area_average(known.astype(np.float32), width, height) > 0.999
+    encoded = linear_to_srgb(image)
+    total, count = np.zeros((3, 3)), 0
+    for shift in SHIFTS:
+        left_out = known & _moved(~known, round(shift * width))
+        if left_out.mean() < ISLAND:
+            continue
+        guess = srgb_to_linear(push_pull(encoded, (known & ~left_out).astype(np.float32)))
+        error = np.where(left_out[..., None], guess - image, 0)
+        share = ndimage.gaussian_filter(left_out.astype(np.float32), DETAIL)[left_out]
+        coarse = ndimage.gaussian_filter(error, (DETAIL, DETAIL, 0))[left_out] / share[:, None]
+        total += coarse.T.astype(np.float64) @ coarse
+        count += len(coarse)
+    return (total / max(count, 1)).astype(np.float32)
+
+
 def in_one_piece(known: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
     """Without specks: a clear island amid smoke, or an unknown one amid the clear, is an accident of the samples."""
     smooth = ndimage.median_filter(known.astype(np.uint8), 7) > 0
@@ -113,3 +147,13 @@ def mostly_beside(grown: npt.NDArray[np.bool_], known: npt.NDArray[np.bool_]) ->
             beside += np.bincount(along[one][border], sides, count + 1)
     kept: npt.NDArray[np.bool_] = grown & (beside >= 0)[patches]
     return kept
+
+
+def _moved(mask: npt.NDArray[np.bool_], right: int) -> npt.NDArray[np.bool_]:
+    """A mask (rows, columns) moved to the right, with nothing where it comes from."""
+    moved = np.zeros_like(mask)
+    if right >= 0:
+        moved[:, right:] = mask[:, : mask.shape[1] - right]
+    else:
+        moved[:, :right] = mask[:, -right:]
+    return moved

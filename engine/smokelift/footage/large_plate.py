@@ -107,7 +107,7 @@ class LargeSamples:
         # as many of the whole pictures' pixels as of small ones: smoke has detail of the reduced ones' itself
         found = clear_picture(self.reduced, self._reduced_noise, detail=DETAIL / _divisor(self.clip))
         image = self._fine(found.image, found.known, found.clear[WHOLE], found.contrast)
-        return Plate(image, self._spread(found.known).astype(np.float32), self.noise)
+        return Plate(image, self._spread(found.known).astype(np.float32), self.noise, found.errors)
 
     def _fine(self, image: Picture, known: Mask, clear: Mask, contrast: Picture) -> Picture:
         """The whole background (linear) from the reduced one, see `ClearPicture`; ``clear`` is that of whole frames."""

@@ -110,6 +110,8 @@ class PanoramaPlate:
         The wide picture, linear.
     confidence : (rows, columns)
         As in `smokelift.footage.plate.Plate`.
+    errors : (3, 3)
+        As there.
     noise
         Of the footage before it.
     cuts
@@ -119,6 +121,7 @@ class PanoramaPlate:
     place: WidePicture
     image: Picture
     confidence: Picture
+    errors: Picture
     noise: Noise
     cuts: tuple[tuple[Callable[[Picture], Picture], float], ...] = ()
 
@@ -129,7 +132,7 @@ class PanoramaPlate:
     def at(self, frame: int) -> Plate:
         """Return the plate of a frame of the footage, counted from 0."""
         image, confidence = (self.place.part(wide, frame) for wide in (self.image, self.confidence))
-        plate = Plate(image, np.clip(confidence, 0, 1), self.noise)
+        plate = Plate(image, np.clip(confidence, 0, 1), self.noise, self.errors)
         for cut, pixels in self.cuts:
             plate = plate.through(cut, pixels)
         return plate
@@ -161,7 +164,7 @@ def estimate_panorama(clip: Clip, turns: Turns, sample_count: int = 32) -> Panor
     place = WidePicture.around(turns)
     samples, seen = wide_samples(clip, place, sample_count)
     found = clear_picture(samples, clip_noise(samples, seen), seen)
-    plates = PanoramaPlate(place, found.image, found.known.astype(np.float32), lasting_noise(0.0))
+    plates = PanoramaPlate(place, found.image, found.known.astype(np.float32), found.errors, lasting_noise(0.0))
     return replace(plates, noise=noise_before(plates, clip))
 
 

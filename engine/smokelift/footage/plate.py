@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -35,11 +35,14 @@ class Plate:
         From 0 (filled from neighbours) to 1 (seen clear in many frames).
     noise
         Of the camera's pictures.
+    errors : (3, 3)
+        Covariance of the colours' errors where it is filled in, linear; 0 if nothing is known of them.
     """
 
     image: Picture
     confidence: Picture
     noise: Noise
+    errors: Picture = field(default_factory=lambda: np.zeros((3, 3), np.float32))
 
     def at(self, frame: int) -> Plate:
         """Return the plate of a frame: this one, since the background stands still."""
@@ -55,7 +58,7 @@ class Plate:
         pixels
             Of which each new one is the mean.
         """
-        return Plate(cut(self.image), cut(self.confidence), self.noise.averaged(pixels))
+        return Plate(cut(self.image), cut(self.confidence), self.noise.averaged(pixels), self.errors)
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,16 @@ import numpy as np
 import numpy.typing as npt
 
 from smokelift.footage.backdrop import backdrop_plate
-from smokelift.footage.behind_smoke import DETAIL, DRIFT, completed, in_one_piece, mostly_beside, push_pull, unlike
+from smokelift.footage.behind_smoke import (
+    DETAIL,
+    DRIFT,
+    completed,
+    continuation_errors,
+    in_one_piece,
+    mostly_beside,
+    push_pull,
+    unlike,
+)
 from smokelift.footage.clear_values import STRIDE, clear_values, smoke_of
 from smokelift.footage.clip import Clip
 from smokelift.footage.exposure import sample_gains, small_size
@@ -82,7 +91,7 @@ class SteadySamples:
     def plate(self) -> Plate:
         """Return the plate of a background of more than one colour."""
         found = clear_picture(self.pictures, self.noise)
-        return Plate(found.image, found.known.astype(np.float32), self.noise)
+        return Plate(found.image, found.known.astype(np.float32), self.noise, found.errors)
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,12 +108,15 @@ class ClearPicture:
         Where each of the samples shows the background that is known.
     contrast : (rows, columns)
         By what the detail of the samples' mean is multiplied to be that of the background; 0 where smoke hides it.
+    errors : (3, 3)
+        As of `smokelift.footage.plate.Plate`.
     """
 
     image: Picture
     known: npt.NDArray[np.bool_]
     clear: npt.NDArray[np.bool_]
     contrast: Picture
+    errors: Picture
 
 
 def estimate_plate(clip: Clip, sample_count: int = 32) -> Plate:
@@ -187,7 +199,7 @@ def clear_picture(
         mean[never] = push_pull(linear_to_srgb(image), sure.astype(np.float32))[never]
         image[never] = srgb_to_linear(mean[never])
     complete, contrast = completed(image, known, sure, mean, smoke.brightness, brightens, detail)
-    return ClearPicture(complete, known, clear, contrast)
+    return ClearPicture(complete, known, clear, contrast, continuation_errors(complete, sure))
 
 
 def steady_samples(clip: Clip, count: int = 32) -> SteadySamples:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
-from smokelift.footage.behind_smoke import in_one_piece, mostly_beside, push_pull, unlike
+from smokelift.footage.behind_smoke import continuation_errors, in_one_piece, mostly_beside, push_pull, unlike
 
 HEIGHT, WIDTH = 40, 60
+COLOUR = np.array([0.3, 0.2, 0.1], np.float32)
 
 
 def hole() -> np.ndarray:
@@ -62,3 +64,50 @@ def test_a_patch_counts_if_it_borders_on_more_that_is_known() -> None:
     assert kept[12:15, 20:40].all()
     assert not kept[20:23, 28:31].any()
     assert kept[known].all()
+
+
+def bricks(deviation: float) -> np.ndarray:
+    """A wall of one colour, whose bricks of 16 x 16 pixels are brighter and darker."""
+    light = 1 + deviation * np.random.default_rng(4).standard_normal((8, 14, 1))
+    return (np.kron(light, np.ones((16, 16, 1))) * COLOUR).astype(np.float32)
+
+
+def column(width: int, shape: tuple[int, ...]) -> np.ndarray:
+    """All but a column in the middle is known."""
+    known = np.ones(shape[:2], np.bool_)
+    known[:, (shape[1] - width) // 2 : (shape[1] + width) // 2] = False
+    return known
+
+
+def test_errors_are_along_the_walls_colour_and_as_large_as_behind_the_smoke() -> None:
+    wall = bricks(0.15)
+    known = column(32, wall.shape)
+    variances, axes = np.linalg.eigh(continuation_errors(wall, known))
+    assert abs(axes[:, 2] @ COLOUR) > 0.999 * np.linalg.norm(COLOUR)
+    assert np.sqrt(variances[2]) == pytest.approx(0.15 * np.linalg.norm(COLOUR), rel=0.5)
+    assert variances[1] < 1e-3 * variances[2]
+    # what is hidden has no part in it
+    wall[~known] = 0.9
+    np.testing.assert_array_equal(continuation_errors(wall, known), continuation_errors(wall * known[..., None], known))
+
+
+def test_errors_of_large_pictures_are_about_those_of_reduced_ones() -> None:
+    wall = bricks(0.15)
+    small, large = (
+        np.trace(continuation_errors(np.kron(wall, np.ones((n, n, 1), np.float32)), column(32 * n, (128 * n, 224 * n))))
+        for n in (2, 4)
+    )
+    assert large == pytest.approx(small, rel=0.2)
+
+
+def test_a_plain_wall_is_continued_without_errors() -> None:
+    wall = bricks(0.0)
+    known = column(32, wall.shape)
+    np.testing.assert_allclose(push_pull(wall, known.astype(np.float32)), wall, rtol=1e-5)
+    assert continuation_errors(wall, known).max() < 1e-10
+
+
+@pytest.mark.parametrize("width", [0, 224], ids=["all known", "nothing known"])
+def test_nothing_to_leave_out_leaves_no_errors(width: int) -> None:
+    wall = bricks(0.15)
+    assert not continuation_errors(wall, column(width, wall.shape)).any()

@@ -111,6 +111,7 @@ def test_what_smoke_never_leaves_keeps_the_detail_that_shows_through() -> None:
     plate = found(film(truth, column=True))
     inside = np.s_[:, 615:665]
     assert (plate.confidence[inside] < 0.5).mean() > 0.9
+    assert 0.03 < np.sqrt(np.trace(plate.errors)) < 0.2
     apart = codes_apart(plate.image, truth)[inside]
     assert np.mean(apart) < 22
     fine, wanted = (linear_to_srgb(image)[inside].mean(-1) for image in (plate.image, truth))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from films import codes_apart
@@ -50,7 +52,9 @@ def test_a_part_has_the_parts_plate() -> None:
     turns = shake(3)
     frames, _ = pictures(wall(), turns)
     plates = estimate_panorama(clip_of(frames), Turns(LENS, turns))
+    plates = replace(plates, errors=np.diag([1e-3, 2e-3, 3e-3]).astype(np.float32))
     part = plates.through(lambda whole: whole[10:50, 20:90], 1.0).at(3)
+    np.testing.assert_array_equal(part.errors, plates.errors)
     np.testing.assert_array_equal(part.image, plates.at(3).image[10:50, 20:90])
 
 

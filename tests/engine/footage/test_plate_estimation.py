@@ -76,6 +76,7 @@ def test_pixels_that_are_never_clear_are_filled_and_marked(tmp_path: Path) -> No
     inner = (np.abs(columns - WIDTH / 2) < 3) & (rows > 34)
     assert plate.confidence[inner].max() < 0.5
     assert plate.confidence[np.abs(columns - WIDTH / 2) > 8].min() == 1.0
+    assert 0 < np.sqrt(np.trace(plate.errors)) < 0.05
     assert codes_apart(plate.image, truth)[inner].max() < 20
     assert all(matte(clip.frame(n), plate).mask[inner].all() for n in (0, 11, 23))
 
