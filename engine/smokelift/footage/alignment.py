@@ -136,11 +136,9 @@ class Level:
 
 def levels(picture: Picture, lens: Lens, count: int = LEVELS) -> tuple[Level, ...]:
     """Return a linear picture (rows, columns, 3) at all resolutions or the finest of them, the coarsest first."""
-    width, height = lens.size
-    scale = max(1.0, max(width, height) / LONGEST)
     found = []
     for halvings in range(count):
-        columns, rows = (max(8, round(n / scale / 2**halvings)) for n in (width, height))
+        columns, rows = level_size(lens, halvings)
         picture = area_average(picture, columns, rows)
         encoded = linear_to_srgb(picture)
         grey: Picture = (encoded[..., 0] + encoded[..., 1] + encoded[..., 2]) / np.float32(3)  # faster than a mean
@@ -148,6 +146,13 @@ def levels(picture: Picture, lens: Lens, count: int = LEVELS) -> tuple[Level, ..
         contrast = np.sqrt(blurred(detail**2, AROUND) + FAINT**2)
         found.append(Level(lens.resized(columns, rows), (detail / contrast).astype(np.float32)))
     return tuple(found[::-1])
+
+
+def level_size(lens: Lens, halvings: int = 0) -> tuple[int, int]:
+    """Return width and height of a picture of a lens at its finest resolution, or after so many halvings."""
+    scale = max(1.0, max(lens.size) / LONGEST) * 2**halvings
+    columns, rows = (max(8, round(n / scale)) for n in lens.size)
+    return columns, rows
 
 
 @dataclass(frozen=True, eq=False)

@@ -296,7 +296,10 @@ class Clip:
     ) -> Picture:
         """Return the area averages of `glimpse_through`."""
         divisor = max(self.size) // longest
-        image = self._read(n, lambda number: self._source.glimpse(number, divisor))
+        if divisor < 2:
+            image = self._kept_or_coded(n)
+        else:
+            image = self._read(n, lambda number: self._source.glimpse(number, divisor))
         if isinstance(image, CodedPicture):
             return CodedPicture(image.codes, change(image.table)).averaged(width, height)
         return area_average(change(image), width, height)

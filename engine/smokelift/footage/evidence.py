@@ -67,17 +67,14 @@ def evidence(clip: Clip) -> Clip:
     return whole.part(first if start is None else start, last)
 
 
-def glimpses(clip: Clip, shot: Clip, change: Callable[[Picture], NDArray[Value]]) -> Iterator[NDArray[Value]]:
-    """Glimpse again at the frames from which `evidence` found that a clip belongs to a shot.
-
-    ``change`` is applied to every linear value by itself; `linear` leaves it.
-    """
-    yield from (clip.glimpse_through(number, GLIMPSE, change) for number in looks(clip))
+def glimpses(clip: Clip, shot: Clip, look: Callable[[Clip, int], NDArray[Value]]) -> Iterator[NDArray[Value]]:
+    """Look again, in some way, at the frames from which `evidence` found that a clip belongs to a shot."""
+    yield from (look(clip, number) for number in looks(clip))
     if len(shot) > len(clip):
         whole = clip.whole()
         for number in looks(whole):
             if 0 <= number - shot.first < len(shot) and not 0 <= number - clip.first < len(clip):
-                yield whole.glimpse_through(number, GLIMPSE, change)
+                yield look(whole, number)
 
 
 def linear(values: Picture) -> Picture:

@@ -143,9 +143,9 @@ class LargeSamples:
         sizes = zip(shown.shape[1:], self.clip.size[::-1], strict=True)
         down, across = (_edges(*each) for each in sizes)
         total = np.zeros((down[-1], across[-1], 3), np.float32)
-        weights = shown[..., None] / (self.gains[WHOLE, None, None] * shown.sum(0, dtype=np.float32)[..., None])
-        for number, weight in zip(self.numbers[WHOLE], weights, strict=True):
-            self.clip.add_weighted(number, weight, (down, across), total)
+        times = shown.sum(0, dtype=np.float32)[..., None]
+        for number, gain, clear in zip(self.numbers[WHOLE], self.gains[WHOLE], shown, strict=True):
+            self.clip.add_weighted(number, clear[..., None] / (gain * times), (down, across), total)
         return total
 
     def _spread(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from smokelift.footage.backdrop import backdrop_plate
 from smokelift.footage.clip import Clip
 from smokelift.footage.evidence import GLIMPSE, glimpses, linear
-from smokelift.footage.exposure import sample_gains, small
+from smokelift.footage.exposure import sample_gains, small, small_size
 from smokelift.footage.images import Picture, area_average
 from smokelift.footage.noise import BLOCK, BLOCKS_APART, Noise, encode_sample, linear_samples, some_blocks
 from smokelift.footage.plate import Plate
@@ -44,13 +44,20 @@ def plain_plate(clip: Clip, shot: Clip) -> Plate | None:
     if divisor < 2 or min(width, height) < BLOCKS_APART * BLOCK:
         return None
     columns, rows = round(width / divisor), max(1, round(height / divisor))
-    shown = list(glimpses(clip, shot, linear))
-    fits = all(glimpse.shape[:2] == (rows, columns) for glimpse in shown)
-    seen = shown if fits else [area_average(glimpse, columns, rows) for glimpse in shown]
-    tiny = [small(glimpse) for glimpse in seen]
+    size = small_size(columns, rows)
+
+    def encoded(of: Clip, number: int) -> npt.NDArray[np.uint16]:
+        return of.glimpse_through(number, GLIMPSE, encode_sample)
+
+    seen: list[Picture] = []
+    if clip.glimpse(0, GLIMPSE).shape[:2] == (rows, columns):
+        tiny = list(glimpses(clip, shot, lambda of, number: of.glimpse_average(number, GLIMPSE, linear, *size)))
+    else:
+        seen = list(glimpses(clip, shot, lambda of, number: of.glimpse_average(number, GLIMPSE, linear, columns, rows)))
+        tiny = [area_average(glimpse, *size) for glimpse in seen]
     if _colour(map(encode_sample, tiny), tiny) is None:  # which most walls show
         return None
-    samples = glimpses(clip, shot, encode_sample) if fits else map(encode_sample, seen)
+    samples = map(encode_sample, seen) if seen else glimpses(clip, shot, encoded)
     if _colour(samples, tiny) is None:
         return None
     numbers = clip.spread(SAMPLES)

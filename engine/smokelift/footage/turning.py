@@ -23,9 +23,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from smokelift.footage.alignment import Lens, align, judged, levels, points_of, shift
+from smokelift.footage.alignment import Lens, align, judged, level_size, levels, points_of, shift
 from smokelift.footage.clip import Clip, ClipError
-from smokelift.footage.evidence import GLIMPSE, looks
+from smokelift.footage.evidence import GLIMPSE, linear, looks
+from smokelift.footage.images import Picture
 from smokelift.footage.large_plate import large_frames
 from smokelift.footage.parallax import travels
 from smokelift.scene import Camera, as_matrix
@@ -160,10 +161,14 @@ def file_turns(clip: Clip, turns: Turns) -> dict[int, Rotation]:
 def _stands_still(clip: Clip, lens: Lens) -> bool:
     """Whether none of the frames that are looked at shows more of the same once it is turned."""
     numbers = large_frames(clip)[FIRST_OF_LARGE] or looks(clip)[FIRST_LOOKS]
-    key = levels(clip.glimpse(numbers.pop(len(numbers) // 2), GLIMPSE), lens)
+
+    def seen(number: int) -> Picture:
+        return clip.glimpse_average(number, GLIMPSE, linear, *level_size(lens))
+
+    key = levels(seen(numbers.pop(len(numbers) // 2)), lens)
     first, same = points_of(key), []
     for number in numbers:
-        picture = clip.glimpse(number, GLIMPSE)
+        picture = seen(number)
         stands = judged(first[-1], levels(picture, lens, 1)[0], Rotation.identity()).same
         # a turn cannot make so much of more than all
         same.append(stands if stands > MOVED else align(first, levels(picture, lens), Rotation.identity()).same)

@@ -368,6 +368,9 @@ def test_a_glimpse_is_a_smaller_picture_of_the_same(tmp_path: Path, rotation: in
         assert glimpse.shape == (height // 2, width // 2, 3)
         assert np.abs(linear_to_srgb(glimpse) - linear_to_srgb(whole[::2, ::2])).max() < 2 / 255
         assert clip.glimpse(1, 1000) is whole
+        for longest in (100, 1000):
+            found = clip.glimpse_average(1, longest, linear_to_srgb, 40, 30)
+            assert np.array_equal(found, area_average(linear_to_srgb(clip.glimpse(1, longest)), 40, 30))
         with pytest.raises(ClipError, match="no frame"):
             clip.glimpse(3, 100)
 
