@@ -110,7 +110,7 @@ def shortcomings(figures: Rows[Mapping[str, Any]], empty: int) -> list[str]:
         said.append(
             f"Hardly any smoke was fitted: a typical frame still differs from the clip by {typical:.0%} of what its "
             "smoke changes there, and its psnr is as high as it is because the smoke is faint. Give the "
-            "background, the light or the medium that the clip was filmed in in a scene file; `smokelift inspect` says "
+            "background, the light or the medium of the clip in a scene file; `smokelift inspect` says "
             "what was taken."
         )
     elif typical > DOUBTFUL:
