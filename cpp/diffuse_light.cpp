@@ -79,10 +79,7 @@ constexpr Series OF_ESCAPED = ESCAPED.slope(), OF_LEFT = LEFT.slope(), OF_SLANTE
 
 } // namespace
 
-BlockTransport::BlockTransport(const float *extinction, float albedo, const Shape &n, float edge)
-    : n_(n), albedo_(albedo), scattering_(extinction, extinction + volume(n)) {
-    for (float &value : scattering_)
-        value *= albedo;
+BlockTransport::BlockTransport(const float *extinction, const Shape &n, float edge) : n_(n) {
     for (auto *values : {&own_, &of_own_})
         for (auto &part : *values)
             part.assign(volume(n), 0.0f);
@@ -188,7 +185,7 @@ SMOKELIFT_INLINE void BlockTransport::follow(const Direction &d, const float *al
         }
     } else {
         constexpr std::size_t ROWS = 8; // side by side, since a beam waits for itself
-        const std::size_t rows = scattering_.size() / nz;
+        const std::size_t rows = volume(n_) / nz;
         std::vector<float> arriving(ROWS * nz);
         for (std::size_t row = 0; row < rows; row += ROWS) {
             const std::size_t first = row * nz, number = std::min(ROWS, rows - row);
@@ -213,7 +210,7 @@ const BlockTransport::Crossing &BlockTransport::crossing(int line) const {
 // What leaves blocks along the line, and against it: of the mean and of the rise of an emission.
 SMOKELIFT_CLONES
 void BlockTransport::sources_along(int line, const float *emission, float *along, float *against) const {
-    const std::size_t count = scattering_.size();
+    const std::size_t count = volume(n_);
     const Crossing &c = crossing(line);
     const float l = c.length, x = l * float(LINES[line][0]), y = l * float(LINES[line][1]),
                 z = l * float(LINES[line][2]);
@@ -230,7 +227,7 @@ void BlockTransport::sources_along(int line, const float *emission, float *along
 SMOKELIFT_CLONES
 void BlockTransport::sources_across(int line, const float *slope, float *both) const {
     const Crossing &c = crossing(line);
-    for (std::size_t i = 0; i < scattering_.size(); ++i)
+    for (std::size_t i = 0; i < volume(n_); ++i)
         both[i] = c.length * c.escaped[i] * slope[i];
 }
 
@@ -276,7 +273,7 @@ void BlockTransport::arriving(int line, const float *both, float *sum) const {
 SMOKELIFT_CLONES
 void BlockTransport::add_line_gradient(int line, const float *emission, const float *weights,
                                        float *result) const {
-    const std::size_t count = scattering_.size();
+    const std::size_t count = volume(n_);
     const Crossing &c = crossing(line);
     const float l = c.length, x = float(LINES[line][0]), y = float(LINES[line][1]), z = float(LINES[line][2]);
     std::vector<float> memory(6 * count);
@@ -318,7 +315,7 @@ void BlockTransport::add_line_gradient(int line, const float *emission, const fl
 // Of a line: the sum of what arrives, the difference, and across an axis the sums of the two slopes.
 SMOKELIFT_CLONES
 void BlockTransport::gather(const float *emission, const float *sums, float *mean) const {
-    const std::size_t count = scattering_.size();
+    const std::size_t count = volume(n_);
     const auto of = [&](int line, int part) { return sums + (line * FIELDS + part) * count; };
     const float weights[2] = {classes_[0].weight, classes_[1].weight};
     const float *const passing[2] = {classes_[0].escaped.data(), classes_[1].escaped.data()};
@@ -353,7 +350,7 @@ void BlockTransport::gather(const float *emission, const float *sums, float *mea
 }
 
 void BlockTransport::mean_radiance(const float *emission, float *mean, Workers &workers) const {
-    const std::size_t count = scattering_.size();
+    const std::size_t count = volume(n_);
     const std::unique_ptr<float[]> memory(new float[std::size(LINES) * FIELDS * count]); // not cleared
     float *const sums = memory.get();
     workers.run(std::size(LINES), [&](int line) {
@@ -374,7 +371,7 @@ void BlockTransport::mean_radiance(const float *emission, float *mean, Workers &
 
 void BlockTransport::add_extinction_gradient(const float *emission, const float *weights, float *result,
                                              Workers &workers) const {
-    const std::size_t count = scattering_.size();
+    const std::size_t count = volume(n_);
     std::vector<float> sums(std::size(LINES) * count, 0.0f);
     workers.run(std::size(LINES),
                 [&](int line) { add_line_gradient(line, emission, weights, sums.data() + line * count); });
@@ -388,32 +385,73 @@ void BlockTransport::add_extinction_gradient(const float *emission, const float 
     }
 }
 
-// <a, b>, weighted by the scattering.
-double BlockTransport::product(const std::vector<float> &a, const std::vector<float> &b) const {
-    const std::size_t count = scattering_.size();
-    double sum = 0;
-    for (std::size_t i = 0; i < count; ++i) {
-        float slopes = 0;
-        for (int field = 1; field < FIELDS; ++field)
-            slopes += a[field * count + i] * b[field * count + i];
-        sum += double(scattering_[i]) * (a[i] * b[i] + SPREAD * slopes);
-    }
-    return sum;
+// The box around the blocks that scatter: no other takes part in the equation. One block where none does.
+DiffuseLight::Part DiffuseLight::around_smoke(const float *extinction, const Shape &n) {
+    Shape low = n, high{};
+    const float *at = extinction;
+    for (int x = 0; x < n[0]; ++x)
+        for (int y = 0; y < n[1]; ++y)
+            for (int z = 0; z < n[2]; ++z)
+                if (*at++ > 0) {
+                    const Shape here{x, y, z};
+                    for (int axis = 0; axis < 3; ++axis) {
+                        low[axis] = std::min(low[axis], here[axis]);
+                        high[axis] = std::max(high[axis], here[axis] + 1);
+                    }
+                }
+    if (high[0] == 0)
+        return {Shape{0, 0, 0}, Shape{1, 1, 1}};
+    return {low, Shape{high[0] - low[0], high[1] - low[1], high[2] - low[2]}};
 }
 
-void BlockTransport::solve(const float *emission, float *phi, Workers &workers) const {
+// visit(at, in_part) for the first blocks of all rows of the part: the place among all, and in the part.
+template <class Visit> void DiffuseLight::over_part(const Visit &visit) const {
+    const auto [x, y, z] = part_.first;
+    for (int i = 0; i < part_.n[0]; ++i)
+        for (int j = 0; j < part_.n[1]; ++j)
+            visit((std::size_t(x + i) * n_[1] + y + j) * n_[2] + z,
+                  (std::size_t(i) * part_.n[1] + j) * part_.n[2]);
+}
+
+std::vector<float> DiffuseLight::cut(const float *values, int fields) const {
+    const std::size_t all = volume(n_), count = volume(part_.n);
+    std::vector<float> result(fields * count);
+    over_part([&](std::size_t at, std::size_t in_part) {
+        for (int field = 0; field < fields; ++field)
+            std::copy_n(values + field * all + at, part_.n[2], result.data() + field * count + in_part);
+    });
+    return result;
+}
+
+DiffuseLight::DiffuseLight(const float *extinction, float albedo, const Shape &n, float edge)
+    : n_(n), part_(around_smoke(extinction, n)), albedo_(albedo), scattering_(cut(extinction, 1)),
+      everywhere_(extinction, n, edge), smoke_(scattering_.data(), part_.n, edge) {
+    for (float &value : scattering_) // the extinction so far
+        value *= albedo;
+}
+
+// The mean radiance of all orders in the part, from that of the first.
+std::vector<float> DiffuseLight::all_orders(std::vector<float> residual, Workers &workers) const {
     const std::size_t count = scattering_.size(), size = FIELDS * count;
-    std::vector<float> residual(size), search, moved(size), scattered(size);
-    mean_radiance(emission, residual.data(), workers);
-    std::fill_n(phi, size, 0.0f);
-    search = residual;
+    // <a, b>, weighted by the scattering
+    const auto product = [&](const std::vector<float> &a, const std::vector<float> &b) {
+        double sum = 0;
+        for (std::size_t i = 0; i < count; ++i) {
+            float slopes = 0;
+            for (int field = 1; field < FIELDS; ++field)
+                slopes += a[field * count + i] * b[field * count + i];
+            sum += double(scattering_[i]) * (a[i] * b[i] + SPREAD * slopes);
+        }
+        return sum;
+    };
+    std::vector<float> phi(size, 0.0f), search = residual, moved(size), scattered(size);
     double square = product(residual, residual);
     const double enough = TOLERANCE * TOLERANCE * square;
     for (int iteration = 0; iteration < MOST_ITERATIONS && square > enough; ++iteration) {
         for (int field = 0; field < FIELDS; ++field)
             for (std::size_t i = 0; i < count; ++i)
                 scattered[field * count + i] = scattering_[i] * search[field * count + i];
-        mean_radiance(scattered.data(), moved.data(), workers);
+        smoke_.mean_radiance(scattered.data(), moved.data(), workers);
         for (std::size_t i = 0; i < size; ++i)
             moved[i] = search[i] - moved[i];
         const auto step = static_cast<float>(square / product(search, moved));
@@ -426,31 +464,53 @@ void BlockTransport::solve(const float *emission, float *phi, Workers &workers) 
         for (std::size_t i = 0; i < size; ++i)
             search[i] = residual[i] + factor * search[i];
     }
-    for (std::size_t i = 0; i < size; ++i) // what is left, scattered no more
-        phi[i] += residual[i];
+    return phi;
+}
+
+// source = emission + scattering x in_smoke,  phi = G source,  everywhere.
+void DiffuseLight::scatter(const std::vector<float> &in_smoke, const float *emission, float *phi,
+                           std::vector<float> &source, Workers &workers) const {
+    const std::size_t all = volume(n_), count = scattering_.size();
+    source.assign(emission, emission + FIELDS * all);
+    over_part([&](std::size_t at, std::size_t in_part) {
+        for (int field = 0; field < FIELDS; ++field)
+            for (int i = 0; i < part_.n[2]; ++i)
+                source[field * all + at + i] +=
+                    scattering_[in_part + i] * in_smoke[field * count + in_part + i];
+    });
+    everywhere_.mean_radiance(source.data(), phi, workers);
+}
+
+void DiffuseLight::solve(const float *emission, float *phi, Workers &workers) const {
+    std::vector<float> first(FIELDS * scattering_.size()), source;
+    smoke_.mean_radiance(cut(emission, FIELDS).data(), first.data(), workers);
+    scatter(all_orders(std::move(first), workers), emission, phi, source, workers);
 }
 
 // G is its own adjoint in the product <,>, so with  q: of_phi = <q, phi>  and  mu = G (q + scattering mu):
 //     d(of_phi^T phi) = <mu, d emission + phi d scattering> + <q + scattering mu, dG (emission + scattering
 //     phi)>.
-void BlockTransport::solve_adjoint(const float *emission, const float *phi, const float *of_phi,
-                                   float *of_emission, float *of_extinction, Workers &workers) const {
-    const std::size_t count = scattering_.size(), size = FIELDS * count;
-    std::vector<float> asked(of_phi, of_phi + size), source(size), weights(size);
+void DiffuseLight::solve_adjoint(const float *emission, const float *phi, const float *of_phi,
+                                 float *of_emission, float *of_extinction, Workers &workers) const {
+    const std::size_t count = volume(n_), size = FIELDS * count;
+    std::vector<float> asked(of_phi, of_phi + size), source(emission, emission + size), weights;
     for (std::size_t i = count; i < size; ++i)
         asked[i] /= SPREAD;
-    solve(asked.data(), of_emission, workers);
+    everywhere_.mean_radiance(asked.data(), of_emission, workers); // asked where there is no smoke, too
+    scatter(all_orders(cut(of_emission, FIELDS), workers), asked.data(), of_emission, weights, workers);
+    over_part([&](std::size_t at, std::size_t in_part) {
+        for (int field = 0; field < FIELDS; ++field)
+            for (int i = 0; i < part_.n[2]; ++i)
+                source[field * count + at + i] += scattering_[in_part + i] * phi[field * count + at + i];
+    });
     for (int field = 0; field < FIELDS; ++field) {
         const float share = field ? SPREAD : 1.0f;
         for (std::size_t i = 0; i < count; ++i) {
-            const std::size_t at = field * count + i;
-            source[at] = emission[at] + scattering_[i] * phi[at];
-            weights[at] = asked[at] + scattering_[i] * of_emission[at];
-            of_emission[at] *= share;
-            of_extinction[i] += albedo_ * phi[at] * of_emission[at];
+            of_emission[field * count + i] *= share;
+            of_extinction[i] += albedo_ * phi[field * count + i] * of_emission[field * count + i];
         }
     }
-    add_extinction_gradient(source.data(), weights.data(), of_extinction, workers);
+    everywhere_.add_extinction_gradient(source.data(), weights.data(), of_extinction, workers);
 }
 
 } // namespace smokelift

@@ -337,10 +337,10 @@ void register_render(py::module_ &module) {
             float *const phi = radiance.mutable_data();
             released([&](Workers &workers) {
                 const std::size_t count = volume(n);
-                const BlockTransport transport(means.data(), albedo, n, edge);
+                const DiffuseLight light(means.data(), albedo, n, edge);
                 for (int channel = 0; channel < channels; ++channel)
-                    transport.solve(means.data() + (1 + channel * Blocks::FIELDS) * count,
-                                    phi + channel * Blocks::FIELDS * count, workers);
+                    light.solve(means.data() + (1 + channel * Blocks::FIELDS) * count,
+                                phi + channel * Blocks::FIELDS * count, workers);
             });
             return radiance;
         },
@@ -357,12 +357,12 @@ void register_render(py::module_ &module) {
             float *const result = of_means.mutable_data();
             released([&](Workers &workers) {
                 const std::size_t count = volume(n);
-                const BlockTransport transport(means.data(), albedo, n, edge);
+                const DiffuseLight light(means.data(), albedo, n, edge);
                 std::fill_n(result, count, 0.0f);
                 for (int channel = 0; channel < channels; ++channel) {
                     const std::size_t at = channel * Blocks::FIELDS * count;
-                    transport.solve_adjoint(means.data() + count + at, radiance.data() + at,
-                                            of_radiance.data() + at, result + count + at, result, workers);
+                    light.solve_adjoint(means.data() + count + at, radiance.data() + at,
+                                        of_radiance.data() + at, result + count + at, result, workers);
                 }
             });
             return of_means;

@@ -63,7 +63,7 @@ def test_coloured_smoke_in_white_light_is_deeper_in_colour_where_light_is_scatte
     ids=["one light", "several, hull", "coloured smoke"],
 )
 def test_gradient_equals_a_complex_step(density, lights, hull, colour):
-    """In voxels at random, those that light reaches late among them."""
+    """In voxels at random, those that light reaches late among them, and in empty ones, near the smoke and far."""
     medium = replace(MEDIUM, color=colour)
     rng = np.random.default_rng(5)
     support = density > 0.2 if hull else None
@@ -72,7 +72,9 @@ def test_gradient_equals_a_complex_step(density, lights, hull, colour):
     ours = renderer(lights, medium, support)
     ours.image(values.astype(np.float32), keep_record=True)
     gradient = ours.gradient(weights.astype(np.float32))
-    for voxel in rng.choice(np.argwhere(values > 0), 3, replace=False):
+    smoky = rng.choice(np.argwhere(values > 0), 3, replace=False)
+    empty = [] if hull else [(3, 3, 27), (3, 2, 46)]
+    for voxel in [*smoky, *empty]:
         moved = values.astype(complex)
         moved[tuple(voxel)] += 1e-30j
         slope = np.sum(weights * exact(moved, lights, medium)).imag / 1e-30
