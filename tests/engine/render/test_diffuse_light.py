@@ -81,6 +81,20 @@ def test_gradient_equals_a_complex_step(density, lights, hull, colour):
         assert gradient[tuple(voxel)] == pytest.approx(slope, rel=2e-3, abs=1e-3 * float(np.abs(gradient).max()))
 
 
+def test_gradient_of_thick_smoke_before_black_equals_a_complex_step(density):
+    """Light in empty blocks beside the smoke counts; before a wall, what the smoke hides would outweigh it."""
+    medium, black = replace(MEDIUM, extinction=40.0), np.zeros(3, np.float32)
+    ours = renderer(medium=medium, background=black)
+    ours.image(density, keep_record=True)
+    gradient = ours.gradient(np.ones((11, 12, 3), np.float32))
+    for voxel in ((4, 0, 31), (2, 0, 30), (2, 2, 37), (3, 2, 39)):
+        moved = density.astype(complex)
+        moved[voxel] += 1e-30j
+        image = reference.render(moved, CAMERA, DOMAIN, medium, (SUN,), black.astype(float), "multiple")
+        slope = np.sum(image).imag / 1e-30
+        assert gradient[voxel] == pytest.approx(slope, rel=3e-3, abs=1e-3 * float(np.abs(gradient).max()))
+
+
 def test_the_box_around_the_smoke_changes_nothing(density):
     """Blocks lie alike whatever the support, and light crosses the empty ones."""
     values = density.copy()
