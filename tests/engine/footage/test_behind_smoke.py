@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from smokelift.footage.behind_smoke import continuation_errors, in_one_piece, mostly_beside, push_pull, unlike
 
@@ -53,6 +54,15 @@ def test_specks_are_accidents() -> None:
     assert not found[14:26, 22:38].any()
     assert found[2:4, 2:4].all()
     assert (found == expected).mean() > 0.98
+
+
+def test_what_most_of_a_square_shows_is_its_median() -> None:
+    """Beyond the edges too, where the picture is its own mirror image."""
+    known = ndimage.gaussian_filter(np.random.default_rng(0).random((40, 60)), 2) > 0.5
+    smooth = ndimage.median_filter(known.astype(np.uint8), 7) > 0
+    islands, count = ndimage.label(smooth)
+    large = [n for n in range(1, count + 1) if (islands == n).mean() > 0.01]
+    assert np.array_equal(in_one_piece(known), np.isin(islands, large))
 
 
 def test_a_patch_counts_if_it_borders_on_more_that_is_known() -> None:
