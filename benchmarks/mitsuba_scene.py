@@ -18,6 +18,10 @@ mi.set_variant("llvm_ad_rgb")
 # Mitsuba's environment has its pole along +Y and looks up atan2(x, -z).
 ENVIRONMENT_TO_WORLD = mi.ScalarTransform4f(np.array([[0.0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]]))
 
+ENDLESS = 1_000_000
+"""Bounces before paths end at random. Mitsuba's roulette ends 5 % of all paths at least, so that in white smoke the
+weight of those that go on grows by 4 % a bounce, and a few paths make a pixel."""
+
 
 def volume(values: np.ndarray, low: np.ndarray, high: np.ndarray) -> dict[str, Any]:
     """Describe values [x, y, z] at voxel centres of a box, trilinear between them."""

@@ -15,7 +15,7 @@ from pathlib import Path
 import mitsuba as mi
 import numpy as np
 
-from benchmarks.mitsuba_scene import emitter, path_traced, sensor, smoke
+from benchmarks.mitsuba_scene import ENDLESS, emitter, path_traced, sensor, smoke
 
 ALBEDOS, DEPTHS = (0.7, 0.9, 0.99), (2.0, 6.0, 15.0)  # optical depths of the thickest column seen from the front
 DIRECTIONS = {  # of travel, 35 degrees downwards
@@ -25,7 +25,6 @@ DIRECTIONS = {  # of travel, 35 degrees downwards
 }
 DISTANCE, FOV = 7.0, 30.0  # of the camera from the axis (m); degrees
 IRRADIANCE = 2 * math.pi
-ROULETTE = 12  # bounces before paths end at random; none end otherwise
 
 
 def main() -> None:
@@ -48,7 +47,7 @@ def main() -> None:
         medium = {"extinction": depth / column, "albedo": albedo}
         sun = {"type": "directional", "direction": DIRECTIONS[light], "irradiance": [IRRADIANCE] * 3}
         scene = {
-            "integrator": {"type": "volpath", "max_depth": -1, "rr_depth": ROULETTE, "hide_emitters": True},
+            "integrator": {"type": "volpath", "max_depth": -1, "rr_depth": ENDLESS, "hide_emitters": True},
             "camera": sensor(camera),
             "domain": smoke(density, low, low + size, medium, {"type": "isotropic"}),
             "light": emitter(sun),

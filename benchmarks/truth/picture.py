@@ -24,6 +24,7 @@ import numpy as np
 
 from benchmarks.example.render import YAWS, blocks, crop, srgb_decode, srgb_encode, turned, wall, write_png, write_video
 from benchmarks.mitsuba_scene import (
+    ENDLESS,
     emitter,
     integral,
     march,
@@ -43,7 +44,6 @@ CHECK_BLOCK = 16  # pixels; volpath's noise is averaged over such blocks
 CHECK_PASSES, CHECK_SAMPLES = 4, 4096  # a block
 ANY = -1  # number of bounces
 SAMPLES = 512  # with multiple scattering
-ROULETTE = 12  # bounces before paths end at random
 IRRADIANCE = 8.0  # of a light, at the middle of the box
 LIGHT_DISTANCE = 2.5  # of a point light from there (m)
 SUNS = {"front": (0.0, 0.819152, -0.573576), "back": (0.0, -0.819152, -0.573576)}  # directions of travel
@@ -137,7 +137,7 @@ class Renderer:
     ) -> np.ndarray:
         """A picture by `volpath` with paths of a depth, 2 for single scattering; pixels are blocks of the camera's."""
         scene = {
-            "integrator": {"type": "volpath", "max_depth": depth, "rr_depth": ROULETTE, "hide_emitters": True},
+            "integrator": {"type": "volpath", "max_depth": depth, "rr_depth": ENDLESS, "hide_emitters": True},
             "camera": sensor(camera, block),
             "domain": smoke(density, self.low, self.high, self.medium, {"type": "isotropic"}),
             "light": emitter(self.light),
