@@ -13,8 +13,9 @@ from smokelift.footage.alignment import Lens
 from smokelift.footage.backdrop import ONE_COLOUR_NOISE, one_colour
 from smokelift.footage.background import given_plates
 from smokelift.footage.clip import Clip
+from smokelift.footage.cut import find_cut
 from smokelift.footage.evidence import evidence
-from smokelift.footage.exposure import largest_change
+from smokelift.footage.exposure import largest_change, small
 from smokelift.footage.focal_length import FocalLength, focal_length
 from smokelift.footage.large_plate import large_samples
 from smokelift.footage.lens import FILM_WIDTH
@@ -25,7 +26,7 @@ from smokelift.footage.plate_estimation import estimate_plate, steady_samples
 from smokelift.footage.steady import exposures, without_noise_light
 from smokelift.footage.turning import Turns, find_turns
 from smokelift.scene import Background, Camera
-from smokelift.setup.smoke import UNKNOWN, SmokeSamples
+from smokelift.setup.smoke import SAMPLES, UNKNOWN, SmokeSamples
 
 BLACK = 0.001
 """Linear radiance below which a background is called black."""
@@ -146,6 +147,20 @@ def exposure_notes(change: float) -> tuple[str, ...]:
     if change == 0:
         return ()
     return (f"The exposure of the clip changes by up to {change:.0%}: every frame is brought to the background's.",)
+
+
+def cut_notes(clip: Clip) -> tuple[str, ...]:
+    """What is to be said of a clip with a cut, a sentence; nothing of others."""
+    numbers = clip.spread(SAMPLES)
+    pictures = [small(clip.reduced(number)) for number in numbers]
+    after = find_cut(numbers, pictures, lambda number: small(clip.reduced(number)))
+    if after is None:
+        return ()
+    last, first = clip.first + after - 1, clip.first + after
+    return (
+        f"The picture changes at once between frames {last} and {first}, as at a cut, so that no background fits both "
+        f"sides; use one of them, --frames {clip.first}:{last} or {first}:{clip.first + len(clip) - 1}.",
+    )
 
 
 def smoke_in_plate(samples: SmokeSamples) -> tuple[str, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from smokelift.footage.backdrop import ONE_COLOUR_NOISE
 from smokelift.footage.clip import Clip
 from smokelift.footage.plate import Plates
+from smokelift.setup.background import cut_notes
 from smokelift.setup.smoke import SAMPLES, SmokeSamples
 
 _GIVE = "give a clean plate, or a color ([background] in a scene file, Clean Plate in Blender)"
@@ -31,6 +32,8 @@ def nothing_seen(clip: Clip, plates: Plates, samples: SmokeSamples, given: bool)
 
 def what_helps(clip: Clip, plates: Plates, given: bool) -> str:
     """What may show the smoke of a clip in which none is found, in a sentence; see `nothing_seen`."""
+    for cut in cut_notes(clip):
+        return cut
     if given:
         return "Check the background that is given: it may hold the smoke, or belong to another clip."
     if len(clip) == 1 and clip.backdrop is None:

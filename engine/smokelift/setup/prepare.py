@@ -21,7 +21,7 @@ from smokelift.render import scene_optics
 from smokelift.scene import Background, Camera, CompleteScene, Domain, Medium, Scene
 from smokelift.scene.checks import Vector
 from smokelift.setup import smoke
-from smokelift.setup.background import exposure_notes, find_plates, smoke_in_plate
+from smokelift.setup.background import cut_notes, exposure_notes, find_plates, smoke_in_plate
 from smokelift.setup.choice import Choice
 from smokelift.setup.further_views import disagreement, open_view
 from smokelift.setup.geometry import clip_lens, find_geometry
@@ -69,6 +69,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
     found = find_plates(clip, scene.camera, scene.background, lens)
     clip, plates = found.clip, found.plates
     samples = sample_smoke(clip, plates, found.turns)
+    cuts = cut_notes(clip) if found.turns is None else ()
     clip = steady(clip, plates, samples.gains)
     burning = fire_share(samples.colours, samples.behind)
     fire = None
@@ -80,7 +81,8 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
         samples = replace(sample_smoke(clip, plates, found.turns), gains=samples.gains)
     geometry = find_geometry(clip, scene, settings, plates, samples, found.turns)
     camera, domain = geometry.camera, geometry.domain
-    doubts = (*nothing_seen(clip, plates, samples, scene.background is not None), *smoke_in_plate(samples))
+    nothing = nothing_seen(clip, plates, samples, scene.background is not None)
+    doubts = tuple(dict.fromkeys((*nothing, *cuts, *smoke_in_plate(samples))))
     notes = [*remarks, *found.notes, *doubts, *exposure_notes(samples.exposure), *geometry.notes]
     if settings.axis_depth is not None:
         SmokeAxis.given(settings.axis_depth, camera, domain)  # refuse early what cannot be

@@ -17,7 +17,7 @@ from smokelift.footage.panorama import PanoramaPlate
 from smokelift.footage.plain import plain_plate
 from smokelift.output.images import write_image
 from smokelift.setup import background
-from smokelift.setup.background import find_plates, focal_notes, smoke_in_plate
+from smokelift.setup.background import cut_notes, find_plates, focal_notes, smoke_in_plate
 from smokelift.setup.geometry import clip_lens
 from smokelift.setup.smoke import SmokeSamples, sample_smoke
 
@@ -150,3 +150,21 @@ def test_one_colour_that_smoke_hides_is_found_on_frames_beyond_the_clip(tmp_path
     trimmed = Clip.open(tmp_path / "frame_##.png", fps=24, frames=(8, 11))
     assert plain_plate(trimmed, trimmed) is None
     assert "one colour" in find_plates(trimmed, None, None).notes[0]
+
+
+def test_a_cut_is_said_with_the_frames_of_each_side(tmp_path) -> None:
+    """Counted in the file, and of a part of it that has one."""
+    random = np.random.default_rng(0)
+    for n in range(14):
+        if n in (0, 7):
+            wall = np.kron(random.uniform(0.05, 0.5, (9, 7)), np.ones((8, 8)))
+        smoke = 0.6 * np.clip(
+            1.5 - np.hypot(*(np.mgrid[:72, :56] - np.array([60 - 4 * n, 28])[:, None, None])) / 9, 0, 1
+        )
+        write_image(tmp_path / f"frame_{n:02d}.png", wall * (1 - smoke) + 0.6 * smoke)
+    with Clip.open(tmp_path / "frame_##.png", frames=(2, 12)) as clip:
+        (said,) = cut_notes(clip)
+    assert "between frames 6 and 7" in said
+    assert "--frames 2:6 or 7:12" in said
+    with Clip.open(tmp_path / "frame_##.png", frames=(7, 13)) as clip:
+        assert cut_notes(clip) == ()
