@@ -57,7 +57,8 @@ def fire_share(colours: Picture, behind: Picture) -> float:
         return 0.0
     fire = _hot(colours, behind)
     brightest = colours.max(-1)
-    other = ~_warm(colours) & (brightest > FAINTEST)
+    # a core that is clipped to yellow or white does not show its color
+    other = ~_warm(colours) & (brightest > FAINTEST) & (brightest < CLIPPED)
     if fire.mean() < LEAST_FIRE or other.mean() < LEAST_SMOKE:
         return 0.0
     added = (colours - behind).max(-1)

@@ -35,6 +35,14 @@ def test_a_flame_in_dark_smoke_is_fire() -> None:
     assert 0.01 < fire_share(*pixels()) < 0.3
 
 
+def test_a_core_that_is_clipped_to_yellow_is_no_bright_smoke() -> None:
+    """It has lost the color of fire, and says nothing of the smoke's."""
+    overexposed = 8 * np.array(FLAME)
+    seen, _ = pixels(flame=overexposed)
+    assert (seen.min(-1) > 0.5).any()
+    assert fire_share(*pixels(flame=overexposed)) > 0.01
+
+
 @pytest.mark.parametrize(
     "what",
     [
