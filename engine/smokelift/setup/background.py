@@ -42,6 +42,10 @@ MOSTLY = 0.5
 """Share of the smoke's pixels without a known background from which most of the smoke may be in the plate."""
 
 
+FEW = 4
+"""Frames from which on smoke hardly looks the same in all by chance: half of its pairs of successive samples do."""
+
+
 @dataclass(frozen=True, eq=False)
 class FoundPlates:
     """The plates of a clip.
@@ -58,6 +62,8 @@ class FoundPlates:
         What was assumed or estimated, a sentence each.
     turns
         Of the camera, if it was found to turn.
+    doubts
+        Why the plates may be wrong, a sentence each.
     """
 
     clip: Clip
@@ -65,6 +71,7 @@ class FoundPlates:
     background: Background | None
     notes: tuple[str, ...] = ()
     turns: Turns | None = None
+    doubts: tuple[str, ...] = ()
 
 
 def find_plates(
@@ -191,7 +198,8 @@ def _estimated(clip: Clip, evidence_of: Callable[[], Clip], lens: Lens | None, t
     turns, focal = (None, None) if plain or lens is None else _turned(clip, lens, told)
     if turns is None:
         plate = backdrop or samples.plate()
-        return FoundPlates(clip, plate, None, (_found(plate),))
+        few = (_from_few(len(shot)),) if backdrop is None and 1 < len(shot) < FEW else ()
+        return FoundPlates(clip, plate, None, (_found(plate),), doubts=few)
     panorama = estimate_panorama(clip, turns)
     parts = [panorama.at(number) for number in clip.spread(EXPOSURE_SAMPLES)]
     unknown = float(np.mean([part.confidence < UNKNOWN for part in parts]))
@@ -246,6 +254,14 @@ def _found(plate: Plate) -> str:
             "floor or a logo does. If that is smoke, give the color in [background]."
         )
     return _how(unknown)
+
+
+def _from_few(frames: int) -> str:
+    """What is to be said of a background of more than one colour that so few frames show, two at least."""
+    return (
+        f"Only {frames} frames show what is behind the smoke: what is the same in all that there are counts as "
+        "background, smoke too. Give a clean plate, or a color, in [background]."
+    )
 
 
 def _how(unknown: float) -> str:

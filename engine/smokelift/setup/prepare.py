@@ -82,7 +82,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
     geometry = find_geometry(clip, scene, settings, plates, samples, found.turns)
     camera, domain = geometry.camera, geometry.domain
     nothing = nothing_seen(clip, plates, samples, scene.background is not None)
-    doubts = tuple(dict.fromkeys((*nothing, *cuts, *smoke_in_plate(samples))))
+    doubts = tuple(dict.fromkeys((*nothing, *found.doubts, *cuts, *smoke_in_plate(samples))))
     notes = [*remarks, *found.notes, *doubts, *exposure_notes(samples.exposure), *geometry.notes]
     if settings.axis_depth is not None:
         SmokeAxis.given(settings.axis_depth, camera, domain)  # refuse early what cannot be

@@ -168,3 +168,16 @@ def test_a_cut_is_said_with_the_frames_of_each_side(tmp_path) -> None:
     assert "--frames 2:6 or 7:12" in said
     with Clip.open(tmp_path / "frame_##.png", frames=(7, 13)) as clip:
         assert cut_notes(clip) == ()
+
+
+@pytest.mark.parametrize(("count", "doubted"), [(1, False), (2, True), (4, False)])
+def test_a_background_that_few_frames_show_is_doubted(tmp_path, count, doubted) -> None:
+    """But not of a photograph, in which no smoke is found at all."""
+    wall = np.kron(np.random.default_rng(0).uniform(0.05, 0.5, (9, 7)), np.ones((8, 8)))
+    rows, columns = np.mgrid[:72, :56]
+    for n in range(count):
+        smoke = 0.6 * np.clip(1.5 - np.hypot(rows - 60 + 8 * n, columns - 28) / 9, 0, 1)
+        write_image(tmp_path / f"frame_{n}.png", wall * (1 - smoke) + 0.6 * smoke)
+    with Clip.open(tmp_path / "frame_#.png") as clip:
+        doubts = find_plates(clip, None, None).doubts
+    assert any(f"Only {count} frames show" in doubt for doubt in doubts) is doubted
