@@ -196,6 +196,7 @@ def apparent_optical_depth(
     combinations as much as they count, T is the least squares solution. None explains a pixel which the smoke makes
     darker although J is brighter than B. Only smoke in its own shadow does so, and such a pixel counts as thick as can
     be told: a fit that starts from less thins it out until nothing is left (docs/experiments/bright-background.md).
+    Where B is continued from around the smoke, it may as well be too bright, by its errors.
     """
     source = np.zeros(3)
     if optics.scattering != "absorption":
@@ -203,8 +204,10 @@ def apparent_optical_depth(
     contrast = plate.image - source
     power = np.sum(contrast**2, -1)
     clear = np.sum((image - source) * contrast, -1) / np.maximum(power, 1e-12)
-    noise = np.sqrt(np.sum((noise_at(image, plate) * contrast) ** 2, -1))
-    in_shadow = (clear - 1) * power > SMOKE_THRESHOLD * noise
+    noise = np.sum((noise_at(image, plate) * contrast) ** 2, -1)
+    if plate.errors.any():
+        noise += (1 - plate.confidence) * np.sum((contrast @ plate.errors) * contrast, -1)
+    in_shadow = (clear - 1) * power > SMOKE_THRESHOLD * np.sqrt(noise)
     if colours is not None:
         counted = colours.weighted(contrast)
         clear = np.sum((image - source) * counted, -1) / np.maximum(np.sum(contrast * counted, -1), 1e-12)

@@ -10,6 +10,7 @@ import pytest
 from smokelift.density import DensitySettings, Observation, ViewSet, reconstruct_density
 from smokelift.density.colour_weight import MODEL_ERROR, ColourWeight
 from smokelift.density.objective import Term, noise_floor
+from smokelift.density.observation import apparent_optical_depth
 from smokelift.evaluation.metrics import psnr
 from smokelift.footage.noise import EIGHT_BIT_NOISE
 from smokelift.footage.plate import Plate, noise_at
@@ -124,3 +125,13 @@ def test_the_other_colours_tell_smoke_from_a_wall_that_is_continued_too_dark(tru
     assert told[0] < 0.1
     assert plain[0] > 0.5
     assert told[1] > plain[1] + 10
+
+
+def test_a_wall_that_is_continued_too_bright_is_no_smoke_in_shadow(optics) -> None:
+    """It is darker than what is continued, as thick smoke in its own shadow would be."""
+    bright, everywhere = replace(found_plate(0.2), image=1.2 * wall()), np.ones(SIZE, np.bool_)
+    certain = replace(bright, errors=np.zeros((3, 3), np.float32))
+    assert apparent_optical_depth(wall(), certain, everywhere, optics).min() > 2
+    depth = apparent_optical_depth(wall(), bright, everywhere, optics)
+    assert depth[bright.confidence == 0].max() == 0
+    assert depth[bright.confidence == 1].min() > 2
