@@ -19,6 +19,13 @@ def test_a_gain_is_found_beside_smoke() -> None:
     np.testing.assert_allclose(gain_of(seen.astype(np.float32), behind), GAINS, rtol=0.01)
 
 
+@pytest.mark.parametrize("channel", range(3))
+def test_a_gain_of_one_channel_is_seen(channel: int) -> None:
+    behind = wall(0.3, 0.7).astype(np.float32)
+    gains = np.where(np.arange(3) == channel, 0.8, 1).astype(np.float32)
+    np.testing.assert_allclose(gain_of(behind * gains, behind), gains, rtol=0.01)
+
+
 def test_smoke_is_no_gain() -> None:
     """Before black nothing tells a gain, and smoke over most of a steady picture is none."""
     black = np.zeros((HEIGHT, WIDTH, 3), np.float32)
