@@ -56,7 +56,7 @@ def set_up(smoke: bpy.types.Object, take: Take, index: dict[str, Any]) -> None:
         scene.render.engine = "CYCLES"
         _scatter_as_fitted(scene, index)
         if settings.light_mode == "ESTIMATE":
-            _estimated_sun(scene, index)
+            _estimated_suns(scene, index)
     if settings.set_up_plate:
         _set_up_plate(smoke, take, index)
     if settings.set_up_colors:
@@ -129,19 +129,22 @@ def _scattering(index: dict[str, Any]) -> str | None:
     return index["scene"]["medium"].get("scattering") or index["settings"].get("density", {}).get("scattering")
 
 
-def _estimated_sun(scene: bpy.types.Scene, index: dict[str, Any]) -> None:
-    """The sun that the engine estimated; it casts shadows where the smoke was fitted with them."""
-    table = index["scene"]["lights"][0]
-    name = f"{NAME} Light"
-    sun = scene.objects.get(name)
-    if sun is None or sun.type != "LIGHT":
-        sun = bpy.data.objects.new(name, bpy.data.lights.new(name, "SUN"))
-        scene.collection.objects.link(sun)
-    strongest = max(table["irradiance"]) or 1.0
-    sun.data.energy = strongest
-    sun.data.color = [part / strongest for part in table["irradiance"]]
-    sun.data.use_shadow = _scattering(index) in ("multiple", "single")
-    sun.rotation_euler = Vector(table["direction"]).to_track_quat("-Z", "Y").to_euler()
+def _estimated_suns(scene: bpy.types.Scene, index: dict[str, Any]) -> None:
+    """The suns that the engine estimated; they cast shadows where the smoke was fitted with them."""
+    tables = index["scene"]["lights"]
+    names = [f"{NAME} Light", *(f"{NAME} Light {number}" for number in range(2, len(tables) + 1))]
+    for name, table in zip(names, tables, strict=True):
+        sun = scene.objects.get(name)
+        if sun is None or sun.type != "LIGHT":
+            sun = bpy.data.objects.new(name, bpy.data.lights.new(name, "SUN"))
+            scene.collection.objects.link(sun)
+        strongest = max(table["irradiance"]) or 1.0
+        sun.data.energy = strongest
+        sun.data.color = [part / strongest for part in table["irradiance"]]
+        sun.data.use_shadow = _scattering(index) in ("multiple", "single")
+        sun.rotation_euler = Vector(table["direction"]).to_track_quat("-Z", "Y").to_euler()
+    for sun in [each for each in scene.objects if each.name.startswith(f"{NAME} Light ") and each.name not in names]:
+        bpy.data.objects.remove(sun)
 
 
 def _set_world(scene: bpy.types.Scene, clip: bpy.types.MovieClip, take: Take, tables: dict[str, Any]) -> None:

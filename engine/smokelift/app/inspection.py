@@ -213,6 +213,8 @@ def _light(shot: Shot, given: Scene) -> tuple[Fact, ...]:
     how = "Light strength: as much as the thickest smoke shows; if none is thick, the light is stronger."
     if not shot.smoky:
         how = "Light strength: no smoke shows it."
+    if shot.scene.scattering in SHADOWED:
+        how = "Light strength: as much as comes from behind the smoke, in the color that the clip asks for."
     if thickness.chosen != UNDETERMINED:
         hides, origin = f"hides {thickness.measured['hidden']:.0%} of what it covers", "measured"
         how = "Light strength: what the smoke adds for what it hides of the texture behind it."

@@ -103,3 +103,28 @@ def ambient_sun(samples: SmokeSamples, medium: Medium, told: NDArray[np.float64]
     scattered = np.array(medium.albedos) / (4 * np.pi)
     irradiance = np.divide(source, scattered, out=np.zeros(3), where=scattered > 0)
     return DirectionalLight((0.0, 0.0, -1.0), (float(irradiance[0]), float(irradiance[1]), float(irradiance[2])))
+
+
+def light_note(scene: CompleteScene, told: bool, seen: bool) -> str:
+    """Say what light is taken for a scene that gives none.
+
+    Parameters
+    ----------
+    scene
+        With the light and the model of scattering that were chosen.
+    told
+        Whether the clip tells how much light the smoke scatters (`thickness`).
+    seen
+        Whether any smoke is seen.
+    """
+    shadows = scene.scattering in SHADOWED
+    amount = "the thickest smoke shows" if seen else "makes thick smoke white"
+    if told:
+        amount = "the smoke adds for what it hides"
+    if shadows:
+        amount = "comes from behind the smoke"
+    irradiance = np.sum([light.irradiance for light in scene.lights if isinstance(light, DirectionalLight)], 0)
+    return (
+        f"Light not given: as much from everywhere as {amount}, "
+        f"irradiance {', '.join(f'{v:.2f}' for v in irradiance)}, {'with' if shadows else 'without'} shadows."
+    )

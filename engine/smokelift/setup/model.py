@@ -20,6 +20,7 @@ from smokelift.setup.directions import choose_directions
 from smokelift.setup.light_strength import choose_strength, scaled
 from smokelift.setup.scattering import choose_scattering, settled, tries_multiple, unclear
 from smokelift.setup.settings import Settings
+from smokelift.setup.surroundings import choose_surroundings
 from smokelift.setup.velocity_grid import choose_coarsening, choose_levels
 from smokelift.velocity import VelocitySettings
 
@@ -45,7 +46,13 @@ class Model:
 
 
 def choose_model(
-    clip: Clip, scene: CompleteScene, plates: Plates, smoky: Sequence[int], by_hand: bool, settings: Settings
+    clip: Clip,
+    scene: CompleteScene,
+    plates: Plates,
+    smoky: Sequence[int],
+    by_hand: bool,
+    settings: Settings,
+    guessed: bool,
 ) -> Model:
     """Choose all that is chosen on coarse densities.
 
@@ -63,6 +70,8 @@ def choose_model(
         Whether the user says how light is scattered.
     settings
         What they decide is taken.
+    guessed
+        Whether nothing tells the light, not even its strength.
     """
 
     @cache
@@ -101,6 +110,10 @@ def choose_model(
             scattering, scattered = choose_scattering(
                 [finer.in_light_of(lit)], scene.scattering, settled(settings.density), tolerance
             )
+        around = choose_surroundings(frames, scattered, settings.density) if guessed else None
+        if around is not None:
+            lights, scattered = around
+            scattering, lit = "single", replace(lit, lights=lights)
         lit = replace(lit, scattering=scattering)
         if directions and scattering != scene.scattering:
             lit, directions = choose_directions(replace(scene, scattering=scattering), frames, settings.density)

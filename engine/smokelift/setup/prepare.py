@@ -25,7 +25,7 @@ from smokelift.setup.background import cut_notes, exposure_notes, find_plates, s
 from smokelift.setup.choice import Choice
 from smokelift.setup.further_views import disagreement, open_view
 from smokelift.setup.geometry import clip_lens, find_geometry
-from smokelift.setup.light import ambient_sun, light_colour, richest_scattering, unknown_direction
+from smokelift.setup.light import ambient_sun, light_colour, light_note, richest_scattering, unknown_direction
 from smokelift.setup.model import choose_model, tried_frames
 from smokelift.setup.no_smoke import nothing_seen
 from smokelift.setup.place import placed
@@ -33,7 +33,7 @@ from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot, ShotView
 from smokelift.setup.smoke import sample_smoke
 from smokelift.setup.smoke_colour import smoke_colour
-from smokelift.setup.thickness import smoke_thickness
+from smokelift.setup.thickness import Thickness, smoke_thickness
 from smokelift.setup.view_gain import balanced
 
 OPTICAL_DEPTH_AT_ONE = 5.0
@@ -102,20 +102,13 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
         medium = replace(medium, flame_color=told or glow)
         choices += (_fire(burning, told or glow, told is not None),)
     asked = scene.scattering if settings.scattering == "auto" else settings.scattering
+    thickness: Thickness | None = None
     light_choices: tuple[Choice[Any], ...] = ()
     lights, richest = scene.lights, richest_scattering(asked, scene.lights, medium)
     if not lights and richest != "absorption":
         thickness = smoke_thickness(samples.textures)
         light_choices = (thickness.choice, unknown_direction())
-        sun = ambient_sun(samples, medium, thickness.source)
-        lights = (sun,)
-        amount = "the thickest smoke shows" if samples.smoky else "makes thick smoke white"
-        if thickness.source is not None:
-            amount = "the smoke adds for what it hides"
-        notes.append(
-            f"Light not given: as much from everywhere as {amount}, "
-            f"irradiance {', '.join(f'{v:.2f}' for v in sun.irradiance)}, without shadows."
-        )
+        lights = (ambient_sun(samples, medium, thickness.source),)
     complete = CompleteScene(
         camera=camera,
         domain=domain,
@@ -129,9 +122,12 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
         inlets=scene.inlets,
     )
     if settings.selection.measure:
-        model = choose_model(clip, complete, plates, samples.smoky, asked is not None, settings)
+        guessed = thickness is not None and thickness.source is None
+        model = choose_model(clip, complete, plates, samples.smoky, asked is not None, settings, guessed)
         complete, settings = model.scene, replace(settings, velocity=model.velocity)
         choices = (*choices, *model.choices)
+    if thickness is not None:
+        notes.append(light_note(complete, thickness.source is not None, bool(samples.smoky)))
     if complete.scattering != "absorption":
         choices += light_choices
     views = [ShotView(clip, camera, plates, _working(camera, domain))]

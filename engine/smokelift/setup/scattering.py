@@ -17,9 +17,10 @@ model meets counts for both.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from smokelift.density import DensitySettings, reconstruct_density
 from smokelift.density.hull import project_voxels, reached
@@ -157,15 +158,19 @@ class HeldOut:
     light
         Strength of the light, in multiples of the scene's, that brings the same densities nearest to them: more than 1
         where the densities are too dark. 1 without scattered light.
+    colour : (3,)
+        The same for red, green and blue alone.
     """
 
     error: float
     light: float
+    colour: NDArray[np.float64] = field(default_factory=lambda: np.ones(3))
 
 
 def held_out(frames: Sequence[CoarseFrame], model: Scattering, judge: Scattering, settings: DensitySettings) -> HeldOut:
     """Fit a model's densities to one half of the pixels, and let the judge show them to the other half."""
-    wrong = change = asked = power = 0.0
+    wrong = change = 0.0
+    asked, power = np.zeros((2, 3))
     for frame in frames:
         scene, plate, halves = frame.scattered_by(model).scene, frame.plate, frame.halves
         density = reconstruct_density(halves.fitted, scene, settings=settings, plate=plate)
@@ -178,7 +183,10 @@ def held_out(frames: Sequence[CoarseFrame], model: Scattering, judge: Scattering
         own, wanted = ((image - behind)[seen].astype(np.float64) for image in (shown, halves.held_out))
         wrong += float(np.sum(np.square(shown - halves.held_out, dtype=np.float64)[seen]))
         change += float(np.sum(np.square(halves.held_out - plate.image, dtype=np.float64)[seen]))
-        asked += float(np.sum(own * wanted))
-        power += float(np.sum(np.square(own)))
-    light = asked / power if judge != "absorption" and power > 0 else 1.0
-    return HeldOut(float(np.sqrt(wrong / max(change, 1e-30))), light)
+        asked += np.sum(own * wanted, 0)
+        power += np.sum(np.square(own), 0)
+    error = float(np.sqrt(wrong / max(change, 1e-30)))
+    if judge == "absorption" or not power.sum() > 0:
+        return HeldOut(error, 1.0)
+    colour = np.divide(asked, power, out=np.ones(3), where=power > 0)
+    return HeldOut(error, float(asked.sum() / power.sum()), colour)

@@ -190,6 +190,24 @@ def test_setting_up_twice_changes_nothing(shot, kept, tmp_path) -> None:
     assert bpy.data.worlds["World"].use_fake_user, "the user's own world would not be saved"
 
 
+def test_every_light_that_was_estimated_is_a_sun(shot, kept, tmp_path) -> None:
+    """Light from everywhere with shadows is several; those of another take go."""
+    take = made(shot, tmp_path / "out", kept)
+    smoke(shot).smokelift.light_mode = "ESTIMATE"
+    path = take.directory / "sequence.json"
+    index = json.loads(path.read_text())
+    lights = [
+        {"type": "directional", "direction": [0.0, 0.0, -1.0], "irradiance": [1.0, 0.5, 0.5]},
+        {"type": "directional", "direction": [1.0, 0.0, 0.0], "irradiance": [2.0, 1.0, 1.0]},
+    ]
+    for count in (2, 1):
+        path.write_text(json.dumps({**index, "scene": {**index["scene"], "lights": lights[:count]}}))
+        bpy.ops.smokelift.set_up()
+        suns = sorted(obj.name for obj in shot.objects if obj.name.startswith("Smokelift Light"))
+        assert suns == ["Smokelift Light", "Smokelift Light 2"][:count]
+        assert sum(shot.objects[name].data.energy for name in suns) == sum(range(1, count + 1))
+
+
 def test_running_twice_makes_a_second_take_and_one_smoke(shot, kept, tmp_path) -> None:
     """The first take's files stay until they are asked to go."""
     made(shot, tmp_path / "out", kept)
