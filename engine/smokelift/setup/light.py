@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from smokelift.footage.noise import Noise
 from smokelift.render import scene_optics
 from smokelift.scene import (
     SHADOWED,
@@ -22,11 +23,23 @@ from smokelift.scene import (
 )
 from smokelift.setup.choice import UNDETERMINED, Choice
 from smokelift.setup.smoke import SmokeSamples
+from smokelift.setup.smoke_colour import FAINTEST
 
 BEYOND = 0.1
 """Share by which the source radiance exceeds the 99th percentile of the smoke's. That smoke then has an optical depth
 of about 2.4, not an infinite one."""
 
+
+DOUBTFUL = 0.12
+"""Error of held-out pixels, as a share of the smoke's contrast, from which the light that is taken before one colour is
+likely wrong: from there on the mass was off by 1.5 and more in 38 of 42 clips, below in 34 of 86
+(docs/experiments/surroundings.md)."""
+
+EVEN = 0.1
+"""Spread of a background of one colour at most, as a share of its mean."""
+
+QUIET = 2 / 255
+"""Noise up to which what is left is not the noise's."""
 
 FEW = 8
 """Directions of an environment whose colour alone is asked for."""
@@ -127,4 +140,30 @@ def light_note(scene: CompleteScene, told: bool, seen: bool) -> str:
     return (
         f"Light not given: as much from everywhere as {amount}, "
         f"irradiance {', '.join(f'{v:.2f}' for v in irradiance)}, {'with' if shadows else 'without'} shadows."
+    )
+
+
+def light_doubts(scattered: Choice[str], samples: SmokeSamples, noise: Noise) -> tuple[str, ...]:
+    """Say that a light which is not given is likely wrong, where nothing else explains what it leaves.
+
+    Before one colour, and not black, what moves is smoke, and its brightness says something of its light.
+
+    Parameters
+    ----------
+    scattered
+        How light is scattered, with the errors of held-out pixels.
+    samples
+        Smoke pixels of the clip and what is behind them.
+    noise
+        Of the clip.
+    """
+    error = scattered.measured.get(f"error_{scattered.chosen}", 0.0)
+    if error < DOUBTFUL or not len(samples.behind) or noise.total.max() > QUIET:
+        return ()
+    low, high = np.percentile(samples.behind.max(-1), (5, 95))
+    if high < FAINTEST or high - low > EVEN * high:
+        return ()
+    return (
+        "The light that is taken is likely wrong, and the smoke too thick or too thin by half and more: it leaves "
+        f"{error:.0%} of what the smoke changes unexplained. Give [[lights]] in a scene file.",
     )

@@ -25,7 +25,14 @@ from smokelift.setup.background import cut_notes, exposure_notes, find_plates, s
 from smokelift.setup.choice import Choice
 from smokelift.setup.further_views import disagreement, open_view
 from smokelift.setup.geometry import clip_lens, find_geometry
-from smokelift.setup.light import ambient_sun, light_colour, light_note, richest_scattering, unknown_direction
+from smokelift.setup.light import (
+    ambient_sun,
+    light_colour,
+    light_doubts,
+    light_note,
+    richest_scattering,
+    unknown_direction,
+)
 from smokelift.setup.model import choose_model, tried_frames
 from smokelift.setup.no_smoke import nothing_seen
 from smokelift.setup.place import placed
@@ -128,6 +135,9 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
         choices = (*choices, *model.choices)
     if thickness is not None:
         notes.append(light_note(complete, thickness.source is not None, bool(samples.smoky)))
+        scattered = next((choice for choice in choices if choice.what == "scattering"), None)
+        if scattered is not None:
+            notes += light_doubts(scattered, samples, plates.noise)
     if complete.scattering != "absorption":
         choices += light_choices
     views = [ShotView(clip, camera, plates, _working(camera, domain))]

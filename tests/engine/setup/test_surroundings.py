@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from smokelift.footage.noise import lasting_noise
 from smokelift.scene import Background, DirectionalLight, Medium, Scene
 from smokelift.setup import surroundings
 from smokelift.setup.choice import Choice
+from smokelift.setup.light import light_doubts
 from smokelift.setup.scattering import HeldOut
 from smokelift.setup.shot import Shot
 from smokelift.setup.surroundings import light_around
@@ -114,3 +117,32 @@ def test_dark_smoke_before_something_bright_stays_dark(plume, draft, tmp_path, l
     dark = replace(plume.scene, medium=Medium(6.0, 0.9), lights=(faint,), background=Background(color=(0.8, 0.9, 1.0)))
     shot = shot_of(unlit(plume.write(tmp_path, plume.densities, dark)), draft)
     assert shot.scene.scattering in ("absorption", "unshadowed")
+
+
+@pytest.mark.parametrize(
+    ("error", "behind", "noise", "said"),
+    [
+        (0.13, (0.4, 0.4, 0.4), 1, True),
+        (0.11, (0.4, 0.4, 0.4), 1, False),
+        (0.13, (0.003, 0.003, 0.003), 1, False),
+        (0.13, (0.4, 0.4, 0.4), 5, False),
+        (0.13, None, 1, False),
+    ],
+    ids=["one colour", "well explained", "black", "noise", "a wall"],
+)
+def test_a_light_that_explains_little_before_one_colour_is_said_to_be_wrong(error, behind, noise, said) -> None:
+    """Elsewhere other things may be what is left."""
+    shown = np.linspace(0.1, 0.5, 300).reshape(100, 3) if behind is None else np.tile(behind, (100, 1))
+    samples = SimpleNamespace(behind=shown)
+    choice = Choice("scattering", "absorption", "", {"error_absorption": error, "error_unshadowed": error})
+    notes = light_doubts(choice, samples, lasting_noise(noise / 255))
+    assert bool(notes) == said
+    assert all("[[lights]]" in note for note in notes)
+
+
+def test_the_doubt_is_said_of_a_shot(lit, draft, leaves, monkeypatch) -> None:
+    """Once, beside the light that is taken, and never of one that is given."""
+    leaves(dict.fromkeys((1.0, 0.7, 0.5), 1.0))
+    monkeypatch.setattr("smokelift.setup.light.DOUBTFUL", 0.01)
+    doubts = [sum("likely wrong" in note for note in shot_of(scene, draft).notes) for scene in (unlit(lit), lit)]
+    assert doubts == [1, 0]
