@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
@@ -17,35 +16,33 @@ from numpy.typing import NDArray
 from smokelift.footage.exposure import small, small_size
 from smokelift.footage.frame_source import ClipError, DamagedFrameError, FrameSource, Look
 from smokelift.footage.image_sequence import ImageSequence
-from smokelift.footage.images import CodedPicture, Edges, Picture, Transfer, Value, add_weighted, area_average
+from smokelift.footage.images import (
+    CodedPicture,
+    Edges,
+    Picture,
+    Transfer,
+    Value,
+    add_weighted,
+    area_average,
+    linear_picture,
+)
+from smokelift.footage.kept_frames import KeptFrames, keep
 from smokelift.footage.video import Video
 from smokelift.scene import ClipSource
 
 __all__ = ["Clip", "ClipError", "is_video"]
 
 AnyPicture = NDArray[Any]
-Key = TypeVar("Key", int, tuple[int, int])
 Image = TypeVar("Image", Picture, Picture | CodedPicture)
 
 CACHE_BYTES = 64 * 2**20
 """Memory for the linear frames of a clip that are kept: two of 1080p."""
-
-KEPT_BYTES = 128 * 2**20
-"""Memory for the frames of a file that are kept as they are stored: twenty of 1080p at 8 bits, for what looks at the
-same ones spread over a clip."""
 
 REDUCED = 320
 """Pixels along the longer side of the frames on which smoke and exposure are looked at."""
 
 REDUCED_BYTES = 32 * 2**20
 """Memory for such frames that are kept: twenty-five at least."""
-
-DECODED_BYTES = 256 * 2**20
-"""Memory for the frames of a file that are kept as they were decoded, reckoned as if stored: what most videos decode to
-takes half of that."""
-
-GLIMPSE_BYTES = 64 * 2**20
-"""Memory for the glimpses of a file that are kept: a hundred at a third of 1080p."""
 
 
 def _whole(picture: AnyPicture) -> AnyPicture:
@@ -143,7 +140,7 @@ class Clip:
             raise ClipError(f'{path}: transfer must be "srgb" or "linear", not "{transfer}"')
         source: FrameSource = Video(path, transfer) if is_video(path) else ImageSequence(path, transfer, fps)
         try:
-            return cls(path, _Kept(source), fps, frames)
+            return cls(path, KeptFrames(source), fps, frames)
         except BaseException:
             source.close()
             raise
@@ -313,7 +310,7 @@ class Clip:
             As `frame` does.
         """
         if n not in self._reduced:
-            _keep(self._reduced, n, self.area_average(n, *self.reduced_size), REDUCED_BYTES)
+            keep(self._reduced, n, self.area_average(n, *self.reduced_size), REDUCED_BYTES)
         return self._reduced[n]
 
     @property
@@ -341,7 +338,7 @@ class Clip:
         divisor = max(self.size) // longest
         if divisor < 2:
             return self.frame(n)
-        return _linear(self._read(n, lambda number: self._source.glimpse(number, divisor)))
+        return linear_picture(self._read(n, lambda number: self._source.glimpse(number, divisor)))
 
     def expect(
         self, whole: Iterable[int] = (), glimpses: Iterable[int] = (), longest: int = 1, perhaps: Iterable[int] = ()
@@ -361,7 +358,7 @@ class Clip:
             `DECODED_BYTES` if that holds them all, until other frames are expected.
         """
         divisor = max(self.size) // longest
-        if isinstance(self._source, _Kept):
+        if isinstance(self._source, KeptFrames):
             small = [self.first + n for n in glimpses] if divisor > 1 else []
             some = [self.first + n for n in perhaps if n < len(self)]
             self._source.expect([self.first + n for n in whole], small, divisor, some)
@@ -426,80 +423,6 @@ class Clip:
         self.close()
 
 
-@dataclass(frozen=True)
-class _Expected:
-    """Frames of a source that are asked for next: whole, as glimpses with sides divided by a number, or perhaps."""
-
-    whole: frozenset[int] = frozenset()
-    glimpses: frozenset[int] = frozenset()
-    divisor: int = 1
-    perhaps: frozenset[int] = frozenset()
-
-
-class _Kept:
-    """The frames of a source, of which the last ones read are kept for all clips that share it."""
-
-    def __init__(self, source: FrameSource) -> None:
-        self._source = source
-        self._kept: OrderedDict[int, Picture | CodedPicture] = OrderedDict()
-        self._glimpses: OrderedDict[tuple[int, int], Picture | CodedPicture] = OrderedDict()
-        self._decoded: dict[int, Callable[[int], Picture | CodedPicture]] = {}
-        self._damaged: dict[tuple[int, int], tuple[int, ...]] = {}
-        self._expected = _Expected()
-        self.count, self.fps, self.warning = source.count, source.fps, source.warning
-        self.files, self.lens, self.backdrop = source.files, source.lens, source.backdrop
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        return self._source.notes
-
-    def read(self, n: int) -> Picture | CodedPicture:
-        if n in self._kept:
-            self._kept.move_to_end(n)
-            return self._kept[n]
-        image = self._decoded[n](1) if n in self._decoded else self._source.read(n)
-        _keep(self._kept, n, image, KEPT_BYTES)
-        return image
-
-    def glimpse(self, n: int, divisor: int) -> Picture | CodedPicture:
-        if (n, divisor) not in self._glimpses:
-            image = self._decoded[n](divisor) if n in self._decoded else self._source.glimpse(n, divisor)
-            _keep(self._glimpses, (n, divisor), image, GLIMPSE_BYTES)
-        return self._glimpses[n, divisor]
-
-    def expect(self, whole: Sequence[int], glimpses: Sequence[int], divisor: int, perhaps: Sequence[int]) -> None:
-        size = max((image.nbytes for image in self._kept.values()), default=0)
-        self._decoded.clear()
-        self._expected = _Expected(
-            # of larger pictures the first would be gone before the last is there
-            frozenset(whole if len(whole) * size <= KEPT_BYTES else ()),
-            frozenset(glimpses),
-            divisor,
-            frozenset(perhaps if len(perhaps) * size <= DECODED_BYTES else ()),
-        )
-
-    def damaged(self, first: int, last: int, look: Look | None = None) -> tuple[int, ...]:
-        expected = self._expected
-        divisor = expected.divisor
-
-        def keep(n: int, picture: Callable[[int], Picture | CodedPicture]) -> None:
-            if n in expected.whole and n not in self._kept:
-                _keep(self._kept, n, picture(1), KEPT_BYTES)
-            if n in expected.glimpses and (n, divisor) not in self._glimpses:
-                _keep(self._glimpses, (n, divisor), picture(divisor), GLIMPSE_BYTES)
-            if n in expected.perhaps and n not in self._kept:
-                self._decoded[n] = picture
-            if look is not None:
-                look(n, picture)
-
-        if (first, last) not in self._damaged:
-            self._damaged[first, last] = self._source.damaged(first, last, keep)
-        return self._damaged[first, last]
-
-    def close(self) -> None:
-        self._source.close()
-
-
 class _Changed:
     """The frames of a clip's source, each replaced; numbers count from the clip's first one."""
 
@@ -522,7 +445,7 @@ class _Changed:
         image, number = self._source.read(n), n - self._clip.first
         if self._keeps is not None and self._keeps(number, lambda: _small(image)):
             return image
-        return self._change(number, _linear(image))
+        return self._change(number, linear_picture(image))
 
     def glimpse(self, n: int, divisor: int) -> Picture | CodedPicture:
         return self.read(n)  # a change may be meant for the whole picture
@@ -535,18 +458,6 @@ class _Changed:
 
     def close(self) -> None:
         self._source.close()
-
-
-def _keep(kept: OrderedDict[Key, Image], key: Key, image: Image, most: int) -> None:
-    """Put a picture, which is read-only from now on, beside the last ones in so many bytes."""
-    (image.codes if isinstance(image, CodedPicture) else image).flags.writeable = False
-    kept[key] = image
-    while len(kept) > max(1, most // image.nbytes):
-        kept.popitem(last=False)
-
-
-def _linear(image: Picture | CodedPicture) -> Picture:
-    return image.linear() if isinstance(image, CodedPicture) else image
 
 
 def _small(image: Picture | CodedPicture) -> Picture:

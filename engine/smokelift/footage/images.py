@@ -107,6 +107,11 @@ class CodedPicture:
             add_weighted(self.linear(), weights, edges, sums)
 
 
+def linear_picture(image: Picture | CodedPicture) -> Picture:
+    """Return a picture that may be as it is stored in linear light."""
+    return image.linear() if isinstance(image, CodedPicture) else image
+
+
 def add_weighted(picture: Picture, weights: Picture, edges: tuple[Edges, Edges], sums: Picture) -> None:
     """Do to a linear picture what `CodedPicture.add_weighted` does."""
     lines, columns = edges

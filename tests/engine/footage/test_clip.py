@@ -302,7 +302,7 @@ def test_what_is_perhaps_asked_for_is_kept_as_it_was_decoded(ramp: Path, monkeyp
         first.expect()
         clip.frame(6)
         assert read == [8, 6]
-    monkeypatch.setattr("smokelift.footage.clip.DECODED_BYTES", 1)
+    monkeypatch.setattr("smokelift.footage.kept_frames.DECODED_BYTES", 1)
     with Clip.open(ramp) as clip:
         clip.expect(perhaps=[5])
         assert clip.damaged == ()
