@@ -67,6 +67,27 @@ class Smoke:
         bright = np.float32(np.quantile(self.radiance[self.transmittance < 0.9], 0.95))
         return Smoke(self.radiance * column + bright * (1 - column), self.transmittance * column)
 
+    def misty(self) -> Smoke:
+        """The same with mist over two thirds of the picture that hardly moves and never goes away.
+
+        It is a third as bright as the smoke's brightest, lets a half of the light through at least, and drifts by the
+        picture's width in 600 frames.
+        """
+        frames, rows, columns = self.radiance.shape
+        noise = np.random.default_rng(7).standard_normal((rows, columns))
+        billows = np.zeros((rows, columns))
+        for part in (8, 16, 32):  # parts of the width along a billow
+            field = ndimage.gaussian_filter(noise, columns / part, mode="wrap")
+            billows += field / field.std() / part
+        billows /= billows.std()
+        height = 1 - np.arange(rows)[:, None] / rows
+        depth = np.clip(1 - height / 0.67, 0, 1) ** 2 * (3 - 2 * np.clip(1 - height / 0.67, 0, 1))
+        drift = columns / 600 * np.arange(frames)
+        opacity = np.stack([depth * np.clip(0.35 + 0.07 * np.roll(billows, round(x), 1), 0, 0.5) for x in drift])
+        bright = np.float32(np.quantile(self.radiance[self.transmittance < 0.9], 0.95))
+        clear = (1 - opacity).astype(np.float32)
+        return Smoke(self.radiance * clear + bright * (1 - clear), self.transmittance * clear)
+
     def before(self, plate: Picture) -> Picture:
         """Linear pictures (frames, rows, columns, 3) before a plate (rows, columns, 3)."""
         return self.radiance[..., None] + self.transmittance[..., None] * plate
@@ -258,6 +279,7 @@ def cases(smoke: Smoke) -> dict[str, Callable[[], Case]]:
         "black, 12 frames": made(black, part=slice(14, 26)),
         "black, column": made(black, column),
         "black, mist": made(black, mist),
+        "black, mist everywhere": made(black, smoke.misty()),
         "black, flash": made(black, gains=flash(count)),
         "black, noise 2%": made(black, spoil=noises["noise 2%"]),
         "black, noise 10%": made(black, spoil=noises["noise 10%"]),

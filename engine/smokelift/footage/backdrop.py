@@ -1,7 +1,8 @@
 """Backgrounds of one colour, before which most stock footage stands.
 
 Where the pixels that never change have one colour, it is behind all that do. Where they have two, it is the one that
-all pixels have at some time: the other is ink that stays.
+all pixels have at some time: the other is ink that stays. Mist that hardly moves changes as little as what it is in
+front of, and has many colours; where all of it fades into black, that is behind it.
 
 A camera that moves shows another part of the background in every frame, so a pixel has no value of its own. One colour
 is known all the same.
@@ -9,13 +10,16 @@ is known all the same.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
+from scipy import ndimage
 
-from smokelift.footage.behind_smoke import ISLAND
+from smokelift.footage.behind_smoke import DETAIL, ISLAND
 from smokelift.footage.images import Picture, linear_to_srgb
 from smokelift.footage.matte import matte
-from smokelift.footage.noise import BLOCK, SMOKE_TO_NOISE, Noise, block_means, linear_samples, over_time
+from smokelift.footage.noise import BLOCK, SMOKE_TO_NOISE, Noise, block_means, decode_samples, linear_samples, over_time
 from smokelift.footage.plate import Plate
 
 ONE_COLOUR = 0.8
@@ -29,6 +33,20 @@ than one colour."""
 AT_ONCE = 0.5
 """Share of the blocks that smoke comes over between two samples, less than a fade or a cut changes at once
 (docs/experiments/background.md)."""
+
+BLACK = 0.1
+"""Share of the picture that is black all the time, at least, for what fades into it to be mist. Of 43 public clips
+those before something have less, but for a stage with sharp edges (docs/experiments/background.md)."""
+
+ENOUGH = 8
+"""Samples of which the clearest view of each pixel is taken."""
+
+SHARPEST = 0.99
+"""Quantile of that view's detail which is looked at: a speck is no object."""
+
+SHARP = np.float32(15 / 255)
+"""Detail of mist and smoke in front of black, in sRGB values, at most (1 to 13 of 255 in 26 clips); walls and stages in
+the dark have edges (17 to 40; docs/experiments/background.md)."""
 
 
 def backdrop_plate(samples: npt.NDArray[np.uint16], noise: Noise) -> Plate | None:
@@ -56,7 +74,6 @@ def _backdrop(samples: npt.NDArray[np.uint16], noise: Noise) -> Picture | None:
 
     Whatever never changes and has another colour stands before the backdrop, and is part of the picture.
     """
-    size = min(BLOCK, *samples.shape[1:3])
     linear = np.concatenate([block_means(linear_samples(sample[None])) for sample in samples])
     blocks = linear_to_srgb(linear)
     middle, limit = np.median(blocks, axis=0), SMOKE_TO_NOISE * noise.averaged(BLOCK**2).total
@@ -73,24 +90,45 @@ def _backdrop(samples: npt.NDArray[np.uint16], noise: Noise) -> Picture | None:
         kinds.append((np.abs(middle - colours[-1]) <= settled).all(-1))
         left = left & ~kinds[-1]
     if left.sum() > (1 - ONE_COLOUR) * still.sum():
-        return None
+        return _black(samples, noise, (over_time(blocks) <= limit).all(-1))
     seen = [(np.abs(blocks - colour) <= limit).all(-1) for colour in colours]
     covered = next((n for n, shown in enumerate(seen) if (still & kinds[n]).any() and _comes_over(shown)), None)
     if covered is None and kinds[0][still].mean() < ONE_COLOUR:
-        return None
+        return _black(samples, noise, (over_time(blocks) <= limit).all(-1))
     alike = kinds[covered or 0]
     bare = alike if covered is None else seen[covered].any(0)
     clear = np.median(linear, axis=0)
     low, high = np.quantile(blocks, [0.05, 0.95], axis=0)
     fixed = still & ~alike & ~bare & ((high - low) <= limit).all(-1)
     picture = np.where(fixed[..., None], clear, clear[still & alike].mean(0))
-    height, width = samples.shape[1:3]
-    rows, columns = (np.minimum(np.arange(n) // size, m - 1) for n, m in zip((height, width), fixed.shape, strict=True))
-    whole: Picture = picture[rows][:, columns].astype(np.float32)
-    own = fixed[rows][:, columns]
+    whole: Picture = _pixels(picture, samples.shape[1:3]).astype(np.float32)
+    own = _pixels(fixed, samples.shape[1:3])
     if own.any():
         whole[own] = np.median(linear_samples(samples[:, own]), axis=0)
     return whole
+
+
+def _black(samples: npt.NDArray[np.uint16], noise: Noise, black: npt.NDArray[np.bool_]) -> Picture | None:
+    """A black picture if much of the samples is black all the time and the rest fades into that, else None.
+
+    ``black`` (rows, columns) is of blocks of pixels.
+    """
+    if black.mean() < BLACK:
+        return None
+    some = samples[:: -(-len(samples) // ENOUGH)]
+    # smoke brightens black; one sample may be astray
+    clearest = np.sort([decode_samples(sample).mean(-1) for sample in some], axis=0)[min(1, len(some) - 1)]
+    detail = np.abs(clearest - ndimage.gaussian_filter(clearest, DETAIL))
+    if np.quantile(detail, SHARPEST) > SHARP + SMOKE_TO_NOISE * noise.white.max():
+        return None
+    return np.zeros((*samples.shape[1:3], 3), np.float32)
+
+
+def _pixels(blocks: npt.NDArray[Any], shape: tuple[int, ...]) -> npt.NDArray[Any]:
+    """Values of blocks (rows, columns, ...) at the pixels of a picture (height, width)."""
+    size = min(BLOCK, *shape)
+    rows, columns = (np.minimum(np.arange(n) // size, m - 1) for n, m in zip(shape, blocks.shape, strict=False))
+    return np.asarray(blocks[rows][:, columns])
 
 
 def _comes_over(shown: npt.NDArray[np.bool_]) -> bool:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from films import COUNT, HEIGHT, WIDTH, codes_apart, film, pan, passing_wall
+from films import COUNT, HEIGHT, WIDTH, codes_apart, film, pan, passing_wall, puff, wall
 
 from smokelift.footage.backdrop import one_colour
 from smokelift.footage.matte import matte
@@ -39,6 +39,37 @@ def test_a_clip_that_fades_in_from_black_is_not_before_black(tmp_path: Path) -> 
     truth[:10] = 0
     plate = estimate_plate(film(tmp_path, truth, lambda n: np.full((HEIGHT, WIDTH), max(1 - n / 2, 0)), 0.0))
     assert np.median(codes_apart(plate.image, truth)) < 2
+
+
+def mist(n: int) -> np.ndarray:
+    """Return the opacity of mist over two thirds of the picture that hardly moves."""
+    rows, columns = np.mgrid[:HEIGHT, :WIDTH]
+    depth = np.clip(rows / HEIGHT - 0.33, 0, 0.67) / 0.67
+    return 0.5 * depth**2 * (3 - 2 * depth) * (1 + 0.2 * np.sin(columns / 9 + 0.02 * n))
+
+
+def test_mist_that_hardly_moves_is_before_the_black_that_it_fades_into(tmp_path: Path) -> None:
+    """It changes as little as a wall, and is most of what does not change."""
+    clip = film(tmp_path, np.zeros((HEIGHT, WIDTH, 3)), mist, 0.4, 0.5)
+    plate = estimate_plate(clip)
+    assert (plate.confidence == 1).all()
+    assert not plate.image.any()
+    assert matte(clip.frame(12), plate).mask[HEIGHT * 2 // 3 :].all()
+
+
+@pytest.mark.parametrize("lit", [False, True], ids=["bars", "spot"])
+def test_what_has_edges_is_no_mist(tmp_path: Path, lit: bool) -> None:
+    """Black bars, and a wall that a spot lights, are as black as what mist is before."""
+    truth = wall(0.2, 0.5)
+    truth[:10] = 0
+    truth[-10:] = 0
+    if lit:
+        rows, columns = np.mgrid[:HEIGHT, :WIDTH]
+        truth = wall(0.2, 0.5) * np.exp(-((rows - 36) ** 2 + (columns - 28) ** 2) / 150)[..., None]
+    plate = estimate_plate(film(tmp_path, truth, puff, 0.6, 0.5))
+    middle = np.s_[28:44, 20:36]
+    assert codes_apart(plate.image, truth)[middle].max() < 30
+    assert plate.image[middle].min() > 0
 
 
 @pytest.mark.parametrize("colour", [(0.0, 0.0, 0.0), (0.1, 0.3, 0.05)], ids=["black", "green"])
