@@ -9,6 +9,7 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from smokelift.density.axis import AxisEstimate
 from smokelift.density.colour_weight import ColourWeight
@@ -22,6 +23,9 @@ from smokelift.scene.checks import LARGEST
 
 THINNEST_CLEAR = 0.05
 """Transmittance at least: optical depth above 3 cannot be told from a brightness."""
+
+PATCH = 3
+"""Pixels along a shaded side of smoke at least (docs/experiments/bright-background.md)."""
 
 ROUNDS = 2
 """Times that optical depth and the weight of the colours are found from each other."""
@@ -196,7 +200,8 @@ def apparent_optical_depth(
     combinations as much as they count, T is the least squares solution. None explains a pixel which the smoke makes
     darker although J is brighter than B. Only smoke in its own shadow does so, and such a pixel counts as thick as can
     be told: a fit that starts from less thins it out until nothing is left (docs/experiments/bright-background.md).
-    Where B is continued from around the smoke, it may as well be too bright, by its errors.
+    Where B is continued from around the smoke, it may as well be too bright, by its errors. A shaded side is a patch of
+    pixels; single ones are a codec's errors.
     """
     source = np.zeros(3)
     if optics.scattering != "absorption":
@@ -213,7 +218,7 @@ def apparent_optical_depth(
         clear = np.sum((image - source) * counted, -1) / np.maximum(np.sum(contrast * counted, -1), 1e-12)
     depth = -np.log(np.clip(clear, THINNEST_CLEAR, 1.0))
     if optics.scattering in SHADOWED:
-        depth[in_shadow] = -np.log(THINNEST_CLEAR)
+        depth[ndimage.binary_opening(in_shadow & mask, np.ones((PATCH, PATCH)))] = -np.log(THINNEST_CLEAR)
     return np.where(mask, depth, 0).astype(np.float32)
 
 

@@ -135,3 +135,19 @@ def test_a_wall_that_is_continued_too_bright_is_no_smoke_in_shadow(optics) -> No
     depth = apparent_optical_depth(wall(), bright, everywhere, optics)
     assert depth[bright.confidence == 0].max() == 0
     assert depth[bright.confidence == 1].min() > 2
+
+
+def test_specks_that_a_codec_leaves_are_no_smoke_in_shadow(optics) -> None:
+    """Amid thin smoke that brightens the wall a few pixels are darker than the wall; a shaded side is a patch."""
+    plate, everywhere = (
+        replace(found_plate(0.0), image=wall(), confidence=np.ones(SIZE, np.float32)),
+        np.ones(SIZE, bool),
+    )
+    darker = np.zeros(SIZE, np.bool_)
+    darker[5:40:4, 4:28:5] = True
+    darker[20, 3:20] = True
+    darker[30:36, 20:26] = True
+    depth = apparent_optical_depth(np.where(darker[..., None], 0.8, 1.1) * wall(), plate, everywhere, optics)
+    thick = depth > 2
+    assert thick[30:36, 20:26].all()
+    assert thick.sum() == 36
