@@ -8,7 +8,8 @@ from smokelift.footage.plate import Plates
 from smokelift.setup.background import cut_notes
 from smokelift.setup.smoke import SAMPLES, SmokeSamples
 
-_GIVE = "give a clean plate, or a color ([background] in a scene file, Clean Plate in Blender)"
+_WHERE = "([background] in a scene file, Clean Plate in Blender)"
+_GIVE = f"give a clean plate, or a color {_WHERE}"
 
 
 def nothing_seen(clip: Clip, plates: Plates, samples: SmokeSamples, given: bool) -> tuple[str, ...]:
@@ -35,7 +36,7 @@ def what_helps(clip: Clip, plates: Plates, given: bool) -> str:
     for cut in cut_notes(clip):
         return cut
     if given:
-        return "Check the background that is given: it may hold the smoke, or belong to another clip."
+        return f"Check the background that is given {_WHERE}: it may hold the smoke, or belong to another clip."
     if len(clip) == 1 and clip.backdrop is None:
         return f"One frame alone does not show what is behind its smoke: {_GIVE}."
     change = float(plates.noise.total.max())
