@@ -14,10 +14,9 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy import ndimage
 
 from smokelift.footage.behind_smoke import DETAIL, ISLAND
-from smokelift.footage.images import Picture, linear_to_srgb
+from smokelift.footage.images import Picture, blurred, linear_to_srgb
 from smokelift.footage.matte import matte
 from smokelift.footage.noise import BLOCK, SMOKE_TO_NOISE, Noise, block_means, decode_samples, linear_samples, over_time
 from smokelift.footage.plate import Plate
@@ -90,11 +89,11 @@ def _backdrop(samples: npt.NDArray[np.uint16], noise: Noise) -> Picture | None:
         kinds.append((np.abs(middle - colours[-1]) <= settled).all(-1))
         left = left & ~kinds[-1]
     if left.sum() > (1 - ONE_COLOUR) * still.sum():
-        return _black(samples, noise, (over_time(blocks) <= limit).all(-1))
+        return _black(samples, noise, blocks)
     seen = [(np.abs(blocks - colour) <= limit).all(-1) for colour in colours]
     covered = next((n for n, shown in enumerate(seen) if (still & kinds[n]).any() and _comes_over(shown)), None)
     if covered is None and kinds[0][still].mean() < ONE_COLOUR:
-        return _black(samples, noise, (over_time(blocks) <= limit).all(-1))
+        return _black(samples, noise, blocks)
     alike = kinds[covered or 0]
     bare = alike if covered is None else seen[covered].any(0)
     clear = np.median(linear, axis=0)
@@ -108,17 +107,18 @@ def _backdrop(samples: npt.NDArray[np.uint16], noise: Noise) -> Picture | None:
     return whole
 
 
-def _black(samples: npt.NDArray[np.uint16], noise: Noise, black: npt.NDArray[np.bool_]) -> Picture | None:
+def _black(samples: npt.NDArray[np.uint16], noise: Noise, blocks: Picture) -> Picture | None:
     """A black picture if much of the samples is black all the time and the rest fades into that, else None.
 
-    ``black`` (rows, columns) is of blocks of pixels.
+    ``blocks`` (frames, rows, columns, 3) are their block means in sRGB values.
     """
-    if black.mean() < BLACK:
+    limit = SMOKE_TO_NOISE * noise.averaged(BLOCK**2).total
+    if (over_time(blocks) <= limit).all(-1).mean() < BLACK:
         return None
     some = samples[:: -(-len(samples) // ENOUGH)]
     # smoke brightens black; one sample may be astray
     clearest = np.sort([decode_samples(sample).mean(-1) for sample in some], axis=0)[min(1, len(some) - 1)]
-    detail = np.abs(clearest - ndimage.gaussian_filter(clearest, DETAIL))
+    detail = np.abs(clearest - blurred(clearest, DETAIL))
     if np.quantile(detail, SHARPEST) > SHARP + SMOKE_TO_NOISE * noise.white.max():
         return None
     return np.zeros((*samples.shape[1:3], 3), np.float32)

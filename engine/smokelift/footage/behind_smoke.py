@@ -122,8 +122,8 @@ def continuation_errors(image: Picture, known: npt.NDArray[np.bool_]) -> Picture
             continue
         guess = srgb_to_linear(push_pull(encoded, (known & ~left_out).astype(np.float32)))
         error = np.where(left_out[..., None], guess - image, 0)
-        share = ndimage.gaussian_filter(left_out.astype(np.float32), DETAIL)[left_out]
-        coarse = ndimage.gaussian_filter(error, (DETAIL, DETAIL, 0))[left_out] / share[:, None]
+        share = blurred(left_out.astype(np.float32), DETAIL)[left_out]
+        coarse = blurred(error, DETAIL)[left_out] / share[:, None]
         total += coarse.T.astype(np.float64) @ coarse
         count += len(coarse)
     return (total / max(count, 1)).astype(np.float32)

@@ -283,23 +283,23 @@ class Clip:
 
     def glimpse_through(self, n: int, longest: int, change: Callable[[Picture], NDArray[Value]]) -> NDArray[Value]:
         """Return `glimpse` with a function applied as by `frame_through`."""
-        divisor = max(self.size) // longest
-        if divisor < 2:
-            return self.frame_through(n, change)
-        return _through(self._read(n, lambda number: self._source.glimpse(number, divisor)), change, _whole)
+        return _through(self._glimpsed(n, longest), change, _whole)
 
     def glimpse_average(
         self, n: int, longest: int, change: Callable[[Picture], Picture], width: int, height: int
     ) -> Picture:
         """Return the area averages of `glimpse_through`."""
-        divisor = max(self.size) // longest
-        if divisor < 2:
-            image = self._kept_or_coded(n)
-        else:
-            image = self._read(n, lambda number: self._source.glimpse(number, divisor))
+        image = self._glimpsed(n, longest)
         if isinstance(image, CodedPicture):
             return CodedPicture(image.codes, change(image.table)).averaged(width, height)
         return area_average(change(image), width, height)
+
+    def _glimpsed(self, n: int, longest: int) -> Picture | CodedPicture:
+        """What `glimpse` makes linear, as it is stored if it is stored in codes."""
+        divisor = max(self.size) // longest
+        if divisor < 2:
+            return self._kept_or_coded(n)
+        return self._read(n, lambda number: self._source.glimpse(number, divisor))
 
     def reduced(self, n: int) -> Picture:
         """Return frame ``n`` as means of light, with `REDUCED` pixels along the longer side at most.
@@ -335,10 +335,9 @@ class Clip:
         ClipError
             As `frame` does.
         """
-        divisor = max(self.size) // longest
-        if divisor < 2:
+        if max(self.size) // longest < 2:
             return self.frame(n)
-        return linear_picture(self._read(n, lambda number: self._source.glimpse(number, divisor)))
+        return linear_picture(self._glimpsed(n, longest))
 
     def expect(
         self, whole: Iterable[int] = (), glimpses: Iterable[int] = (), longest: int = 1, perhaps: Iterable[int] = ()

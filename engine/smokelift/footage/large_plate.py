@@ -18,7 +18,7 @@ import numpy.typing as npt
 from smokelift.footage.backdrop import backdrop_plate
 from smokelift.footage.behind_smoke import DETAIL, MOST_DETAIL
 from smokelift.footage.clip import Clip
-from smokelift.footage.evidence import GLIMPSE, are_large
+from smokelift.footage.evidence import GLIMPSE, are_large, linear
 from smokelift.footage.exposure import sample_gains, small
 from smokelift.footage.images import Edges, Picture, area_average, linear_to_srgb, srgb_to_linear
 from smokelift.footage.noise import (
@@ -29,6 +29,7 @@ from smokelift.footage.noise import (
     as_samples,
     decode_samples,
     encode_sample,
+    even_out,
     linear_samples,
     some_blocks,
 )
@@ -76,7 +77,7 @@ class LargeSamples:
     def noise(self) -> Noise:
         """Of the whole pictures."""
         parts = [
-            encode_sample(self.clip.frame_through(number, _same, some_blocks) / gain)
+            encode_sample(self.clip.frame_through(number, linear, some_blocks) / gain)
             if (gain != 1).any()
             else self.clip.frame_through(number, encode_sample, some_blocks)
             for number, gain in zip(self.numbers[WHOLE], self.gains[WHOLE], strict=True)
@@ -181,9 +182,7 @@ def large_samples(clip: Clip) -> LargeSamples | None:
     for sample, number in zip(reduced, numbers, strict=True):
         sample[...] = as_samples(clip.glimpse_average(number, GLIMPSE, linear_to_srgb, columns, rows))
     gains = sample_gains(np.stack([small(linear_samples(sample)) for sample in reduced]))
-    for sample, gain in zip(reduced, gains, strict=True):
-        if (gain != 1).any():
-            sample[...] = encode_sample(linear_samples(sample) / gain)
+    even_out(reduced, gains)
     return LargeSamples(clip, tuple(numbers), gains, reduced)
 
 
@@ -196,7 +195,3 @@ def _divisor(clip: Clip) -> int:
 def _edges(count: int, pixels: int) -> Edges:
     """Where each of so many parts of a line of pixels begins, and the end of the last."""
     return np.asarray(-(-np.arange(count + 1) * pixels // count), np.int32)
-
-
-def _same(values: Picture) -> Picture:
-    return values

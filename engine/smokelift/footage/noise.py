@@ -122,6 +122,16 @@ def block_means(pictures: Picture) -> Picture:
     return means
 
 
+def even_out(samples: npt.NDArray[np.uint16], gains: Picture) -> None:
+    """Bring samples (frames, rows, columns, 3), as of `encode_sample`, to one exposure, in place.
+
+    ``gains`` (frames, 3) say by how much each is brighter than the others.
+    """
+    for sample, gain in zip(samples, gains, strict=True):
+        if (gain != 1).any():
+            sample[...] = encode_sample(linear_samples(sample) / gain)
+
+
 def sample_block_means(sample: npt.NDArray[np.uint16]) -> Picture:
     """Return the `block_means` of a sample (rows, columns, 3) in sRGB values, (rows, columns, 3).
 

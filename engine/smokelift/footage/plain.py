@@ -16,7 +16,7 @@ from smokelift.footage.clip import Clip
 from smokelift.footage.evidence import GLIMPSE, glimpses, linear
 from smokelift.footage.exposure import sample_gains, small, small_size
 from smokelift.footage.images import Picture, area_average
-from smokelift.footage.noise import BLOCK, BLOCKS_APART, Noise, encode_sample, linear_samples, some_blocks
+from smokelift.footage.noise import BLOCK, BLOCKS_APART, Noise, encode_sample, even_out, some_blocks
 from smokelift.footage.plate import Plate
 from smokelift.footage.plate_estimation import clip_noise
 
@@ -80,9 +80,7 @@ def _colour(encoded: Iterable[npt.NDArray[np.uint16]], whole: Sequence[Picture])
         What shows the exposure of each: the `small` picture of its frame.
     """
     samples = np.stack(list(encoded))
-    for sample, gain in zip(samples, sample_gains(np.stack(whole)), strict=True):
-        if (gain != 1).any():
-            sample[...] = encode_sample(linear_samples(sample) / gain)
+    even_out(samples, sample_gains(np.stack(whole)))
     noise = clip_noise(samples)
     found = backdrop_plate(samples, noise)
     if found is None or (found.image != found.image[0, 0]).any():

@@ -41,7 +41,7 @@ from smokelift.footage.noise import (
     decode_samples,
     drift,
     encode_sample,
-    linear_samples,
+    even_out,
     sample_block_means,
     sampled_count,
     temporal_noise,
@@ -224,9 +224,7 @@ def steady_samples(clip: Clip, count: int = 32) -> SteadySamples:
     for sample, number in zip(samples, numbers, strict=True):
         sample[...] = clip.frame_through(number, encode_sample)
         tiny.append(clip.area_average(number, *small_size(width, height)))
-    for sample, gain in zip(samples, sample_gains(np.stack(tiny)), strict=True):
-        if (gain != 1).any():
-            sample[...] = encode_sample(linear_samples(sample) / gain)
+    even_out(samples, sample_gains(np.stack(tiny)))
     return SteadySamples(samples)
 
 
