@@ -200,26 +200,32 @@ def apparent_optical_depth(
     combinations as much as they count, T is the least squares solution. None explains a pixel which the smoke makes
     darker although J is brighter than B. Only smoke in its own shadow does so, and such a pixel counts as thick as can
     be told: a fit that starts from less thins it out until nothing is left (docs/experiments/bright-background.md).
-    Where B is continued from around the smoke, it may as well be too bright, by its errors. A shaded side is a patch of
-    pixels; single ones are a codec's errors.
     """
     source = np.zeros(3)
     if optics.scattering != "absorption":
         source = optics.unshadowed_source()
     contrast = plate.image - source
-    power = np.sum(contrast**2, -1)
-    clear = np.sum((image - source) * contrast, -1) / np.maximum(power, 1e-12)
+    counted = contrast if colours is None else colours.weighted(contrast)
+    clear = np.sum((image - source) * counted, -1) / np.maximum(np.sum(contrast * counted, -1), 1e-12)
+    depth = -np.log(np.clip(clear, THINNEST_CLEAR, 1.0))
+    if optics.scattering in SHADOWED:
+        depth[_in_shadow(image, plate, mask, contrast)] = -np.log(THINNEST_CLEAR)
+    return np.where(mask, depth, 0).astype(np.float32)
+
+
+def _in_shadow(image: Image, plate: Plate, mask: NDArray[np.bool_], contrast: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Where smoke has to be in its own shadow: it turns the picture away from its source radiance.
+
+    ``contrast`` (rows, columns, 3) is that of the background to the source radiance. Where the background is continued
+    from around the smoke, it may as well be too bright, by its errors. A shaded side is a patch of pixels; single ones
+    are a codec's errors.
+    """
+    away = np.sum((image - plate.image) * contrast, -1)
     noise = np.sum((noise_at(image, plate) * contrast) ** 2, -1)
     if plate.errors.any():
         noise += (1 - plate.confidence) * np.sum((contrast @ plate.errors) * contrast, -1)
-    in_shadow = (clear - 1) * power > SMOKE_THRESHOLD * np.sqrt(noise)
-    if colours is not None:
-        counted = colours.weighted(contrast)
-        clear = np.sum((image - source) * counted, -1) / np.maximum(np.sum(contrast * counted, -1), 1e-12)
-    depth = -np.log(np.clip(clear, THINNEST_CLEAR, 1.0))
-    if optics.scattering in SHADOWED:
-        depth[ndimage.binary_opening(in_shadow & mask, np.ones((PATCH, PATCH)))] = -np.log(THINNEST_CLEAR)
-    return np.where(mask, depth, 0).astype(np.float32)
+    beyond = (away > SMOKE_THRESHOLD * np.sqrt(noise)) & mask
+    return np.asarray(ndimage.binary_opening(beyond, np.ones((PATCH, PATCH))))
 
 
 def _check(observation: Observation, domain: Domain) -> None:

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.footage.images import area_average
+from smokelift.footage.clip import Clip
+from smokelift.footage.images import Picture, area_average
 from smokelift.scene import Camera, Domain
 from smokelift.scene.projection import project, voxel_width
 
@@ -44,6 +45,10 @@ class WorkingPicture:
         """Return the small picture, averaged over areas of a full one (rows, columns, ...)."""
         columns, rows = self.camera.size
         return area_average(self.part(picture), columns, rows)
+
+    def of(self, clip: Clip, number: int) -> Picture:
+        """Return the small picture of a clip's frame; see `Clip.area_average`."""
+        return clip.area_average(number, *self.camera.size, self.part)
 
 
 class CameraError(ValueError):

@@ -41,7 +41,6 @@ bends a pan more than the longer one does, so that either is found from one with
 MOSTLY = 0.5
 """Share of the smoke's pixels without a known background from which most of the smoke may be in the plate."""
 
-
 FEW = 4
 """Frames from which on smoke hardly looks the same in all by chance: half of its pairs of successive samples do."""
 

@@ -148,7 +148,7 @@ def coarse_frame(
     return CoarseFrame(
         replace(scene, camera=working.camera, domain=domain),
         plate.through(working.cut, working.pixels),
-        clip.area_average(number, *working.camera.size, working.part),
+        working.of(clip, number),
         Halves(clip, number, working),
     )
 

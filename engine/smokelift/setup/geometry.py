@@ -292,7 +292,7 @@ def _detail(clip: Clip, camera: Camera, finest: Domain, plates: Plates, smoky: t
             now = camera.at(number)
             working, pixels = working_picture(now, finest), voxel_width(now, finest)
             plate = plates.at(number).through(working.cut, max(pixels, 1.0) ** 2)
-            picture = clip.area_average(number, *working.camera.size, working.part)
+            picture = working.of(clip, number)
             frames.append((picture, plate, min(pixels, 1.0)))
     return smoke_detail(frames, max(finest.resolution))
 

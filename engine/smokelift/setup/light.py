@@ -29,7 +29,6 @@ BEYOND = 0.1
 """Share by which the source radiance exceeds the 99th percentile of the smoke's. That smoke then has an optical depth
 of about 2.4, not an infinite one."""
 
-
 DOUBTFUL = 0.12
 """Error of held-out pixels, as a share of the smoke's contrast, from which the light that is taken before one colour is
 likely wrong: from there on the mass was off by 1.5 and more in 38 of 42 clips, below in 34 of 86
@@ -131,11 +130,12 @@ def light_note(scene: CompleteScene, told: bool, seen: bool) -> str:
         Whether any smoke is seen.
     """
     shadows = scene.scattering in SHADOWED
-    amount = "the thickest smoke shows" if seen else "makes thick smoke white"
-    if told:
-        amount = "the smoke adds for what it hides"
     if shadows:
         amount = "comes from behind the smoke"
+    elif told:
+        amount = "the smoke adds for what it hides"
+    else:
+        amount = "the thickest smoke shows" if seen else "makes thick smoke white"
     irradiance = np.sum([light.irradiance for light in scene.lights if isinstance(light, DirectionalLight)], 0)
     return (
         f"Light not given: as much from everywhere as {amount}, "

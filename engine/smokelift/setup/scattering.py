@@ -46,7 +46,7 @@ SETTLED = 24
 """Steps of descent at least, where models are told apart that differ little: with fewer the ratio is that of the steps
 which each of them lacks (docs/experiments/scattering-selection.md)."""
 
-_WORDS: Mapping[str, str] = {
+WORDS: Mapping[str, str] = {
     "absorption": "absorption only",
     "unshadowed": "scattering without shadows",
     "single": "single scattering with shadows",
@@ -119,16 +119,16 @@ def tries_multiple(scene: CompleteScene) -> bool:
 def _choice(
     chosen: Scattering, richest: Scattering, errors: Mapping[Scattering, float], tolerance: float
 ) -> Choice[str]:
-    said = f"Scattering: {_WORDS[chosen]}"
+    said = f"Scattering: {WORDS[chosen]}"
     if chosen != richest:
         reason = (
-            f"{said}; held-out pixels differ by {errors[chosen]:.1%} of the smoke's contrast, with {_WORDS[richest]} "
+            f"{said}; held-out pixels differ by {errors[chosen]:.1%} of the smoke's contrast, with {WORDS[richest]} "
             f"by {errors[richest]:.1%}."
         )
     elif len(errors) > 1:
         cheaper = MODELS[MODELS.index(richest) - 1]
         reason = (
-            f"{said}; with {_WORDS[cheaper]} held-out pixels differ by {errors[cheaper]:.1%} of the smoke's contrast "
+            f"{said}; with {WORDS[cheaper]} held-out pixels differ by {errors[cheaper]:.1%} of the smoke's contrast "
             f"instead of {errors[richest]:.1%}."
         )
     else:

@@ -48,7 +48,7 @@ class ShotView:
             plate = self.plates.at(frame).through(working.cut, working.pixels)
         else:
             plate = self._still_plates.at(frame)
-        image = self.clip.area_average(frame, *working.camera.size, working.part)
+        image = working.of(self.clip, frame)
         return Observation(working.camera, image, plate)
 
     @cached_property

@@ -23,7 +23,7 @@ from smokelift.footage.matte import matte
 from smokelift.scene import DirectionalLight
 from smokelift.setup.choice import Choice
 from smokelift.setup.coarse import CoarseFrame
-from smokelift.setup.scattering import NEARER, HeldOut, held_out
+from smokelift.setup.scattering import NEARER, WORDS, HeldOut, held_out
 from smokelift.setup.smoke_colour import FAINTEST
 
 SIDES = ((1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, -1.0))
@@ -67,7 +67,7 @@ def choose_surroundings(
 
     def left(radiance: NDArray[np.float64]) -> HeldOut:
         lights = light_around(radiance)
-        lit = [replace(frame, scene=replace(frame.scene, lights=lights)) for frame in frames]
+        lit = [frame.in_light_of(replace(frame.scene, lights=lights)) for frame in frames]
         return held_out(lit, "single", "single", settings)
 
     found, chosen = np.inf, whole
@@ -79,10 +79,10 @@ def choose_surroundings(
             found, chosen = own, coloured
     if not found < min(NEARER * error, error - tolerance):
         return None
-    without = "absorption only" if scattered.chosen == "absorption" else "scattering without shadows"
     reason = (
-        "Scattering: single scattering with shadows, in light from everywhere, for want of a known one; with "
-        f"{without} held-out pixels differ by {error:.1%} of the smoke's contrast instead of {found:.1%}."
+        f"Scattering: {WORDS['single']}, in light from everywhere, for want of a known one; with "
+        f"{WORDS[scattered.chosen]} held-out pixels differ by {error:.1%} of the smoke's contrast instead of "
+        f"{found:.1%}."
     )
     measured = {**scattered.measured, "error_single": found}
     return light_around(chosen), Choice("scattering", "single", reason, measured, tolerance)

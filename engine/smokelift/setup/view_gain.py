@@ -155,7 +155,7 @@ def _moment(front: ShotView, view: ShotView, scene: CompleteScene, frame: int) -
     with suppress(CameraError):
         working = working_picture(view.camera, own.scene.domain)
         plate = view.plates.at(frame).through(working.cut, working.pixels)
-        picture = view.clip.area_average(frame, *working.camera.size, working.part)
+        picture = working.of(view.clip, frame)
         if matte(picture, plate).mask.any():
             return _Moment(own, Observation(working.camera, picture, plate))
     return None
