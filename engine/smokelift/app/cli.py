@@ -16,6 +16,7 @@ from typing import NoReturn
 from smokelift._core import set_threads
 from smokelift.app.commands import COMMANDS
 from smokelift.app.progress import OutputError, one_line, reporter
+from smokelift.output.atomic import DISK_FULL
 from smokelift.output.index import DirectoryBusyError
 from smokelift.output.vdb import VdbUnavailable
 from smokelift.render import DeviceError
@@ -104,8 +105,8 @@ def _sentence(error: Exception) -> str:
     """What an error says, without the number that the system gives it."""
     if not isinstance(error, OSError) or error.filename is None or not error.strerror:
         return str(error)
-    full = error.errno in (errno.ENOSPC, errno.EDQUOT)
-    return f"{error.filename}: {'cannot be written: the disk is full' if full else error.strerror}"
+    reason = "cannot be written: the disk is full" if error.errno in DISK_FULL else error.strerror
+    return f"{error.filename}: {reason}"
 
 
 def _passes(error: BaseException | None) -> bool:

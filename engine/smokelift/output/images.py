@@ -12,7 +12,7 @@ import OpenEXR
 from PIL import Image
 
 from smokelift.footage.images import ImageError, linear_to_srgb
-from smokelift.output.atomic import atomic_path
+from smokelift.output.atomic import DISK_FULL, atomic_path
 
 
 def eight_bit(image: npt.ArrayLike) -> npt.NDArray[np.uint8]:
@@ -66,6 +66,6 @@ def write_image(path: str | Path, image: npt.ArrayLike, *, half: bool = True) ->
 
 def _of_system(error: RuntimeError) -> OSError:
     """The error of the system that OpenEXR tells of in words only."""
-    known = (number for number in (errno.ENOSPC, errno.EDQUOT) if os.strerror(number) in str(error))
+    known = (number for number in DISK_FULL if os.strerror(number) in str(error))
     number = next(known, errno.EIO)
     return OSError(number, os.strerror(number))

@@ -6,7 +6,6 @@ at all. So a killed run leaves a directory that opens, and the same run can go o
 
 from __future__ import annotations
 
-import errno
 import json
 import os
 import shutil
@@ -20,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from smokelift.output.archive import FLAME, VELOCITY, write_arrays
-from smokelift.output.atomic import atomic_path
+from smokelift.output.atomic import DISK_FULL, atomic_path
 from smokelift.output.checksum import checksum
 from smokelift.output.images import write_image
 from smokelift.output.index import DirectoryBusyError, Index, SequenceError, difference, plain, without_folders
@@ -266,7 +265,7 @@ class SequenceWriter:
                 )
 
     def _failed(self, what: str, error: OSError) -> SequenceError:
-        reason = "the disk is full" if error.errno in (errno.ENOSPC, errno.EDQUOT) else str(error)
+        reason = "the disk is full" if error.errno in DISK_FULL else str(error)
         return SequenceError(
             f"{self.directory}: {what} could not be written: {reason}; "
             f"{len(self.finished)} finished frames stay and --resume goes on from them"
