@@ -62,25 +62,24 @@ def main(words: Sequence[str]) -> int:
 
 def _wait(job: Any) -> None:
     """Run a job to its end and print its messages; SIGTERM and Ctrl-C cancel it."""
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     printed = done = 0
     job.start()
+    # Not by KeyboardInterrupt, which could end a poll between taking a message and reading it.
+    before = {number: signal.signal(number, lambda *_: job.cancel()) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         while not job.ended:
-            try:
-                time.sleep(POLL_SECONDS)
-                if job.poll():
-                    for note in job.notes[printed:]:
-                        print(note, flush=True)
-                    printed = len(job.notes)
-                    if job.done > done:
-                        done = job.done
-                        print(f"frame {done} of {job.total}", flush=True)
-            except KeyboardInterrupt:
-                job.cancel()
+            time.sleep(POLL_SECONDS)
+            if job.poll():
+                for note in job.notes[printed:]:
+                    print(note, flush=True)
+                printed = len(job.notes)
+                if job.done > done:
+                    done = job.done
+                    print(f"frame {done} of {job.total}", flush=True)
     finally:
         job.kill()
-        signal.signal(signal.SIGTERM, before)
+        for number, handler in before.items():
+            signal.signal(number, handler or signal.SIG_DFL)  # None: it was not Python's
 
 
 def _smoke(choices: argparse.Namespace) -> bpy.types.Object:
