@@ -141,14 +141,19 @@ def curves(results: Results, name: str, method: str, figure: str) -> Floats:
 
 
 def draw(results: Results, figure: str, label: str, path: Path) -> None:
-    """Draw a chart a disturbance that has the figure: thin lines for scenes, thick ones where all of them have it."""
-    from matplotlib.figure import Figure
+    """Draw a chart a disturbance that has the figure: thin lines for scenes, thick ones where all of them have it.
 
+    Nothing is drawn where none has it: a scene counts once the default is measured on it undisturbed.
+    """
     shown: dict[str, dict[str, Floats]] = {}
     for name in DISTURBANCES:
         found: dict[str, Floats] = {method: curves(results, name, method, figure) for method in METHODS}
         if measured := {method: lines for method, lines in found.items() if not np.isnan(lines).all()}:
             shown[name] = measured
+    if not shown:
+        return
+    from matplotlib.figure import Figure
+
     rows = -(-len(shown) // COLUMNS)
     sheet = Figure(figsize=(3.1 * COLUMNS, 2.5 * rows), layout="constrained")
     axes = sheet.subplots(rows, COLUMNS, squeeze=False).ravel()

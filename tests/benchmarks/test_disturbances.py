@@ -11,7 +11,7 @@ import pytest
 from benchmarks.disturbances import calls, smoke, spoiled
 from benchmarks.disturbances.known import FRONT, GRID, SIZE, Known
 from benchmarks.disturbances.measure import flow_error, whole_run
-from benchmarks.disturbances.report import Results, losing, table
+from benchmarks.disturbances.report import Results, draw, losing, table
 from benchmarks.disturbances.table import DISTURBANCES
 from smokelift import Background, Camera, DirectionalLight, Domain, Medium, Scene
 
@@ -226,6 +226,19 @@ def test_rows_stay_and_the_table_has_the_loss(tmp_path) -> None:
     line = next(line for line in table(again).splitlines() if "missing" in line)
     assert "-2.0, -2.0 (1) | -7.0, -7.0 (1)" in line
     assert "| 0.17 |" in line
+
+
+def test_a_chart_needs_the_default_undisturbed(tmp_path) -> None:
+    """The paper's method alone, as `--methods paper` measures it, has nothing to be compared with."""
+    results, chart = Results(tmp_path / "stability.csv"), tmp_path / "views.png"
+    results.add(("missing", 0.5, "ball", "paper"), {"psnr_new": 20.0, "refused": None})
+    assert len(table(results).splitlines()) == 2
+    draw(results, "psnr_new", "new views", chart)
+    assert not chart.exists()
+    pytest.importorskip("matplotlib")
+    results.add(("missing", DISTURBANCES["missing"].undisturbed, "ball", "default"), {"psnr_new": 25.0})
+    draw(results, "psnr_new", "new views", chart)
+    assert chart.exists()
 
 
 def test_every_disturbance_has_the_strengths_that_it_names() -> None:
