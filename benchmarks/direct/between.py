@@ -19,7 +19,7 @@ from benchmarks.accuracy.scenes import baked_scene
 from benchmarks.direct.clips import density_error, true_moment
 from benchmarks.direct.continuation import tile
 from benchmarks.tables import markdown
-from smokelift.direct.between import between
+from smokelift.direct.interpolation import interpolate
 from smokelift.direct.looping import seam
 from smokelift.evaluation.truth import Truth
 from smokelift.output.sheet import write_sheet
@@ -34,7 +34,7 @@ def retimed(truth: Truth) -> list[float]:
     errors = []
     for frame in range(2, truth.frames - 1, 4):
         before, after = true_moment(truth, frame - 1), true_moment(truth, frame + 1)
-        found = between(before, after, after.velocity, 2 * truth.dt, 0.5).density
+        found = interpolate(before, after, after.velocity, 2 * truth.dt, 0.5).density
         faded = (before.density + after.density) / 2
         errors.append([density_error(d, truth.density(frame)) for d in (before.density, faded, found)])
     return [float(value) for value in np.mean(errors, axis=0)]

@@ -20,8 +20,8 @@ from benchmarks.accuracy.scenes import baked_scene
 from benchmarks.background.flames import reactants
 from benchmarks.direct.clips import density_error, true_moment
 from benchmarks.tables import markdown
-from smokelift.direct import Moment, learnt_simulation
-from smokelift.direct.continuing import LEARNT_FROM
+from smokelift.direct import Moment, fit_simulation
+from smokelift.direct.continuation import FITTED_MOMENTS
 from smokelift.direct.fire import Fire
 from smokelift.evaluation.truth import Truth
 from smokelift.transport import Array
@@ -31,7 +31,7 @@ HEADER = ["scene", "", "mean error", "error, last frame", "emission over the tru
 
 def ways(moments: list[Moment], frames: int, dt: float) -> Iterator[tuple[str, list[Array]]]:
     """Yield every way to continue the fire of moments by so many frames, with its emissions."""
-    simulation = learnt_simulation(moments[-LEARNT_FROM:], dt)
+    simulation = fit_simulation(moments[-FITTED_MOMENTS:], dt)
     assert simulation.fire is not None
     kept = replace(simulation, fire=Fire(1.0, np.zeros_like(simulation.fire.feed)))
     held = moments[-1].flame
@@ -50,7 +50,7 @@ def table(name: str, truth: Truth) -> Iterator[list[str]]:
     """Yield the rows of a scene."""
     emissions = [np.sqrt(left) for left in reactants(truth)]
     cut = 2 * truth.frames // 3
-    moments = [replace(true_moment(truth, n), flame=emissions[n]) for n in range(max(1, cut - LEARNT_FROM), cut)]
+    moments = [replace(true_moment(truth, n), flame=emissions[n]) for n in range(max(1, cut - FITTED_MOMENTS), cut)]
     true = emissions[cut:]
     for how, found in ways(moments, len(true), truth.dt):
         errors = [density_error(f, t) for f, t in zip(found, true, strict=True)]

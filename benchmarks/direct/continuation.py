@@ -19,8 +19,8 @@ import numpy.typing as npt
 from benchmarks.accuracy.scenes import KnownScene, baked_scene
 from benchmarks.direct.clips import density_error, picture_psnr, reconstructed_moment, true_moment
 from benchmarks.tables import markdown
-from smokelift.direct import Moment, learnt_simulation
-from smokelift.direct.continuing import LEARNT_FROM
+from smokelift.direct import Moment, fit_simulation
+from smokelift.direct.continuation import FITTED_MOMENTS
 from smokelift.output.images import eight_bit
 from smokelift.output.sheet import write_sheet
 from smokelift.transport import Array, advect, divergence
@@ -38,7 +38,7 @@ def ways(moments: list[Moment], frames: int, dt: float) -> Iterator[tuple[str, l
         density = advect(carried[-1].density, last.velocity, dt, conserve=True)
         carried.append(Moment(density, last.velocity))
     yield "carried", carried[1:]
-    simulation, simulated = learnt_simulation(moments[-LEARNT_FROM:], dt), [last]
+    simulation, simulated = fit_simulation(moments[-FITTED_MOMENTS:], dt), [last]
     for step in range(1, frames + 1):
         simulated.append(simulation.next(simulated[-1], step))
     yield "simulated", simulated[1:]
@@ -57,9 +57,9 @@ def table(known: KnownScene, folder: Path | None) -> Iterator[list[str]]:
     count = truth.frames if folder is None else len(list(folder.glob("[0-9]*.npz")))
     cut = 2 * count // 3
     if folder is None:
-        moments = [true_moment(truth, frame) for frame in range(max(1, cut - LEARNT_FROM), cut)]
+        moments = [true_moment(truth, frame) for frame in range(max(1, cut - FITTED_MOMENTS), cut)]
     else:
-        moments = [reconstructed_moment(folder, truth, frame) for frame in range(max(1, cut - LEARNT_FROM), cut)]
+        moments = [reconstructed_moment(folder, truth, frame) for frame in range(max(1, cut - FITTED_MOMENTS), cut)]
     frames = range(cut, count)
     run, at = ("truth", Path()) if folder is None else (RUN, folder)
     for how, found in ways(moments, len(frames), truth.dt):
@@ -82,7 +82,7 @@ def picture(known: KnownScene, path: Path) -> None:
     assert truth is not None
     cut = 2 * truth.frames // 3
     frames = range(cut, truth.frames)
-    moments = [true_moment(truth, frame) for frame in range(max(1, cut - LEARNT_FROM), cut)]
+    moments = [true_moment(truth, frame) for frame in range(max(1, cut - FITTED_MOMENTS), cut)]
     shown = [0, len(frames) // 3, 2 * len(frames) // 3, len(frames) - 1]
     white = float(max(truth.density(f).mean(axis=1).max() for f in frames))
     columns = {"what came": [truth.density(frames[i]) for i in shown]}

@@ -25,8 +25,8 @@ from benchmarks.accuracy.scenes import baked_scene
 from benchmarks.direct.clips import true_moment
 from benchmarks.direct.continuation import largest_divergence
 from benchmarks.tables import markdown
-from smokelift.direct import Moment, Simulation, learnt_simulation
-from smokelift.direct.continuing import LEARNT_FROM
+from smokelift.direct import Moment, Simulation, fit_simulation
+from smokelift.direct.continuation import FITTED_MOMENTS
 from smokelift.direct.inflow import Inflow
 from smokelift.direct.physics import Physics
 from smokelift.evaluation.truth import Truth
@@ -84,8 +84,8 @@ def kept(simulation: Simulation) -> float:
 def row(name: str, truth: Truth, frames: int) -> list[str]:
     """Return the figures of a scene."""
     cut = 2 * truth.frames // 3
-    moments = [true_moment(truth, frame) for frame in range(max(1, cut - LEARNT_FROM), cut)]
-    simulation, moment = learnt_simulation(moments, truth.dt), moments[-1]
+    moments = [true_moment(truth, frame) for frame in range(max(1, cut - FITTED_MOMENTS), cut)]
+    simulation, moment = fit_simulation(moments, truth.dt), moments[-1]
     solve = min(seconds(lambda: without_divergence(moments[-1].velocity)) for _ in range(3))
     fast, speed, divergence, spent = max(map(fastest, moments)), 0.0, 0.0, 0.0
     start = expected = float(moment.density.sum(dtype=float))

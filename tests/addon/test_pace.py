@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from addon.pace import paced
-from smokelift.direct import paced as engines
+from smokelift.direct import playback
 
 LONGEST_EXPRESSION = 256
 """Characters that Blender keeps of a driver's expression."""
@@ -19,7 +19,7 @@ def test_places_and_speeds_are_the_engines(speeds) -> None:
     """At every frame, as drivers compute them."""
     count = 41
     pace = paced(count, speeds)
-    places, wanted = engines(count, speeds)
+    places, wanted = playback(count, speeds)
     for time, (place, speed) in enumerate(zip(places, wanted, strict=True)):
         found = [eval(text("t"), {"t": time, "exp": math.exp}) for text in (pace.place, pace.speed)]
         np.testing.assert_allclose(found, (place, speed), rtol=2e-3, atol=2e-3)

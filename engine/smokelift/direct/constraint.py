@@ -23,7 +23,7 @@ Mask = npt.NDArray[np.bool_]
 FaceMasks = tuple[Mask, Mask, Mask]
 
 
-def without_divergence_given(
+def project_with_given_faces(
     field: StaggeredGrid, given: FaceMasks, wanted: Faces, *, tolerance: float = 1e-3, limit: int = 60
 ) -> StaggeredGrid:
     """The nearest field without divergence that has the values wanted on the given faces.

@@ -1,133 +1,199 @@
-"""What the smoke does after the last moment of its clip: a simulation that starts from it.
-
-A step of dt from density rho and velocity u to rho' and u', in the convention of a sequence, whose velocity has carried
-the moment before to this one:
-
-    u'   = Project(advect(u - a, u) + dt (b rho up) + a'), in inlets and fans with their own velocity
-    rho' = exp(-d dt) advect(rho, u'), in inlets with their own density
-
-where a is the air's own motion: wind and turbulence, which all air has beside what moves it. Outside the box it is all
-there is.
-
-Buoyancy b and dissipation d are those of the clip (`smokelift.direct.physics`), as are what enters
-(`smokelift.direct.inflow`) and how fire burns (`smokelift.direct.fire`), which lifts nothing beside what b has of it.
-Advection keeps the mass. There is no viscosity, and MacCormack's correction keeps the eddies that the clip has.
-"""
+"""Continues a sequence on disk: its frames up to one, and then those of a simulation that starts from it."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+import time
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from smokelift.direct.constraint import Mask
-from smokelift.direct.fire import Fire, learnt_fire
-from smokelift.direct.inflow import Inflow, find_inflow
-from smokelift.direct.moment import Moment
-from smokelift.direct.physics import Physics, fit_physics, lift
-from smokelift.direct.surroundings import Surroundings
-from smokelift.transport import Array, Velocity, advect, on_faces, project
+from smokelift.direct.constraint import faces_of
+from smokelift.direct.moment import Moment, read_moment
+from smokelift.direct.obstacles import Ball, Box, Obstacle, Obstacles, outside_message
+from smokelift.direct.simulation import fit_simulation
+from smokelift.direct.surroundings import Fan, Surroundings
+from smokelift.direct.turbulence import Turbulence
+from smokelift.direct.writing import SHORTEST, Written, directed_writer, simulated_figures, write_copy
+from smokelift.output.resume import ResumeState
+from smokelift.output.sequence import Sequence
+from smokelift.output.writer import SequenceWriter
+from smokelift.scene import Domain, Side
+from smokelift.scene.checks import Vector
+from smokelift.transport import Velocity
 
-TRACE = np.float32(1e-4)
-"""Share of the largest density below which nothing is seen. Interpolation spreads such traces over the whole box."""
+FITTED_MOMENTS = 12
+"""Last moments of the clip, at most, that physics and inflow are fitted to. In half a second the source of a clip is
+steady, and the replay of so much is not noticed."""
+
+UNFADED = ("unfaded", "unfaded_flame")
+"""Names of the density and the emission before the fading in the resume state: the simulation goes on from those."""
+
+SMALLEST_EDDY = 3
+"""Voxels across an eddy, at least: fewer do not show that it turns."""
 
 
-@dataclass(frozen=True, eq=False)
-class Simulation:
-    """The smoke of a clip, set free.
+@dataclass(frozen=True)
+class Continuation:
+    """How a sequence goes on.
 
     Attributes
     ----------
-    physics
-        Fitted to the clip.
-    inflow
-        Of the clip.
-    surroundings
-        What the artist has placed.
-    dt
-        Time of a step in seconds.
-    fire
-        Of the clip; None without any.
+    frames
+        Frames after `start`.
+    start
+        The last frame that stays as it is; None takes the last there is.
+    fade
+        Frames at the end in which the smoke fades to nothing.
+    wind
+        Velocity in m/s that all air gains after `start`.
+    turbulences
+        Eddies that all air gains after `start`.
+    fans, obstacles
+        What stands in the box after `start`.
+    closed
+        Sides that are walls after `start`, besides those of the scene.
     """
 
-    physics: Physics
-    inflow: Inflow
-    surroundings: Surroundings
-    dt: float
-    fire: Fire | None = None
-
-    def next(self, moment: Moment, step: int) -> Moment:
-        """Return the moment after one; the step that leads there is counted from 1 at the clip's last moment."""
-        entering, solid = self.inflow.at(step), self.surroundings.solid(step, self.dt)
-        moved = self._moved(moment.velocity, step)
-        driven = moved.with_faces(self._driven(moved, moment, entering, step))
-        velocity = project(driven) if solid is None else solid.projected(driven)
-        filled = None if solid is None else solid.voxels
-        density = self._carried(moment.density, velocity, filled)
-        density *= np.float32(math.exp(-self.physics.dissipation * self.dt))
-        inlets = self.inflow.voxels if filled is None else self.inflow.voxels & ~filled
-        flame = None
-        if self.fire is not None and moment.flame is not None:
-            flame = self.fire.after(self._carried(moment.flame, velocity, filled), filled)
-        return Moment(
-            np.where(inlets, entering.density, density),
-            Velocity(velocity.faces, velocity.voxel_size, velocity.closed),
-            flame,
-        )
-
-    def _carried(self, values: Array, velocity: Velocity, solid: Mask | None) -> Array:
-        return _tidied(advect(values, velocity, self.dt, conserve=True), solid)
-
-    def _moved(self, velocity: Velocity, step: int) -> Velocity:
-        """The velocity that has carried itself along, without the air's own motion."""
-        air = self.surroundings.air(velocity, (step - 1) * self.dt)
-        calm = velocity.with_faces(u - a for u, a in zip(velocity.faces, air, strict=True))
-        moved = advect(calm, velocity, self.dt)
-        came = advect(np.ones(velocity.shape, np.float32), velocity, self.dt, scheme="semi-lagrangian")
-        inside = on_faces(np.stack([came] * 3, axis=-1))
-        return moved.with_faces(u * share for u, share in zip(moved.faces, inside, strict=True))
-
-    def _driven(self, moved: Velocity, moment: Moment, entering: Moment, step: int) -> list[Array]:
-        """The velocity on faces after forces, inlets and fans, before the projection."""
-        rising = lift(moment.density, moved).faces
-        faces = []
-        for axis, own in enumerate(self.surroundings.air(moved, step * self.dt)):
-            driven = moved.faces[axis] + np.float32(self.dt * self.physics.buoyancy) * rising[axis]
-            for place, blown in self.surroundings.blown:
-                driven = np.where(place[axis], np.float32(blown[axis]), driven)
-            driven = np.where(self.inflow.faces[axis], entering.velocity.faces[axis], driven)
-            faces.append(driven + own)
-        return faces
+    frames: int
+    start: int | None = None
+    fade: int = 0
+    wind: Vector = (0.0, 0.0, 0.0)
+    turbulences: tuple[Turbulence, ...] = ()
+    fans: tuple[Fan, ...] = ()
+    obstacles: tuple[Obstacle, ...] = ()
+    closed: tuple[Side, ...] = ()
 
 
-def learnt_simulation(
-    moments: Sequence[Moment], dt: float, marked: Mask | None = None, surroundings: Surroundings | None = None
-) -> Simulation:
-    """The simulation that goes on as the moments of a clip do.
+def continue_sequence(
+    sequence: Sequence, out: str | Path, continuation: Continuation, *, npz: bool = False, resume: bool = False
+) -> Iterator[Written]:
+    """Write a sequence up to a frame, and then what a simulation makes of it.
 
     Parameters
     ----------
-    moments
-        Consecutive ones, two at least.
-    dt
-        Time between them in seconds.
-    marked : (nx, ny, nz) bool, optional
-        Where smoke enters, if that is known.
-    surroundings
-        What is placed around the smoke.
+    sequence
+        See `smokelift.direct.writing.open_source`.
+    out
+        Directory to write to.
+    continuation
+        How it goes on.
+    npz, resume
+        As in `smokelift.output.writer.SequenceWriter`.
+
+    Yields
+    ------
+    The number and the figures of every frame, which is written already.
+
+    Raises
+    ------
+    ValueError
+        If there is no such frame to start from, or too few before it, a fan or an obstacle is not in the box, eddies
+        are too small for the voxels, or a file cannot be read or written.
     """
-    inflow = find_inflow(moments, dt, marked)
-    physics = fit_physics(moments, dt, inflow.voxels)
-    return Simulation(physics, inflow, surroundings or Surroundings(), dt, learnt_fire(moments, dt))
+    start = sequence.frames[-1] if continuation.start is None else continuation.start
+    kept = tuple(number for number in sequence.frames if number <= start)
+    if start not in sequence.frames or len(kept) < SHORTEST:
+        raise ValueError(
+            f"{sequence.directory}: cannot go on from frame {start}; choose one from "
+            f"{sequence.frames[SHORTEST - 1]} to {sequence.frames[-1]}."
+        )
+    surroundings = _surroundings(continuation, sequence.scene.domain)
+    surroundings.solid(1, 1 / sequence.fps)  # refuses what fills the box before anything is written
+    last = start + continuation.frames
+    settings = {
+        "frames": continuation.frames,
+        "start": start,
+        "fade": continuation.fade,
+        "wind": continuation.wind,
+        "turbulences": [asdict(turbulence) for turbulence in continuation.turbulences],
+        "fans": [vars(fan.place) | {"velocity": fan.velocity} for fan in continuation.fans],
+        "obstacles": [_as_settings(obstacle) for obstacle in continuation.obstacles],
+        "closed": continuation.closed,
+    }
+    how = (
+        f"Frames {start + 1} to {last} are a simulation that starts from frame {start}, with the buoyancy, the "
+        "dissipation and the inflow of the clip, and of its fire if it shows any."
+    )
+    camera_frames = [float(number) for number in range(kept[0], last + 1)]
+    with directed_writer(sequence, out, "continue", settings, how, camera_frames, npz=npz, resume=resume) as writer:
+        if writer.state is None and writer.finished:
+            return
+        yield from _copied(sequence, kept, writer)
+        yield from _simulated(sequence, kept, continuation, surroundings, writer)
 
 
-def _tidied(density: Array, solid: Mask | None) -> Array:
-    """The same mass without traces, and without what interpolation lets into obstacles."""
-    kept = density > TRACE * density.max()
-    if solid is not None:
-        kept &= ~solid
-    tidied = np.where(kept, density, np.float32(0))
-    mass, left = (float(values.sum(dtype=np.float64)) for values in (density, tidied))
-    return tidied * np.float32(mass / left) if left > 0 else tidied
+def _copied(sequence: Sequence, numbers: tuple[int, ...], writer: SequenceWriter) -> Iterator[Written]:
+    for number in numbers:
+        if number not in writer.finished:
+            yield write_copy(sequence, number, writer, number, {})
+
+
+def _simulated(
+    sequence: Sequence,
+    kept: tuple[int, ...],
+    continuation: Continuation,
+    surroundings: Surroundings,
+    writer: SequenceWriter,
+) -> Iterator[Written]:
+    start, dt = kept[-1], 1 / sequence.fps
+    # the first frame has no velocity of its own
+    moments = [read_moment(sequence, number) for number in kept[1:][-FITTED_MOMENTS:]]
+    simulation = fit_simulation(moments, dt, sequence.scene.inflow(), surroundings)
+    closed = (*sequence.scene.closed, *continuation.closed)
+    moment, state = moments[-1], writer.state
+    moment = replace(moment, velocity=replace(moment.velocity, closed=closed))
+    if state is not None and state.number > start:
+        moment = _resumed(state, sequence.scene.domain, closed)
+    for step in range(1, continuation.frames + 1):
+        number = start + step
+        if number in writer.finished:
+            continue
+        began = time.perf_counter()
+        moment = simulation.next(moment, step)
+        left = np.float32(_share_left(step, continuation))
+        faded = replace(
+            moment, density=moment.density * left, flame=None if moment.flame is None else moment.flame * left
+        )
+        solid = surroundings.solid(step, dt)
+        obstacles = None if solid is None else solid.voxels
+        figures = simulated_figures(faded, began, "simulated", vars(simulation.physics), obstacles)
+        volumes = [values for values in (moment.density, moment.flame) if values is not None]
+        unfaded = dict(zip(UNFADED, volumes, strict=False))
+        writer.write(number, faded.density, moment.velocity.faces, figures, unfaded, flame=faded.flame)
+        yield number, figures
+
+
+def _resumed(state: ResumeState, domain: Domain, closed: tuple[Side, ...]) -> Moment:
+    """The last simulated moment of a run that goes on."""
+    volumes = [np.asarray(state.extra[name], np.float32) for name in UNFADED if name in state.extra]
+    return Moment(volumes[0], Velocity(state.velocity, domain.voxel_size, closed), *volumes[1:])
+
+
+def _share_left(step: int, continuation: Continuation) -> float:
+    """The part of the smoke that is shown while it fades."""
+    return min(1.0, (continuation.frames - step) / continuation.fade) if continuation.fade else 1.0
+
+
+def _surroundings(continuation: Continuation, domain: Domain) -> Surroundings:
+    blown = []
+    for fan in continuation.fans:
+        voxels = fan.place.voxels(domain)
+        if not voxels.any():
+            raise ValueError(outside_message("fan", domain))
+        blown.append((faces_of(voxels), fan.velocity))
+    for turbulence in continuation.turbulences:
+        if turbulence.size < SMALLEST_EDDY * domain.voxel_size:
+            raise ValueError(
+                f"turbulence of {turbulence.size:g} m is too small for voxels of {domain.voxel_size:.3g} m; make it "
+                f"{SMALLEST_EDDY * domain.voxel_size:.3g} m at least."
+            )
+    obstacles = Obstacles(domain, continuation.obstacles) if continuation.obstacles else None
+    return Surroundings(continuation.wind, continuation.turbulences, tuple(blown), obstacles)
+
+
+def _as_settings(obstacle: Obstacle) -> dict[str, Any]:
+    """What identifies an obstacle in the settings of the new sequence."""
+    return vars(obstacle) if isinstance(obstacle, Ball | Box) else obstacle.fingerprint()

@@ -29,36 +29,37 @@ class Fire:
 
     Attributes
     ----------
-    left
+    remaining
         Share of the emission that is left of it after a step, 0 to 1.
     feed : (nx, ny, nz)
         Emission that a step adds.
     """
 
-    left: float
+    remaining: float
     feed: Array
 
-    def after(self, carried: Array, solid: Mask | None) -> Array:
-        """The emission (nx, ny, nz) after a step, from what was carried along; none in the solid."""
-        emission = np.float32(self.left) * carried + self.feed
+    def after(self, advected: Array, solid: Mask | None) -> Array:
+        """The emission (nx, ny, nz) after a step, from the advected one; zero in obstacles."""
+        emission = np.float32(self.remaining) * advected + self.feed
         return emission if solid is None else np.where(solid, np.float32(0), emission)
 
 
-def learnt_fire(moments: Sequence[Moment], dt: float) -> Fire | None:
-    """The fire of consecutive moments of a clip, `dt` seconds apart; None without any."""
+def fit_fire(moments: Sequence[Moment], dt: float) -> Fire | None:
+    """Fit the fire of consecutive moments of a clip, `dt` seconds apart; None where they show none."""
     burning = [(moment.flame, moment.velocity) for moment in moments if moment.flame is not None]
     if len(burning) < len(moments):
         return None
-    before = np.zeros(moments[0].density.shape, np.float32)
-    after = before.copy()
+    advected = np.zeros(moments[0].density.shape, np.float32)
+    found = advected.copy()
     for (flame, _), (following, velocity) in pairwise(burning):
-        before += advect(flame, velocity, dt, conserve=True)
-        after += following
-    unfed = after < before
-    left = float(after[unfed].sum(dtype=np.float64) / before[unfed].sum(dtype=np.float64)) if unfed.any() else 1.0
-    feed = np.maximum(after - np.float32(left) * before, 0)
-    # what is left out as less than nothing would make the fire grow
-    lasting = (after.sum(dtype=np.float64) - left * before.sum(dtype=np.float64)) / max(
-        feed.sum(dtype=np.float64), 1e-30
-    )
-    return Fire(left, feed * np.float32(lasting / (len(moments) - 1)))
+        advected += advect(flame, velocity, dt, conserve=True)
+        found += following
+    unfed = found < advected
+    remaining = 1.0
+    if unfed.any():
+        remaining = float(found[unfed].sum(dtype=np.float64) / advected[unfed].sum(dtype=np.float64))
+    feed = np.maximum(found - np.float32(remaining) * advected, 0)
+    # The feed is clipped at zero. Scaled to the sum before the clipping it does not make the fire grow.
+    net = found.sum(dtype=np.float64) - remaining * advected.sum(dtype=np.float64)
+    scale = net / max(feed.sum(dtype=np.float64), 1e-30)
+    return Fire(remaining, feed * np.float32(scale / (len(moments) - 1)))

@@ -69,13 +69,13 @@ def find_inflow(moments: Sequence[Moment], dt: float, marked: Mask | None = None
     marked : (nx, ny, nz) bool, optional
         Inlets that are known; otherwise they are found from what the velocities do not explain.
     """
-    voxels = _found(moments, dt) if marked is None else marked
+    voxels = _detect_inlets(moments, dt) if marked is None else marked
     if voxels.any():
         voxels = ndimage.binary_dilation(voxels, ndimage.generate_binary_structure(3, 3), MARGIN)
     return Inflow(voxels, moments)
 
 
-def _found(moments: Sequence[Moment], dt: float) -> Mask:
+def _detect_inlets(moments: Sequence[Moment], dt: float) -> Mask:
     """The voxels of inlets by the mean over all moments, for inlets stand still and errors do not."""
     detection, means = SourceDetection(), None
     smoke: Mask = np.zeros(moments[0].density.shape, bool)
@@ -87,11 +87,11 @@ def _found(moments: Sequence[Moment], dt: float) -> Mask:
         smoke = densest > FAINT * densest.max()
     if means is None:
         return smoke
-    return _strongest(detection.weight(means, smoke) < MOTION, means.mean)
+    return _strongest_inlets(detection.weight(means, smoke) < MOTION, means.mean)
 
 
-def _strongest(entering: Mask, strength: Array) -> Mask:
-    """The connected places where most smoke enters."""
+def _strongest_inlets(entering: Mask, strength: Array) -> Mask:
+    """The connected components of voxels (nx, ny, nz) in which most smoke enters."""
     labels, count = ndimage.label(entering)
     if count == 0:
         return entering

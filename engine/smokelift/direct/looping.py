@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
-from smokelift.direct.between import between
+from smokelift.direct.interpolation import interpolate
 from smokelift.direct.moment import Moment, read_moment
-from smokelift.direct.writing import SHORTEST, Written, directed_writer, simulated_figures, time_step, write_copy
+from smokelift.direct.writing import SHORTEST, Written, directed_writer, simulated_figures, write_copy
 from smokelift.output.sequence import Sequence
 from smokelift.transport import Velocity
 from smokelift.velocity import estimate_velocity
@@ -49,9 +49,9 @@ def loop_sequence(
 ) -> Iterator[Written]:
     """Write a part of a sequence so that its last frame leads to its first.
 
-    The first frames of the part come after the last ones as well: where the two overlap, the one is carried towards the
-    other, by the motion that leads from the one density to the other, and the other back. So shapes move from where
-    they are to where they have to be, and do not fade out here and in there.
+    The part overlaps with its own start. In the overlap the motion from the last density to the first is estimated, the
+    last frames are advected along it and the first ones back, and the two are blended. So shapes move to where they
+    have to be, and do not fade out in one place and in at another.
 
     Parameters
     ----------
@@ -76,24 +76,24 @@ def loop_sequence(
         See `loop_length`, or if a file cannot be read or written.
     """
     length = loop_length(sequence, first, last, overlap)
-    told = {"frames": [first, last], "overlap": overlap}
+    settings = {"frames": [first, last], "overlap": overlap}
     how = f"In frames 1 to {overlap} the end of the loop becomes its start: both are carried to a shape between them."
-    cameras = [float(first + n) for n in range(length)]
-    with directed_writer(sequence, out, "loop", told, how, cameras, npz=npz, resume=resume) as writer:
+    camera_frames = [float(first + n) for n in range(length)]
+    with directed_writer(sequence, out, "loop", settings, how, camera_frames, npz=npz, resume=resume) as writer:
         for index in range(length):
-            number, place = index + 1, first + index
+            number, source = index + 1, first + index
             if number in writer.finished:
                 continue
             began = time.perf_counter()
             if index < overlap:
                 share = number / (overlap + 1)
-                start, end = read_moment(sequence, place), read_moment(sequence, place + length)
-                moment = seam(end, start, share, time_step(sequence) * (overlap + 1))
-                figures = simulated_figures(moment, began, "looped", {"place": place, "share": share})
+                start, end = read_moment(sequence, source), read_moment(sequence, source + length)
+                moment = seam(end, start, share, (overlap + 1) * (1 / sequence.fps))
+                figures = simulated_figures(moment, began, "looped", {"place": source, "share": share})
                 writer.write(number, moment.density, moment.velocity.faces, figures, flame=moment.flame)
                 yield number, figures
             else:
-                yield write_copy(sequence, place, writer, number, {"place": place})
+                yield write_copy(sequence, source, writer, number, {"place": source})
 
 
 def seam(end: Moment, start: Moment, share: float, duration: float) -> Moment:
@@ -113,6 +113,6 @@ def seam(end: Moment, start: Moment, share: float, duration: float) -> Moment:
     else:
         velocity = end.velocity
         way = estimate_velocity(end.density, start.density, duration, velocity.voxel_size, closed=velocity.closed)
-    moment = between(end, start, way, duration, share)
+    moment = interpolate(end, start, way, duration, share)
     faces = [u + w for u, w in zip(moment.velocity.faces, way.faces, strict=True)]
     return replace(moment, velocity=Velocity((faces[0], faces[1], faces[2]), way.voxel_size, way.closed))

@@ -105,8 +105,8 @@ class Mesh:
         places = (self.triangles.astype(np.float64) - domain.min) / domain.voxel_size - 0.5
         return [_crossings(places[:, :, order], tuple(domain.shape[d] for d in order)) for order in ORDERS]
 
-    def told(self) -> dict[str, Any]:
-        """What tells it from another, for the settings of a sequence."""
+    def fingerprint(self) -> dict[str, Any]:
+        """Number of triangles and checksum: what distinguishes it from another in the settings of a sequence."""
         content = np.ascontiguousarray(self.triangles, "<f4").tobytes()
         return {"triangles": len(self.triangles), "checksum": hashlib.sha256(content).hexdigest()}
 

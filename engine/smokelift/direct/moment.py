@@ -6,14 +6,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from smokelift.direct.constraint import FaceMasks, without_divergence_given
+from smokelift.direct.constraint import FaceMasks, project_with_given_faces
 from smokelift.output.sequence import Sequence
 from smokelift.transport import Array, Velocity, divergence
 
-SOUND = 1e-3
-"""Divergence times voxel size over the largest speed, up to which a velocity counts as without divergence."""
+DIVERGENCE_TOLERANCE = 1e-3
+"""Divergence times voxel size over the largest speed, below which a velocity counts as free of divergence."""
 
-COMPLETION = 30
+COMPLETION_ITERATIONS = 30
 """Iterations in which a velocity that is known near smoke alone is completed."""
 
 
@@ -44,24 +44,24 @@ def read_moment(sequence: Sequence, number: int) -> Moment:
         If there is no such frame, or its file is missing or damaged.
     """
     velocity = replace(sequence.staggered_velocity(number), closed=sequence.scene.closed)
-    return Moment(sequence.density(number), completed(velocity), sequence.flame(number))
+    return Moment(sequence.density(number), complete_velocity(velocity), sequence.flame(number))
 
 
-def completed(velocity: Velocity) -> Velocity:
+def complete_velocity(velocity: Velocity) -> Velocity:
     """The velocity without divergence that is nearest to one that is known near smoke alone, and zero elsewhere.
 
     Files keep the velocity near smoke. Cut off there it has divergence, and projecting that would slow the smoke down;
     so the air around is set in motion instead. A velocity without divergence stays as it is.
     """
     largest = max(float(np.abs(component).max()) for component in velocity.faces)
-    if float(np.abs(divergence(velocity)).max()) * velocity.voxel_size <= SOUND * largest:
+    if float(np.abs(divergence(velocity)).max()) * velocity.voxel_size <= DIVERGENCE_TOLERANCE * largest:
         return velocity
-    found = without_divergence_given(velocity, _known(velocity), velocity.faces, limit=COMPLETION)
+    found = project_with_given_faces(velocity, _known(velocity), velocity.faces, limit=COMPLETION_ITERATIONS)
     return velocity.with_faces(found.faces)
 
 
 def _known(velocity: Velocity) -> FaceMasks:
-    """The faces between voxels with a velocity."""
+    """The faces both of whose voxels have a velocity."""
     known = velocity.centres().any(axis=-1)
     pairs = []
     for axis in range(3):

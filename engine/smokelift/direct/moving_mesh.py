@@ -95,9 +95,9 @@ class MovingMesh:
         x, y, z = (_on_faces(found, speeds[:, :, axis], domain, axis) for axis, found in enumerate(crossings))
         return enclosed(crossings, domain), (x, y, z)
 
-    def told(self) -> dict[str, Any]:
-        """What tells it from another, for the settings of a sequence."""
-        parts = [place.told() for place in self.places]
+    def fingerprint(self) -> dict[str, Any]:
+        """Numbers of frames and triangles, and checksum, for the settings of a sequence."""
+        parts = [place.fingerprint() for place in self.places]
         whole = hashlib.sha256("".join(part["checksum"] for part in parts).encode()).hexdigest()
         return {"frames": len(parts), "triangles": parts[0]["triangles"], "checksum": whole}
 

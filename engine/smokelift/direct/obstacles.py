@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from smokelift.direct.constraint import Mask, faces_between, faces_of, without_divergence_given
+from smokelift.direct.constraint import Mask, faces_between, faces_of, project_with_given_faces
 from smokelift.direct.mesh import Mesh
 from smokelift.direct.moving_mesh import MovingMesh
 from smokelift.scene import Domain
@@ -83,16 +83,16 @@ class Solid(NamedTuple):
         inside = faces_of(self.voxels)
         wanted = velocity.with_faces(self.velocity or (np.float32(0) * component for component in velocity.faces))
         if self.velocity is None:
-            field = without_divergence_given(velocity, faces_between(self.voxels), wanted.faces)
+            field = project_with_given_faces(velocity, faces_between(self.voxels), wanted.faces)
         else:
             swelling = np.where(self.voxels, divergence(wanted) * np.float32(velocity.voxel_size), np.float32(0))
-            away = outflow(swelling, velocity)
+            outwards = outflow(swelling, velocity)
             rest, given = (
-                field.with_faces(u - a for u, a in zip(field.faces, away.faces, strict=True))
+                field.with_faces(u - a for u, a in zip(field.faces, outwards.faces, strict=True))
                 for field in (velocity, wanted)
             )
-            found = without_divergence_given(rest, faces_between(self.voxels), given.faces)
-            field = found.with_faces(u + a for u, a in zip(found.faces, away.faces, strict=True))
+            found = project_with_given_faces(rest, faces_between(self.voxels), given.faces)
+            field = found.with_faces(u + a for u, a in zip(found.faces, outwards.faces, strict=True))
         return velocity.with_faces(
             np.where(mask, own, component)
             for mask, own, component in zip(inside, wanted.faces, field.faces, strict=True)
@@ -122,7 +122,7 @@ class Obstacles:
     def __post_init__(self) -> None:
         for thing in self.things:
             if not (thing.ever_in(self.domain) if isinstance(thing, MovingMesh) else thing.voxels(self.domain).any()):
-                raise ValueError(outside("obstacle", self.domain))
+                raise ValueError(outside_message("obstacle", self.domain))
 
     def at(self, step: int, dt: float) -> Solid | None:
         """What is solid after so many steps, which last `dt` seconds each; None if nothing is.
@@ -159,6 +159,6 @@ def _with(solid: Solid, voxels: Mask, velocity: Faces) -> Solid:
     return Solid(solid.voxels | voxels, (x, y, z))
 
 
-def outside(what: str, domain: Domain) -> str:
-    """What is said of a thing that is not in the box."""
+def outside_message(what: str, domain: Domain) -> str:
+    """The sentence that refuses a thing outside the box."""
     return f"the {what} holds no voxel of the box from {domain.min} to {domain.max} m; move it in, or make it larger."

@@ -34,7 +34,7 @@ class Physics:
 
 
 def lift(density: Array, like: Velocity) -> Velocity:
-    """The force on the smoke, as an acceleration in m/s2, where buoyancy is 1."""
+    """The acceleration in m/s2, on faces, that a buoyancy of 1 gives to a density (nx, ny, nz)."""
     faces = [np.zeros_like(component) for component in like.faces]
     faces[2][:, :, 1:-1] = 0.5 * (density[:, :, 1:] + density[:, :, :-1])
     return like.with_faces(faces)
@@ -60,21 +60,21 @@ def fit_physics(moments: Sequence[Moment], dt: float, inlets: Mask) -> Physics:
         carried_mass += float(carried.sum(dtype=np.float64, where=~inlets))
         found_mass += float(after.density.sum(dtype=np.float64, where=~inlets))
     lost = math.log(carried_mass / found_mass) / dt if carried_mass > 0 and found_mass > 0 else 0.0
-    return Physics(_agreed(found), max(0.0, lost))
+    return Physics(_significant_mean(found), max(0.0, lost))
 
 
 def _buoyancy(before: Moment, after: Moment, dt: float, outside: list[Mask]) -> list[float]:
     """The buoyancy that two moments show; none where there is nothing to lift."""
     predicted = project(advect(before.velocity, before.velocity, dt))
     unit = project(lift(before.density, before.velocity))
-    along = square = 0.0
+    change_along = square = 0.0
     for kept, now, then, pushed in zip(outside, after.velocity.faces, predicted.faces, unit.faces, strict=True):
-        along += float(np.vdot((now - then)[kept], pushed[kept]))
+        change_along += float(np.vdot((now - then)[kept], pushed[kept]))
         square += float(np.vdot(pushed[kept], pushed[kept]))
-    return [along / (dt * square)] if square > 0 else []
+    return [change_along / (dt * square)] if square > 0 else []
 
 
-def _agreed(found: list[float]) -> float:
+def _significant_mean(found: list[float]) -> float:
     """The mean of what several moments show; 0 where it is within `SIGNIFICANT` standard errors of that."""
     if len(found) < 2:
         return 0.0

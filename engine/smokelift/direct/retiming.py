@@ -10,19 +10,19 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from smokelift.direct.between import between
+from smokelift.direct.interpolation import interpolate
 from smokelift.direct.moment import Moment, read_moment
-from smokelift.direct.writing import Written, directed_writer, simulated_figures, time_step
+from smokelift.direct.writing import Written, directed_writer, simulated_figures
 from smokelift.output.sequence import Sequence
 
 Values = npt.NDArray[np.float64]
 
 STEPS = 64
-"""Parts into which a frame is divided to add up the time of a ramp."""
+"""Steps a frame of the trapezoidal rule that integrates 1 / speed over a ramp."""
 
 
-def paced(count: int, speeds: tuple[float, ...]) -> tuple[Values, Values]:
-    """Return the moments of a clip that a pace shows, and how fast the clip goes there.
+def playback(count: int, speeds: tuple[float, ...]) -> tuple[Values, Values]:
+    """Return the times of a clip that are shown at some speeds, one after the other.
 
     Parameters
     ----------
@@ -33,23 +33,23 @@ def paced(count: int, speeds: tuple[float, ...]) -> tuple[Values, Values]:
 
     Returns
     -------
-    Places in frames from 0, and the speed at each.
+    The times in frames of the clip from 0, shape (n,), and the speed at each.
     """
-    fine = np.linspace(0, count - 1, STEPS * (count - 1) + 1)
-    speed = np.interp(fine, np.linspace(0, count - 1, len(speeds)), speeds)
-    parts = np.diff(fine) * (1 / speed[1:] + 1 / speed[:-1]) / 2
-    shown = np.concatenate([[0.0], np.cumsum(parts)])
-    frames = np.arange(np.floor(shown[-1] + 1e-6) + 1)
-    places = np.interp(frames, shown, fine)
-    return places, np.interp(places, fine, speed)
+    clip_time = np.linspace(0, count - 1, STEPS * (count - 1) + 1)
+    speed = np.interp(clip_time, np.linspace(0, count - 1, len(speeds)), speeds)
+    durations = np.diff(clip_time) * (1 / speed[1:] + 1 / speed[:-1]) / 2
+    shown_time = np.concatenate([[0.0], np.cumsum(durations)])
+    frames = np.arange(np.floor(shown_time[-1] + 1e-6) + 1)
+    times = np.interp(frames, shown_time, clip_time)
+    return times, np.interp(times, clip_time, speed)
 
 
 def retime_sequence(
     sequence: Sequence, out: str | Path, speeds: tuple[float, ...], *, npz: bool = False, resume: bool = False
 ) -> Iterator[Written]:
-    """Write a sequence at another pace: frames between the clip's own are carried there from both sides.
+    """Write a sequence at another pace: frames between the clip's own are interpolated from both neighbours.
 
-    Velocities are those that are seen: at half the speed half of the smoke's.
+    Velocities are scaled with the speed: at half the speed they are half of the smoke's.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def retime_sequence(
     out
         Directory to write to.
     speeds
-        See `paced`.
+        See `playback`.
     npz, resume
         As in `smokelift.output.writer.SequenceWriter`.
 
@@ -71,23 +71,25 @@ def retime_sequence(
     ValueError
         If a file cannot be read or written.
     """
-    places, pace = paced(len(sequence.frames), speeds)
-    first, dt = sequence.frames[0], time_step(sequence)
+    times, pace = playback(len(sequence.frames), speeds)
+    first, dt = sequence.frames[0], 1 / sequence.fps
     how = "Frames between those of the clip are made of both neighbours, carried there by the velocity."
-    cameras = [first + float(place) for place in places]
+    camera_frames = [first + float(at) for at in times]
     pair: dict[int, Moment] = {}
-    with directed_writer(sequence, out, "retime", {"speeds": speeds}, how, cameras, npz=npz, resume=resume) as writer:
-        for number, (place, speed) in enumerate(zip(places.tolist(), pace.tolist(), strict=True), 1):
+    with directed_writer(
+        sequence, out, "retime", {"speeds": speeds}, how, camera_frames, npz=npz, resume=resume
+    ) as writer:
+        for number, (at, speed) in enumerate(zip(times.tolist(), pace.tolist(), strict=True), 1):
             if number in writer.finished:
                 continue
             began = time.perf_counter()
-            low = first + min(int(place), len(sequence.frames) - 2)
+            low = first + min(int(at), len(sequence.frames) - 2)
             pair = {n: pair[n] if n in pair else read_moment(sequence, n) for n in (low, low + 1)}
             before, after = pair[low], pair[low + 1]
-            moment = between(before, after, after.velocity, dt, place + first - low)
+            moment = interpolate(before, after, after.velocity, dt, at + first - low)
             faces = moment.velocity.with_faces(np.float32(speed) * u for u in moment.velocity.faces)
             figures = simulated_figures(
-                replace(moment, velocity=faces), began, "retimed", {"place": place, "speed": speed}
+                replace(moment, velocity=faces), began, "retimed", {"place": at, "speed": speed}
             )
             writer.write(number, moment.density, faces.faces, figures, flame=moment.flame)
             yield number, figures

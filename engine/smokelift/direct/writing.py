@@ -19,9 +19,6 @@ from smokelift.output.writer import SequenceWriter
 from smokelift.scene import Camera
 from smokelift.transport import Velocity, divergence
 
-USUAL_FPS = 24.0
-"""Frames a second where the clip does not say."""
-
 SHORTEST = 4
 """Frames that a sequence needs to be continued, retimed or looped."""
 
@@ -45,19 +42,13 @@ def open_source(directory: str | Path) -> Sequence:
     return sequence
 
 
-def time_step(sequence: Sequence) -> float:
-    """Seconds from one frame of a sequence to the next."""
-    clip = sequence.scene.clip
-    return 1 / ((clip.fps if clip is not None else None) or USUAL_FPS)
-
-
 def directed_writer(
     sequence: Sequence,
     out: str | Path,
     job: str,
     settings: Mapping[str, Any],
     how: str,
-    places: list[float],
+    camera_frames: list[float],
     *,
     npz: bool,
     resume: bool,
@@ -74,13 +65,13 @@ def directed_writer(
         What is done to it; kept in the settings under ``direct``.
     how
         The same as a sentence for the provenance.
-    places
+    camera_frames
         For every frame that is written, the number of the frame of `sequence` whose camera it has; between frames the
         nearest, beyond them the last.
     npz, resume
         As in `SequenceWriter`.
     """
-    scene = replace(sequence.scene, camera=_camera_of(sequence.scene.camera, places))
+    scene = replace(sequence.scene, camera=_camera_at(sequence.scene.camera, camera_frames))
     return SequenceWriter(
         out,
         scene,
@@ -94,13 +85,13 @@ def directed_writer(
 
 
 def write_copy(
-    sequence: Sequence, place: int, writer: SequenceWriter, number: int, further: Mapping[str, float]
+    sequence: Sequence, source: int, writer: SequenceWriter, number: int, further: Mapping[str, float]
 ) -> Written:
-    """Write a frame of the clip as it is, under a number, with further figures."""
-    figures = {**sequence.figures(place), "origin": "clip", **further}
-    faces = sequence.staggered_velocity(place).faces
-    density, flame = sequence.density(place), sequence.flame(place)
-    writer.write(number, density, faces, figures, ready=sequence.files(place), flame=flame)
+    """Write the frame `source` of a sequence unchanged as the frame `number` of another, with further figures."""
+    figures = {**sequence.figures(source), "origin": "clip", **further}
+    faces = sequence.staggered_velocity(source).faces
+    density, flame = sequence.density(source), sequence.flame(source)
+    writer.write(number, density, faces, figures, ready=sequence.files(source), flame=flame)
     return number, {**figures, "seconds_density": 0.0, "seconds_velocity": 0.0}
 
 
@@ -141,9 +132,10 @@ def _largest_divergence(velocity: Velocity, solid: Mask | None) -> float:
     return float(left.max()) * velocity.voxel_size / largest if largest > 0 else 0.0
 
 
-def _camera_of(camera: Camera, places: list[float]) -> Camera:
+def _camera_at(camera: Camera, frames: list[float]) -> Camera:
+    """A camera with a matrix for each of some frames, counted from 1; one that stands still stays as it is."""
     if not camera.moves:
         return camera
     last = len(camera.matrices) - 1
-    matrices = tuple(camera.matrices[min(max(round(place) - 1, 0), last)] for place in places)
+    matrices = tuple(camera.matrices[min(max(round(frame) - 1, 0), last)] for frame in frames)
     return replace(camera, matrix=matrices[0], matrices=matrices)

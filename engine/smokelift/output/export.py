@@ -50,9 +50,6 @@ SHADE = 1 / 510
 VELOCITY_STEP = 1 / 16
 """Step of a quantised velocity in voxels a frame."""
 
-USUAL_FPS = 24.0
-"""Frames a second where the clip does not say."""
-
 SAMPLES = 5
 """Frames that are written to estimate the size of all."""
 
@@ -124,7 +121,7 @@ def export_sequence(sequence: Sequence, out: str | Path, settings: ExportSetting
         _write_text(out / NOTE, json.dumps(note, indent=1) + "\n")  # first: it says whose files these are
         for number in sequence.frames:
             yield number, _write_frame(sequence, number, out, settings)
-        _write_text(out / USD, usd_text(_usd_volumes(sequence, settings), _fps(sequence), _medium(sequence)))
+        _write_text(out / USD, usd_text(_usd_volumes(sequence, settings), sequence.fps, _medium(sequence)))
         _write_text(out / NOTE, json.dumps({**note, "complete": True}, indent=1) + "\n")
     except OSError as error:
         raise SequenceError(f"{out}: cannot be written: {error}") from error
@@ -187,7 +184,7 @@ def _write_frame(sequence: Sequence, number: int, out: Path, settings: ExportSet
     rho = _thinned(density, domain, extinction)
     if settings.precision == "quantised":
         rho = _rounded(rho, density_step(domain, extinction))
-        velocity = None if velocity is None else _rounded(velocity, velocity_step(domain, _fps(sequence)))
+        velocity = None if velocity is None else _rounded(velocity, velocity_step(domain, sequence.fps))
     flame = None
     if FLAME in _grids(sequence, settings):
         found = sequence.flame(number)
@@ -254,11 +251,6 @@ def _power_of_two(value: float) -> float:
     return 2.0 ** math.floor(math.log2(value))
 
 
-def _fps(sequence: Sequence) -> float:
-    clip = sequence.scene.clip
-    return (clip.fps if clip is not None else None) or USUAL_FPS
-
-
 def _medium(sequence: Sequence) -> dict[str, float]:
     medium = sequence.scene.medium
     return {"extinction": medium.extinction, "albedo": medium.albedo, "anisotropy": medium.anisotropy}
@@ -288,7 +280,7 @@ def _note(sequence: Sequence, settings: ExportSettings) -> dict[str, Any]:
         "grids": list(_grids(sequence, settings)),
         "proxy": settings.proxy,
         "frames": [sequence.frames[0], sequence.frames[-1]],
-        "fps": _fps(sequence),
+        "fps": sequence.fps,
         "medium": _medium(sequence),
         "domain": {"min": list(domain.min), "max": list(domain.max), "resolution": list(domain.resolution)},
         "provenance": [dict(part) for part in sequence.provenance],

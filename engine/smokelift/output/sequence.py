@@ -17,6 +17,9 @@ from smokelift.render import Image
 from smokelift.scene import Camera, CompleteScene, Scene, completed, scene_from_dict
 from smokelift.transport import Array, Velocity, face_shapes, on_faces
 
+USUAL_FPS = 24.0
+"""Frames a second of a sequence whose scene does not say the clip's."""
+
 
 @dataclass(frozen=True)
 class Sequence:
@@ -81,6 +84,12 @@ class Sequence:
             index.frames,
             index.checksums,
         )
+
+    @property
+    def fps(self) -> float:
+        """Frames a second: those of the clip, or `USUAL_FPS` where the scene does not say them."""
+        clip = self.scene.clip
+        return (clip.fps if clip is not None else None) or USUAL_FPS
 
     def density(self, number: int) -> Array:
         """Return the density of a frame, shape (nx, ny, nz): the NumPy twin's if there is one.

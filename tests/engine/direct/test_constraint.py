@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from smokelift.direct import Ball, completed
-from smokelift.direct.constraint import faces_between, faces_of, without_divergence_given
+from smokelift.direct import Ball, complete_velocity
+from smokelift.direct.constraint import faces_between, faces_of, project_with_given_faces
 from smokelift.direct.obstacles import Solid
 from smokelift.transport import Velocity, divergence, project
 from tests.engine.direct.rising import DOMAIN
@@ -32,7 +32,7 @@ def test_the_force_of_an_obstacle_acts_on_its_surface_alone():
     """Elsewhere the field changes by a velocity without divergence only, which no projection would take away."""
     field, solid = uniform(), Ball((0, 0, 1.5), 0.5).voxels(DOMAIN)
     still = Velocity.zero(DOMAIN.shape, DOMAIN.voxel_size).faces
-    found = without_divergence_given(field, faces_between(solid), still)
+    found = project_with_given_faces(field, faces_between(solid), still)
     again = project(Velocity(found.faces, field.voxel_size, field.closed))
     for a, b in zip(found.faces, again.faces, strict=True):
         np.testing.assert_allclose(a, b, atol=1e-5)
@@ -53,7 +53,7 @@ def test_a_velocity_known_near_smoke_is_completed():
         squares = [((a - b)[m] ** 2).sum() for a, b, m in zip(found.faces, whole.faces, known, strict=True)]
         return float(np.sqrt(sum(squares)))
 
-    found = completed(cut)
+    found = complete_velocity(cut)
     assert np.abs(divergence(found)).max() < 1e-3 * max(np.abs(f).max() for f in found.faces) / DOMAIN.voxel_size
     assert error(found) < 0.3 * error(project(cut))
-    assert completed(whole) is whole
+    assert complete_velocity(whole) is whole

@@ -1,94 +1,106 @@
-"""A simulation that starts from a clip: mass, divergence, and a hundred frames."""
+"""Sequences that go on: what is kept, what is added, and how a run is resumed."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from smokelift.direct import Ball, Moment, Simulation, learnt_simulation
-from smokelift.direct.constraint import faces_of
-from smokelift.direct.inflow import Inflow
-from smokelift.direct.obstacles import Obstacles
-from smokelift.direct.physics import Physics
-from smokelift.direct.surroundings import Surroundings
-from smokelift.transport import Velocity, divergence
-from tests.engine.direct.rising import DOMAIN, DT, PHYSICS, at_rest, blob, course, free, plume
+from smokelift.direct import Ball, Continuation, continue_sequence, loop_sequence, open_source, retime_sequence
+from smokelift.output.index import SequenceError
+from smokelift.output.sequence import Sequence
+from tests.engine.direct.rising import plume, write_plume
 
 
-def mass(moment: Moment) -> float:
-    return float(moment.density.sum(dtype=float))
+@pytest.fixture(scope="module")
+def source(tmp_path_factory):
+    directory = tmp_path_factory.mktemp("source") / "smoke"
+    write_plume(directory)
+    return open_source(directory)
 
 
-def height(moment: Moment, axis: int = 2) -> float:
-    """Centre of mass in metres."""
-    sums = moment.density.sum(axis=tuple(d for d in range(3) if d != axis), dtype=float)
-    return float((sums * np.arange(len(sums))).sum() / sums.sum()) * DOMAIN.voxel_size
+def run(source, out, continuation, **options):
+    return [number for number, _ in continue_sequence(source, out, continuation, npz=True, **options)]
 
 
-def test_a_blob_rises_as_it_should_and_keeps_its_mass():
-    """At first it gains speed like a body in a fluid of equal inertia; nothing leaves the box."""
-    moments = course(free(Physics(2.0, 0.0)), at_rest(blob()), 12)
-    assert mass(moments[-1]) == pytest.approx(mass(moments[0]), rel=1e-3)
-    heights = [height(moment) for moment in moments]
-    assert all(np.diff(heights) > 0)
-    assert 0.02 < heights[-1] - heights[0] < 0.5 * 2.0 * (12 * DT) ** 2
+def test_the_clip_stays_and_goes_on(source, tmp_path):
+    assert run(source, tmp_path / "out", Continuation(5)) == list(range(1, 16))
+    made = Sequence.open(tmp_path / "out")
+    assert made.complete
+    assert made.frames == tuple(range(1, 16))
+    for number in source.frames:
+        assert made.files(number)["npz"].read_bytes() == source.files(number)["npz"].read_bytes()
+    assert made.figures(3)["psnr"] == 30
+    # ours goes on as the simulation that made the clip did, although the inlet is only found
+    true = plume()[14].density
+    error = np.linalg.norm(made.density(15) - true) / np.linalg.norm(true)
+    held = np.linalg.norm(source.density(10) - true) / np.linalg.norm(true)
+    assert error < 0.5 * held
+    assert made.provenance[-1]["origin"] == "made up"
+    assert "Frames 11 to 15" in made.provenance[-1]["how"]
 
 
-def test_dissipation_takes_its_share():
-    moments = course(free(Physics(0.0, 0.6)), at_rest(blob()), 12)
-    assert mass(moments[-1]) / mass(moments[0]) == pytest.approx(np.exp(-0.6 * 12 * DT), rel=1e-3)
+def run_twice(source, folder, continuation, last):
+    """Continue a sequence in one go, and in two: stopped after a frame, and gone on with."""
+    run(source, folder / "whole", continuation)
+    for number, _ in continue_sequence(source, folder / "stopped", continuation, npz=True):
+        if number == last:
+            break
+    run(source, folder / "stopped", continuation, resume=True)
+    return Sequence.open(folder / "whole"), Sequence.open(folder / "stopped")
 
 
-def test_a_hundred_frames_do_not_blow_up():
-    clip = plume()
-    moments = course(learnt_simulation(clip, DT), clip[-1], 100)
-    fastest = [max(float(np.abs(f).max()) for f in m.velocity.faces) for m in (*clip, *moments)]
-    assert max(fastest) < 2 * max(fastest[: len(clip)])
-    assert 0.5 < mass(moments[-1]) / mass(clip[-1]) < 2
-    assert max(float(np.abs(divergence(m.velocity)).max()) for m in moments) * DOMAIN.voxel_size < 1e-5
-    # it neither stops nor becomes steady
-    assert max(float(np.abs(f).max()) for f in moments[-1].velocity.faces) > 0.3 * max(fastest[: len(clip)])
+def test_a_stopped_run_goes_on_to_the_same_result(source, tmp_path):
+    continuation = Continuation(5, start=8, fade=3, wind=(0.4, 0.0, 0.0), obstacles=(Ball((0, 0, 1.6), 0.3),))
+    whole, stopped = run_twice(source, tmp_path, continuation, 11)
+    assert whole.frames == stopped.frames == tuple(range(1, 14))
+    for number in whole.frames:
+        np.testing.assert_array_equal(whole.density(number), stopped.density(number))
+    assert not whole.density(13).any()
+    with pytest.raises(SequenceError, match="begun differently"):
+        run(source, tmp_path / "stopped", Continuation(6, start=8), resume=True)
 
 
-def test_wind_carries_the_smoke_along():
-    moments = course(free(Physics(0.0, 0.0), Surroundings(wind=(0.5, 0.0, 0.0))), at_rest(blob()), 24)
-    gone = 0.5 * (24 * DT - 0.5 * (1 - np.exp(-24 * DT / 0.5)))
-    assert height(moments[-1], 0) - height(moments[0], 0) == pytest.approx(gone, rel=0.05)
-    assert abs(height(moments[-1], 1) - height(moments[0], 1)) < 0.01
+def test_fire_goes_on_and_fades_with_the_smoke(tmp_path):
+    """A stopped run goes on with it; retimed and looped it stays too."""
+    write_plume(tmp_path / "source", 6, burning=True)
+    burning = open_source(tmp_path / "source")
+    whole, stopped = run_twice(burning, tmp_path, Continuation(3, fade=2), 8)
+    sums = [float(whole.flame(number).sum()) for number in whole.frames]
+    assert min(sums[:7]) > 0.5 * max(sums)
+    assert sums[7] == pytest.approx(0.5 * sums[6], rel=0.2)
+    assert sums[8] == 0.0
+    assert [float(stopped.flame(number).sum()) for number in stopped.frames] == sums
+    list(retime_sequence(burning, tmp_path / "slow", (0.8,), npz=True))
+    list(loop_sequence(burning, tmp_path / "loop", 1, 6, 2, npz=True))
+    for name in ("slow", "loop"):
+        made = Sequence.open(tmp_path / name)
+        assert all(0.5 * max(sums) < made.flame(n).sum() < 1.2 * max(sums) for n in made.frames)
 
 
-def test_smoke_goes_round_an_obstacle():
-    ball = Ball((0.0, 0.0, 1.4), 0.35)
-    solid = ball.voxels(DOMAIN)
-    start = at_rest(np.where(solid, np.float32(0), blob()))
-    moments = course(free(PHYSICS, Surroundings(obstacles=Obstacles(DOMAIN, (ball,)))), start, 36)
-    for moment in moments[1:]:
-        assert not moment.density[solid].any()
-        assert np.abs(divergence(moment.velocity))[~solid].max() * DOMAIN.voxel_size < 0.02
-    above = 12  # the layer above the middle of the ball
-    assert moments[0].density[:, :, above:].sum() < 0.1 * mass(moments[0])
-    assert moments[-1].density[:, :, above:].sum() > 0.3 * mass(moments[-1])
-    assert mass(moments[-1]) / mass(moments[0]) == pytest.approx(np.exp(-0.3 * 36 * DT), rel=0.01)
+def test_sides_become_walls(source, tmp_path):
+    """No air goes through them any more, and a resumed run has them too."""
+    walls = ("x-", "x+", "y-", "y+", "z+")
+    for number, _ in continue_sequence(source, tmp_path / "shut", Continuation(4, closed=walls), npz=True):
+        if number == 12:
+            break
+    run(source, tmp_path / "shut", Continuation(4, closed=walls), resume=True)
+    run(source, tmp_path / "open", Continuation(4))
+    shut, open_ = (Sequence.open(tmp_path / name).staggered_velocity(14).faces for name in ("shut", "open"))
+    assert not any(np.take(shut[axis], (0, -1), axis).any() for axis in range(3))
+    assert all(np.take(open_[axis], (0, -1), axis).any() for axis in range(3))
 
 
-def test_an_obstacle_closes_the_inlet_that_it_covers():
-    inlet = Ball((0.0, 0.0, 1.4), 0.3)
-    inflow = Inflow(inlet.voxels(DOMAIN), (at_rest(blob()),))
-    around = Surroundings(obstacles=Obstacles(DOMAIN, (Ball(inlet.centre, 0.4),)))
-    nothing = at_rest(np.zeros(DOMAIN.shape, np.float32))
-    assert Simulation(PHYSICS, inflow, Surroundings(), DT).next(nothing, 1).density.any()
-    assert not Simulation(PHYSICS, inflow, around, DT).next(nothing, 1).density.any()
-
-
-def test_a_fan_blows():
-    place = Ball((-0.6, 0.0, 0.8), 0.25)
-    blown = ((faces_of(place.voxels(DOMAIN)), (3.0, 0.0, 0.0)),)
-    moments = course(free(Physics(0.0, 0.0), Surroundings(blown=blown)), at_rest(blob()), 12)
-    assert height(moments[-1], 0) - height(moments[0], 0) > 0.05
-
-
-def test_a_velocity_keeps_the_walls_of_its_box():
-    moment = free().next(at_rest(blob()), 1)
-    assert isinstance(moment.velocity, Velocity)
-    assert moment.velocity.closed == ("z-",)
-    assert not moment.velocity.faces[2][:, :, 0].any()
+def test_what_cannot_be_is_refused(source, tmp_path):
+    for continuation, reason in (
+        (Continuation(5, start=99), "from 4 to 10"),
+        (Continuation(5, start=2), "from 4 to 10"),
+        (Continuation(5, obstacles=(Ball((9, 0, 0), 0.5),)), "holds no voxel"),
+        (Continuation(5, obstacles=(Ball((0, 0, 0), 9),)), "whole box"),
+    ):
+        with pytest.raises(ValueError, match=reason):
+            run(source, tmp_path / "out", continuation)
+    assert not (tmp_path / "out").exists()
+    short = tmp_path / "short"
+    write_plume(short, 3)
+    with pytest.raises(ValueError, match="has 3 frames"):
+        open_source(short)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from smokelift.direct import Ball, learnt_simulation
+from smokelift.direct import Ball, fit_simulation
 from smokelift.direct.fire import Fire
 from smokelift.direct.obstacles import Obstacles
 from smokelift.direct.surroundings import Surroundings
@@ -17,9 +17,9 @@ from tests.engine.direct.rising import DOMAIN, DT, LEFT, course, plume
 def test_fire_goes_on_as_in_the_clip():
     """It is fed where it was, rises and burns out."""
     clip = plume(burning=True)
-    simulation = learnt_simulation(clip[:10], DT)
+    simulation = fit_simulation(clip[:10], DT)
     assert simulation.fire is not None
-    assert simulation.fire.left == pytest.approx(LEFT, rel=0.05)
+    assert simulation.fire.remaining == pytest.approx(LEFT, rel=0.05)
     found, true = course(simulation, clip[9], 4)[-1].flame, clip[13].flame
     assert found.sum() == pytest.approx(true.sum(), rel=0.05)
     assert np.linalg.norm(found - true) < 0.15 * np.linalg.norm(true)
@@ -27,8 +27,8 @@ def test_fire_goes_on_as_in_the_clip():
 
 def test_fire_without_fuel_burns_out():
     clip = plume(burning=True)
-    simulation = learnt_simulation(clip[:10], DT)
-    unfed = replace(simulation, fire=Fire(simulation.fire.left, np.zeros(DOMAIN.shape, np.float32)))
+    simulation = fit_simulation(clip[:10], DT)
+    unfed = replace(simulation, fire=Fire(simulation.fire.remaining, np.zeros(DOMAIN.shape, np.float32)))
     assert course(unfed, clip[9], 12)[-1].flame.sum() == pytest.approx(LEFT**12 * clip[9].flame.sum(), rel=0.3)
 
 
@@ -36,9 +36,9 @@ def test_nothing_burns_in_an_obstacle():
     ball = Ball((0.0, 0.0, 0.3), 0.4)
     around = Surroundings(obstacles=Obstacles(DOMAIN, (ball,)))
     clip = plume(burning=True)
-    after = learnt_simulation(clip, DT, surroundings=around).next(clip[-1], 1)
+    after = fit_simulation(clip, DT, surroundings=around).next(clip[-1], 1)
     assert not after.flame[ball.voxels(DOMAIN)].any()
 
 
 def test_smoke_without_fire_gets_none():
-    assert course(learnt_simulation(plume(), DT), plume()[-1], 1)[-1].flame is None
+    assert course(fit_simulation(plume(), DT), plume()[-1], 1)[-1].flame is None

@@ -18,9 +18,6 @@ from smokelift.scene import Camera, CompleteScene, Scene, orbit
 SIDE_YAW = 90.0
 """Degrees about the vertical from the scene's camera to the view from the side."""
 
-USUAL_FPS = 24.0
-"""Frames a second of a video where the clip does not say."""
-
 
 def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
     """Add the command."""
@@ -56,9 +53,8 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     if is_video:
         numbers = sequence.frames if options.frame is None else (options.frame,)
         viewer = Viewer(scene, camera)
-        fps = (scene.clip.fps if scene.clip else None) or USUAL_FPS
         volumes = ((number, sequence.density(number), sequence.flame(number)) for number in numbers)
-        write_video(options.out, (viewer.image(*each) for each in volumes), fps)
+        write_video(options.out, (viewer.image(*each) for each in volumes), sequence.fps)
     else:
         number = sequence.frames[0] if options.frame is None else options.frame
         write_image(options.out, sequence.render(number, camera))

@@ -8,7 +8,7 @@ from typing import Any
 
 from smokelift.app.options import add_directed_options, finite, require_new
 from smokelift.app.progress import Reporter, say_frames
-from smokelift.direct import open_source, paced, retime_sequence
+from smokelift.direct import open_source, playback, retime_sequence
 
 SPEEDS = 0.01, 100.0
 """Slowest and fastest: beyond them nothing moves, or nothing is left."""
@@ -38,7 +38,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     sequence = open_source(options.directory)
     require_new(options)
     speeds = tuple(options.speed)
-    total = len(paced(len(sequence.frames), speeds)[0])
+    total = len(playback(len(sequence.frames), speeds)[0])
     say_frames(say, retime_sequence(sequence, options.out, speeds, npz=options.npz, resume=options.resume), 1, total)
     seconds = time.monotonic() - began
     say.finish(

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from smokelift.direct import Moment, open_source, paced, retime_sequence
-from smokelift.direct.between import between
+from smokelift.direct import Moment, open_source, playback, retime_sequence
+from smokelift.direct.interpolation import interpolate
 from smokelift.output.sequence import Sequence
 from smokelift.transport import Velocity
 from tests.engine.direct.rising import DOMAIN, DT, at_rest, blob, plume, write_plume
@@ -25,7 +25,7 @@ def test_a_blob_is_where_it_has_to_be_on_its_way(share):
     velocity = moving(way / DT)
     first, last = Moment(blob((-0.2, 0, 1)), velocity), Moment(blob((-0.2 + way, 0, 1)), velocity)
     true = blob((-0.2 + share * way, 0, 1))
-    found = between(first, last, velocity, DT, share)
+    found = interpolate(first, last, velocity, DT, share)
     mixed = (1 - share) * first.density + share * last.density
 
     def error(density):
@@ -39,24 +39,24 @@ def test_a_blob_is_where_it_has_to_be_on_its_way(share):
 
 def test_the_ends_are_the_moments_themselves():
     first, last = plume()[:2]
-    assert between(first, last, last.velocity, DT, 0.0) is first
-    assert between(first, last, last.velocity, DT, 1.0) is last
+    assert interpolate(first, last, last.velocity, DT, 0.0) is first
+    assert interpolate(first, last, last.velocity, DT, 1.0) is last
 
 
 def test_mass_goes_evenly_from_one_moment_to_the_other():
     still = moving(0.0)
     first, last = at_rest(blob()), at_rest(3 * blob())
-    found = between(first, last, still, DT, 0.25)
+    found = interpolate(first, last, still, DT, 0.25)
     assert found.density.sum() == pytest.approx(1.5 * first.density.sum(), rel=1e-4)
 
 
 def test_a_pace_shows_every_moment_once():
-    places, speeds = paced(5, (1.0,))
+    places, speeds = playback(5, (1.0,))
     np.testing.assert_allclose(places, [0, 1, 2, 3, 4])
     np.testing.assert_allclose(speeds, 1)
-    np.testing.assert_allclose(paced(5, (0.5,))[0], np.arange(9) / 2)
-    np.testing.assert_allclose(paced(5, (2.0,))[0], [0, 2, 4])
-    places, speeds = paced(11, (1.0, 0.25))
+    np.testing.assert_allclose(playback(5, (0.5,))[0], np.arange(9) / 2)
+    np.testing.assert_allclose(playback(5, (2.0,))[0], [0, 2, 4])
+    places, speeds = playback(11, (1.0, 0.25))
     assert np.all(np.diff(places) < 1.01)
     assert np.all(np.diff(np.diff(places)) < 0)
     assert speeds[0] == 1
@@ -84,6 +84,6 @@ def test_a_flame_is_carried_as_the_smoke_is():
     way = 2 * DOMAIN.voxel_size
     velocity = moving(way / DT)
     first, last = (Moment(blob((x, 0, 1)), velocity, 3 * blob((x, 0, 1))) for x in (-0.2, -0.2 + way))
-    found = between(first, last, velocity, DT, 0.5)
+    found = interpolate(first, last, velocity, DT, 0.5)
     np.testing.assert_allclose(found.flame, 3 * found.density, rtol=1e-4, atol=1e-5)
-    assert between(first, Moment(last.density, velocity), velocity, DT, 0.5).flame is None
+    assert interpolate(first, Moment(last.density, velocity), velocity, DT, 0.5).flame is None

@@ -1,0 +1,133 @@
+"""The simulation that continues a clip from its last moment.
+
+A step of dt from density rho and velocity u to rho' and u', in the convention of a sequence, whose velocity has carried
+the moment before to this one:
+
+    u'   = Project(advect(u - a, u) + dt (b rho up) + a'), in inlets and fans with their own velocity
+    rho' = exp(-d dt) advect(rho, u'), in inlets with their own density
+
+where a is the ambient velocity: wind and turbulence, which all air has in addition to the flow. Outside the box there
+is nothing else.
+
+Buoyancy b and dissipation d are those of the clip (`smokelift.direct.physics`), as are what enters
+(`smokelift.direct.inflow`) and how fire burns (`smokelift.direct.fire`), which lifts nothing beside what b has of it.
+Advection keeps the mass. There is no viscosity, and MacCormack's correction keeps the eddies that the clip has.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from smokelift.direct.constraint import Mask
+from smokelift.direct.fire import Fire, fit_fire
+from smokelift.direct.inflow import Inflow, find_inflow
+from smokelift.direct.moment import Moment
+from smokelift.direct.physics import Physics, fit_physics, lift
+from smokelift.direct.surroundings import Surroundings
+from smokelift.transport import Array, Velocity, advect, on_faces, project
+
+TRACE = np.float32(1e-4)
+"""Share of the largest density below which nothing is seen. Interpolation spreads such traces over the whole box."""
+
+
+@dataclass(frozen=True, eq=False)
+class Simulation:
+    """A simulation with the forces, inlets and fire of a clip, and with what the artist has placed.
+
+    Attributes
+    ----------
+    physics
+        Fitted to the clip.
+    inflow
+        Of the clip.
+    surroundings
+        What the artist has placed.
+    dt
+        Time of a step in seconds.
+    fire
+        Of the clip; None without any.
+    """
+
+    physics: Physics
+    inflow: Inflow
+    surroundings: Surroundings
+    dt: float
+    fire: Fire | None = None
+
+    def next(self, moment: Moment, step: int) -> Moment:
+        """Return the moment one step later; step 1 starts from the clip's last moment."""
+        entering, solid = self.inflow.at(step), self.surroundings.solid(step, self.dt)
+        moved = self._self_advected(moment.velocity, step)
+        driven = moved.with_faces(self._with_forces(moved, moment, entering, step))
+        velocity = project(driven) if solid is None else solid.projected(driven)
+        obstacle = None if solid is None else solid.voxels
+        density = self._advected(moment.density, velocity, obstacle)
+        density *= np.float32(math.exp(-self.physics.dissipation * self.dt))
+        inlets = self.inflow.voxels if obstacle is None else self.inflow.voxels & ~obstacle
+        flame = None
+        if self.fire is not None and moment.flame is not None:
+            flame = self.fire.after(self._advected(moment.flame, velocity, obstacle), obstacle)
+        return Moment(
+            np.where(inlets, entering.density, density),
+            Velocity(velocity.faces, velocity.voxel_size, velocity.closed),
+            flame,
+        )
+
+    def _advected(self, values: Array, velocity: Velocity, solid: Mask | None) -> Array:
+        return _without_traces(advect(values, velocity, self.dt, conserve=True), solid)
+
+    def _self_advected(self, velocity: Velocity, step: int) -> Velocity:
+        """The velocity after it was advected by itself, without the ambient velocity."""
+        air = self.surroundings.air(velocity, (step - 1) * self.dt)
+        flow = velocity.with_faces(u - a for u, a in zip(velocity.faces, air, strict=True))
+        moved = advect(flow, velocity, self.dt)
+        from_inside = advect(np.ones(velocity.shape, np.float32), velocity, self.dt, scheme="semi-lagrangian")
+        inside = on_faces(np.stack([from_inside] * 3, axis=-1))
+        return moved.with_faces(u * share for u, share in zip(moved.faces, inside, strict=True))
+
+    def _with_forces(self, moved: Velocity, moment: Moment, entering: Moment, step: int) -> list[Array]:
+        """The velocity on faces after forces, inlets and fans, before the projection."""
+        rising = lift(moment.density, moved).faces
+        faces = []
+        for axis, ambient in enumerate(self.surroundings.air(moved, step * self.dt)):
+            driven = moved.faces[axis] + np.float32(self.dt * self.physics.buoyancy) * rising[axis]
+            for fan_faces, fan_velocity in self.surroundings.blown:
+                driven = np.where(fan_faces[axis], np.float32(fan_velocity[axis]), driven)
+            driven = np.where(self.inflow.faces[axis], entering.velocity.faces[axis], driven)
+            faces.append(driven + ambient)
+        return faces
+
+
+def fit_simulation(
+    moments: Sequence[Moment], dt: float, marked: Mask | None = None, surroundings: Surroundings | None = None
+) -> Simulation:
+    """Fit forces, inlets and fire to the moments of a clip, for a simulation that goes on from them.
+
+    Parameters
+    ----------
+    moments
+        Consecutive ones, two at least.
+    dt
+        Time between them in seconds.
+    marked : (nx, ny, nz) bool, optional
+        Where smoke enters, if that is known.
+    surroundings
+        What is placed around the smoke.
+    """
+    inflow = find_inflow(moments, dt, marked)
+    physics = fit_physics(moments, dt, inflow.voxels)
+    return Simulation(physics, inflow, surroundings or Surroundings(), dt, fit_fire(moments, dt))
+
+
+def _without_traces(density: Array, solid: Mask | None) -> Array:
+    """The density with zero for traces and in obstacles, where interpolation puts some, and with its mass restored."""
+    kept = density > TRACE * density.max()
+    if solid is not None:
+        kept &= ~solid
+    cleared = np.where(kept, density, np.float32(0))
+    mass, mass_left = (float(values.sum(dtype=np.float64)) for values in (density, cleared))
+    return cleared * np.float32(mass / mass_left) if mass_left > 0 else cleared
