@@ -24,6 +24,7 @@ from smokelift.footage.images import (
     Value,
     add_weighted,
     area_average,
+    chequered_averages,
     linear_picture,
 )
 from smokelift.footage.kept_frames import KeptFrames, keep
@@ -94,7 +95,8 @@ class Clip:
         self._cache: OrderedDict[int, Picture] = OrderedDict()
         self._reduced: OrderedDict[int, Picture] = OrderedDict()
         if size is None:
-            height, width = self.frame(0).shape[:2]
+            image = self._kept_or_coded(0)
+            height, width = (image.codes if isinstance(image, CodedPicture) else image).shape[:2]
             size = (width, height)
         self.size = size
 
@@ -228,6 +230,20 @@ class Clip:
         if isinstance(image, CodedPicture):
             return CodedPicture(cut(image.codes), image.table).averaged(width, height)
         return area_average(cut(image), width, height)
+
+    def chequered_averages(
+        self, n: int, width: int, height: int, cut: Callable[[AnyPicture], AnyPicture], first: int
+    ) -> tuple[Picture, Picture]:
+        """Return the `images.chequered_averages` of a part of frame ``n``, which ``cut`` takes as of `frame_through`.
+
+        Raises
+        ------
+        ClipError
+            As `frame` does.
+        """
+        image = self._kept_or_coded(n)
+        part = CodedPicture(cut(image.codes), image.table) if isinstance(image, CodedPicture) else cut(image)
+        return chequered_averages(part, width, height, first)
 
     def add_weighted(self, n: int, weights: Picture, edges: tuple[Edges, Edges], sums: Picture) -> None:
         """Add frame ``n``, times weights of its parts, to sums: `images.add_weighted`, which may be cheaper that way.
@@ -402,12 +418,12 @@ class Clip:
         change: Callable[[int, Picture], Picture],
         keeps: Callable[[int, Callable[[], Picture]], bool] | None = None,
     ) -> Clip:
-        """Return the clip with each frame, by its number, replaced. The two share the open file.
+        """Return the clip with each frame, by its number, replaced by one of its size. The two share the open file.
 
         ``keeps`` says of a frame's number, and of what makes its `small` picture, that ``change`` leaves it as it is.
         """
         last = self.first + len(self) - 1
-        return Clip(self.path, _Changed(self, self._source, change, keeps), self.fps, (self.first, last))
+        return Clip(self.path, _Changed(self, self._source, change, keeps), self.fps, (self.first, last), self.size)
 
     def close(self) -> None:
         """Close the file."""

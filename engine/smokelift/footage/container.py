@@ -33,7 +33,7 @@ def open_container(path: Path, form: str | None = None, **options: str) -> Input
     MemoryError
         If there is hardly any memory left, where PyAV would end the process.
     """
-    bytearray(ENOUGH)  # given back at once: Python says that memory lacks, where PyAV would not
+    bytes(ENOUGH)  # given back at once, untouched: Python says that memory lacks, where PyAV would not
     container: InputContainer = av.open(
         f"file:{path.absolute()}", format=form, options={"protocol_whitelist": "file", **options}
     )

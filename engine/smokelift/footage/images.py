@@ -82,12 +82,16 @@ class CodedPicture:
     def averaged(self, width: int, height: int) -> Picture:
         """Return the `area_average` of the linear picture, which is not made as a whole where codes have 8 bits."""
         rows = self.codes.shape[0]
-        if self.codes.dtype != np.uint8 or not 1 <= height < rows:
+        if not 1 <= height < rows:
             return area_average(self.linear(), width, height)
-        weights = _weights(rows, height)
+        return area_average(self.sum_lines(_weights(rows, height)), width, height)
+
+    def sum_lines(self, weights: scipy.sparse.csr_array) -> Picture:
+        """Return sums (n, columns, 3) of the lines of the linear picture, each of weights (n, rows)."""
+        if self.codes.dtype != np.uint8:
+            return _sum_lines(self.linear(), weights)
         codes = np.asarray(self.codes, np.uint8)
-        lines = _core.sum_lines(codes, self.table, weights.indptr, weights.indices, weights.data)
-        return area_average(lines, width, height)
+        return _core.sum_lines(codes, self.table, weights.indptr, weights.indices, weights.data)
 
     def add_weighted(self, weights: Picture, edges: tuple[Edges, Edges], sums: Picture) -> None:
         """Add the linear picture, times weights of its parts, to sums.
@@ -359,12 +363,43 @@ def area_average(image: npt.ArrayLike, width: int, height: int) -> Picture:
     values = np.asarray(image, np.float32)
     rows, columns = values.shape[:2]
     if rows != height:
-        values = (_weights(rows, height) @ values.reshape(rows, -1)).reshape(height, *values.shape[1:])
+        values = _sum_lines(values, _weights(rows, height))
     if columns != width:
         weights, shape = _weights(columns, width), (height, width, *values.shape[2:])
         channels = values.reshape(height, columns, -1)
         values = _core.sum_columns(channels, weights.indptr, weights.indices, weights.data).reshape(shape)
     return np.ascontiguousarray(values)
+
+
+def chequered_averages(image: Picture | CodedPicture, width: int, height: int, first: int) -> tuple[Picture, Picture]:
+    """Resize a picture twice: by the pixels of either colour of a chequerboard, as `area_average` does by all of them.
+
+    Parameters
+    ----------
+    image : (rows, columns, 3)
+        Linear, or as it is stored.
+    width, height
+        The new size in pixels.
+    first
+        0 if the pixel at the top left belongs to the first of the two pictures, 1 if to the second.
+    """
+    rows, columns = (image.codes if isinstance(image, CodedPicture) else image).shape[:2]
+    sums, shares = [], []
+    for odd in (0, 1):
+        weights = _weights(rows, height).copy()
+        weights.data[weights.indices % 2 != odd] = 0
+        weights.eliminate_zeros()
+        sums.append(image.sum_lines(weights) if isinstance(image, CodedPicture) else _sum_lines(image, weights))
+        shares.append(np.repeat(_sum_lines(np.ones((rows, 1), np.float32), weights), columns, axis=1))
+
+    def average(colour: int) -> Picture:
+        """The mean of the pixels whose row and column add up to an even number, or to an odd one."""
+        light, share = sums[colour].copy(), shares[colour].copy()
+        light[:, 1::2], share[:, 1::2] = sums[1 - colour][:, 1::2], shares[1 - colour][:, 1::2]
+        weight = np.maximum(area_average(share, width, height), np.float32(1e-6))
+        return np.asarray(area_average(light, width, height) / weight[..., None], np.float32)
+
+    return average(first), average(1 - first)
 
 
 def blurred(picture: Picture, deviation: float) -> Picture:
@@ -373,6 +408,11 @@ def blurred(picture: Picture, deviation: float) -> Picture:
     It is SciPy's ``gaussian_filter`` of float32, in a third of the time.
     """
     return _core.blur_picture(picture, _gaussian(deviation))
+
+
+def _sum_lines(values: Picture, weights: scipy.sparse.csr_array) -> Picture:
+    """Sums (n, ...) of the lines of a picture (rows, ...), each of weights (n, rows)."""
+    return np.asarray(weights @ values.reshape(len(values), -1)).reshape(-1, *values.shape[1:])
 
 
 @lru_cache

@@ -6,12 +6,7 @@ import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-import numpy as np
-from numpy.typing import NDArray
-
 from smokelift.footage.clip import Clip
-from smokelift.footage.evidence import linear
-from smokelift.footage.images import area_average
 from smokelift.footage.plate import Plate
 from smokelift.footage.working_picture import CameraError, WorkingPicture, working_picture
 from smokelift.render import Image
@@ -56,11 +51,9 @@ class Halves:
 
     @cached_property
     def _both(self) -> tuple[Image, Image]:
-        working, size = self.working, self.working.camera.size
-        shown = self.clip.frame_through(self.number, linear, working.part)
-        rows, columns = np.indices(shown.shape[:2])
-        odd = ((rows + columns + working.top + working.left) % 2).astype(np.float32)
-        return _some(shown, 1 - odd, size), _some(shown, odd, size)
+        working = self.working
+        first = (working.top + working.left) % 2  # the colours are those of the whole picture's pixels
+        return self.clip.chequered_averages(self.number, *working.camera.size, working.part, first)
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,9 +144,3 @@ def coarse_frame(
         working.of(clip, number),
         Halves(clip, number, working),
     )
-
-
-def _some(shown: Image, share: NDArray[np.float32], size: tuple[int, int]) -> Image:
-    """The small picture from some of the pixels that it shows."""
-    weight = np.maximum(area_average(share, *size), np.float32(1e-6))
-    return np.asarray(area_average(shown * share[..., None], *size) / weight[..., None], np.float32)

@@ -21,6 +21,7 @@ from smokelift.footage.images import (
     add_weighted,
     area_average,
     blurred,
+    chequered_averages,
     code_values,
     decode_integers,
     linear_to_srgb,
@@ -254,6 +255,23 @@ def test_averages_of_codes_are_those_of_the_linear_picture_to_the_last_bit(size:
             assert np.array_equal(some.averaged(*size), area_average(picture.linear()[part], *size))
     with pytest.raises(ValueError, match="at least one pixel"):
         picture.averaged(4, 0)
+
+
+@pytest.mark.parametrize("size", [(7, 5), (31, 40), (64, 48), (80, 60)])
+@pytest.mark.parametrize("first", [0, 1])
+def test_averages_of_a_chequerboard_are_those_of_its_pixels_to_the_last_bit(size: tuple[int, int], first: int) -> None:
+    random = np.random.default_rng(0)
+    rows, columns = np.indices((48, 64))
+    for dtype in (np.uint8, np.uint16):
+        top = np.iinfo(dtype).max
+        picture = CodedPicture(random.integers(0, top, (48, 64, 3), dtype, endpoint=True), code_values(top))
+        linear = picture.linear()
+        for colour in (0, 1):
+            share = ((rows + columns) % 2 == (first + colour) % 2).astype(np.float32)
+            weight = np.maximum(area_average(share, *size), np.float32(1e-6))
+            expected = area_average(linear * share[..., None], *size) / weight[..., None]
+            for image in (picture, linear):
+                assert np.array_equal(chequered_averages(image, *size, first)[colour], expected)
 
 
 @pytest.mark.parametrize("channels", [1, 3, 7])
