@@ -36,7 +36,7 @@ def steady(clip: Clip, plates: Plates, known: Mapping[int, Picture] = MappingPro
         return known[number] if number in known else gains_of(number, shown())
 
     def balanced(number: int, picture: Picture) -> Picture:
-        return picture / gains(number, lambda: picture)
+        return picture / gains(number, lambda: small(picture))
 
     return clip.changed(balanced, lambda number, tiny: bool((gains(number, tiny) == 1).all()))
 
@@ -65,10 +65,10 @@ def without_noise_light(clip: Clip, plates: Plates) -> Clip:
 
 
 def exposures(plates: Plates) -> Callable[[int, Picture], Picture]:
-    """Return what tells by how much a frame, given by number and picture, is brighter than its background, (3,)."""
+    """Return what tells by how much a frame, by number and `small` picture, is brighter than its background, (3,)."""
 
     @lru_cache(maxsize=1)
     def still(plate: Plate) -> Picture:
         return small(plate.image)
 
-    return lambda number, picture: gain_of(small(picture), still(plates.at(number)))
+    return lambda number, picture: gain_of(picture, still(plates.at(number)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
@@ -17,6 +17,7 @@ from smokelift.footage.cut import find_cut
 from smokelift.footage.evidence import evidence
 from smokelift.footage.exposure import largest_change, small
 from smokelift.footage.focal_length import FocalLength, focal_length
+from smokelift.footage.images import Picture
 from smokelift.footage.large_plate import large_samples
 from smokelift.footage.lens import FILM_WIDTH
 from smokelift.footage.panorama import estimate_panorama
@@ -26,7 +27,7 @@ from smokelift.footage.plate_estimation import estimate_plate, steady_samples
 from smokelift.footage.steady import exposures, without_noise_light
 from smokelift.footage.turning import Turns, find_turns
 from smokelift.scene import Background, Camera
-from smokelift.setup.smoke import SAMPLES, UNKNOWN, SmokeSamples
+from smokelift.setup.smoke import UNKNOWN, SmokeSamples
 
 BLACK = 0.001
 """Linear radiance below which a background is called black."""
@@ -145,7 +146,7 @@ def _find_plates(
 def exposure_change(clip: Clip, plates: Plates) -> float:
     """Return by which share the exposure of a clip differs from its background's at most; 0 if it never does."""
     gains_of = exposures(plates)
-    return largest_change([gains_of(number, clip.frame(number)) for number in clip.spread(EXPOSURE_SAMPLES)])
+    return largest_change([gains_of(number, small(clip.frame(number))) for number in clip.spread(EXPOSURE_SAMPLES)])
 
 
 def exposure_notes(change: float) -> tuple[str, ...]:
@@ -155,11 +156,9 @@ def exposure_notes(change: float) -> tuple[str, ...]:
     return (f"The exposure of the clip changes by up to {change:.0%}: every frame is brought to the background's.",)
 
 
-def cut_notes(clip: Clip) -> tuple[str, ...]:
-    """What is to be said of a clip with a cut, a sentence; nothing of others."""
-    numbers = clip.spread(SAMPLES)
-    pictures = [small(clip.reduced(number)) for number in numbers]
-    after = find_cut(numbers, pictures, lambda number: small(clip.reduced(number)))
+def cut_notes(clip: Clip, pictures: Mapping[int, Picture]) -> tuple[str, ...]:
+    """What is to be said of a clip with a cut, a sentence; nothing of others. ``pictures`` are its `small_pictures`."""
+    after = find_cut([*pictures], [*pictures.values()], lambda number: small(clip.reduced(number)))
     if after is None:
         return ()
     last, first = clip.first + after - 1, clip.first + after

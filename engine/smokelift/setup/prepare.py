@@ -76,7 +76,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
     found = find_plates(clip, scene.camera, scene.background, lens)
     clip, plates = found.clip, found.plates
     samples = sample_smoke(clip, plates, found.turns)
-    cuts = cut_notes(clip) if found.turns is None else ()
+    cuts = cut_notes(clip, samples.small) if found.turns is None else ()
     clip = steady(clip, plates, samples.gains)
     burning = fire_share(samples.colours, samples.behind)
     fire = None
@@ -88,8 +88,8 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
         samples = replace(sample_smoke(clip, plates, found.turns), gains=samples.gains)
     geometry = find_geometry(clip, scene, settings, plates, samples, found.turns)
     camera, domain = geometry.camera, geometry.domain
-    nothing = nothing_seen(clip, plates, samples, scene.background is not None)
-    doubts = tuple(dict.fromkeys((*nothing, *found.doubts, *cuts, *smoke_in_plate(samples))))
+    nothing = nothing_seen(clip, plates, samples, scene.background is not None, cuts)
+    doubts = (*(nothing or cuts), *found.doubts, *smoke_in_plate(samples))
     notes = [*remarks, *found.notes, *doubts, *exposure_notes(samples.exposure), *geometry.notes]
     if settings.axis_depth is not None:
         SmokeAxis.given(settings.axis_depth, camera, domain)  # refuse early what cannot be

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.footage.clip import REDUCED, Clip
-from smokelift.footage.exposure import largest_change
-from smokelift.footage.images import area_average
+from smokelift.footage.exposure import largest_change, small
+from smokelift.footage.images import Picture, area_average
 from smokelift.footage.matte import matte
 from smokelift.footage.panorama import WidePicture
 from smokelift.footage.plate import Plates
@@ -49,6 +49,8 @@ class SmokeSamples:
         By how much each sample is brighter than its background, (3,), by the number of its frame; they are evened out.
     textures
         What the samples with smoke show of the texture behind it.
+    small
+        The `small_pictures` of the samples.
     """
 
     scale: float
@@ -60,11 +62,17 @@ class SmokeSamples:
     smoky: tuple[int, ...]
     gains: Mapping[int, NDArray[np.float32]]
     textures: tuple[Texture, ...] = ()
+    small: Mapping[int, Picture] = field(default_factory=dict)
 
     @property
     def exposure(self) -> float:
         """Share by which the exposure of a sample differs from its background's at most."""
         return largest_change(list(self.gains.values()))
+
+
+def small_pictures(clip: Clip) -> dict[int, Picture]:
+    """Return `smokelift.footage.exposure.small` pictures of frames spread over a clip, by their numbers, ascending."""
+    return {number: small(clip.reduced(number)) for number in clip.spread(SAMPLES)}
 
 
 def sample_smoke(clip: Clip, plates: Plates, turns: Turns | None = None) -> SmokeSamples:
@@ -78,12 +86,11 @@ def sample_smoke(clip: Clip, plates: Plates, turns: Turns | None = None) -> Smok
     gains: dict[int, NDArray[np.float32]] = {}
     amounts: dict[int, int] = {}
     reduced = plates.through(lambda whole: area_average(whole, columns, rows), scale**2)
-    gains_of = exposures(reduced)
-    for number in clip.spread(SAMPLES):
+    gains_of, tiny = exposures(reduced), small_pictures(clip)
+    for number, shown in tiny.items():
         plate = reduced.at(number)
-        frame = clip.reduced(number)
-        gains[number] = gains_of(number, frame)
-        picture = frame / gains[number]
+        gains[number] = gains_of(number, shown)
+        picture = clip.reduced(number) / gains[number]
         mask = matte(picture, plate).mask
         for whole, part in ((covered, mask), (unknown, plate.confidence < UNKNOWN)):
             whole |= part if wide is None else wide.spread_out(part.astype(np.float32), number) > 0.5
@@ -98,5 +105,5 @@ def sample_smoke(clip: Clip, plates: Plates, turns: Turns | None = None) -> Smok
         corners = (wide.left, wide.top, wide.left + wide.size[0], wide.top + wide.size[1])
         left, top, right, bottom = (scale * corner for corner in corners)
         bounds = (left, top, right, bottom)
-    shown = np.concatenate(colours), np.concatenate(behind)
-    return SmokeSamples(scale, bounds, covered, unknown, *shown, smoky, gains, tuple(textures))
+    radiance = np.concatenate(colours), np.concatenate(behind)
+    return SmokeSamples(scale, bounds, covered, unknown, *radiance, smoky, gains, tuple(textures), tiny)

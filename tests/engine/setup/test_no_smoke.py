@@ -28,7 +28,7 @@ def wall(tmp_path):
 def test_how_many_frames_were_looked_at_is_said(wall) -> None:
     """And what helps."""
     clip, plate = wall
-    said, advice = nothing_seen(clip, plate, sample_smoke(clip, plate), given=False)
+    said, advice = nothing_seen(clip, plate, sample_smoke(clip, plate), given=False, cuts=())
     assert "No smoke found in the 4 frames that were looked at" in said
     assert "give a clean plate, or a color" in advice
 
@@ -39,24 +39,31 @@ def test_nothing_is_said_of_smoke(wall) -> None:
     image = plate.image.copy()
     image[6:18, 8:24] *= 0.5
     dark = replace(plate, image=image)
-    assert nothing_seen(clip, dark, sample_smoke(clip, dark), given=False) == ()
+    assert nothing_seen(clip, dark, sample_smoke(clip, dark), given=False, cuts=()) == ()
 
 
 def test_the_background_that_is_given_is_doubted(wall) -> None:
     """Nothing else is asked for."""
-    assert "Check the background that is given" in what_helps(*wall, given=True)
+    assert "Check the background that is given" in what_helps(*wall, given=True, cuts=())
+
+
+def test_a_cut_is_said_before_all_else(wall) -> None:
+    """No background fits both of its sides."""
+    clip, plate = wall
+    said = nothing_seen(clip, plate, sample_smoke(clip, plate), given=True, cuts=("There is a cut.",))
+    assert said[1:] == ("There is a cut.",)
 
 
 def test_one_frame_shows_no_background(wall) -> None:
     """A photograph of smoke."""
     clip, plate = wall
-    assert "One frame alone does not show" in what_helps(clip.part(2, 2), plate, given=False)
+    assert "One frame alone does not show" in what_helps(clip.part(2, 2), plate, given=False, cuts=())
 
 
 @pytest.mark.parametrize(("codes", "moves"), [(5, False), (20, True)])
 def test_a_background_that_changes_may_be_that_of_a_camera_that_moves(wall, codes, moves) -> None:
     """More than noise does."""
     clip, plate = wall
-    said = what_helps(clip, replace(plate, noise=lasting_noise(codes / 255)), given=False)
+    said = what_helps(clip, replace(plate, noise=lasting_noise(codes / 255)), given=False, cuts=())
     assert ("track it in Blender" in said) is moves
     assert (f"by {codes} of 255" in said) is moves

@@ -19,7 +19,7 @@ from smokelift.output.images import write_image
 from smokelift.setup import background
 from smokelift.setup.background import cut_notes, find_plates, focal_notes, smoke_in_plate
 from smokelift.setup.geometry import clip_lens
-from smokelift.setup.smoke import SmokeSamples, sample_smoke
+from smokelift.setup.smoke import SmokeSamples, sample_smoke, small_pictures
 
 
 def before(floor: float, folder) -> Clip:
@@ -163,11 +163,11 @@ def test_a_cut_is_said_with_the_frames_of_each_side(tmp_path) -> None:
         )
         write_image(tmp_path / f"frame_{n:02d}.png", wall * (1 - smoke) + 0.6 * smoke)
     with Clip.open(tmp_path / "frame_##.png", frames=(2, 12)) as clip:
-        (said,) = cut_notes(clip)
+        (said,) = cut_notes(clip, small_pictures(clip))
     assert "between frames 6 and 7" in said
     assert "--frames 2:6 or 7:12" in said
     with Clip.open(tmp_path / "frame_##.png", frames=(7, 13)) as clip:
-        assert cut_notes(clip) == ()
+        assert cut_notes(clip, small_pictures(clip)) == ()
 
 
 @pytest.mark.parametrize(("count", "doubted"), [(1, False), (2, True), (4, False)])

@@ -23,10 +23,12 @@ from smokelift.output.sequence import Sequence
 from smokelift.output.writer import check_directory, written_kinds
 from smokelift.pipeline import Frame, reconstruct
 from smokelift.render import device
+from smokelift.setup.background import cut_notes
 from smokelift.setup.no_smoke import what_helps
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.provenance import made_up
 from smokelift.setup.shot import Shot
+from smokelift.setup.smoke import small_pictures
 
 UNEXPLAINED = 0.7
 """Root mean square of what a fit leaves, as a share of what the smoke changes: at 0.7 half of the change's energy."""
@@ -85,10 +87,11 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     figures = [sequence.figures(number) for number in sequence.frames]
     empty = sum(not (of_frame.get("hull_share") or 0) > 0 for of_frame in figures)
     if empty == len(figures):
+        cuts = cut_notes(shot.clip, small_pictures(shot.clip))
         raise ValueError(
             f"No smoke found: in no frame does a patch differ from the background by {2 * SMOKE_THRESHOLD:g} times the "
             f"clip's noise, so all frames in {options.out} are empty. "
-            f"{what_helps(shot.clip, shot.views[0].plates, scene.background is not None)}"
+            f"{what_helps(shot.clip, shot.views[0].plates, scene.background is not None, cuts)}"
         )
     for note in shortcomings(figures, empty):
         say.note(note)
