@@ -47,6 +47,11 @@ SHARP = np.float32(15 / 255)
 """Detail of mist and smoke in front of black, in sRGB values, at most (1 to 13 of 255 in 26 clips); walls and stages in
 the dark have edges (17 to 40; docs/experiments/background.md)."""
 
+USUAL, MOST = np.float32(2 / 255), 0.5
+"""Difference in sRGB values up to which a block has the colour of most of a single picture, and share of the blocks
+that have to: 0.51 to 0.93 of frames of 10 public clips before one colour, 0.16 at most of 35 others but for a stage in
+the dark (docs/experiments/background.md)."""
+
 
 def backdrop_plate(samples: npt.NDArray[np.uint16], noise: Noise) -> Plate | None:
     """Return the plate of a background of one colour, or None if it has more.
@@ -66,6 +71,20 @@ def one_colour(plate: Plate) -> tuple[float, float, float] | None:
     colour = np.broadcast_to(np.array([red, green, blue], np.float32), plate.image.shape)
     differs = matte(plate.image, Plate(colour, np.ones_like(plate.confidence), plate.noise)).mask
     return None if (differs & known).any() else (red, green, blue)
+
+
+def usual_colour(picture: Picture) -> tuple[float, float, float] | None:
+    """Return the linear colour of most of a single picture (rows, columns, 3), or None if no colour has most of it.
+
+    One picture does not tell what never changes, so that smoke may be all that has another colour.
+    """
+    linear = block_means(picture[None])[0]
+    blocks = linear_to_srgb(linear)
+    alike = (np.abs(blocks - np.median(blocks, axis=(0, 1))) <= USUAL).all(-1)
+    if alike.mean() < MOST:
+        return None
+    red, green, blue = (float(v) for v in np.median(linear[alike], axis=0))
+    return red, green, blue
 
 
 def _backdrop(samples: npt.NDArray[np.uint16], noise: Noise) -> Picture | None:

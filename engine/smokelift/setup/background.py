@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from smokelift.footage.alignment import Lens
-from smokelift.footage.backdrop import ONE_COLOUR_NOISE, one_colour
+from smokelift.footage.backdrop import ONE_COLOUR_NOISE, one_colour, usual_colour
 from smokelift.footage.background import given_plates
 from smokelift.footage.clip import Clip
 from smokelift.footage.cut import find_cut
@@ -44,6 +44,12 @@ MOSTLY = 0.5
 
 FEW = 4
 """Frames from which on smoke hardly looks the same in all by chance: half of its pairs of successive samples do."""
+
+FROM_ONE = (
+    "One frame alone does not show what moves: the colour that most of it has counts as background, and all else as "
+    "smoke. If that is wrong, give a clean plate, or a color, in [background]."
+)
+"""What is to be said of a background of one colour that a single frame shows."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,6 +195,10 @@ def _estimated(clip: Clip, evidence_of: Callable[[], Clip], lens: Lens | None, t
     if plain_everywhere is not None and plain_everywhere.noise.total.max() <= ONE_COLOUR_NOISE:
         return FoundPlates(clip, plain_everywhere, None, (_found(plain_everywhere),))
     shot = evidence_of()
+    alone = usual_colour(shot.frame(0)) if len(shot) == 1 else None
+    if alone is not None:
+        plate = known_plate(alone, clip)
+        return FoundPlates(clip, plate, None, (_found(plate),), doubts=(FROM_ONE,))
     samples = large_samples(shot) or steady_samples(shot)
     backdrop, noise = samples.backdrop(), samples.noise
     # one colour has nothing to hold on to, and is the same wherever the camera looks; in noise, texture may pass by

@@ -82,6 +82,18 @@ def test_a_clip_alone_is_enough(plume, tmp_path, capsys) -> None:
     assert sequence.scene.domain.resolution == (16, 16, 24)
 
 
+def test_one_picture_alone_is_enough_before_one_colour(plume, tmp_path, capsys) -> None:
+    """It gives smoke at rest, and the run says what counts as smoke."""
+    picture = plume.write(tmp_path / "clip", plume.densities[:1]).clip.path.with_name("frame_0000.png")
+    picture = picture.rename(tmp_path / "photograph.png")
+    assert command("reconstruct", picture, "--out", tmp_path / "out", "--npz", *QUICK) == 0
+    assert "One frame alone does not show what moves" in " ".join(capsys.readouterr().out.split())
+    sequence = Sequence.open(tmp_path / "out")
+    assert sequence.figures(1)["psnr"] > 35
+    assert sequence.density(1).any()
+    assert not sequence.velocity(1).any()
+
+
 def test_the_smoke_stands_where_the_command_says(shot, finished, tmp_path) -> None:
     """The depth of its axis reaches the settings and the smoke; before the middle of the box it is negative."""
     assert command("reconstruct", shot, "--out", tmp_path / "out", "--npz", "--axis-depth", "-0.2", *QUICK) == 0

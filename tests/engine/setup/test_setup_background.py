@@ -12,10 +12,12 @@ from scipy.spatial.transform import Rotation
 from smokelift.footage.alignment import Lens
 from smokelift.footage.clip import Clip
 from smokelift.footage.evidence import GLIMPSE
-from smokelift.footage.images import srgb_to_linear
+from smokelift.footage.images import linear_to_srgb, srgb_to_linear
+from smokelift.footage.matte import matte
 from smokelift.footage.panorama import PanoramaPlate
 from smokelift.footage.plain import plain_plate
 from smokelift.output.images import write_image
+from smokelift.scene import Background
 from smokelift.setup import background
 from smokelift.setup.background import cut_notes, find_plates, focal_notes, smoke_in_plate
 from smokelift.setup.geometry import clip_lens
@@ -168,6 +170,25 @@ def test_a_cut_is_said_with_the_frames_of_each_side(tmp_path) -> None:
     assert "--frames 2:6 or 7:12" in said
     with Clip.open(tmp_path / "frame_##.png", frames=(7, 13)) as clip:
         assert cut_notes(clip, small_pictures(clip)) == ()
+
+
+@pytest.mark.parametrize("colour", [0.0, 0.2], ids=["black", "grey"])
+def test_one_frame_before_one_colour_shows_its_background(tmp_path, colour) -> None:
+    """As the color that a scene file would give; the run says what counts as smoke."""
+    rows, columns = np.mgrid[:120, :80]
+    smoke = np.clip(1.5 - np.hypot(rows - 80, columns - 40) / 20, 0, 1)
+    shown = linear_to_srgb((colour * (1 - smoke) + 0.6 * smoke)[..., None].repeat(3, -1).astype(np.float32))
+    write_image(
+        tmp_path / "photograph.png", srgb_to_linear(shown + np.random.default_rng(0).normal(0, 0.004, (120, 80, 1)))
+    )
+    with Clip.open(tmp_path / "photograph.png") as clip:
+        found = find_plates(clip, None, None)
+        told = find_plates(clip, None, Background(color=(colour,) * 3))
+        masks = [matte(clip.frame(0), each.plates.at(0)).mask for each in (found, told)]
+        assert masks[0][smoke > 0.1].all() and masks[0].mean() < 0.5
+        assert (masks[0] != masks[1]).mean() < 0.01
+    assert found.doubts == (background.FROM_ONE,)
+    assert "Background not given: it is" in found.notes[0]
 
 
 @pytest.mark.parametrize(("count", "doubted"), [(1, False), (2, True), (4, False)])
