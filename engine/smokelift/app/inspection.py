@@ -129,9 +129,10 @@ def facts(shot: Shot, given: Scene, cost: Cost) -> tuple[Fact, ...]:
 def write_scene(path: Path, shot: Shot, given: Scene, known: Sequence[Fact]) -> tuple[Path, ...]:
     """Write all that was found into a scene file, with what is known of it as comments; return the files.
 
-    A background that was estimated becomes a colour of the file, or a picture beside it. The turns of a camera that was
-    steadied belong to the background that they were found with. Both are left to be found again; camera and box stay as
-    they are given, if they are.
+    A background of one colour that was estimated becomes a colour of the file. Any other is left to be found again: a
+    picture does not say which of its parts are unknown, and by how much they may be wrong. It is written beside the
+    file for those who want to mend it. The turns of a camera that was steadied belong to the background that they were
+    found with, and are left to be found again, too; camera and box stay as they are given, if they are.
 
     Raises
     ------
@@ -140,6 +141,7 @@ def write_scene(path: Path, shot: Shot, given: Scene, known: Sequence[Fact]) -> 
     """
     scene, plate = Scene(**vars(shot.scene)), shot.estimated_background
     picture = path.with_name(f"{path.stem}_background.exr")
+    said = [f"{fact.what}: {fact.value} ({fact.origin})" for fact in known if fact.what != "cost"]
     colour = None if plate is None else plate[0, 0]
     one = colour is not None and bool((plate == colour).all())
     files = (path,) if plate is None or one else (path, picture)
@@ -151,10 +153,11 @@ def write_scene(path: Path, shot: Shot, given: Scene, known: Sequence[Fact]) -> 
         scene = replace(scene, background=Background(color=(red, green, blue)))
     elif plate is not None:
         write_image(picture, plate, half=False)
-        scene = replace(scene, background=Background(image=picture.absolute()))
+        scene = replace(scene, background=None)
+        said.append(f"A run finds the background again. {picture.name} shows it: once mended, give it in [background].")
     elif shot.moves and shot.scene.background == Background():
         scene = replace(scene, camera=given.camera, domain=given.domain, background=None)
-    scene.save(path, [f"{fact.what}: {fact.value} ({fact.origin})" for fact in known if fact.what != "cost"])
+    scene.save(path, said)
     return files
 
 
