@@ -151,7 +151,7 @@ def _measured(fire: Fire, case: Case, scene: CompleteScene) -> Iterator[str]:
     density = coarsen(fire.density)
     places = scene.domain.min[1] + (np.arange(RESOLUTION[1]) + 0.5) * 2 / RESOLUTION[1]
     depth = float(np.average(places, weights=density.sum((0, 2)))) if case.told else None
-    with mock.patch("smokelift.setup.prepare.fire_share", lambda *_: 0.0) if case.smoke else mock.MagicMock():
+    with mock.patch("smokelift.setup.fire.fire_share", lambda *_: 0.0) if case.smoke else mock.MagicMock():
         shot, frame = _reconstructed(clip, scene, depth)
     sides = [orbit(scene.camera, scene.domain, 90).resized(32, 48)]
     optics, clear = scene_optics(shot.scene), np.zeros(RESOLUTION, np.float32)

@@ -65,6 +65,11 @@ class Geometry:
     resolution: Choice[Shape] | None
     notes: tuple[str, ...] = ()
 
+    @property
+    def choices(self) -> tuple[Choice[Shape], ...]:
+        """What was measured for it."""
+        return () if self.resolution is None else (self.resolution,)
+
 
 def find_geometry(
     clip: Clip, scene: Scene, settings: Settings, plates: Plates, samples: SmokeSamples, turns: Turns | None = None

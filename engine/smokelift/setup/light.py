@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +26,7 @@ from smokelift.scene import (
 from smokelift.setup.choice import UNDETERMINED, Choice
 from smokelift.setup.smoke import SmokeSamples
 from smokelift.setup.smoke_colour import FAINTEST
+from smokelift.setup.thickness import Thickness, smoke_thickness
 
 BEYOND = 0.1
 """Share by which the source radiance exceeds the 99th percentile of the smoke's. That smoke then has an optical depth
@@ -42,6 +45,55 @@ QUIET = 2 / 255
 
 FEW = 8
 """Directions of an environment whose colour alone is asked for."""
+
+
+@dataclass(frozen=True, eq=False)
+class FoundLight:
+    """The light of a shot, before models of scattering are tried.
+
+    Attributes
+    ----------
+    lights
+        Those that the scene gives, or one from everywhere.
+    scattering
+        The richest model that they allow, or the one that is asked for.
+    thickness
+        What the clip tells of the strength of a light that is not given; None if it is given or nothing is scattered.
+    """
+
+    lights: tuple[Light, ...]
+    scattering: Scattering
+    thickness: Thickness | None = None
+
+    @property
+    def guessed(self) -> bool:
+        """Whether nothing tells the light, not even its strength."""
+        return self.thickness is not None and self.thickness.source is None
+
+    def choices(self, scene: CompleteScene) -> tuple[Choice[Any], ...]:
+        """What was measured of it, if the scene's model of scattering asks for light."""
+        if self.thickness is None or scene.scattering == "absorption":
+            return ()
+        return self.thickness.choice, unknown_direction()
+
+    def notes(
+        self, scene: CompleteScene, choices: Sequence[Choice[Any]], samples: SmokeSamples, noise: Noise
+    ) -> tuple[str, ...]:
+        """What is to be said of it with the model that was chosen: see `light_note` and `light_doubts`."""
+        if self.thickness is None:
+            return ()
+        note = light_note(scene, not self.guessed, bool(samples.smoky))
+        scattered = next((choice for choice in choices if choice.what == "scattering"), None)
+        return (note,) if scattered is None else (note, *light_doubts(scattered, samples, noise))
+
+
+def find_light(given: tuple[Light, ...], asked: Scattering | None, medium: Medium, samples: SmokeSamples) -> FoundLight:
+    """Complete the light; the parameters and errors are those of `richest_scattering` and `ambient_sun`."""
+    richest = richest_scattering(asked, given, medium)
+    if given or richest == "absorption":
+        return FoundLight(given, richest)
+    thickness = smoke_thickness(samples.textures)
+    return FoundLight((ambient_sun(samples, medium, thickness.source),), richest, thickness)
 
 
 def richest_scattering(asked: Scattering | None, lights: tuple[Light, ...], medium: Medium) -> Scattering:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,13 +15,10 @@ from smokelift.scene import (
     Background,
     Camera,
     ClipSource,
-    DirectionalLight,
     Domain,
     EnvironmentLight,
     Inlet,
-    Medium,
     Scene,
-    SceneError,
     as_matrix,
     completed,
     look_at_matrix,
@@ -34,7 +29,7 @@ from smokelift.setup.geometry import COARSEST
 from smokelift.setup.prepare import boundaries, prepare_shot
 from smokelift.setup.settings import LONGEST_SIDE, Settings
 from smokelift.setup.shot import Shot
-from tests.engine.setup.shots import burning, shot_of
+from tests.engine.setup.shots import shot_of
 
 
 def bare(scene: Scene) -> Scene:
@@ -316,160 +311,6 @@ def test_a_single_picture_gives_a_shot(plume, draft, tmp_path) -> None:
     assert shot_of(bare(scene), draft).clip.size == (40, 56)
 
 
-def test_brightening_smoke_has_a_bright_source(plume, draft) -> None:
-    """Thick smoke looks at least as bright as the brightest smoke in the clip."""
-    shot = shot_of(replace(plume.scene, lights=()), draft)
-    with Clip.open(plume.scene.clip) as clip:
-        brightest = max(float(frame.max()) for frame in clip)
-    source = shot.scene.medium.albedo / (4 * np.pi) * np.array(shot.scene.lights[0].irradiance)
-    assert 0.7 * brightest < source.max() < 1.5 * brightest
-
-
-def test_darkening_smoke_has_a_dark_source(plume, draft, tmp_path) -> None:
-    """Before a bright wall, thick dark smoke looks no brighter than the darkest smoke in the clip."""
-    sooty = replace(
-        plume.scene,
-        medium=Medium(extinction=8.0, albedo=0.3),
-        lights=(DirectionalLight((0, 0.5, -0.8), (2.0, 2.0, 2.0)),),
-        background=Background(color=(0.8, 0.8, 0.8)),
-    )
-    scene = plume.write(tmp_path / "clip", plume.densities, sooty)
-    shot = shot_of(replace(scene, lights=()), draft)
-    with Clip.open(scene.clip) as clip:
-        darkest = min(float(frame.min()) for frame in clip)
-    source = 0.3 / (4 * np.pi) * np.array(shot.scene.lights[0].irradiance)
-    assert source.max() <= 1.1 * darkest
-    assert source.max() < 0.4
-
-
-def test_smoke_that_scatters_nothing_needs_no_light(plume, draft, tmp_path) -> None:
-    """Albedo 0 is soot: whatever the light, it only darkens, so none has to be guessed."""
-    black = replace(
-        plume.scene,
-        medium=Medium(extinction=8.0, albedo=0.0),
-        lights=(),
-        background=Background(color=(0.8, 0.8, 0.8)),
-    )
-    scene = plume.write(tmp_path / "clip", plume.densities, black)
-    shot = shot_of(scene, draft)
-    assert shot.scene.medium == black.medium
-
-
-# further views
-
-
-def test_a_further_view_is_opened_in_step(two_views, draft) -> None:
-    """Its frame 0 is of the input's moment, its picture and plate are cut to the box, and a note says so."""
-    shot = shot_of(two_views, draft)
-    _, view = shot.views
-    assert (view.clip.first, len(view.clip)) == (1, 5)
-    front, seen = shot.observe(2)
-    assert front.camera == shot.views[0].working.camera
-    assert seen.image.shape == seen.plate.image.shape == (*seen.camera.size[::-1], 3)
-    np.testing.assert_array_equal(seen.image, view.working.cut(view.clip.frame(2)))
-    (note,) = shot.notes
-    assert note == "View 1: frame_####.png, 90 degrees from the input, frames 1 to 5."
-    assert shot.scene == completed(two_views)
-
-
-@pytest.mark.parametrize(("asked", "first"), [((0, 4), 1), ((2, 3), 3)])
-def test_a_further_view_follows_the_clip_that_is_used(two_views, draft, asked, first) -> None:
-    """Also one that was opened at other frames than the scene's."""
-    for scene in (two_views, two_views.with_frames(1, 3)):
-        with Clip.open(two_views.clip, frames=asked) as clip:
-            _, view = prepare_shot(clip, scene, draft).views
-        assert (view.clip.first, len(view.clip)) == (first, asked[1] - asked[0] + 1)
-
-
-def test_a_further_view_has_the_same_numbers_if_nothing_is_said(two_views, draft) -> None:
-    """Without frames of its own; then the side, which began earlier, is used from its first."""
-    (view,) = two_views.views
-    scene = replace(two_views, views=(replace(view, clip=replace(view.clip, frames=None)),))
-    with Clip.open(scene.clip, frames=(2, 4)) as clip:
-        _, found = prepare_shot(clip, scene, draft).views
-    assert (found.clip.first, len(found.clip)) == (2, 3)
-
-
-def behind(shot: Shot, view: int, frame: int = 0) -> float:
-    """Mean radiance behind the smoke."""
-    return float(shot.observe(frame)[view].plate.image.mean())
-
-
-def test_a_further_views_background(two_views, draft, tmp_path) -> None:
-    """Its own, else the scene's colour, else estimated from its clip; a picture of the input's is not its."""
-    (view,) = two_views.views
-    grey = replace(two_views, views=(replace(view, background=Background(color=(0.5, 0.5, 0.5))),))
-    assert behind(shot_of(grey, draft), 1) == pytest.approx(0.5, abs=1e-3)
-    write_image(tmp_path / "wall.png", np.full((56, 40, 3), 0.5, np.float32))
-    wall = Background(image=tmp_path / "wall.png")
-    pictured = shot_of(replace(two_views, background=wall), draft)
-    assert behind(pictured, 0) == pytest.approx(0.5, abs=1e-2)
-    assert behind(pictured, 1) < 0.2
-    assert "Background not given: it is black" in " ".join(pictured.notes)
-    for n in range(6):
-        write_image(tmp_path / f"wall_{n}.exr", np.full((56, 40, 3), n / 10, np.float32))
-    changing = replace(view, background=Background(image=tmp_path / "wall_#.exr"))
-    assert behind(shot_of(replace(two_views, views=(changing,)), draft), 1, frame=2) == pytest.approx(0.3, abs=1e-3)
-
-
-@pytest.mark.parametrize("wrong", ["camera", "background"])
-def test_views_that_do_not_agree_are_noted(two_views, draft, wrong) -> None:
-    """A camera that stands elsewhere, or another background: nothing is refused, but it is said."""
-    (view,) = two_views.views
-    if wrong == "camera":
-        lower = look_at_matrix((4, 0, 0.2), (0, 0, 0.2), (0, 0, 1))
-        view = replace(view, camera=replace(view.camera, matrix=lower))
-    else:
-        view = replace(view, background=Background(color=(0.5, 0.5, 0.5)))
-    notes = shot_of(replace(two_views, views=(view,)), draft).notes
-    assert any(re.match(r"The views agree on [0-7]?\d% of the smoke", note) for note in notes)
-
-
-def spoilt(scene: Scene, what: str, folder: Path) -> Scene:
-    """A scene whose further view is wrong in one way."""
-    (view,) = scene.views
-    camera, clip = view.camera, view.clip
-    match what:
-        case "short":
-            return replace(scene, views=(replace(view, clip=replace(clip, frames=(4, 5))),))
-        case "rate":
-            return replace(scene, views=(replace(view, clip=replace(clip, fps=25.0)),))
-        case "shape":
-            return replace(scene, views=(replace(view, camera=replace(camera, size=(56, 40))),))
-        case "moving":
-            return replace(scene, views=(replace(view, camera=replace(camera, matrices=(camera.matrix,) * 5)),))
-        case "missing":
-            return replace(scene, views=(replace(view, clip=ClipSource(folder / "none.mp4")),))
-        case "box":
-            return replace(scene, domain=None, camera=None)
-    raise AssertionError(what)
-
-
-@pytest.mark.parametrize(
-    ("what", "sentence"),
-    [
-        ("short", r"has frames 0 to 5, but 4 to 8 are those of the input's moments; use fewer frames"),
-        ("rate", r"has 25 frames a second, the input 24; all views need the same"),
-        ("shape", r"56 x 40, the clip's 40 x 56 \(frame_####.png\)"),
-        ("moving", r"no camera may move"),
-        ("missing", r"none.mp4: no such file"),
-        ("box", r"need the input's \[camera\] and the \[domain\]"),
-    ],
-)
-def test_a_further_view_that_does_not_belong_is_refused(two_views, draft, tmp_path, what, sentence) -> None:
-    """The sentence says what is wrong and what to do."""
-    with pytest.raises(ValueError, match=sentence):
-        shot_of(spoilt(two_views, what, tmp_path), draft)
-
-
-def test_a_further_view_beside_the_box_is_refused(two_views, draft) -> None:
-    """Where the scene is made, as for the input's camera."""
-    (view,) = two_views.views
-    away = look_at_matrix((0, -4, 0.8), (0, -9, 0.8), (0, 0, 1))
-    with pytest.raises(SceneError, match="does not see the domain"):
-        replace(two_views, views=(replace(view, camera=replace(view.camera, matrix=away)),))
-
-
 def test_a_camera_that_shakes_is_steadied(draft, tmp_path) -> None:
     """The volume stands still: the camera turns in its place, a matrix for every frame, and smoke alone is smoke."""
     random = np.random.default_rng(0)
@@ -489,31 +330,3 @@ def test_a_camera_that_shakes_is_steadied(draft, tmp_path) -> None:
     np.testing.assert_allclose(where - where.mean(0), (offsets.mean(0) - offsets)[:, ::-1], atol=0.3)
     assert any(note.startswith("The camera moves, by up to") for note in shot.notes)
     assert shot.estimated_background is None
-
-
-def test_fire_is_said_and_does_not_light_the_smoke(plume, draft, tmp_path) -> None:
-    """Dark smoke with a flame in it, and the same without one."""
-    dim = replace(plume.scene, lights=(DirectionalLight((0.3, 0.5, -0.8), (0.6, 0.6, 0.6)),))
-    scene = replace(plume.write(tmp_path, plume.densities, dim), lights=())
-    with Clip.open(scene.clip) as clip:
-        without, with_fire = (prepare_shot(each, scene, draft) for each in (clip, clip.changed(burning)))
-    assert not any(choice.what == "fire" for choice in without.choices)
-    (said,) = [choice.reason for choice in with_fire.choices if choice.what == "fire"]
-    assert re.match(r"Fire: \d+\.\d% of the smoke's pixels shine by themselves", said)
-    assert "of the color 1, 0.4" in said
-    assert without.fire is None and without.scene.medium.flame_color is None
-    assert with_fire.observe_fire(2).image.max() > 0.5 and without.observe_fire(2) is None
-    red, green, blue = with_fire.scene.medium.flame_color
-    assert (red, green) == (1, pytest.approx(0.4, abs=0.05)) and blue < 0.2
-    assert with_fire.optics.unshadowed_source().max() < 3 * without.optics.unshadowed_source().max()
-
-
-def test_a_color_of_fire_that_is_given_is_taken(plume, draft, tmp_path) -> None:
-    dim = replace(plume.scene, lights=(DirectionalLight((0.3, 0.5, -0.8), (0.6, 0.6, 0.6)),))
-    told = replace(dim, medium=replace(dim.medium, flame_color=(1.0, 0.5, 0.2)))
-    scene = plume.write(tmp_path, plume.densities, told)
-    with Clip.open(scene.clip) as clip:
-        shot = prepare_shot(clip.changed(burning), scene, draft)
-    assert shot.scene.medium.flame_color == (1.0, 0.5, 0.2)
-    (said,) = [choice.reason for choice in shot.choices if choice.what == "fire"]
-    assert "of the color 1, 0.5, 0.2 that is given" in said

@@ -1,0 +1,55 @@
+"""The fire of a clip, told from its smoke before anything is measured on either."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from smokelift.footage.clip import Clip
+from smokelift.footage.fire import fire_colour, fire_share, firelight, without_fire
+from smokelift.footage.plate import Plates
+from smokelift.scene.checks import Vector
+from smokelift.setup.choice import Choice
+from smokelift.setup.smoke import SmokeSamples
+
+
+@dataclass(frozen=True, eq=False)
+class Fire:
+    """What shines by itself.
+
+    Attributes
+    ----------
+    share
+        Of the smoke's pixels that do.
+    light
+        The clip of the light that it adds, in the place of smoke.
+    color
+        Of that light, as the clip shows it.
+    doused
+        The clip without it.
+    """
+
+    share: float
+    light: Clip
+    color: Vector
+    doused: Clip
+
+
+def find_fire(clip: Clip, plates: Plates, samples: SmokeSamples) -> Fire | None:
+    """Find the fire of a clip; None where none burns."""
+    share = fire_share(samples.colours, samples.behind)
+    if not share:
+        return None
+    doused = without_fire(clip, plates)
+    light = firelight(clip, doused)
+    return Fire(share, light, fire_colour(clip, light), doused)
+
+
+def fire_choice(fire: Fire, told: Vector | None) -> Choice[str]:
+    """Say what becomes of fire, whose colour may be told."""
+    red, green, blue = told or fire.color
+    reason = (
+        f"Fire: {fire.share:.1%} of the smoke's pixels shine by themselves. The grid flame holds their light, of the "
+        f"color {red:g}, {green:g}, {blue:g}{' that is given' if told else ''}; the smoke beside it is continued over "
+        "it."
+    )
+    return Choice("fire", f"{fire.share:.3f}", reason, {"share": fire.share, "red": red, "green": green, "blue": blue})

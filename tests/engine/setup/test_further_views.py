@@ -1,0 +1,129 @@
+"""Further views of a shot: in step with the input, before a background of their own, refused where they do not fit."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from smokelift.footage.clip import Clip
+from smokelift.output.images import write_image
+from smokelift.scene import Background, ClipSource, Scene, SceneError, completed, look_at_matrix
+from smokelift.setup.prepare import prepare_shot
+from smokelift.setup.shot import Shot
+from tests.engine.setup.shots import shot_of
+
+
+def test_a_further_view_is_opened_in_step(two_views, draft) -> None:
+    """Its frame 0 is of the input's moment, its picture and plate are cut to the box, and a note says so."""
+    shot = shot_of(two_views, draft)
+    _, view = shot.views
+    assert (view.clip.first, len(view.clip)) == (1, 5)
+    front, seen = shot.observe(2)
+    assert front.camera == shot.views[0].working.camera
+    assert seen.image.shape == seen.plate.image.shape == (*seen.camera.size[::-1], 3)
+    np.testing.assert_array_equal(seen.image, view.working.cut(view.clip.frame(2)))
+    (note,) = shot.notes
+    assert note == "View 1: frame_####.png, 90 degrees from the input, frames 1 to 5."
+    assert shot.scene == completed(two_views)
+
+
+@pytest.mark.parametrize(("asked", "first"), [((0, 4), 1), ((2, 3), 3)])
+def test_a_further_view_follows_the_clip_that_is_used(two_views, draft, asked, first) -> None:
+    """Also one that was opened at other frames than the scene's."""
+    for scene in (two_views, two_views.with_frames(1, 3)):
+        with Clip.open(two_views.clip, frames=asked) as clip:
+            _, view = prepare_shot(clip, scene, draft).views
+        assert (view.clip.first, len(view.clip)) == (first, asked[1] - asked[0] + 1)
+
+
+def test_a_further_view_has_the_same_numbers_if_nothing_is_said(two_views, draft) -> None:
+    """Without frames of its own; then the side, which began earlier, is used from its first."""
+    (view,) = two_views.views
+    scene = replace(two_views, views=(replace(view, clip=replace(view.clip, frames=None)),))
+    with Clip.open(scene.clip, frames=(2, 4)) as clip:
+        _, found = prepare_shot(clip, scene, draft).views
+    assert (found.clip.first, len(found.clip)) == (2, 3)
+
+
+def behind(shot: Shot, view: int, frame: int = 0) -> float:
+    """Mean radiance behind the smoke."""
+    return float(shot.observe(frame)[view].plate.image.mean())
+
+
+def test_a_further_views_background(two_views, draft, tmp_path) -> None:
+    """Its own, else the scene's colour, else estimated from its clip; a picture of the input's is not its."""
+    (view,) = two_views.views
+    grey = replace(two_views, views=(replace(view, background=Background(color=(0.5, 0.5, 0.5))),))
+    assert behind(shot_of(grey, draft), 1) == pytest.approx(0.5, abs=1e-3)
+    write_image(tmp_path / "wall.png", np.full((56, 40, 3), 0.5, np.float32))
+    wall = Background(image=tmp_path / "wall.png")
+    pictured = shot_of(replace(two_views, background=wall), draft)
+    assert behind(pictured, 0) == pytest.approx(0.5, abs=1e-2)
+    assert behind(pictured, 1) < 0.2
+    assert "Background not given: it is black" in " ".join(pictured.notes)
+    for n in range(6):
+        write_image(tmp_path / f"wall_{n}.exr", np.full((56, 40, 3), n / 10, np.float32))
+    changing = replace(view, background=Background(image=tmp_path / "wall_#.exr"))
+    assert behind(shot_of(replace(two_views, views=(changing,)), draft), 1, frame=2) == pytest.approx(0.3, abs=1e-3)
+
+
+@pytest.mark.parametrize("wrong", ["camera", "background"])
+def test_views_that_do_not_agree_are_noted(two_views, draft, wrong) -> None:
+    """A camera that stands elsewhere, or another background: nothing is refused, but it is said."""
+    (view,) = two_views.views
+    if wrong == "camera":
+        lower = look_at_matrix((4, 0, 0.2), (0, 0, 0.2), (0, 0, 1))
+        view = replace(view, camera=replace(view.camera, matrix=lower))
+    else:
+        view = replace(view, background=Background(color=(0.5, 0.5, 0.5)))
+    notes = shot_of(replace(two_views, views=(view,)), draft).notes
+    assert any(re.match(r"The views agree on [0-7]?\d% of the smoke", note) for note in notes)
+
+
+def spoilt(scene: Scene, what: str, folder: Path) -> Scene:
+    """A scene whose further view is wrong in one way."""
+    (view,) = scene.views
+    camera, clip = view.camera, view.clip
+    match what:
+        case "short":
+            return replace(scene, views=(replace(view, clip=replace(clip, frames=(4, 5))),))
+        case "rate":
+            return replace(scene, views=(replace(view, clip=replace(clip, fps=25.0)),))
+        case "shape":
+            return replace(scene, views=(replace(view, camera=replace(camera, size=(56, 40))),))
+        case "moving":
+            return replace(scene, views=(replace(view, camera=replace(camera, matrices=(camera.matrix,) * 5)),))
+        case "missing":
+            return replace(scene, views=(replace(view, clip=ClipSource(folder / "none.mp4")),))
+        case "box":
+            return replace(scene, domain=None, camera=None)
+    raise AssertionError(what)
+
+
+@pytest.mark.parametrize(
+    ("what", "sentence"),
+    [
+        ("short", r"has frames 0 to 5, but 4 to 8 are those of the input's moments; use fewer frames"),
+        ("rate", r"has 25 frames a second, the input 24; all views need the same"),
+        ("shape", r"56 x 40, the clip's 40 x 56 \(frame_####.png\)"),
+        ("moving", r"no camera may move"),
+        ("missing", r"none.mp4: no such file"),
+        ("box", r"need the input's \[camera\] and the \[domain\]"),
+    ],
+)
+def test_a_further_view_that_does_not_belong_is_refused(two_views, draft, tmp_path, what, sentence) -> None:
+    """The sentence says what is wrong and what to do."""
+    with pytest.raises(ValueError, match=sentence):
+        shot_of(spoilt(two_views, what, tmp_path), draft)
+
+
+def test_a_further_view_beside_the_box_is_refused(two_views, draft) -> None:
+    """Where the scene is made, as for the input's camera."""
+    (view,) = two_views.views
+    away = look_at_matrix((0, -4, 0.8), (0, -9, 0.8), (0, 0, 1))
+    with pytest.raises(SceneError, match="does not see the domain"):
+        replace(two_views, views=(replace(view, camera=replace(view.camera, matrix=away)),))
