@@ -63,7 +63,7 @@ def request(smoke: bpy.types.Object) -> tuple[str, list[str], list[bytes]]:
 def _continued(smoke: bpy.types.Object, numbers: list[int]) -> tuple[str, list[str], list[bytes]]:
     settings, scene = smoke.smokelift.directing, scene_of(smoke)
     if settings.fade > settings.frames:
-        raise ShotError(f"The smoke fades in {settings.fade} frames, and only {settings.frames} are added.")
+        raise ShotError(f"The smoke fades in {settings.fade} frames, more than are added ({settings.frames}).")
     words = ["--frames", str(settings.frames), "--fade", str(settings.fade)]
     last, start = numbers[-1], volume.scene_frame(smoke, numbers[-1])
     if settings.use_start:

@@ -247,7 +247,7 @@ class Job:
         if status == 0:
             self.outcome = "done"
         elif self._kill_at is not None or status == CANCELLED:
-            self.outcome, self.sentence = "cancelled", f"Cancelled; {self.done} finished frames stay."
+            self.outcome, self.sentence = "cancelled", f"Cancelled; finished frames stay: {self.done}."
         else:
             self.outcome = "failed"
             self.sentence = self._error or self._failure_reason(status)

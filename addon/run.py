@@ -243,7 +243,7 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
         for row in context.window_manager.smokelift.jobs:
             row.icon = 0
             if row.outcome not in ENDED:
-                row.outcome, row.sentence = "cancelled", f"Stopped; {row.done} finished frames stay."
+                row.outcome, row.sentence = "cancelled", f"Stopped; finished frames stay: {row.done}."
         bpy.utils.previews.remove(self._thumbnails)
         if self._timer is not None:
             context.window_manager.event_timer_remove(self._timer)

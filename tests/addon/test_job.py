@@ -226,7 +226,7 @@ def test_cancelling_a_polite_engine(own_engine) -> None:
     assert job.cancelling
     finished(job)
     assert (job.outcome, job.status) == ("cancelled", 130)
-    assert job.sentence == "Cancelled; 2 finished frames stay."
+    assert job.sentence == "Cancelled; finished frames stay: 2."
 
 
 def test_cancelling_at_once(own_engine) -> None:
@@ -249,7 +249,7 @@ def test_cancelling_an_engine_that_does_not_listen(own_engine, monkeypatch) -> N
     until(lambda: job.poll() and job.total == 9)
     job.cancel()
     assert finished(job).outcome == "cancelled"
-    assert job.sentence == "Cancelled; 4 finished frames stay."
+    assert job.sentence == "Cancelled; finished frames stay: 4."
 
 
 def test_an_engine_that_finishes_although_cancelled(engine) -> None:

@@ -103,7 +103,7 @@ def test_the_commands_run(tmp_path) -> None:
         assert done.returncode == 0, done.stderr
     assert Sequence.open(out).complete
     done = run(check)
-    assert (done.returncode, done.stdout.splitlines()[-1]) == (0, f"2 frames in {out} are as they were written.")
+    assert (done.returncode, done.stdout.splitlines()[-1]) == (0, f"All of {out} is as it was written: 2 frames.")
     done = run(preview)
     assert done.returncode == 0, done.stderr
     assert [path.name for path in (tmp_path / "smoke_preview").iterdir()] == ["frame_0002.png"]

@@ -19,6 +19,7 @@ from smokelift.footage.matte import SMOKE_THRESHOLD, Matte, matte
 from smokelift.footage.plate import Plate
 from smokelift.output.images import eight_bit, write_image
 from smokelift.scene import SHADOWED, Background, Camera, DirectionalLight, Domain, PointLight, Scene
+from smokelift.scene.checks import counted
 from smokelift.scene.projection import project
 from smokelift.setup.background import BLACK
 from smokelift.setup.choice import UNDETERMINED, Choice
@@ -78,7 +79,8 @@ def inspection(shot: Shot, given: Scene, known: Sequence[Fact], notes: Iterable[
         *([] if path is None else [Panel("path of the box's middle while the camera moves", path)]),
     ]
     name = given.clip.path.name if given.clip is not None else "clip"
-    frames = f"{shot.length} frames of {shot.clip.size[0]} x {shot.clip.size[1]} at {shot.clip.fps:.4g} a second"
+    width, height = shot.clip.size
+    frames = f"{counted(shot.length, 'frame')} of {width} x {height} at {shot.clip.fps:.4g} a second"
     others = tuple(note for note in notes if note not in shot.doubts)
     return Page(f"{name}: {frames}", shot.doubts, panels, known, others)
 
@@ -119,7 +121,7 @@ def facts(shot: Shot, given: Scene, cost: Cost) -> tuple[Fact, ...]:
         _place(shot),
         Fact(
             "cost",
-            f"{shot.length} frames: {spent}",
+            f"{counted(shot.length, 'frame')}: {spent}",
             "estimated",
             f"Right to a factor of two; {cost.memory_free / 2**30:.1f} GiB of memory are free.",
         ),

@@ -100,8 +100,8 @@ def run_on_cluster(
                 lost_at = now
             if now - lost_at > returns:
                 raise ClusterError(
-                    f"{address}: the scheduler has not returned in {returns:.0f} s; {len(left)} shots are left, and "
-                    "the same command goes on with them."
+                    f"{address}: the scheduler has not returned in {returns:.0f} s; not finished: "
+                    f"{', '.join(left)}. The same command goes on with them."
                 ) from error
             time.sleep(pause)
 

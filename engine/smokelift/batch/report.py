@@ -13,6 +13,7 @@ from pathlib import Path
 from smokelift.batch.record import Frames, Record
 from smokelift.batch.shots import Shot
 from smokelift.output.atomic import atomic_path
+from smokelift.scene.checks import counted
 
 REPORT = "report.html"
 
@@ -41,7 +42,8 @@ def write_report(folder: Path, title: str, known: Sequence[tuple[Shot, Record, F
     summary = ", ".join(f"{count} {status}" for status, count in counts.most_common())
     text = (
         f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{html.escape(title)}</title>'
-        f"<style>{_STYLE}</style></head><body>\n<h1>{html.escape(title)}</h1>\n<p>{len(known)} shots: {summary}.</p>\n"
+        f"<style>{_STYLE}</style></head><body>\n<h1>{html.escape(title)}</h1>\n"
+        f"<p>{counted(len(known), 'shot')}: {summary}.</p>\n"
         f"<table>\n<tr>{heads}</tr>\n{rows}</table>\n</body></html>\n"
     )
     with atomic_path(path) as aside:
@@ -63,7 +65,7 @@ def _row(shot: Shot, record: Record, frames: Frames) -> str:
     said = html.escape(record.sentence)
     if record.notes:
         notes = "".join(f"<p>{html.escape(note)}</p>" for note in record.notes)
-        said += f"<details><summary>{len(record.notes)} notes</summary>{notes}</details>"
+        said += f"<details><summary>{counted(len(record.notes), 'note')}</summary>{notes}</details>"
     return (
         f"<tr><td>{_picture(shot.picture)}</td><td>{named}</td>"
         f'<td class="{record.status}">{record.status}</td>'

@@ -38,7 +38,7 @@ def loop_length(sequence: Sequence, first: int, last: int, overlap: int) -> int:
     count = last - first + 1
     if count < SHORTEST or not 1 <= overlap <= count // 2:
         raise ValueError(
-            f"{there}; a loop of {count} of them can overlap by 1 to {max(count // 2, 1)} frames, not by {overlap}: "
+            f"{there}; a loop of {count} of them can overlap by {max(count // 2, 1)} at most, not by {overlap}: "
             f"choose another --overlap, or more frames ({SHORTEST} at least)."
         )
     return count - overlap

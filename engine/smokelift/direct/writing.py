@@ -17,6 +17,7 @@ from smokelift.output.layout import INDEX
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
 from smokelift.scene import Camera
+from smokelift.scene.checks import counted
 from smokelift.transport import Velocity, divergence
 
 SHORTEST = 4
@@ -37,7 +38,7 @@ def open_source(directory: str | Path) -> Sequence:
     sequence = Sequence.open(directory)
     if len(sequence.frames) < SHORTEST:
         raise ValueError(
-            f"{directory}: has {len(sequence.frames)} frames; {SHORTEST} are needed to see how smoke moves."
+            f"{directory}: has {counted(len(sequence.frames), 'frame')}; {SHORTEST} are needed to see how smoke moves."
         )
     return sequence
 

@@ -21,6 +21,7 @@ from smokelift.output.sequence import Sequence
 from smokelift.output.sheet import write_sheet
 from smokelift.output.viewer import Viewer
 from smokelift.render import Volume
+from smokelift.scene.checks import counted
 
 TILE_HEIGHT = 320
 """Pixels."""
@@ -113,8 +114,8 @@ def _load_truth(sequence: Sequence, path: Path) -> Truth:
     _check_box(sequence, truth, path)
     if (last := sequence.frames[-1] + first_frame(sequence) - 1) >= truth.frames:
         raise ValueError(
-            f"{path}: holds {truth.frames} frames, but the sequence goes on to frame {last} of its clip (from 0); "
-            "give the truth of that clip, or evaluate a sequence of fewer frames."
+            f"{path}: holds {counted(truth.frames, 'frame')}, but the sequence goes on to frame {last} of its clip "
+            "(from 0); give the truth of that clip, or evaluate a sequence of fewer frames."
         )
     return truth
 

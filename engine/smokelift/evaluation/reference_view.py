@@ -13,6 +13,7 @@ from smokelift.output.sequence import Sequence
 from smokelift.output.viewer import Viewer
 from smokelift.render import Image
 from smokelift.scene import Camera, Scene
+from smokelift.scene.checks import counted
 
 LONGEST_SIDE = 480
 """Pixels of a compared picture at most: larger ones are averaged over areas. Finer than any usual grid."""
@@ -114,8 +115,8 @@ def _view(
         )
     if (last := first + sequence.frames[-1] - 1) >= len(clip):
         raise ValueError(
-            f"{clip.path}: has {len(clip)} frames, but the sequence goes on to frame {last} of its clip (from 0); "
-            "give the whole clip of that camera."
+            f"{clip.path}: has {counted(len(clip), 'frame')}, but the sequence goes on to frame {last} of its clip "
+            "(from 0); give the whole clip of that camera."
         )
     camera = at_most(camera.resized(*clip.size))
     if camera.moves:

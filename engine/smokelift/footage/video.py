@@ -47,6 +47,7 @@ from smokelift.footage.images import (
 )
 from smokelift.footage.layer import Layer, backdrop_of, sample_numbers
 from smokelift.scene import LARGEST_PICTURE
+from smokelift.scene.checks import counted
 
 _EXACT = int(Interpolation.ACCURATE_RND | Interpolation.FULL_CHR_H_INT | Interpolation.FULL_CHR_H_INP)
 _ALPHA_DECODERS = {"vp8": "libvpx", "vp9": "libvpx-vp9"}
@@ -91,7 +92,7 @@ class Video:
             raise ClipError(f"{path}: holds no frame that can be decoded")
         if broken:
             self._drop_undecodable_end()
-            self.warning = f"{path}: is truncated; its first {len(self._times)} frames can be used"
+            self.warning = f"{path}: is truncated; {counted(len(self._times), 'frame')} of it can be used"
         self._varies, self._interlaced = False, False
         self.fps, self._shown = self._steady()
         self.count = len(self._shown)

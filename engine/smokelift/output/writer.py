@@ -28,6 +28,7 @@ from smokelift.output.lock import Lock
 from smokelift.output.resume import ResumeState
 from smokelift.output.vdb import VdbUnavailable, checked_volume, vdb_module, write_vdb
 from smokelift.scene import Background, CompleteScene, scene_to_dict
+from smokelift.scene.checks import counted
 from smokelift.transport import Array, Faces, Velocity, face_shapes
 
 
@@ -268,7 +269,7 @@ class SequenceWriter:
         reason = "the disk is full" if error.errno in DISK_FULL else str(error)
         return SequenceError(
             f"{self.directory}: {what} could not be written: {reason}; "
-            f"{len(self.finished)} finished frames stay and --resume goes on from them"
+            f"finished frames stay ({len(self.finished)}), and --resume goes on from them"
         )
 
 
@@ -328,9 +329,8 @@ def _begun(directory: Path, resume: bool) -> Index | None:
     if there is None or resume:
         return there
     if there.frames:
-        raise SequenceError(
-            f"{directory}: holds {len(there.frames)} finished frames; go on with --resume, or choose another directory"
-        )
+        count = counted(len(there.frames), "finished frame")
+        raise SequenceError(f"{directory}: holds {count}; go on with --resume, or choose another directory")
     return None
 
 

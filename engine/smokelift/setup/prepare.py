@@ -16,6 +16,7 @@ from smokelift.footage.large_plate import large_frames
 from smokelift.footage.working_picture import CameraError, WorkingPicture, working_picture
 from smokelift.render import scene_optics
 from smokelift.scene import Background, Camera, CompleteScene, Domain, Scene
+from smokelift.scene.checks import counted
 from smokelift.setup.choice import Choice
 from smokelift.setup.first_look import first_look
 from smokelift.setup.further_views import disagreement, open_view
@@ -112,10 +113,7 @@ def boundaries(scene: CompleteScene, settings: Settings) -> tuple[str, ...]:
         search = settings.method == "default" and settings.velocity.sources
         entry = f"No inlet marked: {'where smoke enters is found from the densities' if search else 'none is assumed'}."
     else:
-        places, voxels = (
-            f"{n} {what}{'s' * (n > 1)}"
-            for n, what in ((len(scene.inlets), "marked inlet"), (int(inflow.sum()), "voxel"))
-        )
+        places, voxels = counted(len(scene.inlets), "marked inlet"), counted(int(inflow.sum()), "voxel")
         entry = f"Smoke enters at {places} ({voxels}); others are not looked for."
     if not scene.closed:
         return entry, "All sides of the box are open."
@@ -135,9 +133,9 @@ def _check(clip: Clip, scene: Scene) -> None:
     if scene.views and (moves or any(view.camera.moves for view in scene.views)):
         raise ValueError("With further [[views]] no camera may move; give one matrix a camera, or one view only.")
     if scene.camera is not None and moves and len(scene.camera.matrices) != len(clip):
+        given, used = counted(len(scene.camera.matrices), "frame"), counted(len(clip), "frame")
         raise ValueError(
-            f"[camera] matrices are given for {len(scene.camera.matrices)} frames, and {len(clip)} frames of the clip "
-            "are used; give one matrix for each."
+            f"[camera] matrices are given for {given}, but the clip is used with {used}; give one matrix for each."
         )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from smokelift.render import Volume
 from smokelift.scene import Domain
+from smokelift.scene.checks import counted
 from smokelift.setup.choice import Choice
 from smokelift.velocity import VelocitySettings, estimate_velocity
 from smokelift.velocity.settings import LEVELS
@@ -34,7 +35,7 @@ def choose_coarsening(domain: Domain, settings: VelocitySettings, finest: int) -
     """
     what = "velocity grid coarsening"
     if settings.coarsening is not None:
-        reason = f"Velocity grid by hand: coarsened {settings.coarsening} times."
+        reason = f"Velocity grid by hand: coarsened {counted(settings.coarsening, 'time')}."
         return Choice(what, settings.coarsening, reason, by_hand=True)
     coarsening, longest, shortest = 0, max(domain.resolution), min(domain.resolution)
     while longest > finest and shortest >= 16:

@@ -34,7 +34,7 @@ def test_a_batch_runs_what_it_can_and_goes_on_later(shots, capsys) -> None:
     folder = shots.parent / "results"
     assert main(["batch", str(shots), "--progress", "json"]) == 2
     events = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
-    assert events[-1]["text"].startswith("1 of 2 shots did not come to their end (missing)")
+    assert events[-1]["text"].startswith("1 of 2 shots did not come to the end (missing)")
     assert Sequence.open(folder / "plume").complete
     assert "missing.mp4: no such file" in (folder / "report.html").read_text()
     made = (folder / "plume" / "sequence.json").stat().st_mtime_ns

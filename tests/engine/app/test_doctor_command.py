@@ -15,7 +15,7 @@ def test_doctor_in_a_process_of_its_own() -> None:
     done = subprocess.run([*MODULE, "doctor"], env=ENVIRONMENT, capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 0
     assert done.stdout.startswith(f"smokelift {smokelift.__version__}, Python 3.")
-    for word in ("libraries: numpy ", "taichi ", "processor cores", "GiB free", "GPU: ", "OpenVDB"):
+    for word in ("libraries: numpy ", "taichi ", "processor core", "GiB free", "GPU: ", "OpenVDB"):
         assert word in done.stdout
     assert done.stderr == ""
 

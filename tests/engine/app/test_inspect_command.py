@@ -136,12 +136,12 @@ def test_a_scene_of_all_estimates_gives_the_same_smoke(plume, tmp_path, capsys) 
 
 def test_a_background_that_is_a_picture_is_found_again(tmp_path) -> None:
     """What is unknown of it counts as in a run from the clip; its picture, not rounded, is there to be mended."""
-    wall = np.random.default_rng(0).uniform(0.1, 0.3, (56, 40, 3)).astype(np.float32)
+    wall = np.kron(np.random.default_rng(0).uniform(0.05, 0.4, (7, 5, 3)), np.ones((8, 8, 1))).astype(np.float32)
     rows, columns = np.mgrid[:56, :40]
     (tmp_path / "clip").mkdir()
     for n in range(16):
-        rising, staying = (np.hypot(rows - row, columns - 20) / 7 for row in (56 - 4 * n, 54 + n % 3))
-        smoke = 0.7 * np.clip(1.5 - np.minimum(rising, staying), 0, 1)[..., None]
+        rising, staying = (np.hypot(rows - row, columns - 20) / 7 for row in (56 - 4 * n, 52 + n % 3))
+        smoke = (0.7 + 0.2 * np.sin(1.3 * n)) * np.clip(1.5 - np.minimum(rising, staying), 0, 1)[..., None]
         write_image(tmp_path / "clip" / f"frame_{n:04d}.png", wall * (1 - smoke) + 0.8 * smoke)
     clip, scene = tmp_path / "clip" / "frame_####.png", tmp_path / "scene.toml"
     words = ("--frames", "6:6", "--detail", "0", *QUICK)

@@ -431,7 +431,7 @@ def test_a_truncated_clip_offers_what_is_there(tmp_path: Path, name: str) -> Non
     with Clip.open(whole) as clip:
         assert 10 <= len(clip) <= 20
         assert clip.warning is not None
-        assert f"is truncated; its first {len(clip)} frames can be used" in clip.warning
+        assert f"is truncated; {len(clip)} frames of it can be used" in clip.warning
         for n, image in enumerate(clip):
             np.testing.assert_array_equal(image, wanted[n])
     whole.write_bytes(data[:300])

@@ -233,7 +233,7 @@ def test_a_camera_of_another_shape_is_refused(plume, draft) -> None:
 
 def test_a_moving_camera_needs_a_pose_for_every_frame(tracked, draft) -> None:
     """Five frames of the clip are used, so there must be five."""
-    with pytest.raises(ValueError, match=r"matrices are given for 5 frames, and 4 frames of the clip are used"):
+    with pytest.raises(ValueError, match=r"matrices are given for 5 frames, but the clip is used with 4 frames"):
         shot_of(replace(tracked, clip=replace(tracked.clip, frames=(1, 4))), draft)
 
 

@@ -33,6 +33,7 @@ from smokelift.batch import (
     run_on_cluster,
     write_report,
 )
+from smokelift.scene.checks import counted
 
 MEMORY_SHARE = 0.9
 """Part of the free memory that the shots may take together; what is foretold is right to a tenth or two."""
@@ -68,7 +69,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     try:
         unknown = [(shot, known[shot.name][1]) for shot in open_shots if known[shot.name][1].forecast is None]
         if unknown:
-            say.note(f"Looking at {len(unknown)} clips ...")
+            say.note(f"Looking at {counted(len(unknown), 'clip')} ...")
         with closing(_looked(options.scheduler, unknown, stop, say)) as looked:
             for shot, record in looked:
                 known[shot.name] = shot, record, finished_frames(shot)
@@ -105,12 +106,12 @@ def _run(
     page = write_report(shots[0][0].folder, options.list.stem, shots)
     missing = [shot.name for shot, record, _ in shots if record.status != "done"]
     if missing:
+        share = f"{len(missing)} of {counted(len(shots), 'shot')}"
         raise ValueError(
-            f"{len(missing)} of {len(shots)} shots did not come to their end ({', '.join(missing)}); {page} says why. "
-            "The same command goes on with them."
+            f"{share} did not come to the end ({', '.join(missing)}); {page} says why. The same command goes on."
         )
     say.finish(
-        f"{len(shots)} shots are finished; {page} shows them.",
+        f"Finished: {counted(len(shots), 'shot')}; {page} shows the result.",
         {"report": str(page), "shots": [str(shot.directory) for shot, _, _ in shots]},
     )
 
@@ -164,7 +165,7 @@ def _forecast(left: Sequence[Expected], workers: int) -> Iterator[str]:
     """What is left, a line a shot and a line for each number of workers worth having."""
     for each in left:
         memory = f"{_gib(each.memory)} of memory"
-        yield f"{each.shot.name}: {each.frames} frames, {_time(each.seconds)}, {memory} ({each.basis})"
+        yield f"{each.shot.name}: {counted(each.frames, 'frame')}, {_time(each.seconds)}, {memory} ({each.basis})"
     counts = sorted({2**n for n in range(math.ceil(math.log2(max(workers, 1))) + 1) if 2**n < workers} | {workers})
     for count in counts if left else ():
         yield f"{count} at a time: {_time(duration(left, count))}"
@@ -175,8 +176,8 @@ def _summary(left: Sequence[Expected], workers: int) -> str:
         return "Nothing is left to do."
     frames = sum(each.frames for each in left)
     return (
-        f"{len(left)} shots are left, {frames} frames: {_time(duration(left, workers))} with {workers} at a time; the "
-        f"longest alone takes {_time(left[0].seconds)}."
+        f"To be done: {counted(len(left), 'shot')}, {counted(frames, 'frame')}; {_time(duration(left, workers))} with "
+        f"{workers} at a time; the longest alone takes {_time(left[0].seconds)}."
     )
 
 

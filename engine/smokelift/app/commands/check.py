@@ -9,6 +9,7 @@ from smokelift.app.commands.reconstruct import shortcomings
 from smokelift.app.options import named_path
 from smokelift.app.progress import Reporter
 from smokelift.output.sequence import Sequence
+from smokelift.scene.checks import counted
 
 
 def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
@@ -28,8 +29,8 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     """
     sequence = Sequence.open(options.directory)
     if not sequence.complete:
-        count = len(sequence.frames)
-        raise ValueError(f"{options.directory}: has {count} finished frames and is no complete run; --resume goes on.")
+        there = counted(len(sequence.frames), "finished frame")
+        raise ValueError(f"{options.directory}: has {there} and is no complete run; --resume goes on.")
     for number in sequence.frames:
         if not sequence.files(number):
             raise ValueError(f"{options.directory}: the file of frame {number} is missing.")
@@ -40,4 +41,5 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     for note in shortcomings(figures, empty):
         say.note(note)
     count = len(sequence.frames)
-    say.finish(f"{count} frames in {options.directory} are as they were written.", {"frames": count, "empty": empty})
+    text = f"All of {options.directory} is as it was written: {counted(count, 'frame')}."
+    say.finish(text, {"frames": count, "empty": empty})

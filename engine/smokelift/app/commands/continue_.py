@@ -11,6 +11,7 @@ from smokelift.app.options import add_directed_options, finite, named_path, requ
 from smokelift.app.progress import Reporter, say_frames
 from smokelift.direct import Ball, Box, Continuation, Fan, Mesh, MovingMesh, Turbulence, continue_sequence, open_source
 from smokelift.scene import SIDES
+from smokelift.scene.checks import counted
 
 
 def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
@@ -103,7 +104,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     say_frames(say, written, sequence.frames[0], total)
     seconds = time.monotonic() - began
     say.finish(
-        f"{total} frames in {options.out}, {continuation.frames} of them simulated ({seconds:.0f} s).",
+        f"{counted(total, 'frame')} in {options.out}, {continuation.frames} of them simulated ({seconds:.0f} s).",
         {"directory": str(options.out), "frames": total, "seconds": round(seconds, 1)},
     )
 
@@ -113,7 +114,7 @@ def _continuation(options: argparse.Namespace) -> Continuation:
     if options.frames < 1:
         raise ValueError(f"--frames {options.frames}: there has to be 1 at least.")
     if not 0 <= options.fade <= options.frames:
-        raise ValueError(f"--fade {options.fade}: expected 0 to the {options.frames} frames that are added.")
+        raise ValueError(f"--fade {options.fade}: expected 0 to {options.frames}, as many frames as are added.")
     balls = [_ball("--ball", values) for values in options.ball]
     boxes = [Box(*zip(*(sorted(ends) for ends in zip(v[:3], v[3:], strict=True)), strict=True)) for v in options.box]
     return Continuation(

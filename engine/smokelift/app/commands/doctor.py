@@ -14,6 +14,7 @@ from smokelift import __version__, _core
 from smokelift.app.progress import Reporter
 from smokelift.output.vdb import VdbUnavailable, vdb_module
 from smokelift.render import device
+from smokelift.scene.checks import counted
 
 LIBRARIES = ("numpy", "scipy", "av", "OpenEXR", "pillow", "taichi")
 
@@ -34,7 +35,7 @@ def _report() -> list[str]:
     lines = [
         f"smokelift {__version__}, Python {platform.python_version()}, {platform.system()} {platform.machine()}",
         "libraries: " + ", ".join(f"{name} {_version(name)}" for name in LIBRARIES),
-        f"core: {_core.__file__}, {os.cpu_count()} processor cores, "
+        f"core: {_core.__file__}, {counted(os.cpu_count() or 1, 'processor core')}, "
         f"{psutil.virtual_memory().available / 2**30:.1f} of {psutil.virtual_memory().total / 2**30:.1f} GiB free",
     ]
     lines.append(f"GPU: {_gpu(device.start())}")

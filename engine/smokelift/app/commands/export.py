@@ -17,6 +17,7 @@ from smokelift.output.export import (
     require_space,
 )
 from smokelift.output.sequence import Sequence
+from smokelift.scene.checks import counted
 
 
 def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
@@ -49,7 +50,8 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     sequence = Sequence.open(options.directory)
     require_export(sequence, options.out)
     size = export_size(sequence, settings)
-    text = f"The export of {len(sequence.frames)} frames takes about {size / 1e6:.1f} MB"
+    frames = counted(len(sequence.frames), "frame")
+    text = f"The export of {frames} takes about {size / 1e6:.1f} MB"
     if options.size:
         say.finish(f"{text}.", {"size": size, "frames": len(sequence.frames)})
         return
@@ -62,7 +64,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         say.frame(number, {"origin": "exported", "seconds_density": now - before, "seconds_velocity": 0.0})
         before = now
     say.finish(
-        f"{len(sequence.frames)} frames in {options.out}, {written / 1e6:.1f} MB.",
+        f"{frames} in {options.out}, {written / 1e6:.1f} MB.",
         {
             "directory": str(options.out),
             "frames": len(sequence.frames),

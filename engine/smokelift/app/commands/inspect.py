@@ -14,6 +14,7 @@ from smokelift.app.progress import Reporter
 from smokelift.footage.clip import Clip
 from smokelift.render import device
 from smokelift.scene import scene_to_dict
+from smokelift.scene.checks import counted
 from smokelift.setup.prepare import boundaries, prepare_shot
 from smokelift.setup.provenance import made_up
 
@@ -76,8 +77,8 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     voxels = " x ".join(map(str, domain.resolution))
     written = f" {', '.join(map(str, files))} written." if files else ""
     say.finish(
-        f"{frames} frames of {voxels} voxels: about {cost.seconds:.0f} s, {cost.memory / 2**30:.1f} GiB of memory "
-        f"({cost.memory_free / 2**30:.1f} are free), up to {cost.disk / 1e6:.0f} MB on disk.{written}",
+        f"{counted(frames, 'frame')} of {voxels} voxels: about {cost.seconds:.0f} s, {cost.memory / 2**30:.1f} GiB of "
+        f"memory ({cost.memory_free / 2**30:.1f} are free), up to {cost.disk / 1e6:.0f} MB on disk.{written}",
         {
             "frames": frames,
             "scene": scene_to_dict(shot.scene),

@@ -9,6 +9,7 @@ from typing import Any
 from smokelift.app.options import add_directed_options, frame_range, require_new
 from smokelift.app.progress import Reporter, say_frames
 from smokelift.direct import loop_length, loop_sequence, open_source, usual_overlap
+from smokelift.scene.checks import counted
 
 
 def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
@@ -42,6 +43,6 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     say_frames(say, written, 1, total)
     seconds = time.monotonic() - began
     say.finish(
-        f"{total} frames in {options.out}, which repeat ({seconds:.0f} s).",
+        f"{counted(total, 'frame')} in {options.out}, which repeat ({seconds:.0f} s).",
         {"directory": str(options.out), "frames": total, "seconds": round(seconds, 1)},
     )

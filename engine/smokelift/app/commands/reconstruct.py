@@ -23,6 +23,7 @@ from smokelift.output.sequence import Sequence
 from smokelift.output.writer import check_directory, written_kinds
 from smokelift.pipeline import Frame, reconstruct
 from smokelift.render import device
+from smokelift.scene.checks import counted
 from smokelift.setup.background import cut_notes
 from smokelift.setup.no_smoke import what_helps
 from smokelift.setup.prepare import prepare_shot
@@ -97,7 +98,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         say.note(note)
     seconds = time.monotonic() - began
     say.finish(
-        f"{len(sequence.frames)} frames in {options.out} ({seconds:.0f} s).",
+        f"{counted(len(sequence.frames), 'frame')} in {options.out} ({seconds:.0f} s).",
         {"directory": str(options.out), "frames": len(sequence.frames), "seconds": round(seconds, 1)},
     )
 
@@ -106,7 +107,7 @@ def shortcomings(figures: Rows[Mapping[str, Any]], empty: int) -> list[str]:
     """What the figures of a finished run say against it, a sentence each."""
     said = []
     if empty:
-        said.append(f"{empty} of {len(figures)} frames show no smoke and are empty.")
+        said.append(f"No smoke is seen in {empty} of {len(figures)} frames; such frames are empty.")
     left = [of_frame["relative_error"] for of_frame in figures if of_frame.get("relative_error") is not None]
     typical = float(np.median(left)) if left else 0.0
     if typical > UNEXPLAINED:

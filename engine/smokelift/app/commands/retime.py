@@ -9,6 +9,7 @@ from typing import Any
 from smokelift.app.options import add_directed_options, finite, require_new
 from smokelift.app.progress import Reporter, say_frames
 from smokelift.direct import open_source, playback, retime_sequence
+from smokelift.scene.checks import counted
 
 SPEEDS = 0.01, 100.0
 """Slowest and fastest: beyond them nothing moves, or nothing is left."""
@@ -42,6 +43,6 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     say_frames(say, retime_sequence(sequence, options.out, speeds, npz=options.npz, resume=options.resume), 1, total)
     seconds = time.monotonic() - began
     say.finish(
-        f"{total} frames in {options.out} ({seconds:.0f} s).",
+        f"{counted(total, 'frame')} in {options.out} ({seconds:.0f} s).",
         {"directory": str(options.out), "frames": total, "seconds": round(seconds, 1)},
     )
