@@ -1,0 +1,543 @@
+// Light goes from block to block along 14 directions of the lattice: the 6 axes and the 8 diagonals of space,
+// with the weights of Lebedev's rule, which is exact for polynomials of degree 5 (Lebedev 1976, USSR Comput.
+// Math. Math. Phys. 16, 10). A beam meets blocks whole, so nothing is interpolated and no energy is lost.
+//
+// Emission and radiance are linear across a block: in thick smoke light changes within a block, and a mean
+// alone would spread it too deep. On a path of length l through the block's centre, at u from -1/2 to 1/2,
+// with the emission e + r u, the beam L_in that enters a block becomes
+//     L_out = T L_in + l (P e + Q r),    mean along the path     = P L_in + l (B e - Q/t r),
+//                                        mean of u along the path = -Q L_in + l (Q/t e + C r).
+// An axis's beams keep their slopes across too, each carried as a mean is; a diagonal's path leads from
+// corner to corner, so that u tells all three slopes.
+//
+// In the product <a, b> = a_mean b_mean + (a_x b_x + a_y b_y + a_z b_z) / 12, the mean over a block, G is
+// symmetric, since what is true of one direction is so of its opposite.
+#include "block_transport.h"
+
+#include "exponential.h"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <utility>
+
+namespace smokelift {
+namespace {
+
+constexpr float SPREAD = BlockTransport::SPREAD;
+
+// The diagonals (1, y, z) of four lines; the other four directions are their opposites.
+constexpr int DIAGONALS = 4;
+constexpr int DIAGONAL_Y[DIAGONALS] = {1, 1, -1, -1}, DIAGONAL_Z[DIAGONALS] = {1, -1, 1, -1};
+
+// What an axis's beams carry: the mean with the slope along, and the two slopes across.
+constexpr int CARRIED = 3;
+
+// Which parts of a flight tasks make, and how many fields each leaves.
+constexpr int AXES = 3, WAYS = 2;
+constexpr int DIAGONAL_FIELDS = 3; // sums of what arrives, of that with the direction's sign along y, along z
+
+// Series in t, to rounding for t below THIN.
+constexpr float THIN = 1;
+constexpr int TERMS = 11;
+struct Series {
+    float terms[TERMS];
+
+    constexpr float operator()(float t) const {
+        float sum = 0;
+        for (int n = TERMS - 1; n >= 0; --n)
+            sum = terms[n] + t * sum;
+        return sum;
+    }
+    constexpr Series slope() const {
+        Series result{};
+        for (int n = 1; n < TERMS; ++n)
+            result.terms[n - 1] = float(n) * terms[n];
+        return result;
+    }
+};
+// The sum of (-t)^n f(n) / (n + shift)!.
+template <class Factor> constexpr Series series(int shift, Factor factor) {
+    Series result{};
+    double factorial = 1;
+    for (int n = 2; n <= shift; ++n)
+        factorial *= n;
+    for (int n = 0; n < TERMS; ++n) {
+        result.terms[n] = static_cast<float>((n % 2 ? -1 : 1) * factor(n) / factorial);
+        factorial *= n + shift + 1;
+    }
+    return result;
+}
+constexpr Series ESCAPED = series(1, [](int) { return 1.0; });                  // P
+constexpr Series LEFT = series(2, [](int) { return 1.0; });                     // B
+constexpr Series SLANTED = series(2, [](int n) { return -0.5 * n; });           // Q
+constexpr Series TILTED = series(4, [](int n) { return -0.25 * n * (n + 3); }); // C
+constexpr Series OF_ESCAPED = ESCAPED.slope(), OF_LEFT = LEFT.slope(), OF_SLANTED = SLANTED.slope(),
+                 OF_TILTED = TILTED.slope();
+
+// P, B, Q and C of a path of optical depth t that is not thin, and their derivatives by t.
+struct Shares {
+    float escaped, left, slanted, tilted;
+};
+
+SMOKELIFT_INLINE Shares thick_shares(const Attenuation &through, float inverse) {
+    const float escaped = through.opacity * inverse, left = (1 - escaped) * inverse;
+    const float slanted = left - 0.5f * escaped;
+    return {escaped, left, slanted, SPREAD * inverse - (0.5f + inverse) * inverse * slanted};
+}
+
+SMOKELIFT_INLINE Shares thick_slopes(const Attenuation &through, float inverse) {
+    const Shares of = thick_shares(through, inverse);
+    const float escaped = (through.transmittance - of.escaped) * inverse,
+                left = -(escaped + of.left) * inverse;
+    const float slanted = left - 0.5f * escaped;
+    const float tilted = (-SPREAD + (0.5f + 2 * inverse) * of.slanted) * inverse * inverse -
+                         (0.5f + inverse) * inverse * slanted;
+    return {escaped, left, slanted, tilted};
+}
+
+SMOKELIFT_INLINE Shares shares(float t, const Attenuation &through) {
+    const bool thin = t < THIN;
+    const float low = std::min(t, THIN);
+    const Shares thick = thick_shares(through, 1 / std::max(t, THIN));
+    return {thin ? ESCAPED(low) : thick.escaped, thin ? LEFT(low) : thick.left,
+            thin ? SLANTED(low) : thick.slanted, thin ? TILTED(low) : thick.tilted};
+}
+
+SMOKELIFT_INLINE Shares slopes_of_shares(float t) {
+    const bool thin = t < THIN;
+    const float low = std::min(t, THIN);
+    const Shares thick = thick_slopes(attenuation(t), 1 / std::max(t, THIN));
+    return {thin ? OF_ESCAPED(low) : thick.escaped, thin ? OF_LEFT(low) : thick.left,
+            thin ? OF_SLANTED(low) : thick.slanted, thin ? OF_TILTED(low) : thick.tilted};
+}
+
+// Neighbouring blocks. Rows are short, and compilers leave short loops and the rest of long ones scalar.
+constexpr int LANES = Lattice::LANES;
+typedef float Lanes __attribute__((vector_size(4 * LANES), aligned(4), may_alias));
+
+SMOKELIFT_INLINE const Lanes &at(const float *first) { return *reinterpret_cast<const Lanes *>(first); }
+SMOKELIFT_INLINE Lanes &at(float *first) { return *reinterpret_cast<Lanes *>(first); }
+
+// visit(i) for lanes that begin at i. The last ones overlap those before: to visit blocks twice must change
+// nothing.
+template <class Visit> SMOKELIFT_INLINE void by_lanes(int count, const Visit &visit) {
+    for (int i = 0; i + LANES < count; i += LANES)
+        visit(i);
+    visit(count - LANES);
+}
+
+// Not cleared.
+std::unique_ptr<float[]> room(std::size_t size) { return std::unique_ptr<float[]>(new float[size]); }
+
+} // namespace
+
+BlockTransport::BlockTransport(std::vector<float> extinction, const Lattice &lattice, float edge)
+    : lattice_(lattice), extinction_(std::move(extinction)) {
+    classes_[0] = {edge, 1.0f / 15, 2, 4, {}, {}, {}};
+    classes_[1] = {edge * std::sqrt(3.0f), 3.0f / 40, 8, 0, {}, {}, {}};
+    for (Fields &part : own_)
+        part.assign(lattice_.count(), 0.0f);
+    for (Crossing &crossing : classes_) {
+        cross(crossing);
+        for (Fields *values : {&crossing.passed, &crossing.escaped, &crossing.slanted})
+            clear_border(*values);
+    }
+    for (Fields &part : own_)
+        clear_border(part);
+}
+
+void BlockTransport::clear_border(Fields &values) const {
+    const auto [nx, ny, nz] = lattice_.n;
+    for (int x = 0; x < nx; ++x) {
+        for (int y = 0; y <= ny; ++y) {
+            float *const row = values.data() + lattice_.row(x, y);
+            std::fill(row + (y < ny ? nz : 0), row + lattice_.pitch(), 0.0f);
+        }
+    }
+}
+
+// Of a block's emission e the part B l e is its own mean along a beam, and of the rise r the part
+// C l r / SPREAD is its own.
+SMOKELIFT_CLONES
+void BlockTransport::cross(Crossing &c) {
+    const float share = c.weight * c.length, all = share * (c.along + c.across);
+    const std::size_t count = lattice_.count();
+    for (Fields *values : {&c.passed, &c.escaped, &c.slanted})
+        values->resize(count);
+    const float *const __restrict extinction = extinction_.data();
+    float *const __restrict passed = c.passed.data(), *const __restrict escaped = c.escaped.data();
+    float *const __restrict slanted = c.slanted.data();
+    float *const __restrict own = own_[0].data(), *const __restrict own_slope = own_[1].data();
+    const float along = share * c.along / SPREAD, across = share * c.across;
+    for (std::size_t i = 0; i < count; ++i) {
+        const float t = c.length * extinction[i];
+        const Attenuation through = attenuation(t);
+        const Shares of = shares(t, through);
+        passed[i] = through.transmittance;
+        escaped[i] = of.escaped;
+        slanted[i] = of.slanted;
+        own[i] += all * of.left;
+        own_slope[i] += along * of.tilted + across * of.left;
+    }
+}
+
+SMOKELIFT_CLONES
+void BlockTransport::slope(const Crossing &c, Slopes &slopes, Own &of_own) const {
+    const float share = c.weight * c.length * c.length, all = share * (c.along + c.across);
+    const std::size_t count = lattice_.count();
+    slopes.escaped.resize(count);
+    slopes.slanted.resize(count);
+    const float *const __restrict extinction = extinction_.data();
+    float *const __restrict escaped = slopes.escaped.data(), *const __restrict slanted =
+                                                                 slopes.slanted.data();
+    float *const __restrict own = of_own[0].data(), *const __restrict own_slope = of_own[1].data();
+    const float along = share * c.along / SPREAD, across = share * c.across;
+    for (std::size_t i = 0; i < count; ++i) {
+        const Shares of = slopes_of_shares(c.length * extinction[i]);
+        escaped[i] = of.escaped;
+        slanted[i] = of.slanted;
+        own[i] += all * of.left;
+        own_slope[i] += along * of.tilted + across * of.left;
+    }
+}
+
+// Follows the beams of the axis x or y, one way. visit(first, count, arriving) gets neighbouring blocks with
+// what enters them of all that is carried.
+template <class Visit>
+SMOKELIFT_INLINE void BlockTransport::follow_rows(int axis, int way, const float *emission,
+                                                  const Visit &visit) const {
+    const Crossing &crossing = classes_[0];
+    const std::size_t all = lattice_.count();
+    const int lines = axis ? lattice_.n[0] : 1, steps = axis ? lattice_.n[1] + 1 : lattice_.n[0];
+    const int run = axis ? lattice_.pitch() : lattice_.plane();
+    const float length = crossing.length, rising = float(way) * length;
+    Fields memory(std::size_t(2 * CARRIED) * run);
+    float *arriving = memory.data(), *leaving = arriving + CARRIED * run;
+    for (int line = 0; line < lines; ++line) {
+        std::fill_n(arriving, CARRIED * run, 0.0f);
+        for (int step = 0; step < steps; ++step) {
+            const std::size_t first = (std::size_t(line) * steps + (way > 0 ? step : steps - 1 - step)) * run;
+            visit(first, run, arriving);
+            const float *const passed = crossing.passed.data() + first;
+            const float *const escaped = crossing.escaped.data() + first;
+            const float *const slanted = crossing.slanted.data() + first;
+            const float *const mean = emission + first, *const rise = mean + (1 + axis) * all;
+            const float *const across[2] = {mean + (1 + LATERAL[axis][0]) * all,
+                                            mean + (1 + LATERAL[axis][1]) * all};
+            by_lanes(run, [&](int i) SMOKELIFT_INLINE_LAMBDA {
+                const Lanes through = at(passed + i), emitted = length * at(escaped + i);
+                at(leaving + i) = through * at(arriving + i) +
+                                  (emitted * at(mean + i) + rising * at(slanted + i) * at(rise + i));
+                for (int side = 0; side < 2; ++side)
+                    at(leaving + (1 + side) * run + i) =
+                        through * at(arriving + (1 + side) * run + i) + emitted * at(across[side] + i);
+            });
+            std::swap(arriving, leaving);
+        }
+    }
+}
+
+// The same along rows of memory: some rows side by side, since a beam waits for itself.
+template <class Visit>
+SMOKELIFT_INLINE void BlockTransport::follow_along_z(int way, const float *emission,
+                                                     const Visit &visit) const {
+    constexpr int ROWS = Lattice::ROWS;
+    const Crossing &crossing = classes_[0];
+    const std::size_t all = lattice_.count();
+    const int pitch = lattice_.pitch(), run = ROWS * pitch;
+    const int rows = static_cast<int>(all / pitch);
+    const float length = crossing.length, rising = float(way) * length;
+    Fields memory(std::size_t(2 * CARRIED) * run);
+    float *const sources = memory.data(), *const arriving = sources + CARRIED * run;
+    for (int row = 0; row < rows; row += ROWS) {
+        const std::size_t first = std::size_t(std::min(row, rows - ROWS)) * pitch;
+        const float *const passed = crossing.passed.data() + first;
+        const float *const escaped = crossing.escaped.data() + first;
+        const float *const slanted = crossing.slanted.data() + first;
+        const float *const mean = emission + first, *const x = mean + all, *const y = x + all;
+        const float *const rise = y + all;
+        by_lanes(run, [&](int i) SMOKELIFT_INLINE_LAMBDA {
+            const Lanes emitted = length * at(escaped + i);
+            at(sources + i) = emitted * at(mean + i) + rising * at(slanted + i) * at(rise + i);
+            at(sources + run + i) = emitted * at(x + i);
+            at(sources + 2 * run + i) = emitted * at(y + i);
+        });
+        float beams[CARRIED][ROWS] = {};
+        for (int step = 0; step < pitch; ++step) {
+            const int z = way > 0 ? step : pitch - 1 - step;
+            for (int r = 0; r < ROWS; ++r) {
+                for (int part = 0; part < CARRIED; ++part) {
+                    const int place = part * run + r * pitch + z;
+                    arriving[place] = beams[part][r];
+                    beams[part][r] = passed[r * pitch + z] * beams[part][r] + sources[place];
+                }
+            }
+        }
+        visit(first, run, arriving);
+    }
+}
+
+template <class Visit>
+SMOKELIFT_INLINE void BlockTransport::follow_axis(int axis, int way, const float *emission,
+                                                  const Visit &visit) const {
+    if (axis == 2)
+        follow_along_z(way, emission, visit);
+    else
+        follow_rows(axis, way, emission, visit);
+}
+
+// Follows the beams of the four diagonals, or of their opposites. visit(first, count, arriving) gets planes
+// across x with what enters their blocks along each.
+template <class Visit>
+SMOKELIFT_INLINE void BlockTransport::follow_diagonals(int way, const float *emission,
+                                                       const Visit &visit) const {
+    const Crossing &crossing = classes_[1];
+    const std::size_t all = lattice_.count();
+    const int steps = lattice_.n[0], plane = lattice_.plane(), pitch = lattice_.pitch();
+    const int margin = pitch + 1, size = plane + 2 * margin; // what comes from outside the lattice is 0
+    const float length = crossing.length, rising = float(way) * length;
+    Fields memory(std::size_t(2 * DIAGONALS) * size, 0.0f);
+    float *beams = memory.data() + margin, *leaving = beams + DIAGONALS * size;
+    for (int step = 0; step < steps; ++step) {
+        const std::size_t first = std::size_t(way > 0 ? step : steps - 1 - step) * plane;
+        const float *arriving[DIAGONALS];
+        for (int line = 0; line < DIAGONALS; ++line)
+            arriving[line] = beams + line * size - way * (DIAGONAL_Y[line] * pitch + DIAGONAL_Z[line]);
+        visit(first, plane, arriving);
+        const float *const passed = crossing.passed.data() + first;
+        const float *const escaped = crossing.escaped.data() + first;
+        const float *const slanted = crossing.slanted.data() + first;
+        const float *const mean = emission + first, *const x = mean + all, *const y = x + all;
+        const float *const z = y + all;
+        by_lanes(plane, [&](int i) SMOKELIFT_INLINE_LAMBDA {
+            const Lanes through = at(passed + i), emitted = length * at(escaped + i) * at(mean + i);
+            const Lanes slope = rising * at(slanted + i);
+            for (int line = 0; line < DIAGONALS; ++line) {
+                const Lanes rise =
+                    at(x + i) + float(DIAGONAL_Y[line]) * at(y + i) + float(DIAGONAL_Z[line]) * at(z + i);
+                at(leaving + line * size + i) = through * at(arriving[line] + i) + (emitted + slope * rise);
+            }
+        });
+        std::swap(beams, leaving);
+    }
+}
+
+// What both ways of an axis make of the mean radiance, in its four fields.
+SMOKELIFT_CLONES
+void BlockTransport::through_axis(int axis, const float *emission, float *mean) const {
+    const Crossing &crossing = classes_[0];
+    const std::size_t all = lattice_.count();
+    const auto memory = room(CARRIED * all);
+    float *const arrived = memory.get();
+    follow_axis(axis, 1, emission,
+                [&](std::size_t first, int count, const float *arriving) SMOKELIFT_INLINE_LAMBDA {
+                    by_lanes(count, [&](int i) SMOKELIFT_INLINE_LAMBDA {
+                        for (int part = 0; part < CARRIED; ++part)
+                            at(arrived + part * all + first + i) = at(arriving + part * count + i);
+                    });
+                });
+    const float weight = crossing.weight, of_slope = -weight / SPREAD;
+    follow_axis(
+        axis, -1, emission, [&](std::size_t first, int count, const float *back) SMOKELIFT_INLINE_LAMBDA {
+            const float *const forth = arrived + first;
+            const float *const escaped = crossing.escaped.data() + first;
+            const float *const slanted = crossing.slanted.data() + first;
+            float *const of_mean = mean + first, *const along = of_mean + (1 + axis) * all;
+            float *const across[2] = {of_mean + (1 + LATERAL[axis][0]) * all,
+                                      of_mean + (1 + LATERAL[axis][1]) * all};
+            by_lanes(count, [&](int i) SMOKELIFT_INLINE_LAMBDA {
+                const Lanes share = weight * at(escaped + i);
+                at(of_mean + i) = share * (at(forth + i) + at(back + i));
+                at(along + i) = of_slope * at(slanted + i) * (at(forth + i) - at(back + i));
+                for (int side = 0; side < 2; ++side)
+                    at(across[side] + i) =
+                        share * (at(forth + (1 + side) * all + i) + at(back + (1 + side) * count + i));
+            });
+        });
+}
+
+// Of what arrives along four diagonals: the sum, and the sums with their signs along y and z.
+SMOKELIFT_CLONES
+void BlockTransport::through_diagonals(int way, const float *emission, float *sums) const {
+    const std::size_t all = lattice_.count();
+    follow_diagonals(way, emission,
+                     [&](std::size_t first, int count, const float *const *arriving) SMOKELIFT_INLINE_LAMBDA {
+                         float *const sum = sums + first, *const y = sum + all, *const z = y + all;
+                         by_lanes(count, [&](int i) SMOKELIFT_INLINE_LAMBDA {
+                             const Lanes near = at(arriving[0] + i) + at(arriving[1] + i);
+                             const Lanes far = at(arriving[2] + i) + at(arriving[3] + i);
+                             at(sum + i) = near + far;
+                             at(y + i) = near - far;
+                             at(z + i) = (at(arriving[0] + i) - at(arriving[1] + i)) +
+                                         (at(arriving[2] + i) - at(arriving[3] + i));
+                         });
+                     });
+}
+
+// The mean radiance from the parts that mean_radiance() has made.
+SMOKELIFT_CLONES
+void BlockTransport::gather(const float *emission, const float *parts, float *mean) const {
+    const Crossing &c = classes_[1];
+    const std::size_t all = lattice_.count();
+    const float weight = c.weight, of_slope = -c.weight / SPREAD;
+    const float *const diagonals = parts + AXES * FIELDS * all;
+    for (int field = 0; field < FIELDS; ++field) {
+        const float *const __restrict x = parts + field * all, *const __restrict y = x + FIELDS * all;
+        const float *const __restrict z = y + FIELDS * all, *const __restrict own = own_[field > 0].data();
+        const float *const __restrict emitted = emission + field * all;
+        // all diagonals lie along x, so that their sum forth is also that with the sign along x
+        const float *const __restrict forth = diagonals + std::max(field - 1, 0) * all;
+        const float *const __restrict back = forth + DIAGONAL_FIELDS * all;
+        const float *const __restrict share = field ? c.slanted.data() : c.escaped.data();
+        float *const __restrict out = mean + field * all;
+        const float factor = field ? of_slope : weight, sign = field ? -1.0f : 1.0f;
+        for (std::size_t i = 0; i < all; ++i)
+            out[i] = own[i] * emitted[i] + ((x[i] + y[i]) + z[i]) +
+                     factor * share[i] * (forth[i] + sign * back[i]);
+    }
+}
+
+void BlockTransport::mean_radiance(const float *emission, float *mean, Workers &workers) const {
+    const std::size_t all = lattice_.count();
+    const auto memory = room((AXES * FIELDS + WAYS * DIAGONAL_FIELDS) * all);
+    float *const parts = memory.get(), *const diagonals = parts + AXES * FIELDS * all;
+    workers.run(AXES + WAYS, [&](int task) {
+        if (task < WAYS)
+            through_diagonals(task ? -1 : 1, emission, diagonals + task * DIAGONAL_FIELDS * all);
+        else
+            through_axis(task - WAYS, emission, parts + (task - WAYS) * FIELDS * all);
+    });
+    gather(emission, parts, mean);
+}
+
+// What arrives along an axis of all that is carried, forth and then back.
+SMOKELIFT_CLONES
+void BlockTransport::arriving_along_axis(int axis, const float *emission, float *result) const {
+    const std::size_t all = lattice_.count();
+    for (int way = 0; way < WAYS; ++way) {
+        float *const to = result + way * CARRIED * all;
+        follow_axis(axis, way ? -1 : 1, emission,
+                    [&](std::size_t first, int count, const float *arriving) SMOKELIFT_INLINE_LAMBDA {
+                        for (int part = 0; part < CARRIED; ++part)
+                            std::copy_n(arriving + part * count, count, to + part * all + first);
+                    });
+    }
+}
+
+SMOKELIFT_CLONES
+void BlockTransport::arriving_along_diagonals(const float *emission, float *result) const {
+    const std::size_t all = lattice_.count();
+    for (int way = 0; way < WAYS; ++way) {
+        float *const to = result + way * DIAGONALS * all;
+        follow_diagonals(way ? -1 : 1, emission,
+                         [&](std::size_t first, int count, const float *const *arriving)
+                             SMOKELIFT_INLINE_LAMBDA {
+                                 for (int line = 0; line < DIAGONALS; ++line)
+                                     std::copy_n(arriving[line], count, to + line * all + first);
+                             });
+    }
+}
+
+// With L what arrives of l emission along a direction, M what arrives of l weights against it, and r and s
+// their rises along it:
+//     -T L M + P' (l emission M + l weights L) + Q' (l r M - l s L).
+SMOKELIFT_CLONES
+void BlockTransport::axis_gradient(int axis, const Slopes &slopes, const float *emission,
+                                   const float *weights, float *result) const {
+    const Crossing &c = classes_[0];
+    const std::size_t all = lattice_.count();
+    const auto memory = room(2 * WAYS * CARRIED * all);
+    float *const of_emission = memory.get(), *const of_weights = of_emission + WAYS * CARRIED * all;
+    arriving_along_axis(axis, emission, of_emission);
+    arriving_along_axis(axis, weights, of_weights);
+    const float *const __restrict passed = c.passed.data();
+    const float *const __restrict escaped = slopes.escaped.data();
+    const float *const __restrict slanted = slopes.slanted.data();
+    for (int part = 0; part < CARRIED; ++part) {
+        const float *const __restrict forth = of_emission + part * all;
+        const float *const __restrict back = forth + CARRIED * all;
+        const float *const __restrict weighed_forth = of_weights + part * all;
+        const float *const __restrict weighed_back = weighed_forth + CARRIED * all;
+        const int field = part ? 1 + LATERAL[axis][part - 1] : 0;
+        const float *const __restrict emitted = emission + field * all;
+        const float *const __restrict weight = weights + field * all;
+        const float share = c.weight * (part ? SPREAD : 1.0f);
+        for (std::size_t i = 0; i < all; ++i) {
+            const float products = forth[i] * weighed_back[i] + back[i] * weighed_forth[i];
+            const float of_escaped =
+                weight[i] * (forth[i] + back[i]) + emitted[i] * (weighed_forth[i] + weighed_back[i]);
+            const float value = share * (c.length * escaped[i] * of_escaped - passed[i] * products);
+            result[i] = part ? result[i] + value : value;
+        }
+    }
+    const float *const __restrict forth = of_emission, *const __restrict back = forth + CARRIED * all;
+    const float *const __restrict weighed_forth = of_weights;
+    const float *const __restrict weighed_back = weighed_forth + CARRIED * all;
+    const float *const __restrict rise = emission + (1 + axis) * all;
+    const float *const __restrict of_rise = weights + (1 + axis) * all;
+    for (std::size_t i = 0; i < all; ++i)
+        result[i] -= c.weight * c.length * slanted[i] *
+                     (rise[i] * (weighed_forth[i] - weighed_back[i]) + of_rise[i] * (forth[i] - back[i]));
+}
+
+SMOKELIFT_CLONES
+void BlockTransport::diagonal_gradient(const Slopes &slopes, const float *emission, const float *weights,
+                                       float *result) const {
+    const Crossing &c = classes_[1];
+    const std::size_t all = lattice_.count();
+    const auto memory = room(2 * WAYS * DIAGONALS * all);
+    float *const of_emission = memory.get(), *const of_weights = of_emission + WAYS * DIAGONALS * all;
+    arriving_along_diagonals(emission, of_emission);
+    arriving_along_diagonals(weights, of_weights);
+    const float *const __restrict passed = c.passed.data();
+    const float *const __restrict escaped = slopes.escaped.data();
+    const float *const __restrict slanted = slopes.slanted.data();
+    for (int line = 0; line < DIAGONALS; ++line) {
+        const float *const __restrict forth = of_emission + line * all;
+        const float *const __restrict back = forth + DIAGONALS * all;
+        const float *const __restrict weighed_forth = of_weights + line * all;
+        const float *const __restrict weighed_back = weighed_forth + DIAGONALS * all;
+        const auto y = float(DIAGONAL_Y[line]), z = float(DIAGONAL_Z[line]);
+        const float *const __restrict e = emission, *const __restrict w = weights;
+        for (std::size_t i = 0; i < all; ++i) {
+            const float rise = e[all + i] + y * e[2 * all + i] + z * e[3 * all + i];
+            const float of_rise = w[all + i] + y * w[2 * all + i] + z * w[3 * all + i];
+            const float products = forth[i] * weighed_back[i] + back[i] * weighed_forth[i];
+            const float of_escaped =
+                w[i] * (forth[i] + back[i]) + e[i] * (weighed_forth[i] + weighed_back[i]);
+            const float of_slanted =
+                rise * (weighed_forth[i] - weighed_back[i]) + of_rise * (forth[i] - back[i]);
+            const float value = c.weight * (c.length * (escaped[i] * of_escaped - slanted[i] * of_slanted) -
+                                            passed[i] * products);
+            result[i] = line ? result[i] + value : value;
+        }
+    }
+}
+
+void BlockTransport::add_extinction_gradient(const float *emission, const float *weights, float *result,
+                                             Workers &workers) const {
+    const std::size_t all = lattice_.count();
+    Slopes slopes[2];
+    Own of_own = {Fields(all), Fields(all)};
+    for (int number = 0; number < 2; ++number)
+        slope(classes_[number], slopes[number], of_own);
+    const auto memory = room((AXES + 1) * all);
+    float *const parts = memory.get();
+    workers.run(AXES + 1, [&](int task) {
+        if (task == AXES)
+            diagonal_gradient(slopes[1], emission, weights, parts + task * all);
+        else
+            axis_gradient(task, slopes[0], emission, weights, parts + task * all);
+    });
+    for (std::size_t i = 0; i < all; ++i) {
+        float of_slopes = 0;
+        for (int field = 1; field < FIELDS; ++field)
+            of_slopes += weights[field * all + i] * emission[field * all + i];
+        result[i] += of_own[0][i] * weights[i] * emission[i] + SPREAD * of_own[1][i] * of_slopes;
+        for (int part = 0; part <= AXES; ++part)
+            result[i] += parts[part * all + i];
+    }
+}
+
+} // namespace smokelift
