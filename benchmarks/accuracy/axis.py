@@ -19,7 +19,8 @@ import numpy as np
 import numpy.typing as npt
 
 from benchmarks.tables import markdown
-from smokelift.density.axis import SmokeAxis, estimate_axis
+from smokelift.density.axis import SmokeAxis
+from smokelift.density.axis_from_picture import estimate_axis
 from smokelift.evaluation.truth import Truth
 from smokelift.render import Renderer
 from smokelift.scene import Camera, Domain, Medium

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.density.axis import AxisEstimate, estimate_axis
+from smokelift.density.axis import AxisEstimate
 from smokelift.density.axis_from_light import coarse_domain, refine_axis
+from smokelift.density.axis_from_picture import estimate_axis
 from smokelift.density.observation import Observation, ObservedClip, apparent_optical_depth
 from smokelift.density.screen import seen_at
 from smokelift.footage.matte import matte

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from smokelift.density.axis import SmokeAxis, estimate_axis
+from smokelift.density.axis import SmokeAxis
+from smokelift.density.axis_from_picture import estimate_axis
 from smokelift.render import Renderer
 from smokelift.scene import Camera, Domain, Inlet, Medium
 
