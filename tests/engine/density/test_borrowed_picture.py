@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import ndimage
 
@@ -96,6 +96,7 @@ def test_without_smoke_nothing_is_borrowed() -> None:
     np.testing.assert_array_equal(both, alone)
 
 
+@settings(max_examples=100, deadline=None, derandomize=True)
 @given(
     first=st.integers(2, 10),
     last=st.integers(24, 37),
