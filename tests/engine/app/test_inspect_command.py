@@ -12,7 +12,8 @@ from command_line import QUICK, command, events, refused
 from smokelift.footage.images import read_image
 from smokelift.output.images import write_image
 from smokelift.output.sequence import Sequence
-from smokelift.scene import Inlet, Scene
+from smokelift.scene import Background, DirectionalLight, Inlet, Medium, Scene
+from smokelift.setup.surroundings import light_around
 
 
 def test_inspect_says_how_smoke_gets_in_and_out(plume, tmp_path, capsys) -> None:
@@ -132,6 +133,26 @@ def test_a_scene_of_all_estimates_gives_the_same_smoke(plume, tmp_path, capsys) 
         first, second = own.density(number), written.density(number)
         assert np.linalg.norm(second - first) < 0.02 * np.linalg.norm(first)
     assert "is there already; nothing was overwritten" in refused(capsys, "inspect", clip, "--write", scene, *words)
+
+
+def test_light_from_everywhere_is_found_in_a_clip_and_reaches_the_volume(plume, tmp_path) -> None:
+    """Where nothing tells the light, and smoke before one colour has a lit side: six lights with shadows."""
+    sun = DirectionalLight((-0.8, 0.5, -0.3), (1.5, 1.35, 1.1))
+    lights, behind = (sun, *light_around(np.full(3, 0.2))), Background(color=(0.3, 0.3, 0.3))
+    true = replace(plume.scene, medium=Medium(6.0, 0.9), lights=lights, background=behind)
+    densities = [np.roll(plume.densities[0], 3 * n, axis=2) for n in range(4)]
+    filmed = plume.write(tmp_path / "clip", densities, true)
+    replace(filmed, medium=None, lights=(), background=None).save(tmp_path / "clip.toml")
+    written, words = tmp_path / "written.toml", ("--detail", "0", *QUICK)
+    assert command("inspect", tmp_path / "clip.toml", "--write", written, *words) == 0
+    scene = Scene.load(written)
+    assert (scene.scattering, len(scene.lights)) == ("single", 6)
+    assert np.allclose(np.sum([light.direction for light in scene.lights], 0), 0)
+    assert command("reconstruct", written, "--out", tmp_path / "out", "--npz", "--frames", "0:1", *words) == 0
+    sequence = Sequence.open(tmp_path / "out")
+    assert sequence.scene.lights == scene.lights
+    assert all(sequence.figures(number)["psnr"] > 40 for number in (1, 2))
+    assert sequence.density(2).any()
 
 
 def test_a_background_that_is_a_picture_is_found_again(tmp_path) -> None:
