@@ -2,6 +2,7 @@
 #include "picture_blur.h"
 #include "pictures.h"
 #include "python.h"
+#include "ranks.h"
 
 namespace smokelift {
 namespace {
@@ -173,6 +174,25 @@ void register_pictures(py::module_ &module) {
             return blurred;
         },
         "picture"_a, "weights"_a);
+
+    module.def(
+        "at_ranks",
+        [](const Array &values, const std::vector<int> &ranks) {
+            require_fit(values.ndim() > 0 && values.shape(0) > 0);
+            const int lines = int(values.shape(0));
+            for (const int rank : ranks)
+                require_fit(rank >= 0 && rank < lines);
+            std::vector<py::ssize_t> shape(values.shape(), values.shape() + values.ndim());
+            shape[0] = py::ssize_t(ranks.size());
+            Array found(shape);
+            float *const result = found.mutable_data();
+            {
+                const py::gil_scoped_release unlocked;
+                at_ranks(values.data(), lines, std::size_t(values.size() / lines), ranks, result);
+            }
+            return found;
+        },
+        "values"_a, "ranks"_a);
 
     module.def(
         "interleave",

@@ -8,6 +8,7 @@ frame. ``closed`` says which sides of the box are walls, in the order x-, x+, y-
 Functions raise ValueError for arrays whose shapes do not belong together.
 """
 
+from collections.abc import Sequence
 from typing import Any, TypedDict
 
 import numpy as np
@@ -463,6 +464,9 @@ def interleave(
     channels: tuple[npt.NDArray[np.uint8], npt.NDArray[np.uint8], npt.NDArray[np.uint8]],
 ) -> npt.NDArray[np.uint8]:
     """Write three pictures (rows, columns), in each of which pixels lie one after the other, as (rows, columns, 3)."""
+
+def at_ranks(values: Array, ranks: Sequence[int]) -> Array:
+    """Values (len(ranks), ...) that have some ranks, from 0, along the first axis of values, none of which is NaN."""
 
 def blur_picture(picture: Array, weights: npt.NDArray[np.floating[Any]]) -> Array:
     """A picture (rows, columns) or (rows, columns, channels), smoothed down and across.

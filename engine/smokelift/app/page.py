@@ -150,12 +150,15 @@ _ENDS = (*_STARTS[1:], _WIDTH)
 def _wrapped(text: str, font: ImageFont.FreeTypeFont | ImageFont.ImageFont, width: float) -> list[str]:
     """The lines of a text that are no wider than so many pixels, unless a single word is."""
     lines: list[str] = []
+    space, taken = font.getlength(" "), 0.0
     for word in text.split():
-        longer = f"{lines[-1]} {word}" if lines else word
-        if lines and font.getlength(longer) <= width:
-            lines[-1] = longer
+        length = font.getlength(word)
+        if lines and taken + space + length <= width:
+            lines[-1] += f" {word}"
+            taken += space + length
         else:
             lines.append(word)
+            taken = length
     return lines
 
 

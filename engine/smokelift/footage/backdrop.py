@@ -20,6 +20,7 @@ from smokelift.footage.images import Picture, blurred, linear_to_srgb
 from smokelift.footage.matte import matte
 from smokelift.footage.noise import BLOCK, SMOKE_TO_NOISE, Noise, block_means, decode_samples, linear_samples, over_time
 from smokelift.footage.plate import Plate
+from smokelift.footage.seen import median_of_seen, quantile_of_seen
 
 ONE_COLOUR = 0.8
 """Share of the pixels that never change which has to have one colour for it to be the backdrop's; the others are a
@@ -94,7 +95,7 @@ def _backdrop(samples: npt.NDArray[np.uint16], noise: Noise) -> Picture | None:
     """
     linear = np.concatenate([block_means(linear_samples(sample[None])) for sample in samples])
     blocks = linear_to_srgb(linear)
-    middle, limit = np.median(blocks, axis=0), SMOKE_TO_NOISE * noise.averaged(BLOCK**2).total
+    middle, limit = median_of_seen(blocks), SMOKE_TO_NOISE * noise.averaged(BLOCK**2).total
     still = (over_time(blocks - middle) <= limit).all(-1)
     if not still.any():
         return None
@@ -115,8 +116,8 @@ def _backdrop(samples: npt.NDArray[np.uint16], noise: Noise) -> Picture | None:
         return _black(samples, noise, blocks)
     alike = kinds[covered or 0]
     bare = alike if covered is None else seen[covered].any(0)
-    clear = np.median(linear, axis=0)
-    low, high = np.quantile(blocks, [0.05, 0.95], axis=0)
+    clear = median_of_seen(linear)
+    low, high = (quantile_of_seen(blocks, share) for share in (0.05, 0.95))
     fixed = still & ~alike & ~bare & ((high - low) <= limit).all(-1)
     picture = np.where(fixed[..., None], clear, clear[still & alike].mean(0))
     whole: Picture = _pixels(picture, samples.shape[1:3]).astype(np.float32)

@@ -9,7 +9,7 @@ import numpy as np
 
 from smokelift.footage.evidence import SAME_SHOT, STILL
 from smokelift.footage.exposure import gain_of
-from smokelift.footage.images import Picture, linear_to_srgb
+from smokelift.footage.images import Picture, brightest_channel, linear_to_srgb
 
 STEADY = 0.5
 """Share of the pixels that stay as they are from one sample to the next on both sides of a cut, at least: where a
@@ -57,7 +57,7 @@ def _alike(one: Picture, other: Picture) -> float:
     encoded = linear_to_srgb(one)
 
     def share(picture: Picture) -> float:
-        return float((np.abs(linear_to_srgb(picture) - encoded).max(-1) < STILL).mean())
+        return float((brightest_channel(np.abs(linear_to_srgb(picture) - encoded)) < STILL).mean())
 
     found = share(other)
     return found if found >= STEADY else max(found, share(other / gain_of(other, one)))

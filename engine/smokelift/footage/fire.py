@@ -13,7 +13,7 @@ import numpy.typing as npt
 from scipy import ndimage
 
 from smokelift.footage.clip import Clip
-from smokelift.footage.images import Picture
+from smokelift.footage.images import Picture, brightest_channel
 from smokelift.footage.matte import matte
 from smokelift.footage.plate import Plate, Plates
 from smokelift.scene.checks import Vector
@@ -56,12 +56,12 @@ def fire_share(colours: Picture, behind: Picture) -> float:
     if not len(colours):
         return 0.0
     fire = _hot(colours, behind)
-    brightest = colours.max(-1)
+    brightest = brightest_channel(colours)
     # a core that is clipped to yellow or white does not show its color
     other = ~_warm(colours) & (brightest > FAINTEST) & (brightest < CLIPPED)
     if fire.mean() < LEAST_FIRE or other.mean() < LEAST_SMOKE:
         return 0.0
-    added = (colours - behind).max(-1)
+    added = brightest_channel(colours - behind)
     smoke, flame = np.percentile(added[other], 95), np.median(added[fire])
     return float(fire.mean()) if smoke < DARKER * flame else 0.0
 

@@ -33,6 +33,7 @@ Picture = npt.NDArray[np.float32]
 Transfer = Literal["srgb", "linear"]
 Edges = npt.NDArray[np.int32]
 Value = TypeVar("Value", np.float32, np.uint16)
+Number = TypeVar("Number", np.float32, np.float64)
 
 MOST_PIXELS = 2**28
 """Pixels of a picture, at most."""
@@ -400,6 +401,12 @@ def chequered_averages(image: Picture | CodedPicture, width: int, height: int, f
         return np.asarray(area_average(light, width, height) / weight[..., None], np.float32)
 
     return average(first), average(1 - first)
+
+
+def brightest_channel(values: npt.NDArray[Number]) -> npt.NDArray[Number]:
+    """Return the largest of the three values along the last axis; NumPy's ``max`` takes five times as long there."""
+    red, green, blue = np.moveaxis(values, -1, 0)
+    return np.asarray(np.maximum(np.maximum(red, green), blue))
 
 
 def blurred(picture: Picture, deviation: float) -> Picture:

@@ -79,7 +79,8 @@ def matte(frame: npt.ArrayLike, plate: Plate) -> Matte:
         width = float(np.sqrt(width**2 - SMOOTHING**2))
     difference = (linear_to_srgb(shown) - linear_to_srgb(behind)) / noise
     smooth = blurred(difference, width)
-    deviation = np.sqrt((smooth**2).mean(axis=2))
+    red, green, blue = np.moveaxis(smooth**2, -1, 0)
+    deviation = np.sqrt((red + green + blue) / np.float32(3))  # faster than a mean
     deviation /= np.clip(np.median(deviation), 1.0, GLOBAL_DEVIATION)
     certain = 2.0 * SMOKE_THRESHOLD
     patches, count = ndimage.label(deviation > SMOKE_THRESHOLD, structure=np.ones((3, 3)))

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from smokelift.footage.images import brightest_channel
 from smokelift.scene.checks import Vector
 from smokelift.setup.choice import UNDETERMINED, Choice
 from smokelift.setup.smoke import SmokeSamples
@@ -107,11 +108,12 @@ def _grey(why: str, degrees: float | None = None) -> SmokeColour:
 
 def _line(samples: SmokeSamples) -> tuple[Array, Array] | None:
     """Background and colour of the thickest smoke that is not clipped; None if there is too little of it."""
-    clear = samples.colours.max(-1, initial=0.0) < CLIPPED
+    clear = brightest_channel(samples.colours) < CLIPPED
     if clear.sum() < max(FEWEST, 0.1 * len(clear)):
         return None
     colours, behind = (values[clear].astype(np.float64) for values in (samples.colours, samples.behind))
-    change = np.linalg.norm(colours - behind, axis=-1)
+    red, green, blue = (colours - behind).T
+    change = np.sqrt(red**2 + green**2 + blue**2)
     thick = change >= np.percentile(change, THICKEST)
     seen = colours[thick].mean(0)
     return (np.maximum(behind[thick].mean(0), 0), seen) if seen.max() >= FAINTEST else None

@@ -21,6 +21,7 @@ from smokelift.footage.images import (
     add_weighted,
     area_average,
     blurred,
+    brightest_channel,
     chequered_averages,
     code_values,
     decode_integers,
@@ -306,6 +307,12 @@ def test_pictures_are_smoothed_as_by_scipy(shape: tuple[int, ...], deviation: fl
     picture = np.random.default_rng(0).standard_normal(shape).astype(np.float32)
     expected = ndimage.gaussian_filter(picture, (deviation, deviation, 0)[: len(shape)])
     np.testing.assert_allclose(blurred(picture, deviation), expected, rtol=1e-6, atol=1e-7)
+
+
+@pytest.mark.parametrize("shape", [(0, 3), (7, 3), (4, 5, 3)])
+def test_the_brightest_channel_is_the_largest(shape: tuple[int, ...]) -> None:
+    values = np.random.default_rng(0).standard_normal(shape).astype(np.float32)
+    assert np.array_equal(brightest_channel(values), values.max(-1))
 
 
 def test_channels_are_interleaved() -> None:
