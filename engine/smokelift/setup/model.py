@@ -13,10 +13,11 @@ from smokelift.density import Density, reconstruct_density
 from smokelift.footage.clip import Clip
 from smokelift.footage.matte import matte
 from smokelift.footage.plate import Plates
-from smokelift.scene import CompleteScene
+from smokelift.scene import CompleteScene, Scattering
 from smokelift.setup.choice import Choice
 from smokelift.setup.coarse import LONGEST, CoarseFrame, coarse_frame
 from smokelift.setup.directions import choose_directions
+from smokelift.setup.flicker import STEADY, exposure_of, light_of
 from smokelift.setup.light_strength import choose_strength, scaled
 from smokelift.setup.scattering import choose_scattering, settled, tries_multiple, unclear
 from smokelift.setup.settings import Settings
@@ -43,6 +44,16 @@ class Model:
     scene: CompleteScene
     velocity: VelocitySettings
     choices: tuple[Choice[Any], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Scattered:
+    """How strong the lights are, in multiples of the scene's, and how light is scattered."""
+
+    factor: float
+    strength: tuple[Choice[str], ...]
+    scattering: Scattering
+    choice: Choice[str]
 
 
 def choose_model(
@@ -82,6 +93,13 @@ def choose_model(
         frame = coarse(number)
         return frame is not None and bool(matte(frame.picture, frame.plate).mask.any())
 
+    def light(number: int) -> float:
+        frame = coarse(number)
+        return light_of(frame) if frame is not None else 0.0
+
+    def exposure(number: int) -> float:
+        return exposure_of(number, len(clip), light)
+
     numbers = [number for number in tried_frames(smoky) if shows_smoke(number)]
     frames = [frame for frame in map(coarse, numbers) if frame is not None]
     coarsened = choose_coarsening(scene.domain, settings.velocity, settings.selection.velocity_side)
@@ -89,27 +107,38 @@ def choose_model(
     if not frames:
         return Model(scene, replace(velocity, levels=velocity.grids), ())
     lit, directions = choose_directions(scene, frames, settings.density)
-    strength: tuple[Choice[str], ...] = ()
-    error_of_multiple = None
-    # what single scattering lacks would be taken for light that is missing
-    if scene.scattering == "multiple" or (scene.scattering == "single" and tries_multiple(scene) and not by_hand):
-        alike = [frame.in_light_of(lit).scattered_by("multiple") for frame in frames]
-        factor, error_of_multiple, strength = choose_strength(alike, settings.density)
-        scene, lit = scaled(scene, factor), scaled(lit, factor)
-    frames = [frame.in_light_of(lit) for frame in frames]
-    if by_hand:
-        said = scene.scattering
-        scattered: Choice[str] = Choice("scattering", said, f"Scattering by hand: {said}.", by_hand=True)
-    else:
+    said = scene.scattering
+
+    def scattered_with(gains: Sequence[float]) -> _Scattered:
+        """How strong the light is and how it is scattered, where the frames are exposed by gains."""
+        exposed = [frame.in_light_of(scaled(lit, gain)) for frame, gain in zip(frames, gains, strict=True)]
+        known: dict[Scattering, float] = {}
+        strength: tuple[Choice[str], ...] = ()
+        factor = 1.0
+        # what single scattering lacks would be taken for light that is missing
+        if said == "multiple" or (said == "single" and tries_multiple(scene) and not by_hand):
+            alike = [frame.scattered_by("multiple") for frame in exposed]
+            factor, known["multiple"], strength = choose_strength(alike, settings.density)
+            exposed = [frame.in_light_of(scaled(frame.scene, factor)) for frame in exposed]
+        if by_hand:
+            chosen = Choice("scattering", said, f"Scattering by hand: {said}.", by_hand=True)
+            return _Scattered(factor, strength, said, chosen)
         tolerance = settings.selection.scattering_error
-        scattering, scattered = choose_scattering(
-            frames, scene.scattering, settings.density, tolerance, error_of_multiple
-        )
-        finer = coarse(numbers[0], 2 * LONGEST) if unclear(scattered) else None
+        found = choose_scattering(exposed, said, settings.density, tolerance, known)
+        finer = coarse(numbers[0], 2 * LONGEST) if unclear(found[1]) else None
         if finer is not None and finer.scene.domain != frames[0].scene.domain:
-            scattering, scattered = choose_scattering(
-                [finer.in_light_of(lit)], scene.scattering, settled(settings.density), tolerance
-            )
+            own = finer.in_light_of(exposed[0].scene)
+            found = choose_scattering([own], said, settled(settings.density), tolerance, {})
+        return _Scattered(factor, strength, *found)
+
+    found = scattered_with([1.0] * len(frames))
+    # more light than one frame's smoke can scatter once may be that frame's exposure
+    if (found.strength or found.scattering == "multiple") and abs(exposure(numbers[0]) - 1) > STEADY:
+        found = scattered_with([exposure(number) for number in numbers])
+    scene, lit = scaled(scene, found.factor), scaled(lit, found.factor)
+    frames = [frame.in_light_of(lit) for frame in frames]
+    strength, scattering, scattered = found.strength, found.scattering, found.choice
+    if not by_hand:
         around = choose_surroundings(frames, scattered, settings.density) if guessed else None
         if around is not None:
             lights, scattered = around

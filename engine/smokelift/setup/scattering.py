@@ -42,9 +42,9 @@ CLEAR = 0.5
 """The same ratio, above which the errors may be those of the coarse grid: then either model seems to meet the smoke, or
 neither does (docs/experiments/scattering-selection.md)."""
 
-SETTLED = 24
-"""Steps of descent at least, where models are told apart that differ little: with fewer the ratio is that of the steps
-which each of them lacks (docs/experiments/scattering-selection.md)."""
+SETTLED = 64
+"""Steps of descent that a fit may take where models are told apart that differ little: enough for every fit to end by
+itself. One that is cut off has the error of the steps which it lacks (docs/experiments/scattering-selection.md)."""
 
 WORDS: Mapping[str, str] = {
     "absorption": "absorption only",
@@ -59,7 +59,7 @@ def choose_scattering(
     richest: Scattering,
     settings: DensitySettings,
     tolerance: float,
-    error_of_multiple: float | None = None,
+    known: Mapping[Scattering, float],
 ) -> tuple[Scattering, Choice[str]]:
     """Choose the model of scattering.
 
@@ -74,13 +74,13 @@ def choose_scattering(
         How to fit.
     tolerance
         Error, as a share of what the smoke changes in the picture, that a cheaper model may add.
-    error_of_multiple
-        `HeldOut.error` of multiple scattering, if it is known already.
+    known
+        `HeldOut.error` of models, each of its own densities, as far as it is measured already.
     """
 
     def own_error(model: Scattering) -> float:
-        if model == "multiple" and error_of_multiple is not None:
-            return error_of_multiple
+        if model in known:
+            return known[model]
         return held_out(frames, model, model, settings).error
 
     errors = {richest: own_error(richest)}

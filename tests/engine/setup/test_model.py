@@ -121,7 +121,7 @@ def test_single_scattering_is_kept_where_both_meet_the_picture(plume, draft, mon
     assert chosen(shot_of(plume.scene, draft), "scattering").chosen == "multiple"
 
 
-@pytest.mark.parametrize(("near", "asked"), [(0.05, {(8, 4), (16, 24)}), (0.01, {(8, 4)})])
+@pytest.mark.parametrize(("near", "asked"), [(0.05, {(8, 4), (16, 64)}), (0.01, {(8, 4)})])
 def test_models_that_coarse_frames_do_not_tell_apart_are_tried_on_finer_ones(
     plume, draft, monkeypatch, near, asked
 ) -> None:
