@@ -20,6 +20,8 @@ def named_path(text: str) -> Path:
         text.encode("utf-8")
     except UnicodeEncodeError:
         raise argparse.ArgumentTypeError("the path is no text in UTF-8: rename the file or the folder") from None
+    if not text:
+        raise argparse.ArgumentTypeError("the path is empty: give the name of a file or a folder")
     return Path(text)
 
 

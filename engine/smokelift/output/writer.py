@@ -224,8 +224,14 @@ class SequenceWriter:
         if there is None:
             self._clear(INDEX)  # nothing else is written before it
             return
-        for part in ("scene", "settings", "sources", "versions"):
+        # another clip or quality, say, makes another scene, and another scene other settings of a part
+        for told in ("sources", "own settings", "scene", "settings", "versions"):
+            part = told.removeprefix("own ")
             before, now = (getattr(index, part) for index in (there, self._index))
+            if told != part:
+                before, now = (
+                    {key: value for key, value in each.items() if not isinstance(value, dict)} for each in (before, now)
+                )
             if part == "scene" and there.sources:  # their checksums tell files apart, wherever a project was moved to
                 before, now = without_folders(before), without_folders(now)
             # early versions kept no sources; a patch of Python changes no result

@@ -23,7 +23,7 @@ def read_text(path: Path) -> str:
     try:
         if path.stat().st_size > LARGEST_TEXT:
             raise OSError(f"{path}: cannot be read: it holds more than {LARGEST_TEXT >> 20} MiB")
-        return path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8-sig")  # some editors on Windows begin a file with a byte order mark
     except UnicodeDecodeError as error:
         raise OSError(f"{path}: is not a text file in UTF-8") from error
     except OSError as error:

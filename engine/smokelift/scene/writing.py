@@ -34,6 +34,9 @@ def write_file(parts: Mapping[str, Any], path: Path, comments: Sequence[str] = (
     try:
         aside.write_text(text, encoding="utf-8")
         aside.replace(path)
+    except OSError as error:
+        error.filename = str(path)  # the name that was asked for
+        raise
     finally:
         aside.unlink(missing_ok=True)
 

@@ -140,7 +140,9 @@ class Settings:
         method: MethodName = "default",
         resolution: tuple[int, int, int] | Literal["auto"] | None = None,
     ) -> Settings:
-        """The settings of a quality and a method."""
+        """The settings of a quality and a method; ValueError if there is no such one."""
+        if quality not in QUALITIES:
+            raise ValueError(f"quality must be one of {', '.join(QUALITIES)}, not {quality!r}.")
         if method == "paper":
             selection = SelectionSettings(measure=False)
             return cls(method=method, quality=quality, resolution=resolution, selection=selection, detail=0.0)

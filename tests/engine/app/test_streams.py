@@ -74,6 +74,9 @@ def test_a_path_that_is_no_text_is_refused() -> None:
     status, lines = ended("reconstruct", "a.mp4", "--out", b"\xff")
     assert status == 2
     assert lines[-1].endswith("argument --out: the path is no text in UTF-8: rename the file or the folder")
+    status, lines = ended("reconstruct", "a.mp4", "--out", b"")
+    assert status == 2
+    assert lines[-1].endswith("argument --out: the path is empty: give the name of a file or a folder")
 
 
 def test_a_terminal_obeys_no_name(capsys) -> None:

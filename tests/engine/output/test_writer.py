@@ -229,6 +229,9 @@ def test_another_run_is_not_resumed(tmp_path: Path, no_vdb: None) -> None:
     scene = replace(SCENE, lights=())
     with pytest.raises(SequenceError, match=r"scene\.lights was .* and is now null"):
         SequenceWriter(tmp_path, scene, SETTINGS, npz=True, resume=True).__enter__()
+    finer = {**other, "quality": "fine"}  # which is why the scene is another one
+    with pytest.raises(SequenceError, match=r"settings\.quality was .* and is now \"fine\""):
+        SequenceWriter(tmp_path, scene, finer, npz=True, resume=True).__enter__()
     with SequenceWriter(tmp_path, SCENE, SETTINGS, npz=True, resume=True) as writer:
         assert writer.finished == (1,)  # the refusals left no lock behind
 

@@ -26,6 +26,12 @@ from smokelift.scene import (
 AIMED = "position = [0, -7, 1.5]\ntarget = [0, 0, 1.5]"
 
 
+def test_a_byte_order_mark_is_no_part_of_a_scene(tmp_path: Path) -> None:
+    """Some editors on Windows write one."""
+    (tmp_path / "scene.toml").write_text('[clip]\npath = "a.mp4"\n', encoding="utf-8-sig")
+    assert Scene.load(tmp_path / "scene.toml").clip == ClipSource(tmp_path / "a.mp4")
+
+
 def test_every_table_is_read(tmp_path: Path) -> None:
     scene = load(tmp_path, GOOD)
     assert scene.clip == ClipSource(tmp_path / "smoke.mp4", 24.0, (0, 10))

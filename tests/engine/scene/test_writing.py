@@ -116,6 +116,13 @@ def test_a_scene_comes_back_as_it_was_saved(tmp_path_factory: pytest.TempPathFac
     assert scene_from_dict(scene_to_dict(scene)) == scene
 
 
+def test_a_scene_that_cannot_be_written_names_its_file(tmp_path: Path) -> None:
+    """Not the hidden one that it is written to first."""
+    with pytest.raises(FileNotFoundError) as refused:
+        Scene().save(tmp_path / "none" / "scene.toml")
+    assert refused.value.filename == str(tmp_path / "none" / "scene.toml")
+
+
 def test_paths_move_with_the_scene_file(tmp_path: Path) -> None:
     old, new = tmp_path / "old", tmp_path / "new"
     old.mkdir()

@@ -79,6 +79,12 @@ def test_bad_values_are_refused(values: dict[str, Any], words: str) -> None:
         Settings(**values)
 
 
+def test_a_quality_that_there_is_not_is_refused() -> None:
+    """Before it is looked up."""
+    with pytest.raises(ValueError, match="quality must be one of draft, balanced, fine, not 'ultra'"):
+        Settings.preset("ultra")  # type: ignore[arg-type]
+
+
 def test_settings_do_not_change() -> None:
     """They are frozen."""
     with pytest.raises(FrozenInstanceError):
