@@ -1,15 +1,19 @@
 """Smokelift's Blender add-on: a clip of smoke becomes a volume in the shot.
 
-The library knows nothing of Blender: `take` is the files of a run, `job` the engine's process, `toml` the text of a
-scene file, `pace` a speed ramp, `contract` what the add-on repeats of the engine. `smoke` finds the objects that hold
-the settings. `scene_file` (Blender scene to scene file), `volume` (sequence to Volume object), `look` (its material),
-`directing` (what acts on the smoke after its clip), `shot_setup` (camera, world and light that match the clip),
-`compositing` (smoke over the clip) and `projection` (the clip's background on a card), all with the clean `plate`, and
-`undistort` (the clip without its lens's distortion) translate to Blender's data and back. The interface is
-thin: `properties`; `panel` with the sub-panels `results_panel`, `advanced_panel`, `look_panel`, `setup_panel` and
-`direct_panel`, each with its buttons (`subpanel` is what they share); the other buttons in `operators`, `box` and
-`editors`, and what all of them need in `needs`. `run` keeps the queue; `export` hands a smoke on, and `instances` shows
-it at other times; `drop`, `presets` and `preferences` are what Blender calls so; `batch` is the command line.
+It knows nothing of the engine but its command line and its files. From what knows no Blender to the interface:
+
+- Without Blender: `take` (the files of a run), `job` (the engine's process), `toml` (the text of a scene file), `pace`
+  (a speed ramp), `contract` (what the add-on repeats of the engine).
+- Blender's data to the engine's and back: `smoke` (the objects that hold the settings), `smoke_takes` (its takes),
+  `scene_file` (Blender scene to scene file), `volume` (sequence to Volume object), `look` (its material), `directing`
+  (what acts on the smoke after its clip), `shot_setup` (camera, world and light that match the clip), `compositing`
+  (smoke over the clip), `projection` (the clip's background on a card), `plate` (the clean plate for these three),
+  `instances` (the smoke at other times), `undistort` (the clip without its lens's distortion).
+- Work beside Blender: `run` (the queue of takes), `shot_check` (the forecast of a run), `batch` (the command line).
+- Interface: `properties` (the settings); `panel` with the sub-panels `results_panel`, `advanced_panel`, `look_panel`,
+  `setup_panel`, `direct_panel` and `export`, each with its buttons (`subpanel` is what they share); other buttons in
+  `operators`, `box` and `editors` (`needs` says when they can be pressed); `drop`, `presets` and `preferences`, which
+  Blender calls so.
 """
 
 from types import ModuleType

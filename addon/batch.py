@@ -25,7 +25,7 @@ POLL_SECONDS = 0.05
 
 def main(words: Sequence[str]) -> int:
     """Make a smoke of the scene; returns the exit status."""
-    from . import preferences, run
+    from . import preferences, smoke_takes
     from .contract import BAD_INPUT, CANCELLED, DONE
     from .job import EngineMissingError, Job, engine_command
     from .scene_file import ShotError
@@ -37,10 +37,10 @@ def main(words: Sequence[str]) -> int:
         return int(leaving.code or 0)
     try:
         smoke = _smoke(choices)
-        take = run.unfinished(smoke) if choices.resume else None
+        take = smoke_takes.unfinished(smoke) if choices.resume else None
         if take is not None:
-            run.find_again(smoke, take)
-        take = take or run.write_take(smoke)
+            smoke_takes.update_moved_files(smoke, take)
+        take = take or smoke_takes.write_take(smoke)
         job = Job(engine_command(take.arguments() + preferences.thread_options()), take.log_file)
     except (ShotError, TakeError, EngineMissingError) as error:
         print(f"smokelift: {error}", file=sys.stderr, flush=True)
@@ -49,7 +49,7 @@ def main(words: Sequence[str]) -> int:
     if job.outcome != "done":
         print(f"smokelift: {job.sentence}", file=sys.stderr, flush=True)
         return CANCELLED if job.outcome == "cancelled" else (job.status or 1)
-    run.present(smoke, take)
+    smoke_takes.present(smoke, take)
     print(job.sentence, flush=True)
     if choices.set_up:
         bpy.ops.smokelift.set_up()

@@ -3,7 +3,7 @@
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from . import run
+from . import run, smoke_takes
 from .needs import NeedsClipAndResult
 from .panel import draw_closed
 from .scene_file import ShotError
@@ -22,7 +22,7 @@ class SMOKELIFT_OT_direct(NeedsClipAndResult, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         smoke = active_smoke(context.scene)
         try:
-            take = run.write_directed(smoke)
+            take = smoke_takes.write_directed(smoke)
         except (ShotError, TakeError) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}

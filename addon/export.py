@@ -13,15 +13,15 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import BoolProperty, EnumProperty, PointerProperty, StringProperty
 
-from . import preferences, run, volume
+from . import preferences, smoke_takes, volume
 from .contract import ASSET_FILE, EXPORT_FILE, FRAME_FILE, PROXY_FILE
 from .instances import copy_of, gather, scatter
 from .job import EngineMissingError, Job, engine_command
 from .needs import NeedsResult
 from .panel import draw_text
 from .paths import PATH_OPTIONS, absolute, relative
-from .smoke import active_smoke, scene_of
-from .subpanel import OfResult
+from .smoke import active_smoke, find_smoke, scene_of
+from .subpanel import OfResult, redraw
 from .take import Take
 
 TICK_SECONDS = 0.1
@@ -112,7 +112,7 @@ class _Session:
         if job is None:
             return None
         if job.poll():
-            run.redraw(bpy.context.window_manager)
+            redraw(bpy.context.window_manager)
         if not job.ended:
             return TICK_SECONDS
         if not self.exporting:
@@ -120,14 +120,14 @@ class _Session:
             self.size = iface_("About {:s}").format(megabytes(job.details["size"])) if done else job.sentence
         else:
             self.sentence = job.sentence
-            smoke = run.find_smoke(self.smoke)
+            smoke = find_smoke(self.smoke)
             if smoke is not None and job.outcome == "done":
                 write_asset(smoke, folder_of(smoke))
         self.job, self.exporting = None, False
         return None
 
     def _start_size(self) -> None:
-        smoke = run.find_smoke(self._asked)
+        smoke = find_smoke(self._asked)
         if smoke is None or self.exporting or volume.shown_take(smoke) is None:
             return
         try:
@@ -149,7 +149,7 @@ _session = _Session()
 def folder_of(smoke: bpy.types.Object) -> Path:
     """The folder for the export of a smoke."""
     chosen = smoke.smokelift_export.folder
-    return absolute(chosen) if chosen else run.output_folder(smoke) / "export"
+    return absolute(chosen) if chosen else smoke_takes.output_folder(smoke) / "export"
 
 
 def arguments(smoke: bpy.types.Object) -> list[str]:

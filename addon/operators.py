@@ -7,7 +7,7 @@ import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import BoolProperty, StringProperty
 
-from . import run
+from . import run, shot_check, smoke_takes
 from .needs import NeedsClip
 from .properties import SEEDS
 from .scene_file import ShotError
@@ -118,7 +118,7 @@ def _make_smoke(operator: bpy.types.Operator, context: bpy.types.Context) -> set
     """Write a take and queue it; the operator reports what is in the way."""
     smoke = active_smoke(context.scene)
     try:
-        take = run.write_take(smoke)
+        take = smoke_takes.write_take(smoke)
     except (ShotError, TakeError) as error:
         operator.report({"ERROR"}, str(error))
         return {"CANCELLED"}
@@ -136,12 +136,12 @@ class SMOKELIFT_OT_resume(NeedsClip, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         smoke = active_smoke(context.scene)
-        take = run.unfinished(smoke)
-        if take is None or run.busy(context.window_manager, take):
+        take = smoke_takes.unfinished(smoke)
+        if take is None or smoke_takes.busy(context.window_manager, take):
             self.report({"ERROR"}, "No stopped run to resume: press Make Smoke.")
             return {"CANCELLED"}
         try:
-            run.find_again(smoke, take)
+            smoke_takes.update_moved_files(smoke, take)
         except TakeError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
@@ -182,7 +182,7 @@ class SMOKELIFT_OT_check(NeedsClip, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         state = context.window_manager.smokelift
         state.check_smoke = active_smoke(context.scene).session_uid
-        state.check_ticks = run.CHECK_TICKS
+        state.check_ticks = shot_check.TICKS
         run.work(context)
         return {"FINISHED"}
 

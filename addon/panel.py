@@ -5,9 +5,10 @@ import textwrap
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from . import presets, run, volume
+from . import presets, shot_check, smoke_takes, volume
+from .job import ENDED
 from .scene_file import box_of, clip_path, frame_rate
-from .smoke import active_smoke, migrate_soon, smokes
+from .smoke import active_smoke, find_smoke, migrate_soon, smokes
 from .undistort import is_distorted
 
 POINTS_A_LETTER = 6.5
@@ -45,7 +46,7 @@ class _Main:
         row.active = settings.detail > 0.0
         row.prop(settings, "seed")
         _draw_cost(column, context, smoke)
-        layout.prop(settings, "output", placeholder=str(run.output_folder(smoke)))
+        layout.prop(settings, "output", placeholder=str(smoke_takes.output_folder(smoke)))
         _draw_run(layout, context, smoke)
 
 
@@ -117,7 +118,7 @@ def _draw_cost(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bp
     state = context.window_manager.smokelift
     if state.check_smoke != smoke.session_uid:
         layout.operator("smokelift.check", icon="VIEWZOOM")
-        run.check_soon(context)
+        shot_check.check_soon(context)
         return
     if state.check_error:
         draw_text(layout, context, state.check_error, "ERROR")
@@ -137,8 +138,8 @@ def _draw_run(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy
     own = [row for row in jobs if row.smoke_uid == smoke.session_uid]
     column = layout.column()
     column.scale_y = 1.5
-    if all(row.outcome in run.ENDED for row in own):
-        begun = run.unfinished(smoke)
+    if all(row.outcome in ENDED for row in own):
+        begun = smoke_takes.unfinished(smoke)
         if begun is not None and begun.frames():
             text = iface_("Resume after Frame {:d}").format(begun.frames())
             column.operator("smokelift.resume", text=text, translate=False, icon="FILE_REFRESH")
@@ -166,7 +167,7 @@ def _draw_job(
     layout: bpy.types.UILayout, context: bpy.types.Context, shown: bpy.types.Object, row: bpy.types.PropertyGroup
 ) -> None:
     box = layout.box()
-    smoke = run.find_smoke(row.smoke_uid)
+    smoke = find_smoke(row.smoke_uid)
     if smoke is not None and smoke != shown:
         box.label(text=smoke.name, icon="VOLUME_DATA")
     if row.outcome == "waiting":
@@ -177,7 +178,7 @@ def _draw_job(
         draw_text(box, context, row.sentence, "ERROR" if row.outcome == "failed" else "INFO")
     if row.icon:
         box.template_icon(icon_value=row.icon, scale=8.0)
-    if row.outcome in run.ENDED:
+    if row.outcome in ENDED:
         for warning in filter(None, row.warnings.split("\n")):
             draw_text(box, context, warning, "ERROR")
         box.operator("smokelift.open_log", icon="TEXT").take = row.take

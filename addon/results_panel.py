@@ -7,11 +7,12 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import StringProperty
 
-from . import run, volume
+from . import smoke_takes, volume
+from .job import ENDED
 from .needs import NeedsClip, NeedsResult
 from .panel import size
 from .smoke import active_smoke
-from .subpanel import OfClip
+from .subpanel import OfClip, redraw
 from .take import Take, TakeError, takes
 
 
@@ -29,7 +30,7 @@ class SMOKELIFT_OT_show_take(NeedsClip, bpy.types.Operator):
         if not take.frames():
             self.report({"ERROR"}, rpt_("There is no finished frame in {:s}.").format(str(take.directory)))
             return {"CANCELLED"}
-        run.present(active_smoke(context.scene), take)
+        smoke_takes.present(active_smoke(context.scene), take)
         return {"FINISHED"}
 
 
@@ -51,7 +52,7 @@ class SMOKELIFT_OT_switch_take(NeedsResult, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         smoke = active_smoke(context.scene)
-        run.present(smoke, volume.take_before(smoke))
+        smoke_takes.present(smoke, volume.take_before(smoke))
         return {"FINISHED"}
 
 
@@ -91,7 +92,7 @@ class SMOKELIFT_OT_name_take(bpy.types.Operator):
         except TakeError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        run.redraw(context.window_manager)
+        redraw(context.window_manager)
         return {"FINISHED"}
 
 
@@ -132,17 +133,15 @@ class SMOKELIFT_OT_remove_takes(NeedsClip, bpy.types.Operator):
 
 def unused_takes(context: bpy.types.Context) -> list[Take]:
     """The results in the active smoke's folder that no Volume of this file shows and no run needs."""
-    kept = _in_use(context)
-    return [
-        take for take in takes(run.output_folder(active_smoke(context.scene))) if take.directory.resolve() not in kept
-    ]
+    kept, folder = _in_use(context), smoke_takes.output_folder(active_smoke(context.scene))
+    return [take for take in takes(folder) if take.directory.resolve() not in kept]
 
 
 def _in_use(context: bpy.types.Context) -> set[Path]:
     """Directories of the takes that Volumes of this file show or that runs write; a link may lead to the same one."""
     shown = {take.directory for data in bpy.data.volumes if (take := volume.take_of(data)) is not None}
     rows = context.window_manager.smokelift.jobs
-    queued = {Take(Path(row.take)) for row in rows if row.outcome not in run.ENDED}
+    queued = {Take(Path(row.take)) for row in rows if row.outcome not in ENDED}
     read = {source for take in queued if (source := take.source()) is not None}
     return {directory.resolve() for directory in shown | {take.directory for take in queued | read}}
 
@@ -171,7 +170,7 @@ class _Results(OfClip):
         layout = self.layout
         smoke = active_smoke(context.scene)
         shown = volume.shown_take(smoke)
-        found = takes(run.output_folder(smoke))
+        found = takes(smoke_takes.output_folder(smoke))
         column = layout.column(align=True)
         for take in found:
             row = column.row(align=True)

@@ -1,4 +1,4 @@
-"""The engine beside Blender: the queue of takes, the check before a run, and the progress on show."""
+"""The engine beside Blender: an operator that works through the queue of takes and shows their progress."""
 
 import functools
 import time
@@ -7,93 +7,15 @@ from pathlib import Path
 import bpy
 import bpy.utils.previews
 
-from . import directing, preferences, scene_file, shot_setup, volume
+from . import preferences, shot_check, volume
 from .job import ENDED, EngineMissingError, Job, Queue, engine_command
-from .paths import absolute
-from .smoke import active_smoke, part_duplicate, smokes
-from .take import Take, TakeError, new_take, takes
+from .smoke import find_smoke
+from .smoke_takes import show_while_made
+from .subpanel import redraw
+from .take import Take, TakeError
 
 TICK_SECONDS = 0.1
-CHECK_TICKS = 4
-"""Ticks without a change of settings before the engine checks the shot."""
-
-
-def output_folder(smoke: bpy.types.Object) -> Path:
-    """The folder of a smoke's takes: the chosen one, else in that of the preferences, beside the .blend or the clip."""
-    settings = smoke.smokelift
-    if settings.output:
-        return absolute(settings.output)
-    common = preferences.output_folder()
-    if common is not None:
-        return common / settings.folder
-    if bpy.data.filepath:
-        return Path(bpy.data.filepath).parent / "smokelift" / settings.folder
-    return scene_file.clip_path(settings.clip).parent / f"{settings.folder}_smokelift"
-
-
-def write_take(smoke: bpy.types.Object) -> Take:
-    """Write the files of a new take.
-
-    Raises
-    ------
-    ShotError, TakeError
-        If the shot is unusable, or the folder cannot be written to.
-    """
-    tables = scene_file.shot_tables(smoke)
-    part_duplicate(smoke)
-    take = new_take(output_folder(smoke))
-    take.write(tables, scene_file.options(smoke))
-    return take
-
-
-def write_directed(smoke: bpy.types.Object) -> Take:
-    """Write the files of a new take that is made of the one on show.
-
-    Raises
-    ------
-    ShotError, TakeError
-        If a setting or an object cannot be used, or the folder cannot be written to.
-    """
-    source = volume.shown_take(smoke)
-    if source is None:
-        raise scene_file.ShotError("Make smoke first: there is none yet to direct.")
-    if busy(bpy.context.window_manager, source):
-        raise scene_file.ShotError("The result on show is still being made: wait for its end, or cancel it.")
-    direction, options, meshes = directing.request(smoke)
-    part_duplicate(smoke)
-    take = new_take(output_folder(smoke))
-    take.write_directed(direction, source, options, meshes)
-    return take
-
-
-def find_again(smoke: bpy.types.Object, take: Take) -> None:
-    """Tell a take that is resumed where clip and plate are today, if the project was moved.
-
-    Raises
-    ------
-    TakeError
-        If its files are damaged.
-    """
-    settings = smoke.smokelift
-    if take.direction() is None:
-        files = {"clip": ("path", scene_file.clip_path(settings.clip))}
-        if settings.plate:
-            files["background"] = ("image", absolute(settings.plate))
-        take.find_again(files)
-
-
-def unfinished(smoke: bpy.types.Object) -> Take | None:
-    """The take that can be resumed: the one on show, else the newest."""
-    if smoke.smokelift.clip is None:
-        return None
-    newest = takes(output_folder(smoke))[-1:]
-    candidates = [take for take in (volume.shown_take(smoke), *newest) if take is not None]
-    return next((take for take in candidates if take.resumable()), None)
-
-
-def page_file() -> Path:
-    """Where the engine shows in pictures what it found of the shot that was checked last."""
-    return Path(bpy.app.tempdir) / "smokelift_inspect.png"
+"""From one look at the engine to the next."""
 
 
 def enqueue(context: bpy.types.Context, smoke: bpy.types.Object, take: Take) -> None:
@@ -107,25 +29,13 @@ def enqueue(context: bpy.types.Context, smoke: bpy.types.Object, take: Take) -> 
     work(context)
 
 
-def present(smoke: bpy.types.Object, take: Take) -> None:
-    """Show a take's finished frames, and the camera that the engine assumed if it did."""
-    index = take.index()
-    if volume.show(smoke, take) and index is not None:
-        shot_setup.assumed_camera(smoke, index)
-
-
-def busy(manager: bpy.types.WindowManager, take: Take) -> bool:
-    """Whether a take runs or waits."""
-    return any(row.take == str(take.directory) and row.outcome not in ENDED for row in manager.smokelift.jobs)
-
-
 def work(context: bpy.types.Context) -> None:
     """Start the worker unless it runs."""
     if bpy.app.background:
         bpy.ops.smokelift.work("EXEC_DEFAULT")
         return
     manager = context.window_manager
-    if _leaving(manager):
+    if _has_unregistered(manager):
         if not bpy.app.timers.is_registered(_work_later):
             bpy.app.timers.register(_work_later, first_interval=TICK_SECONDS)
     elif not workers(manager):
@@ -144,7 +54,7 @@ def workers(manager: bpy.types.WindowManager) -> list[bpy.types.Operator]:
     return [operator for operator in running if _name(operator) == SMOKELIFT_OT_work.__name__]
 
 
-def _leaving(manager: bpy.types.WindowManager) -> bool:
+def _has_unregistered(manager: bpy.types.WindowManager) -> bool:
     """Whether a window still lists an operator that was unregistered while it ran.
 
     It drops it with its next event. Blender crashes if another modal operator starts before that.
@@ -160,28 +70,13 @@ def _name(operator: bpy.types.Operator) -> str | None:
         return None
 
 
-def _drop_unregistered(timer: bpy.types.Timer) -> float | None:
-    """End a timer that gives the first window events, once no unregistered operator is left for them to drop."""
+def _wait_for_unregistered(timer: bpy.types.Timer) -> float | None:
+    """Keep a timer that gives the first window events until no window lists an unregistered operator any more."""
     manager = bpy.context.window_manager
-    if _leaving(manager):
+    if _has_unregistered(manager):
         return TICK_SECONDS
     manager.event_timer_remove(timer)
     return None
-
-
-def check_soon(context: bpy.types.Context) -> None:
-    """Check the active smoke unless it was checked. Drawing code may call this."""
-    state, first = context.window_manager.smokelift, context.window_manager.windows[0]
-    smoke = active_smoke(context.scene)
-    known = smoke is None or smoke.session_uid == state.check_smoke
-    if not known and context.window == first and not bpy.app.timers.is_registered(_check):
-        bpy.app.timers.register(_check)  # drawing code may not change data
-
-
-def _check() -> None:
-    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
-        if bpy.ops.smokelift.check.poll():
-            bpy.ops.smokelift.check()
 
 
 def _open_log(take: str) -> None:
@@ -233,13 +128,12 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
         self._jobs: dict[str, Job] = {}
         self._before: dict[str, Take | None] = {}  # what was on show when a job's first frame came
         self._not_shown: dict[str, Job] = {}  # jobs whose newest frames the viewport does not show yet
-        self._check: Job | None = None
+        self._check = shot_check.ShotCheck()
         self._thumbnails = bpy.utils.previews.new()
 
     def _end(self, context: bpy.types.Context) -> None:
         self._queue.kill()
-        if self._check is not None:
-            self._check.kill()
+        self._check.kill()
         for row in context.window_manager.smokelift.jobs:
             row.icon = 0
             if row.outcome not in ENDED:
@@ -269,10 +163,10 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
             name, job = self._not_shown.popitem()
             if name in rows:
                 self._show(rows[name], job)
-        checked = self._poll_check(manager.smokelift)
+        checked = self._check.poll(manager.smokelift)
         if changed or checked:
             redraw(manager)
-        return bool(self._jobs or self._not_shown) or self._check is not None or manager.smokelift.check_ticks > 0
+        return bool(self._jobs or self._not_shown) or self._check.running or manager.smokelift.check_ticks > 0
 
     def _start(self, name: str, row: bpy.types.PropertyGroup) -> None:
         take = Take(Path(name))
@@ -300,7 +194,8 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
         created = 0
         if smoke is not None:
             count = _datablocks()
-            self._show_or_return(smoke, take, job)
+            before = self._before.setdefault(row.take, volume.shown_take(smoke))
+            show_while_made(smoke, take, before, job.outcome)
             created = _datablocks() - count
         if not bpy.app.background:
             row.icon = self._thumbnail(take)
@@ -312,15 +207,6 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
             if job.outcome == "failed":
                 # later: Blender never removes a modal operator that opens a window from its first one
                 bpy.app.timers.register(functools.partial(_open_log, row.take))
-
-    def _show_or_return(self, smoke: bpy.types.Object, take: Take, job: Job) -> None:
-        """Show a take while it is made; after a failure, or if it is stopped, what was on show before."""
-        shown = volume.shown_take(smoke)
-        before = self._before.setdefault(str(take.directory), shown)
-        if shown not in (before, take):
-            return  # the artist has chosen another
-        stopped = job.outcome in ("failed", "cancelled")
-        present(smoke, before if stopped and before is not None else take)
 
     def _thumbnail(self, take: Take) -> int:
         """The icon of the take's thumbnail; 0 if there is none."""
@@ -336,67 +222,9 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
             bpy.data.images.remove(image)
         return preview.icon_id
 
-    def _poll_check(self, state: bpy.types.PropertyGroup) -> bool:
-        """Check the shot once its settings rest; returns whether anything changed."""
-        if state.check_ticks > 0:
-            state.check_ticks -= 1
-            if state.check_ticks > 0:
-                return False
-            self._start_check(state)
-            return True
-        if self._check is None:
-            return False
-        self._check.poll()
-        if not self._check.ended:
-            return False
-        job, self._check = self._check, None
-        details = job.details
-        state.check_done = job.outcome == "done"
-        state.check_error = "" if state.check_done else job.sentence
-        state.notes = "\n".join(job.notes)
-        if state.check_done:
-            state.resolution = details["scene"]["domain"]["resolution"]
-            state.seconds = details["seconds"]
-            state.memory, state.memory_free = details["memory"] / 2**30, details["memory_free"] / 2**30
-            state.disk = details["disk"] / 1e6
-        return True
-
-    def _start_check(self, state: bpy.types.PropertyGroup) -> None:
-        if self._check is not None:
-            self._check.kill()
-            self._check = None
-        smoke = find_smoke(state.check_smoke)
-        state.check_done, state.check_error = False, ""
-        if smoke is None:
-            return
-        folder = Path(bpy.app.tempdir)
-        try:
-            take = Take(folder / "smokelift_check")
-            take.write(scene_file.shot_tables(smoke, quick=True), scene_file.options(smoke))
-            words = ["inspect", str(take.scene_file), "--page", str(page_file()), "--progress", "json"]
-            words += scene_file.options(smoke) + preferences.thread_options()
-            self._check = Job(engine_command(words), take.log_file)
-        except (scene_file.ShotError, TakeError, EngineMissingError) as error:
-            state.check_error = str(error)
-            return
-        self._check.start()
-
-
-def find_smoke(uid: int) -> bpy.types.Object | None:
-    """A smoke by its number of this session, also after a new name; None if it was deleted."""
-    return next((obj for scene in bpy.data.scenes for obj in smokes(scene) if obj.session_uid == uid), None)
-
 
 def _datablocks() -> int:
     return sum(map(len, (bpy.data.objects, bpy.data.volumes, bpy.data.cameras, bpy.data.materials)))
-
-
-def redraw(manager: bpy.types.WindowManager) -> None:
-    """Redraw every area that shows the panel."""
-    for window in manager.windows:
-        for area in window.screen.areas:
-            if area.type in ("VIEW_3D", "CLIP_EDITOR"):
-                area.tag_redraw()
 
 
 def _playing(context: bpy.types.Context) -> bool:
@@ -409,9 +237,9 @@ def register() -> None:
 
 def unregister() -> None:
     """Unregister the worker and end its jobs."""
-    for later in (_check, _work_later):
-        if bpy.app.timers.is_registered(later):
-            bpy.app.timers.unregister(later)
+    shot_check.end_timer()
+    if bpy.app.timers.is_registered(_work_later):
+        bpy.app.timers.unregister(_work_later)
     manager = bpy.context.window_manager
     running = workers(manager)
     for worker in running:
@@ -419,4 +247,4 @@ def unregister() -> None:
     bpy.utils.unregister_class(SMOKELIFT_OT_work)
     if running:
         timer = manager.event_timer_add(TICK_SECONDS, window=manager.windows[0])
-        bpy.app.timers.register(functools.partial(_drop_unregistered, timer), first_interval=TICK_SECONDS)
+        bpy.app.timers.register(functools.partial(_wait_for_unregistered, timer), first_interval=TICK_SECONDS)

@@ -41,6 +41,11 @@ def active_smoke(scene: bpy.types.Scene) -> bpy.types.Object | None:
     return found[0] if found else None
 
 
+def find_smoke(uid: int) -> bpy.types.Object | None:
+    """A smoke by its number of this session, also after a new name; None if it was deleted."""
+    return next((obj for scene in bpy.data.scenes for obj in smokes(scene) if obj.session_uid == uid), None)
+
+
 def scene_of(smoke: bpy.types.Object) -> bpy.types.Scene:
     """The scene of a smoke: the one at the window if it is in several."""
     scenes = smoke.users_scene
@@ -80,7 +85,7 @@ def free_folder(smoke: bpy.types.Object) -> str:
     return next(name for name in names if name not in taken)
 
 
-def part_duplicate(smoke: bpy.types.Object) -> None:
+def separate_duplicate(smoke: bpy.types.Object) -> None:
     """Give a duplicate of another smoke a folder, and a Volume, of its own before it gets a take of its own.
 
     The duplicate is the younger one; what both show stays where it is.

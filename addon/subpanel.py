@@ -28,3 +28,11 @@ class OfResult(OfClip):
     def poll(cls, context: bpy.types.Context) -> bool:
         smoke = active_smoke(context.scene)
         return smoke is not None and volume.shown_take(smoke) is not None
+
+
+def redraw(manager: bpy.types.WindowManager) -> None:
+    """Redraw every area that shows the panel."""
+    for window in manager.windows:
+        for area in window.screen.areas:
+            if area.type in ("VIEW_3D", "CLIP_EDITOR"):
+                area.tag_redraw()

@@ -156,8 +156,8 @@ class Take:
             return {}
         return request if isinstance(request, dict) else {}
 
-    def find_again(self, files: Mapping[str, tuple[str, Path]]) -> None:
-        """Tell its scene file where the files lie that are not where they were: the project was moved.
+    def update_moved_files(self, files: Mapping[str, tuple[str, Path]]) -> None:
+        """Write today's paths into its scene file for files that are not where they were: the project was moved.
 
         Parameters
         ----------

@@ -9,7 +9,7 @@ from pathlib import Path
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from . import run
+from . import smoke_takes
 from .compositing import SINCE_5, compositor
 from .smoke import active_smoke
 
@@ -93,7 +93,7 @@ class SMOKELIFT_OT_undistort(bpy.types.Operator):
             self.report({"ERROR"}, "The clean plate is distorted too: choose Background: From the Clip first.")
             return {"CANCELLED"}
         clip, kept = settings.clip, {name: getattr(settings, name) for name in ("first", "last", "folder", "fps")}
-        folder = run.output_folder(smoke) / "undistorted"
+        folder = smoke_takes.output_folder(smoke) / "undistorted"
         try:
             settings.clip = undistorted(clip, folder)
         except RuntimeError:

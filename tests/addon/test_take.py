@@ -152,16 +152,16 @@ def test_a_scene_file_is_told_where_its_files_went(tmp_path) -> None:
     }
     take.write(tables, [])
     files = {"clip": ("path", tmp_path / "clip.mp4"), "background": ("image", tmp_path / "other.png")}
-    take.find_again(files)
+    take.update_moved_files(files)
     assert tomllib.loads(take.scene_file.read_text()) == tables
     for name in ("clip.mp4", "other.png"):
         (tmp_path / name).write_text("found")
-    take.find_again(files)
+    take.update_moved_files(files)
     tables["clip"]["path"] = str(tmp_path / "clip.mp4")
     assert tomllib.loads(take.scene_file.read_text()) == tables
     take.scene_file.write_text("[clip")
     with pytest.raises(TakeError, match="make the smoke again"):
-        take.find_again(files)
+        take.update_moved_files(files)
 
 
 def test_a_folder_that_cannot_be_written_to(tmp_path) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from addon import direct_panel, directing, run, volume
+from addon import direct_panel, directing, smoke_takes, volume
 from addon.scene_file import ShotError
 from addon.smoke import activate, smokes
 from addon.take import Take, takes
@@ -43,7 +43,7 @@ def result(shot, made, tmp_path):
     obj.smokelift.output = str(folder)
     shot.render.fps = 24
     activate(obj, shot)
-    run.present(obj, Take(folder / "take_0001"))
+    smoke_takes.present(obj, Take(folder / "take_0001"))
     return obj
 
 
@@ -294,7 +294,7 @@ def test_a_loop_repeats_and_slow_motion_lasts(result, tmp_path) -> None:
 def test_a_stopped_run_is_resumed_after_its_project_was_moved(result, tmp_path) -> None:
     """The other take lies beside it."""
     result.smokelift.directing.frames = 3
-    take = run.write_directed(result)
+    take = smoke_takes.write_directed(result)
     written = continue_sequence(open_source(take.source().directory), take.directory, Continuation(3))
     assert [next(written)[0] for _ in range(FRAMES + 1)][-1] == FRAMES + 1
     written.close()
@@ -322,11 +322,9 @@ def test_frames_of_a_stopped_run_do_not_stay_on_show(result, tmp_path, outcome) 
     """They are seen while they are made, and can be resumed or picked."""
     shown, take = volume.shown_take(result), Take(tmp_path / "out" / "take_0002")
     shutil.copytree(shown.directory, take.directory)
-    worker = SimpleNamespace(_before={})
-    show = run.SMOKELIFT_OT_work._show_or_return
-    show(worker, result, take, SimpleNamespace(outcome="running"))
+    smoke_takes.show_while_made(result, take, shown, "running")
     assert volume.shown_take(result) == take
-    show(worker, result, take, SimpleNamespace(outcome=outcome))
+    smoke_takes.show_while_made(result, take, shown, outcome)
     assert volume.shown_take(result) == (take if outcome == "done" else shown)
 
 
@@ -336,11 +334,9 @@ def test_a_result_that_the_artist_chose_meanwhile_stays(result, tmp_path) -> Non
     take, other = (Take(tmp_path / "out" / name) for name in ("take_0002", "take_0003"))
     for copy in (take, other):
         shutil.copytree(shown.directory, copy.directory)
-    worker = SimpleNamespace(_before={})
-    show = run.SMOKELIFT_OT_work._show_or_return
-    show(worker, result, take, SimpleNamespace(outcome="running"))
-    run.present(result, other)
-    show(worker, result, take, SimpleNamespace(outcome="done"))
+    smoke_takes.show_while_made(result, take, shown, "running")
+    smoke_takes.present(result, other)
+    smoke_takes.show_while_made(result, take, shown, "done")
     assert volume.shown_take(result) == other
 
 
@@ -407,12 +403,12 @@ def test_duplicates_have_folders_of_their_own(shot, result, tmp_path, output) ->
     """For what they make; until then a duplicate shows what the other does. The first one keeps its folder."""
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
     result.smokelift.output = output
-    kept, data = run.output_folder(result), result.data
+    kept, data = smoke_takes.output_folder(result), result.data
     other = result.copy()
     shot.collection.objects.link(other)
-    assert run.output_folder(other) == kept
+    assert smoke_takes.output_folder(other) == kept
     result.smokelift.directing.frames = other.smokelift.directing.frames = 1
-    made = [run.write_directed(obj) for obj in (other, result, other)]
+    made = [smoke_takes.write_directed(obj) for obj in (other, result, other)]
     assert [take.directory.parent == kept for take in made] == [False, True, False]
     assert made[0].directory.parent == made[2].directory.parent
     assert made[0].source() == made[1].source() == volume.shown_take(result)
@@ -422,9 +418,9 @@ def test_duplicates_have_folders_of_their_own(shot, result, tmp_path, output) ->
 def test_a_result_that_a_run_reads_is_not_deleted(result, tmp_path) -> None:
     """What is made of it waits in the queue."""
     shown, other = volume.shown_take(result), Take(tmp_path / "out" / "take_0009")
-    take = run.write_directed(result)
+    take = smoke_takes.write_directed(result)
     shutil.copytree(shown.directory, other.directory)
-    run.present(result, other)
+    smoke_takes.present(result, other)
     row = bpy.context.window_manager.smokelift.jobs.add()
     row.take, row.smoke_uid = str(take.directory), result.session_uid
     with pytest.raises(RuntimeError, match="a run needs it"):

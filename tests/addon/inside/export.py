@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 import pytest
 
-from addon import export, run, volume
+from addon import export, smoke_takes, volume
 from addon.take import Take
 from smokelift.output.export import ExportSettings, export_sequence
 from smokelift.output.sequence import Sequence
@@ -38,11 +38,11 @@ def made(scene, tmp_path) -> bpy.types.Object:
     rho = np.zeros((8, 8, 12), np.float32)
     rho[2:6, 2:6, 1:8] = 0.7
     faces = [np.full(shape, 0.1, np.float32) for shape in ((9, 8, 12), (8, 9, 12), (8, 8, 13))]
-    take = Take(run.output_folder(obj) / "take_0001")
+    take = Take(smoke_takes.output_folder(obj) / "take_0001")
     with SequenceWriter(take.directory, described, {"quality": "draft"}) as writer:
         for number in range(1, FRAMES + 1):
             writer.write(number, rho, faces)
-    run.present(obj, take)
+    smoke_takes.present(obj, take)
     return obj
 
 
@@ -71,7 +71,7 @@ def test_an_export_beside_the_results(made) -> None:
     before = len(bpy.data.node_groups)
     assert bpy.ops.smokelift.export() == {"FINISHED"}
     folder = export.folder_of(made)
-    assert folder.parent == run.output_folder(made)
+    assert folder.parent == smoke_takes.output_folder(made)
     names = {path.name for path in folder.iterdir()}
     frames = {f"smoke_{number:04d}.vdb" for number in range(1, FRAMES + 1)}
     assert names == {*frames, "export.json", "smoke.usda", "smoke.blend"}

@@ -8,7 +8,7 @@ from pathlib import Path
 import bpy
 import pytest
 
-from addon import preferences, presets, run
+from addon import preferences, presets, smoke_takes
 from addon.smoke import new_smoke, smokes
 from tests.example_shot import EXAMPLE
 
@@ -32,7 +32,7 @@ def test_without_preferences_everything_is_as_usual(scene, clip) -> None:
     """As where the add-on runs from its sources."""
     obj = new_smoke(scene, clip)
     assert obj.smokelift.quality == "balanced"
-    assert run.output_folder(obj) == EXAMPLE / "clip_smokelift"
+    assert smoke_takes.output_folder(obj) == EXAMPLE / "clip_smokelift"
     assert preferences.thread_options() == []
 
 
@@ -42,9 +42,9 @@ def test_new_smokes_follow_the_preferences(scene, clip, user, tmp_path) -> None:
     user.quality, user.output, user.threads = "draft", str(tmp_path), 1
     second = new_smoke(scene, clip)
     assert [obj.smokelift.quality for obj in (first, second)] == ["balanced", "draft"]
-    assert [run.output_folder(obj) for obj in (first, second)] == [tmp_path / "clip", tmp_path / "clip_2"]
+    assert [smoke_takes.output_folder(obj) for obj in (first, second)] == [tmp_path / "clip", tmp_path / "clip_2"]
     second.smokelift.output = str(tmp_path / "own")
-    assert run.output_folder(second) == tmp_path / "own"
+    assert smoke_takes.output_folder(second) == tmp_path / "own"
     assert preferences.thread_options() == ["--threads", "1"]
 
 

@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import bpy
 import pytest
 
-from addon import results_panel, run, volume
-from addon.smoke import active_smoke, hide_default_cube, new_smoke, smokes
+from addon import results_panel, run, smoke_takes, volume
+from addon.smoke import active_smoke, find_smoke, hide_default_cube, new_smoke, smokes
 from addon.take import Take, takes
 from conftest import quietly
 from tests.example_shot import EXAMPLE, add, add_box, add_camera, smoke
@@ -57,10 +57,10 @@ def test_smokes_of_one_clip_have_folders_of_their_own(scene, clip, tmp_path) -> 
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
     first, second = new_smoke(scene, clip), new_smoke(scene, clip)
     second.name = "Other"
-    folders = [run.output_folder(obj) for obj in (first, second)]
+    folders = [smoke_takes.output_folder(obj) for obj in (first, second)]
     assert folders == [tmp_path / "smokelift" / name for name in ("clip", "clip_2")]
     second.smokelift.clip = clip
-    assert run.output_folder(second) == folders[1]
+    assert smoke_takes.output_folder(second) == folders[1]
 
 
 def test_add_makes_one_more(scene) -> None:
@@ -78,11 +78,11 @@ def test_a_deleted_smoke_is_made_no_more(scene, clip, tmp_path) -> None:
     """Its run is cancelled, and its finished frames stay."""
     obj = new_smoke(scene, clip)
     obj.smokelift.output = str(tmp_path)
-    take = run.write_take(obj)
+    take = smoke_takes.write_take(obj)
     uid = obj.session_uid
-    assert run.find_smoke(uid) == obj
+    assert find_smoke(uid) == obj
     scene.collection.objects.unlink(obj)
-    assert run.find_smoke(uid) is None
+    assert find_smoke(uid) is None
     rows = bpy.context.window_manager.smokelift.jobs
     row = rows.add()
     row.take, row.smoke_uid = str(take.directory), uid
@@ -124,7 +124,7 @@ def test_smoke_that_is_linked_is_finished(scene, clip, tmp_path) -> None:
 
 def with_takes(scene: bpy.types.Scene, folder, count: int) -> list[Take]:
     smoke(scene).smokelift.output = str(folder)
-    made = [run.write_take(smoke(scene)) for _ in range(count)]
+    made = [smoke_takes.write_take(smoke(scene)) for _ in range(count)]
     for take in made:
         take.directory.mkdir()
         (take.directory / "smoke_0001.vdb").write_bytes(b"x" * 1000)

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from mathutils import Vector
 
-from addon import look, run, shot_setup, volume
+from addon import look, shot_setup, smoke_takes, volume
 from addon.scene_file import box_corners
 from addon.take import Take
 from conftest import FRAMES, made, quietly, rendered
@@ -413,7 +413,7 @@ def test_a_stopped_run_is_found_again_under_its_own_name(shot, tmp_path) -> None
     take.write({}, [])
     volume.show(smoke(shot), take)
     shot = reopened(tmp_path / "shot")
-    assert run.unfinished(smoke(shot)) == take
+    assert smoke_takes.unfinished(smoke(shot)) == take
 
 
 def test_setting_up_keeps_the_plate_by_a_relative_path_and_no_old_world(shot, tmp_path) -> None:
@@ -459,7 +459,7 @@ def test_a_guessed_camera_is_made(shot, tmp_path, size) -> None:
     index["scene"]["camera"] = scene_to_dict(Scene(camera=camera))["camera"]
     (take.directory / "sequence.json").write_text(json.dumps(index))
     for _ in range(2):
-        run.present(smoke(shot), take)
+        smoke_takes.present(smoke(shot), take)
     assert shot.camera == own
     (obj,) = (obj for obj in shot.objects if obj.type == "CAMERA" and obj != own)
     bpy.context.view_layer.update()
@@ -469,7 +469,7 @@ def test_a_guessed_camera_is_made(shot, tmp_path, size) -> None:
     assert (place.x * size[0], (1 - place.y) * size[1]) == pytest.approx((column, row), abs=1e-3)
     assert math.isclose(obj.data.lens, camera.fx * 36 / max(size), rel_tol=1e-5)
     shot.camera = None
-    run.present(smoke(shot), take)
+    smoke_takes.present(smoke(shot), take)
     assert shot.camera == obj
     assert replace(camera, size=size) == camera
 
@@ -483,16 +483,16 @@ def test_a_guessed_camera_that_was_changed_stays(shot, tmp_path) -> None:
         camera = Camera.look_at((0.0, -distance, 1.0), (0.0, 0.0, 1.0), fov_y_degrees=6 * distance, size=(256, 384))
         index["scene"]["camera"] = scene_to_dict(Scene(camera=camera))["camera"]
         (take.directory / "sequence.json").write_text(json.dumps(index))
-    run.present(smoke(shot), takes[0])
+    smoke_takes.present(smoke(shot), takes[0])
     (obj,) = (obj for obj in shot.objects if obj.type == "CAMERA" and obj != shot.camera)
     obj.name, obj.location.y = "Mine", -6.0
-    run.present(smoke(shot), takes[0])
+    smoke_takes.present(smoke(shot), takes[0])
     assert obj.location.y == -6.0
-    run.present(smoke(shot), takes[1])
+    smoke_takes.present(smoke(shot), takes[1])
     assert len([obj for obj in shot.objects if obj.type == "CAMERA"]) == 2
     assert obj.location.y == -6.0
     lens = obj.data.lens
     assert lens == pytest.approx(18.0 / math.tan(math.radians(24.0)), rel=1e-4), "the lens was not changed by hand"
     obj.data.lens = 85.0
-    run.present(smoke(shot), takes[0])
+    smoke_takes.present(smoke(shot), takes[0])
     assert obj.data.lens == 85.0

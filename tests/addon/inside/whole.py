@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import smokelift
-from addon import look, run, volume
+from addon import look, run, shot_check, smoke_takes, volume
 from addon.scene_file import point_intensity, shot_tables, sun_irradiance
 from addon.smoke import activate, smokes
 from addon.take import Take, takes
@@ -69,7 +69,7 @@ def made(scene: bpy.types.Scene, folder: Path, kept: Path) -> Take:
     shutil.copytree(kept, folder)
     choose(scene, folder)
     take = Take(folder / "take_0001")
-    run.present(smoke(scene), take)
+    smoke_takes.present(smoke(scene), take)
     return take
 
 
@@ -286,7 +286,7 @@ def test_a_look_ahead(shot, tmp_path) -> None:
     assert 1 < state.disk < 100
     assert "Medium not given" in state.notes
     assert bpy.ops.smokelift.show_page() == {"FINISHED"}
-    page = bpy.data.images[run.page_file().name]
+    page = bpy.data.images[shot_check.page_file().name]
     assert page.size[0] > 1000
     shot.camera = None
     bpy.ops.smokelift.check()
@@ -298,20 +298,20 @@ def test_going_on_with_what_was_stopped(shot, tmp_path) -> None:
     """From the last finished frame, with the settings of then, to a complete take."""
     settings = smoke(shot).smokelift
     choose(shot, tmp_path / "out")
-    take = run.write_take(smoke(shot))
+    take = smoke_takes.write_take(smoke(shot))
     stopped = Scene.load(take.scene_file)
     with Clip.open(stopped.clip) as clip:
         frames = smokelift.reconstruct(clip, stopped, Settings.preset("draft"), take.directory)
         next(frames), next(frames)
         frames.close()
     settings.quality = "fine"
-    assert run.unfinished(smoke(shot)) == take
+    assert smoke_takes.unfinished(smoke(shot)) == take
     assert bpy.ops.smokelift.resume() == {"FINISHED"}
     (row,) = bpy.context.window_manager.smokelift.jobs
     assert (row.outcome, row.done, row.total) == ("done", 4, 4)
     assert take.complete()
     assert smoke(shot).data.frame_duration == 4
-    assert run.unfinished(smoke(shot)) is None
+    assert smoke_takes.unfinished(smoke(shot)) is None
     with pytest.raises(RuntimeError, match="No stopped run to resume"):
         bpy.ops.smokelift.resume()
 
@@ -329,13 +329,13 @@ def test_going_on_where_the_output_is_not_beside_the_file(shot, tmp_path, saved_
     choose(shot, tmp_path / "out")
     settings = smoke(shot).smokelift
     settings.last, settings.longest_side, settings.plate_mode = FIRST + 1, 32, "ESTIMATE"
-    stopped = run.write_take(smoke(shot))
+    stopped = smoke_takes.write_take(smoke(shot))
     known = Scene.load(stopped.scene_file)
     with Clip.open(known.clip) as clip:
         frames = smokelift.reconstruct(clip, known, Settings.preset("draft"), stopped.directory)
         next(frames)
         frames.close()
-    run.present(smoke(shot), stopped)
+    smoke_takes.present(smoke(shot), stopped)
     save()
     quietly(lambda: bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath))
     assert smoke(bpy.context.scene).data.filepath.startswith("//..")
@@ -355,7 +355,7 @@ def test_going_on_after_the_project_was_moved(shot, tmp_path) -> None:
     bpy.ops.wm.save_as_mainfile(filepath=str(project / "shot.blend"))
     bpy.ops.file.make_paths_relative()
     settings.plate = "//plate.png"
-    take = run.write_take(smoke(shot))
+    take = smoke_takes.write_take(smoke(shot))
     stopped = Scene.load(take.scene_file)
     with Clip.open(stopped.clip) as clip:
         frames = smokelift.reconstruct(clip, stopped, Settings.preset("draft"), take.directory)
@@ -378,7 +378,7 @@ def test_scenes_have_their_own_smoke(shot, tmp_path) -> None:
     smoke(other).smokelift.quality = "draft"
     smoke(other).smokelift.first, smoke(other).smokelift.last = FIRST, FIRST + 1
     smoke(other).smokelift.output = str(tmp_path / "two")
-    run.enqueue(bpy.context, smoke(other), run.write_take(smoke(other)))
+    run.enqueue(bpy.context, smoke(other), smoke_takes.write_take(smoke(other)))
     rows = bpy.context.window_manager.smokelift.jobs
     assert [row.outcome for row in rows] == ["done", "done"]
     assert volume.shown_take(smoke(shot)) == Take(tmp_path / "one" / "take_0001")
@@ -432,13 +432,13 @@ def test_an_hours_trial(shot, tmp_path) -> None:
     assert shown == [folders[0] / "take_0002", folders[1] / "take_0001"]
 
     activate(right, shot)
-    stopped = run.write_take(right)
+    stopped = smoke_takes.write_take(right)
     known = Scene.load(stopped.scene_file)
     with Clip.open(known.clip) as clip:
         frames = smokelift.reconstruct(clip, known, Settings.preset("draft"), stopped.directory)
         next(frames)
         frames.close()
-    run.present(right, stopped)
+    smoke_takes.present(right, stopped)
     (tmp_path / "root" / "elsewhere").mkdir()
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "root" / "elsewhere" / "shot.blend"))
     assert bpy.ops.smokelift.resume() == {"FINISHED"}
@@ -550,7 +550,7 @@ def test_cycles_and_the_engine_agree_on_all_orders_of_scattering(shot, kept, tmp
     index = take.index()
     medium = index["scene"]["medium"] | {"extinction": 15.0, "albedo": 0.95, "scattering": "multiple"}
     (take.directory / "sequence.json").write_text(json.dumps(index | {"scene": index["scene"] | {"medium": medium}}))
-    run.present(smoke(shot), take)
+    smoke_takes.present(smoke(shot), take)
     assert bpy.ops.smokelift.set_up() == {"FINISHED"}
     tables = shot_tables(smoke(shot)) | {"background": {"color": [0.0, 0.0, 0.0]}}
     known = [scene_from_dict(tables | {"medium": medium | {"scattering": model}}) for model in ("multiple", "single")]

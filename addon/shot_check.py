@@ -1,0 +1,103 @@
+"""The check of a shot before its run: the engine's forecast of time, memory and disk, and what it assumes.
+
+It starts by itself once the settings rest, and its result is shown in the panel.
+"""
+
+from pathlib import Path
+
+import bpy
+
+from . import preferences, scene_file
+from .job import EngineMissingError, Job, engine_command
+from .smoke import active_smoke, find_smoke
+from .take import Take, TakeError
+
+TICKS = 4
+"""Ticks of `run.TICK_SECONDS` without a change of settings before the engine checks the shot."""
+
+
+def page_file() -> Path:
+    """Where the engine shows in pictures what it found of the shot that was checked last."""
+    return Path(bpy.app.tempdir) / "smokelift_inspect.png"
+
+
+class ShotCheck:
+    """The engine's check of the shot whose settings changed last; its result goes into the state of the session."""
+
+    def __init__(self) -> None:
+        self._job: Job | None = None
+
+    @property
+    def running(self) -> bool:
+        """Whether the engine is at work on it."""
+        return self._job is not None
+
+    def kill(self) -> None:
+        """End the engine at once."""
+        if self._job is not None:
+            self._job.kill()
+            self._job = None
+
+    def poll(self, state: bpy.types.PropertyGroup) -> bool:
+        """Start the check once the settings rest, and read its result; returns whether anything changed."""
+        if state.check_ticks > 0:
+            state.check_ticks -= 1
+            if state.check_ticks > 0:
+                return False
+            self._start(state)
+            return True
+        if self._job is None:
+            return False
+        self._job.poll()
+        if not self._job.ended:
+            return False
+        job, self._job = self._job, None
+        details = job.details
+        state.check_done = job.outcome == "done"
+        state.check_error = "" if state.check_done else job.sentence
+        state.notes = "\n".join(job.notes)
+        if state.check_done:
+            state.resolution = details["scene"]["domain"]["resolution"]
+            state.seconds = details["seconds"]
+            state.memory, state.memory_free = details["memory"] / 2**30, details["memory_free"] / 2**30
+            state.disk = details["disk"] / 1e6
+        return True
+
+    def _start(self, state: bpy.types.PropertyGroup) -> None:
+        self.kill()
+        smoke = find_smoke(state.check_smoke)
+        state.check_done, state.check_error = False, ""
+        if smoke is None:
+            return
+        folder = Path(bpy.app.tempdir)
+        try:
+            take = Take(folder / "smokelift_check")
+            take.write(scene_file.shot_tables(smoke, quick=True), scene_file.options(smoke))
+            arguments = ["inspect", str(take.scene_file), "--page", str(page_file()), "--progress", "json"]
+            arguments += scene_file.options(smoke) + preferences.thread_options()
+            self._job = Job(engine_command(arguments), take.log_file)
+        except (scene_file.ShotError, TakeError, EngineMissingError) as error:
+            state.check_error = str(error)
+            return
+        self._job.start()
+
+
+def check_soon(context: bpy.types.Context) -> None:
+    """Check the active smoke unless it was checked. Drawing code may call this."""
+    state, first = context.window_manager.smokelift, context.window_manager.windows[0]
+    smoke = active_smoke(context.scene)
+    known = smoke is None or smoke.session_uid == state.check_smoke
+    if not known and context.window == first and not bpy.app.timers.is_registered(_check):
+        bpy.app.timers.register(_check)  # drawing code may not change data
+
+
+def _check() -> None:
+    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
+        if bpy.ops.smokelift.check.poll():
+            bpy.ops.smokelift.check()
+
+
+def end_timer() -> None:
+    """End the timer that would start a check."""
+    if bpy.app.timers.is_registered(_check):
+        bpy.app.timers.unregister(_check)

@@ -1,0 +1,114 @@
+"""The takes of a smoke: where they lie, how a new one is written, which can be resumed, and which is on show."""
+
+from pathlib import Path
+
+import bpy
+
+from . import directing, preferences, scene_file, shot_setup, volume
+from .job import ENDED, Outcome
+from .paths import absolute
+from .smoke import separate_duplicate
+from .take import Take, new_take, takes
+
+
+def output_folder(smoke: bpy.types.Object) -> Path:
+    """The folder of a smoke's takes: the chosen one, else in that of the preferences, beside the .blend or the clip."""
+    settings = smoke.smokelift
+    if settings.output:
+        return absolute(settings.output)
+    common = preferences.output_folder()
+    if common is not None:
+        return common / settings.folder
+    if bpy.data.filepath:
+        return Path(bpy.data.filepath).parent / "smokelift" / settings.folder
+    return scene_file.clip_path(settings.clip).parent / f"{settings.folder}_smokelift"
+
+
+def write_take(smoke: bpy.types.Object) -> Take:
+    """Write the files of a new take.
+
+    Raises
+    ------
+    ShotError, TakeError
+        If the shot is unusable, or the folder cannot be written to.
+    """
+    tables = scene_file.shot_tables(smoke)
+    separate_duplicate(smoke)
+    take = new_take(output_folder(smoke))
+    take.write(tables, scene_file.options(smoke))
+    return take
+
+
+def write_directed(smoke: bpy.types.Object) -> Take:
+    """Write the files of a new take that is made of the one on show.
+
+    Raises
+    ------
+    ShotError, TakeError
+        If a setting or an object cannot be used, or the folder cannot be written to.
+    """
+    source = volume.shown_take(smoke)
+    if source is None:
+        raise scene_file.ShotError("Make smoke first: there is none yet to direct.")
+    if busy(bpy.context.window_manager, source):
+        raise scene_file.ShotError("The result on show is still being made: wait for its end, or cancel it.")
+    direction, options, meshes = directing.request(smoke)
+    separate_duplicate(smoke)
+    take = new_take(output_folder(smoke))
+    take.write_directed(direction, source, options, meshes)
+    return take
+
+
+def update_moved_files(smoke: bpy.types.Object, take: Take) -> None:
+    """Write today's paths of clip and plate into the scene file of a take that is resumed, if the project was moved.
+
+    Raises
+    ------
+    TakeError
+        If its files are damaged.
+    """
+    settings = smoke.smokelift
+    if take.direction() is None:
+        files = {"clip": ("path", scene_file.clip_path(settings.clip))}
+        if settings.plate:
+            files["background"] = ("image", absolute(settings.plate))
+        take.update_moved_files(files)
+
+
+def unfinished(smoke: bpy.types.Object) -> Take | None:
+    """The take that can be resumed: the one on show, else the newest."""
+    if smoke.smokelift.clip is None:
+        return None
+    newest = takes(output_folder(smoke))[-1:]
+    candidates = [take for take in (volume.shown_take(smoke), *newest) if take is not None]
+    return next((take for take in candidates if take.resumable()), None)
+
+
+def present(smoke: bpy.types.Object, take: Take) -> None:
+    """Show a take's finished frames, and the camera that the engine assumed if it did."""
+    index = take.index()
+    if volume.show(smoke, take) and index is not None:
+        shot_setup.assumed_camera(smoke, index)
+
+
+def show_while_made(smoke: bpy.types.Object, take: Take, before: Take | None, outcome: Outcome) -> None:
+    """Show the frames of a take while it is made, unless the artist has chosen another meanwhile.
+
+    Parameters
+    ----------
+    smoke, take
+        The smoke, and the take that is made for it.
+    before
+        What the smoke showed before; it is shown again if the run fails or is stopped.
+    outcome
+        State of the run.
+    """
+    if volume.shown_take(smoke) not in (before, take):
+        return
+    stopped = outcome in ("failed", "cancelled")
+    present(smoke, before if stopped and before is not None else take)
+
+
+def busy(manager: bpy.types.WindowManager, take: Take) -> bool:
+    """Whether a take runs or waits."""
+    return any(row.take == str(take.directory) and row.outcome not in ENDED for row in manager.smokelift.jobs)
