@@ -8,7 +8,8 @@ It knows nothing of the engine but its command line and its files. From what kno
   `scene_file` (Blender scene to scene file), `volume` (sequence to Volume object), `look` (its material), `directing`
   (what acts on the smoke after its clip), `shot_setup` (camera, world and light that match the clip), `compositing`
   (smoke over the clip), `projection` (the clip's background on a card), `plate` (the clean plate for these three),
-  `instances` (the smoke at other times), `undistort` (the clip without its lens's distortion).
+  `instances` (the smoke at other times), `nodes` (the node
+  groups of these), `undistort` (the clip without its lens's distortion).
 - Work beside Blender: `run` (the queue of takes), `shot_check` (the forecast of a run), `batch` (the command line).
 - Interface: `properties` (the settings); `panel` with the sub-panels `results_panel`, `advanced_panel`, `look_panel`,
   `setup_panel`, `direct_panel` and `export`, each with its buttons (`subpanel` is what they share); other buttons in

@@ -10,6 +10,7 @@ from typing import Any
 import bpy
 from mathutils import Matrix, Vector
 
+from .nodes import Input, feed, new_group, own_group
 from .plate import plate_image, play_beside
 from .scene_file import engine_to_world
 from .smoke import scene_of
@@ -35,6 +36,21 @@ GRAIN_PIXELS = 4
 
 LARGEST_DIFFERENCE = 0.05
 """Between clip and plate, blurred (linear light): beyond it the clip shows smoke, whose detail is no grain."""
+
+_INPUTS = (
+    Input("Render", "NodeSocketColor", "The smoke on transparent film", (0.0, 0.0, 0.0, 0.0)),
+    Input(
+        "Plate",
+        "NodeSocketColor",
+        "What is behind the smoke: the clean plate, or another clip",
+        (0.0, 0.0, 0.0, 1.0),
+    ),
+    Input(
+        "Clip", "NodeSocketColor", "The clip, from which the grain and the foreground are taken", (0.0, 0.0, 0.0, 1.0)
+    ),
+    Input("Foreground", "NodeSocketFloat", "Mask of what is in front of the smoke in the clip", 0.0, 0.0, 1.0),
+    Input("Grain", "NodeSocketFloat", "Strength of the clip's grain on plate and smoke; 0 is none", 1.0, 0.0, 10.0),
+)
 
 SINCE_5 = bpy.app.version >= (5, 0, 0)
 """Blender 5.0 makes the compositor of node groups, and gives it the shaders' Mix node."""
@@ -171,33 +187,15 @@ def _source(
 
 def _group() -> bpy.types.NodeTree:
     """The node group: the file's own, which the artist may have changed, else a new one."""
-    for known in bpy.data.node_groups:
-        if known.library is None and known.get(MARK):
-            return known
-    tree = bpy.data.node_groups.new(GROUP, "CompositorNodeTree")
-    tree[MARK] = True
-    for name, kind, default, description in (
-        ("Render", "NodeSocketColor", (0.0, 0.0, 0.0, 0.0), "The smoke on transparent film"),
-        (
-            "Plate",
-            "NodeSocketColor",
-            (0.0, 0.0, 0.0, 1.0),
-            "What is behind the smoke: the clean plate, or another clip",
-        ),
-        (
-            "Clip",
-            "NodeSocketColor",
-            (0.0, 0.0, 0.0, 1.0),
-            "The clip, from which the grain and the foreground are taken",
-        ),
-        ("Foreground", "NodeSocketFloat", 0.0, "Mask of what is in front of the smoke in the clip"),
-        ("Grain", "NodeSocketFloat", 1.0, "Strength of the clip's grain on plate and smoke; 0 is none"),
-    ):
-        socket = tree.interface.new_socket(name, description=description, in_out="INPUT", socket_type=kind)
-        if kind == "NodeSocketFloat":
-            socket.min_value, socket.max_value = 0.0, 1.0 if name == "Foreground" else 10.0
-        socket.default_value = default
-    tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
+    tree = own_group(MARK)
+    if tree is None:
+        tree = new_group(GROUP, "CompositorNodeTree", MARK, _INPUTS, [("Image", "NodeSocketColor")])
+        _build(tree)
+    return tree
+
+
+def _build(tree: bpy.types.NodeTree) -> None:
+    """Make the group's nodes: the render over the plate, with the clip's grain, and the clip's foreground over both."""
     given, output = tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
     source = given.outputs
     over = tree.nodes.new("CompositorNodeAlphaOver")
@@ -205,8 +203,20 @@ def _group() -> bpy.types.NodeTree:
     plate, clip = _at_render_size(tree, source["Plate"]), _at_render_size(tree, source["Clip"])
     tree.links.new(plate, below)
     tree.links.new(source["Render"], above)
-    # the plate has no grain, and the same edges as the clip: what is left of their difference without its blur
-    # is the clip's own grain, frame by frame
+    grain = _grain(tree, clip, plate)
+    grainy = _mix(tree, "ADD", source["Grain"], over.outputs["Image"], grain)
+    front = _mix(tree, "MIX", source["Foreground"], grainy, clip)
+    tree.links.new(front, output.inputs[0])
+    for place, node in enumerate(tree.nodes):
+        node.location = (0.0, 0.0) if node == given else (220.0 * (len(tree.nodes) if node == output else place), 0.0)
+
+
+def _grain(tree: bpy.types.NodeTree, clip: bpy.types.NodeSocket, plate: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
+    """The clip's own grain, frame by frame.
+
+    The plate has no grain, and the same edges as the clip: their difference less its blur is grain. Where the blurred
+    difference is large the clip shows smoke, and the grain fades out.
+    """
     differs = _mix(tree, "SUBTRACT", 1.0, clip, plate)
     blurred = _blurred(tree, differs)
     fine = _mix(tree, "SUBTRACT", 1.0, differs, blurred)
@@ -214,13 +224,7 @@ def _group() -> bpy.types.NodeTree:
     ratio = _mix(tree, "MULTIPLY", 1.0, blurred, steep)
     smoky = _mix(tree, "MULTIPLY", 1.0, ratio, ratio)
     clear = _mix(tree, "SUBTRACT", 1.0, (1.0, 1.0, 1.0, 1.0), smoky, clamp=True)
-    grain = _mix(tree, "MULTIPLY", 1.0, fine, clear)
-    grainy = _mix(tree, "ADD", source["Grain"], over.outputs["Image"], grain)
-    front = _mix(tree, "MIX", source["Foreground"], grainy, clip)
-    tree.links.new(front, output.inputs[0])
-    for place, node in enumerate(tree.nodes):
-        node.location = (0.0, 0.0) if node == given else (220.0 * (len(tree.nodes) if node == output else place), 0.0)
-    return tree
+    return _mix(tree, "MULTIPLY", 1.0, fine, clear)
 
 
 def _at_render_size(tree: bpy.types.NodeTree, picture: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
@@ -250,10 +254,7 @@ def _mix(
         sockets, result = list(node.inputs), node.outputs[0]
     node.blend_type = blend
     for socket, value in zip(sockets, (factor, a, b), strict=True):
-        if isinstance(value, bpy.types.NodeSocket):
-            tree.links.new(value, socket)
-        else:
-            socket.default_value = value
+        feed(tree, socket, value)
     return result
 
 

@@ -15,7 +15,7 @@ from bpy.props import BoolProperty, EnumProperty, PointerProperty, StringPropert
 
 from . import preferences, smoke_takes, volume
 from .contract import ASSET_FILE, EXPORT_FILE, FRAME_FILE, PROXY_FILE
-from .instances import copy_of, gather, scatter
+from .instances import copy_of, remove_scattered, scatter
 from .job import EngineMissingError, Job, engine_command
 from .needs import NeedsResult
 from .panel import draw_text
@@ -181,7 +181,7 @@ def write_asset(smoke: bpy.types.Object, folder: Path) -> None:
             asset.asset_data.description = volume.provenance_note(smoke)
         bpy.data.libraries.write(str(folder / ASSET_FILE), {copy, points}, path_remap="RELATIVE_ALL", compress=True)
     finally:
-        gather(points)
+        remove_scattered(points)
         _remove(copy)
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty, IntProperty
 
+from .nodes import Input, add_node, feed, new_group, own_group
 from .paths import absolute, relative
 
 GROUP = "Smokelift Instances"
@@ -19,6 +20,24 @@ MARK = "smokelift_instances"
 
 OFFSET = "time_offset"
 """Attribute of the points: frames by which the instance plays later."""
+
+_INPUTS = (
+    Input(
+        "Points",
+        "NodeSocketGeometry",
+        "Where instances stand; the attribute time_offset says by how many frames each plays later",
+    ),
+    Input("Times", "NodeSocketCollection", "Volumes that play the same files, each later than the one before"),
+    Input("Frames Apart", "NodeSocketInt", "Frames from one of the times to the next", default=1, low=1),
+    Input(
+        "Random Offset",
+        "NodeSocketInt",
+        "Frames by which an instance plays later at random, at most; added to time_offset",
+        default=0,
+        low=0,
+    ),
+    Input("Seed", "NodeSocketInt", "Another seed makes other random offsets", default=0, low=0),
+)
 
 APART = 1.1
 """Distance of the first points over the width of the smoke."""
@@ -31,7 +50,7 @@ def copy_of(obj: bpy.types.Object, name: str) -> bpy.types.Object:
     return copy
 
 
-def later(obj: bpy.types.Object, name: str, offset: int, repeat: bool) -> bpy.types.Object:
+def copy_later(obj: bpy.types.Object, name: str, offset: int, repeat: bool) -> bpy.types.Object:
     """A copy of a Volume object that plays some frames later; again and again if it repeats or the original does."""
     copy = copy_of(obj, name)
     if obj.data.library is not None:
@@ -61,7 +80,7 @@ def scatter(obj: bpy.types.Object, width: float, count: int, step: int, repeat: 
     times = bpy.data.collections.new(f"{obj.name} Times")
     for number in range(count):
         # the node for collections counts objects in the order of their names
-        copy = later(obj, f"{obj.name} {number * step:05d}", number * step, repeat)
+        copy = copy_later(obj, f"{obj.name} {number * step:05d}", number * step, repeat)
         copy.location = (0.0, 0.0, 0.0)
         times.objects.link(copy)
     apart = APART * (width or 1.0)
@@ -87,7 +106,7 @@ def set_input(points: bpy.types.Object, name: str, value: Any) -> None:
         modifier[key] = value
 
 
-def gather(points: bpy.types.Object) -> None:
+def remove_scattered(points: bpy.types.Object) -> None:
     """Remove what `scatter` made."""
     modifier = points.modifiers[GROUP]
     key, group = modifier.node_group.interface.items_tree["Times"].identifier, modifier.node_group
@@ -102,49 +121,25 @@ def gather(points: bpy.types.Object) -> None:
 
 def _group() -> bpy.types.NodeTree:
     """The node group: the file's own, which the artist may have changed, else a new one."""
-    for known in bpy.data.node_groups:
-        if known.library is None and known.get(MARK):
-            return known
-    tree = bpy.data.node_groups.new(GROUP, "GeometryNodeTree")
-    tree[MARK] = True
-    tree.is_modifier = True
-    for name, kind, default, description in (
-        (
-            "Points",
-            "NodeSocketGeometry",
-            None,
-            "Where instances stand; the attribute time_offset says by how many frames each plays later",
-        ),
-        ("Times", "NodeSocketCollection", None, "Volumes that play the same files, each later than the one before"),
-        ("Frames Apart", "NodeSocketInt", 1, "Frames from one of the times to the next"),
-        (
-            "Random Offset",
-            "NodeSocketInt",
-            0,
-            "Frames by which an instance plays later at random, at most; added to time_offset",
-        ),
-        ("Seed", "NodeSocketInt", 0, "Another seed makes other random offsets"),
-    ):
-        socket = tree.interface.new_socket(name, description=description, in_out="INPUT", socket_type=kind)
-        if default is not None:
-            socket.default_value, socket.min_value = default, default
-    tree.interface.new_socket("Instances", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    tree = own_group(MARK)
+    if tree is None:
+        tree = new_group(GROUP, "GeometryNodeTree", MARK, _INPUTS, [("Instances", "NodeSocketGeometry")])
+        tree.is_modifier = True
+        _build(tree)
+    return tree
+
+
+def _build(tree: bpy.types.NodeTree) -> None:
+    """Make the group's nodes: the offset of each point, counted in Frames Apart, picks its Volume."""
     given, output = tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
     source = given.outputs
 
     def new(kind: str, column: int, row: int, inputs: dict[str | int, Any], **settings: Any) -> bpy.types.NodeSocket:
-        """A node with inputs by name or place; returns its first output. Which there are depends on its settings."""
-        node = tree.nodes.new(kind)
-        node.location = (200.0 * column, -200.0 * row)
-        for name, value in settings.items():
-            setattr(node, name, value)
+        """A node with inputs by name or number; returns its first output. Which there are depends on its settings."""
+        node = add_node(tree, kind, column, row, **settings)
         sockets = [socket for socket in node.inputs if socket.enabled]
         for key, value in inputs.items():
-            socket = sockets[key] if isinstance(key, int) else next(each for each in sockets if each.name == key)
-            if isinstance(value, bpy.types.NodeSocket):
-                tree.links.new(value, socket)
-            else:
-                socket.default_value = value
+            feed(tree, sockets[key] if isinstance(key, int) else next(s for s in sockets if s.name == key), value)
         return next(socket for socket in node.outputs if socket.enabled)
 
     def frames(operation: str, column: int, a: Any, b: Any) -> bpy.types.NodeSocket:
@@ -160,7 +155,6 @@ def _group() -> bpy.types.NodeTree:
     placed = new("GeometryNodeInstanceOnPoints", 4, 0, chosen)
     tree.links.new(placed, output.inputs[0])
     given.location, output.location = (-100.0, 0.0), (1000.0, 0.0)
-    return tree
 
 
 def _activate(context: bpy.types.Context, obj: bpy.types.Object) -> None:
@@ -197,7 +191,7 @@ class SMOKELIFT_OT_add_instance(_NeedsSequence, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         obj = context.object
-        instance = later(obj, obj.name, self.offset, self.repeat)
+        instance = copy_later(obj, obj.name, self.offset, self.repeat)
         context.collection.objects.link(instance)
         _activate(context, instance)
         return {"FINISHED"}

@@ -11,6 +11,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from .kept import set_and_remember, set_unless_changed
+from .nodes import Input, add_node, new_group, own_group
 
 NODE = "Smokelift"
 """Name of the node that holds the values; a material without it is the artist's own."""
@@ -63,84 +64,73 @@ PRESETS = {
     "STEAM": (
         "Steam",
         "White and thin, gone at its edges, bright against the light",
-        Look(0.6, 100.0, edge_contrast=1.5, anisotropy=0.25),
+        Look(density=0.6, brightness=100.0, edge_contrast=1.5, anisotropy=0.25),
     ),
-    "SOOT": ("Soot", "Black and thick", Look(2.5, color=(0.05, 0.045, 0.04))),
+    "SOOT": ("Soot", "Black and thick", Look(density=2.5, color=(0.05, 0.045, 0.04))),
     "DUST": (
         "Dust",
         "The color of sand, which reddens the light that passes through",
-        Look(1.2, color=(0.7, 0.55, 0.4), edge_contrast=1.4, absorption_color=(0.25, 0.1, 0.03)),
+        Look(density=1.2, color=(0.7, 0.55, 0.4), edge_contrast=1.4, absorption_color=(0.25, 0.1, 0.03)),
     ),
-    "MIST": ("Mist", "White, thin and without edges", Look(0.3, 100.0, edge_contrast=0.3, anisotropy=0.25)),
+    "MIST": (
+        "Mist",
+        "White, thin and without edges",
+        Look(density=0.3, brightness=100.0, edge_contrast=0.3, anisotropy=0.25),
+    ),
 }
 """Name, description and look of each preset."""
 
 CONTROLS = (*Look().inputs(), "Anisotropy")
 """Names of the inputs that the tab shows."""
 
-# name, type, default, lowest and highest value, description
 _INPUTS = (
-    ("Density", "NodeSocketFloat", 1.0, 0.0, 1e6, "Times what was fitted to the clip"),
-    (
+    Input("Density", "NodeSocketFloat", "Times what was fitted to the clip", 1.0, 0.0, 1e6),
+    Input(
         "Brightness",
         "NodeSocketFloat",
+        "Below 1 darker; above 1 the share of light that the smoke absorbs is divided by this",
         1.0,
         0.0,
         1e3,
-        "Below 1 darker; above 1 the share of light that the smoke absorbs is divided by this",
     ),
-    (
-        "Color",
-        "NodeSocketColor",
-        (1.0, 1.0, 1.0, 1.0),
-        None,
-        None,
-        "Times the albedo: the color of the smoke in white light",
+    Input("Color", "NodeSocketColor", "Times the albedo: the color of the smoke in white light", (1.0, 1.0, 1.0, 1.0)),
+    Input("Edge Contrast", "NodeSocketFloat", "Above 1 thin smoke gets thinner, below 1 thicker", 1.0, 0.0, 10.0),
+    Input(
+        "Absorption Color", "NodeSocketColor", "Color of the light that gets through the smoke", (0.0, 0.0, 0.0, 1.0)
     ),
-    ("Edge Contrast", "NodeSocketFloat", 1.0, 0.0, 10.0, "Above 1 thin smoke gets thinner, below 1 thicker"),
-    (
-        "Absorption Color",
-        "NodeSocketColor",
-        (0.0, 0.0, 0.0, 1.0),
-        None,
-        None,
-        "Color of the light that gets through the smoke",
-    ),
-    ("Anisotropy", "NodeSocketFloat", 0.0, -1.0, 1.0, "Forward scattering above 0, backward below; fitted"),
-    ("Extinction", "NodeSocketFloat", 1.0, 0.0, 1e9, "Per metre of smoke of density 1; fitted to the clip"),
-    ("Albedo", "NodeSocketColor", (0.9, 0.9, 0.9, 1.0), None, None, "Scattered share of the extinction; fitted"),
-    (
+    Input("Anisotropy", "NodeSocketFloat", "Forward scattering above 0, backward below; fitted", 0.0, -1.0, 1.0),
+    Input("Extinction", "NodeSocketFloat", "Per metre of smoke of density 1; fitted to the clip", 1.0, 0.0, 1e9),
+    Input("Albedo", "NodeSocketColor", "Scattered share of the extinction; fitted", (0.9, 0.9, 0.9, 1.0)),
+    Input(
         "Edge Density",
         "NodeSocketFloat",
+        "Density below which smoke counts as thin: where Edge Contrast changes it",
         0.1,
         1e-9,
         1e9,
-        "Density below which smoke counts as thin: where Edge Contrast changes it",
     ),
-    (
+    Input(
         "Flame Strength",
         "NodeSocketFloat",
+        "Times the light of the grid flame, if there is one; 1 is as bright as in the clip",
         1.0,
         0.0,
         1e6,
-        "Times the light of the grid flame, if there is one; 1 is as bright as in the clip",
     ),
-    (
+    Input(
         "Flame Color",
         "NodeSocketColor",
-        (1.0, 0.35, 0.08, 1.0),
-        None,
-        None,
         "Color of the light of the grid flame; fitted to the clip",
+        (1.0, 0.35, 0.08, 1.0),
     ),
-    ("Blackbody Intensity", "NodeSocketFloat", 1.0, 0.0, 1.0, "Glow of the grid temperature, if there is one"),
-    (
+    Input("Blackbody Intensity", "NodeSocketFloat", "Glow of the grid temperature, if there is one", 1.0, 0.0, 1.0),
+    Input(
         "Temperature",
         "NodeSocketFloat",
+        "Kelvin that a value of 1 in the grid temperature stands for",
         BLACKBODY_KELVIN,
         0.0,
         1e5,
-        "Kelvin that a value of 1 in the grid temperature stands for",
     ),
 )
 
@@ -214,7 +204,7 @@ def upgrade(material: bpy.types.Material) -> None:
     """
     tree = material.node_tree
     old = tree.nodes.get(NODE) if tree is not None and material.library is None else None
-    if old is None or old.type != "PRINCIPLED_VOLUME" or not _plain(old):
+    if old is None or old.type != "PRINCIPLED_VOLUME" or not _is_default(old):
         return
     node = _add_group(tree)
     node.location = old.location
@@ -233,7 +223,7 @@ def upgrade(material: bpy.types.Material) -> None:
     node.name = node.label = NODE
 
 
-def _plain(shader: bpy.types.ShaderNode) -> bool:
+def _is_default(shader: bpy.types.ShaderNode) -> bool:
     """Whether a Principled Volume has only values that our group takes over."""
     if any(socket.is_linked for socket in shader.inputs):
         return False
@@ -269,90 +259,81 @@ def _add_group(tree: bpy.types.NodeTree) -> bpy.types.ShaderNode:
 
 def _group() -> bpy.types.NodeTree:
     """The node group: the file's own, which the artist may have changed, else a new one."""
-    for known in bpy.data.node_groups:
-        if known.library is None and known.get(MARK):
-            return known
-    tree = bpy.data.node_groups.new(GROUP, "ShaderNodeTree")
-    tree[MARK] = True
-    for name, kind, default, low, high, description in _INPUTS:
-        socket = tree.interface.new_socket(name, description=description, in_out="INPUT", socket_type=kind)
-        if low is not None:
-            socket.min_value, socket.max_value = low, high
-        socket.default_value = default
-    tree.interface.new_socket("Volume", in_out="OUTPUT", socket_type="NodeSocketShader")
-    _connect(tree)
+    tree = own_group(MARK)
+    if tree is None:
+        tree = new_group(GROUP, "ShaderNodeTree", MARK, _INPUTS, [("Volume", "NodeSocketShader")])
+        _build(tree)
     return tree
 
 
-def _connect(tree: bpy.types.NodeTree) -> None:
-    """Make the group's nodes."""
-    given = tree.nodes.new("NodeGroupInput")
-    source = given.outputs
+class _Formulas:
+    """Adds nodes that compute, at places (column, row), and gives their results."""
 
-    def new(kind: str, column: int, row: int, *inputs: Any, **settings: Any) -> bpy.types.ShaderNode:
-        node = tree.nodes.new(kind)
-        node.location = (200.0 * column, -200.0 * row)
-        for name, value in settings.items():
-            setattr(node, name, value)
-        for place, value in enumerate(inputs):
-            if isinstance(value, bpy.types.NodeSocket):
-                tree.links.new(value, node.inputs[place])
-            else:
-                node.inputs[place].default_value = value
-        return node
+    def __init__(self, tree: bpy.types.NodeTree) -> None:
+        self._tree = tree
 
-    def grid(name: str, row: int) -> bpy.types.NodeSocket:
-        return new("ShaderNodeAttribute", 0, row, attribute_name=name).outputs["Fac"]
+    def grid(self, name: str, row: int) -> bpy.types.NodeSocket:
+        """The values of a grid of the Volume; 0 where it has none of that name."""
+        return add_node(self._tree, "ShaderNodeAttribute", 0, row, attribute_name=name).outputs["Fac"]
 
-    def math(operation: str, column: int, row: int, a: Any, b: Any) -> bpy.types.NodeSocket:
-        return new("ShaderNodeMath", column, row, a, b, operation=operation).outputs[0]
+    def math(self, operation: str, column: int, row: int, a: Any, b: Any) -> bpy.types.NodeSocket:
+        """A number of two numbers."""
+        return add_node(self._tree, "ShaderNodeMath", column, row, a, b, operation=operation).outputs[0]
 
-    def vector(operation: str, column: int, row: int, a: Any, b: Any) -> bpy.types.NodeSocket:
-        return new("ShaderNodeVectorMath", column, row, a, b, operation=operation).outputs["Vector"]
-
-    def scaled(column: int, row: int, a: Any, factor: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
-        node = new("ShaderNodeVectorMath", column, row, a, operation="SCALE")
-        tree.links.new(factor, node.inputs["Scale"])
+    def vector(self, operation: str, column: int, row: int, a: Any, b: Any) -> bpy.types.NodeSocket:
+        """A vector of two vectors."""
+        node = add_node(self._tree, "ShaderNodeVectorMath", column, row, a, b, operation=operation)
         return node.outputs["Vector"]
 
-    # extinction: density x min(density / edge density, 1) ^ (edge contrast - 1)
-    density = grid("density", 0)
-    ratio = math("DIVIDE", 1, 0, density, source["Edge Density"])
-    thin = math("MAXIMUM", 2, 0, math("MINIMUM", 1, 1, ratio, 1.0), LEAST_RATIO)
-    shape = math("POWER", 3, 0, thin, math("SUBTRACT", 2, 1, source["Edge Contrast"], 1.0))
-    amount = math("MULTIPLY", 3, 1, source["Extinction"], source["Density"])
-    extinction = math("MULTIPLY", 5, 0, math("MULTIPLY", 4, 0, density, shape), amount)
+    def scaled(self, column: int, row: int, a: Any, factor: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
+        """A vector times a number."""
+        node = add_node(self._tree, "ShaderNodeVectorMath", column, row, a, operation="SCALE")
+        self._tree.links.new(factor, node.inputs["Scale"])
+        return node.outputs["Vector"]
 
-    # albedo: 1 - (1 - a min(brightness, 1)) / max(brightness, 1), which stays between black and white
-    white = (1.0, 1.0, 1.0)
-    tinted = vector("MULTIPLY", 1, 3, source["Albedo"], source["Color"])
-    darker = scaled(2, 3, tinted, math("MINIMUM", 1, 4, source["Brightness"], 1.0))
-    share = math("DIVIDE", 2, 5, 1.0, math("MAXIMUM", 1, 5, source["Brightness"], 1.0))
-    absorbed = scaled(4, 3, vector("SUBTRACT", 3, 3, white, darker), share)
-    albedo = vector("SUBTRACT", 5, 3, white, absorbed)
 
-    # light of its own: an attribute without a grid is 0
-    flame = math("MULTIPLY", 1, 7, grid("flame", 7), source["Flame Strength"])
-    kelvin = math("MULTIPLY", 1, 8, grid("temperature", 8), source["Temperature"])
-
-    shader = new("ShaderNodeVolumePrincipled", 6, 0)
-    for name in ("Density Attribute", "Color Attribute", "Temperature Attribute"):
-        shader.inputs[name].default_value = ""
+def _build(tree: bpy.types.NodeTree) -> None:
+    """Make the group's nodes."""
+    given = tree.nodes.new("NodeGroupInput")
+    given.location = (-200.0, -600.0)
+    source, formulas = given.outputs, _Formulas(tree)
     feeds = {
-        "Density": extinction,
-        "Color": albedo,
+        "Density": _extinction(formulas, source),
+        "Color": _albedo(formulas, source),
         "Absorption Color": source["Absorption Color"],
         "Anisotropy": source["Anisotropy"],
-        "Emission Strength": flame,
+        "Emission Strength": formulas.math("MULTIPLY", 1, 7, formulas.grid("flame", 7), source["Flame Strength"]),
         "Emission Color": source["Flame Color"],
         "Blackbody Intensity": source["Blackbody Intensity"],
-        "Temperature": kelvin,
+        "Temperature": formulas.math("MULTIPLY", 1, 8, formulas.grid("temperature", 8), source["Temperature"]),
     }
+    shader = add_node(tree, "ShaderNodeVolumePrincipled", 6, 0)
+    for name in ("Density Attribute", "Color Attribute", "Temperature Attribute"):
+        shader.inputs[name].default_value = ""
     for name, socket in feeds.items():
         tree.links.new(socket, shader.inputs[name])
-    given.location = (-200.0, -600.0)
-    output = new("NodeGroupOutput", 8, 0)
-    tree.links.new(shader.outputs[0], output.inputs[0])
+    add_node(tree, "NodeGroupOutput", 8, 0, shader.outputs[0])
+
+
+def _extinction(formulas: _Formulas, source: Any) -> bpy.types.NodeSocket:
+    """The extinction times density x min(density / edge density, 1) ^ (edge contrast - 1)."""
+    density = formulas.grid("density", 0)
+    ratio = formulas.math("DIVIDE", 1, 0, density, source["Edge Density"])
+    thin = formulas.math("MAXIMUM", 2, 0, formulas.math("MINIMUM", 1, 1, ratio, 1.0), LEAST_RATIO)
+    exponent = formulas.math("SUBTRACT", 2, 1, source["Edge Contrast"], 1.0)
+    shape = formulas.math("POWER", 3, 0, thin, exponent)
+    amount = formulas.math("MULTIPLY", 3, 1, source["Extinction"], source["Density"])
+    return formulas.math("MULTIPLY", 5, 0, formulas.math("MULTIPLY", 4, 0, density, shape), amount)
+
+
+def _albedo(formulas: _Formulas, source: Any) -> bpy.types.NodeSocket:
+    """1 - (1 - a min(brightness, 1)) / max(brightness, 1) of the tinted albedo a: it stays between black and white."""
+    white = (1.0, 1.0, 1.0)
+    tinted = formulas.vector("MULTIPLY", 1, 3, source["Albedo"], source["Color"])
+    darker = formulas.scaled(2, 3, tinted, formulas.math("MINIMUM", 1, 4, source["Brightness"], 1.0))
+    share = formulas.math("DIVIDE", 2, 5, 1.0, formulas.math("MAXIMUM", 1, 5, source["Brightness"], 1.0))
+    absorbed = formulas.scaled(4, 3, formulas.vector("SUBTRACT", 3, 3, white, darker), share)
+    return formulas.vector("SUBTRACT", 5, 3, white, absorbed)
 
 
 @persistent

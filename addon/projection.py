@@ -10,6 +10,7 @@ import bpy
 from mathutils import Matrix, Vector
 
 from .kept import set_unless_changed
+from .nodes import Input, add_node, new_group, own_group
 from .plate import play_beside, show_plate
 from .scene_file import engine_to_world
 from .smoke import scene_of
@@ -27,6 +28,13 @@ PROJECTOR = "Smokelift Projector"
 
 CARD = "Smokelift Card"
 """Name of the plane that the plate is projected on."""
+
+_INPUTS = (
+    Input("Point", "NodeSocketVector", "A point in the space of the camera that filmed"),
+    Input("Focal Length", "NodeSocketVector", "Focal length over the width and over the height of the picture"),
+    Input("Center", "NodeSocketVector", "Center of the lens in the picture, from 0 to 1"),
+    Input("Perspective", "NodeSocketFloat", "1 for a perspective camera, 0 for an orthographic one"),
+)
 
 CARD_BEHIND = 1.1
 """Distance of the card from the projector over that of the box's farthest corner."""
@@ -180,46 +188,23 @@ def _new_material() -> bpy.types.Material:
 
 def _group() -> bpy.types.NodeTree:
     """The node group that finds a point in the plate: the own one of the file, which may be changed, else a new one."""
-    for known in bpy.data.node_groups:
-        if known.library is None and known.get(MARK):
-            return known
-    tree = bpy.data.node_groups.new(MATERIAL, "ShaderNodeTree")
-    tree[MARK] = True
-    for name, kind, description in (
-        ("Point", "NodeSocketVector", "A point in the space of the camera that filmed"),
-        ("Focal Length", "NodeSocketVector", "Focal length over the width and over the height of the picture"),
-        ("Center", "NodeSocketVector", "Center of the lens in the picture, from 0 to 1"),
-        ("Perspective", "NodeSocketFloat", "1 for a perspective camera, 0 for an orthographic one"),
-    ):
-        tree.interface.new_socket(name, description=description, in_out="INPUT", socket_type=kind)
-    tree.interface.new_socket("Vector", in_out="OUTPUT", socket_type="NodeSocketVector")
-    tree.interface.new_socket("In Front", in_out="OUTPUT", socket_type="NodeSocketFloat")
-    given, output = tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
-    source = given.outputs
-
-    def new(kind: str, column: int, *inputs: Any, **settings: Any) -> bpy.types.ShaderNode:
-        node = tree.nodes.new(kind)
-        node.location = (200.0 * column, 0.0)
-        for name, value in settings.items():
-            setattr(node, name, value)
-        for place, value in enumerate(inputs):
-            if isinstance(value, bpy.types.NodeSocket):
-                tree.links.new(value, node.inputs[place])
-            else:
-                node.inputs[place].default_value = value
-        return node
-
-    # center + focal length x (point / depth): a camera looks along its -Z axis
-    depth = new("ShaderNodeMath", 2, new("ShaderNodeSeparateXYZ", 1, source["Point"]).outputs["Z"], -1.0)
-    depth.operation = "MULTIPLY"
-    spread = new("ShaderNodeMath", 3, depth.outputs[0], source["Perspective"], operation="POWER")
-    seen = new("ShaderNodeVectorMath", 4, source["Point"], operation="DIVIDE")
-    tree.links.new(spread.outputs[0], seen.inputs[1])
-    placed = new("ShaderNodeVectorMath", 5, seen.outputs[0], source["Focal Length"], source["Center"])
-    placed.operation = "MULTIPLY_ADD"
-    front = new("ShaderNodeMath", 5, depth.outputs[0], 0.0, operation="GREATER_THAN")
-    front.location.y = -250.0
-    tree.links.new(placed.outputs[0], output.inputs["Vector"])
-    tree.links.new(front.outputs[0], output.inputs["In Front"])
-    given.location, output.location = (0.0, 0.0), (1200.0, 0.0)
+    tree = own_group(MARK)
+    if tree is None:
+        outputs = [("Vector", "NodeSocketVector"), ("In Front", "NodeSocketFloat")]
+        tree = new_group(MATERIAL, "ShaderNodeTree", MARK, _INPUTS, outputs)
+        _build(tree)
     return tree
+
+
+def _build(tree: bpy.types.NodeTree) -> None:
+    """Make the nodes of center + focal length x (point / depth); a camera looks along its -Z axis."""
+    source = add_node(tree, "NodeGroupInput", 0, 0).outputs
+    z = add_node(tree, "ShaderNodeSeparateXYZ", 1, 0, source["Point"]).outputs["Z"]
+    depth = add_node(tree, "ShaderNodeMath", 2, 0, z, -1.0, operation="MULTIPLY").outputs[0]
+    # depth ^ 0 = 1 for an orthographic camera
+    divisor = add_node(tree, "ShaderNodeMath", 3, 0, depth, source["Perspective"], operation="POWER").outputs[0]
+    slope = add_node(tree, "ShaderNodeVectorMath", 4, 0, source["Point"], divisor, operation="DIVIDE").outputs[0]
+    factors = (slope, source["Focal Length"], source["Center"])
+    point = add_node(tree, "ShaderNodeVectorMath", 5, 0, *factors, operation="MULTIPLY_ADD")
+    in_front = add_node(tree, "ShaderNodeMath", 5, 1.25, depth, 0.0, operation="GREATER_THAN")
+    add_node(tree, "NodeGroupOutput", 6, 0, point.outputs[0], in_front.outputs[0])

@@ -127,8 +127,8 @@ def test_all_share_one_group_and_nothing_is_left(shown) -> None:
     bpy.context.view_layer.objects.active = shown
     second = scattered(count=3)
     assert first.modifiers[0].node_group == second.modifiers[0].node_group
-    instances.gather(first)
-    instances.gather(second)
+    instances.remove_scattered(first)
+    instances.remove_scattered(second)
     assert [len(kind) for kind in kinds] == before
 
 

@@ -1,0 +1,82 @@
+"""Node groups that the add-on makes: their sockets, and the nodes in them."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import bpy
+
+SPACING = 200.0
+"""From one column or row of nodes to the next."""
+
+
+class Input(NamedTuple):
+    """An input of a node group; what is None stays as Blender has it."""
+
+    name: str
+    kind: str
+    description: str
+    default: Any = None
+    low: float | None = None
+    high: float | None = None
+
+
+def own_group(mark: str) -> bpy.types.NodeTree | None:
+    """The file's own node group with a mark, which the artist may have renamed or changed; None if there is none."""
+    return next((group for group in bpy.data.node_groups if group.library is None and group.get(mark)), None)
+
+
+def new_group(
+    name: str, kind: str, mark: str, inputs: Sequence[Input], outputs: Sequence[tuple[str, str]]
+) -> bpy.types.NodeTree:
+    """A new node group without nodes.
+
+    Parameters
+    ----------
+    name, kind
+        Its name, and the type of its tree.
+    mark
+        Custom property by which `own_group` finds it under any name.
+    inputs, outputs
+        Its sockets; of the outputs name and type.
+    """
+    tree = bpy.data.node_groups.new(name, kind)
+    tree[mark] = True
+    for item in inputs:
+        socket = tree.interface.new_socket(
+            item.name, description=item.description, in_out="INPUT", socket_type=item.kind
+        )
+        for attribute, value in (("min_value", item.low), ("max_value", item.high), ("default_value", item.default)):
+            if value is not None:
+                setattr(socket, attribute, value)
+    for output, output_kind in outputs:
+        tree.interface.new_socket(output, in_out="OUTPUT", socket_type=output_kind)
+    return tree
+
+
+def add_node(
+    tree: bpy.types.NodeTree, kind: str, column: float, row: float, *inputs: Any, **settings: Any
+) -> bpy.types.Node:
+    """Add a node at a place of the grid that `SPACING` makes.
+
+    Parameters
+    ----------
+    inputs
+        What feeds its first inputs, in their order: sockets of other nodes, or values.
+    settings
+        Values of its attributes, which are set before the inputs.
+    """
+    node = tree.nodes.new(kind)
+    node.location = (SPACING * column, -SPACING * row)
+    for name, value in settings.items():
+        setattr(node, name, value)
+    for number, value in enumerate(inputs):
+        feed(tree, node.inputs[number], value)
+    return node
+
+
+def feed(tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket, value: Any) -> None:
+    """Link an input to a socket, or set it to a value."""
+    if isinstance(value, bpy.types.NodeSocket):
+        tree.links.new(value, socket)
+    else:
+        socket.default_value = value
