@@ -24,12 +24,12 @@ from smokelift_command import Termination
 
 DONE, BAD_INPUT, NO_DEVICE, CANCELLED = 0, 2, 3, 130
 
-_PASSING = {
+_TRANSIENT = {
     getattr(errno, name)
     for name in ("ENOSPC", "EDQUOT", "EIO", "ESTALE", "ETIMEDOUT", "EHOSTDOWN", "EHOSTUNREACH", "ENOTCONN")
     if hasattr(errno, name)  # some systems lack some
 }
-"""Failures of a storage: it is full, or its server is away."""
+"""Errors of a storage that pass: it is full, or its server is away."""
 
 MOST_THREADS = 1024
 """As a guard against a number that no processor has."""
@@ -84,19 +84,19 @@ def _run(options: argparse.Namespace, hint: str) -> int:
     except OutputError:
         raise
     except (DeviceError, MemoryError) as error:
-        lacking = isinstance(error, MemoryError)
-        say.fail(str(error) or "Out of memory; choose a lower --resolution.", NO_DEVICE, later=lacking)
+        out_of_memory = isinstance(error, MemoryError)
+        say.fail(str(error) or "Out of memory; choose a lower --resolution.", NO_DEVICE, retryable=out_of_memory)
         return NO_DEVICE
     except (ValueError, VdbUnavailable, OSError, RuntimeError) as error:
         # the system's limits: ulimit -v, ulimit -u
         if getattr(error, "errno", None) in (errno.EAGAIN, errno.ENOMEM) or "start new thread" in str(error):
             say.fail(
-                f"The system gives no more memory or threads ({error}); end other programs.", NO_DEVICE, later=True
+                f"The system gives no more memory or threads ({error}); end other programs.", NO_DEVICE, retryable=True
             )
             return NO_DEVICE
         if isinstance(error, RuntimeError) and not isinstance(error, VdbUnavailable):
             raise
-        say.fail(_sentence(error), BAD_INPUT, later=_passes(error))
+        say.fail(_sentence(error), BAD_INPUT, retryable=_is_transient(error))
         return BAD_INPUT
     return DONE
 
@@ -109,10 +109,10 @@ def _sentence(error: Exception) -> str:
     return f"{error.filename}: {reason}"
 
 
-def _passes(error: BaseException | None) -> bool:
-    """Return whether a failure is one of the storage or of another run, which pass without anything being changed."""
+def _is_transient(error: BaseException | None) -> bool:
+    """Return whether a failure passes by itself: one of the storage, or another run in the same directory."""
     while error is not None:
-        if isinstance(error, DirectoryBusyError) or getattr(error, "errno", None) in _PASSING:
+        if isinstance(error, DirectoryBusyError) or getattr(error, "errno", None) in _TRANSIENT:
             return True
         error = error.__cause__
     return False

@@ -71,8 +71,8 @@ class Reporter(Protocol):
     def finish(self, text: str, details: Mapping[str, Any]) -> None:
         """The job is done."""
 
-    def fail(self, text: str, status: int, later: bool = False) -> None:
-        """The job ended otherwise; ``later`` if the same command may succeed later as it is."""
+    def fail(self, text: str, status: int, retryable: bool = False) -> None:
+        """The job ended otherwise; ``retryable`` if the same command may succeed later."""
 
 
 def reporter(style: Style) -> Reporter:
@@ -138,7 +138,7 @@ class _Text:
         self._stop()
         self.note(text)
 
-    def fail(self, text: str, status: int, later: bool = False) -> None:
+    def fail(self, text: str, status: int, retryable: bool = False) -> None:
         self._stop()
         self._errors.print(one_line(text), markup=False, soft_wrap=True)
 
@@ -182,8 +182,8 @@ class _Json:
     def finish(self, text: str, details: Mapping[str, Any]) -> None:
         self._say("done", text=text, **details)
 
-    def fail(self, text: str, status: int, later: bool = False) -> None:
-        self._say("error", text=text, status=status, later=later)
+    def fail(self, text: str, status: int, retryable: bool = False) -> None:
+        self._say("error", text=text, status=status, later=retryable)
 
     def _say(self, event: str, **fields: Any) -> None:
         with _output():

@@ -31,8 +31,8 @@ GRACE_SECONDS = 20.0
 
 
 @dataclass
-class Ended:
-    """What a run of the engine came to.
+class EngineResult:
+    """How a run of the engine ended, and what it took.
 
     Attributes
     ----------
@@ -40,8 +40,8 @@ class Ended:
         Its exit status; less than 0 if a signal ended it.
     sentence
         What it said last: its result or why there is none.
-    later
-        Whether the same command may succeed later as it is, because the disk is full, say.
+    retryable
+        Whether the same command may succeed later: the disk is full, say.
     details
         Of its result.
     notes
@@ -52,7 +52,7 @@ class Ended:
 
     status: int = 0
     sentence: str = ""
-    later: bool = False
+    retryable: bool = False
     details: Mapping[str, Any] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     seconds: float = 0.0
@@ -60,7 +60,9 @@ class Ended:
     memory: int = 0
 
 
-def run_engine(arguments: Sequence[str], stop: threading.Event, log: Path, engine: Sequence[str] = ENGINE) -> Ended:
+def run_engine(
+    arguments: Sequence[str], stop: threading.Event, log: Path, engine: Sequence[str] = ENGINE
+) -> EngineResult:
     """Run the engine to its end.
 
     Parameters
@@ -80,7 +82,7 @@ def run_engine(arguments: Sequence[str], stop: threading.Event, log: Path, engin
         If it cannot be started.
     """
     began = time.monotonic()
-    ended = Ended()
+    result = EngineResult()
     with ExitStack() as open_files:
         kept: IO[bytes] | None = None
         with suppress(OSError):
@@ -94,16 +96,18 @@ def run_engine(arguments: Sequence[str], stop: threading.Event, log: Path, engin
             )
         )
         try:
-            _follow(process, ended, stop, kept)
+            _follow(process, result, stop, kept)
         finally:
             process.kill()  # nothing, unless we are interrupted ourselves
-    ended.status = process.returncode
-    ended.seconds = time.monotonic() - began
-    return ended
+    result.status = process.returncode
+    result.seconds = time.monotonic() - began
+    return result
 
 
-def _follow(process: subprocess.Popen[bytes], ended: Ended, stop: threading.Event, log: IO[bytes] | None) -> None:
-    """Take in what a process says, and measure it, until it has ended."""
+def _follow(
+    process: subprocess.Popen[bytes], result: EngineResult, stop: threading.Event, log: IO[bytes] | None
+) -> None:
+    """Read what a process says, and measure it, until it has ended."""
     assert process.stdin is not None and process.stdout is not None
     lines: queue.Queue[bytes | None] = queue.Queue()
     threading.Thread(target=_read, args=(process.stdout, lines), daemon=True).start()
@@ -117,8 +121,8 @@ def _follow(process: subprocess.Popen[bytes], ended: Ended, stop: threading.Even
             if log is not None:
                 with suppress(OSError):
                     log.write(line)
-            _take_in(line, ended, last_words)
-        _measure(process, ended)
+            _read_message(line, result, last_words)
+        _measure(process, result)
         if stop.is_set() and kill_at == float("inf"):
             kill_at = time.monotonic() + GRACE_SECONDS
             with suppress(OSError):  # it has ended already
@@ -126,9 +130,9 @@ def _follow(process: subprocess.Popen[bytes], ended: Ended, stop: threading.Even
         if time.monotonic() > kill_at:
             process.kill()
     process.wait()
-    if not ended.sentence:
+    if not result.sentence:
         signal = f"signal {-process.returncode}" if process.returncode < 0 else f"status {process.returncode}"
-        ended.sentence = f"The engine ended by itself ({signal}): {' '.join(last_words) or 'it said nothing'}"
+        result.sentence = f"The engine ended by itself ({signal}): {' '.join(last_words) or 'it said nothing'}"
 
 
 def _read(output: IO[bytes], lines: queue.Queue[bytes | None]) -> None:
@@ -138,7 +142,7 @@ def _read(output: IO[bytes], lines: queue.Queue[bytes | None]) -> None:
     lines.put(None)
 
 
-def _take_in(line: bytes, ended: Ended, last_words: deque[str]) -> None:
+def _read_message(line: bytes, result: EngineResult, last_words: deque[str]) -> None:
     text = line.decode("utf-8", "replace").strip()
     try:
         message = json.loads(text)
@@ -148,16 +152,16 @@ def _take_in(line: bytes, ended: Ended, last_words: deque[str]) -> None:
             last_words.append(text)
         return
     if event == "note":
-        ended.notes.append(str(message["text"]))
+        result.notes.append(str(message["text"]))
     elif event in ("done", "error"):
-        ended.sentence = str(message["text"])
-        ended.details = message
-        ended.later = bool(message.get("later"))
+        result.sentence = str(message["text"])
+        result.details = message
+        result.retryable = bool(message.get("later"))
 
 
-def _measure(process: subprocess.Popen[bytes], ended: Ended) -> None:
+def _measure(process: subprocess.Popen[bytes], result: EngineResult) -> None:
     with suppress(psutil.Error):  # it has ended already
         seen = psutil.Process(process.pid)
-        ended.memory = max(ended.memory, seen.memory_info().rss)
+        result.memory = max(result.memory, seen.memory_info().rss)
         times = seen.cpu_times()
-        ended.processor_seconds = max(ended.processor_seconds, times.user + times.system)
+        result.processor_seconds = max(result.processor_seconds, times.user + times.system)

@@ -8,24 +8,24 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from smokelift.batch.record import Frames, Record
+from smokelift.batch.record import ShotState
 from smokelift.batch.shots import Shot
 
 Basis = Literal["measured", "scaled", "foretold"]
 
 
 @dataclass(frozen=True)
-class Expected:
+class Remaining:
     """What is left of a shot.
 
     Attributes
     ----------
     shot
-        Which.
+        The shot.
     frames
-        That are not finished.
+        How many are not finished.
     seconds
-        That they take.
+        How long they take.
     memory
         Bytes at the peak: what was measured, or what is foretold if that is more.
     basis
@@ -40,32 +40,32 @@ class Expected:
     basis: Basis
 
 
-def expected(known: Iterable[tuple[Shot, Record, Frames]]) -> tuple[Expected, ...]:
+def remaining_work(states: Iterable[ShotState]) -> tuple[Remaining, ...]:
     """Return what is left of each shot that is not finished and whose clip was looked at, longest first."""
-    known = list(known)
+    states = list(states)
     ratios = [
         statistics.fmean(frames.seconds) * record.forecast.frames / record.forecast.seconds
-        for _, record, frames in known
+        for _, record, frames in states
         if record.forecast is not None and record.forecast.seconds > 0 and frames.seconds
     ]
     scale = statistics.median(ratios) if ratios else None
     left = []
-    for shot, record, frames in known:
+    for shot, record, frames in states:
         if record.forecast is None or frames.complete:
             continue
         forecast = record.forecast
         missing = max(0, forecast.frames - frames.count)
         if frames.seconds:
             basis: Basis = "measured"
-            a_frame = statistics.fmean(frames.seconds)
+            seconds_a_frame = statistics.fmean(frames.seconds)
         else:
             basis = "foretold" if scale is None else "scaled"
-            a_frame = forecast.seconds / max(1, forecast.frames) * (scale or 1.0)
-        left.append(Expected(shot, missing, missing * a_frame, max(forecast.memory, record.memory), basis))
+            seconds_a_frame = forecast.seconds / max(1, forecast.frames) * (scale or 1.0)
+        left.append(Remaining(shot, missing, missing * seconds_a_frame, max(forecast.memory, record.memory), basis))
     return tuple(sorted(left, key=lambda each: -each.seconds))
 
 
-def duration(left: Sequence[Expected], workers: int) -> float:
+def duration(left: Sequence[Remaining], workers: int) -> float:
     """Return the seconds that so many workers take, a shot at a time each, the longest shots first.
 
     At most a third more than the best order (Graham, SIAM J. Appl. Math. 17, 1969, 416).

@@ -9,7 +9,7 @@ import json
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 from smokelift.batch.shots import Shot
 from smokelift.output.atomic import atomic_path
@@ -92,8 +92,26 @@ class Frames:
     psnr: list[float] = field(default_factory=list)
 
 
+class ShotState(NamedTuple):
+    """A shot with its record and its finished frames, as they are on the storage."""
+
+    shot: Shot
+    record: Record
+    frames: Frames
+
+    @property
+    def finished(self) -> bool:
+        """Whether the shot need not be run again."""
+        return self.record.status == "done" and self.frames.complete
+
+
+def read_state(shot: Shot) -> ShotState:
+    """Read what the storage has of a shot as it is now listed."""
+    return ShotState(shot, read_record(shot), finished_frames(shot))
+
+
 def read_record(shot: Shot) -> Record:
-    """Return what is known of a shot as it is now listed; of one whose options or input changed that is nothing."""
+    """Return the record of a shot as it is now listed; a new one if its options or its input have changed."""
     fresh = Record(of=_identity(shot))
     with suppress(OSError, ValueError, TypeError, AttributeError):  # a damaged record is none
         data = json.loads(_path(shot).read_text(encoding="utf-8"))
@@ -114,11 +132,6 @@ def finished_frames(shot: Shot) -> Frames:
     seconds = [float(of.get("seconds_density") or 0) + float(of.get("seconds_velocity") or 0) for of in figures]
     psnr = [float(of["psnr"]) for of in figures if of.get("psnr") is not None]
     return Frames(len(figures), index.complete, seconds, psnr)
-
-
-def is_finished(shot: Shot) -> bool:
-    """Return whether the shot need not be run again, as it is now listed."""
-    return read_record(shot).status == "done" and finished_frames(shot).complete
 
 
 def _path(shot: Shot) -> Path:

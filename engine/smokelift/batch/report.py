@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from smokelift.batch.record import Frames, Record
+from smokelift.batch.record import Frames, Record, ShotState
 from smokelift.batch.shots import Shot
 from smokelift.output.atomic import atomic_path
 from smokelift.scene.checks import counted
@@ -33,17 +33,17 @@ img { height: 12em; max-width: 24em; object-fit: contain }
 _HEADINGS = ("clip and smoke", "shot", "state", "frames", "fit (dB)", "time (s)", "memory (GiB)", "what was said")
 
 
-def write_report(folder: Path, title: str, known: Sequence[tuple[Shot, Record, Frames]]) -> Path:
+def write_report(folder: Path, title: str, states: Sequence[ShotState]) -> Path:
     """Write the page and return its path; OSError if that fails."""
     path = folder / REPORT
-    rows = "".join(_row(*each) for each in known)
+    rows = "".join(_row(*each) for each in states)
     heads = "".join(f"<th>{heading}</th>" for heading in _HEADINGS)
-    counts = Counter(record.status for _, record, _ in known)
+    counts = Counter(record.status for _, record, _ in states)
     summary = ", ".join(f"{count} {status}" for status, count in counts.most_common())
     text = (
         f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{html.escape(title)}</title>'
         f"<style>{_STYLE}</style></head><body>\n<h1>{html.escape(title)}</h1>\n"
-        f"<p>{counted(len(known), 'shot')}: {summary}.</p>\n"
+        f"<p>{counted(len(states), 'shot')}: {summary}.</p>\n"
         f"<table>\n<tr>{heads}</tr>\n{rows}</table>\n</body></html>\n"
     )
     with atomic_path(path) as aside:

@@ -11,15 +11,15 @@ import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from smokelift.batch.engine import BAD_INPUT, CANCELLED, DONE, ENGINE, NO_DEVICE, Ended, run_engine
-from smokelift.batch.record import Forecast, Record, Status, finished_frames, is_finished, read_record
+from smokelift.batch.engine import BAD_INPUT, CANCELLED, DONE, ENGINE, NO_DEVICE, EngineResult, run_engine
+from smokelift.batch.record import Forecast, Record, Status, finished_frames, read_record, read_state
 from smokelift.batch.shots import Shot
 from smokelift.output.lock import Lock
 
 
 @dataclass(frozen=True)
 class Patience:
-    """How long is waited for what passes: a full disk, a server that is away, memory that others use.
+    """How long to wait for failures that pass: a full disk, a server that is away, memory that others use.
 
     Attributes
     ----------
@@ -34,6 +34,9 @@ class Patience:
     pause: float = 5.0
     longest_pause: float = 120.0
     total: float = 3600.0
+
+
+PATIENCE = Patience()
 
 
 def look_at_shot(shot: Shot, stop: threading.Event, engine: Sequence[str] = ENGINE) -> Record:
@@ -54,16 +57,13 @@ def look_at_shot(shot: Shot, stop: threading.Event, engine: Sequence[str] = ENGI
         return record
     shot.folder.mkdir(parents=True, exist_ok=True)
     options = [word for word in shot.options if word != "--npz"]  # `inspect` writes nothing
-    ended = run_engine(["inspect", str(shot.input), *options], stop, shot.log, engine)
-    if ended.status != DONE:
-        return replace(record, status=_status(ended), sentence=ended.sentence)
-    known = ended.details
+    result = run_engine(["inspect", str(shot.input), *options], stop, shot.log, engine)
+    if result.status != DONE:
+        return replace(record, status=_status(result), sentence=result.sentence)
+    known = result.details
     record = replace(record, forecast=Forecast(int(known["frames"]), float(known["seconds"]), int(known["memory"])))
     record.write(shot)
     return record
-
-
-PATIENCE = Patience()
 
 
 def finish_shot(
@@ -75,7 +75,7 @@ def finish_shot(
 ) -> Record:
     """Reconstruct a shot to its end, going on from the frames that are there.
 
-    What passes is waited for. A crash is not: whoever calls decides where to try again.
+    A failure that passes is waited for. After a crash the caller decides where to try again.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def finish_shot(
     say
         Is told what is waited for.
     patience
-        How long to wait for what passes.
+        How long to wait for failures that pass.
     engine
         The command.
 
@@ -98,12 +98,12 @@ def finish_shot(
     waited, pause, frames = 0.0, patience.pause, -1
     while True:
         try:
-            record, later = _try(shot, stop, engine)
+            record, retry = _try(shot, stop, engine)
         except OSError as error:  # the storage itself
-            record, later = replace(read_record(shot), status="stuck", sentence=str(error)), True
+            record, retry = replace(read_record(shot), status="stuck", sentence=str(error)), True
         if stop.is_set() and record.status != "done":
             return replace(record, status="cancelled", sentence="Cancelled; finished frames stay.")
-        if not later:
+        if not retry:
             return record
         if (there := finished_frames(shot).count) > frames:
             waited, pause, frames = 0.0, patience.pause, there
@@ -123,33 +123,34 @@ def _try(shot: Shot, stop: threading.Event, engine: Sequence[str]) -> tuple[Reco
         return replace(read_record(shot), status="stuck", sentence=sentence), True
     try:
         before = read_record(shot)
-        if is_finished(shot) or stop.is_set():
+        if read_state(shot).finished or stop.is_set():
             return before, False
         before = replace(before, status="running", sentence="", runs=before.runs + 1, machine=platform.node())
         before.write(shot)
         arguments = ["reconstruct", str(shot.input), "--out", str(shot.directory), "--thumbnail", str(shot.picture)]
-        ended = run_engine([*arguments, "--resume", *shot.options], stop, shot.log, engine)
+        result = run_engine([*arguments, "--resume", *shot.options], stop, shot.log, engine)
         record = replace(
             before,
-            status=_status(ended),
-            sentence=ended.sentence,
-            notes=tuple(ended.notes) or before.notes,
-            seconds=before.seconds + ended.seconds,
-            processor_seconds=before.processor_seconds + ended.processor_seconds,
-            memory=max(before.memory, ended.memory),
+            status=_status(result),
+            sentence=result.sentence,
+            notes=tuple(result.notes) or before.notes,
+            seconds=before.seconds + result.seconds,
+            processor_seconds=before.processor_seconds + result.processor_seconds,
+            memory=max(before.memory, result.memory),
         )
-        _keep(record, shot, stop)
-        return record, ended.later and ended.status != DONE
+        _write_with_retries(record, shot, stop)
+        return record, result.retryable and result.status != DONE
     finally:
         lock.release()
 
 
-KEEPING = (0.5, 2.0, 8.0)
-"""Seconds between tries to write a record. Without it a shot is prepared once more, and none of its frames made."""
+WRITE_PAUSES = (0.5, 2.0, 8.0)
+"""Seconds between tries to write a record. A shot without one is prepared once more, and keeps its frames."""
 
 
-def _keep(record: Record, shot: Shot, stop: threading.Event) -> None:
-    for pause in KEEPING:
+def _write_with_retries(record: Record, shot: Shot, stop: threading.Event) -> None:
+    """Write a record; OSError if that fails after all pauses."""
+    for pause in WRITE_PAUSES:
         try:
             return record.write(shot)
         except OSError:
@@ -157,11 +158,11 @@ def _keep(record: Record, shot: Shot, stop: threading.Event) -> None:
     record.write(shot)
 
 
-def _status(ended: Ended) -> Status:
-    if ended.status == DONE:
+def _status(result: EngineResult) -> Status:
+    if result.status == DONE:
         return "done"
-    if ended.status == CANCELLED:
+    if result.status == CANCELLED:
         return "cancelled"
-    if ended.later:
+    if result.retryable:
         return "stuck"
-    return "refused" if ended.status in (BAD_INPUT, NO_DEVICE) else "crashed"
+    return "refused" if result.status in (BAD_INPUT, NO_DEVICE) else "crashed"

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from command_line import QUICK, command, events, names, refused
 
-from smokelift.app.commands.reconstruct import shortcomings
 from smokelift.output.sequence import Sequence
 from smokelift.output.vdb import VdbUnavailable, vdb_module
 from smokelift.scene import completed
@@ -197,16 +196,6 @@ def test_a_fit_of_nothing_is_said(shot, tmp_path, capsys) -> None:
     assert command("reconstruct", shot, "--out", tmp_path / "out", *words) == 0
     assert "differs from the clip by 100% of what its smoke changes" in " ".join(capsys.readouterr().out.split())
     assert Sequence.open(tmp_path / "out").figures(1)["relative_error"] == pytest.approx(1, abs=0.01)
-
-
-@pytest.mark.parametrize(
-    ("left", "says"), [(0.2, ()), (0.4, ("may be smoke", "40%")), (0.8, ("Hardly any smoke was fitted", "80%"))]
-)
-def test_what_a_fit_leaves_is_said(left: float, says: tuple[str, ...]) -> None:
-    """A good fit says nothing, and one frame that is worse than the others neither."""
-    said = shortcomings([{"relative_error": left}, {"relative_error": left}, {"relative_error": 0.9}, {}], 0)
-    assert len(said) == bool(says)
-    assert all(word in said[0] for word in says)
 
 
 def test_resuming_what_is_complete_changes_nothing(finished, shot) -> None:

@@ -24,7 +24,7 @@ def test_what_is_no_message_is_told_of_one_that_ends_by_itself(tmp_path) -> None
 def test_a_log_that_cannot_be_written_stops_nothing(tmp_path) -> None:
     code = """print('{"event": "done", "text": "Made.", "frames": 3}')"""
     ended = run_engine([], threading.Event(), tmp_path / "no" / "log", (*PYTHON, code))
-    assert (ended.status, ended.sentence, ended.details["frames"], ended.later) == (0, "Made.", 3, False)
+    assert (ended.status, ended.sentence, ended.details["frames"], ended.retryable) == (0, "Made.", 3, False)
 
 
 def test_the_real_command_ends_when_its_standard_input_closes() -> None:

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import psutil
 
-from smokelift.batch import finish_shot, finished_frames, is_finished, look_at_shot, read_record
+from smokelift.batch import finish_shot, finished_frames, look_at_shot, read_record, read_state
 from smokelift.batch.work import Patience
 
 SHORT = Patience(pause=0.05, longest_pause=0.05, total=5.0)
@@ -19,7 +19,7 @@ def test_a_finished_shot_is_not_run_again(make_shot, fake, ledger) -> None:
     shot = make_shot(frames=3)
     record = finish_shot(shot, threading.Event(), engine=fake)
     assert (record.status, record.sentence, record.notes) == ("done", "Finished.", ("A fake.",))
-    assert is_finished(shot)
+    assert read_state(shot).finished
     again = finish_shot(shot, threading.Event(), engine=fake)
     assert (again.runs, ledger(shot)) == (1, [1, 2, 3])
 
@@ -27,9 +27,9 @@ def test_a_finished_shot_is_not_run_again(make_shot, fake, ledger) -> None:
 def test_other_options_are_another_shot(make_shot, fake) -> None:
     shot = make_shot()
     finish_shot(shot, threading.Event(), engine=fake)
-    assert not is_finished(replace(shot, options=("--quality=fine",)))
+    assert not read_state(replace(shot, options=("--quality=fine",))).finished
     shot.input.write_text(shot.input.read_text() + " ")
-    assert not is_finished(shot)
+    assert not read_state(shot).finished
 
 
 def test_after_a_crash_the_next_run_goes_on(make_shot, fake, ledger) -> None:

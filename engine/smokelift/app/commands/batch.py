@@ -17,18 +17,17 @@ from smokelift.app.cost import memory_free
 from smokelift.app.options import named_path
 from smokelift.app.progress import Reporter
 from smokelift.batch import (
-    Expected,
-    Frames,
     Record,
+    Remaining,
     Room,
     Shot,
+    ShotState,
     duration,
-    expected,
     finish_shot,
-    finished_frames,
     look_at_shot,
-    read_record,
     read_shots,
+    read_state,
+    remaining_work,
     run_here,
     run_on_cluster,
     write_report,
@@ -61,86 +60,86 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     ValueError
         If the list cannot be used, or a shot did not come to its end; the others did.
     """
-    shots = read_shots(options.list, _judge)
-    known = {shot.name: (shot, read_record(shot), finished_frames(shot)) for shot in shots}
-    open_shots = [shot for shot, record, frames in known.values() if not (record.status == "done" and frames.complete)]
+    shots = read_shots(options.list, _check_arguments)
+    states = {shot.name: read_state(shot) for shot in shots}
     stop = threading.Event()
     workers = options.workers or os.cpu_count() or 1
     try:
-        unknown = [(shot, known[shot.name][1]) for shot in open_shots if known[shot.name][1].forecast is None]
+        unfinished = [state for state in states.values() if not state.finished]
+        unknown = [(state.shot, state.record) for state in unfinished if state.record.forecast is None]
         if unknown:
             say.note(f"Looking at {counted(len(unknown), 'clip')} ...")
-        with closing(_looked(options.scheduler, unknown, stop, say)) as looked:
-            for shot, record in looked:
-                known[shot.name] = shot, record, finished_frames(shot)
+        with closing(_look_at_shots(options.scheduler, unknown, stop, say)) as looked_at:
+            for shot, record in looked_at:
+                states[shot.name] = read_state(shot)._replace(record=record)
                 if record.forecast is None:
                     say.note(f"{shot.name}: {record.sentence}")
-        left = expected(known.values())
-        for line in _forecast(left, workers):
+        left = remaining_work(states.values())
+        for line in _forecast_lines(left, workers):
             say.note(line)
         if options.plan:
             say.finish(_summary(left, workers), _as_dict(left, workers))
             return
-        _run(options, say, known, left, workers, stop)
+        _run_remaining(options, say, states, left, workers, stop)
     finally:
         stop.set()
 
 
-def _run(
+def _run_remaining(
     options: argparse.Namespace,
     say: Reporter,
-    known: dict[str, tuple[Shot, Record, Frames]],
-    left: Sequence[Expected],
+    states: dict[str, ShotState],
+    left: Sequence[Remaining],
     workers: int,
     stop: threading.Event,
 ) -> None:
     """Run what is left, and keep the report up to date."""
-    begin = [(each.shot, known[each.shot.name][1]) for each in left]
-    with closing(_ended(options.scheduler, begin, workers, stop, say)) as all_ended:
-        for shot, record in all_ended:
-            known[shot.name] = shot, record, finished_frames(shot)
+    shots = [(each.shot, states[each.shot.name].record) for each in left]
+    with closing(_run_shots(options.scheduler, shots, workers, stop, say)) as ended:
+        for shot, record in ended:
+            states[shot.name] = read_state(shot)._replace(record=record)
             say.note(f"{shot.name}: {record.status}. {record.sentence}")
             with suppress(OSError):  # the storage may be full for a while; the next shot brings the page up to date
-                write_report(shot.folder, options.list.stem, list(known.values()))
-    shots = list(known.values())
-    page = write_report(shots[0][0].folder, options.list.stem, shots)
-    missing = [shot.name for shot, record, _ in shots if record.status != "done"]
+                write_report(shot.folder, options.list.stem, list(states.values()))
+    final = list(states.values())
+    page = write_report(final[0].shot.folder, options.list.stem, final)
+    missing = [state.shot.name for state in final if state.record.status != "done"]
     if missing:
-        share = f"{len(missing)} of {counted(len(shots), 'shot')}"
+        share = f"{len(missing)} of {counted(len(final), 'shot')}"
         raise ValueError(
             f"{share} did not come to the end ({', '.join(missing)}); {page} says why. The same command goes on."
         )
     say.finish(
-        f"Finished: {counted(len(shots), 'shot')}; {page} shows the result.",
-        {"report": str(page), "shots": [str(shot.directory) for shot, _, _ in shots]},
+        f"Finished: {counted(len(final), 'shot')}; {page} shows the result.",
+        {"report": str(page), "shots": [str(state.shot.directory) for state in final]},
     )
 
 
-def _looked(
+def _look_at_shots(
     scheduler: str | None, unknown: Sequence[tuple[Shot, Record]], stop: threading.Event, say: Reporter
 ) -> Generator[tuple[Shot, Record], None, None]:
-    """Look at shots, one after the other or on a cluster."""
+    """Look at shots, one after the other or on a cluster, and yield each with its forecast."""
     if scheduler is not None:
         yield from run_on_cluster(unknown, look_at_shot, scheduler, say.note)
     else:
         yield from ((shot, look_at_shot(shot, stop)) for shot, _ in unknown)
 
 
-def _ended(
+def _run_shots(
     scheduler: str | None,
-    begin: Sequence[tuple[Shot, Record]],
+    shots: Sequence[tuple[Shot, Record]],
     workers: int,
     stop: threading.Event,
     say: Reporter,
 ) -> Generator[tuple[Shot, Record], None, None]:
     """Run shots, here or on a cluster, and yield each when it has ended."""
     if scheduler is not None:
-        yield from run_on_cluster(begin, finish_shot, scheduler, say.note)
+        yield from run_on_cluster(shots, finish_shot, scheduler, say.note)
         return
     room = Room(round(MEMORY_SHARE * memory_free()), workers)
     total = psutil.virtual_memory().total
     fitting = []
-    for shot, record in begin:
+    for shot, record in shots:
         if record.forecast is not None and record.forecast.memory > total:
             say.note(
                 f"{shot.name}: needs {_gib(record.forecast.memory)} and this machine has {_gib(total)}; choose a lower "
@@ -148,20 +147,20 @@ def _ended(
             )
         else:
             fitting.append((shot, record))
-    told = threading.Lock()
+    one_at_a_time = threading.Lock()
 
-    def tell(text: str) -> None:
-        with told:
+    def note(text: str) -> None:
+        with one_at_a_time:
             say.note(text)
 
     def work(shot: Shot) -> Record:
-        tell(f"{shot.name}: begins.")
-        return finish_shot(shot, stop, tell)
+        note(f"{shot.name}: begins.")
+        return finish_shot(shot, stop, note)
 
     yield from run_here(fitting, work, room, stop)
 
 
-def _forecast(left: Sequence[Expected], workers: int) -> Iterator[str]:
+def _forecast_lines(left: Sequence[Remaining], workers: int) -> Iterator[str]:
     """What is left, a line a shot and a line for each number of workers worth having."""
     for each in left:
         memory = f"{_gib(each.memory)} of memory"
@@ -171,7 +170,7 @@ def _forecast(left: Sequence[Expected], workers: int) -> Iterator[str]:
         yield f"{count} at a time: {_time(duration(left, count))}"
 
 
-def _summary(left: Sequence[Expected], workers: int) -> str:
+def _summary(left: Sequence[Remaining], workers: int) -> str:
     if not left:
         return "Nothing is left to do."
     frames = sum(each.frames for each in left)
@@ -181,7 +180,7 @@ def _summary(left: Sequence[Expected], workers: int) -> str:
     )
 
 
-def _as_dict(left: Sequence[Expected], workers: int) -> dict[str, Any]:
+def _as_dict(left: Sequence[Remaining], workers: int) -> dict[str, Any]:
     return {
         "seconds": round(duration(left, workers), 1),
         "workers": workers,
@@ -209,16 +208,16 @@ def _gib(size: float) -> str:
     return f"{size / 2**30:.1f} GiB"
 
 
-class _Judge(argparse.ArgumentParser):
+class _RaisingParser(argparse.ArgumentParser):
     """Says what is wrong with a shot's options as an exception."""
 
     def error(self, message: str) -> NoReturn:
         raise ValueError(message)
 
 
-def _judge(arguments: Sequence[str]) -> None:
+def _check_arguments(arguments: Sequence[str]) -> None:
     """Raise ValueError if ``smokelift reconstruct`` does not take the arguments."""
-    parser = _Judge()
+    parser = _RaisingParser()
     common = argparse.ArgumentParser(add_help=False)
     common.add_argument("--device", choices=("auto", "cpu", "gpu"))
     reconstruct.add_parser(parser.add_subparsers(), common)

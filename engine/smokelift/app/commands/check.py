@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from smokelift.app.commands.reconstruct import shortcomings
 from smokelift.app.options import named_path
 from smokelift.app.progress import Reporter
+from smokelift.app.shortcomings import count_empty, shortcomings
 from smokelift.output.sequence import Sequence
 from smokelift.scene.checks import counted
 
@@ -35,10 +35,10 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         if not sequence.files(number):
             raise ValueError(f"{options.directory}: the file of frame {number} is missing.")
     figures = [sequence.figures(number) for number in sequence.frames]
-    empty = sum(not (of_frame.get("hull_share") or 0) > 0 for of_frame in figures)
+    empty = count_empty(figures)
     if empty == len(figures):
         raise ValueError(f"{options.directory}: no frame shows smoke.")
-    for note in shortcomings(figures, empty):
+    for note in shortcomings(figures):
         say.note(note)
     count = len(sequence.frames)
     text = f"All of {options.directory} is as it was written: {counted(count, 'frame')}."

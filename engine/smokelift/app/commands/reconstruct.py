@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Mapping
-from collections.abc import Sequence as Rows
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +13,7 @@ from PIL import Image
 from smokelift.app.cost import require_memory
 from smokelift.app.options import add_run_options, named_path, require_folder, scene_of, settings_of
 from smokelift.app.progress import Reporter
+from smokelift.app.shortcomings import count_empty, shortcomings
 from smokelift.footage.clip import Clip
 from smokelift.footage.matte import SMOKE_THRESHOLD
 from smokelift.output.atomic import atomic_path
@@ -30,13 +29,6 @@ from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.provenance import made_up
 from smokelift.setup.shot import Shot
 from smokelift.setup.smoke import small_pictures
-
-UNEXPLAINED = 0.7
-"""Root mean square of what a fit leaves, as a share of what the smoke changes: at 0.7 half of the change's energy."""
-
-DOUBTFUL = 0.3
-"""The same from which not all of the change may be smoke: good results leave less, those in which labels, leaves, a
-head or the light are taken for smoke more (docs/clips.md)."""
 
 
 def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
@@ -86,45 +78,20 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
             del frame  # while the next is computed its memory is free
     sequence = Sequence.open(options.out)
     figures = [sequence.figures(number) for number in sequence.frames]
-    empty = sum(not (of_frame.get("hull_share") or 0) > 0 for of_frame in figures)
-    if empty == len(figures):
+    if count_empty(figures) == len(figures):
         cuts = cut_notes(shot.clip, small_pictures(shot.clip))
         raise ValueError(
             f"No smoke found: in no frame does a patch differ from the background by {2 * SMOKE_THRESHOLD:g} times the "
             f"clip's noise, so all frames in {options.out} are empty. "
             f"{what_helps(shot.clip, shot.views[0].plates, scene.background is not None, cuts)}"
         )
-    for note in shortcomings(figures, empty):
+    for note in shortcomings(figures):
         say.note(note)
     seconds = time.monotonic() - began
     say.finish(
         f"{counted(len(sequence.frames), 'frame')} in {options.out} ({seconds:.0f} s).",
         {"directory": str(options.out), "frames": len(sequence.frames), "seconds": round(seconds, 1)},
     )
-
-
-def shortcomings(figures: Rows[Mapping[str, Any]], empty: int) -> list[str]:
-    """What the figures of a finished run say against it, a sentence each."""
-    said = []
-    if empty:
-        said.append(f"No smoke is seen in {empty} of {len(figures)} frames; such frames are empty.")
-    left = [of_frame["relative_error"] for of_frame in figures if of_frame.get("relative_error") is not None]
-    typical = float(np.median(left)) if left else 0.0
-    if typical > UNEXPLAINED:
-        said.append(
-            f"Hardly any smoke was fitted: a typical frame still differs from the clip by {typical:.0%} of what its "
-            "smoke changes there, and its psnr is as high as it is because the smoke is faint. Give the "
-            "background, the light or the medium of the clip in a scene file; `smokelift inspect` says "
-            "what was taken."
-        )
-    elif typical > DOUBTFUL:
-        said.append(
-            "Not all that was taken for smoke may be smoke: a typical frame still differs from the clip by "
-            f"{typical:.0%} of what changes in it. What moves, light that changes and labels look like smoke, too; "
-            "`smokelift inspect` shows what was taken. Crop the clip, cut its frames out of a longer file in which the "
-            "light changes, or give a clean plate in [background]."
-        )
-    return said
 
 
 def _check_outputs(options: argparse.Namespace) -> None:
