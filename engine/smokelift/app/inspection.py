@@ -1,29 +1,21 @@
-"""What is known of a shot before it is reconstructed, on one page: what was found in the clip, chosen and assumed."""
+"""The page of a shot before it is reconstructed: pictures of what was found in the clip, above the facts."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
-from smokelift.app.cost import Cost
 from smokelift.app.page import TILE, Fact, Page, Panel, fitted
-from smokelift.footage.exposure import shows_exposure, small
 from smokelift.footage.images import area_average, linear_to_srgb
 from smokelift.footage.matte import SMOKE_THRESHOLD, Matte, matte
 from smokelift.footage.plate import Plate
-from smokelift.output.images import eight_bit, write_image
-from smokelift.scene import SHADOWED, Background, Camera, DirectionalLight, Domain, PointLight, Scene
+from smokelift.output.images import eight_bit
+from smokelift.scene import SHADOWED, Camera, DirectionalLight, Domain, PointLight, Scene
 from smokelift.scene.checks import counted
 from smokelift.scene.projection import project
-from smokelift.setup.background import BLACK
-from smokelift.setup.choice import UNDETERMINED, Choice
-from smokelift.setup.geometry import PICTURE_HEIGHT
 from smokelift.setup.shot import Shot
 from smokelift.setup.smoke import UNKNOWN
 
@@ -41,12 +33,8 @@ HEAD = 16.0
 BINS = 96
 """Of the histogram."""
 
-CLEAN, NOISY = 2.0, 6.0
-"""Noise in 8 bit codes up to which a clip is called clean, and from which noisy: thin smoke is lost in it
-(docs/experiments/background.md)."""
 
-
-def inspection(shot: Shot, given: Scene, known: Sequence[Fact], notes: Iterable[str]) -> Page:
+def inspection_page(shot: Shot, given: Scene, known: Sequence[Fact], notes: Iterable[str]) -> Page:
     """Return the page of a shot.
 
     Parameters
@@ -56,7 +44,7 @@ def inspection(shot: Shot, given: Scene, known: Sequence[Fact], notes: Iterable[
     given
         What the user said of it.
     known
-        The `facts` of it.
+        The facts of it, see `smokelift.app.facts`.
     notes
         Sentences that are said as well.
     """
@@ -83,179 +71,6 @@ def inspection(shot: Shot, given: Scene, known: Sequence[Fact], notes: Iterable[
     frames = f"{counted(shot.length, 'frame')} of {width} x {height} at {shot.clip.fps:.4g} a second"
     others = tuple(note for note in notes if note not in shot.doubts)
     return Page(f"{name}: {frames}", shot.doubts, panels, known, others)
-
-
-def facts(shot: Shot, given: Scene, cost: Cost) -> tuple[Fact, ...]:
-    """Return what is known of a shot, a line each."""
-    scene, domain = shot.scene, shot.scene.domain
-    plate = shot.views[0].plates.at(0)
-    size = " x ".join(f"{high - low:.3g}" for low, high in zip(domain.min, domain.max, strict=True))
-    calibrated, boxed = given.camera is not None, given.domain is not None
-    medium = scene.medium
-    thick = f"{medium.extinction:.3g} 1/m at density 1"
-    tint = "grey" if medium.is_grey else ", ".join(f"{v:.2f}" for v in medium.color)
-    told, know = given.medium is not None, "Give [medium] if you know it."
-    taken = f"The picture is taken to be {PICTURE_HEIGHT:g} m high where the smoke is."
-    around, placed = "around the smoke of the whole clip", "estimated"
-    if not shot.smoky:
-        around, placed = "over all of the picture", UNDETERMINED
-    spent = f"about {cost.seconds:.0f} s, {cost.memory / 2**30:.1f} GiB of memory, {cost.disk / 1e6:.0f} MB on disk"
-    return (
-        _background(shot, given, plate),
-        _exposure(shot, plate),
-        _noise(plate),
-        _known(
-            "camera",
-            f"{scene.camera.type}, {'moves' if scene.camera.moves else 'stands still'}",
-            calibrated,
-            _said(shot, "Camera"),
-        ),
-        _known("scale", f"box of {size} m", boxed, f"{taken} Give [camera] and [domain] in metres."),
-        Fact("box", "as given", "given") if boxed else Fact("box", around, placed, _said(shot, "Domain")),
-        _chosen(shot, "resolution", "grid", " x ".join(map(str, domain.resolution)), boxed),
-        _known("extinction", thick, told, f"A picture shows it times the density only. {know}"),
-        _known("albedo", f"{medium.albedo:.3g}", told, f"A picture shows it times the light only. {know}"),
-        _chosen(shot, "smoke colour", "smoke colour", tint, told),
-        *_light(shot, given),
-        _chosen(shot, "scattering", "scattering", scene.scattering, given.scattering is not None),
-        _place(shot),
-        Fact(
-            "cost",
-            f"{counted(shot.length, 'frame')}: {spent}",
-            "estimated",
-            f"Right to a factor of two; {cost.memory_free / 2**30:.1f} GiB of memory are free.",
-        ),
-    )
-
-
-def write_scene(path: Path, shot: Shot, given: Scene, known: Sequence[Fact]) -> tuple[Path, ...]:
-    """Write all that was found into a scene file, with what is known of it as comments; return the files.
-
-    A background of one colour that was estimated becomes a colour of the file. Any other is left to be found again: a
-    picture does not say which of its parts are unknown, and by how much they may be wrong. It is written beside the
-    file for those who want to mend it. The turns of a camera that was steadied belong to the background that they were
-    found with, and are left to be found again, too; camera and box stay as they are given, if they are.
-
-    Raises
-    ------
-    ValueError
-        If a file is there already.
-    """
-    scene, plate = Scene(**vars(shot.scene)), shot.estimated_background
-    picture = path.with_name(f"{path.stem}_background.exr")
-    said = [f"{fact.what}: {fact.value} ({fact.origin})" for fact in known if fact.what != "cost"]
-    colour = None if plate is None else plate[0, 0]
-    one = colour is not None and bool((plate == colour).all())
-    files = (path,) if plate is None or one else (path, picture)
-    for file in files:
-        if file.exists():
-            raise ValueError(f"{file}: is there already; nothing was overwritten, give another name.")
-    if colour is not None and one:
-        red, green, blue = map(float, colour)
-        scene = replace(scene, background=Background(color=(red, green, blue)))
-    elif plate is not None:
-        write_image(picture, plate, half=False)
-        scene = replace(scene, background=None)
-        said.append(f"A run finds the background again. {picture.name} shows it: once mended, give it in [background].")
-    elif shot.moves and shot.scene.background == Background():
-        scene = replace(scene, camera=given.camera, domain=given.domain, background=None)
-    scene.save(path, said)
-    return files
-
-
-def _said(shot: Shot, about: str) -> str:
-    """The sentence that is said about a part of a scene that is not given."""
-    return next((note for note in shot.notes if note.startswith(about)), "")
-
-
-def _known(what: str, value: str, is_given: bool, otherwise: str) -> Fact:
-    """The line of what a user gives, or nothing determines."""
-    return Fact(what, value, "given") if is_given else Fact(what, value, UNDETERMINED, otherwise)
-
-
-def _background(shot: Shot, given: Scene, plate: Plate) -> Fact:
-    if given.background is not None:
-        return Fact("background", "as given", "given")
-    unknown = float((plate.confidence < UNKNOWN).mean())
-    colour = plate.image[0, 0]
-    value = "a picture"
-    if (plate.image == colour).all():
-        value = "black" if colour.max() < BLACK else f"one colour, {', '.join(f'{v:.2g}' for v in colour)} (linear)"
-    return Fact(
-        "background",
-        f"{value}, {unknown:.0%} of it unknown" if unknown else value,
-        "estimated",
-        _said(shot, "Background"),
-    )
-
-
-def _exposure(shot: Shot, plate: Plate) -> Fact:
-    if not shows_exposure(small(plate.image)):
-        how = "The background is too dark or too bright to show it: what flickers is taken for smoke."
-        return Fact("exposure", "taken to be steady", UNDETERMINED, how)
-    value = f"changes by up to {shot.exposure:.0%}, evened out" if shot.exposure > 0 else "steady"
-    return Fact("exposure", value, "measured", "Of what does not move, against the background.")
-
-
-def _noise(plate: Plate) -> Fact:
-    codes = 255 * float(plate.noise.total.max())
-    kind = "clean" if codes <= CLEAN else "noisy: thin smoke is lost in it" if codes >= NOISY else "usual"
-    lasting = 255 * float(plate.noise.lasting.max())
-    return Fact("noise", f"{kind}, {codes:.1f} of 255", "measured", f"{lasting:.1f} of it is shared by neighbours.")
-
-
-def _light(shot: Shot, given: Scene) -> tuple[Fact, ...]:
-    """The lines of the light: how strong it is, and what of it one picture does not tell."""
-    if shot.scene.scattering == "absorption":
-        return (Fact("light", "none is needed", "estimated" if given.scattering is None else "given"),)
-    strength, thickness = _choice(shot, "light strength"), _choice(shot, "smoke thickness")
-    if strength is not None:
-        return (Fact("light", f"{strength.chosen} times as strong as given", "measured", strength.reason),)
-    if given.lights or thickness is None:
-        return (Fact("light", "as given", "given"),)
-    colour = ", ".join(f"{v:.2g}" for v in shot.optics.unshadowed_source())
-    hides, origin = "as the light asks for", UNDETERMINED
-    how = "Light strength: as much as the thickest smoke shows; if none is thick, the light is stronger."
-    if not shot.smoky:
-        how = "Light strength: no smoke shows it."
-    if shot.scene.scattering in SHADOWED:
-        how = "Light strength: as much as comes from behind the smoke, in the color that the clip asks for."
-    if thickness.chosen != UNDETERMINED:
-        hides, origin = f"hides {thickness.measured['hidden']:.0%} of what it covers", "measured"
-        how = "Light strength: what the smoke adds for what it hides of the texture behind it."
-    return (
-        Fact("light strength", f"smoke of radiance {colour}", origin, how),
-        _chosen(shot, "smoke thickness", "smoke thickness", hides, False),
-        _chosen(shot, "light direction", "sun's direction", "no sun", False),
-        _chosen(shot, "light direction", "sun's color", "that of all light", False),
-        _chosen(shot, "light direction", "ambient share", "all light is from everywhere", False),
-    )
-
-
-def _place(shot: Shot) -> Fact:
-    given, place = shot.settings.axis_depth, shot.place
-    if given is not None:
-        return Fact("place in depth", f"{given:.2f} m behind the middle of the box", "given")
-    if len(shot.views) > 1:
-        return Fact("place in depth", "as the cameras show it", "estimated")
-    value = "the middle of the box"
-    if place is not None:
-        depth = round(place.depth, 2) + 0.0  # no minus before zero
-        value = f"{depth:.2f} m behind the middle of the box, give or take {place.deviation:.2f} m"
-    return _chosen(shot, "axis depth", "place in depth", value, False)
-
-
-def _chosen(shot: Shot, what: str, name: str, value: str, is_given: bool) -> Fact:
-    """The line of a choice, or of what was not chosen because it is given or was not measured."""
-    choice = _choice(shot, what)
-    if is_given or choice is None:
-        return Fact(name, value, "given" if is_given else UNDETERMINED)
-    untold = choice.chosen == UNDETERMINED or not (shot.smoky or choice.by_hand)
-    return Fact(name, value, UNDETERMINED if untold else "by hand" if choice.by_hand else "measured", choice.reason)
-
-
-def _choice(shot: Shot, what: str) -> Choice[Any] | None:
-    return next((choice for choice in shot.choices if choice.what == what), None)
 
 
 def _with_box(shot: Shot, camera: Camera, picture: NDArray[np.float32]) -> Tile:

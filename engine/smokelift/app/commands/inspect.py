@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import asdict
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
 from typing import Any
 
 from smokelift.app.cost import estimate_cost
-from smokelift.app.inspection import facts, inspection, write_scene
+from smokelift.app.facts import facts
+from smokelift.app.inspection import inspection_page
 from smokelift.app.options import add_run_options, named_path, require_folder, scene_of, settings_of
-from smokelift.app.page import PAGE_KINDS, write_page
+from smokelift.app.page import PAGE_KINDS, Fact, write_page
 from smokelift.app.progress import Reporter
 from smokelift.footage.clip import Clip
+from smokelift.output.images import write_image
 from smokelift.render import device
-from smokelift.scene import scene_to_dict
+from smokelift.scene import Background, Scene, scene_to_dict
 from smokelift.scene.checks import counted
 from smokelift.setup.prepare import boundaries, prepare_shot
 from smokelift.setup.provenance import made_up
+from smokelift.setup.shot import Shot
 
 
 def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
@@ -69,11 +74,11 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         files = list(options.page)
         if options.page:
             said = {fact.how for fact in known}
-            page = inspection(shot, scene, known, [note for note in notes if note not in said])
+            page = inspection_page(shot, scene, known, [note for note in notes if note not in said])
             for path in options.page:
                 write_page(path, page)
         if options.write is not None:
-            files += write_scene(options.write, shot, scene, known)
+            files += _write_scene(options.write, shot, scene, known)
     voxels = " x ".join(map(str, domain.resolution))
     written = f" {', '.join(map(str, files))} written." if files else ""
     say.finish(
@@ -88,3 +93,38 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
             **asdict(cost),
         },
     )
+
+
+def _write_scene(path: Path, shot: Shot, given: Scene, known: Sequence[Fact]) -> tuple[Path, ...]:
+    """Write all that was found into a scene file, with what is known of it as comments; return the files.
+
+    A background of one colour that was estimated becomes a colour of the file. Any other is left to be found again: a
+    picture does not say which of its parts are unknown, and by how much they may be wrong. It is written beside the
+    file for those who want to mend it. The turns of a camera that was steadied belong to the background that they were
+    found with, and are left to be found again, too; camera and box stay as they are given, if they are.
+
+    Raises
+    ------
+    ValueError
+        If a file is there already.
+    """
+    scene, plate = Scene(**vars(shot.scene)), shot.estimated_background
+    picture = path.with_name(f"{path.stem}_background.exr")
+    said = [f"{fact.what}: {fact.value} ({fact.origin})" for fact in known if fact.what != "cost"]
+    colour = None if plate is None else plate[0, 0]
+    one_colour = colour is not None and bool((plate == colour).all())
+    files = (path,) if plate is None or one_colour else (path, picture)
+    for file in files:
+        if file.exists():
+            raise ValueError(f"{file}: is there already; nothing was overwritten, give another name.")
+    if colour is not None and one_colour:
+        red, green, blue = map(float, colour)
+        scene = replace(scene, background=Background(color=(red, green, blue)))
+    elif plate is not None:
+        write_image(picture, plate, half=False)
+        scene = replace(scene, background=None)
+        said.append(f"A run finds the background again. {picture.name} shows it: once mended, give it in [background].")
+    elif shot.moves and shot.scene.background == Background():
+        scene = replace(scene, camera=given.camera, domain=given.domain, background=None)
+    scene.save(path, said)
+    return files

@@ -1,0 +1,174 @@
+"""What is known of a shot before it is reconstructed, fact by fact: its value, where that comes from, and how."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from smokelift.app.cost import Cost
+from smokelift.app.page import Fact
+from smokelift.footage.exposure import shows_exposure, small
+from smokelift.footage.plate import Plate
+from smokelift.scene import SHADOWED, Scene
+from smokelift.scene.checks import counted
+from smokelift.setup.background import BLACK
+from smokelift.setup.choice import UNDETERMINED, Choice
+from smokelift.setup.geometry import PICTURE_HEIGHT
+from smokelift.setup.shot import Shot
+from smokelift.setup.smoke import UNKNOWN
+
+CLEAN, NOISY = 2.0, 6.0
+"""Noise in 8 bit codes up to which a clip is called clean, and from which noisy: thin smoke is lost in it
+(docs/experiments/background.md)."""
+
+
+def facts(shot: Shot, given: Scene, cost: Cost) -> tuple[Fact, ...]:
+    """Return what is known of a shot, a line each."""
+    scene, domain = shot.scene, shot.scene.domain
+    plate = shot.views[0].plates.at(0)
+    size = " x ".join(f"{high - low:.3g}" for low, high in zip(domain.min, domain.max, strict=True))
+    has_camera, has_box = given.camera is not None, given.domain is not None
+    height = f"The picture is taken to be {PICTURE_HEIGHT:g} m high where the smoke is."
+    return (
+        _background(shot, given, plate),
+        _exposure(shot, plate),
+        _noise(plate),
+        _given_or_undetermined(
+            "camera",
+            f"{scene.camera.type}, {'moves' if scene.camera.moves else 'stands still'}",
+            has_camera,
+            _note_about(shot, "Camera"),
+        ),
+        _given_or_undetermined("scale", f"box of {size} m", has_box, f"{height} Give [camera] and [domain] in metres."),
+        _box(shot, has_box),
+        _chosen(shot, "resolution", "grid", " x ".join(map(str, domain.resolution)), has_box),
+        *_medium(shot, given.medium is not None),
+        *_light(shot, given),
+        _chosen(shot, "scattering", "scattering", scene.scattering, given.scattering is not None),
+        _place(shot),
+        _cost(shot, cost),
+    )
+
+
+def _box(shot: Shot, is_given: bool) -> Fact:
+    if is_given:
+        return Fact("box", "as given", "given")
+    if not shot.smoky:
+        return Fact("box", "over all of the picture", UNDETERMINED, _note_about(shot, "Domain"))
+    return Fact("box", "around the smoke of the whole clip", "estimated", _note_about(shot, "Domain"))
+
+
+def _medium(shot: Shot, is_given: bool) -> tuple[Fact, ...]:
+    medium, know = shot.scene.medium, "Give [medium] if you know it."
+    extinction = f"{medium.extinction:.3g} 1/m at density 1"
+    colour = "grey" if medium.is_grey else ", ".join(f"{v:.2f}" for v in medium.color)
+    product = f"A picture shows it times the density only. {know}"
+    light = f"A picture shows it times the light only. {know}"
+    return (
+        _given_or_undetermined("extinction", extinction, is_given, product),
+        _given_or_undetermined("albedo", f"{medium.albedo:.3g}", is_given, light),
+        _chosen(shot, "smoke colour", "smoke colour", colour, is_given),
+    )
+
+
+def _cost(shot: Shot, cost: Cost) -> Fact:
+    spent = f"about {cost.seconds:.0f} s, {cost.memory / 2**30:.1f} GiB of memory, {cost.disk / 1e6:.0f} MB on disk"
+    free = f"Right to a factor of two; {cost.memory_free / 2**30:.1f} GiB of memory are free."
+    return Fact("cost", f"{counted(shot.length, 'frame')}: {spent}", "estimated", free)
+
+
+def _note_about(shot: Shot, about: str) -> str:
+    """The note of a shot that begins with a word: what was assumed of a part of the scene that is not given."""
+    return next((note for note in shot.notes if note.startswith(about)), "")
+
+
+def _given_or_undetermined(what: str, value: str, is_given: bool, how: str) -> Fact:
+    """The line of what a user gives and no measurement determines."""
+    return Fact(what, value, "given") if is_given else Fact(what, value, UNDETERMINED, how)
+
+
+def _background(shot: Shot, given: Scene, plate: Plate) -> Fact:
+    if given.background is not None:
+        return Fact("background", "as given", "given")
+    unknown = float((plate.confidence < UNKNOWN).mean())
+    colour = plate.image[0, 0]
+    value = "a picture"
+    if (plate.image == colour).all():
+        value = "black" if colour.max() < BLACK else f"one colour, {', '.join(f'{v:.2g}' for v in colour)} (linear)"
+    return Fact(
+        "background",
+        f"{value}, {unknown:.0%} of it unknown" if unknown else value,
+        "estimated",
+        _note_about(shot, "Background"),
+    )
+
+
+def _exposure(shot: Shot, plate: Plate) -> Fact:
+    if not shows_exposure(small(plate.image)):
+        how = "The background is too dark or too bright to show it: what flickers is taken for smoke."
+        return Fact("exposure", "taken to be steady", UNDETERMINED, how)
+    value = f"changes by up to {shot.exposure:.0%}, evened out" if shot.exposure > 0 else "steady"
+    return Fact("exposure", value, "measured", "Of what does not move, against the background.")
+
+
+def _noise(plate: Plate) -> Fact:
+    codes = 255 * float(plate.noise.total.max())
+    kind = "clean" if codes <= CLEAN else "noisy: thin smoke is lost in it" if codes >= NOISY else "usual"
+    lasting = 255 * float(plate.noise.lasting.max())
+    return Fact("noise", f"{kind}, {codes:.1f} of 255", "measured", f"{lasting:.1f} of it is shared by neighbours.")
+
+
+def _light(shot: Shot, given: Scene) -> tuple[Fact, ...]:
+    """The lines of the light: how strong it is, and what of it one picture does not tell."""
+    if shot.scene.scattering == "absorption":
+        return (Fact("light", "none is needed", "estimated" if given.scattering is None else "given"),)
+    strength, thickness = _choice(shot, "light strength"), _choice(shot, "smoke thickness")
+    if strength is not None:
+        return (Fact("light", f"{strength.chosen} times as strong as given", "measured", strength.reason),)
+    if given.lights or thickness is None:
+        return (Fact("light", "as given", "given"),)
+    colour = ", ".join(f"{v:.2g}" for v in shot.optics.unshadowed_source())
+    hides, origin = "as the light asks for", UNDETERMINED
+    how = "Light strength: as much as the thickest smoke shows; if none is thick, the light is stronger."
+    if not shot.smoky:
+        how = "Light strength: no smoke shows it."
+    if shot.scene.scattering in SHADOWED:
+        how = "Light strength: as much as comes from behind the smoke, in the color that the clip asks for."
+    if thickness.chosen != UNDETERMINED:
+        hides, origin = f"hides {thickness.measured['hidden']:.0%} of what it covers", "measured"
+        how = "Light strength: what the smoke adds for what it hides of the texture behind it."
+    return (
+        Fact("light strength", f"smoke of radiance {colour}", origin, how),
+        _chosen(shot, "smoke thickness", "smoke thickness", hides, False),
+        _chosen(shot, "light direction", "sun's direction", "no sun", False),
+        _chosen(shot, "light direction", "sun's color", "that of all light", False),
+        _chosen(shot, "light direction", "ambient share", "all light is from everywhere", False),
+    )
+
+
+def _place(shot: Shot) -> Fact:
+    given, place = shot.settings.axis_depth, shot.place
+    if given is not None:
+        return Fact("place in depth", f"{given:.2f} m behind the middle of the box", "given")
+    if len(shot.views) > 1:
+        return Fact("place in depth", "as the cameras show it", "estimated")
+    value = "the middle of the box"
+    if place is not None:
+        depth = round(place.depth, 2) + 0.0  # no minus before zero
+        value = f"{depth:.2f} m behind the middle of the box, give or take {place.deviation:.2f} m"
+    return _chosen(shot, "axis depth", "place in depth", value, False)
+
+
+def _chosen(shot: Shot, what: str, name: str, value: str, is_given: bool) -> Fact:
+    """The line of a choice, or of what was not chosen because it is given or was not measured."""
+    choice = _choice(shot, what)
+    if is_given or choice is None:
+        return Fact(name, value, "given" if is_given else UNDETERMINED)
+    if choice.chosen == UNDETERMINED or not (shot.smoky or choice.by_hand):
+        origin = UNDETERMINED
+    else:
+        origin = "by hand" if choice.by_hand else "measured"
+    return Fact(name, value, origin, choice.reason)
+
+
+def _choice(shot: Shot, what: str) -> Choice[Any] | None:
+    return next((choice for choice in shot.choices if choice.what == what), None)
