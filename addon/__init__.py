@@ -5,7 +5,8 @@ It knows nothing of the engine but its command line and its files. From what kno
 - Without Blender: `take` (the files of a run), `job` (the engine's process), `toml` (the text of a scene file), `pace`
   (a speed ramp), `contract` (what the add-on repeats of the engine).
 - Blender's data to the engine's and back: `smoke` (the objects that hold the settings), `smoke_takes` (its takes),
-  `scene_file` (Blender scene to scene file), `volume` (sequence to Volume object), `look` (its material), `directing`
+  `scene_file` (Blender scene to scene file: `clip_table`, `camera_table`, `box_table` and `light_tables`, of
+  a `blender_scene`), `volume` (sequence to Volume object), `look` (its material), `directing`
   (what acts on the smoke after its clip), `shot_setup` (camera, world and light that match the clip), `compositing`
   (smoke over the clip), `projection` (the clip's background on a card), `plate` (the clean plate for these three),
   `instances` (the smoke at other times), `nodes` (the node

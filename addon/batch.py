@@ -26,9 +26,9 @@ POLL_SECONDS = 0.05
 def main(words: Sequence[str]) -> int:
     """Make a smoke of the scene; returns the exit status."""
     from . import preferences, smoke_takes
+    from .blender_scene import ShotError
     from .contract import BAD_INPUT, CANCELLED, DONE
     from .job import EngineMissingError, Job, engine_command
-    from .scene_file import ShotError
     from .take import TakeError
 
     try:
@@ -84,7 +84,8 @@ def _wait(job: Any) -> None:
 
 def _smoke(choices: argparse.Namespace) -> bpy.types.Object:
     """The smoke, with its settings overridden by the options; it is active then."""
-    from .scene_file import ShotError, use_frames
+    from .blender_scene import ShotError
+    from .clip_table import use_frames
     from .smoke import activate, active_smoke, migrate, new_smoke, smokes
 
     migrate()  # the file may have been opened before the add-on was registered

@@ -3,7 +3,7 @@
 import bpy
 from mathutils import Vector
 
-from .scene_file import box_of
+from .box_table import box_of
 from .smoke import active_smoke
 
 BOX_SHARE = 0.9

@@ -10,9 +10,9 @@ from typing import Any
 import bpy
 from mathutils import Matrix, Vector
 
+from .box_table import engine_to_world
 from .nodes import Input, feed, new_group, own_group
 from .plate import plate_image, play_beside
-from .scene_file import engine_to_world
 from .smoke import scene_of
 from .take import Take
 

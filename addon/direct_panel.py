@@ -4,9 +4,9 @@ import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
 from . import run, smoke_takes
+from .blender_scene import ShotError
 from .needs import NeedsClipAndResult
 from .panel import draw_closed
-from .scene_file import ShotError
 from .smoke import active_smoke
 from .subpanel import OfResult
 from .take import TakeError

@@ -14,8 +14,8 @@ import numpy.typing as npt
 from mathutils import Matrix, Vector
 
 from . import volume
+from .blender_scene import ShotError, at_frame
 from .contract import SHORTEST, SIDES
-from .scene_file import ShotError, at_frame
 from .smoke import scene_of
 
 BLOWING = ("WIND", "FORCE")

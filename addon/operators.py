@@ -8,9 +8,9 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import BoolProperty, StringProperty
 
 from . import run, shot_check, smoke_takes
+from .blender_scene import ShotError
 from .needs import NeedsClip
 from .properties import SEEDS
-from .scene_file import ShotError
 from .smoke import activate, active_smoke, hide_default_cube, new_smoke, smokes
 from .take import TakeError
 

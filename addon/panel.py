@@ -6,8 +6,10 @@ import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
 from . import presets, shot_check, smoke_takes, volume
+from .blender_scene import frame_rate
+from .box_table import box_of
+from .clip_table import clip_path
 from .job import ENDED
-from .scene_file import box_of, clip_path, frame_rate
 from .smoke import active_smoke, find_smoke, migrate_soon, smokes
 from .undistort import is_distorted
 

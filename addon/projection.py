@@ -9,10 +9,10 @@ from typing import Any
 import bpy
 from mathutils import Matrix, Vector
 
+from .box_table import engine_to_world
 from .kept import set_unless_changed
 from .nodes import Input, add_node, new_group, own_group
 from .plate import play_beside, show_plate
-from .scene_file import engine_to_world
 from .smoke import scene_of
 from .take import Take
 from .volume import frames_before

@@ -7,8 +7,10 @@ from pathlib import Path
 
 import bpy
 
-from . import preferences, scene_file
+from . import preferences
+from .blender_scene import ShotError
 from .job import EngineMissingError, Job, engine_command
+from .scene_file import options, shot_tables
 from .smoke import active_smoke, find_smoke
 from .take import Take, TakeError
 
@@ -72,11 +74,11 @@ class ShotCheck:
         folder = Path(bpy.app.tempdir)
         try:
             take = Take(folder / "smokelift_check")
-            take.write(scene_file.shot_tables(smoke, quick=True), scene_file.options(smoke))
+            take.write(shot_tables(smoke, quick=True), options(smoke))
             arguments = ["inspect", str(take.scene_file), "--page", str(page_file()), "--progress", "json"]
-            arguments += scene_file.options(smoke) + preferences.thread_options()
+            arguments += options(smoke) + preferences.thread_options()
             self._job = Job(engine_command(arguments), take.log_file)
-        except (scene_file.ShotError, TakeError, EngineMissingError) as error:
+        except (ShotError, TakeError, EngineMissingError) as error:
             state.check_error = str(error)
             return
         self._job.start()

@@ -4,9 +4,13 @@ from pathlib import Path
 
 import bpy
 
-from . import directing, preferences, scene_file, shot_setup, volume
+from . import directing, preferences, shot_setup, volume
+from .blender_scene import ShotError
+from .clip_table import clip_path
 from .job import ENDED, Outcome
 from .paths import absolute
+from .scene_file import options as engine_options
+from .scene_file import shot_tables
 from .smoke import separate_duplicate
 from .take import Take, new_take, takes
 
@@ -21,7 +25,7 @@ def output_folder(smoke: bpy.types.Object) -> Path:
         return common / settings.folder
     if bpy.data.filepath:
         return Path(bpy.data.filepath).parent / "smokelift" / settings.folder
-    return scene_file.clip_path(settings.clip).parent / f"{settings.folder}_smokelift"
+    return clip_path(settings.clip).parent / f"{settings.folder}_smokelift"
 
 
 def write_take(smoke: bpy.types.Object) -> Take:
@@ -32,10 +36,10 @@ def write_take(smoke: bpy.types.Object) -> Take:
     ShotError, TakeError
         If the shot is unusable, or the folder cannot be written to.
     """
-    tables = scene_file.shot_tables(smoke)
+    tables = shot_tables(smoke)
     separate_duplicate(smoke)
     take = new_take(output_folder(smoke))
-    take.write(tables, scene_file.options(smoke))
+    take.write(tables, engine_options(smoke))
     return take
 
 
@@ -49,9 +53,9 @@ def write_directed(smoke: bpy.types.Object) -> Take:
     """
     source = volume.shown_take(smoke)
     if source is None:
-        raise scene_file.ShotError("Make smoke first: there is none yet to direct.")
+        raise ShotError("Make smoke first: there is none yet to direct.")
     if busy(bpy.context.window_manager, source):
-        raise scene_file.ShotError("The result on show is still being made: wait for its end, or cancel it.")
+        raise ShotError("The result on show is still being made: wait for its end, or cancel it.")
     direction, options, meshes = directing.request(smoke)
     separate_duplicate(smoke)
     take = new_take(output_folder(smoke))
@@ -69,7 +73,7 @@ def update_moved_files(smoke: bpy.types.Object, take: Take) -> None:
     """
     settings = smoke.smokelift
     if take.direction() is None:
-        files = {"clip": ("path", scene_file.clip_path(settings.clip))}
+        files = {"clip": ("path", clip_path(settings.clip))}
         if settings.plate:
             files["background"] = ("image", absolute(settings.plate))
         take.update_moved_files(files)

@@ -8,12 +8,13 @@ import bpy
 from bpy.app.handlers import persistent
 from mathutils import Vector
 
+from .blender_scene import frame_rate
+from .box_table import engine_to_world
 from .contract import DIRECTIONS, FRAME_FILE, MADE_UP
 from .kept import set_unless_changed
 from .look import fit_look
 from .pace import paced
 from .paths import absolute, relative
-from .scene_file import engine_to_world, frame_rate
 from .smoke import scene_of, smokes
 from .take import Take
 

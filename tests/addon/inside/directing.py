@@ -12,7 +12,7 @@ import pytest
 from mathutils import Matrix
 
 from addon import direct_panel, directing, smoke_takes, volume
-from addon.scene_file import ShotError
+from addon.blender_scene import ShotError
 from addon.smoke import activate, smokes
 from addon.take import Take, takes
 from smokelift.direct import Box, Continuation, Mesh, continue_sequence, open_source

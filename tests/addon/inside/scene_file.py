@@ -11,8 +11,10 @@ import pytest
 from bpy_extras.object_utils import world_to_camera_view
 from mathutils import Euler, Matrix, Vector
 
-from addon import scene_file as module
-from addon.scene_file import ShotError, shot_tables, use_frames
+from addon.blender_scene import ShotError
+from addon.box_table import box_corners, engine_to_world
+from addon.clip_table import use_frames
+from addon.scene_file import options, shot_tables
 from addon.take import Take
 from smokelift.scene import Scene
 from smokelift.scene.projection import project
@@ -185,9 +187,7 @@ def test_a_camera_that_moves_has_a_matrix_for_every_frame(tracked, tmp_path, ang
     for index, frame in enumerate(range(11, 31)):
         tracked.frame_set(frame)
         depsgraph = bpy.context.evaluated_depsgraph_get()
-        wanted = (
-            module.engine_to_world(smoke(tracked)).inverted() @ tracked.camera.evaluated_get(depsgraph).matrix_world
-        )
+        wanted = engine_to_world(smoke(tracked)).inverted() @ tracked.camera.evaluated_get(depsgraph).matrix_world
         np.testing.assert_allclose(camera.matrices[index], wanted, atol=1e-5)
 
 
@@ -361,13 +361,6 @@ def test_the_box_becomes_cubes(shot, tmp_path, quality, longest) -> None:
     assert domain.centre[:2] == pytest.approx((0.0, 0.0))
 
 
-def test_the_engine_has_the_same_qualities() -> None:
-    """Said twice, because the add-on imports nothing of the engine."""
-    from smokelift.setup.settings import LONGEST_SIDE
-
-    assert dict(LONGEST_SIDE) == module.LONGEST_SIDE
-
-
 def test_a_resolution_of_ones_own(shot, tmp_path) -> None:
     """Along the longest side."""
     smoke(shot).smokelift.longest_side = 40
@@ -376,11 +369,11 @@ def test_a_resolution_of_ones_own(shot, tmp_path) -> None:
 
 def test_a_resolution_that_is_left_open_is_measured(shot) -> None:
     """In the scene's box; a box that is guessed always is, and a number of one's own never."""
-    assert module.options(smoke(shot))[-2:] == ["--resolution", "auto"]
+    assert options(smoke(shot))[-2:] == ["--resolution", "auto"]
     smoke(shot).smokelift.longest_side = 40
-    assert "--resolution" not in module.options(smoke(shot))
+    assert "--resolution" not in options(smoke(shot))
     smoke(shot).smokelift.longest_side, smoke(shot).smokelift.camera_mode = 0, "GUESS"
-    assert "--resolution" not in module.options(smoke(shot))
+    assert "--resolution" not in options(smoke(shot))
 
 
 def test_a_turned_box_turns_everything_else(shot, tmp_path) -> None:
@@ -389,13 +382,13 @@ def test_a_turned_box_turns_everything_else(shot, tmp_path) -> None:
     box.rotation_euler = (0.2, -0.1, 0.5)
     bpy.context.view_layer.update()
     found = engines(shot, tmp_path)
-    world = module.engine_to_world(smoke(shot))
-    corners = np.array([world.inverted() @ corner for corner in module.box_corners(box)])
+    world = engine_to_world(smoke(shot))
+    corners = np.array([world.inverted() @ corner for corner in box_corners(box)])
     low, high = corners.min(0), corners.max(0)
     assert (np.array(found.domain.min) <= low + 1e-5).all()
     assert (np.array(found.domain.max) >= high - 1e-5).all()
     pixels, _ = project(found.camera, corners)
-    seen = [world_to_camera_view(shot, shot.camera, corner) for corner in module.box_corners(box)]
+    seen = [world_to_camera_view(shot, shot.camera, corner) for corner in box_corners(box)]
     np.testing.assert_allclose(pixels, [(p.x * 256, (1 - p.y) * 384) for p in seen], atol=1e-3)
     direction = world.to_3x3() @ Vector(found.lights[0].direction)
     assert direction.dot(Vector((0.57, 0.46, -0.68)).normalized()) == pytest.approx(1.0)
@@ -430,7 +423,7 @@ def test_an_inlet(shot, tmp_path) -> None:
     bpy.context.view_layer.update()
     (found,) = engines(shot, tmp_path).inlets
     assert found.radius == pytest.approx(0.3)
-    assert list(module.engine_to_world(smoke(shot)) @ Vector(found.centre)) == pytest.approx([0.1, -0.2, 0.3], abs=1e-6)
+    assert list(engine_to_world(smoke(shot)) @ Vector(found.centre)) == pytest.approx([0.1, -0.2, 0.3], abs=1e-6)
     bpy.data.objects.remove(inlet)
     assert engines(shot, tmp_path).inlets == ()
 
@@ -438,18 +431,18 @@ def test_an_inlet(shot, tmp_path) -> None:
 def test_a_known_depth(shot) -> None:
     """Said to the engine if it is known, in one word even where it is negative; zero is a depth as well."""
     smoke(shot).smokelift.axis_depth = -0.25
-    assert not any(word.startswith("--axis-depth") for word in module.options(smoke(shot)))
+    assert not any(word.startswith("--axis-depth") for word in options(smoke(shot)))
     smoke(shot).smokelift.use_axis_depth = True
-    assert "--axis-depth=-0.25" in module.options(smoke(shot))
+    assert "--axis-depth=-0.25" in options(smoke(shot))
     smoke(shot).smokelift.axis_depth = 0.0
-    assert "--axis-depth=0" in module.options(smoke(shot))
+    assert "--axis-depth=0" in options(smoke(shot))
 
 
 def test_depth_detail_and_variation(shot) -> None:
     """Said to the engine always, as they are shown: the slider's 0.3 is not 0.30000001."""
-    assert {"--detail=1", "--seed=0"} <= set(module.options(smoke(shot)))
+    assert {"--detail=1", "--seed=0"} <= set(options(smoke(shot)))
     smoke(shot).smokelift.detail, smoke(shot).smokelift.seed = 0.3, 12
-    assert {"--detail=0.3", "--seed=12"} <= set(module.options(smoke(shot)))
+    assert {"--detail=0.3", "--seed=12"} <= set(options(smoke(shot)))
 
 
 def test_an_inlet_needs_a_box_of_its_own(shot) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from addon import undistort
-from addon.scene_file import clip_table
+from addon.clip_table import clip_table
 from conftest import pixels
 from smokelift.output.images import write_image
 from tests.example_shot import smoke

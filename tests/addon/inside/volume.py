@@ -14,7 +14,7 @@ import pytest
 from mathutils import Vector
 
 from addon import look, shot_setup, smoke_takes, volume
-from addon.scene_file import box_corners
+from addon.box_table import box_corners
 from addon.take import Take
 from conftest import FRAMES, made, quietly, rendered
 from smokelift.output.images import write_image

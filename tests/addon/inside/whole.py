@@ -13,7 +13,8 @@ import pytest
 
 import smokelift
 from addon import look, run, shot_check, smoke_takes, volume
-from addon.scene_file import point_intensity, shot_tables, sun_irradiance
+from addon.light_tables import point_intensity, sun_irradiance
+from addon.scene_file import shot_tables
 from addon.smoke import activate, smokes
 from addon.take import Take, takes
 from conftest import quietly, rendered

@@ -35,42 +35,21 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
         metavar=("X", "Y", "Z"),
         help="velocity in m/s that all air gains",
     )
-    parser.add_argument(
+    _add_repeatable(
+        parser,
         "--turbulence",
-        type=finite,
-        nargs=3,
-        action="append",
-        default=[],
-        metavar=("SPEED", "SIZE", "SEED"),
-        help="eddies in all air: their speed in m/s, their size in metres, and a whole number (each makes others); may "
-        "be given again",
+        ("SPEED", "SIZE", "SEED"),
+        "eddies in all air: their speed in m/s, their size in metres, and a whole number (each makes others)",
     )
-    parser.add_argument(
+    _add_repeatable(
+        parser,
         "--fan",
-        type=finite,
-        nargs=7,
-        action="append",
-        default=[],
-        metavar=("X", "Y", "Z", "RADIUS", "VX", "VY", "VZ"),
-        help="a ball in which air is blown: centre and radius in metres, velocity in m/s; may be given again",
+        ("X", "Y", "Z", "RADIUS", "VX", "VY", "VZ"),
+        "a ball in which air is blown: centre and radius in metres, velocity in m/s",
     )
-    parser.add_argument(
-        "--ball",
-        type=finite,
-        nargs=4,
-        action="append",
-        default=[],
-        metavar=("X", "Y", "Z", "RADIUS"),
-        help="a round obstacle, in metres; may be given again",
-    )
-    parser.add_argument(
-        "--box",
-        type=finite,
-        nargs=6,
-        action="append",
-        default=[],
-        metavar=("X", "Y", "Z", "X2", "Y2", "Z2"),
-        help="an obstacle from one corner to the other, in metres; may be given again",
+    _add_repeatable(parser, "--ball", ("X", "Y", "Z", "RADIUS"), "a round obstacle, in metres")
+    _add_repeatable(
+        parser, "--box", ("X", "Y", "Z", "X2", "Y2", "Z2"), "an obstacle from one corner to the other, in metres"
     )
     parser.add_argument(
         "--mesh",
@@ -90,6 +69,19 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
         help=f"sides of the box that become walls, of {', '.join(SIDES)}; those of the clip stay walls",
     )
     parser.set_defaults(run=run)
+
+
+def _add_repeatable(parser: argparse.ArgumentParser, option: str, values: tuple[str, ...], what: str) -> None:
+    """Add an option of some numbers that may be given again."""
+    parser.add_argument(
+        option,
+        type=finite,
+        nargs=len(values),
+        action="append",
+        default=[],
+        metavar=values,
+        help=f"{what}; may be given again",
+    )
 
 
 def run(options: argparse.Namespace, say: Reporter) -> None:

@@ -1,0 +1,66 @@
+"""The box that holds the smoke: the domain and the inlet in a scene file, and the engine's world in Blender's."""
+
+import math
+from typing import Any
+
+import bpy
+from mathutils import Matrix, Vector
+
+from .blender_scene import ShotError
+from .contract import FEWEST_VOXELS, LONGEST_SIDE
+from .smoke import scene_of
+
+
+def box_of(smoke: bpy.types.Object) -> bpy.types.Object | None:
+    """The box that holds the smoke."""
+    return in_scene(scene_of(smoke), smoke.smokelift.box)
+
+
+def in_scene(scene: bpy.types.Scene, obj: bpy.types.Object | None) -> bpy.types.Object | None:
+    """The object if the scene holds it. A setting still refers to an object that was deleted."""
+    return obj if obj is not None and obj.name in scene.objects else None
+
+
+def box_corners(box: bpy.types.Object) -> list[Vector]:
+    """The eight corners of a box in the world."""
+    return [box.matrix_world @ Vector(corner) for corner in box.bound_box]
+
+
+def domain_table(box: bpy.types.Object, rotation: Matrix, settings: bpy.types.PropertyGroup) -> dict[str, Any]:
+    """The domain: the box in cubic voxels, a multiple of four along each side. It grows and keeps its floor."""
+    to_engine = rotation.inverted()
+    corners = [to_engine @ corner for corner in box_corners(box)]
+    low = Vector(min(corner[axis] for corner in corners) for axis in range(3))
+    high = Vector(max(corner[axis] for corner in corners) for axis in range(3))
+    extent = high - low
+    if min(extent) <= 1e-6 * max(*extent, 1e-6):
+        raise ShotError("The box is flat: give it a width, a depth and a height.")
+    voxel = max(extent) / (settings.longest_side or LONGEST_SIDE[settings.quality])
+    counts = [max(FEWEST_VOXELS, 4 * math.ceil(length / voxel / 4 - 1e-4)) for length in extent]
+    size = [count * voxel for count in counts]
+    middle = (low + high) / 2
+    start = [middle[0] - size[0] / 2, middle[1] - size[1] / 2, low[2]]
+    return {
+        "min": start,
+        "max": [s + length for s, length in zip(start, size, strict=True)],
+        "resolution": counts,
+    }
+
+
+def inlet_table(inlet: bpy.types.Object, rotation: Matrix, domain: dict[str, Any]) -> dict[str, Any]:
+    """A ball, as large as the Empty is drawn."""
+    centre = rotation.inverted() @ inlet.matrix_world.translation
+    radius = inlet.empty_display_size * max(abs(scale) for scale in inlet.matrix_world.to_scale())
+    if radius <= 0.0:
+        raise ShotError("The inlet has no size: scale up its Empty.")
+    sides = zip(domain["min"], centre, domain["max"], strict=True)
+    if (centre - Vector(min(max(place, low), high) for low, place, high in sides)).length > radius:
+        raise ShotError("The inlet is outside the box: move it to where the smoke enters.")
+    return {"centre": list(centre), "radius": radius}
+
+
+def engine_to_world(smoke: bpy.types.Object) -> Matrix:
+    """The matrix (4x4) from the engine's world to Blender's."""
+    settings = smoke.smokelift
+    box = box_of(smoke) if settings.camera_mode == "SCENE" else None
+    return Matrix.Identity(4) if box is None else box.matrix_world.to_quaternion().to_matrix().to_4x4()

@@ -1,0 +1,84 @@
+"""The clip in a scene file: its path, the frames that are used, their rate and their transfer function."""
+
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from .blender_scene import ShotError, frame_rate
+from .contract import PANORAMA_SUFFIXES
+from .paths import absolute
+from .smoke import scene_of
+
+TRANSFERS = {"sRGB": "srgb", "Linear Rec.709": "linear", "scene_linear": "linear", "Non-Color": "linear"}
+"""The engine's name of the transfer function of a clip's pixels, by Blender's colour space."""
+
+
+def clip_path(clip: bpy.types.MovieClip) -> Path:
+    """The absolute path of a clip."""
+    return absolute(clip.filepath, clip.library)
+
+
+def clip_table(smoke: bpy.types.Object) -> dict[str, Any]:
+    """The clip and its used frames, counted from 0."""
+    settings = smoke.smokelift
+    clip = settings.clip
+    if clip is None:
+        raise ShotError("Choose a clip first.")
+    path, count = clip_path(clip), _frame_count(clip)
+    if not 1 <= settings.first <= settings.last <= count:
+        raise ShotError(f"Frames {settings.first} to {settings.last} are not in the clip: it has frames 1 to {count}.")
+    before = clip.frame_offset - 1
+    table: dict[str, Any] = {"path": str(path), "frames": [settings.first + before, settings.last + before]}
+    if settings.fps > 0.0:
+        table["fps"] = settings.fps
+    elif clip.source == "SEQUENCE":
+        table["fps"] = frame_rate(scene_of(smoke))
+    transfer = _transfer(clip) if settings.transfer == "AUTO" else settings.transfer
+    if transfer is not None:
+        table["transfer"] = transfer
+    return table
+
+
+def _transfer(clip: bpy.types.MovieClip) -> str | None:
+    """The transfer function that the clip's colour space says; None for the one that its kind of file has."""
+    space = clip.colorspace_settings.name
+    if not space:  # the colour management of this Blender does not know it
+        return None
+    if space not in TRANSFERS:
+        raise ShotError(
+            f"The clip's color space is {space}, and only sRGB and Linear Rec.709 can be read: convert the clip, or "
+            "choose another Color Space under Advanced."
+        )
+    usual = "linear" if clip_path(clip).suffix.lower() in PANORAMA_SUFFIXES else "srgb"
+    return None if TRANSFERS[space] == usual else TRANSFERS[space]
+
+
+def _frame_count(clip: bpy.types.MovieClip) -> int:
+    path = clip_path(clip)
+    if not path.is_file():
+        raise ShotError(f"The clip {path} is not there: choose it again, or use File > External Data.")
+    if clip.frame_duration < 1:  # Blender takes any file for a clip
+        raise ShotError(f"The clip {path} is no video and no picture that Blender can read: choose another.")
+    return clip.frame_duration
+
+
+def use_frames(smoke: bpy.types.Object, first: int, last: int) -> None:
+    """Use some frames of the clip's file, counted from 0 as the engine counts them.
+
+    Raises
+    ------
+    ShotError
+        If the clip does not have them.
+    """
+    settings = smoke.smokelift
+    lowest = settings.clip.frame_offset
+    highest = lowest + _frame_count(settings.clip) - 1
+    if not lowest <= first <= last <= highest:
+        raise ShotError(f"Frames {first} to {last} are not in the clip: it has frames {lowest} to {highest}, from 0.")
+    settings.first, settings.last = first - lowest + 1, last - lowest + 1
+
+
+def start_frame(settings: bpy.types.PropertyGroup) -> int:
+    """The scene's frame that shows the first used frame of the clip."""
+    return settings.clip.frame_start + settings.first - 1
