@@ -156,7 +156,7 @@ def test_an_engine_that_says_nothing_and_fails(engine) -> None:
     assert (job.outcome, job.sentence) == ("failed", "The engine stopped with an error of its own: status 7")
 
 
-def test_rubbish_is_kept_in_the_log_and_disturbs_nothing(engine, log) -> None:
+def test_lines_that_are_no_messages_go_to_the_log(engine, log) -> None:
     """Text, broken JSON, JSON of another kind, fields of other types, bytes that are no text, half a line."""
     rubbish = [
         b"[Taichi] hello\n",
@@ -181,7 +181,7 @@ def test_rubbish_is_kept_in_the_log_and_disturbs_nothing(engine, log) -> None:
         assert word in text
 
 
-def test_a_flood_is_taken_in_sips(engine) -> None:
+def test_a_poll_reads_a_bounded_number_of_lines(engine) -> None:
     """A poll takes a bounded part, nothing is lost, and the engine waits meanwhile."""
     count = 20 * module.LINES_A_POLL
     job = engine(

@@ -29,7 +29,7 @@ def handlers() -> int:
     return sum(len(entries) for entries in lists if isinstance(entries, list))
 
 
-def test_nothing_is_left() -> None:
+def test_unregistering_leaves_nothing_behind() -> None:
     """No class, operator, property or handler; and it can be done again."""
     assert {"Object.smokelift", "ops.run", "SMOKELIFT_PT_view"} <= ours()
     during = handlers()

@@ -61,7 +61,7 @@ def test_the_clip_is_made_straight(bent, tmp_path) -> None:
     assert not bpy.ops.smokelift.undistort.poll()
 
 
-def test_a_clean_plate_would_not_fit(bent, tmp_path) -> None:
+def test_a_distorted_clean_plate_is_refused(bent, tmp_path) -> None:
     """It has the same distortion."""
     smoke(bent).smokelift.plate_mode = "FILE"
     with pytest.raises(RuntimeError, match="clean plate is distorted too"):

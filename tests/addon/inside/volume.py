@@ -176,7 +176,7 @@ def test_the_smoke_keeps_step_with_a_clip_that_is_moved(shot, tmp_path) -> None:
     assert data.frame_start == 500
 
 
-def test_it_grows(shot, tmp_path) -> None:
+def test_a_take_that_is_being_made_shows_its_finished_frames(shot, tmp_path) -> None:
     """Frames are seen as soon as they are finished, in the same object."""
     take = made(tmp_path)
     whole = json.loads((take.directory / "sequence.json").read_text())
@@ -308,7 +308,7 @@ def test_coloured_smoke_has_its_colour(shot, tmp_path) -> None:
     assert list(color.default_value) == pytest.approx([0.8, 0.8, 0.8, 1.0])
 
 
-def test_running_again_replaces(shot, tmp_path) -> None:
+def test_a_new_result_replaces_the_old_one_in_the_same_object(shot, tmp_path) -> None:
     """One object, one volume, one material, with the new values."""
     volume.show(smoke(shot), made(tmp_path))
     before = [len(kind) for kind in (bpy.data.objects, bpy.data.volumes, bpy.data.materials)]

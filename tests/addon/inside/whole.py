@@ -88,7 +88,7 @@ def look_alike(scene: bpy.types.Scene, folder: Path) -> tuple[float, float]:
     return psnr(found, wanted), psnr(found[within], wanted[within])
 
 
-def test_everything_known(shot, kept, tmp_path) -> None:
+def test_a_shot_of_which_everything_is_given_is_made(shot, kept, tmp_path) -> None:
     """Camera, box, sun and plate: frames, place and material are the engine's, and a render looks like the clip."""
     if hasattr(shot.cycles, "volume_biased"):
         shot.cycles.volume_biased = False  # as an artist has it
@@ -115,7 +115,7 @@ def test_light_and_background_from_the_clip(shot, tmp_path) -> None:
     assert within > WANTED_DB - 3  # four frames of a standing plume say little about what is behind it
 
 
-def test_nothing_known_but_the_clip(scene, tmp_path) -> None:
+def test_a_shot_of_which_only_the_clip_is_given_is_made(scene, tmp_path) -> None:
     """A new file, whose cube would hide the smoke, and a clip: the smoke is active, and the playhead stays."""
     bpy.ops.mesh.primitive_cube_add(size=2.0)
     cube = scene.objects["Cube"]
@@ -276,7 +276,7 @@ def test_a_clip_without_smoke_is_not_done(scene, tmp_path) -> None:
     assert "Clean Plate in Blender" in row.sentence
 
 
-def test_a_look_ahead(shot, tmp_path) -> None:
+def test_the_check_says_what_a_run_takes_and_assumes(shot, tmp_path) -> None:
     """Time, memory, disk, and what is assumed; an impossible shot says why."""
     bpy.ops.smokelift.check()
     state = bpy.context.window_manager.smokelift
@@ -388,7 +388,7 @@ def test_scenes_have_their_own_smoke(shot, tmp_path) -> None:
     assert smoke(other).name not in shot.objects
 
 
-def test_an_hours_trial(shot, tmp_path) -> None:
+def test_two_smokes_through_an_hour_of_work(shot, tmp_path) -> None:
     """Two smokes, each with its clip: one made again after it was moved, one deleted, undone and resumed elsewhere."""
     project = tmp_path / "root" / "project"
     shutil.copytree(EXAMPLE, project)

@@ -6,7 +6,7 @@ import numpy as np
 from command_line import command, events, names, refused
 
 
-def test_a_clip_goes_on(finished, tmp_path, capsys) -> None:
+def test_continue_adds_frames(finished, tmp_path, capsys) -> None:
     out = tmp_path / "out"
     words = ("continue", finished, "--out", out, "--frames", 3, "--npz", "--fade", 1, "--wind", 0.2, -0.1, 0)
     words += ("--turbulence", 0.3, 0.6, 1, "--turbulence", 0.1, 0.9, 2, "--closed", "z-", "x+")

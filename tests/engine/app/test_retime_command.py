@@ -5,7 +5,7 @@ from __future__ import annotations
 from command_line import command, events, names, refused
 
 
-def test_slow_motion(finished, tmp_path, capsys) -> None:
+def test_retime_writes_slow_motion(finished, tmp_path, capsys) -> None:
     out = tmp_path / "slow"
     frames = len([name for name in names(finished) if name.endswith(".npz")])
     assert command("retime", finished, "--out", out, "--speed", 0.5, "--npz", "--progress", "json") == 0
@@ -15,7 +15,7 @@ def test_slow_motion(finished, tmp_path, capsys) -> None:
     assert said[0] == {"event": "start", "total": 2 * frames - 1, "done": 0}
 
 
-def test_a_loop(finished, tmp_path, capsys) -> None:
+def test_loop_writes_a_loop(finished, tmp_path, capsys) -> None:
     out = tmp_path / "loop"
     assert command("loop", finished, "--out", out, "--overlap", 1, "--npz", "--progress", "json") == 0
     said = events(capsys.readouterr().out)

@@ -39,7 +39,7 @@ def test_a_closed_pipe_cancels() -> None:
     assert lines == ["Standard output cannot be written: Broken pipe."]
 
 
-def test_who_may_resume_is_told_so_of_a_closed_pipe(tmp_path) -> None:
+def test_a_closed_pipe_says_that_the_run_can_be_resumed(tmp_path) -> None:
     read, write = os.pipe()
     os.close(read)
     words = ("reconstruct", "missing.toml", "--out", str(tmp_path / "out"), "--progress", "json")
@@ -79,7 +79,7 @@ def test_a_path_that_is_no_text_is_refused() -> None:
     assert lines[-1].endswith("argument --out: the path is empty: give the name of a file or a folder")
 
 
-def test_a_terminal_obeys_no_name(capsys) -> None:
+def test_control_characters_of_a_path_are_spelt_out(capsys) -> None:
     """An escape sequence in a path could rename the window or hide what is written."""
     sentence = refused(capsys, "inspect", "\x1b]0;owned\x07\x9b31m.toml")
     assert sentence == r"\x1b]0;owned\x07\x9b31m.toml: cannot be read: No such file or directory"
@@ -150,7 +150,7 @@ def test_limits_of_the_system_are_said_to_be_limits(shot, capsys, monkeypatch, e
         (None, False),
     ],
 )
-def test_programs_are_told_what_may_pass(shot, capsys, monkeypatch, reason, later) -> None:
+def test_json_says_whether_a_failure_may_pass(shot, capsys, monkeypatch, reason, later) -> None:
     """A full disk does, whatever the sentence is about."""
 
     def fail(_choice: str) -> None:

@@ -89,7 +89,7 @@ def until(true: Callable[[], object]) -> None:
 
 @needs_dask
 @posix
-def test_what_is_lost_of_a_cluster_loses_nothing_and_repeats_nothing(cluster, make_shot, tmp_path, ledger) -> None:
+def test_a_killed_worker_or_scheduler_neither_loses_nor_repeats_frames(cluster, make_shot, tmp_path, ledger) -> None:
     """A worker and the scheduler are killed while shots run, and the storage is full for a while."""
     full = tmp_path / "full"
     full.touch()

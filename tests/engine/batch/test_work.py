@@ -24,7 +24,7 @@ def test_a_finished_shot_is_not_run_again(make_shot, fake, ledger) -> None:
     assert (again.runs, ledger(shot)) == (1, [1, 2, 3])
 
 
-def test_other_options_are_another_shot(make_shot, fake) -> None:
+def test_a_shot_whose_options_changed_is_run_again(make_shot, fake) -> None:
     shot = make_shot()
     finish_shot(shot, threading.Event(), engine=fake)
     assert not read_state(replace(shot, options=("--quality=fine",))).finished
@@ -98,7 +98,7 @@ def test_a_stopped_shot_ends_and_its_frames_stay(make_shot, fake) -> None:
     assert not [child for child in psutil.Process().children() if "fake_engine" in " ".join(child.cmdline())]
 
 
-def test_a_damaged_record_is_none(make_shot, fake, ledger) -> None:
+def test_a_damaged_record_counts_as_none(make_shot, fake, ledger) -> None:
     shot = make_shot()
     finish_shot(shot, threading.Event(), engine=fake)
     (shot.folder / "shot.json").write_text('{"of": 3')
@@ -107,7 +107,7 @@ def test_a_damaged_record_is_none(make_shot, fake, ledger) -> None:
     assert ledger(shot) == [1, 2, 3]
 
 
-def test_a_look_is_taken_once_and_its_forecast_kept(make_shot, fake) -> None:
+def test_a_shot_is_forecast_once(make_shot, fake) -> None:
     shot = make_shot(frames=5, memory=300)
     record = look_at_shot(shot, threading.Event(), fake)
     assert json.loads((shot.folder / "shot.json").read_text())["forecast"] == {

@@ -22,7 +22,7 @@ def run(source, out, continuation, **options):
     return [number for number, _ in continue_sequence(source, out, continuation, npz=True, **options)]
 
 
-def test_the_clip_stays_and_goes_on(source, tmp_path):
+def test_a_continuation_keeps_the_frames_of_the_clip_and_adds_its_own(source, tmp_path):
     assert run(source, tmp_path / "out", Continuation(5)) == list(range(1, 16))
     made = Sequence.open(tmp_path / "out")
     assert made.complete
@@ -90,7 +90,7 @@ def test_sides_become_walls(source, tmp_path):
     assert all(np.take(open_[axis], (0, -1), axis).any() for axis in range(3))
 
 
-def test_what_cannot_be_is_refused(source, tmp_path):
+def test_impossible_continuations_are_refused(source, tmp_path):
     for continuation, reason in (
         (Continuation(5, start=99), "from 4 to 10"),
         (Continuation(5, start=2), "from 4 to 10"),

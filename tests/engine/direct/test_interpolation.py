@@ -19,7 +19,7 @@ def moving(speed: float) -> Velocity:
 
 
 @pytest.mark.parametrize("share", [0.25, 0.5, 0.75])
-def test_a_blob_is_where_it_has_to_be_on_its_way(share):
+def test_interpolation_moves_a_blob_and_does_not_blend_two(share):
     """Two voxels in a frame: mixing without carrying would show two blobs."""
     way = 2 * DOMAIN.voxel_size
     velocity = moving(way / DT)
@@ -37,7 +37,7 @@ def test_a_blob_is_where_it_has_to_be_on_its_way(share):
     np.testing.assert_allclose(found.velocity.faces[0][4:12], velocity.faces[0][4:12], rtol=1e-3)
 
 
-def test_the_ends_are_the_moments_themselves():
+def test_interpolation_gives_the_moments_themselves_at_both_ends():
     first, last = plume()[:2]
     assert interpolate(first, last, last.velocity, DT, 0.0) is first
     assert interpolate(first, last, last.velocity, DT, 1.0) is last

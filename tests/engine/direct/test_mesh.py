@@ -63,7 +63,7 @@ def test_a_round_mesh_is_a_ball(turned):
     assert (inside ^ wanted).sum() < 0.02 * wanted.sum()
 
 
-def test_parts_may_overlap_and_leave_the_box():
+def test_parts_of_a_mesh_may_overlap_and_leave_the_box():
     """What two parts share is solid, and nothing leaks out of what is cut off by the box."""
     triangles = np.concatenate([cube((-0.5, -0.5, -1), (0.3, 0.5, 1)), cube((-0.1, -0.3, 0.5), (5, 0.3, 2))])
     inside = Mesh(triangles).voxels(DOMAIN)
@@ -71,7 +71,7 @@ def test_parts_may_overlap_and_leave_the_box():
     np.testing.assert_array_equal(inside, wanted)
 
 
-def test_a_hole_does_no_harm_and_a_plane_is_refused():
+def test_a_mesh_with_a_hole_works_and_a_plane_is_refused():
     """A few triangles of a round mesh are missing; a plane encloses nothing."""
     triangles = ball((0, 0, 1.5), 0.6)
     holed = Mesh(np.delete(triangles, slice(300, 306), axis=0)).voxels(DOMAIN)
@@ -81,7 +81,7 @@ def test_a_hole_does_no_harm_and_a_plane_is_refused():
         Mesh(plane).voxels(DOMAIN)
 
 
-def test_a_file_is_read_as_it_was_written(tmp_path):
+def test_an_stl_file_is_read_as_it_was_written(tmp_path):
     """To the bit; what is no such file is refused in one sentence."""
     triangles = cube((-0.5, -0.3, 0.4), (0.7, 0.4, 2.1))
     path = tmp_path / "cube.stl"

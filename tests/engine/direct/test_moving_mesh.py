@@ -67,7 +67,7 @@ def test_a_ball_pushes_still_smoke_before_it():
     assert np.average(places, weights=after.sum(axis=(1, 2))) > 0.06
 
 
-def test_one_that_swells_pushes_air_away():
+def test_a_mesh_that_swells_pushes_air_away():
     triangles = ball((0.0, 0.0, 0.0), 1.0)
     grown = MovingMesh(tuple(Mesh(((0.3 + 0.02 * n) * triangles + [0, 0, 1.5]).astype(np.float32)) for n in range(3)))
     solid = Obstacles(DOMAIN, (grown,)).at(2, DT)
@@ -110,7 +110,7 @@ def test_numbered_files_are_one_obstacle(tmp_path):
         MovingMesh.read(pattern)
 
 
-def test_one_that_never_comes_into_the_box_is_refused():
+def test_a_mesh_that_never_reaches_the_box_is_refused():
     far = cube((5.0, -0.3, 1.2), (5.5, 0.3, 1.7))
     with pytest.raises(ValueError, match="holds no voxel"):
         Obstacles(DOMAIN, (along_x(far, 0.1, 5),))

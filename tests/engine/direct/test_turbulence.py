@@ -38,7 +38,7 @@ def test_eddies_have_the_speed_and_the_size_asked_for():
         assert float((row[steps:] * row[:-steps]).mean()) < -0.1 * float((row * row).mean())
 
 
-def test_they_change_in_the_time_that_air_takes_to_cross_them():
+def test_eddies_change_in_the_time_that_air_takes_to_cross_them():
     now = eddies(Turbulence(0.5, 0.4))
     soon, late = (eddies(Turbulence(0.5, 0.4), time) for time in (0.08, 3.2))
     assert likeness(now, soon) > 0.95

@@ -74,7 +74,7 @@ def test_quantised_shows_in_no_picture_of_8_bits(sequence: Sequence, tmp_path: P
 
 
 @needs_vdb
-def test_less_is_smaller(sequence: Sequence, tmp_path: Path) -> None:
+def test_fewer_grids_and_bits_make_a_smaller_export(sequence: Sequence, tmp_path: Path) -> None:
     sizes = [
         export_size(sequence, settings)
         for settings in (ExportSettings(), ExportSettings("quantised"), ExportSettings("quantised", velocity=False))

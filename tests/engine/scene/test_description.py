@@ -25,7 +25,7 @@ def test_further_views_keep_step_with_another_range(tmp_path: Path) -> None:
         began.with_frames(0, 4)
 
 
-def test_a_camera_that_passes_the_domain_by_is_refused() -> None:
+def test_a_camera_that_does_not_see_the_domain_is_refused() -> None:
     domain = Domain((-1, -1, 0), (1, 1, 3), (2, 2, 3))
     size = (64, 64)
     for target in ((0, -20, 1.5), (20, -7, 1.5), (0, -7.1, 20)):

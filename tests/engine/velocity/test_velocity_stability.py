@@ -93,7 +93,7 @@ def test_speeds_from_a_tenth_of_a_voxel_to_ten(speed):
 
 
 @pytest.mark.parametrize("factor", [1e-3, 1e3])
-def test_any_unit_of_density(factor):
+def test_extreme_units_of_density_do_not_matter(factor):
     before, after = moved((0.4, 0.2, 0.6))
     reference = estimate_velocity(before, after, DT, VOXEL).centres()
     scaled = estimate_velocity(factor * before, factor * after, DT, VOXEL).centres()
@@ -101,7 +101,7 @@ def test_any_unit_of_density(factor):
 
 
 @pytest.mark.parametrize(("space", "time"), [(1e3, 1.0), (1.0, 1e3), (1e-3, 1e-3)])
-def test_any_unit_of_space_and_time(space, time):
+def test_extreme_units_of_space_and_time_do_not_matter(space, time):
     before, after = moved((0.4, 0.2, 0.6))
     reference = estimate_velocity(before, after, DT, VOXEL).centres()
     scaled = estimate_velocity(before, after, time * DT, space * VOXEL).centres() * (time / space)
@@ -123,7 +123,7 @@ def test_a_chain_of_frames_settles():
     assert all(0.7 < speed / largest < 1.6 for speed in speeds[4:])
 
 
-def test_a_sealed_box():
+def test_the_velocity_is_found_in_a_box_of_walls():
     """No pressure is singular, and nothing goes through any wall."""
     before, after = moved((0.5, -0.3, 0.6))
     found = estimate_velocity(before, after, DT, VOXEL, closed=SIDES)
