@@ -31,8 +31,8 @@ STL_HEADER = 80
 """Bytes before the number of triangles."""
 
 
-def request(smoke: bpy.types.Object) -> tuple[str, list[str], list[bytes]]:
-    """What is done to the take that a smoke shows.
+def engine_request(smoke: bpy.types.Object) -> tuple[str, list[str], list[bytes]]:
+    """What the engine is asked to do to the take that a smoke shows.
 
     Returns
     -------
@@ -48,15 +48,15 @@ def request(smoke: bpy.types.Object) -> tuple[str, list[str], list[bytes]]:
     if len(numbers) < SHORTEST:
         raise ShotError(f"{SHORTEST} frames at least are needed to see how smoke moves: make the result longer first.")
     if settings.direction == "retime":
-        return "retime", ["--speed", *map(_word, settings.speeds())], []
+        return "retime", ["--speed", *map(_number_text, settings.speeds())], []
     if settings.direction == "loop":
-        words = ["--overlap", str(settings.overlap)] if settings.overlap else []
+        options = ["--overlap", str(settings.overlap)] if settings.overlap else []
         if settings.use_part:
-            first, last = (_number(smoke, numbers, f) for f in (settings.part_first, settings.part_last))
+            first, last = (_frame_of_take(smoke, numbers, f) for f in (settings.part_first, settings.part_last))
             if last - first + 1 < SHORTEST:
                 raise ShotError(f"A loop needs {SHORTEST} frames at least: choose a later last frame.")
-            words = ["--frames", f"{first}:{last}", *words]
-        return "loop", words, []
+            options = ["--frames", f"{first}:{last}", *options]
+        return "loop", options, []
     return _continued(smoke, numbers)
 
 
@@ -64,23 +64,23 @@ def _continued(smoke: bpy.types.Object, numbers: list[int]) -> tuple[str, list[s
     settings, scene = smoke.smokelift.directing, scene_of(smoke)
     if settings.fade > settings.frames:
         raise ShotError(f"The smoke fades in {settings.fade} frames, more than are added ({settings.frames}).")
-    words = ["--frames", str(settings.frames), "--fade", str(settings.fade)]
+    options = ["--frames", str(settings.frames), "--fade", str(settings.fade)]
     last, start = numbers[-1], volume.scene_frame(smoke, numbers[-1])
     if settings.use_start:
         start = settings.start
-        last = _number(smoke, numbers, start)
+        last = _frame_of_take(smoke, numbers, start)
         if last < numbers[SHORTEST - 1]:
             raise ShotError(f"{SHORTEST} frames are needed before the smoke reacts: choose a later frame.")
-        words += ["--start", str(last)]
+        options += ["--start", str(last)]
     if settings.closed:
-        words += ["--closed", *(side for side in SIDES if side in settings.closed)]
+        options += ["--closed", *(side for side in SIDES if side in settings.closed)]
     later = [volume.scene_frame(smoke, last + step) for step in range(1, settings.frames + 1)]
     with at_frame(scene, start) as depsgraph:
-        words += _blown(smoke, depsgraph)
-        return "continue", words, _obstacles(smoke, depsgraph, later)
+        options += _air_options(smoke, depsgraph)
+        return "continue", options, _obstacles(smoke, depsgraph, later)
 
 
-def _number(smoke: bpy.types.Object, numbers: list[int], frame: int) -> int:
+def _frame_of_take(smoke: bpy.types.Object, numbers: list[int], frame: int) -> int:
     """The number in the take that is shown in a frame of the scene."""
     number = volume.number_at(smoke, frame)
     if number not in numbers:
@@ -89,12 +89,12 @@ def _number(smoke: bpy.types.Object, numbers: list[int], frame: int) -> int:
     return number
 
 
-def _blown(smoke: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> list[str]:
+def _air_options(smoke: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> list[str]:
     """Options for wind, turbulence and fans."""
     settings = smoke.smokelift.directing
     to_smoke = _world_to_smoke(smoke.evaluated_get(depsgraph))
     scale = abs(to_smoke.to_3x3().determinant()) ** (1 / 3)
-    wind, others = Vector(), []
+    wind, local = Vector(), []
     for obj in _effectors(smoke):
         seen = obj.evaluated_get(depsgraph)
         field, kind = seen.field, _kind(seen)
@@ -108,32 +108,34 @@ def _blown(smoke: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> list[str]
             if field.use_max_distance:
                 raise ShotError(f"Turbulence is everywhere: switch off Max Distance of {obj.name}.")
             size = field.size or UNSIZED
-            others += ["--turbulence", *map(_word, (abs(field.strength) * scale, size * scale, field.seed))]
+            local += ["--turbulence", *map(_number_text, (abs(field.strength) * scale, size * scale, field.seed))]
         elif kind == "WIND" and not field.use_max_distance:
             wind += field.strength * ahead
         elif kind != "NONE" or obj.type == "EMPTY":
-            own = field.distance_max if kind != "NONE" and field.use_max_distance else None
-            radius = obj.empty_display_size * abs(matrix.to_3x3().determinant()) ** (1 / 3) if own is None else own
-            blown = (settings.fan_speed if kind == "NONE" else field.strength) * ahead
-            others += ["--fan", *map(_word, (*(to_smoke @ matrix.translation), radius * scale, *blown))]
-    return (["--wind", *map(_word, wind)] if wind.length > 0.0 else []) + others
+            if kind != "NONE" and field.use_max_distance:
+                radius = field.distance_max
+            else:
+                radius = obj.empty_display_size * abs(matrix.to_3x3().determinant()) ** (1 / 3)
+            velocity = (settings.fan_speed if kind == "NONE" else field.strength) * ahead
+            local += ["--fan", *map(_number_text, (*(to_smoke @ matrix.translation), radius * scale, *velocity))]
+    return (["--wind", *map(_number_text, wind)] if wind.length > 0.0 else []) + local
 
 
 def _obstacles(smoke: bpy.types.Object, depsgraph: bpy.types.Depsgraph, later: list[int]) -> list[bytes]:
     """The meshes as a binary STL file, and as one more for each later frame of the scene as long as they move."""
     meshes = [obj for obj in _effectors(smoke) if obj.type in MESHES and _kind(obj.evaluated_get(depsgraph)) == "NONE"]
 
-    def now() -> bytes:
+    def current_stl() -> bytes:
         to_smoke = _world_to_smoke(smoke.evaluated_get(depsgraph))
         seen = [obj.evaluated_get(depsgraph) for obj in meshes]
         return _stl([_triangles(obj, to_smoke @ obj.matrix_world) for obj in seen])
 
-    files = [now()]
+    files = [current_stl()]
     if not files[0]:
         return []
     for frame in later:
         scene_of(smoke).frame_set(frame)
-        content = now()
+        content = current_stl()
         if len(content) != len(files[0]):
             raise ShotError(
                 f"The obstacles change their number of triangles in frame {frame}: a mesh that moves has to keep them."
@@ -178,6 +180,7 @@ def _triangles(obj: bpy.types.Object, matrix: Matrix) -> npt.NDArray[np.float64]
     whole = np.array(matrix)
     moved = places.reshape(-1, 3) @ whole[:3, :3].T + whole[:3, 3]
     triangles = moved[corners].reshape(-1, 3, 3)
+    # six times the signed volume that a closed surface encloses
     inward = np.einsum("ni,ni", triangles[:, 0], np.cross(triangles[:, 1], triangles[:, 2])) < 0
     return triangles[:, ::-1] if inward else triangles
 
@@ -193,7 +196,7 @@ def _stl(parts: list[npt.NDArray[np.float64]]) -> bytes:
     return bytes(STL_HEADER) + len(records).to_bytes(4, "little") + records.tobytes()
 
 
-def _word(value: float) -> str:
+def _number_text(value: float) -> str:
     """A number as the engine's command line reads it, which takes ``-1e-05`` for an option."""
     if not math.isfinite(value):
         raise ShotError("A place or a speed is not finite: look at the scale of the smoke and of its effectors.")

@@ -56,7 +56,7 @@ def write_directed(smoke: bpy.types.Object) -> Take:
         raise ShotError("Make smoke first: there is none yet to direct.")
     if busy(bpy.context.window_manager, source):
         raise ShotError("The result on show is still being made: wait for its end, or cancel it.")
-    direction, options, meshes = directing.request(smoke)
+    direction, options, meshes = directing.engine_request(smoke)
     separate_duplicate(smoke)
     take = new_take(output_folder(smoke))
     take.write_directed(direction, source, options, meshes)

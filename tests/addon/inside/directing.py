@@ -102,17 +102,17 @@ def test_frames_are_those_of_the_scene(shot, result) -> None:
     """The take begins where the clip does, and may be moved in time."""
     settings = result.smokelift.directing
     settings.frames, settings.fade = 10, 4
-    assert directing.request(result) == ("continue", ["--frames", "10", "--fade", "4"], [])
+    assert directing.engine_request(result) == ("continue", ["--frames", "10", "--fade", "4"], [])
     result.data.frame_start = 101
     settings.use_start, settings.start = True, 105
-    assert directing.request(result)[1][-2:] == ["--start", "5"]
+    assert directing.engine_request(result)[1][-2:] == ["--start", "5"]
     for frame, said in ((102, "4 frames are needed"), (107, "from 101 to 106")):
         settings.start = frame
         with pytest.raises(ShotError, match=said):
-            directing.request(result)
+            directing.engine_request(result)
     settings.fade = 11
     with pytest.raises(ShotError, match="fades in 11"):
-        directing.request(result)
+        directing.engine_request(result)
 
 
 def test_frames_in_real_time(shot, result) -> None:
@@ -128,9 +128,9 @@ def test_sides_are_closed(result) -> None:
     """From the frame on from which the smoke goes on, whatever the clip had."""
     result.smokelift.closed = {"z-"}
     settings = result.smokelift.directing
-    assert "--closed" not in directing.request(result)[1]
+    assert "--closed" not in directing.engine_request(result)[1]
     settings.closed = {"x-", "y+"}
-    assert directing.request(result)[1][-3:] == ["--closed", "x-", "y+"]
+    assert directing.engine_request(result)[1][-3:] == ["--closed", "x-", "y+"]
 
 
 def test_meshes_are_obstacles(result, acting, tmp_path) -> None:
@@ -139,18 +139,18 @@ def test_meshes_are_obstacles(result, acting, tmp_path) -> None:
     obj = placed(acting, "Crate", mesh, **place)
     acting.objects.link(result.smokelift.box)
     wanted = Box((-0.5, -0.5, 1.0), (0.5, 0.5, 2.0)).voxels(DOMAIN)
-    (content,) = directing.request(result)[2]
+    (content,) = directing.engine_request(result)[2]
     np.testing.assert_array_equal(solid(content, tmp_path), wanted)
     obj.scale.x = -0.5
     other, there = cube(0.25, (0.5, 0.0, 1.5))
     small = placed(acting, "Small", other, **there)
     both = wanted | Box((0.25, -0.25, 1.25), (0.75, 0.25, 1.75)).voxels(DOMAIN)
-    np.testing.assert_array_equal(solid(*directing.request(result)[2], tmp_path), both)
+    np.testing.assert_array_equal(solid(*directing.engine_request(result)[2], tmp_path), both)
     obj.hide_viewport = True
-    assert solid(*directing.request(result)[2], tmp_path).sum() < both.sum()
+    assert solid(*directing.engine_request(result)[2], tmp_path).sum() < both.sum()
     modifier = small.modifiers.new("Round", "SUBSURF")
     modifier.levels = 2
-    assert len(directing.request(result)[2][0]) > len(content)
+    assert len(directing.engine_request(result)[2][0]) > len(content)
 
 
 def test_meshes_that_move(shot, result, acting, tmp_path) -> None:
@@ -163,7 +163,7 @@ def test_meshes_that_move(shot, result, acting, tmp_path) -> None:
         obj.location.x = x
         obj.keyframe_insert("location", index=0, frame=frame)
     before = shot.frame_current
-    files = directing.request(result)[2]
+    files = directing.engine_request(result)[2]
     assert shot.frame_current == before
     assert len(files) == 4  # at the start and 1, 2 and 3 frames later; then it stays
     assert files[0] == files[1]
@@ -176,7 +176,7 @@ def test_meshes_that_move(shot, result, acting, tmp_path) -> None:
     build = obj.modifiers.new("Build", "BUILD")
     build.frame_start, build.frame_duration = last, 10
     with pytest.raises(ShotError, match="number of triangles"):
-        directing.request(result)
+        directing.engine_request(result)
 
 
 def test_the_smokes_own_space_counts(result, acting, tmp_path) -> None:
@@ -186,12 +186,12 @@ def test_the_smokes_own_space_counts(result, acting, tmp_path) -> None:
     fan = placed(
         acting, "Fan", empty_display_size=0.5, location=(-0.8, 0.0, 0.6), rotation_euler=(0.0, math.pi / 2, 0.0)
     )
-    before, options = (part for part in directing.request(result)[:0:-1])
+    before, options = (part for part in directing.engine_request(result)[:0:-1])
     result.location, result.scale, result.rotation_euler = (3.0, 1.0, -2.0), (2.0, 2.0, 2.0), (0.0, 0.0, 1.2)
     bpy.context.view_layer.update()
     there = Matrix.Translation(result.location) @ result.rotation_euler.to_matrix().to_4x4() @ Matrix.Scale(2.0, 4)
     obj.matrix_basis, fan.matrix_basis = there @ obj.matrix_basis, there @ fan.matrix_basis
-    after, found = (part for part in directing.request(result)[:0:-1])
+    after, found = (part for part in directing.engine_request(result)[:0:-1])
     np.testing.assert_array_equal(solid(*after, tmp_path), solid(*before, tmp_path))
     # one metre in the scene is half a metre of the smoke's own
     np.testing.assert_allclose(words(found, "--fan")[0][:4], words(options, "--fan")[0][:4], atol=1e-5)
@@ -210,7 +210,7 @@ def test_winds_and_fans(result, acting) -> None:
     gust = placed(acting, "Gust", field="WIND", location=(0.0, 0.5, 1.0)).field
     gust.strength, gust.use_max_distance, gust.distance_max = 3.0, True, 0.3
     result.smokelift.directing.fan_speed = 1.5
-    options = directing.request(result)[1]
+    options = directing.engine_request(result)[1]
     np.testing.assert_allclose(words(options, "--wind"), [[0.8, 0.0, 0.0]], atol=1e-5)
     wanted = [
         [0.0, 0.0, 1.0, 0.2, 0.0, 0.0, -2.0],
@@ -220,36 +220,36 @@ def test_winds_and_fans(result, acting) -> None:
     np.testing.assert_allclose(sorted(words(options, "--fan")), wanted, atol=1e-5)
     placed(acting, "Swirl", field="VORTEX")
     with pytest.raises(ShotError, match="field of Swirl cannot be used"):
-        directing.request(result)
+        directing.engine_request(result)
 
 
 def test_turbulence(result, acting) -> None:
     """In the smoke's own metres; a size of 0 is what Blender takes for it."""
     field = placed(acting, "Stir", field="TURBULENCE").field
     field.strength, field.size, field.seed = 0.4, 0.25, 7
-    assert words(directing.request(result)[1], "--turbulence") == [[0.4, 0.25, 7.0]]
+    assert words(directing.engine_request(result)[1], "--turbulence") == [[0.4, 0.25, 7.0]]
     result.scale, field.size = (2.0, 2.0, 2.0), 0.0
     bpy.context.view_layer.update()
-    np.testing.assert_allclose(words(directing.request(result)[1], "--turbulence"), [[0.2, 0.5, 7.0]], atol=1e-5)
+    np.testing.assert_allclose(words(directing.engine_request(result)[1], "--turbulence"), [[0.2, 0.5, 7.0]], atol=1e-5)
     field.use_max_distance = True
     with pytest.raises(ShotError, match="Max Distance of Stir"):
-        directing.request(result)
+        directing.engine_request(result)
 
 
 def test_retime_and_loop(result) -> None:
     """One speed or three; the whole or a part."""
     settings = result.smokelift.directing
     settings.direction, settings.speed = "retime", 0.25
-    assert directing.request(result)[:2] == ("retime", ["--speed", "0.250000"])
+    assert directing.engine_request(result)[:2] == ("retime", ["--speed", "0.250000"])
     settings.use_ramp = True
-    assert len(directing.request(result)[1]) == 4
+    assert len(directing.engine_request(result)[1]) == 4
     settings.direction = "loop"
-    assert directing.request(result)[:2] == ("loop", [])
+    assert directing.engine_request(result)[:2] == ("loop", [])
     settings.use_part, settings.part_first, settings.part_last, settings.overlap = True, 2, 6, 2
-    assert directing.request(result)[1] == ["--frames", "2:6", "--overlap", "2"]
+    assert directing.engine_request(result)[1] == ["--frames", "2:6", "--overlap", "2"]
     settings.part_last = 4
     with pytest.raises(ShotError, match="4 frames"):
-        directing.request(result)
+        directing.engine_request(result)
 
 
 # whole runs
