@@ -39,156 +39,285 @@ std::size_t row_of(const Blocks &blocks, int x, int y) {
     return (std::size_t(x) * blocks.n[1] + y) * blocks.n[2];
 }
 
-// Calls visit(first, end, block) for the voxels of each block in a range of a row.
-template <class Visit>
-SMOKELIFT_INLINE void along_row(const Blocks &blocks, const std::array<int, 2> &span, const Visit &visit) {
-    int z = span[0], block = block_of(blocks, 2, z);
-    while (z < span[1]) {
-        const int end = std::min(span[1], (block + 1) * blocks.size - blocks.offset[2]);
-        visit(z, end, block);
-        z = end;
-        ++block;
-    }
-}
-
-// A row of values between four rows of blocks; `x` and `y` are the distances from their centres, in blocks.
-struct Mixed {
-    std::size_t rows[4];
-    float weights[4], x[4], y[4];
-
-    Mixed(const Blocks &blocks, const Between &x, const Between &y) {
-        for (int i = 0; i < 4; ++i) {
-            rows[i] = row_of(blocks, x.block + i / 2, y.block + i % 2);
-            weights[i] = (i / 2 ? x.fraction : 1 - x.fraction) * (i % 2 ? y.fraction : 1 - y.fraction);
-            this->x[i] = x.fraction - float(i / 2);
-            this->y[i] = y.fraction - float(i % 2);
-        }
-    }
-};
-
 // Distance of a voxel's centre from that of its block, over the mean square of those of all voxels, in
 // blocks: a slope is the mean of the values times this.
-float lever(const Blocks &blocks, int axis, int voxel) {
+float lever_of(const Blocks &blocks, int axis, int voxel) {
     const auto size = float(blocks.size);
     const int place = (voxel + blocks.offset[axis]) % blocks.size;
     return blocks.size > 1 ? 12 * size / (size * size - 1) * (float(place) + 0.5f - 0.5f * size) : 0.0f;
 }
 
-std::vector<float> levers(const Blocks &blocks, int axis, int count) {
-    std::vector<float> result(count);
-    for (int voxel = 0; voxel < count; ++voxel)
-        result[voxel] = lever(blocks, axis, voxel);
-    return result;
+// Of voxels along z: their blocks and levers.
+struct AlongZ {
+    std::vector<int> block;
+    std::vector<float> lever;
+
+    AlongZ(const Blocks &blocks, int count) : block(count), lever(count) {
+        for (int z = 0; z < count; ++z) {
+            block[z] = block_of(blocks, 2, z);
+            lever[z] = lever_of(blocks, 2, z);
+        }
+    }
+};
+
+// A plane of voxels across x takes and gives whole rows along z: rows of voxels in a loop that vectorises,
+// and of the few rows of blocks each place along z by itself.
+
+std::array<int, 2> joined(const std::array<int, 2> &a, const std::array<int, 2> &b) {
+    if (a[0] >= a[1])
+        return b;
+    if (b[0] >= b[1])
+        return a;
+    return {std::min(a[0], b[0]), std::max(a[1], b[1])};
+}
+
+// The first floats of voxels, `width` apart.
+SMOKELIFT_INLINE void load(const float *__restrict from, int width, const std::array<int, 2> &span,
+                           float *__restrict to) {
+    if (width == 2)
+        for (int z = span[0]; z < span[1]; ++z)
+            to[z] = from[2 * z];
+    else
+        for (int z = span[0]; z < span[1]; ++z)
+            to[z] = from[width * z];
+}
+
+// Adds plane x of the voxels to plane `block_x` of means; `sums` of the rows in a block, by place along z.
+SMOKELIFT_CLONES
+void average_plane(const Voxels &medium, const Spans &spans, const Blocks &blocks, const AlongZ &along_z,
+                   int block_x, int x, float *means) {
+    const int length = medium.n[2], channels = medium.width - 1;
+    const std::size_t count = blocks.count();
+    const float share = 1.0f / float(blocks.size * blocks.size * blocks.size);
+    const float along_x = lever_of(blocks, 0, x);
+    std::vector<float> memory((3 + 2 * std::size_t(channels)) * length);
+    float *const __restrict kappa = memory.data(), *const __restrict radiance = kappa + length;
+    float *const sums = radiance + length;
+    for (int block_y = 0; block_y < blocks.n[1]; ++block_y) {
+        const auto [first, end] = voxels_in(blocks, 1, block_y, medium.n[1]);
+        std::array<int, 2> filled{0, 0};
+        std::fill_n(sums, (1 + 2 * channels) * length, 0.0f);
+        for (int y = first; y < end; ++y) {
+            const auto &span = spans.along_z[std::size_t(x) * medium.n[1] + y];
+            if (span[0] >= span[1])
+                continue;
+            filled = joined(filled, span);
+            const float along_y = lever_of(blocks, 1, y);
+            const float *const voxel = medium.at(x, y, 0);
+            load(voxel, medium.width, span, kappa);
+            float *const __restrict extinction = sums;
+            for (int z = span[0]; z < span[1]; ++z)
+                extinction[z] += kappa[z];
+            for (int channel = 0; channel < channels; ++channel) {
+                load(voxel + 1 + channel, medium.width, span, radiance);
+                float *const __restrict emission = sums + (1 + 2 * channel) * length;
+                float *const __restrict lifted = emission + length;
+                for (int z = span[0]; z < span[1]; ++z) {
+                    const float value = kappa[z] * radiance[z];
+                    emission[z] += value;
+                    lifted[z] += value * along_y;
+                }
+            }
+        }
+        float *const row = means + row_of(blocks, block_x, block_y);
+        for (int z = filled[0]; z < filled[1]; ++z) {
+            float *out = row + along_z.block[z];
+            out[0] += share * sums[z];
+            for (int channel = 0; channel < channels; ++channel) {
+                const float emission = share * sums[(1 + 2 * channel) * length + z];
+                float *const fields = out + (1 + channel * Blocks::FIELDS) * count;
+                fields[0] += emission;
+                fields[count] += emission * along_x;
+                fields[2 * count] += share * sums[(2 + 2 * channel) * length + z];
+                fields[3 * count] += emission * along_z.lever[z];
+            }
+        }
+    }
+}
+
+// Adds to the derivatives by k and by J, `channel` floats behind it, that by the emission k J.
+SMOKELIFT_INLINE void add_products(const std::array<int, 2> &span, const float *__restrict voxel,
+                                   const float *__restrict of_emission, float along_y, int length, int width,
+                                   int channel, float *__restrict out) {
+    const float *const __restrict of_emission_y = of_emission + length;
+    for (int z = span[0]; z < span[1]; ++z) {
+        const float value = of_emission[z] + along_y * of_emission_y[z];
+        out[z * width] += value * voxel[z * width + channel];
+        out[z * width + channel] += value * voxel[z * width];
+    }
+}
+
+SMOKELIFT_CLONES
+void average_adjoint_plane(const Voxels &medium, const Spans &spans, const Blocks &blocks,
+                           const AlongZ &along_z, const float *of_means, const Voxels &gradient, int x) {
+    const int width = medium.width, length = medium.n[2];
+    const std::size_t count = blocks.count();
+    const float share = 1.0f / float(blocks.size * blocks.size * blocks.size);
+    const float along_x = lever_of(blocks, 0, x);
+    std::vector<float> memory((2 * std::size_t(width) - 1) * length);
+    for (int block_y = 0; block_y < blocks.n[1]; ++block_y) {
+        const auto [first, end] = voxels_in(blocks, 1, block_y, medium.n[1]);
+        std::array<int, 2> filled{0, 0};
+        for (int y = first; y < end; ++y)
+            filled = joined(filled, spans.along_z[std::size_t(x) * medium.n[1] + y]);
+        const float *const row = of_means + row_of(blocks, block_of(blocks, 0, x), block_y);
+        for (int z = filled[0]; z < filled[1]; ++z) {
+            const float *const in = row + along_z.block[z];
+            memory[z] = share * in[0];
+            for (int channel = 0; channel < width - 1; ++channel) {
+                const float *const fields = in + (1 + channel * Blocks::FIELDS) * count;
+                float *const out = memory.data() + (1 + 2 * channel) * length + z;
+                out[0] = share * (fields[0] + along_x * fields[count] + along_z.lever[z] * fields[3 * count]);
+                out[length] = share * fields[2 * count];
+            }
+        }
+        for (int y = first; y < end; ++y) {
+            const auto &span = spans.along_z[std::size_t(x) * medium.n[1] + y];
+            const float along_y = lever_of(blocks, 1, y);
+            const float *const voxel = medium.at(x, y, 0);
+            float *const out = gradient.at(x, y, 0);
+            for (int z = span[0]; z < span[1]; ++z)
+                out[z * width] += memory[z];
+            for (int channel = 0; channel < width - 1; ++channel) {
+                const float *const of_emission = memory.data() + (1 + 2 * channel) * length;
+                if (width == 2) // neighbours in memory
+                    add_products(span, voxel, of_emission, along_y, length, 2, 1, out);
+                else
+                    add_products(span, voxel, of_emission, along_y, length, width, channel + 1, out);
+            }
+        }
+    }
+}
+
+// A channel on the rows of voxels through the centres of blocks in a plane across x: for each row of blocks
+// the values, and their slope along y.
+SMOKELIFT_CLONES
+void expand(const float *fields, const Blocks &blocks, const Between &across_x,
+            const std::vector<Between> &along_z, float *rows) {
+    const std::size_t count = blocks.count(), length = along_z.size();
+    const float near = 1 - across_x.fraction, far = across_x.fraction, bent = near * far;
+    const std::size_t next = std::size_t(blocks.n[1]) * blocks.n[2];
+    std::vector<float> line(3 * std::size_t(blocks.n[2]));
+    float *const __restrict mean = line.data(), *const __restrict of_y = mean + blocks.n[2];
+    float *const __restrict of_z = of_y + blocks.n[2];
+    for (int y = 0; y < blocks.n[1]; ++y) {
+        const float *const __restrict in = fields + row_of(blocks, across_x.block, y);
+        for (int z = 0; z < blocks.n[2]; ++z) {
+            mean[z] = near * in[z] + far * in[next + z] + bent * (in[count + z] - in[count + next + z]);
+            of_y[z] = near * in[2 * count + z] + far * in[2 * count + next + z];
+            of_z[z] = near * in[3 * count + z] + far * in[3 * count + next + z];
+        }
+        float *const __restrict out = rows + 2 * y * length;
+        for (std::size_t z = 0; z < length; ++z) {
+            const auto [b, f] = along_z[z];
+            out[z] = mean[b] + f * (mean[b + 1] - mean[b] + (1 - f) * (of_z[b] - of_z[b + 1]));
+            out[length + z] = of_y[b] + f * (of_y[b + 1] - of_y[b]);
+        }
+    }
+}
+
+SMOKELIFT_CLONES
+void expand_adjoint(const float *rows, const Blocks &blocks, const std::vector<Between> &along_z,
+                    float *part) {
+    const std::size_t length = along_z.size(), plane = std::size_t(blocks.n[1]) * blocks.n[2];
+    for (int y = 0; y < blocks.n[1]; ++y) {
+        const float *const in = rows + 2 * y * length;
+        float *const mean = part + std::size_t(y) * blocks.n[2];
+        float *const of_y = mean + plane, *const of_z = of_y + plane;
+        for (std::size_t z = 0; z < length; ++z) {
+            const auto [b, f] = along_z[z];
+            const float near = (1 - f) * in[z], bent = f * near;
+            mean[b] += near;
+            mean[b + 1] += f * in[z];
+            of_y[b] += (1 - f) * in[length + z];
+            of_y[b + 1] += f * in[length + z];
+            of_z[b] += bent;
+            of_z[b + 1] -= bent;
+        }
+    }
+}
+
+// What a row of voxels takes of the two rows of blocks beside it: of their values and of their slopes.
+struct Mix {
+    float near, near_slope, far, far_slope;
+
+    Mix(float fraction, float factor)
+        : near(factor * (1 - fraction)), near_slope(near * fraction), far(factor * fraction),
+          far_slope(-far * (1 - fraction)) {}
+};
+
+SMOKELIFT_CLONES
+void add_rows(const float *rows, float factor, const Blocks &blocks, const Voxels &medium, const Spans &spans,
+              int x, int channel) {
+    const std::size_t length = medium.n[2];
+    std::vector<float> memory(length);
+    float *const __restrict mixed = memory.data();
+    for (int y = 0; y < medium.n[1]; ++y) {
+        const auto &span = spans.along_z[std::size_t(x) * medium.n[1] + y];
+        const Between across_y = between(blocks, 1, y);
+        const Mix mix(across_y.fraction, factor);
+        const float *const __restrict near = rows + 2 * across_y.block * length;
+        const float *const __restrict far = near + 2 * length;
+        for (int z = span[0]; z < span[1]; ++z)
+            mixed[z] = mix.near * near[z] + mix.near_slope * near[length + z] + mix.far * far[z] +
+                       mix.far_slope * far[length + z];
+        float *const __restrict out = medium.at(x, y, 0) + channel;
+        for (int z = span[0]; z < span[1]; ++z)
+            out[z * medium.width] += mixed[z];
+    }
+}
+
+SMOKELIFT_CLONES
+void gather_rows(const Voxels &gradient, const Spans &spans, const Blocks &blocks, int x, int channel,
+                 float *rows) {
+    const std::size_t length = gradient.n[2];
+    std::vector<float> memory(length);
+    float *const __restrict value = memory.data();
+    for (int y = 0; y < gradient.n[1]; ++y) {
+        const auto &span = spans.along_z[std::size_t(x) * gradient.n[1] + y];
+        const Between across_y = between(blocks, 1, y);
+        const Mix mix(across_y.fraction, 1);
+        load(gradient.at(x, y, 0) + channel, gradient.width, span, value);
+        float *const __restrict near = rows + 2 * across_y.block * length;
+        float *const __restrict near_slope = near + length, *const __restrict far = near_slope + length;
+        float *const __restrict far_slope = far + length;
+        for (int z = span[0]; z < span[1]; ++z) {
+            near[z] += mix.near * value[z];
+            near_slope[z] += mix.near_slope * value[z];
+            far[z] += mix.far * value[z];
+            far_slope[z] += mix.far_slope * value[z];
+        }
+    }
 }
 
 } // namespace
 
 void average(const Voxels &medium, const Spans &spans, const Blocks &blocks, float *means, Workers &workers) {
-    const int width = medium.width;
-    const std::size_t count = blocks.count();
-    const float share = 1.0f / float(blocks.size * blocks.size * blocks.size);
-    const std::vector<float> along_y = levers(blocks, 1, medium.n[1]),
-                             along_z = levers(blocks, 2, medium.n[2]);
-    std::fill_n(means, (1 + (width - 1) * Blocks::FIELDS) * count, 0.0f);
+    std::fill_n(means, (1 + (medium.width - 1) * Blocks::FIELDS) * blocks.count(), 0.0f);
+    const AlongZ along_z(blocks, medium.n[2]);
     workers.run(blocks.n[0], [&](int block_x) {
         const auto [first, end] = voxels_in(blocks, 0, block_x, medium.n[0]);
-        for (int x = first; x < end; ++x) {
-            const float along_x = lever(blocks, 0, x);
-            for (int y = 0; y < medium.n[1]; ++y) {
-                const auto &span = spans.along_z[std::size_t(x) * medium.n[1] + y];
-                const float *in = medium.at(x, y, 0);
-                float *const out = means + row_of(blocks, block_x, block_of(blocks, 1, y));
-                along_row(blocks, span, [&](int z, int last, int block) SMOKELIFT_INLINE_LAMBDA {
-                    float extinction = 0;
-                    for (int i = z; i < last; ++i)
-                        extinction += in[i * width];
-                    out[block] += share * extinction;
-                    for (int channel = 1; channel < width; ++channel) {
-                        float emission = 0, rise = 0;
-                        for (int i = z; i < last; ++i) {
-                            const float value = share * in[i * width] * in[i * width + channel];
-                            emission += value;
-                            rise += value * along_z[i];
-                        }
-                        float *const fields = out + (1 + (channel - 1) * Blocks::FIELDS) * count + block;
-                        fields[0] += emission;
-                        fields[count] += emission * along_x;
-                        fields[2 * count] += emission * along_y[y];
-                        fields[3 * count] += rise;
-                    }
-                });
-            }
-        }
+        for (int x = first; x < end; ++x)
+            average_plane(medium, spans, blocks, along_z, block_x, x, means);
     });
 }
 
 void average_adjoint(const Voxels &medium, const Spans &spans, const Blocks &blocks, const float *of_means,
                      const Voxels &gradient, Workers &workers) {
-    const int width = medium.width;
-    const std::size_t count = blocks.count();
-    const float share = 1.0f / float(blocks.size * blocks.size * blocks.size);
-    const std::vector<float> along_y = levers(blocks, 1, medium.n[1]),
-                             along_z = levers(blocks, 2, medium.n[2]);
-    workers.run(medium.n[0], [&](int x) {
-        const float along_x = lever(blocks, 0, x);
-        for (int y = 0; y < medium.n[1]; ++y) {
-            const auto &span = spans.along_z[std::size_t(x) * medium.n[1] + y];
-            const float *voxel = medium.at(x, y, 0);
-            const float *const in = of_means + row_of(blocks, block_of(blocks, 0, x), block_of(blocks, 1, y));
-            float *const out = gradient.at(x, y, 0);
-            along_row(blocks, span, [&](int z, int last, int block) SMOKELIFT_INLINE_LAMBDA {
-                const float of_extinction = share * in[block];
-                for (int i = z; i < last; ++i)
-                    out[i * width] += of_extinction;
-                for (int channel = 1; channel < width; ++channel) {
-                    const float *const fields = in + (1 + (channel - 1) * Blocks::FIELDS) * count + block;
-                    const float mean =
-                        share * (fields[0] + along_x * fields[count] + along_y[y] * fields[2 * count]);
-                    const float slope = share * fields[3 * count];
-                    for (int i = z; i < last; ++i) {
-                        const float of_emission = mean + slope * along_z[i];
-                        out[i * width] += of_emission * voxel[i * width + channel];
-                        out[i * width + channel] += of_emission * voxel[i * width];
-                    }
-                }
-            });
-        }
-    });
+    const AlongZ along_z(blocks, medium.n[2]);
+    workers.run(medium.n[0],
+                [&](int x) { average_adjoint_plane(medium, spans, blocks, along_z, of_means, gradient, x); });
 }
 
 void add_interpolated(const float *values, float factor, const Blocks &blocks, const Voxels &medium,
                       const Spans &spans, Workers &workers) {
-    const std::size_t count = blocks.count();
     const std::vector<Between> along_z = all_between(blocks, 2, medium.n[2]);
     workers.run(medium.n[0], [&](int x) {
-        const Between across_x = between(blocks, 0, x);
-        std::vector<float> line(blocks.n[2]), slope(blocks.n[2]);
-        for (int y = 0; y < medium.n[1]; ++y) {
-            const auto &span = spans.along_z[std::size_t(x) * medium.n[1] + y];
-            if (span[0] >= span[1])
-                continue;
-            const Mixed mixed(blocks, across_x, between(blocks, 1, y));
-            float *const out = medium.at(x, y, 0);
-            for (int channel = 1; channel < medium.width; ++channel) {
-                const float *const fields = values + (channel - 1) * Blocks::FIELDS * count;
-                std::fill(line.begin(), line.end(), 0.0f);
-                std::fill(slope.begin(), slope.end(), 0.0f);
-                for (int i = 0; i < 4; ++i) {
-                    const float *const from = fields + mixed.rows[i];
-                    const float weight = factor * mixed.weights[i];
-                    for (int z = 0; z < blocks.n[2]; ++z) {
-                        line[z] += weight * (from[z] + mixed.x[i] * from[count + z] +
-                                             mixed.y[i] * from[2 * count + z]);
-                        slope[z] += weight * from[3 * count + z];
-                    }
-                }
-                for (int z = span[0]; z < span[1]; ++z) {
-                    const auto [block, f] = along_z[z];
-                    out[z * medium.width + channel] +=
-                        line[block] +
-                        f * (line[block + 1] - line[block] + (1 - f) * (slope[block] - slope[block + 1]));
-                }
-            }
+        std::vector<float> rows(2 * std::size_t(blocks.n[1]) * medium.n[2]);
+        for (int channel = 1; channel < medium.width; ++channel) {
+            expand(values + (channel - 1) * Blocks::FIELDS * blocks.count(), blocks, between(blocks, 0, x),
+                   along_z, rows.data());
+            add_rows(rows.data(), factor, blocks, medium, spans, x, channel);
         }
     });
 }
@@ -202,37 +331,11 @@ void interpolate_adjoint(const Voxels &gradient, const Spans &spans, float facto
     constexpr int PARTS = 3;
     std::vector<float> planes(channels * PARTS * plane * gradient.n[0], 0.0f);
     workers.run(gradient.n[0], [&](int x) {
-        std::vector<float> line(blocks.n[2]), slope(blocks.n[2]);
-        for (int y = 0; y < gradient.n[1]; ++y) {
-            const auto &span = spans.along_z[std::size_t(x) * gradient.n[1] + y];
-            if (span[0] >= span[1])
-                continue;
-            const Between across_y = between(blocks, 1, y);
-            const float *const in = gradient.at(x, y, 0);
-            for (int channel = 0; channel < channels; ++channel) {
-                std::fill(line.begin(), line.end(), 0.0f);
-                std::fill(slope.begin(), slope.end(), 0.0f);
-                for (int z = span[0]; z < span[1]; ++z) {
-                    const auto [block, f] = along_z[z];
-                    const float value = in[z * gradient.width + 1 + channel];
-                    const float near = (1 - f) * value, bent = f * near;
-                    line[block] += near;
-                    line[block + 1] += f * value;
-                    slope[block] += bent;
-                    slope[block + 1] -= bent;
-                }
-                float *const part = planes.data() + (std::size_t(x) * channels + channel) * PARTS * plane;
-                for (int side = 0; side < 2; ++side) {
-                    const float share = side ? across_y.fraction : 1 - across_y.fraction;
-                    const float from_centre = share * (across_y.fraction - float(side));
-                    float *const mean = part + (across_y.block + side) * blocks.n[2];
-                    for (int z = 0; z < blocks.n[2]; ++z) {
-                        mean[z] += share * line[z];
-                        mean[plane + z] += from_centre * line[z];
-                        mean[2 * plane + z] += share * slope[z];
-                    }
-                }
-            }
+        for (int channel = 0; channel < channels; ++channel) {
+            std::vector<float> rows(2 * std::size_t(blocks.n[1]) * gradient.n[2], 0.0f);
+            gather_rows(gradient, spans, blocks, x, channel + 1, rows.data());
+            expand_adjoint(rows.data(), blocks, along_z,
+                           planes.data() + (std::size_t(x) * channels + channel) * PARTS * plane);
         }
     });
     std::fill_n(of_values, channels * Blocks::FIELDS * count, 0.0f);

@@ -103,6 +103,16 @@ def test_the_box_around_the_smoke_changes_nothing(density):
     np.testing.assert_allclose(part, whole, rtol=1e-4)
 
 
+def test_light_that_has_left_the_blocks_does_not_come_back():
+    """Rows of blocks lie one behind the other in memory; in a box full of smoke the next one is near."""
+    shape, black = (12, 10, 10), np.zeros(3, np.float32)
+    values = np.random.default_rng(1).random(shape).astype(np.float32)
+    domain, medium = Domain((0.0, 0.0, 0.0), (1.2, 1.0, 1.0), shape), replace(MEDIUM, extinction=5.0)
+    image = Renderer(CAMERA, domain, medium, (SUN,), black, "multiple").image(values)
+    sums = reference.render(values.astype(float), CAMERA, domain, medium, (SUN,), black.astype(float), "multiple")
+    np.testing.assert_allclose(image, sums, rtol=5e-4, atol=1e-5)
+
+
 @pytest.mark.parametrize(("extinction", "lost"), [(0.5, 0.01), (2.0, 0.04), (8.0, 0.2)])
 def test_white_smoke_gives_back_the_light_of_a_white_room(extinction, lost):
     """Where radiance 1 comes from everywhere, smoke that absorbs nothing can hardly be seen, and hardly shines."""
