@@ -18,7 +18,7 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from smokelift.footage.behind_smoke import DRIFT, push_pull
+from smokelift.footage.behind_smoke import DRIFT, ISLAND, push_pull
 from smokelift.footage.images import Picture
 from smokelift.footage.noise import linear_samples
 from smokelift.footage.seen import at_rank, count_of_seen
@@ -85,8 +85,14 @@ def smoke_of(grey: Picture, window: float) -> Smoke:
     likeness = float(alike[pairs].mean()) if pairs.any() else 0.5
     # what most samples agree on is the background for certain
     certain = (counts.max(0) > MOST * number) & (number >= LEAST_SEEN * len(values))
+    behind = push_pull(background.reshape(*shape, 1), certain.reshape(shape).astype(np.float32)).ravel()
     # there, what a codec's drift may be says nothing of smoke
-    change = np.where((np.abs(away) > 0.5 * window + DRIFT) & certain, away, 0.0)
+    least = 0.5 * window + DRIFT
+    change = np.where((np.abs(away) > least) & certain, away, 0.0)
+    if (change != 0).any(0).mean() < ISLAND:
+        # smoke that never leaves its place shows beside it by accident only, and in its place all the time
+        background, away = behind, values - behind
+        change = np.where(np.abs(away) > least, away, 0.0)
     if not change.any():
         return Smoke(likeness, 1.0, np.ones(shape, np.bool_))
     brighter, darker = (np.square(np.maximum(each, 0)).sum(0) for each in (change, -change))
@@ -96,8 +102,7 @@ def smoke_of(grey: Picture, window: float) -> Smoke:
         turn = np.inf if brighter.sum() >= darker.sum() else -np.inf
     thickest = np.quantile(values[change != 0], [0.01, 0.99])
     brightness = float(np.clip(turn, *thickest))
-    behind = push_pull(background.reshape(*shape, 1), certain.reshape(shape).astype(np.float32))[..., 0]
-    return Smoke(likeness, brightness, behind <= turn)
+    return Smoke(likeness, brightness, (behind <= turn).reshape(shape))
 
 
 def clear_values(

@@ -133,6 +133,27 @@ def test_what_a_codec_changes_is_no_sign_of_dark_smoke(tmp_path: Path) -> None:
     assert np.median(codes_apart(plate.image, truth)[stays]) < 15
 
 
+@pytest.mark.parametrize(("colour", "edge"), [(0.9, 0.1), (0.02, 0.9)])
+def test_smoke_that_never_leaves_tells_itself_which_way_it_changes_the_picture(
+    tmp_path: Path, colour: float, edge: float
+) -> None:
+    """A chimney's column, beside which a shred of the other brightness passes once."""
+    truth = np.linspace(0.2, 0.3, WIDTH, dtype=np.float32)[None, :, None].repeat(HEIGHT, 0).repeat(3, 2)
+    rows, columns = np.mgrid[:HEIGHT, :WIDTH]
+    column = np.abs(columns - WIDTH / 2) < 14
+    shred = (np.abs(rows - 28) < 2) & (np.abs(columns - 48) < 2)
+
+    def opacity(n: int) -> np.ndarray:
+        thickness = np.random.default_rng(n).uniform(0.3, 0.9, (HEIGHT, 1))
+        return np.where(column, thickness, 0.5 * (shred & (n == 5)))
+
+    shown = np.where(column, colour, edge)[..., None].astype(np.float32)
+    plate = estimate_plate(film(tmp_path, truth, opacity, shown, 0.5))
+    inner = np.abs(columns - WIDTH / 2) < 6
+    assert plate.confidence[inner].max() < 0.5
+    assert np.median(codes_apart(plate.image, truth)[inner]) < 15
+
+
 def test_what_hardly_changes_is_no_smoke_however_unlike_its_surroundings(tmp_path: Path) -> None:
     """A dark jacket before a bright wall that breathes by ten codes, beside a puff."""
     jacket = np.s_[40:, :12]
