@@ -87,12 +87,12 @@ def smoke_of(grey: Picture, window: float) -> Smoke:
     certain = (counts.max(0) > MOST * number) & (number >= LEAST_SEEN * len(values))
     behind = push_pull(background.reshape(*shape, 1), certain.reshape(shape).astype(np.float32)).ravel()
     # there, what a codec's drift may be says nothing of smoke
-    least = 0.5 * window + DRIFT
-    change = np.where((np.abs(away) > least) & certain, away, 0.0)
+    beyond = 0.5 * window + DRIFT
+    change = np.where((np.abs(away) > beyond) & certain, away, 0.0)
     if (change != 0).any(0).mean() < ISLAND:
         # smoke that never leaves its place shows beside it by accident only, and in its place all the time
         background, away = behind, values - behind
-        change = np.where(np.abs(away) > least, away, 0.0)
+        change = np.where(np.abs(away) > beyond, away, 0.0)
     if not change.any():
         return Smoke(likeness, 1.0, np.ones(shape, np.bool_))
     brighter, darker = (np.square(np.maximum(each, 0)).sum(0) for each in (change, -change))
