@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from smokelift.footage.clip import Clip
-from smokelift.footage.plate import Plate
+from smokelift.footage.matte import matte
+from smokelift.footage.plate import Plate, Plates
 from smokelift.footage.working_picture import CameraError, WorkingPicture, working_picture
 from smokelift.render import Image
 from smokelift.scene import Camera, CompleteScene, Domain, Scattering
@@ -77,6 +78,11 @@ class CoarseFrame:
     picture: Image
     halves: Halves
 
+    @property
+    def shows_smoke(self) -> bool:
+        """Whether it does."""
+        return bool(matte(self.picture, self.plate).mask.any())
+
     def in_light_of(self, scene: CompleteScene) -> CoarseFrame:
         """The frame with the lights of a scene."""
         return replace(self, scene=replace(self.scene, lights=scene.lights))
@@ -84,6 +90,37 @@ class CoarseFrame:
     def scattered_by(self, scattering: Scattering) -> CoarseFrame:
         """The frame with another model of scattering."""
         return replace(self, scene=replace(self.scene, scattering=scattering))
+
+
+@dataclass(frozen=True, eq=False)
+class CoarseClip:
+    """A clip before coarse grids; each frame is made once.
+
+    Attributes
+    ----------
+    clip
+        The footage.
+    scene
+        With the camera of the clip's full pictures and the fine domain.
+    plates
+        Of the full pictures.
+    """
+
+    clip: Clip
+    scene: CompleteScene
+    plates: Plates
+
+    def frame(self, number: int, times: int = 1) -> CoarseFrame | None:
+        """A frame on a grid so many times finer than `LONGEST` asks for; None if it does not show the domain."""
+        key = number, times
+        if key not in self._frames:
+            camera, plate = self.scene.camera.at(number), self.plates.at(number)
+            self._frames[key] = coarse_frame(self.clip, number, camera, self.scene, plate, times * LONGEST)
+        return self._frames[key]
+
+    @cached_property
+    def _frames(self) -> dict[tuple[int, int], CoarseFrame | None]:
+        return {}
 
 
 def coarse_domain(domain: Domain, pixels: float, most_voxels: int = LONGEST) -> Domain:

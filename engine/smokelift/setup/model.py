@@ -1,4 +1,4 @@
-"""All that is chosen on coarse densities, in the order in which one choice needs the other."""
+"""All that is chosen on coarse densities: the light, and the grids that velocities are estimated on."""
 
 from __future__ import annotations
 
@@ -11,17 +11,12 @@ import numpy as np
 
 from smokelift.density import Density, reconstruct_density
 from smokelift.footage.clip import Clip
-from smokelift.footage.matte import matte
 from smokelift.footage.plate import Plates
-from smokelift.scene import CompleteScene, Scattering
+from smokelift.scene import CompleteScene
 from smokelift.setup.choice import Choice
-from smokelift.setup.coarse import LONGEST, CoarseFrame, coarse_frame
-from smokelift.setup.directions import choose_directions
-from smokelift.setup.flicker import STEADY, exposure_of, light_of
-from smokelift.setup.light_strength import choose_strength, scaled
-from smokelift.setup.scattering import choose_scattering, settled, tries_multiple, unclear
+from smokelift.setup.coarse import CoarseClip
+from smokelift.setup.light_model import choose_light_model
 from smokelift.setup.settings import Settings
-from smokelift.setup.surroundings import choose_surroundings
 from smokelift.setup.velocity_grid import choose_coarsening, choose_levels
 from smokelift.velocity import VelocitySettings
 
@@ -44,16 +39,6 @@ class Model:
     scene: CompleteScene
     velocity: VelocitySettings
     choices: tuple[Choice[Any], ...]
-
-
-@dataclass(frozen=True, eq=False)
-class _Scattered:
-    """How strong the lights are, in multiples of the scene's, and how light is scattered."""
-
-    factor: float
-    strength: tuple[Choice[str], ...]
-    scattering: Scattering
-    choice: Choice[str]
 
 
 def choose_model(
@@ -85,96 +70,41 @@ def choose_model(
         Whether nothing tells the light, not even its strength.
     """
 
-    @cache
-    def coarse(number: int, most_voxels: int = LONGEST) -> CoarseFrame | None:
-        return coarse_frame(clip, number, scene.camera.at(number), scene, plates.at(number), most_voxels)
-
-    def shows_smoke(number: int) -> bool:
-        frame = coarse(number)
-        return frame is not None and bool(matte(frame.picture, frame.plate).mask.any())
-
-    def light(number: int) -> float:
-        frame = coarse(number)
-        return light_of(frame) if frame is not None else 0.0
-
-    def exposure(number: int) -> float:
-        return exposure_of(number, len(clip), light)
-
-    numbers = [number for number in tried_frames(smoky) if shows_smoke(number)]
-    frames = [frame for frame in map(coarse, numbers) if frame is not None]
     coarsened = choose_coarsening(scene.domain, settings.velocity, settings.selection.velocity_side)
     velocity = replace(settings.velocity, coarsening=coarsened.chosen)
+    coarse = CoarseClip(clip, scene, plates)
+    tried = ((number, coarse.frame(number)) for number in tried_frames(smoky))
+    frames = {number: frame for number, frame in tried if frame is not None and frame.shows_smoke}
     if not frames:
         return Model(scene, replace(velocity, levels=velocity.grids), ())
-    lit, directions = choose_directions(scene, frames, settings.density)
-    said = scene.scattering
-
-    def scattered_with(gains: Sequence[float]) -> _Scattered:
-        """How strong the light is and how it is scattered, where the frames are exposed by gains."""
-        exposed = [frame.in_light_of(scaled(lit, gain)) for frame, gain in zip(frames, gains, strict=True)]
-        known: dict[Scattering, float] = {}
-        strength: tuple[Choice[str], ...] = ()
-        factor = 1.0
-        # what single scattering lacks would be taken for light that is missing
-        if said == "multiple" or (said == "single" and tries_multiple(scene) and not by_hand):
-            alike = [frame.scattered_by("multiple") for frame in exposed]
-            factor, known["multiple"], strength = choose_strength(alike, settings.density)
-            exposed = [frame.in_light_of(scaled(frame.scene, factor)) for frame in exposed]
-        if by_hand:
-            chosen = Choice("scattering", said, f"Scattering by hand: {said}.", by_hand=True)
-            return _Scattered(factor, strength, said, chosen)
-        tolerance = settings.selection.scattering_error
-        found = choose_scattering(exposed, said, settings.density, tolerance, known)
-        finer = coarse(numbers[0], 2 * LONGEST) if unclear(found[1]) else None
-        if finer is not None and finer.scene.domain != frames[0].scene.domain:
-            own = finer.in_light_of(exposed[0].scene)
-            found = choose_scattering([own], said, settled(settings.density), tolerance, {})
-        return _Scattered(factor, strength, *found)
-
-    found = scattered_with([1.0] * len(frames))
-    # more light than one frame's smoke can scatter once may be that frame's exposure
-    if (found.strength or found.scattering == "multiple") and abs(exposure(numbers[0]) - 1) > STEADY:
-        found = scattered_with([exposure(number) for number in numbers])
-    scene, lit = scaled(scene, found.factor), scaled(lit, found.factor)
-    frames = [frame.in_light_of(lit) for frame in frames]
-    strength, scattering, scattered = found.strength, found.scattering, found.choice
-    if not by_hand:
-        around = choose_surroundings(frames, scattered, settings.density) if guessed else None
-        if around is not None:
-            lights, scattered = around
-            scattering, lit = "single", replace(lit, lights=lights)
-        lit = replace(lit, scattering=scattering)
-        if directions and scattering != scene.scattering:
-            lit, directions = choose_directions(replace(scene, scattering=scattering), frames, settings.density)
+    light = choose_light_model(coarse, frames, by_hand, guessed, settings)
 
     @cache
     def density(number: int) -> Density | None:
-        frame = coarse(number)
+        frame = coarse.frame(number)
         if frame is None:
             return None
-        own = frame.in_light_of(lit).scattered_by(lit.scattering)
+        own = frame.in_light_of(light.scene).scattered_by(light.scene.scattering)
         return reconstruct_density(frame.picture, own.scene, settings=settings.density, plate=frame.plate)
 
-    densities = [found for found in map(density, numbers) if found is not None]
+    densities = [found for found in map(density, frames) if found is not None]
     if velocity.levels is None:
         # before the last frame, since something has to follow
-        followed = sorted({min(number, len(clip) - 2) for number in numbers if len(clip) > 1})
+        followed = sorted({min(number, len(clip) - 2) for number in frames if len(clip) > 1})
         ends = [(density(number), density(number + 1)) for number in followed]
         pairs = [(before.values, after.values) for before, after in ends if before is not None and after is not None]
-        moved = choose_levels(pairs, frames[0].scene.domain, scene.domain, velocity)
+        moved = choose_levels(pairs, next(iter(frames.values())).scene.domain, scene.domain, velocity)
     else:
         levels = velocity.levels
         moved = Choice[int]("velocity levels", levels, f"Velocity grids by hand: {levels}.", by_hand=True)
     choices: tuple[Choice[Any], ...] = (
         _inside(densities, scene),
-        *strength,
-        scattered,
-        *directions,
+        *light.choices,
         _iterations(densities, settings),
         coarsened,
         moved,
     )
-    return Model(lit, replace(velocity, levels=moved.chosen), choices)
+    return Model(light.scene, replace(velocity, levels=moved.chosen), choices)
 
 
 def tried_frames(smoky: Sequence[int]) -> tuple[int, ...]:

@@ -134,7 +134,7 @@ def test_models_that_coarse_frames_do_not_tell_apart_are_tried_on_finer_ones(
         errors = {"single": 0.05, "multiple": near if voxels == 8 else 0.01}
         return HeldOut(errors[judge] if fitted == judge else 0.4, 1.0)
 
-    monkeypatch.setattr("smokelift.setup.model.LONGEST", 8)
+    monkeypatch.setattr("smokelift.setup.coarse.LONGEST", 8)
     for module in (scattering, light_strength):
         monkeypatch.setattr(module, "held_out", known)
     choice = chosen(shot_of(plume.scene, draft), "scattering")
@@ -219,7 +219,7 @@ def test_where_coarse_pictures_show_no_smoke_the_richest_model_stays(plume, draf
         judged = matte(frame, plate)
         return replace(judged, mask=np.zeros_like(judged.mask))
 
-    monkeypatch.setattr("smokelift.setup.model.matte", blind)
+    monkeypatch.setattr("smokelift.setup.coarse.matte", blind)
     shot = shot_of(plume.scene, draft)
     assert shot.scene.scattering == "single"
     assert not any(choice.what == "scattering" for choice in shot.choices)
