@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from smokelift.direct import Ball, fit_simulation
-from smokelift.direct.fire import Fire
+from smokelift.direct.fire import Fire, fit_fire
 from smokelift.direct.obstacles import Obstacles
 from smokelift.direct.surroundings import Surroundings
-from tests.engine.direct.rising import DOMAIN, DT, LEFT, course, plume
+from tests.engine.direct.rising import DOMAIN, DT, LEFT, at_rest, blob, course, plume
 
 
 def test_fire_goes_on_as_in_the_clip():
@@ -42,3 +42,15 @@ def test_nothing_burns_in_an_obstacle():
 
 def test_smoke_without_fire_gets_none():
     assert course(fit_simulation(plume(), DT), plume()[-1], 1)[-1].flame is None
+
+
+def test_the_feed_makes_no_more_fire_than_the_clip_has() -> None:
+    """Where less is left than elsewhere nothing feeds the fire; taken for nothing it would make the fire grow."""
+    before, after = blob(), blob()
+    after[:8] *= 0.4
+    after[8:12] *= 0.8
+    after[12:] *= 2.0
+    moments = [replace(at_rest(blob()), flame=flame) for flame in (before, after)]
+    fire = fit_fire(moments, DT)
+    assert fire is not None
+    assert fire.after(before, None).sum() == pytest.approx(after.sum(), rel=1e-4)
