@@ -48,10 +48,10 @@ SHARP = np.float32(15 / 255)
 """Detail of mist and smoke in front of black, in sRGB values, at most (1 to 13 of 255 in 26 clips); walls and stages in
 the dark have edges (17 to 40; docs/experiments/background.md)."""
 
-USUAL, MOST = np.float32(2 / 255), 0.5
-"""Difference in sRGB values up to which a block has the colour of most of a single picture, and share of the blocks
-that have to: 0.51 to 0.93 of frames of 10 public clips before one colour, 0.16 at most of 35 others but for a stage in
-the dark (docs/experiments/background.md)."""
+AROUND, MOST = np.float32(2 / 255), 0.5
+"""Difference in sRGB values up to which a block has the colour around a single picture, and share of the blocks along
+its sides that have to, on three of them: 0.56 to 1 of 18 frames of public clips before one colour, 0.2 at most of
+others but for stages in the dark (docs/experiments/background.md)."""
 
 
 def backdrop_plate(samples: npt.NDArray[np.uint16], noise: Noise) -> Plate | None:
@@ -74,17 +74,20 @@ def one_colour(plate: Plate) -> tuple[float, float, float] | None:
     return None if (differs & known).any() else (red, green, blue)
 
 
-def usual_colour(picture: Picture) -> tuple[float, float, float] | None:
-    """Return the linear colour of most of a single picture (rows, columns, 3), or None if no colour has most of it.
+def colour_around(picture: Picture) -> tuple[float, float, float] | None:
+    """Return the linear colour along the sides of a single picture (rows, columns, 3), or None if they have more.
 
-    One picture does not tell what never changes, so that smoke may be all that has another colour.
+    One picture does not tell what never changes, so that smoke may be all that has another colour. It may come in from
+    one side, and cover more of the picture than its background does.
     """
     linear = block_means(picture[None])[0]
     blocks = linear_to_srgb(linear)
-    alike = (np.abs(blocks - np.median(blocks, axis=(0, 1))) <= USUAL).all(-1)
-    if alike.mean() < MOST:
+    sides = [(values[0], values[-1], values[:, 0], values[:, -1]) for values in (blocks, linear)]
+    colour = np.median(np.concatenate(sides[0]), axis=0)
+    alike = [(np.abs(side - colour) <= AROUND).all(-1) for side in sides[0]]
+    if sum(side.mean() >= MOST for side in alike) < 3:
         return None
-    red, green, blue = (float(v) for v in np.median(linear[alike], axis=0))
+    red, green, blue = (float(v) for v in np.median(np.concatenate(sides[1])[np.concatenate(alike)], axis=0))
     return red, green, blue
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from smokelift.footage.alignment import Lens
-from smokelift.footage.backdrop import ONE_COLOUR_NOISE, one_colour, usual_colour
+from smokelift.footage.backdrop import ONE_COLOUR_NOISE, colour_around, one_colour
 from smokelift.footage.background import given_plates
 from smokelift.footage.clip import Clip
 from smokelift.footage.cut import find_cut
@@ -46,7 +46,7 @@ FEW = 4
 """Frames from which on smoke hardly looks the same in all by chance: half of its pairs of successive samples do."""
 
 FROM_ONE = (
-    "One frame alone does not show what moves: the colour that most of it has counts as background, and all else as "
+    "One frame alone does not show what moves: the colour around it counts as background, and all that has another as "
     "smoke. If that is wrong, give a clean plate, or a color, in [background]."
 )
 """What is to be said of a background of one colour that a single frame shows."""
@@ -195,7 +195,7 @@ def _estimated(clip: Clip, evidence_of: Callable[[], Clip], lens: Lens | None, t
     if plain_everywhere is not None and plain_everywhere.noise.total.max() <= ONE_COLOUR_NOISE:
         return FoundPlates(clip, plain_everywhere, None, (_found(plain_everywhere),))
     shot = evidence_of()
-    alone = usual_colour(shot.frame(0)) if len(shot) == 1 else None
+    alone = colour_around(shot.frame(0)) if len(shot) == 1 else None
     if alone is not None:
         plate = known_plate(alone, clip)
         return FoundPlates(clip, plate, None, (_found(plate),), doubts=(FROM_ONE,))

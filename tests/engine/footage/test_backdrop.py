@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from films import COUNT, HEIGHT, WIDTH, codes_apart, film, pan, passing_wall, puff, wall
 
-from smokelift.footage.backdrop import one_colour, usual_colour
+from smokelift.footage.backdrop import colour_around, one_colour
 from smokelift.footage.matte import matte
 from smokelift.footage.plate_estimation import estimate_plate
 
@@ -90,12 +90,15 @@ def test_a_slope_behind_a_moving_camera_is_not_one_colour(tmp_path: Path) -> Non
     assert one_colour(estimate_plate(pan(tmp_path, wide, 1.0))) is None
 
 
-def test_a_single_picture_has_a_usual_colour_if_most_of_it_has(tmp_path: Path) -> None:
-    """In noise, too; not a wall, and not what smoke covers by more than half."""
+def test_a_single_picture_has_a_colour_around_it() -> None:
+    """In noise, too, behind smoke that covers most of it and comes in from one side; not a wall, and no black bars."""
     picture = np.full((60, 80, 3), 0.2, np.float32)
     picture += np.random.default_rng(0).normal(0, 0.004, picture.shape).astype(np.float32)
-    picture[:25] = np.linspace(0.3, 0.9, 80)[:, None]
-    assert usual_colour(picture) == pytest.approx((0.2, 0.2, 0.2), abs=0.002)
-    picture[:35] = np.linspace(0.3, 0.9, 80)[:, None]
-    assert usual_colour(picture) is None
-    assert usual_colour(wall(0.2, 0.7).astype(np.float32)) is None
+    picture[5:, 10:70] = np.linspace(0.3, 0.9, 60)[:, None]
+    assert colour_around(picture) == pytest.approx((0.2, 0.2, 0.2), abs=0.002)
+    picture[:, 10:70] = np.linspace(0.3, 0.9, 60)[:, None]
+    assert colour_around(picture) is None
+    bars = np.kron(np.random.default_rng(0).uniform(0.1, 0.6, (12, 16, 1)), np.ones((5, 5, 3))).astype(np.float32)
+    assert colour_around(bars) is None
+    bars[:10] = bars[-10:] = 0
+    assert colour_around(bars) is None
