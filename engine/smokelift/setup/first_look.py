@@ -14,6 +14,7 @@ from smokelift.setup.background import FoundPlates, cut_notes, exposure_notes, f
 from smokelift.setup.fire import Fire, find_fire
 from smokelift.setup.no_smoke import nothing_seen
 from smokelift.setup.smoke import SmokeSamples, sample_smoke
+from smokelift.setup.smoke_colour import several_colours
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,5 +70,5 @@ def first_look(clip: Clip, camera: Camera | None, background: Background | None,
         clip = fire.doused
         samples = replace(sample_smoke(clip, found.plates, found.turns), gains=samples.gains)
     nothing = nothing_seen(clip, found.plates, samples, background is not None, cuts)
-    doubts = (*(nothing or cuts), *found.doubts, *smoke_in_plate(samples))
+    doubts = (*(nothing or cuts), *found.doubts, *smoke_in_plate(samples), *several_colours(samples))
     return FirstLook(clip, found, samples, fire, doubts)

@@ -100,6 +100,28 @@ def smoke_colour(samples: SmokeSamples, light: Array) -> SmokeColour:
     )
 
 
+def several_colours(samples: SmokeSamples) -> tuple[str, ...]:
+    """Return what is to be said of smoke of more than one colour before black, a sentence; nothing of other smoke.
+
+    Before black all light of smoke of one colour has that colour, however thick it is. What is off the one colour that
+    explains the most of the light is another colour's. White that is clipped has none.
+    """
+    shown = samples.colours[samples.colours.min(-1, initial=1.0) < CLIPPED].astype(np.float64)
+    if len(shown) < FEWEST or np.percentile(samples.behind.max(-1), THICKEST) >= FAINTEST:
+        return ()
+    if np.percentile(shown.max(-1), THICKEST) < FAINTEST:
+        return ()
+    along = np.linalg.eigvalsh(shown.T @ shown)
+    off = float(np.degrees(np.arcsin(np.sqrt(along[:-1].sum().clip(0) / along.sum()))))
+    if off < LEAST:
+        return ()
+    return (
+        f"The smoke has more than one colour: its light is {off:.0f} degrees from the nearest single one on the mean, "
+        "but one is taken for all of it, so colours are wrong and the thickness may be. Crop the clip to smoke of one "
+        "colour.",
+    )
+
+
 def _grey(why: str, degrees: float | None = None) -> SmokeColour:
     reason = f"Smoke colour: undetermined, grey is taken: {why}."
     measured = {} if degrees is None else {"degrees": degrees}

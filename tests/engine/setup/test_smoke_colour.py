@@ -5,7 +5,7 @@ import pytest
 
 from smokelift.setup.choice import UNDETERMINED
 from smokelift.setup.smoke import SmokeSamples
-from smokelift.setup.smoke_colour import smoke_colour
+from smokelift.setup.smoke_colour import several_colours, smoke_colour
 
 WHITE = np.ones(3)
 RED, DUST = np.array((1.0, 0.3, 0.2)), np.array((1.0, 0.75, 0.48))
@@ -75,3 +75,36 @@ def test_pixels_without_a_colour_say_nothing(colours):
         1.0, (0, 0, 1, 1), *np.ones((2, 1, 1), bool), colours.astype("f4"), empty.astype("f4"), (0,), {}
     )
     assert smoke_colour(seen, WHITE).choice.chosen == UNDETERMINED
+
+
+def two_kinds(one, other, behind=BLACK):
+    """Smoke of two colours, as much of each."""
+    parts = samples(one, behind), samples(other, behind)
+    colours, grounds = (np.concatenate([getattr(part, name) for part in parts]) for name in ("colours", "behind"))
+    return SmokeSamples(1.0, (0, 0, 1, 1), *np.ones((2, 1, 1), bool), colours, grounds, (0,), {})
+
+
+def test_smoke_of_more_than_one_colour_is_said():
+    (said,) = several_colours(two_kinds(RED, np.array((0.2, 0.3, 1.0))))
+    assert "more than one colour" in said
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "behind"),
+    [
+        (RED, 0.4 * RED, BLACK),  # lit more and less
+        (WHITE, 0.8 * DUST, BLACK),  # warm and neutral light at once
+        (np.array((0.1, 0.25, 0.9)), WHITE, BLACK),  # blue, and clipped where it is brightest
+        (RED, WHITE, SKY),  # what is behind it has a colour as well
+    ],
+    ids=["shaded", "mixed light", "clipped", "sky"],
+)
+def test_smoke_of_one_colour_is_not_said_to_have_several(one, other, behind):
+    both = two_kinds(one, other, behind)
+    if behind is BLACK and other is WHITE:
+        both.colours[500:] = 1.0
+    assert not several_colours(both)
+
+
+def test_no_smoke_has_no_colours():
+    assert not several_colours(samples(WHITE, BLACK, 0.0))
