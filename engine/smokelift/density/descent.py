@@ -12,6 +12,7 @@ from __future__ import annotations
 import functools
 from collections import deque
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,74 +81,123 @@ def descend(
         Of each term what is left of the start's picture, L - I, if the renderers hold the records of these pictures.
     """
     where = np.flatnonzero(hull)
-    volume, slopes = (np.zeros(hull.shape, np.float32) for _ in range(2))
     began = density.ravel()[where]
     current = np.minimum(began, np.float32(bound))
     floor = np.float32(FLOOR * (current.mean() if current.size else 0.0))
-    scale = current + floor
-    enough = noise_floor(terms)
-
-    def residuals_of(candidate: Values) -> tuple[Image, ...]:
-        volume.ravel()[where] = candidate
-        return tuple(term.renderer.image(volume, keep_record=True) - term.view.image for term in terms)
-
-    def gradient_of(residuals: tuple[Image, ...]) -> Values:
-        """Derivative of the objective in units of the scale, for the last density evaluated."""
-        parts = (
-            term.renderer.gradient(term.image_gradient(residual), out=slopes).ravel().take(where)
-            for term, residual in zip(terms, residuals, strict=True)
-        )
-        found = functools.reduce(np.add, parts)
-        found *= scale
-        return found
-
-    def moved_by(direction: Values, trial: float) -> Values:
-        """Where a step of this length arrives. New memory takes as long as the arithmetic, so there is little of it."""
-        candidate = direction * np.float32(-trial)
-        candidate *= scale
-        candidate += current
-        return np.asarray(np.clip(candidate, lowest, highest, out=candidate))
-
+    shape = hull.shape
+    problem = _Problem(terms, where, np.zeros(shape, np.float32), np.zeros(shape, np.float32), current + floor)
     if recorded and np.array_equal(current, began):
-        volume.ravel()[where] = current
+        problem.show(current)
         residuals = recorded
     else:
-        residuals = residuals_of(current)
-    loss = objective(terms, residuals)
+        residuals = problem.residuals(current)
+    loss, enough = objective(terms, residuals), noise_floor(terms)
     curvature = _Curvature()
     gradient: Values | None = None
-    moved: Values | None = None
+    step: _Step | None = None
     done = idle = 0
     while done < iterations and loss > enough and idle < patience:
-        before, gradient = gradient, gradient_of(residuals)
-        if before is not None and moved is not None:
-            curvature.learn(moved, np.subtract(gradient, before, out=before))
+        before, gradient = gradient, problem.gradient(residuals)
+        if before is not None and step is not None:
+            curvature.learn(step.moved, np.subtract(gradient, before, out=before))
         held = ((current <= 0) & (gradient > 0)) | ((current >= bound) & (gradient < 0))
         direction = curvature.newton(np.where(held, np.float32(0), gradient))
         direction[held] = 0
         slope = _dot(gradient, direction)
         if not slope > 0:
             break
+        length = 1.0 if curvature.known else min(0.1 * loss / slope, LONGEST)
         reach = LARGEST * (current + floor)
         lowest, highest = np.maximum(current - reach, 0), np.minimum(current + reach, np.float32(bound))
-        trial = 1.0 if curvature.known else min(0.1 * loss / slope, LONGEST)
-        for _ in range(SHORTENINGS):
-            candidate = moved_by(direction, trial)
-            moved = candidate - current
-            moved /= scale
-            new_residuals = residuals_of(candidate)
-            new_loss = objective(terms, new_residuals)
-            # what the bounds leave of a long step need not lead down
-            if new_loss <= loss + SUFFICIENT * min(_dot(gradient, moved), 0.0):
-                break
-            trial *= SHORTEN
-        else:
-            volume.ravel()[where] = current
-            return Fit(volume, loss, residuals, done)
-        idle = idle + 1 if loss - new_loss < tolerance * new_loss else 0
-        current, residuals, loss = candidate, new_residuals, new_loss
+        step = _step(problem, current, loss, gradient, direction, length, (lowest, highest))
+        if step is None:
+            problem.show(current)
+            break
+        idle = idle + 1 if loss - step.loss < tolerance * step.loss else 0
+        current, residuals, loss = step.density, step.residuals, step.loss
         done += 1
-    return Fit(volume, loss, residuals, done)
+    return Fit(problem.volume, loss, residuals, done)
+
+
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    """The objective of the hull's voxels.
+
+    Attributes
+    ----------
+    terms
+        Its parts.
+    where : (n,)
+        The hull's voxels in the volume.
+    volume : (nx, ny, nz)
+        The last density that was shown.
+    slopes : (nx, ny, nz)
+        Room for a gradient.
+    scale : (n,)
+        Units that the voxels are measured in.
+    """
+
+    terms: Sequence[Term]
+    where: NDArray[np.intp]
+    volume: Volume
+    slopes: Volume
+    scale: Values
+
+    def show(self, density: Values) -> None:
+        """Write a density of the hull's voxels into the volume."""
+        self.volume.ravel()[self.where] = density
+
+    def residuals(self, density: Values) -> tuple[Image, ...]:
+        """What the pictures of a density differ by from those that are to be met."""
+        self.show(density)
+        return tuple(term.renderer.image(self.volume, keep_record=True) - term.view.image for term in self.terms)
+
+    def gradient(self, residuals: tuple[Image, ...]) -> Values:
+        """Derivative of the objective in units of the scale, for the density whose residuals are the last."""
+        parts = (
+            term.renderer.gradient(term.image_gradient(residual), out=self.slopes).ravel().take(self.where)
+            for term, residual in zip(self.terms, residuals, strict=True)
+        )
+        found = functools.reduce(np.add, parts)
+        found *= self.scale
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Step:
+    """Where a step arrives: its density, how far it moved in units of the scale, and what is left there."""
+
+    density: Values
+    moved: Values
+    residuals: tuple[Image, ...]
+    loss: float
+
+
+def _step(
+    problem: _Problem,
+    current: Values,
+    loss: float,
+    gradient: Values,
+    direction: Values,
+    length: float,
+    bounds: tuple[Values, Values],
+) -> _Step | None:
+    """Step against a direction, shortened until the objective falls sufficiently; None if it never does."""
+    for _ in range(SHORTENINGS):
+        # new memory takes as long as the arithmetic, so there is little of it
+        density = direction * np.float32(-length)
+        density *= problem.scale
+        density += current
+        np.clip(density, *bounds, out=density)
+        moved = density - current
+        moved /= problem.scale
+        residuals = problem.residuals(density)
+        found = objective(problem.terms, residuals)
+        # what the bounds leave of a long step need not lead down
+        if found <= loss + SUFFICIENT * min(_dot(gradient, moved), 0.0):
+            return _Step(density, moved, residuals, found)
+        length *= SHORTEN
+    return None
 
 
 class _Curvature:
