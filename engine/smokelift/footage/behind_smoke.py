@@ -30,6 +30,19 @@ MOST_DETAIL = 0.95
 LEAST_TRANSMITTANCE = 0.2
 """Light let through by the smoke from which the detail behind it can be told from noise."""
 
+RIM = 14
+"""Pixels from what is unknown within which smoke may be so thin that it passes for clear
+(docs/experiments/background.md)."""
+
+RIM_MEAN = 8.0
+"""Standard deviation in pixels of the Gaussian over which that is judged, lest single bricks pass for smoke."""
+
+NEIGHBOURHOOD = 17
+"""Pixels along the square around a pixel in which smoke is looked for: a macroblock of H.264 and one more."""
+
+NEAR_SMOKE = 0.1
+"""Share of it that is not clear, whenever the pixel itself seems to be, from which it is amid smoke."""
+
 SHIFTS = (-1 / 2, -1 / 3, -1 / 6, 1 / 6, 1 / 3, 1 / 2)
 """Where the outline of the unknown is laid on what is known, to the right, in widths of the picture."""
 
@@ -80,6 +93,39 @@ def unlike(image: Picture, known: npt.NDArray[np.bool_]) -> Picture:
     """By how much a linear picture differs from what is known around, in grey sRGB values (rows, columns)."""
     encoded = linear_to_srgb(image)
     return np.asarray(np.abs((encoded - push_pull(encoded, known.astype(np.float32))).mean(-1)))
+
+
+def thin_rim(
+    image: Picture, known: npt.NDArray[np.bool_], brightens: npt.NDArray[np.bool_], clear: npt.NDArray[np.bool_]
+) -> npt.NDArray[np.bool_]:
+    """Return what is known beside the unknown, but most likely is smoke that hardly changes.
+
+    It is drawn towards the smoke's brightness by more than drift, compared with what is continued from further away,
+    and smoke is near whenever it seems to be clear. A coarse codec keeps thin smoke as still as a background.
+
+    Parameters
+    ----------
+    image : (rows, columns, 3)
+        Linear.
+    known : (rows, columns)
+    brightens : (rows, columns)
+        Where smoke brightens.
+    clear : (frames, rows, columns)
+        Where each sample seems to be clear, or does not show the pixel.
+    """
+    beyond = ndimage.distance_transform_edt(known) > RIM
+    if known.all() or not beyond.any():
+        return np.zeros_like(known)
+    encoded = linear_to_srgb(image)
+    towards = (encoded - push_pull(encoded, beyond.astype(np.float32))).mean(-1) * np.where(brightens, 1, -1)
+    share = np.maximum(blurred(known.astype(np.float32), RIM_MEAN), 1e-3)
+    drawn = blurred(np.where(known, towards, 0).astype(np.float32), RIM_MEAN) > DRIFT * share
+    rim = np.asarray(known & ~beyond & drawn)
+    if rim.any():
+        for seems in clear:
+            smoky = ndimage.uniform_filter((~seems).astype(np.float32), NEIGHBOURHOOD)
+            rim &= ~seems | (smoky > NEAR_SMOKE)
+    return rim
 
 
 def push_pull(image: Picture, confidence: Picture) -> Picture:

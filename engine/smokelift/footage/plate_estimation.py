@@ -26,6 +26,7 @@ from smokelift.footage.behind_smoke import (
     in_one_piece,
     mostly_beside,
     push_pull,
+    thin_rim,
     unlike,
 )
 from smokelift.footage.clear_values import STRIDE, clear_values, smoke_of
@@ -193,6 +194,9 @@ def clear_picture(
         alike = (in_one_piece(known | (calm & (apart <= most))) for most in (DRIFT, LIKE_SURROUNDINGS))
         # surroundings that are unknown themselves speak for nothing
         sure, known = (mostly_beside(each, known) for each in alike)
+        # what is not seen is no sign of smoke
+        thin = thin_rim(image, known, brightens, clear if seen is None else clear | ~seen)
+        sure, known = sure & ~thin, known & ~thin
     mean = _mean(samples, seen)
     if seen is not None and not seen.any(0).all():
         never = ~seen.any(0)

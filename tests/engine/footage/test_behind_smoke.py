@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from smokelift.footage.behind_smoke import continuation_errors, in_one_piece, mostly_beside, push_pull, unlike
+from smokelift.footage.behind_smoke import continuation_errors, in_one_piece, mostly_beside, push_pull, thin_rim, unlike
 
 HEIGHT, WIDTH = 40, 60
 COLOUR = np.array([0.3, 0.2, 0.1], np.float32)
@@ -121,3 +121,22 @@ def test_a_plain_wall_is_continued_without_errors() -> None:
 def test_nothing_to_leave_out_leaves_no_errors(width: int) -> None:
     wall = bricks(0.15)
     assert not continuation_errors(wall, column(width, wall.shape)).any()
+
+
+def test_thin_smoke_at_the_rim_is_told_from_a_bright_wall() -> None:
+    """Smoke that never leaves has bright rims: the one where it never leaves the neighbourhood either is smoke."""
+    rows, columns = np.mgrid[:120, :90]
+    smoke = columns < 20
+    bright = (columns >= 20) & (columns < 32) & (rows % 40 < 24)
+    image = np.where(bright[..., None], 0.3, 0.2).astype(np.float32).repeat(3, -1)
+    image[80:] = np.where(bright[80:, :, None], 0.1, 0.2)
+    clear = np.repeat(~smoke[None], 4, axis=0)
+    clear[2, 36:76] = True
+    thin = thin_rim(image, ~smoke, np.ones_like(smoke), clear)
+    near = np.s_[20:26]
+    assert thin[4:20, near].all()
+    assert not thin[44:60, near].any()
+    assert not thin[84:100, near].any()
+    assert not thin[:, 32:].any()
+    darkens = np.zeros_like(smoke)
+    assert thin_rim(image, ~smoke, darkens, clear)[84:100, near].all()
