@@ -10,7 +10,7 @@ from smokelift.footage.plate import Plate, Plates
 from smokelift.footage.steady import steady
 from smokelift.render import Image
 from smokelift.scene import Background, Camera
-from smokelift.setup.background import FoundPlates, cut_notes, exposure_notes, find_plates, smoke_in_plate
+from smokelift.setup.background import FoundPlates, between_bars, cut_notes, exposure_notes, find_plates, smoke_in_plate
 from smokelift.setup.fire import Fire, find_fire
 from smokelift.setup.no_smoke import nothing_seen
 from smokelift.setup.smoke import SmokeSamples, sample_smoke
@@ -70,5 +70,6 @@ def first_look(clip: Clip, camera: Camera | None, background: Background | None,
         clip = fire.doused
         samples = replace(sample_smoke(clip, found.plates, found.turns), gains=samples.gains)
     nothing = nothing_seen(clip, found.plates, samples, background is not None, cuts)
-    doubts = (*(nothing or cuts), *found.doubts, *smoke_in_plate(samples), *several_colours(samples))
+    bars = between_bars(samples) if background is None else ()
+    doubts = (*(nothing or cuts), *found.doubts, *smoke_in_plate(samples), *bars, *several_colours(samples))
     return FirstLook(clip, found, samples, fire, doubts)

@@ -19,7 +19,7 @@ from smokelift.footage.plain import plain_plate
 from smokelift.output.images import write_image
 from smokelift.scene import Background
 from smokelift.setup import background
-from smokelift.setup.background import cut_notes, find_plates, focal_notes, smoke_in_plate
+from smokelift.setup.background import between_bars, cut_notes, find_plates, focal_notes, smoke_in_plate
 from smokelift.setup.geometry import clip_lens
 from smokelift.setup.smoke import SmokeSamples, sample_smoke, small_pictures
 
@@ -202,3 +202,18 @@ def test_a_background_that_few_frames_show_is_doubted(tmp_path, count, doubted) 
     with Clip.open(tmp_path / "frame_#.png") as clip:
         doubts = find_plates(clip, None, None).doubts
     assert any(f"Only {count} frames show" in doubt for doubt in doubts) is doubted
+
+
+@pytest.mark.parametrize(
+    ("rows", "missing", "said"),
+    [((6, 44), 0.0, True), ((6, 44), 0.2, False), ((20, 50), 0.0, False), ((0, 44), 0.0, False)],
+    ids=["bars", "ragged", "bank of fog", "from above"],
+)
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_picture_between_bars_that_is_taken_for_smoke_is_said(rows, missing, said, turned) -> None:
+    covered = np.zeros((50, 80), np.bool_)
+    covered[slice(*rows)] = np.random.default_rng(0).random((rows[1] - rows[0], 80)) >= missing
+    covered = covered.T if turned else covered
+    none = np.zeros((0, 3), np.float32)
+    (*notes,) = between_bars(SmokeSamples(1.0, (0, 0, 1, 1), covered, ~covered, none, none, (0,), {}))
+    assert [("left" if turned else "above") in note for note in notes] == [True] * said
