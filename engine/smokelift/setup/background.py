@@ -45,7 +45,8 @@ MOSTLY = 0.5
 BETWEEN_BARS = 0.95
 """Share of the picture between two bars which smoke covers at some time there, if it is not the picture itself: smoke
 that crosses all of a picture has no two straight edges. A generated clip with bars has .98, fog and mist .70 and .75
-over all of their rows (docs/clips.md)."""
+over all of their rows (docs/clips.md). Each frame shows most of that picture, while a puff that passes fills a strip in
+the course of time."""
 
 FEW = 4
 """Frames from which on smoke hardly looks the same in all by chance: half of its pairs of successive samples do."""
@@ -192,11 +193,12 @@ def smoke_in_plate(samples: SmokeSamples) -> tuple[str, ...]:
 
 def between_bars(samples: SmokeSamples) -> tuple[str, ...]:
     """What is to be said where bars beside the picture are its only background, a sentence; nothing of others."""
+    at_a_time = len(samples.colours) / max(len(samples.gains), 1)
     for where, covered in (("above and below", samples.covered), ("to the left and right of", samples.covered.T)):
         rows = np.flatnonzero(covered.any(1))
         if len(rows) and rows[0] > 0 and rows[-1] < len(covered) - 1:
             picture = covered[rows[0] : rows[-1] + 1]
-            if picture.mean() >= BETWEEN_BARS:
+            if picture.mean() >= BETWEEN_BARS and at_a_time > MOSTLY * picture.size:
                 return (
                     f"Only bars {where} the picture never change, so all between them is taken for smoke: crop them "
                     "off, or give a clean plate.",

@@ -205,15 +205,22 @@ def test_a_background_that_few_frames_show_is_doubted(tmp_path, count, doubted) 
 
 
 @pytest.mark.parametrize(
-    ("rows", "missing", "said"),
-    [((6, 44), 0.0, True), ((6, 44), 0.2, False), ((20, 50), 0.0, False), ((0, 44), 0.0, False)],
-    ids=["bars", "ragged", "bank of fog", "from above"],
+    ("rows", "missing", "at_a_time", "said"),
+    [
+        ((6, 44), 0.0, 1.0, True),
+        ((6, 44), 0.2, 0.8, False),
+        ((20, 50), 0.0, 1.0, False),
+        ((0, 44), 0.0, 1.0, False),
+        ((6, 44), 0.0, 0.3, False),
+    ],
+    ids=["bars", "ragged", "bank of fog", "from above", "a puff that passes"],
 )
 @pytest.mark.parametrize("turned", [False, True])
-def test_a_picture_between_bars_that_is_taken_for_smoke_is_said(rows, missing, said, turned) -> None:
+def test_a_picture_between_bars_that_is_taken_for_smoke_is_said(rows, missing, at_a_time, said, turned) -> None:
     covered = np.zeros((50, 80), np.bool_)
     covered[slice(*rows)] = np.random.default_rng(0).random((rows[1] - rows[0], 80)) >= missing
     covered = covered.T if turned else covered
-    none = np.zeros((0, 3), np.float32)
-    (*notes,) = between_bars(SmokeSamples(1.0, (0, 0, 1, 1), covered, ~covered, none, none, (0,), {}))
+    seen = np.zeros((round(2 * at_a_time * covered.sum()), 3), np.float32)  # in two samples
+    gains = dict.fromkeys(range(2), np.ones(3, np.float32))
+    (*notes,) = between_bars(SmokeSamples(1.0, (0, 0, 1, 1), covered, ~covered, seen, seen, (0,), gains))
     assert [("left" if turned else "above") in note for note in notes] == [True] * said
