@@ -36,14 +36,6 @@ LEAST_SEEN = 1 / 8
 ONE_SIDED = 0.9
 """Share of the changes by smoke to one side from which on it only brightens, or darkens, and the rest is noise."""
 
-UNEXPLAINED = 1 / 3
-"""Share of the changes to the rarer side that smoke of one brightness may leave without a cause, and the rest is its.
-Where a codec keeps passing smoke for most of a clip, what is behind looks like a change to that side, too
-(docs/experiments/background.md)."""
-
-LEVELS = 64
-"""Values of the smoke's brightness that are tried, the brightest and the darkest that are seen among them."""
-
 FALSE_ALARM = 1e-3
 """Share of the pixels always under smoke that pass for clear at times."""
 
@@ -97,9 +89,6 @@ def smoke_of(grey: Picture, window: float) -> Smoke:
         return Smoke(likeness, 1.0, np.ones(shape, np.bool_))
     brighter, darker = (np.square(np.maximum(each, 0)).sum(0) for each in (change, -change))
     turn = _turn(background, brighter, darker)
-    least = min(brighter.sum(), darker.sum())
-    if np.isfinite(turn) and _past_all(values[change != 0], change[change != 0]) > UNEXPLAINED * least:
-        turn = np.inf if brighter.sum() >= darker.sum() else -np.inf
     thickest = np.quantile(values[change != 0], [0.01, 0.99])
     brightness = float(np.clip(turn, *thickest))
     return Smoke(likeness, brightness, (behind <= turn).reshape(shape))
@@ -160,20 +149,6 @@ def _turn(background: Picture, brighter: Picture, darker: Picture) -> float:
     # the value that explains the most of the changes
     wrong = np.cumsum(darker[order]) + np.cumsum(brighter[order][::-1])[::-1]
     return float(background[order][wrong.argmin()])
-
-
-def _past_all(values: Picture, change: Picture) -> float:
-    """Return the least sum of the squared changes past a brightness, of all that smoke may have.
-
-    Smoke draws what is behind it towards its own brightness, never past it. ``values`` (n,) are what the changes (n,)
-    led to.
-    """
-    brighter = change > 0
-    past = (
-        np.where(brighter, values - level, level - values).clip(0, np.abs(change))
-        for level in np.linspace(values.min(), values.max(), LEVELS, dtype=np.float32)
-    )
-    return min(float(np.square(each).sum()) for each in past)
 
 
 def _supports(ordered: Picture, window: float) -> npt.NDArray[np.int16]:

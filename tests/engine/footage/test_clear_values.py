@@ -20,17 +20,6 @@ def passing(wall: np.ndarray) -> np.ndarray:
     return (wall + opacity * (brightness - wall)).astype(np.float32)
 
 
-def test_smoke_that_a_codec_keeps_for_most_of_a_clip_is_not_darkened() -> None:
-    wall = np.random.default_rng(1).uniform(0.3, 0.45, (ROWS, COLUMNS))
-    samples = passing(wall)
-    kept = np.s_[8:16, 8:16]
-    samples[:28, *kept] = 0.4 * wall[kept] + 0.6 * BRIGHTNESS
-    samples[28:, *kept] = wall[kept]
-    smoke = smoke_of(samples, 3 / 255)
-    assert smoke.brightens.all()
-    np.testing.assert_allclose(smoke.brightness, 0.62, atol=0.03)
-
-
 def test_smoke_brightens_what_is_darker_and_darkens_what_is_brighter() -> None:
     wall = np.random.default_rng(1).uniform(0.1, 0.2, (ROWS, COLUMNS))
     wall[:, COLUMNS // 2 :] += 0.75
