@@ -81,14 +81,16 @@ def smoke_of(grey: Picture, window: float) -> Smoke:
     # there, what a codec's drift may be says nothing of smoke
     beyond = 0.5 * window + DRIFT
     change = np.where((np.abs(away) > beyond) & certain, away, 0.0)
+    turn = _turn(background, change)
     if (change != 0).any(0).mean() < ISLAND:
-        # smoke that never leaves its place shows beside it by accident only, and in its place all the time
-        background, away = behind, values - behind
-        change = np.where(np.abs(away) > beyond, away, 0.0)
+        # Smoke that never leaves its place shows beside it by accident only, and in its place all the time. If that is
+        # no one-sided change, other things move, too, and say nothing of smoke.
+        in_place = values - behind
+        in_place = np.where(np.abs(in_place) > beyond, in_place, 0.0)
+        if in_place.any() and np.isinf(side := _turn(behind, in_place)):
+            change, turn = in_place, side
     if not change.any():
         return Smoke(likeness, 1.0, np.ones(shape, np.bool_))
-    brighter, darker = (np.square(np.maximum(each, 0)).sum(0) for each in (change, -change))
-    turn = _turn(background, brighter, darker)
     thickest = np.quantile(values[change != 0], [0.01, 0.99])
     brightness = float(np.clip(turn, *thickest))
     return Smoke(likeness, brightness, (behind <= turn).reshape(shape))
@@ -138,8 +140,9 @@ def clear_values(
     return value.astype(np.float32), known, calm
 
 
-def _turn(background: Picture, brighter: Picture, darker: Picture) -> float:
-    """The grey value below which backgrounds are brightened and above which they are darkened, each by so much."""
+def _turn(background: Picture, change: Picture) -> float:
+    """The grey value below which changes (frames, n) brighten backgrounds (n,) and above which they darken them."""
+    brighter, darker = (np.square(np.maximum(each, 0)).sum(0) for each in (change, -change))
     one_sided = ONE_SIDED * float((brighter + darker).sum())
     if brighter.sum() >= one_sided:
         return np.inf
