@@ -70,10 +70,10 @@ def choose_light_model(
     lit, directions = choose_directions(scene, list(frames.values()), fit)
     found = _scattered(clip, frames, lit, [1.0] * len(frames), by_hand, settings)
     # more light than one frame's smoke can scatter once may be that frame's exposure
-    if found.strength or found.scattering == "multiple":
+    bright = bool(found.strength) or found.scattering == "multiple"
+    if bright and abs(_exposure(clip, next(iter(frames))) - 1) > STEADY:
         gains = [_exposure(clip, number) for number in frames]
-        if abs(gains[0] - 1) > STEADY:
-            found = _scattered(clip, frames, lit, gains, by_hand, settings)
+        found = _scattered(clip, frames, lit, gains, by_hand, settings)
     scene, lit = scaled(scene, found.factor), scaled(lit, found.factor)
     if by_hand:
         return LightModel(lit, (*found.strength, found.choice, *directions))
