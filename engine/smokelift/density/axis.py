@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.density.screen import view_frame
+from smokelift.density.screen import reach_along, view_frame
 from smokelift.scene import Camera, Domain
 
 
@@ -139,8 +139,3 @@ class AxisEstimate:
     cue: Cue
     depth: float
     deviation: float
-
-
-def reach_along(domain: Domain, direction: NDArray[np.float64]) -> float:
-    """Half the domain's extent (m) along a direction."""
-    return float(np.abs(direction) @ (np.array(domain.max) - np.array(domain.centre)))

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.density.axis import SmokeAxis, reach_along
-from smokelift.density.screen import Upright, view_frame
+from smokelift.density.axis import SmokeAxis
+from smokelift.density.screen import Upright, reach_along, view_frame
 from smokelift.density.smoke_rows import SmokeRows
 from smokelift.scene import Camera, Domain
 

@@ -13,10 +13,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.density.axis import AxisEstimate, SmokeAxis, reach_along
+from smokelift.density.axis import AxisEstimate, SmokeAxis
 from smokelift.density.axis_from_floor import axis_from_floor
 from smokelift.density.axis_from_inlets import axis_from_inlets
-from smokelift.density.screen import upright_screen, view_frame
+from smokelift.density.screen import reach_along, upright_screen, view_frame
 from smokelift.density.smoke_rows import SmokeRows
 from smokelift.scene import Camera, Domain, Inlet
 

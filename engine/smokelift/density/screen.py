@@ -27,6 +27,11 @@ def view_frame(camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.float64]
     return np.cross(depth, height), depth, height
 
 
+def reach_along(domain: Domain, direction: NDArray[np.float64]) -> float:
+    """Half the domain's extent (m) along a direction."""
+    return float(np.abs(direction) @ (np.array(domain.max) - np.array(domain.centre)))
+
+
 @dataclass(frozen=True, eq=False)
 class Upright:
     """A picture on the upright screen through the domain's centre, row by row.
@@ -88,11 +93,10 @@ def upright_screen(amount: NDArray[np.float32], camera: Camera, domain: Domain, 
     lateral, depth, height = view_frame(camera)
     centre = np.array(domain.centre)
     h = domain.voxel_size
-    half = np.abs(np.array(domain.max) - centre)
-    reach_across, reach_up, reach_along = np.abs(lateral) @ half, np.abs(height) @ half, np.abs(depth) @ half
-    across = np.arange(-reach_across + h / 2, reach_across, h)
+    sideways = reach_along(domain, lateral)
+    across = np.arange(-sideways + h / 2, sideways, h)
     # what stands before the screen shows beyond the domain's ends there
-    ends = reach_up + reach_along / 2
+    ends = reach_along(domain, height) + reach_along(domain, depth) / 2
     up = np.arange(-ends + h / (2 * per_voxel), ends, h / per_voxel)
     points = centre + across[None, :, None] * lateral + up[:, None, None] * height
     return Screen(up, across, seen_at(points, amount, camera), h)

@@ -8,8 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.density.axis import reach_along
-from smokelift.density.screen import Upright, view_frame
+from smokelift.density.screen import Upright, reach_along, view_frame
 from smokelift.scene import Camera, Domain
 
 NEAR_SIDE = 0.3, 0.45
