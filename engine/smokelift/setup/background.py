@@ -40,7 +40,8 @@ TELEPHOTO = 3.0
 bends a pan more than the longer one does, so that either is found from one within a factor of about two."""
 
 MOSTLY = 0.5
-"""Share of the smoke's pixels without a known background from which most of the smoke may be in the plate."""
+"""Share from which on it is most of a whole: of the smoke's pixels, those without a known background; of a picture,
+those that differ from one colour; of what lies between bars, the smoke of a frame."""
 
 BETWEEN_BARS = 0.95
 """Share of the picture between two bars which smoke covers at some time there, if it is not the picture itself: smoke
