@@ -29,7 +29,7 @@ FEWEST_WORDS = 4
 TOPICS = {
     "Command line": ("engine/smokelift/app", "engine/smokelift_command"),
     "Clip and background": ("engine/smokelift/footage",),
-    "Scene file": ("engine/smokelift/scene",),
+    "Scene file": ("engine/smokelift/checks", "engine/smokelift/scene"),
     "Set-up of the shot": ("engine/smokelift/setup",),
     "Density and rendering": ("engine/smokelift/density", "engine/smokelift/render"),
     "Velocity and transport": ("engine/smokelift/velocity", "engine/smokelift/transport", "engine/smokelift/pipeline"),

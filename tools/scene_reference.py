@@ -14,8 +14,8 @@ from pathlib import Path
 from types import NoneType, UnionType
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
+from smokelift.checks import shown
 from smokelift.scene import Background, ClipSource, Domain, Inlet, Medium, Scene, View
-from smokelift.scene.checks import shown
 from smokelift.scene.lights import LIGHT_TYPES
 
 Row = tuple[str, str, str, str]

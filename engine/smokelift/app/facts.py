@@ -6,10 +6,10 @@ from typing import Any
 
 from smokelift.app.cost import Cost
 from smokelift.app.page import Fact
+from smokelift.checks import counted
 from smokelift.footage.exposure import shows_exposure, small
 from smokelift.footage.plate import Plate
 from smokelift.scene import SHADOWED, Scene
-from smokelift.scene.checks import counted
 from smokelift.setup.background import BLACK
 from smokelift.setup.choice import UNDETERMINED, Choice
 from smokelift.setup.geometry import PICTURE_HEIGHT

@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from smokelift.app.page import TILE, Fact, Page, Panel, fitted
+from smokelift.checks import counted
 from smokelift.footage.images import area_average, linear_to_srgb
 from smokelift.footage.matte import SMOKE_THRESHOLD, Matte, matte
 from smokelift.footage.plate import Plate
 from smokelift.output.images import eight_bit
 from smokelift.scene import SHADOWED, Camera, DirectionalLight, Domain, PointLight, Scene
-from smokelift.scene.checks import counted
 from smokelift.scene.projection import project
 from smokelift.setup.shot import Shot
 from smokelift.setup.smoke import UNKNOWN

@@ -12,8 +12,8 @@ from pathlib import Path
 
 from smokelift.batch.record import Frames, Record, ShotState
 from smokelift.batch.shots import Shot
+from smokelift.checks import counted
 from smokelift.output.atomic import atomic_path
-from smokelift.scene.checks import counted
 
 REPORT = "report.html"
 

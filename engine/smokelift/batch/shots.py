@@ -23,7 +23,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from smokelift.scene.checks import shown
+from smokelift.checks import shown
 from smokelift.scene.files import read_text
 from smokelift.scene.toml_lines import Place, find_lines
 

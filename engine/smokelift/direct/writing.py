@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from smokelift.checks import counted
 from smokelift.direct.constraint import Mask
 from smokelift.direct.moment import Moment
 from smokelift.output.checksum import checksum
@@ -17,7 +18,6 @@ from smokelift.output.layout import INDEX
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
 from smokelift.scene import Camera
-from smokelift.scene.checks import counted
 from smokelift.transport import Velocity, divergence
 
 SHORTEST = 4

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image as Pillow
 
+from smokelift.checks import counted
 from smokelift.evaluation.frame_means import Figures, PictureMeans, VolumeMeans
 from smokelift.evaluation.reference_view import INPUT, ReferenceView, first_frame, open_views
 from smokelift.evaluation.resampling import resampled
@@ -21,7 +22,6 @@ from smokelift.output.sequence import Sequence
 from smokelift.output.sheet import write_sheet
 from smokelift.output.viewer import Viewer
 from smokelift.render import Volume
-from smokelift.scene.checks import counted
 
 TILE_HEIGHT = 320
 """Pixels."""

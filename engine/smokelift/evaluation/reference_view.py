@@ -6,6 +6,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from smokelift.checks import counted
 from smokelift.footage.background import background_picture, open_plates
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import area_average
@@ -13,7 +14,6 @@ from smokelift.output.sequence import Sequence
 from smokelift.output.viewer import Viewer
 from smokelift.render import Image
 from smokelift.scene import Camera, Scene
-from smokelift.scene.checks import counted
 
 LONGEST_SIDE = 480
 """Pixels of a compared picture at most: larger ones are averaged over areas. Finer than any usual grid."""

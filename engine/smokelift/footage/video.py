@@ -29,6 +29,7 @@ from av.video.plane import VideoPlane
 from av.video.reformatter import ColorRange, Interpolation
 
 import smokelift._core as _core
+from smokelift.checks import counted
 from smokelift.footage import lens
 from smokelift.footage.colour import ENCODINGS, Encoding, primaries_name, to_bt709
 from smokelift.footage.container import lacks_index, open_container
@@ -47,7 +48,6 @@ from smokelift.footage.images import (
 )
 from smokelift.footage.layer import Layer, backdrop_of, sample_numbers
 from smokelift.scene import LARGEST_PICTURE
-from smokelift.scene.checks import counted
 
 _EXACT = int(Interpolation.ACCURATE_RND | Interpolation.FULL_CHR_H_INT | Interpolation.FULL_CHR_H_INP)
 _ALPHA_DECODERS = {"vp8": "libvpx", "vp9": "libvpx-vp9"}

@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
+from smokelift.checks import shown
 from smokelift.output.atomic import atomic_path
 from smokelift.output.layout import INDEX
-from smokelift.scene.checks import shown
 from smokelift.scene.files import read_text
 
 FORMAT = 1

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from smokelift.checks import counted
 from smokelift.output.archive import FLAME, VELOCITY, write_arrays
 from smokelift.output.atomic import DISK_FULL, atomic_path
 from smokelift.output.checksum import checksum
@@ -28,7 +29,6 @@ from smokelift.output.lock import Lock
 from smokelift.output.resume import ResumeState
 from smokelift.output.vdb import VdbUnavailable, checked_volume, vdb_module, write_vdb
 from smokelift.scene import Background, CompleteScene, scene_to_dict
-from smokelift.scene.checks import counted
 from smokelift.transport import Array, Faces, Velocity, face_shapes
 
 

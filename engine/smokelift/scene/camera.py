@@ -9,18 +9,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.scene.checks import (
-    SceneError,
-    Vector,
-    integer,
-    items,
-    number,
-    positive,
-    set_fields,
-    shown,
-    unexpected,
-    vector,
-)
+from smokelift.checks import shown
+from smokelift.scene.checks import SceneError, Vector, integer, items, number, positive, set_fields, unexpected, vector
 from smokelift.scene.domain import Domain
 
 Matrix = tuple[tuple[float, float, float, float], ...]

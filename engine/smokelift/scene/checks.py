@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from smokelift.checks import shown
 
 Vector = tuple[float, float, float]
 """x, y, z or red, green, blue."""
@@ -32,32 +34,9 @@ class SceneError(ValueError):
         self.table = table
 
 
-def shown(value: object) -> str:
-    """Return a value as a scene file would have it, cut to a readable length."""
-    if isinstance(value, bool):
-        return str(value).lower()
-    text = f'"{_spelt_out(value)}"' if isinstance(value, str) else repr(value).replace("(", "[").replace(")", "]")
-    return text if len(text) <= 60 else text[:57] + "..."
-
-
-def counted(number: int, noun: str) -> str:
-    """Return so many of something in words: "1 frame", "2 frames"."""
-    return f"{number} {noun}{'' if number == 1 else 's'}"
-
-
-def _spelt_out(text: str) -> str:
-    """The text with line breaks and the like as their codes, so that a message stays one line."""
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
-
-
 def unexpected(value: object, key: str, expected: str, table: str = "") -> SceneError:
     """Return the error that says what was expected under ``key`` and what was found."""
     return SceneError(f"{key} must be {expected}, not {shown(value)}", key=key, table=table)
-
-
-def one_of(names: Iterable[str]) -> str:
-    """Return the values that a key may have, as a message lists them."""
-    return ", ".join(f'"{name}"' for name in names)
 
 
 def number(value: Any, key: str, expected: str = "a number", valid: Callable[[float], bool] = math.isfinite) -> float:

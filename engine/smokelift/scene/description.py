@@ -14,9 +14,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from smokelift.checks import shown
 from smokelift.scene.background import Background
 from smokelift.scene.camera import Camera
-from smokelift.scene.checks import SceneError, set_fields, shown
+from smokelift.scene.checks import SceneError, set_fields
 from smokelift.scene.clip_source import ClipSource
 from smokelift.scene.domain import Domain, Inlet, Side, checked_sides
 from smokelift.scene.environment_light import EnvironmentLight

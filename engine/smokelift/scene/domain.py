@@ -9,7 +9,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.scene.checks import SceneError, Vector, integer, items, one_of, positive, set_fields, unexpected, vector
+from smokelift.checks import one_of
+from smokelift.scene.checks import SceneError, Vector, integer, items, positive, set_fields, unexpected, vector
 
 Side = Literal["x-", "x+", "y-", "y+", "z-", "z+"]
 SIDES: tuple[Side, ...] = ("x-", "x+", "y-", "y+", "z-", "z+")

@@ -6,7 +6,8 @@ import math
 from dataclasses import dataclass, replace
 from typing import Protocol
 
-from smokelift.scene.checks import SceneError, Vector, colour, set_fields, shown, vector
+from smokelift.checks import shown
+from smokelift.scene.checks import SceneError, Vector, colour, set_fields, vector
 from smokelift.scene.domain import Domain
 
 FARTHEST = 1e6

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from smokelift.scene.checks import Vector, number, one_of, positive, set_fields, unexpected, vector
+from smokelift.checks import one_of
+from smokelift.scene.checks import Vector, number, positive, set_fields, unexpected, vector
 
 Scattering = Literal["multiple", "single", "unshadowed", "absorption"]
 """How light is scattered: any number of times, once and with self-shadowing, once without, or not at all."""

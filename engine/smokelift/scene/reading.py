@@ -19,9 +19,10 @@ from dataclasses import MISSING, dataclass, fields
 from pathlib import Path
 from typing import Any, TypeVar, get_args, get_type_hints
 
+from smokelift.checks import one_of, shown
 from smokelift.scene.background import Background
 from smokelift.scene.camera import Camera, focal_length, look_at_matrix, picture_size
-from smokelift.scene.checks import SceneError, one_of, positive, shown, unexpected
+from smokelift.scene.checks import SceneError, positive, unexpected
 from smokelift.scene.clip_source import ClipSource
 from smokelift.scene.domain import Domain, Inlet
 from smokelift.scene.files import read_text

@@ -9,6 +9,7 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
+from smokelift.checks import counted
 from smokelift.density.axis import SmokeAxis
 from smokelift.footage.clip import Clip
 from smokelift.footage.evidence import GLIMPSE, looks
@@ -16,7 +17,6 @@ from smokelift.footage.large_plate import large_frames
 from smokelift.footage.working_picture import CameraError, WorkingPicture, working_picture
 from smokelift.render import scene_optics
 from smokelift.scene import Background, Camera, CompleteScene, Domain, Scene
-from smokelift.scene.checks import counted
 from smokelift.setup.choice import Choice
 from smokelift.setup.first_look import first_look
 from smokelift.setup.further_views import disagreement, open_view

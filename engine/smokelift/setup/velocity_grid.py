@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from smokelift.checks import counted
 from smokelift.render import Volume
 from smokelift.scene import Domain
-from smokelift.scene.checks import counted
 from smokelift.setup.choice import Choice
 from smokelift.velocity import VelocitySettings, estimate_velocity
 from smokelift.velocity.settings import LEVELS

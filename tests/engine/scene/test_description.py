@@ -9,7 +9,6 @@ import pytest
 from scene_examples import GOOD, load, moving_camera
 
 from smokelift.scene import Camera, Domain, Scene, SceneError
-from smokelift.scene.checks import counted
 
 
 def test_further_views_keep_step_with_another_range(tmp_path: Path) -> None:
@@ -43,7 +42,3 @@ def test_a_moving_camera_must_see_the_domain_once() -> None:
     assert Scene(camera=camera, domain=domain).camera == camera
     with pytest.raises(SceneError, match="does not see the domain"):
         Scene(camera=moving_camera((50, -7, 1.5), (40, -7, 1.5)), domain=domain)
-
-
-def test_one_of_something_is_no_plural() -> None:
-    assert [counted(number, "frame") for number in (0, 1, 2)] == ["0 frames", "1 frame", "2 frames"]

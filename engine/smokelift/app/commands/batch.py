@@ -32,7 +32,7 @@ from smokelift.batch import (
     run_on_cluster,
     write_report,
 )
-from smokelift.scene.checks import counted
+from smokelift.checks import counted
 
 MEMORY_SHARE = 0.9
 """Part of the free memory that the shots may take together; what is foretold is right to a tenth or two."""

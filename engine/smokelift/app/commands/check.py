@@ -8,8 +8,8 @@ from typing import Any
 from smokelift.app.options import named_path
 from smokelift.app.progress import Reporter
 from smokelift.app.shortcomings import count_empty, shortcomings
+from smokelift.checks import counted
 from smokelift.output.sequence import Sequence
-from smokelift.scene.checks import counted
 
 
 def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:

@@ -9,9 +9,9 @@ from typing import Any
 
 from smokelift.app.options import add_directed_options, finite, named_path, require_new
 from smokelift.app.progress import Reporter, say_frames
+from smokelift.checks import counted
 from smokelift.direct import Ball, Box, Continuation, Fan, Mesh, MovingMesh, Turbulence, continue_sequence, open_source
 from smokelift.scene import SIDES
-from smokelift.scene.checks import counted
 
 
 def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:

@@ -12,9 +12,9 @@ import psutil
 
 from smokelift import __version__, _core
 from smokelift.app.progress import Reporter
+from smokelift.checks import counted
 from smokelift.output.vdb import VdbUnavailable, vdb_module
 from smokelift.render import device
-from smokelift.scene.checks import counted
 
 LIBRARIES = ("numpy", "scipy", "av", "OpenEXR", "pillow", "taichi")
 

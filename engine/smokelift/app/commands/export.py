@@ -8,6 +8,7 @@ from typing import Any, get_args
 
 from smokelift.app.options import named_path
 from smokelift.app.progress import Reporter
+from smokelift.checks import counted
 from smokelift.output.export import (
     ExportSettings,
     Precision,
@@ -17,7 +18,6 @@ from smokelift.output.export import (
     require_space,
 )
 from smokelift.output.sequence import Sequence
-from smokelift.scene.checks import counted
 
 
 def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:

@@ -14,11 +14,11 @@ from smokelift.app.inspection import inspection_page
 from smokelift.app.options import add_run_options, named_path, require_folder, scene_of, settings_of
 from smokelift.app.page import PAGE_KINDS, Fact, write_page
 from smokelift.app.progress import Reporter
+from smokelift.checks import counted
 from smokelift.footage.clip import Clip
 from smokelift.output.images import write_image
 from smokelift.render import device
 from smokelift.scene import Background, Scene, scene_to_dict
-from smokelift.scene.checks import counted
 from smokelift.setup.prepare import boundaries, prepare_shot
 from smokelift.setup.provenance import made_up
 from smokelift.setup.shot import Shot

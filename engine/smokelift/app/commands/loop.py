@@ -8,8 +8,8 @@ from typing import Any
 
 from smokelift.app.options import add_directed_options, frame_range, require_new
 from smokelift.app.progress import Reporter, say_frames
+from smokelift.checks import counted
 from smokelift.direct import loop_length, loop_sequence, open_source, usual_overlap
-from smokelift.scene.checks import counted
 
 
 def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:

@@ -14,6 +14,7 @@ from smokelift.app.cost import require_memory
 from smokelift.app.options import add_run_options, named_path, require_folder, scene_of, settings_of
 from smokelift.app.progress import Reporter
 from smokelift.app.shortcomings import count_empty, shortcomings
+from smokelift.checks import counted
 from smokelift.footage.clip import Clip
 from smokelift.footage.matte import SMOKE_THRESHOLD
 from smokelift.output.atomic import atomic_path
@@ -22,7 +23,6 @@ from smokelift.output.sequence import Sequence
 from smokelift.output.writer import check_directory, written_kinds
 from smokelift.pipeline import Frame, reconstruct
 from smokelift.render import device
-from smokelift.scene.checks import counted
 from smokelift.setup.background import cut_notes
 from smokelift.setup.no_smoke import what_helps
 from smokelift.setup.prepare import prepare_shot

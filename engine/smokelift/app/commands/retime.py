@@ -8,8 +8,8 @@ from typing import Any
 
 from smokelift.app.options import add_directed_options, finite, require_new
 from smokelift.app.progress import Reporter, say_frames
+from smokelift.checks import counted
 from smokelift.direct import open_source, playback, retime_sequence
-from smokelift.scene.checks import counted
 
 SPEEDS = 0.01, 100.0
 """Slowest and fastest: beyond them nothing moves, or nothing is left."""
