@@ -49,7 +49,7 @@ struct Series {
             sum = terms[n] + t * sum;
         return sum;
     }
-    constexpr Series slope() const {
+    constexpr Series derivative() const {
         Series result{};
         for (int n = 1; n < TERMS; ++n)
             result.terms[n - 1] = float(n) * terms[n];
@@ -69,47 +69,49 @@ template <class Factor> constexpr Series series(int shift, Factor factor) {
     return result;
 }
 constexpr Series ESCAPED = series(1, [](int) { return 1.0; });                  // P
-constexpr Series LEFT = series(2, [](int) { return 1.0; });                     // B
+constexpr Series KEPT = series(2, [](int) { return 1.0; });                     // B
 constexpr Series SLANTED = series(2, [](int n) { return -0.5 * n; });           // Q
 constexpr Series TILTED = series(4, [](int n) { return -0.25 * n * (n + 3); }); // C
-constexpr Series OF_ESCAPED = ESCAPED.slope(), OF_LEFT = LEFT.slope(), OF_SLANTED = SLANTED.slope(),
-                 OF_TILTED = TILTED.slope();
+constexpr Series ESCAPED_DERIVATIVE = ESCAPED.derivative(), KEPT_DERIVATIVE = KEPT.derivative(),
+                 SLANTED_DERIVATIVE = SLANTED.derivative(), TILTED_DERIVATIVE = TILTED.derivative();
 
-// P, B, Q and C of a path of optical depth t that is not thin, and their derivatives by t.
+// P, B, Q and C of the formulas above, or their derivatives by t.
 struct Shares {
-    float escaped, left, slanted, tilted;
+    float escaped, kept, slanted, tilted;
 };
 
+// Of a path of optical depth t >= THIN, `inverse` = 1 / t.
+
 SMOKELIFT_INLINE Shares thick_shares(const Attenuation &through, float inverse) {
-    const float escaped = through.opacity * inverse, left = (1 - escaped) * inverse;
-    const float slanted = left - 0.5f * escaped;
-    return {escaped, left, slanted, SPREAD * inverse - (0.5f + inverse) * inverse * slanted};
+    const float escaped = through.opacity * inverse, kept = (1 - escaped) * inverse;
+    const float slanted = kept - 0.5f * escaped;
+    return {escaped, kept, slanted, SPREAD * inverse - (0.5f + inverse) * inverse * slanted};
 }
 
-SMOKELIFT_INLINE Shares thick_slopes(const Attenuation &through, float inverse) {
+SMOKELIFT_INLINE Shares thick_share_derivatives(const Attenuation &through, float inverse) {
     const Shares of = thick_shares(through, inverse);
     const float escaped = (through.transmittance - of.escaped) * inverse,
-                left = -(escaped + of.left) * inverse;
-    const float slanted = left - 0.5f * escaped;
+                kept = -(escaped + of.kept) * inverse;
+    const float slanted = kept - 0.5f * escaped;
     const float tilted = (-SPREAD + (0.5f + 2 * inverse) * of.slanted) * inverse * inverse -
                          (0.5f + inverse) * inverse * slanted;
-    return {escaped, left, slanted, tilted};
+    return {escaped, kept, slanted, tilted};
 }
 
 SMOKELIFT_INLINE Shares shares(float t, const Attenuation &through) {
     const bool thin = t < THIN;
     const float low = std::min(t, THIN);
     const Shares thick = thick_shares(through, 1 / std::max(t, THIN));
-    return {thin ? ESCAPED(low) : thick.escaped, thin ? LEFT(low) : thick.left,
+    return {thin ? ESCAPED(low) : thick.escaped, thin ? KEPT(low) : thick.kept,
             thin ? SLANTED(low) : thick.slanted, thin ? TILTED(low) : thick.tilted};
 }
 
-SMOKELIFT_INLINE Shares slopes_of_shares(float t) {
+SMOKELIFT_INLINE Shares share_derivatives(float t) {
     const bool thin = t < THIN;
     const float low = std::min(t, THIN);
-    const Shares thick = thick_slopes(attenuation(t), 1 / std::max(t, THIN));
-    return {thin ? OF_ESCAPED(low) : thick.escaped, thin ? OF_LEFT(low) : thick.left,
-            thin ? OF_SLANTED(low) : thick.slanted, thin ? OF_TILTED(low) : thick.tilted};
+    const Shares thick = thick_share_derivatives(attenuation(t), 1 / std::max(t, THIN));
+    return {thin ? ESCAPED_DERIVATIVE(low) : thick.escaped, thin ? KEPT_DERIVATIVE(low) : thick.kept,
+            thin ? SLANTED_DERIVATIVE(low) : thick.slanted, thin ? TILTED_DERIVATIVE(low) : thick.tilted};
 }
 
 // Neighbouring blocks. Rows are short, and compilers leave short loops and the rest of long ones scalar.
@@ -127,8 +129,47 @@ template <class Visit> SMOKELIFT_INLINE void by_lanes(int count, const Visit &vi
     visit(count - LANES);
 }
 
-// Not cleared.
-std::unique_ptr<float[]> room(std::size_t size) { return std::unique_ptr<float[]>(new float[size]); }
+std::unique_ptr<float[]> uninitialised(std::size_t size) { return std::unique_ptr<float[]>(new float[size]); }
+
+// What arrives along a line of the lattice, both ways: L of the emission, M of the weights taken for one. The
+// optical depth t of a block changes <weights, G emission>, by the beam that crosses it there and the one
+// that comes back, by
+//     -T (L M) + P' l (e M + w L) + Q' l (r M - s L),
+// with the emission e and the weight w of the block, and their rises r and s along the beam.
+struct Beams {
+    const float *forth, *back;                 // L
+    const float *weighed_forth, *weighed_back; // M
+
+    SMOKELIFT_INLINE float by_passed(std::size_t i) const {
+        return forth[i] * weighed_back[i] + back[i] * weighed_forth[i];
+    }
+    SMOKELIFT_INLINE float by_escaped(std::size_t i, float emitted, float weight) const {
+        return weight * (forth[i] + back[i]) + emitted * (weighed_forth[i] + weighed_back[i]);
+    }
+    SMOKELIFT_INLINE float by_slanted(std::size_t i, float rise, float weight_rise) const {
+        return rise * (weighed_forth[i] - weighed_back[i]) + weight_rise * (forth[i] - back[i]);
+    }
+};
+
+// Memory for what arrives along several lines of one lattice: fields of L forth, L back, M forth, M back.
+class Arriving {
+public:
+    Arriving(int lines, std::size_t count)
+        : size_(lines * count), count_(count), memory_(uninitialised(4 * size_)) {}
+
+    float *of_emission(int way) { return part(way > 0 ? 0 : 1); }
+    float *of_weights(int way) { return part(way > 0 ? 2 : 3); }
+    Beams beams(int line) const {
+        const std::size_t at = line * count_;
+        return {part(0) + at, part(1) + at, part(2) + at, part(3) + at};
+    }
+
+private:
+    float *part(int number) const { return memory_.get() + number * size_; }
+
+    std::size_t size_, count_;
+    std::unique_ptr<float[]> memory_;
+};
 
 } // namespace
 
@@ -139,7 +180,7 @@ BlockTransport::BlockTransport(std::vector<float> extinction, const Lattice &lat
     for (Fields &part : own_)
         part.assign(lattice_.count(), 0.0f);
     for (Crossing &crossing : classes_) {
-        cross(crossing);
+        set_up(crossing);
         for (Fields *values : {&crossing.passed, &crossing.escaped, &crossing.slanted})
             clear_border(*values);
     }
@@ -160,7 +201,7 @@ void BlockTransport::clear_border(Fields &values) const {
 // Of a block's emission e the part B l e is its own mean along a beam, and of the rise r the part
 // C l r / SPREAD is its own.
 SMOKELIFT_CLONES
-void BlockTransport::cross(Crossing &c) {
+void BlockTransport::set_up(Crossing &c) {
     const float share = c.weight * c.length, all = share * (c.along + c.across);
     const std::size_t count = lattice_.count();
     for (Fields *values : {&c.passed, &c.escaped, &c.slanted})
@@ -177,28 +218,30 @@ void BlockTransport::cross(Crossing &c) {
         passed[i] = through.transmittance;
         escaped[i] = of.escaped;
         slanted[i] = of.slanted;
-        own[i] += all * of.left;
-        own_slope[i] += along * of.tilted + across * of.left;
+        own[i] += all * of.kept;
+        own_slope[i] += along * of.tilted + across * of.kept;
     }
 }
 
 SMOKELIFT_CLONES
-void BlockTransport::slope(const Crossing &c, Slopes &slopes, Own &of_own) const {
+void BlockTransport::differentiate(const Crossing &c, DepthDerivatives &derivatives,
+                                   Own &own_derivative) const {
     const float share = c.weight * c.length * c.length, all = share * (c.along + c.across);
     const std::size_t count = lattice_.count();
-    slopes.escaped.resize(count);
-    slopes.slanted.resize(count);
+    derivatives.escaped.resize(count);
+    derivatives.slanted.resize(count);
     const float *const __restrict extinction = extinction_.data();
-    float *const __restrict escaped = slopes.escaped.data(), *const __restrict slanted =
-                                                                 slopes.slanted.data();
-    float *const __restrict own = of_own[0].data(), *const __restrict own_slope = of_own[1].data();
+    float *const __restrict escaped = derivatives.escaped.data(), *const __restrict slanted =
+                                                                      derivatives.slanted.data();
+    float *const __restrict own = own_derivative[0].data(), *const __restrict own_slope =
+                                                                own_derivative[1].data();
     const float along = share * c.along / SPREAD, across = share * c.across;
     for (std::size_t i = 0; i < count; ++i) {
-        const Shares of = slopes_of_shares(c.length * extinction[i]);
+        const Shares of = share_derivatives(c.length * extinction[i]);
         escaped[i] = of.escaped;
         slanted[i] = of.slanted;
-        own[i] += all * of.left;
-        own_slope[i] += along * of.tilted + across * of.left;
+        own[i] += all * of.kept;
+        own_slope[i] += along * of.tilted + across * of.kept;
     }
 }
 
@@ -328,7 +371,7 @@ SMOKELIFT_CLONES
 void BlockTransport::through_axis(int axis, const float *emission, float *mean) const {
     const Crossing &crossing = classes_[0];
     const std::size_t all = lattice_.count();
-    const auto memory = room(CARRIED * all);
+    const auto memory = uninitialised(CARRIED * all);
     float *const arrived = memory.get();
     follow_axis(axis, 1, emission,
                 [&](std::size_t first, int count, const float *arriving) SMOKELIFT_INLINE_LAMBDA {
@@ -400,7 +443,7 @@ void BlockTransport::gather(const float *emission, const float *parts, float *me
 
 void BlockTransport::mean_radiance(const float *emission, float *mean, Workers &workers) const {
     const std::size_t all = lattice_.count();
-    const auto memory = room((AXES * FIELDS + WAYS * DIAGONAL_FIELDS) * all);
+    const auto memory = uninitialised((AXES * FIELDS + WAYS * DIAGONAL_FIELDS) * all);
     float *const parts = memory.get(), *const diagonals = parts + AXES * FIELDS * all;
     workers.run(AXES + WAYS, [&](int task) {
         if (task < WAYS)
@@ -411,105 +454,81 @@ void BlockTransport::mean_radiance(const float *emission, float *mean, Workers &
     gather(emission, parts, mean);
 }
 
-// What arrives along an axis of all that is carried, forth and then back.
+// What arrives along an axis, one way, of all that is carried: a field each.
 SMOKELIFT_CLONES
-void BlockTransport::arriving_along_axis(int axis, const float *emission, float *result) const {
+void BlockTransport::arriving_along_axis(int axis, int way, const float *emission, float *fields) const {
     const std::size_t all = lattice_.count();
-    for (int way = 0; way < WAYS; ++way) {
-        float *const to = result + way * CARRIED * all;
-        follow_axis(axis, way ? -1 : 1, emission,
-                    [&](std::size_t first, int count, const float *arriving) SMOKELIFT_INLINE_LAMBDA {
-                        for (int part = 0; part < CARRIED; ++part)
-                            std::copy_n(arriving + part * count, count, to + part * all + first);
-                    });
-    }
+    follow_axis(axis, way, emission,
+                [&](std::size_t first, int count, const float *arriving) SMOKELIFT_INLINE_LAMBDA {
+                    for (int part = 0; part < CARRIED; ++part)
+                        std::copy_n(arriving + part * count, count, fields + part * all + first);
+                });
+}
+
+// The same along four diagonals.
+SMOKELIFT_CLONES
+void BlockTransport::arriving_along_diagonals(int way, const float *emission, float *fields) const {
+    const std::size_t all = lattice_.count();
+    follow_diagonals(way, emission,
+                     [&](std::size_t first, int count, const float *const *arriving) SMOKELIFT_INLINE_LAMBDA {
+                         for (int line = 0; line < DIAGONALS; ++line)
+                             std::copy_n(arriving[line], count, fields + line * all + first);
+                     });
 }
 
 SMOKELIFT_CLONES
-void BlockTransport::arriving_along_diagonals(const float *emission, float *result) const {
-    const std::size_t all = lattice_.count();
-    for (int way = 0; way < WAYS; ++way) {
-        float *const to = result + way * DIAGONALS * all;
-        follow_diagonals(way ? -1 : 1, emission,
-                         [&](std::size_t first, int count, const float *const *arriving)
-                             SMOKELIFT_INLINE_LAMBDA {
-                                 for (int line = 0; line < DIAGONALS; ++line)
-                                     std::copy_n(arriving[line], count, to + line * all + first);
-                             });
-    }
-}
-
-// With L what arrives of l emission along a direction, M what arrives of l weights against it, and r and s
-// their rises along it:
-//     -T L M + P' (l emission M + l weights L) + Q' (l r M - l s L).
-SMOKELIFT_CLONES
-void BlockTransport::axis_gradient(int axis, const Slopes &slopes, const float *emission,
+void BlockTransport::axis_gradient(int axis, const DepthDerivatives &derivatives, const float *emission,
                                    const float *weights, float *result) const {
     const Crossing &c = classes_[0];
     const std::size_t all = lattice_.count();
-    const auto memory = room(2 * WAYS * CARRIED * all);
-    float *const of_emission = memory.get(), *const of_weights = of_emission + WAYS * CARRIED * all;
-    arriving_along_axis(axis, emission, of_emission);
-    arriving_along_axis(axis, weights, of_weights);
-    const float *const __restrict passed = c.passed.data();
-    const float *const __restrict escaped = slopes.escaped.data();
-    const float *const __restrict slanted = slopes.slanted.data();
+    Arriving arriving(CARRIED, all);
+    for (const int way : {1, -1}) {
+        arriving_along_axis(axis, way, emission, arriving.of_emission(way));
+        arriving_along_axis(axis, way, weights, arriving.of_weights(way));
+    }
+    const float *const passed = c.passed.data();
+    const float *const escaped = derivatives.escaped.data(), *const slanted = derivatives.slanted.data();
     for (int part = 0; part < CARRIED; ++part) {
-        const float *const __restrict forth = of_emission + part * all;
-        const float *const __restrict back = forth + CARRIED * all;
-        const float *const __restrict weighed_forth = of_weights + part * all;
-        const float *const __restrict weighed_back = weighed_forth + CARRIED * all;
+        const Beams beams = arriving.beams(part);
         const int field = part ? 1 + LATERAL[axis][part - 1] : 0;
-        const float *const __restrict emitted = emission + field * all;
-        const float *const __restrict weight = weights + field * all;
+        const float *const emitted = emission + field * all, *const weight = weights + field * all;
         const float share = c.weight * (part ? SPREAD : 1.0f);
         for (std::size_t i = 0; i < all; ++i) {
-            const float products = forth[i] * weighed_back[i] + back[i] * weighed_forth[i];
-            const float of_escaped =
-                weight[i] * (forth[i] + back[i]) + emitted[i] * (weighed_forth[i] + weighed_back[i]);
-            const float value = share * (c.length * escaped[i] * of_escaped - passed[i] * products);
+            const float by_passed = beams.by_passed(i);
+            const float by_escaped = beams.by_escaped(i, emitted[i], weight[i]);
+            const float value = share * (c.length * escaped[i] * by_escaped - passed[i] * by_passed);
             result[i] = part ? result[i] + value : value;
         }
     }
-    const float *const __restrict forth = of_emission, *const __restrict back = forth + CARRIED * all;
-    const float *const __restrict weighed_forth = of_weights;
-    const float *const __restrict weighed_back = weighed_forth + CARRIED * all;
-    const float *const __restrict rise = emission + (1 + axis) * all;
-    const float *const __restrict of_rise = weights + (1 + axis) * all;
+    const Beams beams = arriving.beams(0);
+    const float *const rise = emission + (1 + axis) * all, *const weight_rise = weights + (1 + axis) * all;
     for (std::size_t i = 0; i < all; ++i)
-        result[i] -= c.weight * c.length * slanted[i] *
-                     (rise[i] * (weighed_forth[i] - weighed_back[i]) + of_rise[i] * (forth[i] - back[i]));
+        result[i] -= c.weight * c.length * slanted[i] * beams.by_slanted(i, rise[i], weight_rise[i]);
 }
 
 SMOKELIFT_CLONES
-void BlockTransport::diagonal_gradient(const Slopes &slopes, const float *emission, const float *weights,
-                                       float *result) const {
+void BlockTransport::diagonal_gradient(const DepthDerivatives &derivatives, const float *emission,
+                                       const float *weights, float *result) const {
     const Crossing &c = classes_[1];
     const std::size_t all = lattice_.count();
-    const auto memory = room(2 * WAYS * DIAGONALS * all);
-    float *const of_emission = memory.get(), *const of_weights = of_emission + WAYS * DIAGONALS * all;
-    arriving_along_diagonals(emission, of_emission);
-    arriving_along_diagonals(weights, of_weights);
-    const float *const __restrict passed = c.passed.data();
-    const float *const __restrict escaped = slopes.escaped.data();
-    const float *const __restrict slanted = slopes.slanted.data();
+    Arriving arriving(DIAGONALS, all);
+    for (const int way : {1, -1}) {
+        arriving_along_diagonals(way, emission, arriving.of_emission(way));
+        arriving_along_diagonals(way, weights, arriving.of_weights(way));
+    }
+    const float *const passed = c.passed.data();
+    const float *const escaped = derivatives.escaped.data(), *const slanted = derivatives.slanted.data();
+    const float *const e = emission, *const w = weights;
     for (int line = 0; line < DIAGONALS; ++line) {
-        const float *const __restrict forth = of_emission + line * all;
-        const float *const __restrict back = forth + DIAGONALS * all;
-        const float *const __restrict weighed_forth = of_weights + line * all;
-        const float *const __restrict weighed_back = weighed_forth + DIAGONALS * all;
+        const Beams beams = arriving.beams(line);
         const auto y = float(DIAGONAL_Y[line]), z = float(DIAGONAL_Z[line]);
-        const float *const __restrict e = emission, *const __restrict w = weights;
         for (std::size_t i = 0; i < all; ++i) {
             const float rise = e[all + i] + y * e[2 * all + i] + z * e[3 * all + i];
-            const float of_rise = w[all + i] + y * w[2 * all + i] + z * w[3 * all + i];
-            const float products = forth[i] * weighed_back[i] + back[i] * weighed_forth[i];
-            const float of_escaped =
-                w[i] * (forth[i] + back[i]) + e[i] * (weighed_forth[i] + weighed_back[i]);
-            const float of_slanted =
-                rise * (weighed_forth[i] - weighed_back[i]) + of_rise * (forth[i] - back[i]);
-            const float value = c.weight * (c.length * (escaped[i] * of_escaped - slanted[i] * of_slanted) -
-                                            passed[i] * products);
+            const float weight_rise = w[all + i] + y * w[2 * all + i] + z * w[3 * all + i];
+            const float by_passed = beams.by_passed(i), by_escaped = beams.by_escaped(i, e[i], w[i]);
+            const float by_slanted = beams.by_slanted(i, rise, weight_rise);
+            const float value = c.weight * (c.length * (escaped[i] * by_escaped - slanted[i] * by_slanted) -
+                                            passed[i] * by_passed);
             result[i] = line ? result[i] + value : value;
         }
     }
@@ -518,23 +537,24 @@ void BlockTransport::diagonal_gradient(const Slopes &slopes, const float *emissi
 void BlockTransport::add_extinction_gradient(const float *emission, const float *weights, float *result,
                                              Workers &workers) const {
     const std::size_t all = lattice_.count();
-    Slopes slopes[2];
-    Own of_own = {Fields(all), Fields(all)};
+    DepthDerivatives derivatives[2];
+    Own own_derivative = {Fields(all), Fields(all)};
     for (int number = 0; number < 2; ++number)
-        slope(classes_[number], slopes[number], of_own);
-    const auto memory = room((AXES + 1) * all);
+        differentiate(classes_[number], derivatives[number], own_derivative);
+    const auto memory = uninitialised((AXES + 1) * all);
     float *const parts = memory.get();
     workers.run(AXES + 1, [&](int task) {
         if (task == AXES)
-            diagonal_gradient(slopes[1], emission, weights, parts + task * all);
+            diagonal_gradient(derivatives[1], emission, weights, parts + task * all);
         else
-            axis_gradient(task, slopes[0], emission, weights, parts + task * all);
+            axis_gradient(task, derivatives[0], emission, weights, parts + task * all);
     });
     for (std::size_t i = 0; i < all; ++i) {
-        float of_slopes = 0;
+        float slope_products = 0;
         for (int field = 1; field < FIELDS; ++field)
-            of_slopes += weights[field * all + i] * emission[field * all + i];
-        result[i] += of_own[0][i] * weights[i] * emission[i] + SPREAD * of_own[1][i] * of_slopes;
+            slope_products += weights[field * all + i] * emission[field * all + i];
+        result[i] +=
+            own_derivative[0][i] * weights[i] * emission[i] + SPREAD * own_derivative[1][i] * slope_products;
         for (int part = 0; part <= AXES; ++part)
             result[i] += parts[part * all + i];
     }

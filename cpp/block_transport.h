@@ -55,16 +55,16 @@ private:
         float along, across;  // directions of the class: that a slope lies along, and across
         Fields passed, escaped, slanted;
     };
-    // By the optical depth: P' and Q'.
-    struct Slopes {
+    // By the optical depth t: P' and Q'.
+    struct DepthDerivatives {
         Fields escaped, slanted;
     };
-    // Part of a block's emission that is its own mean radiance over all directions, for the mean and for the
-    // slopes.
+    // Part of a block's emission that is its own mean radiance over all directions (m), for the mean and for
+    // the slopes.
     using Own = std::array<Fields, 2>;
 
-    void cross(Crossing &crossing);
-    void slope(const Crossing &crossing, Slopes &slopes, Own &of_own) const;
+    void set_up(Crossing &crossing);
+    void differentiate(const Crossing &crossing, DepthDerivatives &derivatives, Own &own_derivative) const;
     void clear_border(Fields &values) const;
 
     template <class Visit>
@@ -78,11 +78,11 @@ private:
     void through_diagonals(int way, const float *emission, float *sums) const;
     void gather(const float *emission, const float *parts, float *mean) const;
 
-    void arriving_along_axis(int axis, const float *emission, float *result) const;
-    void arriving_along_diagonals(const float *emission, float *result) const;
-    void axis_gradient(int axis, const Slopes &slopes, const float *emission, const float *weights,
-                       float *result) const;
-    void diagonal_gradient(const Slopes &slopes, const float *emission, const float *weights,
+    void arriving_along_axis(int axis, int way, const float *emission, float *fields) const;
+    void arriving_along_diagonals(int way, const float *emission, float *fields) const;
+    void axis_gradient(int axis, const DepthDerivatives &derivatives, const float *emission,
+                       const float *weights, float *result) const;
+    void diagonal_gradient(const DepthDerivatives &derivatives, const float *emission, const float *weights,
                            float *result) const;
 
     Lattice lattice_;

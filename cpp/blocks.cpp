@@ -137,11 +137,11 @@ void average_plane(const Voxels &medium, const Spans &spans, const Blocks &block
 
 // Adds to the derivatives by k and by J, `channel` floats behind it, that by the emission k J.
 SMOKELIFT_INLINE void add_products(const std::array<int, 2> &span, const float *__restrict voxel,
-                                   const float *__restrict of_emission, float along_y, int length, int width,
-                                   int channel, float *__restrict out) {
-    const float *const __restrict of_emission_y = of_emission + length;
+                                   const float *__restrict emission_gradient, float along_y, int length,
+                                   int width, int channel, float *__restrict out) {
+    const float *const __restrict lifted_gradient = emission_gradient + length;
     for (int z = span[0]; z < span[1]; ++z) {
-        const float value = of_emission[z] + along_y * of_emission_y[z];
+        const float value = emission_gradient[z] + along_y * lifted_gradient[z];
         out[z * width] += value * voxel[z * width + channel];
         out[z * width + channel] += value * voxel[z * width];
     }
@@ -149,7 +149,8 @@ SMOKELIFT_INLINE void add_products(const std::array<int, 2> &span, const float *
 
 SMOKELIFT_CLONES
 void average_adjoint_plane(const Voxels &medium, const Spans &spans, const Blocks &blocks,
-                           const AlongZ &along_z, const float *of_means, const Voxels &gradient, int x) {
+                           const AlongZ &along_z, const float *means_gradient, const Voxels &gradient,
+                           int x) {
     const int width = medium.width, length = medium.n[2];
     const std::size_t count = blocks.count();
     const float share = 1.0f / float(blocks.size * blocks.size * blocks.size);
@@ -160,7 +161,7 @@ void average_adjoint_plane(const Voxels &medium, const Spans &spans, const Block
         std::array<int, 2> filled{0, 0};
         for (int y = first; y < end; ++y)
             filled = joined(filled, spans.along_z[std::size_t(x) * medium.n[1] + y]);
-        const float *const row = of_means + row_of(blocks, block_of(blocks, 0, x), block_y);
+        const float *const row = means_gradient + row_of(blocks, block_of(blocks, 0, x), block_y);
         for (int z = filled[0]; z < filled[1]; ++z) {
             const float *const in = row + along_z.block[z];
             memory[z] = share * in[0];
@@ -179,11 +180,11 @@ void average_adjoint_plane(const Voxels &medium, const Spans &spans, const Block
             for (int z = span[0]; z < span[1]; ++z)
                 out[z * width] += memory[z];
             for (int channel = 0; channel < width - 1; ++channel) {
-                const float *const of_emission = memory.data() + (1 + 2 * channel) * length;
+                const float *const emission_gradient = memory.data() + (1 + 2 * channel) * length;
                 if (width == 2) // neighbours in memory
-                    add_products(span, voxel, of_emission, along_y, length, 2, 1, out);
+                    add_products(span, voxel, emission_gradient, along_y, length, 2, 1, out);
                 else
-                    add_products(span, voxel, of_emission, along_y, length, width, channel + 1, out);
+                    add_products(span, voxel, emission_gradient, along_y, length, width, channel + 1, out);
             }
         }
     }
@@ -198,20 +199,20 @@ void expand(const float *fields, const Blocks &blocks, const Between &across_x,
     const float near = 1 - across_x.fraction, far = across_x.fraction, bent = near * far;
     const std::size_t next = std::size_t(blocks.n[1]) * blocks.n[2];
     std::vector<float> line(3 * std::size_t(blocks.n[2]));
-    float *const __restrict mean = line.data(), *const __restrict of_y = mean + blocks.n[2];
-    float *const __restrict of_z = of_y + blocks.n[2];
+    float *const __restrict mean = line.data(), *const __restrict slope_y = mean + blocks.n[2];
+    float *const __restrict slope_z = slope_y + blocks.n[2];
     for (int y = 0; y < blocks.n[1]; ++y) {
         const float *const __restrict in = fields + row_of(blocks, across_x.block, y);
         for (int z = 0; z < blocks.n[2]; ++z) {
             mean[z] = near * in[z] + far * in[next + z] + bent * (in[count + z] - in[count + next + z]);
-            of_y[z] = near * in[2 * count + z] + far * in[2 * count + next + z];
-            of_z[z] = near * in[3 * count + z] + far * in[3 * count + next + z];
+            slope_y[z] = near * in[2 * count + z] + far * in[2 * count + next + z];
+            slope_z[z] = near * in[3 * count + z] + far * in[3 * count + next + z];
         }
         float *const __restrict out = rows + 2 * y * length;
         for (std::size_t z = 0; z < length; ++z) {
             const auto [b, f] = along_z[z];
-            out[z] = mean[b] + f * (mean[b + 1] - mean[b] + (1 - f) * (of_z[b] - of_z[b + 1]));
-            out[length + z] = of_y[b] + f * (of_y[b + 1] - of_y[b]);
+            out[z] = mean[b] + f * (mean[b + 1] - mean[b] + (1 - f) * (slope_z[b] - slope_z[b + 1]));
+            out[length + z] = slope_y[b] + f * (slope_y[b + 1] - slope_y[b]);
         }
     }
 }
@@ -223,16 +224,16 @@ void expand_adjoint(const float *rows, const Blocks &blocks, const std::vector<B
     for (int y = 0; y < blocks.n[1]; ++y) {
         const float *const in = rows + 2 * y * length;
         float *const mean = part + std::size_t(y) * blocks.n[2];
-        float *const of_y = mean + plane, *const of_z = of_y + plane;
+        float *const slope_y = mean + plane, *const slope_z = slope_y + plane;
         for (std::size_t z = 0; z < length; ++z) {
             const auto [b, f] = along_z[z];
             const float near = (1 - f) * in[z], bent = f * near;
             mean[b] += near;
             mean[b + 1] += f * in[z];
-            of_y[b] += (1 - f) * in[length + z];
-            of_y[b + 1] += f * in[length + z];
-            of_z[b] += bent;
-            of_z[b + 1] -= bent;
+            slope_y[b] += (1 - f) * in[length + z];
+            slope_y[b + 1] += f * in[length + z];
+            slope_z[b] += bent;
+            slope_z[b + 1] -= bent;
         }
     }
 }
@@ -302,11 +303,12 @@ void average(const Voxels &medium, const Spans &spans, const Blocks &blocks, flo
     });
 }
 
-void average_adjoint(const Voxels &medium, const Spans &spans, const Blocks &blocks, const float *of_means,
-                     const Voxels &gradient, Workers &workers) {
+void average_adjoint(const Voxels &medium, const Spans &spans, const Blocks &blocks,
+                     const float *means_gradient, const Voxels &gradient, Workers &workers) {
     const AlongZ along_z(blocks, medium.n[2]);
-    workers.run(medium.n[0],
-                [&](int x) { average_adjoint_plane(medium, spans, blocks, along_z, of_means, gradient, x); });
+    workers.run(medium.n[0], [&](int x) {
+        average_adjoint_plane(medium, spans, blocks, along_z, means_gradient, gradient, x);
+    });
 }
 
 void add_interpolated(const float *values, float factor, const Blocks &blocks, const Voxels &medium,
@@ -323,7 +325,7 @@ void add_interpolated(const float *values, float factor, const Blocks &blocks, c
 }
 
 void interpolate_adjoint(const Voxels &gradient, const Spans &spans, float factor, const Blocks &blocks,
-                         float *of_values, Workers &workers) {
+                         float *values_gradient, Workers &workers) {
     const int channels = gradient.width - 1;
     const std::vector<Between> along_z = all_between(blocks, 2, gradient.n[2]);
     const std::size_t plane = std::size_t(blocks.n[1]) * blocks.n[2], count = blocks.count();
@@ -338,7 +340,7 @@ void interpolate_adjoint(const Voxels &gradient, const Spans &spans, float facto
                            planes.data() + (std::size_t(x) * channels + channel) * PARTS * plane);
         }
     });
-    std::fill_n(of_values, channels * Blocks::FIELDS * count, 0.0f);
+    std::fill_n(values_gradient, channels * Blocks::FIELDS * count, 0.0f);
     for (int x = 0; x < gradient.n[0]; ++x) {
         const Between across_x = between(blocks, 0, x);
         for (int channel = 0; channel < channels; ++channel) {
@@ -347,7 +349,7 @@ void interpolate_adjoint(const Voxels &gradient, const Spans &spans, float facto
                 const float share = factor * (side ? across_x.fraction : 1 - across_x.fraction);
                 const float from_centre = share * (across_x.fraction - float(side));
                 float *const to =
-                    of_values + channel * Blocks::FIELDS * count + (across_x.block + side) * plane;
+                    values_gradient + channel * Blocks::FIELDS * count + (across_x.block + side) * plane;
                 for (std::size_t i = 0; i < plane; ++i) {
                     to[i] += share * mean[i];
                     to[count + i] += from_centre * mean[i];

@@ -27,8 +27,8 @@ struct Blocks {
 void average(const Voxels &medium, const Spans &spans, const Blocks &blocks, float *means, Workers &workers);
 
 // Adds to `gradient` what the derivatives by these fields say of kappa and J.
-void average_adjoint(const Voxels &medium, const Spans &spans, const Blocks &blocks, const float *of_means,
-                     const Voxels &gradient, Workers &workers);
+void average_adjoint(const Voxels &medium, const Spans &spans, const Blocks &blocks,
+                     const float *means_gradient, const Voxels &gradient, Workers &workers);
 
 // J += factor x values, by channel linear across blocks: what the eight blocks around a voxel say of it,
 // weighted as between their centres.
@@ -37,6 +37,6 @@ void add_interpolated(const float *values, float factor, const Blocks &blocks, c
 
 // Derivative by these values, from that by J.
 void interpolate_adjoint(const Voxels &gradient, const Spans &spans, float factor, const Blocks &blocks,
-                         float *of_values, Workers &workers);
+                         float *values_gradient, Workers &workers);
 
 } // namespace smokelift

@@ -7,6 +7,9 @@
 //
 //     dL/dkappa_s = d tau_s+1 (J_s - R_s+1),   dL/dJ_s = tau_s a_s,   R_s = a_s J_s + (1 - a_s) R_s+1
 //
+// Times the derivative of the loss by L and summed over the channels, J_s is `inscattered` and R_s is
+// `behind`, which starts as the derivative by the transmittance of the whole ray.
+//
 // Neighbouring rays go together, plane by plane: their samples lie in the same cache lines, and everything
 // after the look-up is vector arithmetic. On the way back samples are first turned into derivatives, ray by
 // ray, and then added to the voxels plane by plane: each plane belongs to one task, so nothing is atomic.
@@ -188,10 +191,10 @@ SMOKELIFT_INLINE void march_run(const Voxels &medium, const Rays &rays, const Ru
             continue;
         for (int lane = 0; lane < LANES; ++lane) {
             const float x = sample[0][lane] * lanes.length[lane];
-            const Attenuation step_of = attenuation(x);
+            const Attenuation crossed = attenuation(x);
             for (int w = 1; w < W; ++w)
-                radiance[w][lane] += tau[lane] * step_of.opacity * sample[w][lane];
-            tau[lane] *= step_of.transmittance;
+                radiance[w][lane] += tau[lane] * crossed.opacity * sample[w][lane];
+            tau[lane] *= crossed.transmittance;
             total[lane] += x;
         }
     }
@@ -204,19 +207,19 @@ SMOKELIFT_INLINE void march_run(const Voxels &medium, const Rays &rays, const Ru
 }
 
 template <int W>
-SMOKELIFT_INLINE void turn_run(const Rays &rays, const Run &run, const float *depth,
-                               const float *of_scattered, const float *of_transmittance,
-                               const Record &record) {
+SMOKELIFT_INLINE void adjoint_sweep(const Rays &rays, const Run &run, const float *depth,
+                                    const float *scattered_gradient, const float *transmittance_gradient,
+                                    const Record &record) {
     const std::size_t pixel = std::size_t(run.row) * rays.columns + run.column;
-    float of_channel[W][LANES] = {}, behind[LANES] = {}, before[LANES] = {}, length[LANES] = {};
+    float radiance_gradient[W][LANES] = {}, behind[LANES] = {}, before[LANES] = {}, length[LANES] = {};
     int first[LANES], last[LANES];
     std::fill_n(first, LANES, 0);
     std::fill_n(last, LANES, -1);
     for (int lane = 0; lane < run.count; ++lane) {
         const std::size_t at = pixel + lane;
         for (int w = 1; w < W; ++w)
-            of_channel[w][lane] = of_scattered[at * (W - 1) + w - 1];
-        behind[lane] = of_transmittance[at];
+            radiance_gradient[w][lane] = scattered_gradient[at * (W - 1) + w - 1];
+        behind[lane] = transmittance_gradient[at];
         before[lane] = depth[at]; // optical depth from the camera to the back of the sample
         length[lane] = rays.length[at];
         first[lane] = rays.planes[4 * at + 2];
@@ -229,18 +232,19 @@ SMOKELIFT_INLINE void turn_run(const Rays &rays, const Run &run, const float *de
             std::copy_n(record.at(rays, w, k, run), run.count, sample[w]);
         for (int lane = 0; lane < LANES; ++lane) {
             const float x = sample[0][lane] * length[lane];
-            const Attenuation step_of = attenuation(x);
+            const Attenuation crossed = attenuation(x);
             before[lane] = std::max(before[lane] - x, 0.0f);
             const float tau = attenuation(before[lane]).transmittance;
-            float glow = 0;
+            float inscattered = 0;
             for (int w = 1; w < W; ++w)
-                glow += of_channel[w][lane] * sample[w][lane];
+                inscattered += radiance_gradient[w][lane] * sample[w][lane];
             const bool crosses = first[lane] <= k && k <= last[lane];
-            const float of_extinction = length[lane] * tau * step_of.transmittance * (glow - behind[lane]);
-            sample[0][lane] = crosses ? of_extinction : 0.0f;
+            const float extinction_gradient =
+                length[lane] * tau * crossed.transmittance * (inscattered - behind[lane]);
+            sample[0][lane] = crosses ? extinction_gradient : 0.0f;
             for (int w = 1; w < W; ++w)
-                sample[w][lane] = tau * step_of.opacity * of_channel[w][lane];
-            behind[lane] = step_of.opacity * glow + step_of.transmittance * behind[lane];
+                sample[w][lane] = tau * crossed.opacity * radiance_gradient[w][lane];
+            behind[lane] = crossed.opacity * inscattered + crossed.transmittance * behind[lane];
         }
         for (int w = 0; w < W; ++w)
             std::copy_n(sample[w], run.count, record.at(rays, w, k, run));
@@ -287,19 +291,20 @@ void march_runs(const Voxels &medium, const Rays &rays, int first, int end, floa
 }
 
 SMOKELIFT_CLONES
-void turn_runs(const Rays &rays, int width, int first, int end, const float *depth, const float *of_scattered,
-               const float *of_transmittance, const Record &record) {
+void adjoint_sweeps(const Rays &rays, int width, int first, int end, const float *depth,
+                    const float *scattered_gradient, const float *transmittance_gradient,
+                    const Record &record) {
     for (int r = first; r < end; ++r) {
         const Run &run = rays.runs[r];
         switch (width) {
         case 1:
-            turn_run<1>(rays, run, depth, of_scattered, of_transmittance, record);
+            adjoint_sweep<1>(rays, run, depth, scattered_gradient, transmittance_gradient, record);
             break;
         case 2:
-            turn_run<2>(rays, run, depth, of_scattered, of_transmittance, record);
+            adjoint_sweep<2>(rays, run, depth, scattered_gradient, transmittance_gradient, record);
             break;
         default:
-            turn_run<CHANNELS>(rays, run, depth, of_scattered, of_transmittance, record);
+            adjoint_sweep<CHANNELS>(rays, run, depth, scattered_gradient, transmittance_gradient, record);
         }
     }
 }
@@ -420,11 +425,12 @@ void march(const Voxels &medium, const Rays &rays, float *scattered, float *dept
               [&](int first, int end) { march_runs(medium, rays, first, end, scattered, depth, record); });
 }
 
-void march_adjoint(const Rays &rays, const float *depth, const float *of_scattered,
-                   const float *of_transmittance, const Record &record, const Voxels &gradient,
+void march_adjoint(const Rays &rays, const float *depth, const float *scattered_gradient,
+                   const float *transmittance_gradient, const Record &record, const Voxels &gradient,
                    Workers &workers) {
     over_runs(rays, workers, [&](int first, int end) {
-        turn_runs(rays, gradient.width, first, end, depth, of_scattered, of_transmittance, record);
+        adjoint_sweeps(rays, gradient.width, first, end, depth, scattered_gradient, transmittance_gradient,
+                       record);
     });
     for (int axis = 0; axis < 3; ++axis) {
         if (std::none_of(rays.runs.begin(), rays.runs.end(), [&](const Run &r) { return r.axis == axis; }))

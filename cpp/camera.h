@@ -51,8 +51,8 @@ void march(const Voxels &medium, const Rays &rays, float *scattered, float *dept
            Workers &workers);
 
 // Turns the recorded samples into derivatives, in place, and adds them to the voxels of `gradient`.
-void march_adjoint(const Rays &rays, const float *depth, const float *of_scattered,
-                   const float *of_transmittance, const Record &record, const Voxels &gradient,
+void march_adjoint(const Rays &rays, const float *depth, const float *scattered_gradient,
+                   const float *transmittance_gradient, const Record &record, const Voxels &gradient,
                    Workers &workers);
 
 } // namespace smokelift

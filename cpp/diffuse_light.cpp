@@ -170,13 +170,15 @@ void DiffuseLight::solve(const float *emission, float *phi, Workers &workers) co
     without_border(mean, FIELDS, all_, phi);
 }
 
-// G is its own adjoint in the product <,>, so with  q: of_phi = <q, phi>  and  mu = G (q + scattering mu):
-//     d(of_phi^T phi) = <mu, d emission + phi d scattering> + <q + scattering mu, dG (emission + scattering
-//     phi)>.
-void DiffuseLight::solve_adjoint(const float *emission, const float *phi, const float *of_phi,
-                                 float *of_emission, float *of_extinction, Workers &workers) const {
+// G is its own adjoint in the product <,>, so with  q: phi_gradient = <q, phi>  and  mu = G (q + scattering
+// mu):
+//     d(phi_gradient^T phi) = <mu, d emission + phi d scattering> + <q + scattering mu, dG (emission +
+//     scattering phi)>.
+void DiffuseLight::solve_adjoint(const float *emission, const float *phi, const float *phi_gradient,
+                                 float *emission_gradient, float *extinction_gradient,
+                                 Workers &workers) const {
     const std::size_t count = volume(all_.n), size = FIELDS * all_.count();
-    Fields asked = with_border(of_phi, FIELDS, all_), mu(size);
+    Fields asked = with_border(phi_gradient, FIELDS, all_), mu(size);
     for (std::size_t i = all_.count(); i < size; ++i)
         asked[i] /= SPREAD;
     everywhere_.mean_radiance(asked.data(), mu.data(), workers); // asked where there is no smoke, too
@@ -184,18 +186,18 @@ void DiffuseLight::solve_adjoint(const float *emission, const float *phi, const 
     everywhere_.mean_radiance(weights.data(), mu.data(), workers);
     const Fields source =
         with_scattered(cut(with_border(phi, FIELDS, all_), FIELDS), with_border(emission, FIELDS, all_));
-    Fields of_kappa(all_.count(), 0.0f), result(count);
-    everywhere_.add_extinction_gradient(source.data(), weights.data(), of_kappa.data(), workers);
-    without_border(of_kappa, 1, all_, result.data());
-    without_border(mu, FIELDS, all_, of_emission);
+    Fields kappa_gradient(all_.count(), 0.0f), result(count);
+    everywhere_.add_extinction_gradient(source.data(), weights.data(), kappa_gradient.data(), workers);
+    without_border(kappa_gradient, 1, all_, result.data());
+    without_border(mu, FIELDS, all_, emission_gradient);
     for (int field = 0; field < FIELDS; ++field) {
         const float share = field ? SPREAD : 1.0f;
         for (std::size_t i = 0; i < count; ++i) {
-            of_emission[field * count + i] *= share;
-            result[i] += albedo_ * phi[field * count + i] * of_emission[field * count + i];
+            emission_gradient[field * count + i] *= share;
+            result[i] += albedo_ * phi[field * count + i] * emission_gradient[field * count + i];
         }
     }
-    axpy(1, result.data(), of_extinction, count);
+    axpy(1, result.data(), extinction_gradient, count);
 }
 
 } // namespace smokelift

@@ -21,8 +21,8 @@ public:
     void solve(const float *emission, float *phi, Workers &workers) const;
 
     // From the derivative by phi: that by the emission, and what to add to that by the extinction.
-    void solve_adjoint(const float *emission, const float *phi, const float *of_phi, float *of_emission,
-                       float *of_extinction, Workers &workers) const;
+    void solve_adjoint(const float *emission, const float *phi, const float *phi_gradient,
+                       float *emission_gradient, float *extinction_gradient, Workers &workers) const;
 
 private:
     using Fields = std::vector<float>;

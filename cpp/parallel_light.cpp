@@ -194,17 +194,17 @@ void depth_gradient(const Columns &columns, const Voxels &medium, const Voxels &
     const int c_axis = LATERAL[light.axis][1];
     const Stride stride = gradient.stride(c_axis), scratch_stride = scratch.stride(c_axis);
     std::vector<float> memory(2 * columns.count_c);
-    float *const __restrict lit = memory.data(), *const __restrict of_inscatter = lit + columns.count_c;
+    float *const __restrict lit = memory.data(), *const __restrict inscatter_gradient = lit + columns.count_c;
     sweep(columns, medium, task,
           [&](int k, int i, int first, int end, const float *__restrict depth) SMOKELIFT_INLINE_LAMBDA {
               phase_row(phase, light, light.axis, k, i, first, end, lit);
               const float *in = gradient.at(light.axis, k, i, first) + 1;
-              std::fill_n(of_inscatter, end - first, 0.0f);
+              std::fill_n(inscatter_gradient, end - first, 0.0f);
               for (int channel = 0; channel < gradient.width - 1; ++channel)
                   for (int c = 0; c < end - first; ++c)
-                      of_inscatter[c] -= light.energy[channel] * in[c * stride + channel];
+                      inscatter_gradient[c] -= light.energy[channel] * in[c * stride + channel];
               for (int c = 0; c < end - first; ++c)
-                  lit[c] *= of_inscatter[c] * attenuation(light.step * depth[c]).transmittance;
+                  lit[c] *= inscatter_gradient[c] * attenuation(light.step * depth[c]).transmittance;
               float *out = scratch.at(light.axis, k, i, first);
               for (int c = 0; c < end - first; ++c)
                   out[c * scratch_stride] = lit[c];
@@ -217,12 +217,12 @@ void depth_gradient_of_all(const Voxels &medium, const Voxels &gradient, const V
                            const Spans &spans, int x) {
     for (int y = 0; y < medium.n[1]; ++y) {
         const auto &span = spans.along_z[std::size_t(x) * medium.n[1] + y];
-        const float *inscatter = medium.at(x, y, 0), *of_inscatter = gradient.at(x, y, 0);
+        const float *inscatter = medium.at(x, y, 0), *inscatter_gradient = gradient.at(x, y, 0);
         float *out = scratch.at(x, y, 0);
         for (int z = span[0]; z < span[1]; ++z) {
             float sum = 0;
             for (int channel = 1; channel < medium.width; ++channel)
-                sum -= inscatter[z * medium.width + channel] * of_inscatter[z * medium.width + channel];
+                sum -= inscatter[z * medium.width + channel] * inscatter_gradient[z * medium.width + channel];
             out[z] = sum;
         }
     }

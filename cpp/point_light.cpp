@@ -175,20 +175,22 @@ void gather_plane(const Cone &cone, const Voxels &gradient, const Spans &spans, 
                   const PointLight &light, int number, float *columns, float *back) {
     const Stride stride = gradient.stride(LATERAL[cone.axis][1]);
     std::vector<float> memory(2 * cone.count_c);
-    float *const __restrict of_depth = memory.data(), *const __restrict depth = of_depth + cone.count_c;
+    float *const __restrict depth_gradient = memory.data(), *const __restrict depth =
+                                                                depth_gradient + cone.count_c;
     const double scale = cone.far / cone.distance(number);
     std::fill_n(back + cone.offset(number, cone.first_p), std::size_t(cone.count_p) * cone.count_q, 0.0f);
     owned_rows(cone, spans, number, columns,
                [&](int k, int i, int first, int end, float f, const float *near) SMOKELIFT_INLINE_LAMBDA {
-                   phase_row(phase, light, cone.axis, k, i, first, end, of_depth);
+                   phase_row(phase, light, cone.axis, k, i, first, end, depth_gradient);
                    depth_row(cone, number, first, end, f, near, depth);
                    const float *in = gradient.at(cone.axis, k, i, first) + 1;
                    float *const to_near = back + (near - columns), *const to_far = to_near + cone.count_q;
                    for (int c = 0; c < end - first; ++c) {
-                       float of_inscatter = 0;
+                       float inscatter_gradient = 0;
                        for (int channel = 0; channel < gradient.width - 1; ++channel)
-                           of_inscatter -= light.energy[channel] * in[c * stride + channel];
-                       const float value = of_depth[c] * of_inscatter * attenuation(depth[c]).transmittance;
+                           inscatter_gradient -= light.energy[channel] * in[c * stride + channel];
+                       const float value =
+                           depth_gradient[c] * inscatter_gradient * attenuation(depth[c]).transmittance;
                        const double at = (first + c - cone.light_c()) * scale - cone.first_q;
                        const int q = static_cast<int>(at);
                        const float g = static_cast<float>(at - q);

@@ -214,17 +214,17 @@ void register_render(py::module_ &module) {
         "shade_adjoint",
         [](Floats medium, Floats gradient, Floats scratch, const Support &support, const Phase &phase,
            const std::vector<Light> &lights) {
-            const Voxels voxels = voxels_of(medium, support), slopes = voxels_of(gradient, support);
+            const Voxels voxels = voxels_of(medium, support), gradients = voxels_of(gradient, support);
             const Voxels space = voxels_of(scratch, support);
-            require_fit(space.width == 1 && slopes.width == voxels.width);
+            require_fit(space.width == 1 && gradients.width == voxels.width);
             released([&](Workers &workers) {
-                fold_border(slopes);
+                fold_border(gradients);
                 const bool alone = lights.size() == 1;
                 for (const Light &light : lights) {
                     if (const auto *point = std::get_if<PointLight>(&light))
-                        shade_adjoint(voxels, slopes, support.spans, phase, *point, workers);
+                        shade_adjoint(voxels, gradients, support.spans, phase, *point, workers);
                     else
-                        shade_adjoint(voxels, slopes, space, support.spans, phase,
+                        shade_adjoint(voxels, gradients, space, support.spans, phase,
                                       std::get<ParallelLight>(light), alone, workers);
                 }
             });
@@ -249,23 +249,24 @@ void register_render(py::module_ &module) {
 
     module.def(
         "march_adjoint",
-        [](const OwnedRays &rays, const Floats &depth, const Floats &of_scattered,
-           const Floats &of_transmittance, std::optional<Floats> record, Floats gradient,
+        [](const OwnedRays &rays, const Floats &depth, const Floats &scattered_gradient,
+           const Floats &transmittance_gradient, std::optional<Floats> record, Floats gradient,
            const Support &support) {
             const Voxels voxels = voxels_of(gradient, support);
-            rays.require_pixels(of_scattered, voxels.width - 1);
-            rays.require_pixels(of_transmittance, 1);
+            rays.require_pixels(scattered_gradient, voxels.width - 1);
+            rays.require_pixels(transmittance_gradient, 1);
             rays.require_pixels(depth, 1);
             const Record samples = rays.record(record, voxels.width);
             require_fit(samples.data);
             released([&](Workers &workers) {
                 clear(voxels, workers);
-                march_adjoint(rays.rays, depth.data(), of_scattered.data(), of_transmittance.data(), samples,
-                              voxels, workers);
+                march_adjoint(rays.rays, depth.data(), scattered_gradient.data(),
+                              transmittance_gradient.data(), samples, voxels, workers);
             });
         },
-        "rays"_a, "depth"_a.noconvert(), "of_scattered"_a.noconvert(), "of_transmittance"_a.noconvert(),
-        "record"_a.noconvert(), "gradient"_a.noconvert(), "support"_a);
+        "rays"_a, "depth"_a.noconvert(), "scattered_gradient"_a.noconvert(),
+        "transmittance_gradient"_a.noconvert(), "record"_a.noconvert(), "gradient"_a.noconvert(),
+        "support"_a);
 
     py::class_<Blocks>(module, "Blocks")
         .def(py::init([](const std::array<int, 3> &shape, int size, const std::array<int, 3> &offset) {
@@ -287,17 +288,18 @@ void register_render(py::module_ &module) {
 
     module.def(
         "average_adjoint",
-        [](Floats medium, const Support &support, const Blocks &blocks, const OverBlocks &of_means,
+        [](Floats medium, const Support &support, const Blocks &blocks, const OverBlocks &means_gradient,
            Floats gradient) {
-            const Voxels voxels = voxels_of(medium, support), slopes = voxels_of(gradient, support);
+            const Voxels voxels = voxels_of(medium, support), gradients = voxels_of(gradient, support);
             require_around(blocks, support);
-            require_fit(slopes.width == voxels.width &&
-                        blocks_shape(of_means, 1 + (voxels.width - 1) * Blocks::FIELDS) == blocks.n);
+            require_fit(gradients.width == voxels.width &&
+                        blocks_shape(means_gradient, 1 + (voxels.width - 1) * Blocks::FIELDS) == blocks.n);
             released([&](Workers &workers) {
-                average_adjoint(voxels, support.spans, blocks, of_means.data(), slopes, workers);
+                average_adjoint(voxels, support.spans, blocks, means_gradient.data(), gradients, workers);
             });
         },
-        "medium"_a.noconvert(), "support"_a, "blocks"_a, "of_means"_a.noconvert(), "gradient"_a.noconvert());
+        "medium"_a.noconvert(), "support"_a, "blocks"_a, "means_gradient"_a.noconvert(),
+        "gradient"_a.noconvert());
 
     module.def(
         "add_interpolated",
@@ -316,15 +318,15 @@ void register_render(py::module_ &module) {
     module.def(
         "interpolate_adjoint",
         [](Floats gradient, const Support &support, float factor, const Blocks &blocks) {
-            const Voxels slopes = voxels_of(gradient, support);
+            const Voxels gradients = voxels_of(gradient, support);
             require_around(blocks, support);
-            OverBlocks of_values = over_blocks((slopes.width - 1) * Blocks::FIELDS, blocks.n);
-            float *const to = of_values.mutable_data();
+            OverBlocks values_gradient = over_blocks((gradients.width - 1) * Blocks::FIELDS, blocks.n);
+            float *const to = values_gradient.mutable_data();
             released([&](Workers &workers) {
-                fold_border(slopes);
-                interpolate_adjoint(slopes, support.spans, factor, blocks, to, workers);
+                fold_border(gradients);
+                interpolate_adjoint(gradients, support.spans, factor, blocks, to, workers);
             });
-            return of_values;
+            return values_gradient;
         },
         "gradient"_a.noconvert(), "support"_a, "factor"_a, "blocks"_a);
 
@@ -348,13 +350,13 @@ void register_render(py::module_ &module) {
 
     module.def(
         "diffuse_adjoint",
-        [](const OverBlocks &means, const OverBlocks &radiance, const OverBlocks &of_radiance, float albedo,
-           float edge) {
+        [](const OverBlocks &means, const OverBlocks &radiance, const OverBlocks &radiance_gradient,
+           float albedo, float edge) {
             const int channels = channels_of(means), fields = channels * Blocks::FIELDS;
             const Shape n = blocks_shape(means, 1 + fields);
-            require_fit(blocks_shape(radiance, fields) == n && blocks_shape(of_radiance, fields) == n);
-            OverBlocks of_means = over_blocks(1 + fields, n);
-            float *const result = of_means.mutable_data();
+            require_fit(blocks_shape(radiance, fields) == n && blocks_shape(radiance_gradient, fields) == n);
+            OverBlocks means_gradient = over_blocks(1 + fields, n);
+            float *const result = means_gradient.mutable_data();
             released([&](Workers &workers) {
                 const std::size_t count = volume(n);
                 const DiffuseLight light(means.data(), albedo, n, edge);
@@ -362,12 +364,13 @@ void register_render(py::module_ &module) {
                 for (int channel = 0; channel < channels; ++channel) {
                     const std::size_t at = channel * Blocks::FIELDS * count;
                     light.solve_adjoint(means.data() + count + at, radiance.data() + at,
-                                        of_radiance.data() + at, result + count + at, result, workers);
+                                        radiance_gradient.data() + at, result + count + at, result, workers);
                 }
             });
-            return of_means;
+            return means_gradient;
         },
-        "means"_a.noconvert(), "radiance"_a.noconvert(), "of_radiance"_a.noconvert(), "albedo"_a, "edge"_a);
+        "means"_a.noconvert(), "radiance"_a.noconvert(), "radiance_gradient"_a.noconvert(), "albedo"_a,
+        "edge"_a);
 }
 
 } // namespace smokelift

@@ -357,8 +357,8 @@ def march(medium: Volume, support: Support, rays: Rays, scattered: Array, depth:
 def march_adjoint(
     rays: Rays,
     depth: Array,
-    of_scattered: Array,
-    of_transmittance: Array,
+    scattered_gradient: Array,
+    transmittance_gradient: Array,
     record: Volume | None,
     gradient: Volume,
     support: Support,
@@ -382,7 +382,7 @@ class Blocks:
 def average(medium: Volume, support: Support, blocks: Blocks) -> Array:
     """Over blocks (1 + 4 channels, bx, by, bz): the mean of the extinction kappa, then kappa J by channel, linear."""
 
-def average_adjoint(medium: Volume, support: Support, blocks: Blocks, of_means: Array, gradient: Volume) -> None:
+def average_adjoint(medium: Volume, support: Support, blocks: Blocks, means_gradient: Array, gradient: Volume) -> None:
     """Add to the derivatives by kappa and J what those by the result of `average` say of them."""
 
 def add_interpolated(values: Array, factor: float, blocks: Blocks, medium: Volume, support: Support) -> None:
@@ -402,7 +402,7 @@ def diffuse(means: Array, albedo: float, edge: float) -> Array:
         Of a block in metres.
     """
 
-def diffuse_adjoint(means: Array, radiance: Array, of_radiance: Array, albedo: float, edge: float) -> Array:
+def diffuse_adjoint(means: Array, radiance: Array, radiance_gradient: Array, albedo: float, edge: float) -> Array:
     """Derivative by the means (1 + 4 channels, bx, by, bz) from that by the radiance of `diffuse`."""
 
 # Pictures

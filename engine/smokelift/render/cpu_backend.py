@@ -98,13 +98,19 @@ class CpuBackend:
         _core.march(self._medium, self._support, self._rays, self._scattered, self._depth, record)
         return self._scattered, self._depth
 
-    def gradient(self, of_scattered: Floats, of_transmittance: Floats, out: Floats | None = None) -> Floats:
+    def gradient(self, scattered_gradient: Floats, transmittance_gradient: Floats, out: Floats | None = None) -> Floats:
         """Pull derivatives by the last recorded picture back to the density (nx, ny, nz); uses the record up."""
         plan = self._plan
         if self._gradient is None:
             self._gradient = _core.zeros(self._medium.shape)
         _core.march_adjoint(
-            self._rays, self._depth, of_scattered, of_transmittance, self._record, self._gradient, self._support
+            self._rays,
+            self._depth,
+            scattered_gradient,
+            transmittance_gradient,
+            self._record,
+            self._gradient,
+            self._support,
         )
         if self._diffuse:
             self._diffuse.pull_back(self._medium, self._gradient)

@@ -57,8 +57,8 @@ class Backend(Protocol):
 
     def gradient(
         self,
-        of_scattered: NDArray[np.float32],
-        of_transmittance: NDArray[np.float32],
+        scattered_gradient: NDArray[np.float32],
+        transmittance_gradient: NDArray[np.float32],
         out: NDArray[np.float32] | None = None,
     ) -> NDArray[np.float32]:
         """Pull derivatives by the last recorded picture back to the density (nx, ny, nz); see `Renderer.gradient`."""

@@ -66,14 +66,18 @@ class DiffuseLight:
         if self._means is None or self._radiance is None:
             raise RuntimeError("No diffuse light has been added.")
         self._interpolate(self._radiance, -self._albedo, medium)
-        of_radiance = self._shares * _core.interpolate_adjoint(gradient, self._support, self._albedo, self._blocks)
-        of_means = np.zeros_like(self._means)
+        radiance_gradient = self._shares * _core.interpolate_adjoint(
+            gradient, self._support, self._albedo, self._blocks
+        )
+        means_gradient = np.zeros_like(self._means)
         for albedo, part in self._alike:
             means = _of(self._means, part)
-            of_part = _core.diffuse_adjoint(means, self._radiance[part], of_radiance[part], albedo, self._edge)
-            of_means[0] += of_part[0]
-            of_means[1:][part] = of_part[1:]
-        _core.average_adjoint(medium, self._support, self._blocks, of_means, gradient)
+            part_gradient = _core.diffuse_adjoint(
+                means, self._radiance[part], radiance_gradient[part], albedo, self._edge
+            )
+            means_gradient[0] += part_gradient[0]
+            means_gradient[1:][part] = part_gradient[1:]
+        _core.average_adjoint(medium, self._support, self._blocks, means_gradient, gradient)
 
     def _interpolate(self, radiance: Floats, factor: float, medium: Floats) -> None:
         """Add a multiple of what the voxels scatter of the blocks' radiance, each channel by its share."""

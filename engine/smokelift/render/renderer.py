@@ -120,8 +120,9 @@ class Renderer:
         (nx, ny, nz) float32
             dloss / ddensity, 0 outside the support.
         """
-        of_image = np.asarray(image_gradient, np.float32)
-        of_transmittance = np.einsum("...c,...c", of_image, np.broadcast_to(self._background, of_image.shape))
+        image_gradient = np.asarray(image_gradient, np.float32)
+        background = np.broadcast_to(self._background, image_gradient.shape)
+        transmittance_gradient = np.einsum("...c,...c", image_gradient, background)
         with products_on_one_thread():
-            of_scattered = np.ascontiguousarray(of_image @ self._colour.T)
-        return self._backend.gradient(of_scattered, of_transmittance, out)
+            scattered_gradient = np.ascontiguousarray(image_gradient @ self._colour.T)
+        return self._backend.gradient(scattered_gradient, transmittance_gradient, out)

@@ -69,15 +69,17 @@ class GpuBackend:
             )  # fmt: skip
         return taichi.download(self._scattered)[..., : self._channels], taichi.download(self._depth)
 
-    def gradient(self, of_scattered: Floats, of_transmittance: Floats, out: Floats | None = None) -> Floats:
+    def gradient(self, scattered_gradient: Floats, transmittance_gradient: Floats, out: Floats | None = None) -> Floats:
         """Pull derivatives by the last recorded picture back to the density (nx, ny, nz); uses the record up."""
         plan = self._plan
         if self._gradient is None:
             self._gradient = taichi.zeros((*self._padded, self._channels + 1))
-        of_scattered = of_scattered if self._channels else np.zeros((*of_transmittance.shape, 1), np.float32)
+        scattered_gradient = (
+            scattered_gradient if self._channels else np.zeros((*transmittance_gradient.shape, 1), np.float32)
+        )
         camera.march_adjoint(
             self._record, self._length, self._planes, self._depth,
-            taichi.upload(of_scattered), taichi.upload(of_transmittance), self._channels,
+            taichi.upload(scattered_gradient), taichi.upload(transmittance_gradient), self._channels,
         )  # fmt: skip
         to_pixel = taichi.matrix(plan.rays.to_pixel)
         for number, axis in enumerate(plan.rays.axes or (0,)):
@@ -99,53 +101,53 @@ class GpuBackend:
 
     def _shade(self) -> None:
         add = 0
-        for of_light in self._plan.lighting.lights:
-            scatters = (self._energy(of_light), self._to_eye, *self._phase, add)
-            if isinstance(of_light, ParallelSweep):
-                columns = self._sweep(self._medium, of_light, of_light.travel)
+        for sweep in self._plan.lighting.lights:
+            scatters = (self._energy(sweep), self._to_eye, *self._phase, add)
+            if isinstance(sweep, ParallelSweep):
+                columns = self._sweep(self._medium, sweep, sweep.travel)
                 light.shade_parallel(
-                    columns, self._near, self._medium, *_slopes(of_light), of_light.step,
-                    taichi.vector(of_light.direction), *scatters,
+                    columns, self._near, self._medium, *_slopes(sweep), sweep.step,
+                    taichi.vector(sweep.direction), *scatters,
                 )  # fmt: skip
                 add = 1
                 continue
-            for face in of_light.faces:
-                columns = self._cast(of_light, face)
-                light.shade_point(columns, self._near, self._medium, *_rays(of_light, face), *scatters)
+            for face in sweep.faces:
+                columns = self._cast(sweep, face)
+                light.shade_point(columns, self._near, self._medium, *_rays(sweep, face), *scatters)
             add = 1
         camera.extend_into_border(self._medium)
 
     def _shade_adjoint(self) -> None:
         if self._scratch is None:
             self._scratch = taichi.zeros((*self._padded, 1))
-        for of_light in self._plan.lighting.lights:
-            scatters = (self._energy(of_light), self._to_eye, *self._phase)
-            if isinstance(of_light, ParallelSweep):
-                columns = self._sweep(self._medium, of_light, of_light.travel)
+        for sweep in self._plan.lighting.lights:
+            scatters = (self._energy(sweep), self._to_eye, *self._phase)
+            if isinstance(sweep, ParallelSweep):
+                columns = self._sweep(self._medium, sweep, sweep.travel)
                 light.parallel_depth_gradient(
-                    columns, self._near, self._gradient, self._scratch, *_slopes(of_light), of_light.step,
-                    taichi.vector(of_light.direction), *scatters,
+                    columns, self._near, self._gradient, self._scratch, *_slopes(sweep), sweep.step,
+                    taichi.vector(sweep.direction), *scatters,
                 )  # fmt: skip
                 # the adjoint of the sweep is that of the light that travels the other way
-                columns = self._sweep(self._scratch, of_light, -of_light.travel)
-                light.add_parallel_shadow(columns, self._near, self._gradient, *_slopes(of_light), of_light.step)
+                columns = self._sweep(self._scratch, sweep, -sweep.travel)
+                light.add_parallel_shadow(columns, self._near, self._gradient, *_slopes(sweep), sweep.step)
                 continue
-            for face in of_light.faces:
-                rays = _rays(of_light, face)
-                columns = self._cast(of_light, face)
+            for face in sweep.faces:
+                rays = _rays(sweep, face)
+                columns = self._cast(sweep, face)
                 light.point_depth_gradient(columns, self._near, self._gradient, self._scratch, *rays, *scatters)
-                light.gather_rays(self._scratch, columns, *rays, of_light.voxel_size)
+                light.gather_rays(self._scratch, columns, *rays, sweep.voxel_size)
                 light.add_point_shadow(columns, self._near, self._gradient, *rays)
 
-    def _sweep(self, voxels: Any, of_light: ParallelSweep, travel: int) -> Any:
-        x, y, z = (n + (axis != of_light.axis) for axis, n in enumerate(self._plan.shape))
+    def _sweep(self, voxels: Any, sweep: ParallelSweep, travel: int) -> Any:
+        x, y, z = (n + (axis != sweep.axis) for axis, n in enumerate(self._plan.shape))
         columns = self._buffer((x, y, z))
-        light.accumulate_columns(voxels, columns, of_light.axis, travel, *of_light.slope, of_light.first)
+        light.accumulate_columns(voxels, columns, sweep.axis, travel, *sweep.slope, sweep.first)
         return columns
 
-    def _cast(self, of_light: PointSweep, face: Face) -> Any:
+    def _cast(self, sweep: PointSweep, face: Face) -> Any:
         columns = self._buffer((face.planes, face.columns_b[1], face.columns_c[1]))
-        light.accumulate_rays(self._medium, columns, *_rays(of_light, face), of_light.voxel_size)
+        light.accumulate_rays(self._medium, columns, *_rays(sweep, face), sweep.voxel_size)
         return columns
 
     def _buffer(self, shape: tuple[int, int, int]) -> Any:
@@ -153,18 +155,18 @@ class GpuBackend:
             self._columns[shape] = taichi.zeros(shape)
         return self._columns[shape]
 
-    def _energy(self, of_light: ParallelSweep | PointSweep) -> Any:
-        return taichi.vector(np.resize(of_light.energy, 3))
+    def _energy(self, sweep: ParallelSweep | PointSweep) -> Any:
+        return taichi.vector(np.resize(sweep.energy, 3))
 
     @property
     def _phase(self) -> tuple[float, float]:
         return self._plan.medium.anisotropy, self._plan.medium.albedo
 
 
-def _slopes(of_light: ParallelSweep) -> tuple[int, float, float, int]:
-    return of_light.axis, *of_light.slope, of_light.first
+def _slopes(sweep: ParallelSweep) -> tuple[int, float, float, int]:
+    return sweep.axis, *sweep.slope, sweep.first
 
 
-def _rays(of_light: PointSweep, face: Face) -> tuple[Any, ...]:
+def _rays(sweep: PointSweep, face: Face) -> tuple[Any, ...]:
     begin = np.array([face.columns_b[0], face.columns_c[0]])
-    return face.axis, face.travel, face.first, face.far, taichi.vector(begin), taichi.vector(of_light.position)
+    return face.axis, face.travel, face.first, face.far, taichi.vector(begin), taichi.vector(sweep.position)

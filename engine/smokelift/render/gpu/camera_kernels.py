@@ -102,8 +102,8 @@ def march_adjoint(
     length: ndarray2,
     planes: planes_type,
     depth: ndarray2,
-    of_scattered: ndarray3,
-    of_transmittance: ndarray2,
+    scattered_gradient: ndarray3,
+    transmittance_gradient: ndarray2,
     channels: ti.template(),
 ):
     """Turn the recorded samples into the derivatives of the loss by them, in place."""
@@ -112,21 +112,21 @@ def march_adjoint(
         first = planes[row, column, 2]
         last = planes[row, column, 3]
         d = length[row, column]
-        behind = of_transmittance[row, column]
+        behind = transmittance_gradient[row, column]
         before = depth[row, column]  # optical depth from the camera to the back of the sample
         for step in range(last - first + 1):
             k = last - step if travel > 0 else first + step
             x = record[k, row, column, 0] * d
-            glow = 0.0
+            inscattered = 0.0
             for channel in ti.static(range(channels)):
-                glow += of_scattered[row, column, channel] * record[k, row, column, channel + 1]
+                inscattered += scattered_gradient[row, column, channel] * record[k, row, column, channel + 1]
             opacity = _opacity(x)
             before = ti.max(before - x, 0.0)
             tau = ti.exp(-before)
-            record[k, row, column, 0] = d * tau * (1.0 - opacity) * (glow - behind)
+            record[k, row, column, 0] = d * tau * (1.0 - opacity) * (inscattered - behind)
             for channel in ti.static(range(channels)):
-                record[k, row, column, channel + 1] = tau * opacity * of_scattered[row, column, channel]
-            behind = opacity * glow + (1.0 - opacity) * behind
+                record[k, row, column, channel + 1] = tau * opacity * scattered_gradient[row, column, channel]
+            behind = opacity * inscattered + (1.0 - opacity) * behind
 
 
 @ti.kernel
