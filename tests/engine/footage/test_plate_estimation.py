@@ -62,6 +62,20 @@ def test_smoke_is_found_in_much_noise_before_a_wall_that_is_not_told(tmp_path: P
         assert mask[puff(n) == 0.0].mean() < 0.08
 
 
+def test_a_burst_that_comes_over_all_of_black_is_no_noise(tmp_path: Path) -> None:
+    rows, columns = np.mgrid[:HEIGHT, :WIDTH]
+
+    def burst(n: int) -> np.ndarray:
+        return (6 <= n < 15) * (0.6 + 0.3 * np.sin(rows / 7 + n) * np.cos(columns / 9 - n))
+
+    clip = film(tmp_path, np.zeros((HEIGHT, WIDTH, 3), np.float32), burst, 0.9)
+    plate = estimate_plate(clip)
+    assert plate.image.max() < 0.01
+    assert plate.noise.total.max() < 3 / 255
+    assert matte(clip.frame(10), plate).mask.mean() > 0.95
+    assert matte(clip.frame(2), plate).mask.mean() < 0.02
+
+
 def test_pixels_that_are_never_clear_are_filled_and_marked(tmp_path: Path) -> None:
     truth = np.linspace(0.1, 0.3, WIDTH, dtype=np.float32)[None, :, None].repeat(HEIGHT, 0).repeat(3, 2)
     rows, columns = np.mgrid[:HEIGHT, :WIDTH]
