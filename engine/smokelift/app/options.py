@@ -10,7 +10,7 @@ from typing import Literal
 
 from smokelift.output.writer import check_directory, written_kinds
 from smokelift.scene import SCATTERINGS, ClipSource, Scene
-from smokelift.scene.checks import LARGEST
+from smokelift.scene.checks import LARGEST, SceneError, file_path
 from smokelift.setup.settings import METHODS, QUALITIES, Settings
 
 
@@ -22,7 +22,10 @@ def named_path(text: str) -> Path:
         raise argparse.ArgumentTypeError("the path is no text in UTF-8: rename the file or the folder") from None
     if not text:
         raise argparse.ArgumentTypeError("the path is empty: give the name of a file or a folder")
-    return Path(text)
+    try:
+        return file_path(text, "path")
+    except SceneError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
 
 
 def add_run_options(parser: argparse.ArgumentParser) -> None:

@@ -15,6 +15,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from smokelift.checks import listed, numbers, require_kind
 from smokelift.density.depth_prior import DepthEstimate, DepthPrior, ImposedView, RoundDepth
 from smokelift.density.descent import descend
 from smokelift.density.hull import inside
@@ -212,10 +213,10 @@ def reconstruct_density(
     True
     """
     complete = completed(scene)
+    require_kind(settings, DensitySettings | None, "settings", "DensitySettings (settings.density of a run's)")
+    views = listed(views, Observation, "views", "a list of Observations")
     optics = scene_optics(complete)
-    with np.errstate(over="ignore"):
-        picture = np.asarray(image, np.float32)
-    own = Observation(complete.camera, picture, plate or BLACK)
+    own = Observation(complete.camera, image, BLACK if plate is None else plate)
     seen = ViewSet.of([_with_plate(each, complete) for each in (own, *views)], optics)
     if initial is not None:
         initial = _checked_initial(initial, optics.domain)
@@ -269,8 +270,7 @@ def fit_figures(views: ViewSet, residuals: Sequence[Image], iterations: int) -> 
 
 
 def _checked_initial(initial: Volume, domain: Domain) -> Volume:
-    with np.errstate(over="ignore"):
-        initial = np.asarray(initial, np.float32)
+    initial = numbers(initial, "The initial density")
     if initial.shape != domain.resolution:
         raise ValueError(f"The initial density must have the shape {domain.resolution}, not {initial.shape}.")
     if not np.isfinite(initial).all() or initial.min() < 0:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from smokelift.checks import radiance, require_kind
 from smokelift.density.axis import AxisEstimate
 from smokelift.density.colour_weight import ColourWeight
 from smokelift.density.hull import Projection, common_hull, project_voxels, reached
@@ -55,11 +56,21 @@ class Observation:
     plate
         The clean plate: what the camera sees without smoke, with the noise of its pictures. By default black with the
         noise of 8 bits, for which `reconstruct_density` substitutes the scene's background.
+
+    Raises
+    ------
+    ValueError
+        If one of them is of another kind.
     """
 
     camera: Camera
     image: Image
     plate: Plate = BLACK
+
+    def __post_init__(self) -> None:
+        require_kind(self.camera, Camera, "camera", "a Camera")
+        require_kind(self.plate, Plate, "plate", "a Plate (a known picture is the scene's background)")
+        object.__setattr__(self, "image", radiance(self.image, "The picture"))
 
 
 class ObservedClip(Protocol):

@@ -29,7 +29,8 @@ from smokelift.footage.images import (
 )
 from smokelift.footage.kept_frames import KeptFrames, keep
 from smokelift.footage.video import Video
-from smokelift.scene import ClipSource
+from smokelift.scene import ClipSource, SceneError
+from smokelift.scene.checks import file_path
 
 __all__ = ["Clip", "ClipError", "is_video"]
 
@@ -130,16 +131,17 @@ class Clip:
             With the path: no such file, no video in it, a picture missing, nothing that can be decoded, or a
             range of frames outside the clip.
         """
-        if isinstance(path, ClipSource):
-            fps = path.fps if fps is None else fps
-            frames = path.frames if frames is None else frames
-            transfer = path.transfer if transfer is None else transfer
-            path = path.path
-        path = Path(path)
-        if fps is not None and not (np.isfinite(fps) and fps > 0.0):
-            raise ClipError(f"{path}: fps must be a number above 0, not {fps}")
-        if transfer not in (None, "srgb", "linear"):
-            raise ClipError(f'{path}: transfer must be "srgb" or "linear", not "{transfer}"')
+        try:
+            said = path if isinstance(path, ClipSource) else ClipSource(file_path(path, "path"))
+            said = ClipSource(
+                said.path,
+                fps=said.fps if fps is None else fps,
+                frames=said.frames if frames is None else frames,
+                transfer=said.transfer if transfer is None else transfer,
+            )
+        except SceneError as error:
+            raise ClipError(str(error) if error.key == "path" else f"{path}: {error}") from error
+        path, fps, frames, transfer = said.path, said.fps, said.frames, said.transfer
         source: FrameSource = Video(path, transfer) if is_video(path) else ImageSequence(path, transfer, fps)
         try:
             return cls(path, KeptFrames(source), fps, frames)
@@ -380,8 +382,8 @@ class Clip:
 
     def _read(self, n: int, read: Callable[[int], Image]) -> Image:
         """Return a frame from the file, or what stands in for it: the last sound one lasts on, as when one drops."""
-        if not 0 <= n < self._count:
-            raise ClipError(f"{self.path}: there is no frame {n}; there are 0 to {self._count - 1}")
+        if not isinstance(n, int | np.integer) or not 0 <= n < self._count:
+            raise ClipError(f"{self.path}: there is no frame {n!r}; there are 0 to {self._count - 1}")
         try:
             return read(self.first + n)
         except DamagedFrameError as error:

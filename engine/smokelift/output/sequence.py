@@ -7,6 +7,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from smokelift.checks import shown
 from smokelift.output.archive import FLAME, VELOCITY, read_arrays
 from smokelift.output.checksum import checksum
 from smokelift.output.index import Index, SequenceError
@@ -15,6 +18,7 @@ from smokelift.output.vdb import read_flame, read_vdb
 from smokelift.output.viewer import Viewer
 from smokelift.render import Image
 from smokelift.scene import Camera, CompleteScene, Scene, completed, scene_from_dict
+from smokelift.scene.checks import file_path
 from smokelift.transport import Array, Velocity, face_shapes, on_faces
 
 USUAL_FPS = 24.0
@@ -65,7 +69,9 @@ class Sequence:
         SequenceError
             If there is no sequence, or it is damaged.
         """
-        directory = Path(directory)
+        directory = file_path(directory, "directory", "the path of a directory")
+        if directory.is_file():
+            raise SequenceError(f"{directory}: is a file; give the directory of the sequence")
         index = Index.read(directory)
         try:
             described = scene_from_dict(index.scene, str(directory / INDEX), directory)
@@ -207,9 +213,9 @@ class Sequence:
         return self._figures[str(number)]
 
     def _check(self, number: int) -> None:
-        if number not in self.frames:
+        if number not in self.frames or not isinstance(number, int | np.integer):
             span = f"it has {self.frames[0]} to {self.frames[-1]}" if self.frames else "it has none"
-            raise SequenceError(f"{self.directory}: there is no frame {number}; {span}")
+            raise SequenceError(f"{self.directory}: there is no frame {shown(number)}; {span}")
 
     def _check_sum(self, path: Path) -> None:
         written = self._checksums.get(path.name)

@@ -6,6 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
+from smokelift.checks import require_kind
 from smokelift.footage.background import background_picture, behind, open_plates
 from smokelift.render import Image, Renderer, Volume, scene_optics
 from smokelift.render.emission import emitted
@@ -28,6 +29,7 @@ class Viewer:
     """
 
     def __init__(self, scene: CompleteScene, camera: Camera | None = None, background: Image | None = None) -> None:
+        require_kind(camera, Camera | None, "camera", "a Camera")
         self._scene, self._camera = scene, camera or scene.camera
         self._optics = scene_optics(scene)
         self._plates = open_plates(scene.background, scene.camera) if background is None else None

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from smokelift.checks import require_kind
 from smokelift.density import Density, ViewSet
 from smokelift.density.flame import flame_emission
 from smokelift.density.hull import inside, project_voxels
@@ -28,6 +29,7 @@ from smokelift.pipeline.sources import sources
 from smokelift.render import Volume
 from smokelift.render.blas import products_on_one_thread
 from smokelift.scene import Domain, Scene
+from smokelift.scene.checks import file_path
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.provenance import provenance
 from smokelift.setup.settings import Settings
@@ -135,13 +137,18 @@ def reconstruct(
     ValueError
         For bad input (`SceneError`, `ClipError`, `SequenceError` are ValueErrors too).
     """
+    require_kind(clip, Clip, "clip", 'a Clip (Clip.open("clip.mp4") opens one)')
+    require_kind(scene, Scene, "scene", "a Scene (Scene() leaves all open, Scene.load reads a file)")
+    require_kind(settings, Settings | None, "settings", "Settings (Settings.preset makes them)")
+    require_kind(shot, Shot | None, "shot", "a Shot (prepare_shot makes one)")
+    require_kind(method, Method | None, "method", "a Method (compose makes one)")
     shot = shot or prepare_shot(clip, scene, settings or Settings.preset())
     method = method or compose(shot.settings)
     if out is None:
         yield from _frames(shot, method, None)
         return
     with SequenceWriter(
-        out,
+        file_path(out, "out", "the path of a directory"),
         shot.scene,
         shot.settings.as_dict(),
         npz=npz,

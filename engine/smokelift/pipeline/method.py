@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from smokelift.baselines.density import AllCarried, FixedRateDescent, OrthogonalCopy
 from smokelift.baselines.velocity import PaperVelocity
+from smokelift.checks import require_kind
 from smokelift.density import (
     BlendCarried,
     BorrowedMoments,
@@ -48,6 +49,7 @@ class Method:
 
 def compose(settings: Settings) -> Method:
     """The method that settings ask for."""
+    require_kind(settings, Settings, "settings", "Settings (Settings.preset makes them)")
     return _METHODS[settings.method](settings)
 
 

@@ -6,11 +6,13 @@ from collections.abc import Sequence
 from typing import overload
 
 import numpy as np
+import numpy.typing as npt
 
+from smokelift.checks import numbers, radiance, require_kind
 from smokelift.footage.background import background_picture
 from smokelift.render.optics import scene_renderer
 from smokelift.render.renderer import Image, Renderer, Volume
-from smokelift.scene import Camera, CompleteScene, Scene, completed
+from smokelift.scene import Camera, CompleteScene, Scene, completed, require_scene
 
 LARGEST_DEPTH = 1e20
 """Optical depth of a voxel, at most: that of a ray through thousands of them is still a number of 32 bits."""
@@ -111,38 +113,38 @@ def render_gradient(
     ((16, 16, 16), (24, 32, 3), True)
     """
     if camera is None or isinstance(camera, Camera):
-        return _of_view(density, _renderer(scene, camera), np.asarray(target, np.float32))
+        return _of_view(density, _renderer(scene, camera), target)
+    require_kind(camera, Sequence, "camera", "a Camera, or a list of them")
     if len(camera) != len(target) or not camera:
         raise ValueError(f"There must be one target a camera, not {len(target)} for {len(camera)}.")
-    views = [
-        _of_view(density, _renderer(scene, view), np.asarray(goal, np.float32))
-        for view, goal in zip(camera, target, strict=True)
-    ]
+    views = [_of_view(density, _renderer(scene, view), goal) for view, goal in zip(camera, target, strict=True)]
     losses, gradients, images = zip(*views, strict=True)
     return sum(losses), sum(gradients[1:], gradients[0]), list(images)
 
 
 def _renderer(scene: Scene | CompleteScene, camera: Camera | None) -> Renderer:
     """The renderer of a camera; the scene's own, if it has one, still decides how an environment is sampled."""
+    require_scene(scene)
+    require_kind(camera, Camera | None, "camera", "a Camera")
     whole = completed(scene, scene.camera or camera)
     return scene_renderer(whole, camera, background_picture(scene, camera))
 
 
-def _of_view(density: Volume, renderer: Renderer, target: Image) -> tuple[float, Volume, Image]:
+def _of_view(density: Volume, renderer: Renderer, target: npt.ArrayLike) -> tuple[float, Volume, Image]:
     width, height = renderer.camera.size
-    if target.shape != (height, width, 3):
-        raise ValueError(f"The target image must have the shape {(height, width, 3)}, not {target.shape}.")
-    if not np.isfinite(target).all():
+    wanted = radiance(target, "The target image")
+    if wanted.shape != (height, width, 3):
+        raise ValueError(f"The target image must have the shape {(height, width, 3)}, not {wanted.shape}.")
+    if not np.isfinite(wanted).all():
         raise ValueError("The target image holds values that are not finite.")
     image = renderer.image(_checked(density, renderer), keep_record=True)
-    difference = image - target
+    difference = image - wanted
     loss = float(np.sum(np.square(difference, dtype=np.float64)))
     return loss, renderer.gradient(2 * difference), image
 
 
 def _checked(density: Volume, renderer: Renderer) -> Volume:
-    with np.errstate(over="ignore"):
-        density = np.asarray(density, np.float32)
+    density = numbers(density, "The density")
     wanted = renderer.domain.resolution
     if density.shape != wanted:
         raise ValueError(f"The density has the shape {density.shape}, the domain {wanted}; they must agree.")

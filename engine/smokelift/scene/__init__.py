@@ -7,7 +7,7 @@ from smokelift.scene.background import Background
 from smokelift.scene.camera import LARGEST_PICTURE, Camera, as_matrix, look_at_matrix, orbit, shared_part
 from smokelift.scene.checks import SceneError
 from smokelift.scene.clip_source import ClipSource
-from smokelift.scene.complete import CompleteScene, completed
+from smokelift.scene.complete import CompleteScene, completed, require_scene
 from smokelift.scene.description import Scene
 from smokelift.scene.dictionary import scene_from_dict, scene_to_dict
 from smokelift.scene.domain import SIDES, Domain, Inlet, Side
@@ -43,6 +43,7 @@ __all__ = [
     "completed",
     "look_at_matrix",
     "orbit",
+    "require_scene",
     "scene_from_dict",
     "scene_to_dict",
     "shared_part",

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from smokelift.checks import shown
+from smokelift.checks import described, shown
 
 Vector = tuple[float, float, float]
 """x, y, z or red, green, blue."""
@@ -17,6 +18,9 @@ Vector = tuple[float, float, float]
 LARGEST, SMALLEST = 1e9, 1e-9
 """No number of a scene is larger, and none that must be above 0 is smaller: what is computed of a few of them stays a
 normal number of 32 bits."""
+
+ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:/")
+"""Begins the address of a file on a network. A drive of Windows has one letter."""
 
 
 class SceneError(ValueError):
@@ -97,8 +101,12 @@ def set_fields(instance: object, **values: object) -> None:
         object.__setattr__(instance, name, value)
 
 
-def file_path(value: Any, key: str) -> Path:
-    """Return ``value`` as the path of a file, or raise a SceneError that names ``key``."""
+def file_path(value: Any, key: str, expected: str = "the path of a file") -> Path:
+    """Return ``value`` as a path, or raise a SceneError that names ``key``."""
     if not isinstance(value, str | Path) or not str(value):
-        raise unexpected(value, key, "the path of a file")
+        raise SceneError(f"{key} must be {expected}, not {described(value)}", key=key)
+    if ADDRESS.match(str(value)):
+        raise SceneError(
+            f"{shown(str(value))} is an address; save the file on this computer and give its path", key=key
+        )
     return Path(value)

@@ -8,8 +8,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from smokelift.checks import require_kind
 from smokelift.scene.background import Background
 from smokelift.scene.camera import Camera
+from smokelift.scene.checks import file_path
 from smokelift.scene.clip_source import ClipSource
 from smokelift.scene.description import Scene
 from smokelift.scene.domain import Domain, Inlet, Side
@@ -48,8 +50,8 @@ class CompleteScene:
     inlets: tuple[Inlet, ...] = ()
 
     def save(self, path: str | Path) -> None:
-        """Write a scene file that `Scene.load` and `completed` read back as an equal scene."""
-        write_file(vars(self), Path(path))
+        """Write a scene file that `Scene.load` and `completed` read back as an equal scene; see `Scene.save`."""
+        write_file(vars(self), file_path(path, "path"))
 
     def inflow(self) -> NDArray[np.bool_] | None:
         """Return the voxels where smoke enters, shape (nx, ny, nz); None if no inlet is marked."""
@@ -57,6 +59,11 @@ class CompleteScene:
             return None
         entries: NDArray[np.bool_] = np.logical_or.reduce([inlet.voxels(self.domain) for inlet in self.inlets])
         return entries
+
+
+def require_scene(scene: object) -> None:
+    """Refuse what is no scene; ValueError."""
+    require_kind(scene, Scene | CompleteScene, "scene", "a Scene (Scene.load reads one from a file)")
 
 
 def completed(scene: Scene | CompleteScene, camera: Camera | None = None) -> CompleteScene:
@@ -74,6 +81,7 @@ def completed(scene: Scene | CompleteScene, camera: Camera | None = None) -> Com
     ValueError
         If there is no camera or no domain.
     """
+    require_scene(scene)
     camera = camera or scene.camera
     if camera is None:
         raise ValueError("The scene has no camera; give one.")

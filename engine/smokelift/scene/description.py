@@ -14,10 +14,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from smokelift.checks import shown
+from smokelift.checks import listed, require_kind, shown
 from smokelift.scene.background import Background
 from smokelift.scene.camera import Camera
-from smokelift.scene.checks import SceneError, set_fields
+from smokelift.scene.checks import SceneError, file_path, integer, set_fields
 from smokelift.scene.clip_source import ClipSource
 from smokelift.scene.domain import Domain, Inlet, Side, checked_sides
 from smokelift.scene.environment_light import EnvironmentLight
@@ -73,13 +73,27 @@ class Scene:
 
     def __post_init__(self) -> None:
         """Check what no table can check alone."""
-        set_fields(self, lights=tuple(self.lights), views=tuple(self.views), inlets=tuple(self.inlets))
-        for table, listed in (("inlet", self.inlets), ("lights", self.lights), ("views", self.views)):
-            if len(listed) > MOST_LISTED:
-                raise SceneError(f"is given {len(listed)} times; {MOST_LISTED} at most", table=table)
+        self._check_kinds()
+        for table, given in (("inlet", self.inlets), ("lights", self.lights), ("views", self.views)):
+            if len(given) > MOST_LISTED:
+                raise SceneError(f"is given {len(given)} times; {MOST_LISTED} at most", table=table)
         set_fields(self, closed=checked_sides(self.closed), scattering=checked_scattering(self.scattering))
         if self.domain is not None:
             self._check_places(self.domain)
+
+    def _check_kinds(self) -> None:
+        """Refuse a part that is of another kind, and make tuples of lists."""
+        require_kind(self.clip, ClipSource | None, "clip", 'a ClipSource, such as ClipSource("clip.mp4")')
+        require_kind(self.camera, Camera | None, "camera", "a Camera")
+        require_kind(self.domain, Domain | None, "domain", "a Domain")
+        require_kind(self.medium, Medium | None, "medium", "a Medium")
+        require_kind(self.background, Background | None, "background", "a Background")
+        set_fields(
+            self,
+            lights=listed(self.lights, Light, "lights", "a list of lights"),
+            views=listed(self.views, View, "views", "a list of Views"),
+            inlets=listed(self.inlets, Inlet, "inlets", "a list of Inlets"),
+        )
 
     def _check_places(self, domain: Domain) -> None:
         """Refuse an inlet outside the domain, a light inside it, and a camera that does not see it."""
@@ -115,6 +129,7 @@ class Scene:
         """
         if self.clip is None:
             raise SceneError("a scene without a clip has no frames", table="clip")
+        first, last = integer(first, "first"), integer(last, "last")
         skipped = first - self.clip.first
         views = []
         for index, view in enumerate(self.views):
@@ -141,11 +156,18 @@ class Scene:
         SceneError
             With the file, the line, the key, what was expected and what was found.
         """
-        return read_file(Path(path), cls)
+        return read_file(file_path(path, "path"), cls)
 
     def save(self, path: str | Path, comments: Sequence[str] = ()) -> None:
         """Write a scene file that :meth:`load` reads back as an equal scene.
 
         Paths below the file's folder are written relative to it, all others absolute. Comments are lines at its top.
+
+        Raises
+        ------
+        SceneError
+            If the path is that of a folder.
+        OSError
+            If the file cannot be written.
         """
-        write_file(vars(self), Path(path), comments)
+        write_file(vars(self), file_path(path, "path"), comments)

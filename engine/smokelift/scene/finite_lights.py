@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from smokelift.checks import shown
 from smokelift.scene.checks import SceneError, Vector, colour, set_fields, vector
@@ -92,6 +92,7 @@ FiniteLight = DirectionalLight | PointLight
 """What one sweep through the voxels can do."""
 
 
+@runtime_checkable
 class SampledLight(Protocol):
     """A light for which finitely many simple ones stand, whatever the camera and the smoke."""
 

@@ -22,7 +22,7 @@ from typing import Any, TypeVar, get_args, get_type_hints
 from smokelift.checks import one_of, shown
 from smokelift.scene.background import Background
 from smokelift.scene.camera import Camera, focal_length, look_at_matrix, picture_size
-from smokelift.scene.checks import SceneError, positive, unexpected
+from smokelift.scene.checks import SceneError, file_path, positive, unexpected
 from smokelift.scene.clip_source import ClipSource
 from smokelift.scene.domain import Domain, Inlet
 from smokelift.scene.files import read_text
@@ -159,8 +159,8 @@ class _Reader:
                 return None
             _require(values, *(each.name for each in fields(kind) if each.default is MISSING))
             for key, hint in get_type_hints(kind).items():
-                if Path in (hint, *get_args(hint)) and isinstance(values.get(key), str) and values[key]:
-                    values[key] = self.base / values[key]
+                if Path in (hint, *get_args(hint)) and isinstance(values.get(key), str):
+                    values[key] = self.base / file_path(values[key], key)
             return kind(**values)
 
         return read

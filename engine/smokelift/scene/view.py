@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from smokelift.checks import require_kind
 from smokelift.scene.background import Background
 from smokelift.scene.camera import Camera
 from smokelift.scene.clip_source import ClipSource
@@ -26,3 +27,9 @@ class View:
     camera: Camera
     clip: ClipSource
     background: Background | None = None
+
+    def __post_init__(self) -> None:
+        """Check the kinds."""
+        require_kind(self.camera, Camera, "camera", "a Camera")
+        require_kind(self.clip, ClipSource, "clip", 'a ClipSource, such as ClipSource("clip.mp4")')
+        require_kind(self.background, Background | None, "background", "a Background")

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
 import tomli_w
 
+from smokelift.checks import listed, printable
 from smokelift.scene.camera import Camera
+from smokelift.scene.checks import SceneError
 from smokelift.scene.lights import LIGHT_TYPES
 
 Table = dict[str, Any]
@@ -28,8 +31,18 @@ def write_file(parts: Mapping[str, Any], path: Path, comments: Sequence[str] = (
         The file.
     comments
         Lines at its top.
+
+    Raises
+    ------
+    SceneError
+        If the path is that of a folder.
+    OSError
+        If the file cannot be written.
     """
-    text = "".join(f"# {line}\n" for line in comments) + tomli_w.dumps(to_tables(parts, path.absolute().parent))
+    if path.is_dir():
+        raise SceneError(f"{path}: is a folder; give the name of a file")
+    top = "".join(f"# {printable(line)}\n" for line in listed(comments, str, "comments", "a list of lines"))
+    text = top + tomli_w.dumps(to_tables(parts, path.absolute().parent))
     aside = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
         aside.write_text(text, encoding="utf-8")
@@ -38,7 +51,8 @@ def write_file(parts: Mapping[str, Any], path: Path, comments: Sequence[str] = (
         error.filename = str(path)  # the name that was asked for
         raise
     finally:
-        aside.unlink(missing_ok=True)
+        with suppress(OSError):  # what failed before says why
+            aside.unlink(missing_ok=True)
 
 
 def to_tables(parts: Mapping[str, Any], base: Path | None) -> Table:

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 import smokelift._core as _core
+from smokelift.checks import numbers, require_kind
 from smokelift.scene.domain import box_around
 from smokelift.transport.grid import (
     Array,
@@ -82,8 +83,11 @@ def advect(
     """
     if scheme not in ("maccormack", "semi-lagrangian"):
         raise ValueError(f"unknown scheme {scheme!r}: expected 'maccormack' or 'semi-lagrangian'.")
+    require_kind(velocity, Velocity, "velocity", "a Velocity")
     displacement = velocity.displacement(dt)
     corrected = scheme == "maccormack"
+    if not isinstance(field, Velocity):
+        field = numbers(field, "the field")
     require_same_shape("the field", field.shape, velocity.shape)
     if isinstance(field, Velocity):
         if conserve:

@@ -6,13 +6,14 @@ Harlow and Welch 1965), where its divergence and the pressure projection are exa
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
 
+from smokelift.checks import numbers, shown
 from smokelift.scene import SIDES, Side
 from smokelift.scene.checks import LARGEST, SMALLEST
 
@@ -47,7 +48,9 @@ class StaggeredGrid:
 
     def __post_init__(self) -> None:
         require_positive("voxel_size", self.voxel_size)
-        x, y, z = (np.ascontiguousarray(component, np.float32) for component in self.faces)
+        if not isinstance(self.faces, Sequence) or len(self.faces) != 3:
+            raise ValueError("faces must be three arrays, of the components on x, y and z faces.")
+        x, y, z = (np.ascontiguousarray(numbers(component, "faces")) for component in self.faces)
         if any(component.ndim != 3 for component in (x, y, z)):
             raise ValueError("faces must be three three-dimensional arrays.")
         shape = (x.shape[0] - 1, *x.shape[1:])
@@ -58,13 +61,13 @@ class StaggeredGrid:
                 "expected (nx+1, ny, nz), (nx, ny+1, nz) and (nx, ny, nz+1)."
             )
         object.__setattr__(self, "faces", (x, y, z))
-        object.__setattr__(self, "closed", _in_order(self.closed))
+        object.__setattr__(self, "closed", sides_in_order(self.closed))
 
     @classmethod
     def zero(cls, shape: tuple[int, ...], voxel_size: float, closed: Iterable[Side] = ()) -> Self:
         """The field that is zero on a box of `shape` voxels."""
         x, y, z = (np.zeros(n, np.float32) for n in face_shapes(shape))
-        return cls((x, y, z), voxel_size, tuple(closed))
+        return cls((x, y, z), voxel_size, sides_in_order(closed))
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -160,7 +163,10 @@ class Velocity(StaggeredGrid):
 
 def face_shapes(shape: tuple[int, ...]) -> tuple[tuple[int, int, int], ...]:
     """Shapes of the three arrays of face values of a box of `shape` voxels."""
-    nx, ny, nz = shape
+    counts = tuple(shape) if isinstance(shape, Iterable) else ()
+    if len(counts) != 3 or not all(isinstance(count, int | np.integer) and count >= 1 for count in counts):
+        raise ValueError(f"A box has three whole numbers of voxels, each at least 1, not {shown(shape)}.")
+    nx, ny, nz = counts
     return (nx + 1, ny, nz), (nx, ny + 1, nz), (nx, ny, nz + 1)
 
 
@@ -219,17 +225,24 @@ def on_faces(centres: Array) -> Faces:
     return half * (x[1:] + x[:-1]), half * (y[:, 1:] + y[:, :-1]), half * (z[:, :, 1:] + z[:, :, :-1])
 
 
-def _in_order(closed: Iterable[Side]) -> tuple[Side, ...]:
-    names = set(closed)
-    if unknown := names - set(SIDES):
-        raise ValueError(f"unknown side {sorted(unknown)[0]!r}: expected some of {', '.join(SIDES)}.")
+def sides_in_order(closed: Iterable[Side]) -> tuple[Side, ...]:
+    """Return the names of walls in the order of `SIDES`; ValueError if one is unknown."""
+    if isinstance(closed, str) or not isinstance(closed, Iterable):
+        raise ValueError(f"closed must be a list of sides, some of {', '.join(SIDES)}, not {shown(closed)}.")
+    names = list(closed)
+    if unknown := [name for name in names if name not in SIDES]:
+        raise ValueError(f"unknown side {unknown[0]!r}: expected some of {', '.join(SIDES)}.")
     return tuple(side for side in SIDES if side in names)
 
 
 def require_positive(name: str, value: float) -> None:
     """Refuse what is not positive, or beyond what a scene may hold."""
-    if not SMALLEST <= value <= LARGEST:
-        raise ValueError(f"{name} must be positive and finite, from {SMALLEST:g} to {LARGEST:g}, not {value}.")
+    try:
+        fits = bool(SMALLEST <= value <= LARGEST)
+    except (TypeError, ValueError):  # no number, or several
+        fits = False
+    if not fits:
+        raise ValueError(f"{name} must be positive and finite, from {SMALLEST:g} to {LARGEST:g}, not {shown(value)}.")
 
 
 def require_same_shape(what: str, shape: tuple[int, ...], expected: tuple[int, ...]) -> None:

@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 import smokelift._core as _core
+from smokelift.checks import require_kind
 from smokelift.scene import Side
-from smokelift.transport.grid import Array, StaggeredGrid, Velocity
+from smokelift.transport.grid import Array, StaggeredGrid, Velocity, sides_in_order
 
 
 def project(velocity: Velocity, closed: Iterable[Side] | None = None) -> Velocity:
@@ -45,8 +46,9 @@ def project(velocity: Velocity, closed: Iterable[Side] | None = None) -> Velocit
     >>> bool(calm.figures["divergence"] < 1e-5)
     True
     """
+    require_kind(velocity, Velocity, "velocity", "a Velocity")
     if closed is not None:
-        velocity = replace(velocity, closed=tuple(closed))
+        velocity = replace(velocity, closed=sides_in_order(closed))
     grid, largest = without_divergence(velocity, passes=2)
     return Velocity(grid.faces, velocity.voxel_size, velocity.closed, figures={"divergence": largest})
 

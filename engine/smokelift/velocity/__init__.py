@@ -27,6 +27,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from smokelift.checks import require_kind
 from smokelift.scene import Side
 from smokelift.transport import Velocity
 from smokelift.velocity.coarse_to_fine import CoarseToFine
@@ -97,10 +98,11 @@ def estimate_velocity(
     >>> round(float(velocity.centres()[12, 12, 10, 2]), 1)  # m/s
     1.0
     """
+    require_kind(settings, VelocitySettings | None, "settings", "VelocitySettings (settings.velocity of a run's)")
     found = CoarseToFine(settings or VelocitySettings()).estimate(
         before, after, dt, voxel_size, closed=closed, inflow=inflow, prediction=prediction
     )
-    x, y, z = before.shape
+    x, y, z = np.shape(before)
     return refined_to(found, (x, y, z))
 
 

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from scipy import ndimage
 
 import smokelift._core as _core
+from smokelift.checks import numbers, require_kind
 from smokelift.scene import Side
 from smokelift.transport import (
     Array,
@@ -177,6 +178,8 @@ def checked(
     require_positive("voxel_size", voxel_size)
     first, second = _density("before", before), _density("after", after)
     require_same_shape("after", second.shape, first.shape)
+    require_kind(inflow, np.ndarray | None, "inflow", "an array of booleans, one a voxel")
+    require_kind(prediction, Velocity | None, "prediction", "a Velocity")
     if inflow is not None:
         require_same_shape("inflow", inflow.shape, first.shape)
     if prediction is not None:
@@ -194,6 +197,7 @@ def motion_weight(shape: tuple[int, ...], inflow: Mask | None) -> Array:
 
 
 def _density(name: str, values: Density) -> Array:
+    values = numbers(values, name)
     if values.ndim != 3 or 0 in values.shape:
         raise ValueError(f"{name} must be a three-dimensional array, not one of shape {values.shape}.")
     if not np.isfinite(values).all():
@@ -202,4 +206,4 @@ def _density(name: str, values: Density) -> Array:
         raise ValueError(f"{name} holds negative densities.")
     if values.max() > LARGEST_DENSITY:
         raise ValueError(f"{name} holds densities up to {values.max():g}; scale them to {LARGEST_DENSITY:g} at most.")
-    return np.ascontiguousarray(values, np.float32)
+    return np.ascontiguousarray(values)

@@ -22,6 +22,14 @@ def test_a_file_that_is_no_video(tmp_path, capsys) -> None:
     assert "shot.mp4" in refused(capsys, "reconstruct", tmp_path / "shot.mp4", "--out", tmp_path / "out")
 
 
+@pytest.mark.parametrize("words", [("inspect",), ("evaluate", "smoke", "--truth"), ("check",)])
+def test_an_address(capsys, words) -> None:
+    """Nothing is downloaded."""
+    assert command(*words, "https://example.com/smoke") == 2
+    sentence = '"https://example.com/smoke" is an address; save the file on this computer and give its path'
+    assert capsys.readouterr().err.splitlines()[-1].endswith(sentence)
+
+
 def test_an_unknown_key(shot, tmp_path, capsys) -> None:
     """The key and its line."""
     text = shot.read_text().replace("[medium]\n", "[medium]\ncolour = 3\n")

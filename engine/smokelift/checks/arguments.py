@@ -1,0 +1,97 @@
+"""Arguments that are no such thing as a function takes, refused where they are given."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import UnionType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smokelift.checks.words import shown
+
+CODES = (np.uint8, np.uint16)
+"""What picture files hold in place of light."""
+
+
+def require_kind(value: object, kinds: type | UnionType | tuple[type, ...], name: str, expected: str) -> None:
+    """Refuse an argument that is of none of the kinds.
+
+    Parameters
+    ----------
+    value
+        What was given.
+    kinds
+        What is taken.
+    name, expected
+        Of the argument, and what it must be, in words.
+
+    Raises
+    ------
+    ValueError
+        Of another kind.
+    """
+    if not isinstance(value, kinds):
+        raise ValueError(f"{name} must be {expected}, not {described(value)}.")
+
+
+def listed(values: Any, kinds: type | UnionType | tuple[type, ...], name: str, expected: str) -> tuple[Any, ...]:
+    """Return what a list holds, or raise a ValueError if it is no list, or one of its items is of none of the kinds."""
+    require_kind(values, list | tuple, name, expected)
+    for value in values:
+        if not isinstance(value, kinds):
+            raise ValueError(f"{name} must be {expected}, but one of them is {described(value)}.")
+    return tuple(values)
+
+
+def numbers(values: Any, name: str, dtype: type[np.floating[Any]] = np.float32) -> NDArray[Any]:
+    """Return an array of real numbers; the same one if it is of the type that is wanted.
+
+    Parameters
+    ----------
+    values
+        An array, or lists of numbers.
+    name
+        What a message calls it.
+    dtype
+        Of the result. A number that it cannot hold becomes infinite.
+
+    Raises
+    ------
+    ValueError
+        If it holds anything else, or rows of different lengths.
+    """
+    try:
+        array = np.asarray(values)
+    except ValueError as error:
+        raise ValueError(f"{name} must be an array of numbers, but its parts differ in shape.") from error
+    if array.dtype.kind not in "biuf":
+        raise ValueError(f"{name} must be an array of real numbers, not {described(values)}.")
+    with np.errstate(over="ignore"):
+        return array.astype(dtype, copy=False)
+
+
+def radiance(values: Any, name: str) -> NDArray[np.float32]:
+    """Return a picture as float32.
+
+    Raises
+    ------
+    ValueError
+        If it holds no real numbers, or the codes of a picture file: nothing would look wrong but the result.
+    """
+    if getattr(values, "dtype", None) in CODES:
+        raise ValueError(f"{name} must be linear radiance, not codes of {values.dtype}; `Clip` reads files as light.")
+    return numbers(values, name)
+
+
+def described(value: object) -> str:
+    """Return what was given, in words: itself if it is short, else its kind."""
+    if value is None or isinstance(value, bool | int | float | str | np.number):
+        return shown(value)
+    if isinstance(value, Path):
+        return f"the path {value}"
+    if isinstance(value, np.ndarray):
+        return f"an array of {value.dtype}"
+    kind = type(value).__name__
+    return f"{'an' if kind[0] in 'AEIOUaeiou' else 'a'} {kind}"
