@@ -104,6 +104,11 @@ def _background(shot: Shot, given: Scene, plate: Plate) -> Fact:
 
 def _exposure(shot: Shot, plate: Plate) -> Fact:
     if not shows_exposure(small(plate.image)):
+        if shot.exposure > 0:
+            value = f"flickers by up to {shot.exposure:.0%}, evened out"
+            return Fact(
+                "exposure", value, "measured", "Of all smoke in the picture; slower changes are taken for smoke's."
+            )
         how = "The background is too dark or too bright to show it: what flickers is taken for smoke."
         return Fact("exposure", "taken to be steady", UNDETERMINED, how)
     value = f"changes by up to {shot.exposure:.0%}, evened out" if shot.exposure > 0 else "steady"

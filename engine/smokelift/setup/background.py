@@ -162,10 +162,18 @@ def exposure_change(clip: Clip, plates: Plates) -> float:
     return largest_change([gains_of(number, small(clip.frame(number))) for number in clip.spread(EXPOSURE_SAMPLES)])
 
 
-def exposure_notes(change: float) -> tuple[str, ...]:
-    """What is to be said of a clip whose exposure changes by a share, a sentence; nothing of others."""
+def exposure_notes(change: float, flickers: bool = False) -> tuple[str, ...]:
+    """What is to be said of a clip whose exposure changes by a share, a sentence; nothing of others.
+
+    ``flickers`` says that the smoke alone shows it (`smokelift.footage.flicker`).
+    """
     if change == 0:
         return ()
+    if flickers:
+        return (
+            f"The exposure of the clip flickers by up to {change:.0%}, which only the smoke shows: every frame is "
+            "brought to that of those around it.",
+        )
     return (f"The exposure of the clip changes by up to {change:.0%}: every frame is brought to the background's.",)
 
 

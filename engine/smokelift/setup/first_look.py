@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from smokelift.footage.alignment import Lens
 from smokelift.footage.clip import Clip
+from smokelift.footage.flicker import evened, flicker_gains
 from smokelift.footage.plate import Plate, Plates
 from smokelift.footage.steady import steady
 from smokelift.render import Image
@@ -24,7 +27,8 @@ class FirstLook:
     Attributes
     ----------
     clip
-        The footage at its background's exposure, without fire and without the brightness that noise adds.
+        The footage at its background's exposure, or at that of the frames around each where only the smoke shows it;
+        without fire and without the brightness that noise adds.
     background
         What stands behind the smoke, and how the camera turns before it.
     samples
@@ -33,6 +37,8 @@ class FirstLook:
         None where none burns.
     doubts
         Why the result may be nothing, or wrong, a sentence each.
+    flickers
+        Whether the smoke alone shows how the exposure changes.
     """
 
     clip: Clip
@@ -40,6 +46,7 @@ class FirstLook:
     samples: SmokeSamples
     fire: Fire | None
     doubts: tuple[str, ...]
+    flickers: bool
 
     @property
     def plates(self) -> Plates:
@@ -56,7 +63,7 @@ class FirstLook:
     @property
     def notes(self) -> tuple[str, ...]:
         """What was assumed or estimated, a sentence each; the doubts are among them."""
-        return (*self.background.notes, *self.doubts, *exposure_notes(self.samples.exposure))
+        return (*self.background.notes, *self.doubts, *exposure_notes(self.samples.exposure, self.flickers))
 
 
 def first_look(clip: Clip, camera: Camera | None, background: Background | None, lens: Lens | None) -> FirstLook:
@@ -66,10 +73,16 @@ def first_look(clip: Clip, camera: Camera | None, background: Background | None,
     cuts = cut_notes(found.clip, samples.small) if found.turns is None else ()
     clip = steady(found.clip, found.plates, samples.gains)
     fire = find_fire(clip, found.plates, samples)
+    flickers = False
     if fire is not None:
         clip = fire.doused
         samples = replace(sample_smoke(clip, found.plates, found.turns), gains=samples.gains)
+    # flames flicker by themselves
+    elif samples.smoky and (gains := flicker_gains(found.clip, found.plates, samples.smoky[0])) is not None:
+        clip = evened(clip, gains)
+        flickers, known = True, {number: np.full(3, gains[number], np.float32) for number in samples.gains}
+        samples = replace(sample_smoke(clip, found.plates, found.turns), gains=known)
     nothing = nothing_seen(clip, found.plates, samples, background is not None, cuts)
     bars = between_bars(samples) if background is None else ()
     doubts = (*(nothing or cuts), *found.doubts, *smoke_in_plate(samples), *bars, *several_colours(samples))
-    return FirstLook(clip, found, samples, fire, doubts)
+    return FirstLook(clip, found, samples, fire, doubts, flickers)

@@ -6,7 +6,7 @@ which one choice needs the other.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,7 +14,6 @@ from smokelift.scene import CompleteScene, Scattering
 from smokelift.setup.choice import Choice
 from smokelift.setup.coarse import CoarseClip, CoarseFrame
 from smokelift.setup.directions import choose_directions
-from smokelift.setup.flicker import STEADY, exposure_of, light_of
 from smokelift.setup.light_strength import choose_strength, scaled
 from smokelift.setup.scattering import choose_scattering, settled, tries_multiple, unclear
 from smokelift.setup.settings import Settings
@@ -68,12 +67,7 @@ def choose_light_model(
     """
     scene, fit = clip.scene, settings.density
     lit, directions = choose_directions(scene, list(frames.values()), fit)
-    found = _scattered(clip, frames, lit, [1.0] * len(frames), by_hand, settings)
-    # more light than one frame's smoke can scatter once may be that frame's exposure
-    bright = bool(found.strength) or found.scattering == "multiple"
-    if bright and abs(_exposure(clip, next(iter(frames))) - 1) > STEADY:
-        gains = [_exposure(clip, number) for number in frames]
-        found = _scattered(clip, frames, lit, gains, by_hand, settings)
+    found = _scattered(clip, frames, lit, by_hand, settings)
     scene, lit = scaled(scene, found.factor), scaled(lit, found.factor)
     if by_hand:
         return LightModel(lit, (*found.strength, found.choice, *directions))
@@ -93,13 +87,12 @@ def _scattered(
     clip: CoarseClip,
     frames: Mapping[int, CoarseFrame],
     lit: CompleteScene,
-    gains: Sequence[float],
     by_hand: bool,
     settings: Settings,
 ) -> _Scattered:
-    """How strong the light of a scene is and how it is scattered, if the frames are exposed by gains."""
+    """How strong the light of a scene is and how it is scattered."""
     said, fit = lit.scattering, settings.density
-    exposed = [frame.in_light_of(scaled(lit, gain)) for frame, gain in zip(frames.values(), gains, strict=True)]
+    exposed = [frame.in_light_of(lit) for frame in frames.values()]
     factor = 1.0
     strength: tuple[Choice[str], ...] = ()
     known: dict[Scattering, float] = {}
@@ -118,13 +111,3 @@ def _scattered(
         own = finer.in_light_of(exposed[0].scene)
         scattering, choice = choose_scattering([own], said, settled(fit), tolerance, {})
     return _Scattered(factor, strength, scattering, choice)
-
-
-def _exposure(clip: CoarseClip, number: int) -> float:
-    """Exposure of a frame beside that of its neighbours."""
-
-    def light(number: int) -> float:
-        frame = clip.frame(number)
-        return 0.0 if frame is None else light_of(frame)
-
-    return exposure_of(number, len(clip.clip), light)
