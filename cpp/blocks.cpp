@@ -30,7 +30,7 @@ int block_of(const Blocks &blocks, int axis, int voxel) {
 }
 
 // The voxels in plane `block` of blocks, first and end.
-std::array<int, 2> voxels_in(const Blocks &blocks, int axis, int block, int count) {
+Span voxels_in(const Blocks &blocks, int axis, int block, int count) {
     const int first = block * blocks.size - blocks.offset[axis];
     return {std::max(first, 0), std::min(first + blocks.size, count)};
 }
@@ -40,7 +40,8 @@ std::size_t row_of(const Blocks &blocks, int x, int y) {
 }
 
 // Distance of a voxel's centre from that of its block, over the mean square of those of all voxels, in
-// blocks: a slope is the mean of the values times this.
+// blocks: the slope of the straight line that fits a block's values best is the mean of the values times
+// this.
 float lever_of(const Blocks &blocks, int axis, int voxel) {
     const auto size = float(blocks.size);
     const int place = (voxel + blocks.offset[axis]) % blocks.size;
@@ -63,17 +64,8 @@ struct AlongZ {
 // A plane of voxels across x takes and gives whole rows along z: rows of voxels in a loop that vectorises,
 // and of the few rows of blocks each place along z by itself.
 
-std::array<int, 2> joined(const std::array<int, 2> &a, const std::array<int, 2> &b) {
-    if (a[0] >= a[1])
-        return b;
-    if (b[0] >= b[1])
-        return a;
-    return {std::min(a[0], b[0]), std::max(a[1], b[1])};
-}
-
 // The first floats of voxels, `width` apart.
-SMOKELIFT_INLINE void load(const float *__restrict from, int width, const std::array<int, 2> &span,
-                           float *__restrict to) {
+SMOKELIFT_INLINE void load(const float *__restrict from, int width, const Span &span, float *__restrict to) {
     if (width == 2)
         for (int z = span[0]; z < span[1]; ++z)
             to[z] = from[2 * z];
@@ -95,7 +87,7 @@ void average_plane(const Voxels &medium, const Spans &spans, const Blocks &block
     float *const sums = radiance + length;
     for (int block_y = 0; block_y < blocks.n[1]; ++block_y) {
         const auto [first, end] = voxels_in(blocks, 1, block_y, medium.n[1]);
-        std::array<int, 2> filled{0, 0};
+        Span filled{0, 0};
         std::fill_n(sums, (1 + 2 * channels) * length, 0.0f);
         for (int y = first; y < end; ++y) {
             const auto &span = spans.along_z[std::size_t(x) * medium.n[1] + y];
@@ -135,8 +127,9 @@ void average_plane(const Voxels &medium, const Spans &spans, const Blocks &block
     }
 }
 
-// Adds to the derivatives by k and by J, `channel` floats behind it, that by the emission k J.
-SMOKELIFT_INLINE void add_products(const std::array<int, 2> &span, const float *__restrict voxel,
+// Adds to the derivatives by the extinction and by J, `channel` floats behind it, those by their product, the
+// emission.
+SMOKELIFT_INLINE void add_products(const Span &span, const float *__restrict voxel,
                                    const float *__restrict emission_gradient, float along_y, int length,
                                    int width, int channel, float *__restrict out) {
     const float *const __restrict lifted_gradient = emission_gradient + length;
@@ -158,7 +151,7 @@ void average_adjoint_plane(const Voxels &medium, const Spans &spans, const Block
     std::vector<float> memory((2 * std::size_t(width) - 1) * length);
     for (int block_y = 0; block_y < blocks.n[1]; ++block_y) {
         const auto [first, end] = voxels_in(blocks, 1, block_y, medium.n[1]);
-        std::array<int, 2> filled{0, 0};
+        Span filled{0, 0};
         for (int y = first; y < end; ++y)
             filled = joined(filled, spans.along_z[std::size_t(x) * medium.n[1] + y]);
         const float *const row = means_gradient + row_of(blocks, block_of(blocks, 0, x), block_y);
@@ -238,7 +231,8 @@ void expand_adjoint(const float *rows, const Blocks &blocks, const std::vector<B
     }
 }
 
-// What a row of voxels takes of the two rows of blocks beside it: of their values and of their slopes.
+// What a row of voxels takes of the two rows of blocks beside it, of their values and of their slopes. At the
+// fraction t from one centre to the next it is (1 - t) (near + t near_slope) + t (far - (1 - t) far_slope).
 struct Mix {
     float near, near_slope, far, far_slope;
 

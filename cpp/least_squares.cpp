@@ -41,9 +41,15 @@ void add_scaled(const float *__restrict a, float factor, float *__restrict out, 
         out[i] += factor * a[i];
 }
 
+// Enough blocks of slabs for some threads, each of so many that the slabs computed twice at its ends hardly
+// count.
+constexpr int BLOCKS = 8, LEAST_SLABS = 4, MOST_SLABS = 16;
+
+} // namespace
+
 // The few slabs that a sweep along x has in use. They start as zero, as edges on the sides of the box have to
 // be.
-class Window {
+class LeastSquares::Window {
 public:
     explicit Window(const Box &box) : shapes_(box.edges()), cells_{1, box.cells[1], box.cells[2]} {
         for (int c = 0; c < 3; ++c)
@@ -70,85 +76,88 @@ private:
     std::vector<float> memory_;
 };
 
-} // namespace
+// What the terms in the curl ask of the vorticity on the edges of slab i; without `irrotational` only R's
+// part.
+void LeastSquares::stress(Window &window, bool irrotational, int i) const {
+    const int nx = box_.cells[0];
+    for (int c = 0; c < 3; ++c) {
+        const Shape low = first_edge(c);
+        const Out out = window.stress(i)[c];
+        if (i < low[0] || i >= nx) {
+            std::fill_n(out.data, out.slab_size(), 0.0f);
+            continue;
+        }
+        In pointwise;
+        if (irrotational) {
+            edge_means_slab(irrotational_, c, window.irrotational(c), i);
+            pointwise = window.irrotational(c);
+        }
+        smoothness_slab(window.vorticity(std::max(i - 1, low[0]))[c], window.vorticity(i)[c],
+                        window.vorticity(std::min(i + 1, nx - 1))[c], low, box_.cells,
+                        regularisation_.second_order, pointwise, out);
+    }
+}
+
+// weight direction . u in the cells of slab i; with an offset, - weight offset.
+void LeastSquares::along(Window &window, const StaggeredIn &u, In offset, int i) const {
+    const Out out = window.along(i);
+    if (offset.data) {
+        minus_product(offset.row(i, 0), weight_.row(i, 0), out.data, out.slab_size());
+    } else {
+        directional_slab(u, direction_, out, i);
+        multiply(weight_.row(i, 0), out.data, out.slab_size());
+    }
+}
+
+// Slab i of the result from what the window holds around it; returns its scalar product with u.
+double LeastSquares::finish(Window &window, const StaggeredIn &u, const StaggeredOut &result, int i) const {
+    const Regularisation &r = regularisation_;
+    Out3 out{};
+    for (int c = 0; c < 3; ++c)
+        if (i < u[c].n[0]) {
+            const In a = slab(u[c], i);
+            out[c] = slab(result[c], i);
+            if (r.first_order > 0) {
+                smoothness_slab(slab(u[c], std::max(i - 1, 0)), a, slab(u[c], std::min(i + 1, u[c].n[0] - 1)),
+                                {0, 0, 0}, u[c].n, r.first_order, {}, out[c]);
+                add_scaled(a.data, r.kinetic, out[c].data, a.slab_size());
+            } else {
+                scaled(a.data, r.kinetic, out[c].data, a.slab_size());
+            }
+        }
+    add_curl_transposed_slab(read(window.stress(i)), read(window.stress(i + 1)), out);
+    add_directional_transposed_slab(i > 0 ? In(window.along(i - 1)) : In{},
+                                    i < box_.cells[0] ? In(window.along(i)) : In{}, direction_, out, i);
+    double product = 0;
+    for (int c = 0; c < 3; ++c)
+        if (out[c].data)
+            product += dot(u[c].row(i, 0), out[c].data, out[c].slab_size());
+    return product;
+}
 
 // A u with its scalar product with u; with an offset, R's part of A u less direction^T (weight offset).
 // Everything between u and the result is done slab by slab while it lies in the cache.
 double LeastSquares::sweep(const StaggeredIn &u, In offset, const StaggeredOut &result,
                            Workers &workers) const {
     const int nx = box_.cells[0], slabs = nx + 1;
-    const int size = std::clamp(nx / 8, 4, 16), blocks = (slabs + size - 1) / size;
-    const Regularisation &r = regularisation_;
-
-    const auto stress = [&](Window &window, int i) {
-        for (int c = 0; c < 3; ++c) {
-            const Shape low = first_edge(c);
-            const Out out = window.stress(i)[c];
-            if (i < low[0] || i >= nx) {
-                std::fill_n(out.data, out.slab_size(), 0.0f);
-                continue;
-            }
-            In pointwise;
-            if (!offset.data) {
-                edge_means_slab(irrotational_, c, window.irrotational(c), i);
-                pointwise = window.irrotational(c);
-            }
-            smoothness_slab(window.vorticity(std::max(i - 1, low[0]))[c], window.vorticity(i)[c],
-                            window.vorticity(std::min(i + 1, nx - 1))[c], low, box_.cells, r.second_order,
-                            pointwise, out);
-        }
-    };
-    const auto along = [&](Window &window, int i) {
-        const Out out = window.along(i);
-        if (offset.data) {
-            minus_product(offset.row(i, 0), weight_.row(i, 0), out.data, out.slab_size());
-        } else {
-            directional_slab(u, direction_, out, i);
-            multiply(weight_.row(i, 0), out.data, out.slab_size());
-        }
-    };
-    const auto finish = [&](Window &window, int i) {
-        Out3 out{};
-        double product = 0;
-        for (int c = 0; c < 3; ++c)
-            if (i < u[c].n[0]) {
-                const In a = slab(u[c], i);
-                out[c] = slab(result[c], i);
-                if (r.first_order > 0) {
-                    smoothness_slab(slab(u[c], std::max(i - 1, 0)), a,
-                                    slab(u[c], std::min(i + 1, u[c].n[0] - 1)), {0, 0, 0}, u[c].n,
-                                    r.first_order, {}, out[c]);
-                    add_scaled(a.data, r.kinetic, out[c].data, a.slab_size());
-                } else {
-                    scaled(a.data, r.kinetic, out[c].data, a.slab_size());
-                }
-            }
-        add_curl_transposed_slab(read(window.stress(i)), read(window.stress(i + 1)), out);
-        add_directional_transposed_slab(i > 0 ? In(window.along(i - 1)) : In{},
-                                        i < nx ? In(window.along(i)) : In{}, direction_, out, i);
-        for (int c = 0; c < 3; ++c)
-            if (out[c].data)
-                product += dot(u[c].row(i, 0), out[c].data, out[c].slab_size());
-        return product;
-    };
-
+    const int size = std::clamp(nx / BLOCKS, LEAST_SLABS, MOST_SLABS), blocks = (slabs + size - 1) / size;
     return workers.sum(blocks, [&](int block) {
         const int first = block * size, last = std::min(first + size, slabs);
         Window window(box_);
         double product = 0;
         if (first > 0) {
             curl_slab(u, window.vorticity(first - 1), first - 1);
-            along(window, first - 1);
+            along(window, u, offset, first - 1);
         }
         curl_slab(u, window.vorticity(first), first);
         for (int i = first; i <= last; ++i) {
             if (i + 1 < nx)
                 curl_slab(u, window.vorticity(i + 1), i + 1);
-            stress(window, i);
+            stress(window, !offset.data, i);
             if (i > first)
-                product += finish(window, i - 1);
+                product += finish(window, u, result, i - 1);
             if (i < std::min(last, nx))
-                along(window, i);
+                along(window, u, offset, i);
         }
         return product;
     });

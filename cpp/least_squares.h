@@ -15,6 +15,8 @@ struct Regularisation {
 //     E(u) = sum over cells of weight (offset + direction . u)^2 + irrotational |curl u|^2 + R(u - centre),
 //     R(v) = the three terms of Regularisation
 //
+// with `direction`, `offset`, `weight` and `irrotational` at cell centres, (nx, ny, nz).
+//
 // E(u) = u.Au - 2 b.u + constant with A symmetric and positive definite if kinetic > 0.
 class LeastSquares {
 public:
@@ -35,7 +37,12 @@ public:
     const Box &box() const { return box_; }
 
 private:
+    class Window;
+
     double sweep(const StaggeredIn &u, In offset, const StaggeredOut &result, Workers &workers) const;
+    void stress(Window &window, bool irrotational, int i) const;
+    void along(Window &window, const StaggeredIn &u, In offset, int i) const;
+    double finish(Window &window, const StaggeredIn &u, const StaggeredOut &result, int i) const;
 
     Box box_;
     Regularisation regularisation_;

@@ -21,15 +21,15 @@
 namespace smokelift {
 namespace {
 
-constexpr int ROWS_PER_TASK = 12;
+constexpr int ROWS_PER_TASK = 12; // of columns: their sums stay in the cache
 
 struct Columns {
     const ParallelLight &light;
     const Spans &spans;
-    int planes, count_b, count_c;                // of the grid: along the axis, along the two others
-    int first_p, end_p;                          // rows of columns that meet the grid
-    int first_q, count_q;                        // columns in a row
-    std::vector<std::array<int, 2>> filled_rows; // of voxels, by plane: first and end of those with a span
+    int planes, count_b, count_c;  // of the grid: along the axis, along the two others
+    int first_p, end_p;            // rows of columns that meet the grid
+    int first_q, count_q;          // columns in a row
+    std::vector<Span> filled_rows; // of voxels, by plane: first and end of those with a span
 
     Columns(const ParallelLight &l, const Spans &s) : light(l), spans(s) {
         planes = s.n[l.axis];
@@ -80,93 +80,149 @@ SMOKELIFT_INLINE void load_row(const float *from, Stride stride, int count, floa
     }
 }
 
-SMOKELIFT_INLINE std::array<int, 2> joined(const std::array<int, 2> &a, const std::array<int, 2> &b) {
-    if (a[0] >= a[1])
-        return b;
-    if (b[0] >= b[1])
-        return a;
-    return {std::min(a[0], b[0]), std::max(a[1], b[1])};
-}
+// One task's rows of columns on their way through the planes of voxels, with the sum so far in every column.
+// A plane is sampled in two steps: rows of voxels are slid along themselves to where the columns are, then
+// mixed across.
+class Rows {
+public:
+    SMOKELIFT_INLINE Rows(const Columns &columns, const Voxels &field, int task)
+        : columns_(columns), field_(field), axis_(columns.light.axis),
+          begin_(columns.first_p + task * ROWS_PER_TASK),
+          rows_(std::min(columns.end_p - begin_, ROWS_PER_TASK + 1)), pitch_(columns.count_q),
+          width_(columns.count_c + 2),
+          memory_(std::size_t(2 * rows_ + 1) * pitch_ + std::size_t(rows_ + 3) * width_),
+          sums_(memory_.data()), values_(sums_ + std::size_t(rows_) * pitch_),
+          mixed_(values_ + std::size_t(rows_) * pitch_), slid_(mixed_ + pitch_),
+          line_(slid_ + std::size_t(rows_ + 1) * width_), depth_(line_ + width_), slid_range_(rows_ + 1),
+          filled_(rows_), stride_(field.stride(LATERAL[axis_][1])) {}
+
+    // Goes on to plane k. False if none of the voxels beside these columns is in a span.
+    SMOKELIFT_INLINE bool enter(int k) {
+        k_ = k;
+        shift_b_ = columns_.shift(0, k);
+        shift_c_ = columns_.shift(1, k);
+        fraction_b_ = columns_.fraction(0, k);
+        fraction_c_ = columns_.fraction(1, k);
+        first_row_ = std::max(0, columns_.filled_rows[k][0] - begin_ - shift_b_);
+        end_row_ = std::min(rows_ + 1, columns_.filled_rows[k][1] - begin_ - shift_b_);
+        first_column_ = std::max(0, first_row_ - 1);
+        end_column_ = std::min(rows_, end_row_);
+        return first_row_ < end_row_;
+    }
+
+    // The field where the columns meet the plane.
+    SMOKELIFT_INLINE void sample() {
+        slide_voxels();
+        mix_slid();
+        for (int r = first_row_; r < end_row_; ++r) {
+            float *const row = slid_ + std::size_t(r) * width_;
+            std::fill(row + slid_range_[r][0], row + slid_range_[r][1], 0.0f);
+            slid_range_[r] = {0, 0};
+        }
+    }
+
+    // visit(k, i, first, end, depth) for the rows of voxels between these columns: sums up to their centres,
+    // that is with half of the plane's own value.
+    template <class Visit> SMOKELIFT_INLINE void visit_voxels(const Visit &visit) const {
+        const float f = fraction_b_, g = fraction_c_;
+        float *const __restrict mixed = mixed_, *const __restrict depth = depth_;
+        for (int r = first_column_; r < std::min(rows_ - 1, end_row_ - 1); ++r) {
+            const int i = voxel_row(r + 1); // between columns r and r + 1
+            const auto &span = columns_.spans.row(axis_, k_, i);
+            const int first = span[0], count = span[1] - span[0];
+            if (count <= 0)
+                continue;
+            const int q = first - shift_c_ - 1 - columns_.first_q;
+            const float *__restrict s0 = sums_ + std::size_t(r) * pitch_ + q, *__restrict s1 = s0 + pitch_;
+            const float *__restrict v0 = values_ + std::size_t(r) * pitch_ + q, *__restrict v1 = v0 + pitch_;
+            for (int c = 0; c <= count; ++c)
+                mixed[c] = f * (s0[c] + 0.5f * v0[c]) + (1 - f) * (s1[c] + 0.5f * v1[c]);
+            for (int c = 0; c < count; ++c)
+                depth[c] = g * mixed[c] + (1 - g) * mixed[c + 1];
+            visit(k_, i, first, span[1], depth_);
+        }
+    }
+
+    // Adds the plane to the sums.
+    SMOKELIFT_INLINE void leave() {
+        for (int r = first_column_; r < end_column_; ++r) {
+            float *__restrict sum = sums_ + std::size_t(r) * pitch_;
+            float *__restrict value = values_ + std::size_t(r) * pitch_;
+            for (int q = filled_[r][0]; q < filled_[r][1]; ++q) {
+                sum[q] += value[q];
+                value[q] = 0;
+            }
+        }
+    }
+
+private:
+    // The row of voxels before row r of columns.
+    SMOKELIFT_INLINE int voxel_row(int r) const { return begin_ + r + shift_b_; }
+
+    // slid[1 + c] is between voxels c and c + 1.
+    SMOKELIFT_INLINE void slide_voxels() {
+        const float g = fraction_c_;
+        for (int r = first_row_; r < end_row_; ++r) {
+            const int i = voxel_row(r);
+            const auto &span = columns_.spans.row(axis_, k_, i);
+            const int count = span[1] - span[0];
+            if (count <= 0)
+                continue;
+            load_row(field_.at(axis_, k_, i, span[0]), stride_, count, line_ + 1);
+            line_[0] = line_[count + 1] = 0;
+            const float *const line = line_;
+            float *__restrict out = slid_ + std::size_t(r) * width_ + span[0];
+            for (int c = 0; c <= count; ++c)
+                out[c] = line[c] + g * (line[c + 1] - line[c]);
+            slid_range_[r] = {span[0], span[1] + 1};
+        }
+    }
+
+    SMOKELIFT_INLINE void mix_slid() {
+        const float f = fraction_b_;
+        const int to_q = -1 - shift_c_ - columns_.first_q; // number of the column at slid[0]
+        for (int r = first_column_; r < end_column_; ++r) {
+            const auto [first, end] = joined(slid_range_[r], slid_range_[r + 1]);
+            const float *__restrict near = slid_ + std::size_t(r) * width_, *__restrict far = near + width_;
+            float *__restrict value = values_ + std::size_t(r) * pitch_ + to_q;
+            for (int c = first; c < end; ++c)
+                value[c] = near[c] + f * (far[c] - near[c]);
+            filled_[r] = {first + to_q, end + to_q};
+        }
+    }
+
+    const Columns &columns_;
+    const Voxels &field_;
+    const int axis_, begin_, rows_; // first row of columns, and how many
+    const int pitch_, width_;       // columns in a row, and voxels with their border
+    std::vector<float> memory_;
+    float *const sums_, *const values_; // of the planes before, of this one: (rows, pitch)
+    float *const mixed_;                // a row of columns
+    float *const slid_;                 // (rows + 1, width)
+    float *const line_, *const depth_;  // rows of voxels
+    // where rows of `slid` and of `values` are not zero
+    std::vector<Span> slid_range_, filled_;
+    const Stride stride_;
+
+    // of the plane: the whole part of its shift and the rest; rows of voxels that are not empty, counted like
+    // the rows of columns before them; the rows of columns beside those
+    int k_ = 0, shift_b_ = 0, shift_c_ = 0;
+    float fraction_b_ = 0, fraction_c_ = 0;
+    int first_row_ = 0, end_row_ = 0, first_column_ = 0, end_column_ = 0;
+};
 
 // Takes task number `task` of the columns through the field (its first float of each voxel). visit(k, i,
 // first, end, depth) gets the sums along the light's way, in units of (value of the field) x planes, for a
 // row of voxels.
 template <class Visit>
 SMOKELIFT_INLINE void sweep(const Columns &columns, const Voxels &field, int task, const Visit &visit) {
-    const ParallelLight &light = columns.light;
-    const int begin = columns.first_p + task * ROWS_PER_TASK;
-    const int rows = std::min(columns.end_p - begin, ROWS_PER_TASK + 1);
-    const int pitch = columns.count_q, count_c = columns.count_c;
-    const int width = count_c + 2; // a row of voxels with its border
-    std::vector<float> memory(std::size_t(2 * rows + 1) * pitch + std::size_t(rows + 3) * width);
-    float *const sums = memory.data(), *const values = sums + std::size_t(rows) * pitch;
-    float *const mixed = values + std::size_t(rows) * pitch, *const slid = mixed + pitch,
-                 *const line = slid + std::size_t(rows + 1) * width, *const depth = line + width;
-    // where rows of `slid` and of `values` are not zero
-    std::vector<std::array<int, 2>> slid_range(rows + 1), filled(rows);
-    const Stride stride = field.stride(LATERAL[light.axis][1]);
-
+    Rows rows(columns, field, task);
     for (int step = 0; step < columns.planes; ++step) {
-        const int k = light.travel > 0 ? step : columns.planes - 1 - step;
-        const int shift_b = columns.shift(0, k), shift_c = columns.shift(1, k);
-        const float f = columns.fraction(0, k), g = columns.fraction(1, k);
-        // rows of voxels that are not empty, counted like the rows of columns before them
-        const int first_row = std::max(0, columns.filled_rows[k][0] - begin - shift_b),
-                  end_row = std::min(rows + 1, columns.filled_rows[k][1] - begin - shift_b);
-        if (first_row >= end_row)
+        if (!rows.enter(columns.light.travel > 0 ? step : columns.planes - 1 - step))
             continue;
-        const int first_column = std::max(0, first_row - 1), end_column = std::min(rows, end_row);
-        // rows of voxels, slid along themselves to where the columns are: slid[1 + c] is between c and c + 1
-        for (int r = first_row; r < end_row; ++r) {
-            const int i = begin + r + shift_b;
-            const auto &span = columns.spans.row(light.axis, k, i);
-            const int count = span[1] - span[0];
-            if (count <= 0)
-                continue;
-            load_row(field.at(light.axis, k, i, span[0]), stride, count, line + 1);
-            line[0] = line[count + 1] = 0;
-            float *__restrict out = slid + std::size_t(r) * width + span[0];
-            for (int c = 0; c <= count; ++c)
-                out[c] = line[c] + g * (line[c + 1] - line[c]);
-            slid_range[r] = {span[0], span[1] + 1};
-        }
-        const int to_q = -1 - shift_c - columns.first_q; // number of the column at slid[0]
-        for (int r = first_column; r < end_column; ++r) {
-            const auto [first, end] = joined(slid_range[r], slid_range[r + 1]);
-            const float *__restrict near = slid + std::size_t(r) * width, *__restrict far = near + width;
-            float *__restrict value = values + std::size_t(r) * pitch + to_q;
-            for (int c = first; c < end; ++c)
-                value[c] = near[c] + f * (far[c] - near[c]);
-            filled[r] = {first + to_q, end + to_q};
-        }
-        for (int r = first_row; r < end_row; ++r) {
-            std::fill(slid + std::size_t(r) * width + slid_range[r][0],
-                      slid + std::size_t(r) * width + slid_range[r][1], 0.0f);
-            slid_range[r] = {0, 0};
-        }
-        for (int r = first_column; r < std::min(rows - 1, end_row - 1); ++r) {
-            const int i = begin + r + shift_b + 1; // the row of voxels between columns r and r + 1
-            const auto &span = columns.spans.row(light.axis, k, i);
-            const int first = span[0], count = span[1] - span[0];
-            if (count <= 0)
-                continue;
-            const int q = first - shift_c - 1 - columns.first_q;
-            const float *__restrict s0 = sums + std::size_t(r) * pitch + q, *__restrict s1 = s0 + pitch;
-            const float *__restrict v0 = values + std::size_t(r) * pitch + q, *__restrict v1 = v0 + pitch;
-            for (int c = 0; c <= count; ++c)
-                mixed[c] = f * (s0[c] + 0.5f * v0[c]) + (1 - f) * (s1[c] + 0.5f * v1[c]);
-            for (int c = 0; c < count; ++c)
-                depth[c] = g * mixed[c] + (1 - g) * mixed[c + 1];
-            visit(k, i, first, span[1], depth);
-        }
-        for (int r = first_column; r < end_column; ++r) {
-            float *__restrict sum = sums + std::size_t(r) * pitch;
-            float *__restrict value = values + std::size_t(r) * pitch;
-            for (int q = filled[r][0]; q < filled[r][1]; ++q) {
-                sum[q] += value[q];
-                value[q] = 0;
-            }
-        }
+        rows.sample();
+        rows.visit_voxels(visit);
+        rows.leave();
     }
 }
 

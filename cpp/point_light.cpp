@@ -19,7 +19,7 @@
 namespace smokelift {
 namespace {
 
-constexpr int ROWS_PER_TASK = 8;
+constexpr int ROWS_PER_TASK = 8; // of columns
 
 // A face with the light it belongs to, over a grid.
 struct Cone : PointLight::Face {
@@ -46,7 +46,7 @@ struct Cone : PointLight::Face {
         return axis < lateral ? across <= distance : across < distance;
     }
     // The voxels of a lateral axis that belong to this face, first and end.
-    std::array<int, 2> owned(int lateral, int count, double distance) const {
+    Span owned(int lateral, int count, double distance) const {
         int first = index_within(std::floor(light[lateral] - distance), 0, count);
         int end = index_within(std::ceil(light[lateral] + distance) + 1, 0, count);
         while (first < end && !owns(lateral, first, distance))

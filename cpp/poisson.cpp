@@ -78,12 +78,11 @@ void Poisson::solve(Out f, Workers &workers) const {
         last.assign(nz, 0);
         for (int i = 0; i < nx; ++i) {
             // A missing neighbour takes 1 from the diagonal at a wall and adds 1 at an open side.
-            const double end = (i > 0            ? 0
-                                : box_.closed[0] ? -1
-                                                 : 1) +
-                               (i < nx - 1       ? 0
-                                : box_.closed[1] ? -1
-                                                 : 1);
+            double end = 0;
+            if (i == 0)
+                end += box_.closed[0] ? -1 : 1;
+            if (i == nx - 1)
+                end += box_.closed[1] ? -1 : 1;
             eliminate(pivots.data() + std::size_t(i) * nz, last.data(), z_square_.data(), y_square_[j], end,
                       nz);
         }

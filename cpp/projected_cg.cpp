@@ -8,6 +8,19 @@
 
 namespace smokelift {
 
+namespace {
+
+// Steps that may pass without a new least gradient. In single precision the gradient stops falling somewhere,
+// and steps beyond that lead away from the minimum; far from there it may rise for a while all the same.
+constexpr double NEAR_ROUNDING = 1e-8; // square of the gradient, over that of the fluid at rest
+constexpr int PATIENCE_FAR = 20, PATIENCE_NEAR = 1;
+
+int patience(double least, double reference) {
+    return least > NEAR_ROUNDING * reference ? PATIENCE_FAR : PATIENCE_NEAR;
+}
+
+} // namespace
+
 Figures projected_cg(const LeastSquares &problem, StaggeredField &b, double tolerance, int limit,
                      const StaggeredOut &u, Workers &workers) {
     Figures figures;
@@ -31,11 +44,9 @@ Figures projected_cg(const LeastSquares &problem, StaggeredField &b, double tole
 
     // The square of the projected gradient; the limit is relative to what the images ask of a fluid at rest.
     const double goal = tolerance * tolerance * reference;
-    // In single precision the gradient stops falling somewhere; steps beyond that lead away from the minimum.
-    // Far from there it may rise for a while all the same.
-    const auto patience = [&](double least) { return least > 1e-8 * reference ? 20 : 1; };
     double best = squared, before = 0;
-    for (int stalled = 0; squared > goal && stalled < patience(best) && figures.iterations < limit;) {
+    for (int stalled = 0;
+         squared > goal && stalled < patience(best, reference) && figures.iterations < limit;) {
         spectral.descend(before > 0 ? float(squared / before) : 0, search.out(), workers);
         const double curvature = problem.apply(search.in(), product, workers);
         const float step = float(squared / curvature);

@@ -54,9 +54,7 @@ void require_parts(const Integers &first, py::ssize_t parts, py::ssize_t whole) 
 
 const unsigned char *bytes_of(const Marks &a) { return reinterpret_cast<const unsigned char *>(a.data()); }
 
-} // namespace
-
-void register_pictures(py::module_ &module) {
+void register_places(py::module_ &module) {
     using namespace py::literals;
 
     py::class_<PictureMap>(module, "PictureMap")
@@ -106,6 +104,10 @@ void register_pictures(py::module_ &module) {
             return values;
         },
         "picture"_a, "rows"_a, "columns"_a);
+}
+
+void register_codes(py::module_ &module) {
+    using namespace py::literals;
 
     module.def(
         "sum_lines",
@@ -159,6 +161,30 @@ void register_pictures(py::module_ &module) {
         "picture"_a, "table"_a, "weights"_a, "lines"_a, "columns"_a, py::arg("sums").noconvert());
 
     module.def(
+        "interleave",
+        [](const std::array<Codes, 3> &channels) {
+            std::array<CodedLines, 3> planes;
+            for (int c = 0; c < 3; ++c) {
+                const Codes &plane = channels[c];
+                require_fit(plane.ndim() == 2 && plane.strides(1) == 1 &&
+                            std::equal(plane.shape(), plane.shape() + 2, channels[0].shape()));
+                planes[c] = {plane.data(), plane.strides(0), int(plane.shape(0)), int(plane.shape(1))};
+            }
+            py::array_t<unsigned char> codes({channels[0].shape(0), channels[0].shape(1), py::ssize_t(3)});
+            unsigned char *const result = codes.mutable_data();
+            {
+                const py::gil_scoped_release unlocked;
+                interleave(planes, result);
+            }
+            return codes;
+        },
+        "channels"_a);
+}
+
+void register_filters(py::module_ &module) {
+    using namespace py::literals;
+
+    module.def(
         "blur_picture",
         [](const Array &picture, const Doubles &weights) {
             require_fit((picture.ndim() == 2 || picture.ndim() == 3) && picture.size() > 0);
@@ -193,26 +219,14 @@ void register_pictures(py::module_ &module) {
             return found;
         },
         "values"_a, "ranks"_a);
+}
 
-    module.def(
-        "interleave",
-        [](const std::array<Codes, 3> &channels) {
-            std::array<CodedLines, 3> planes;
-            for (int c = 0; c < 3; ++c) {
-                const Codes &plane = channels[c];
-                require_fit(plane.ndim() == 2 && plane.strides(1) == 1 &&
-                            std::equal(plane.shape(), plane.shape() + 2, channels[0].shape()));
-                planes[c] = {plane.data(), plane.strides(0), int(plane.shape(0)), int(plane.shape(1))};
-            }
-            py::array_t<unsigned char> codes({channels[0].shape(0), channels[0].shape(1), py::ssize_t(3)});
-            unsigned char *const result = codes.mutable_data();
-            {
-                const py::gil_scoped_release unlocked;
-                interleave(planes, result);
-            }
-            return codes;
-        },
-        "channels"_a);
+} // namespace
+
+void register_pictures(py::module_ &module) {
+    register_places(module);
+    register_codes(module);
+    register_filters(module);
 }
 
 } // namespace smokelift

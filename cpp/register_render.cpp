@@ -104,6 +104,8 @@ void require_around(const Blocks &blocks, const Support &support) {
                         (2 * blocks.n[axis] - 1) * blocks.size);
 }
 
+using Light = std::variant<ParallelLight, PointLight>;
+
 // Zeros that get memory where they are touched.
 Array zeros(const std::vector<py::ssize_t> &shape) {
     std::size_t size = 1;
@@ -115,14 +117,39 @@ Array zeros(const std::vector<py::ssize_t> &shape) {
     return array_of(std::move(values), shape);
 }
 
-} // namespace
-
-void register_render(py::module_ &module) {
+void register_voxels(py::module_ &module) {
     using namespace py::literals;
 
     module.def("zeros", &zeros, "shape"_a);
 
     py::class_<Support>(module, "Support").def(py::init<const SupportMarks &>(), "marked"_a);
+
+    module.def(
+        "pack",
+        [](const py::array_t<float> &density, const std::array<int, 3> &corner, const Support &support,
+           float extinction, Floats medium) {
+            const auto box = box_of<const float>(density, density.data(), support, corner);
+            const Voxels voxels = voxels_of(medium, support);
+            released([&](Workers &workers) {
+                pack(box, support.marked.data(), extinction, support.spans, voxels, workers);
+            });
+        },
+        "density"_a.noconvert(), "corner"_a, "support"_a, "extinction"_a, "medium"_a.noconvert());
+
+    module.def(
+        "unpack",
+        [](Floats gradient, const Support &support, float extinction, py::array_t<float> result,
+           const std::array<int, 3> &corner) {
+            const Voxels voxels = voxels_of(gradient, support);
+            const auto box = box_of<float>(result, result.mutable_data(), support, corner);
+            released(
+                [&](Workers &workers) { unpack(voxels, support.marked.data(), extinction, box, workers); });
+        },
+        "gradient"_a.noconvert(), "support"_a, "extinction"_a, "result"_a.noconvert(), "corner"_a);
+}
+
+void register_lights(py::module_ &module) {
+    using namespace py::literals;
 
     py::class_<Phase>(module, "Phase")
         .def(py::init([](const std::array<std::array<float, 4>, 3> &to_eye, float albedo, float anisotropy) {
@@ -154,46 +181,6 @@ void register_render(py::module_ &module) {
              }),
              py::kw_only(), "position"_a, "energy"_a, "voxel_size"_a, "faces"_a);
 
-    py::class_<OwnedRays>(module, "Rays")
-        .def(py::init<const Floats &, const Floats &, const Integers &>(), "lines"_a, "length"_a, "planes"_a)
-        .def(
-            "clip",
-            [](OwnedRays &self, const Support &support, Floats medium) {
-                const Voxels voxels = voxels_of(medium, support);
-                released([&](Workers &workers) { clip(voxels, self.rays, workers); });
-            },
-            "support"_a, "medium"_a.noconvert())
-        .def_property_readonly("samples", [](const OwnedRays &self) {
-            std::size_t count = 0;
-            for (std::size_t ray = 0; ray < self.rays.pixels(); ++ray)
-                count += std::max(0, self.rays.planes[4 * ray + 3] - self.rays.planes[4 * ray + 2] + 1);
-            return count;
-        });
-
-    module.def(
-        "pack",
-        [](const py::array_t<float> &density, const std::array<int, 3> &corner, const Support &support,
-           float extinction, Floats medium) {
-            const auto box = box_of<const float>(density, density.data(), support, corner);
-            const Voxels voxels = voxels_of(medium, support);
-            released([&](Workers &workers) {
-                pack(box, support.marked.data(), extinction, support.spans, voxels, workers);
-            });
-        },
-        "density"_a.noconvert(), "corner"_a, "support"_a, "extinction"_a, "medium"_a.noconvert());
-
-    module.def(
-        "unpack",
-        [](Floats gradient, const Support &support, float extinction, py::array_t<float> result,
-           const std::array<int, 3> &corner) {
-            const Voxels voxels = voxels_of(gradient, support);
-            const auto box = box_of<float>(result, result.mutable_data(), support, corner);
-            released(
-                [&](Workers &workers) { unpack(voxels, support.marked.data(), extinction, box, workers); });
-        },
-        "gradient"_a.noconvert(), "support"_a, "extinction"_a, "result"_a.noconvert(), "corner"_a);
-
-    using Light = std::variant<ParallelLight, PointLight>;
     module.def(
         "shade",
         [](Floats medium, const Support &support, const Phase &phase, const std::vector<Light> &lights) {
@@ -231,6 +218,26 @@ void register_render(py::module_ &module) {
         },
         "medium"_a.noconvert(), "gradient"_a.noconvert(), "scratch"_a.noconvert(), "support"_a, "phase"_a,
         "lights"_a);
+}
+
+void register_camera(py::module_ &module) {
+    using namespace py::literals;
+
+    py::class_<OwnedRays>(module, "Rays")
+        .def(py::init<const Floats &, const Floats &, const Integers &>(), "lines"_a, "length"_a, "planes"_a)
+        .def(
+            "clip",
+            [](OwnedRays &self, const Support &support, Floats medium) {
+                const Voxels voxels = voxels_of(medium, support);
+                released([&](Workers &workers) { clip(voxels, self.rays, workers); });
+            },
+            "support"_a, "medium"_a.noconvert())
+        .def_property_readonly("samples", [](const OwnedRays &self) {
+            std::size_t count = 0;
+            for (std::size_t ray = 0; ray < self.rays.pixels(); ++ray)
+                count += std::max(0, self.rays.planes[4 * ray + 3] - self.rays.planes[4 * ray + 2] + 1);
+            return count;
+        });
 
     module.def(
         "march",
@@ -267,6 +274,10 @@ void register_render(py::module_ &module) {
         "rays"_a, "depth"_a.noconvert(), "scattered_gradient"_a.noconvert(),
         "transmittance_gradient"_a.noconvert(), "record"_a.noconvert(), "gradient"_a.noconvert(),
         "support"_a);
+}
+
+void register_diffuse_light(py::module_ &module) {
+    using namespace py::literals;
 
     py::class_<Blocks>(module, "Blocks")
         .def(py::init([](const std::array<int, 3> &shape, int size, const std::array<int, 3> &offset) {
@@ -371,6 +382,15 @@ void register_render(py::module_ &module) {
         },
         "means"_a.noconvert(), "radiance"_a.noconvert(), "radiance_gradient"_a.noconvert(), "albedo"_a,
         "edge"_a);
+}
+
+} // namespace
+
+void register_render(py::module_ &module) {
+    register_voxels(module);
+    register_lights(module);
+    register_camera(module);
+    register_diffuse_light(module);
 }
 
 } // namespace smokelift

@@ -16,7 +16,7 @@ template <int W> struct VectorOf {
     typedef float type __attribute__((vector_size(4 * W), aligned(4), may_alias));
 };
 
-// R rows by W columns of c stay in registers while k runs.
+// c = a b for R rows of a (R, k) and W columns of b (k, W); the rows of c stay in registers while k runs.
 template <int R, int W>
 SMOKELIFT_INLINE void tile(int k, const float *__restrict a, Stride lda, const float *__restrict b,
                            Stride ldb, float *__restrict c, Stride ldc) {
@@ -33,6 +33,7 @@ SMOKELIFT_INLINE void tile(int k, const float *__restrict a, Stride lda, const f
         *reinterpret_cast<Vector *>(c + r * ldc) = sum[r];
 }
 
+// The same for m rows.
 template <int W>
 SMOKELIFT_INLINE void stripe(int m, int k, const float *a, Stride lda, const float *b, Stride ldb, float *c,
                              Stride ldc) {
@@ -100,55 +101,68 @@ LineTransform::LineTransform(Transform transform, int n, int first, int count) :
     }
 }
 
-// Plans a transform of points start, start + stride, ...; says where its modes will be.
+// Plans a transform of points start, start + stride, ...; says in which row each of its modes will be.
 std::vector<int> LineTransform::split(Transform transform, int n, const std::vector<int> &modes, int start,
                                       int stride) {
+    if (n <= dense || n % 2)
+        return leave_dense(transform, n, modes, start, stride);
+    return has_half_modes(transform) ? split_pairs(transform, n, start, stride)
+                                     : split_parities(transform, n, modes, start, stride);
+}
+
+std::vector<int> LineTransform::leave_dense(Transform transform, int n, const std::vector<int> &modes,
+                                            int start, int stride) {
+    std::vector<int> rows(modes.size());
+    Leaf leaf;
+    leaf.start = start;
+    leaf.stride = stride;
+    leaf.points = points_of(transform, n);
+    leaf.count = int(modes.size());
+    leaf.first = leaves_.empty() ? 0 : leaves_.back().first + leaves_.back().count;
+    leaf.analysis.resize(std::size_t(leaf.count) * leaf.points);
+    leaf.synthesis.resize(leaf.analysis.size());
+    for (int m = 0; m < leaf.count; ++m) {
+        rows[m] = leaf.first + m;
+        for (int i = 0; i < leaf.points; ++i) {
+            const float x = float(value(transform, n, modes[m], i));
+            leaf.analysis[std::size_t(m) * leaf.points + i] = x;
+            leaf.synthesis[std::size_t(i) * leaf.count + m] = x;
+        }
+    }
+    leaves_.push_back(std::move(leaf));
+    return rows;
+}
+
+// Types I and II: modes of even and odd number are symmetric about the middle or antisymmetric.
+std::vector<int> LineTransform::split_parities(Transform transform, int n, const std::vector<int> &modes,
+                                               int start, int stride) {
     const auto row = [&](int i) { return start + i * stride; };
     const bool cosine = is_cosine(transform);
-    const int half = n / 2;
+    std::vector<int> even, odd;
+    for (int mode : modes)
+        (mode % 2 ? odd : even).push_back(mode / 2);
+    const int last = points_of(transform, n) - 1;
+    for (int i = 0; i < last - i; ++i)
+        before_.push_back({row(i), row(last - i), 1, 1, 1, -1});
+    const int end = row(last);                             // the differences lie from there backwards
+    const auto half_modes = Transform(int(transform) + 4); // of the same kind
+    const auto even_rows = split(transform, n / 2, even, cosine ? start : end, cosine ? stride : -stride);
+    const auto odd_rows = split(half_modes, n / 2, odd, cosine ? end : start, cosine ? -stride : stride);
+    auto next_even = even_rows.begin(), next_odd = odd_rows.begin();
     std::vector<int> rows(modes.size());
-    if (n <= dense || n % 2) {
-        Leaf leaf;
-        leaf.start = start;
-        leaf.stride = stride;
-        leaf.points = points_of(transform, n);
-        leaf.count = int(modes.size());
-        leaf.first = leaves_.empty() ? 0 : leaves_.back().first + leaves_.back().count;
-        leaf.analysis.resize(std::size_t(leaf.count) * leaf.points);
-        leaf.synthesis.resize(leaf.analysis.size());
-        for (int m = 0; m < leaf.count; ++m) {
-            rows[m] = leaf.first + m;
-            for (int i = 0; i < leaf.points; ++i) {
-                const float x = float(value(transform, n, modes[m], i));
-                leaf.analysis[std::size_t(m) * leaf.points + i] = x;
-                leaf.synthesis[std::size_t(i) * leaf.count + m] = x;
-            }
-        }
-        leaves_.push_back(std::move(leaf));
-        return rows;
-    }
-    if (!has_half_modes(transform)) {
-        // Modes of even and odd number are symmetric about the middle or antisymmetric.
-        std::vector<int> even, odd;
-        for (int mode : modes)
-            (mode % 2 ? odd : even).push_back(mode / 2);
-        const int last = points_of(transform, n) - 1;
-        for (int i = 0; i < last - i; ++i)
-            before_.push_back({row(i), row(last - i), 1, 1, 1, -1});
-        const int end = row(last);                             // the differences lie from there backwards
-        const auto half_modes = Transform(int(transform) + 4); // of the same kind
-        const auto of_even = split(transform, half, even, cosine ? start : end, cosine ? stride : -stride);
-        const auto of_odd = split(half_modes, half, odd, cosine ? end : start, cosine ? -stride : stride);
-        auto e = of_even.begin(), o = of_odd.begin();
-        for (std::size_t m = 0; m < modes.size(); ++m)
-            rows[m] = modes[m] % 2 ? *o++ : *e++;
-        return rows;
-    }
-    // Modes m and n - 1 - m are the same on every second point, and opposite on the others (III), or sums and
-    // differences of neighbours turned by half the angle of m (IV).
-    const bool whole = !on_centres(transform);
+    for (std::size_t m = 0; m < modes.size(); ++m)
+        rows[m] = modes[m] % 2 ? *next_odd++ : *next_even++;
+    return rows;
+}
+
+// Types III and IV, all n modes: m and n - 1 - m are the same on every second point, and opposite on the
+// others (III), or sums and differences of neighbours turned by half the angle of m (IV).
+std::vector<int> LineTransform::split_pairs(Transform transform, int n, int start, int stride) {
+    const auto row = [&](int i) { return start + i * stride; };
+    const bool cosine = is_cosine(transform), on_faces = !on_centres(transform);
+    const int half = n / 2;
     std::vector<int> a, b;
-    if (whole) {
+    if (on_faces) {
         a = split(transform, half, count_up(half), row(cosine ? 0 : 1), 2 * stride);
         b = split(cosine ? Transform::dct4 : Transform::dst4, half, count_up(half), row(cosine ? 1 : 0),
                   2 * stride);
@@ -158,10 +172,11 @@ std::vector<int> LineTransform::split(Transform transform, int n, const std::vec
         a = split(transform, half, count_up(half), row(0), 2 * stride);
         b = split(cosine ? Transform::dst4 : Transform::dct4, half, count_up(half), row(1), 2 * stride);
     }
+    std::vector<int> rows(n);
     for (int m = 0; m < half; ++m) {
         const double angle = (m + 0.5) * std::acos(-1.0) / n / 2;
         const float c = float(std::cos(angle)), s = float(std::sin(angle));
-        if (whole)
+        if (on_faces)
             after_.push_back({a[m], b[m], 1, 1, cosine ? 1.0f : -1.0f, cosine ? -1.0f : 1.0f});
         else
             after_.push_back({a[m], b[m], c, cosine ? s : -s, cosine ? -s : s, c});

@@ -47,6 +47,11 @@ private:
     };
 
     std::vector<int> split(Transform transform, int n, const std::vector<int> &modes, int start, int stride);
+    std::vector<int> leave_dense(Transform transform, int n, const std::vector<int> &modes, int start,
+                                 int stride);
+    std::vector<int> split_parities(Transform transform, int n, const std::vector<int> &modes, int start,
+                                    int stride);
+    std::vector<int> split_pairs(Transform transform, int n, int start, int stride);
     void analyse(float *points, float *modes) const;
     void synthesise(float *modes, float *points) const;
 

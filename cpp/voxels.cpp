@@ -6,16 +6,6 @@
 namespace smokelift {
 namespace {
 
-using Span = std::array<int, 2>;
-
-Span both(const Span &a, const Span &b) {
-    if (a[0] >= a[1])
-        return b;
-    if (b[0] >= b[1])
-        return a;
-    return {std::min(a[0], b[0]), std::max(a[1], b[1])};
-}
-
 // Ranges of a table of rows, each joined with its eight neighbours' and made one longer at both ends.
 std::vector<Span> around(const std::vector<Span> &rows, int count_a, int count_b, int length) {
     std::vector<Span> result(rows.size());
@@ -24,7 +14,7 @@ std::vector<Span> around(const std::vector<Span> &rows, int count_a, int count_b
             Span span{0, 0};
             for (int i = std::max(a - 1, 0); i <= std::min(a + 1, count_a - 1); ++i)
                 for (int j = std::max(b - 1, 0); j <= std::min(b + 1, count_b - 1); ++j)
-                    span = both(span, rows[std::size_t(i) * count_b + j]);
+                    span = joined(span, rows[std::size_t(i) * count_b + j]);
             if (span[0] < span[1])
                 span = {std::max(span[0] - 1, 0), std::min(span[1] + 1, length)};
             result[std::size_t(a) * count_b + b] = span;
@@ -44,9 +34,9 @@ Spans spans_around(const unsigned char *marked, const Shape &n) {
             Span &z_span = along_z[std::size_t(x) * n[1] + y];
             for (int z = 0; z < n[2]; ++z) {
                 if (row[z]) {
-                    z_span = both(z_span, {z, z + 1});
+                    z_span = joined(z_span, {z, z + 1});
                     Span &y_span = along_y[std::size_t(x) * n[2] + z];
-                    y_span = both(y_span, {y, y + 1});
+                    y_span = joined(y_span, {y, y + 1});
                 }
             }
         }

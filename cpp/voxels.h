@@ -5,6 +5,7 @@
 
 #include "threads.h"
 
+#include <algorithm>
 #include <cstddef>
 #include <vector>
 
@@ -35,13 +36,25 @@ struct Voxels {
     }
 };
 
+// A range of a row: first and end. Empty where first is not before end.
+using Span = std::array<int, 2>;
+
+// The shortest range that holds both.
+SMOKELIFT_INLINE Span joined(const Span &a, const Span &b) {
+    if (a[0] >= a[1])
+        return b;
+    if (b[0] >= b[1])
+        return a;
+    return {std::min(a[0], b[0]), std::max(a[1], b[1])};
+}
+
 // Ranges of rows of voxels: along z by (x, y), and along y by (x, z).
 struct Spans {
-    std::vector<std::array<int, 2>> along_z, along_y; // first and end
+    std::vector<Span> along_z, along_y;
     Shape n{};
 
     // The row at lateral position i of plane k across an axis.
-    const std::array<int, 2> &row(int axis, int k, int i) const {
+    const Span &row(int axis, int k, int i) const {
         return axis == 0   ? along_z[std::size_t(k) * n[1] + i]
                : axis == 1 ? along_z[std::size_t(i) * n[1] + k]
                            : along_y[std::size_t(i) * n[2] + k];
