@@ -1,4 +1,4 @@
-// Eigenvectors of the differences along one axis of the MAC grid.
+// Eigenvectors of the differences along one axis of the MAC grid, in units of one cell.
 #pragma once
 
 #include "trigonometric.h"

@@ -33,8 +33,7 @@ constexpr int DIAGONAL_Y[DIAGONALS] = {1, 1, -1, -1}, DIAGONAL_Z[DIAGONALS] = {1
 // What an axis's beams carry: the mean with the slope along, and the two slopes across.
 constexpr int CARRIED = 3;
 
-// Which parts of a flight tasks make, and how many fields each leaves.
-constexpr int AXES = 3, WAYS = 2;
+constexpr int AXES = 3, WAYS = 2;  // x, y, z; forth (1) and back (-1)
 constexpr int DIAGONAL_FIELDS = 3; // sums of what arrives, of that with the direction's sign along y, along z
 
 // Series in t, to rounding for t below THIN.

@@ -11,9 +11,9 @@
 
 namespace smokelift {
 
-// Where blocks lie in memory, z fastest: behind each row and behind each plane across x is a border, which
-// nothing leaves. It is also what lies before the next, so that the neighbour in any direction is one offset
-// away, and a whole plane is one loop.
+// Where blocks lie in memory, [x][y][z] with z fastest: behind each row and behind each plane across x is a
+// border, which nothing leaves. It is also what lies before the next, so that the neighbour in any direction
+// is one offset away, and a whole plane is one loop.
 struct Lattice {
     static constexpr int LANES = 8; // blocks that loops take at once, no row being shorter
 

@@ -24,7 +24,9 @@ namespace smokelift {
 namespace {
 
 constexpr int LANES = Rays::LANES, CHANNELS = 4;
-constexpr int RUNS_PER_TASK = 64, PLANES_PER_TASK = 16, TILE_ROWS = 16, AHEAD = 3;
+constexpr int RUNS_PER_TASK = 64, PLANES_PER_TASK = 16; // portions for a thread
+constexpr int TILE_ROWS = 16;                           // of pixels whose runs follow each other
+constexpr int AHEAD = 3; // planes before a look-up that its voxels are asked for
 
 template <int N> struct Floats {
     typedef float type __attribute__((vector_size(4 * N), aligned(4), may_alias));

@@ -1,4 +1,5 @@
-// Camera rays through the grid: the picture, and its derivative (method sections 1 and 2).
+// Camera rays through the grid: the picture, and its derivative. Eq. 1 to 5 of Cen, Zhang and Liang (2023),
+// with the opacity of a step as 1 - exp(-optical depth); the derivative is that of the sums over samples.
 #pragma once
 
 #include "voxels.h"
@@ -20,9 +21,10 @@ struct Run {
 struct Rays {
     static constexpr int LANES = 16; // pixels of a run, at most
 
-    const float *lines = nullptr;  // b0, b1, c0, c1 of each
-    const float *length = nullptr; // distance between samples, m
-    int *planes = nullptr;         // dominant axis, travel, first and last plane of each; last < first: none
+    const float *lines = nullptr;  // [row][column][4]: b0, b1, c0, c1
+    const float *length = nullptr; // [row][column]: distance between samples, m
+    // [row][column][4]: dominant axis, travel, first and last plane. Last < first: none.
+    int *planes = nullptr;
     int rows = 0, columns = 0;
     std::vector<Run> runs;
 
@@ -45,12 +47,14 @@ struct Record {
 // Shortens every ray to where the voxels around it hold anything, and finds the runs again.
 void clip(const Voxels &medium, Rays &rays, Workers &workers);
 
-// Radiance scattered towards the camera, [row][column][channel], and optical depth of every ray. The record
-// is optional.
+// Radiance scattered towards the camera (W/m^2/sr), [row][column][channel], and optical depth of every ray,
+// [row][column]. The record is optional.
 void march(const Voxels &medium, const Rays &rays, float *scattered, float *depth, const Record &record,
            Workers &workers);
 
-// Turns the recorded samples into derivatives, in place, and adds them to the voxels of `gradient`.
+// Turns the recorded samples into derivatives of the loss, in place, and adds them to the voxels of
+// `gradient`. Given are its derivatives by the radiance scattered along every ray and by the ray's
+// transmittance.
 void march_adjoint(const Rays &rays, const float *depth, const float *scattered_gradient,
                    const float *transmittance_gradient, const Record &record, const Voxels &gradient,
                    Workers &workers);

@@ -23,11 +23,11 @@ void add_line(const unsigned char *__restrict codes, const float *__restrict val
         sums[x] += values[codes[x]];
 }
 
-// `fixed` channels are those that there are, or 0 where that is not known before.
-template <int fixed>
+// `Fixed` channels are those that there are, or 0 where that is not known before.
+template <int Fixed>
 void sum_columns_of(const float *__restrict values, const Extent &picture, const LineWeights &weights,
                     float *__restrict sums) {
-    const int channels = fixed ? fixed : picture.channels;
+    const int channels = Fixed ? Fixed : picture.channels;
     const std::ptrdiff_t width = std::ptrdiff_t(picture.columns) * channels;
     for (int line = 0; line < picture.lines; ++line, values += width) {
         for (int column = 0; column < weights.count; ++column, sums += channels) {

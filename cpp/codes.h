@@ -7,7 +7,7 @@
 
 namespace smokelift {
 
-// Lines of codes, `stride` bytes apart.
+// Lines of codes [line][column and channel], `stride` bytes apart.
 struct CodedLines {
     const unsigned char *codes = nullptr;
     std::ptrdiff_t stride = 0;

@@ -1,4 +1,5 @@
-// The data term: the change between two densities as a linear function of the velocity.
+// The data term: the change between two densities as a linear function of the velocity u, in cells per frame,
+// around a known u_k. Arrays at cell centres, (nx, ny, nz).
 #pragma once
 
 #include "grid.h"

@@ -1,5 +1,5 @@
-// G is symmetric, so I - G scattering is self-adjoint in the product of blocks weighted by the scattering,
-// and conjugate gradients solve for all orders of scattering at once.
+// G is symmetric (block_transport.cpp), so I - G scattering is self-adjoint in the product of blocks weighted
+// by the scattering, and conjugate gradients solve for all orders of scattering at once.
 #include "diffuse_light.h"
 
 #include "vectors.h"

@@ -14,10 +14,12 @@ class DiffuseLight {
 public:
     static constexpr int FIELDS = Blocks::FIELDS;
 
+    // Extinction in 1/m, [x][y][z]; `edge` is that of a block (m).
     DiffuseLight(const float *extinction, float albedo, const Shape &n, float edge);
 
-    // Its mean radiance:  phi = G (emission + albedo extinction phi).  Blocks without extinction emit
-    // nothing. Here arrays have no border: [field][x][y][z].
+    // Its mean radiance (W/m^2/sr), from what blocks emit (W/m^3/sr, the same in all directions):
+    //     phi = G (emission + albedo extinction phi).
+    // Blocks without extinction emit nothing. Arrays are [field][x][y][z], without a border.
     void solve(const float *emission, float *phi, Workers &workers) const;
 
     // From the derivative by phi: that by the emission, and what to add to that by the extinction.

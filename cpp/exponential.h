@@ -12,9 +12,10 @@ struct Attenuation {
     float transmittance, opacity;
 };
 
-// For an optical depth x >= 0: exp(-x) = 2^n exp(r) with |r| <= ln(2) / 2, and exp(r) - 1 as a polynomial, so
-// that the opacity of a thin step keeps its digits. Depths beyond 87 count as 87: 1e-38 is left, never a
-// denormal.
+// For an optical depth x >= 0: exp(-x) = 2^n exp(r) with |r| <= ln(2) / 2, and exp(r) - 1 by its Taylor
+// series up to r^7, so that the opacity of a thin step keeps its digits. ln(2) is taken off in two parts, the
+// first of so few digits that its product with n is exact (Cody and Waite 1980). Depths beyond 87 count as
+// 87: 1e-38 is left, never a denormal.
 SMOKELIFT_INLINE Attenuation attenuation(float x) {
     const float shifted = 1.5f * (1 << 23); // adding it rounds to an integer, which then lies in the low bits
     const float t = x < 87.0f ? -x : -87.0f;

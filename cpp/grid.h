@@ -32,7 +32,7 @@ template <class T> struct Grid {
 
 using In = Grid<const float>;
 using Out = Grid<float>;
-using Mask = Grid<const unsigned char>; // 0 or 1
+using Mask = Grid<const unsigned char>; // 0 or 1, as NumPy's booleans
 
 // The elements with the first index i.
 template <class T> Grid<T> slab(const Grid<T> &a, int i) { return {a.row(i, 0), {1, a.n[1], a.n[2]}}; }

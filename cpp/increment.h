@@ -6,7 +6,7 @@
 
 namespace smokelift {
 
-// Largest magnitude of the difference of two velocities.
+// Largest magnitude of the difference of two velocities, over all components.
 float largest_difference(const StaggeredIn &a, const StaggeredIn &b, Workers &workers);
 
 // u + (solution - u, every component clamped to +- largest), projected, over the solution.

@@ -1,5 +1,6 @@
-// How light reaches the voxels, for one light: J = E p V, and the derivative of that (method sections 1 and
-// 2).
+// How light reaches the voxels, for one light: J = E p V, and the derivative of that. E is the energy of the
+// light, p the phase function times albedo, V the transmittance from the light to the voxel: eq. 4 and 5 of
+// Cen, Zhang and Liang (2023).
 #pragma once
 
 #include "voxels.h"

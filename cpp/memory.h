@@ -18,6 +18,8 @@ namespace smokelift {
 // pages. A large array has pages of its own, which hold zeros and go back to the system with the array. They
 // are large pages where the system has them: in small ones the look-ups of rays would cost as much again.
 template <class T> struct LazyPages {
+    static constexpr std::size_t LARGE_PAGE = std::size_t(1) << 21; // bytes, on x86-64 and most others
+
     using value_type = T;
 
     LazyPages() = default;
@@ -41,7 +43,7 @@ template <class T> struct LazyPages {
         ::operator delete(memory);
     }
     // From one large page on: in smaller pages the rays through a volume of 64 x 64 x 96 take a third longer.
-    static bool is_large(std::size_t n) { return n * sizeof(T) >= std::size_t(1) << 21; }
+    static bool is_large(std::size_t n) { return n * sizeof(T) >= LARGE_PAGE; }
     static bool starts_as_zero(std::size_t n) {
 #if defined(__linux__)
         return is_large(n);
@@ -60,14 +62,13 @@ private:
 #if defined(__linux__)
     // Begins at the boundary of a large page; what lies before it and behind the end is given back at once.
     static void *map(std::size_t bytes) {
-        constexpr std::size_t large = std::size_t(1) << 21;
         const auto small = std::size_t(sysconf(_SC_PAGESIZE));
         void *memory =
-            mmap(nullptr, bytes + large, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+            mmap(nullptr, bytes + LARGE_PAGE, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
         if (memory == MAP_FAILED)
             throw std::bad_alloc();
-        const auto begin = reinterpret_cast<std::uintptr_t>(memory), end = begin + bytes + large;
-        const std::uintptr_t first = (begin + large - 1) / large * large;
+        const auto begin = reinterpret_cast<std::uintptr_t>(memory), end = begin + bytes + LARGE_PAGE;
+        const std::uintptr_t first = (begin + LARGE_PAGE - 1) / LARGE_PAGE * LARGE_PAGE;
         const std::uintptr_t last = (first + bytes + small - 1) / small * small;
         if (first > begin)
             munmap(memory, first - begin);

@@ -8,7 +8,8 @@
 
 namespace smokelift {
 
-// For each component a constant and, if there are slopes, three along x, y, z from -1 to 1.
+// Velocity in cells per frame that smoke of density 1 gains: for each component a constant and, if there are
+// slopes, three along x, y, z from -1 to 1 across the box.
 using MomentumSource = std::vector<std::array<float, 3>>;
 
 // trust * prediction + P(density * source), with P the pressure projection; the prediction is not looked at

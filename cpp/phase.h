@@ -8,11 +8,16 @@
 
 namespace smokelift {
 
+constexpr float PI = 3.14159265f;
+// Least square of a distance to the eye, and least 1 + g^2 - 2 g cosine: nothing is divided by 0.
+constexpr float LEAST_SQUARE = 1e-30f, LEAST_BASE = 1e-6f;
+
 // A value that changes linearly along the row: value(c) = at_0 + c step, in each of the three axes.
 struct RowOfVectors {
     float at_0[3], step[3];
 };
 
+// From the voxels of row i of plane k across an axis to the eye, of any length.
 SMOKELIFT_INLINE RowOfVectors eye_directions(const Phase &phase, int axis, int k, int i) {
     const int b = LATERAL[axis][0], c = LATERAL[axis][1];
     RowOfVectors row{};
@@ -24,9 +29,10 @@ SMOKELIFT_INLINE RowOfVectors eye_directions(const Phase &phase, int axis, int k
     return row;
 }
 
+// Albedo times the numerator of Henyey and Greenstein's phase function (1941), 1/sr.
 SMOKELIFT_INLINE float phase_norm(const Phase &phase) {
     const float g = phase.anisotropy;
-    return phase.albedo * (1 - g * g) / (4 * 3.14159265f);
+    return phase.albedo * (1 - g * g) / (4 * PI);
 }
 
 // albedo x Henyey-Greenstein for voxels first ... end - 1 of a row into out[0 ...].
@@ -45,8 +51,8 @@ SMOKELIFT_INLINE void phase_row(const Phase &phase, const ParallelLight &light, 
         const float x = eye.at_0[0] + at * eye.step[0], y = eye.at_0[1] + at * eye.step[1],
                     z = eye.at_0[2] + at * eye.step[2];
         const float cosine =
-            (l[0] * x + l[1] * y + l[2] * z) / std::sqrt(std::max(x * x + y * y + z * z, 1e-30f));
-        const float base = std::max(1 + g * g - 2 * g * cosine, 1e-6f);
+            (l[0] * x + l[1] * y + l[2] * z) / std::sqrt(std::max(x * x + y * y + z * z, LEAST_SQUARE));
+        const float base = std::max(1 + g * g - 2 * g * cosine, LEAST_BASE);
         out[c] = norm / (base * std::sqrt(base));
     }
 }
@@ -68,8 +74,8 @@ SMOKELIFT_INLINE void phase_row(const Phase &phase, const PointLight &light, int
         const float u = from[0] + at * along[0], v = from[1] + at * along[1], w = from[2] + at * along[2];
         const float square = u * u + v * v + w * w;
         const float cosine =
-            (u * x + v * y + w * z) / std::sqrt(std::max(x * x + y * y + z * z, 1e-30f) * square);
-        const float base = std::max(1 + g * g - 2 * g * cosine, 1e-6f);
+            (u * x + v * y + w * z) / std::sqrt(std::max(x * x + y * y + z * z, LEAST_SQUARE) * square);
+        const float base = std::max(1 + g * g - 2 * g * cosine, LEAST_BASE);
         out[c] = norm / (base * std::sqrt(base) * square);
     }
 }

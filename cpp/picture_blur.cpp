@@ -20,16 +20,16 @@ int mirrored(int i, int n) {
     return i < n ? i : 2 * n - 1 - i;
 }
 
-template <int width>
+template <int Width>
 SMOKELIFT_INLINE void sum_some(const float *middle, double weight, const std::vector<Pair> &pairs,
                                std::size_t from, float *result) {
-    double sum[width];
-    for (int x = 0; x < width; ++x)
+    double sum[Width];
+    for (int x = 0; x < Width; ++x)
         sum[x] = middle[from + x] * weight;
     for (const Pair &pair : pairs)
-        for (int x = 0; x < width; ++x)
+        for (int x = 0; x < Width; ++x)
             sum[x] += (double(pair.before[from + x]) + pair.after[from + x]) * pair.weight;
-    for (int x = 0; x < width; ++x)
+    for (int x = 0; x < Width; ++x)
         result[from + x] = float(sum[x]);
 }
 

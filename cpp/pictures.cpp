@@ -8,6 +8,7 @@ namespace smokelift {
 namespace {
 
 constexpr std::size_t READS_PER_TASK = 1 << 16;
+constexpr double LEAST_DEPTH = 1e-12; // m; a voxel in the plane of the eye is in no picture
 
 // Homogeneous pixel coordinates along a row of voxels.
 struct PixelRow {
@@ -31,7 +32,7 @@ struct Place {
 
 SMOKELIFT_INLINE Place place_of(const PictureMap &map, const PixelRow &line, int k) {
     const double z = map.centres[2][k], depth = line.at(2, z);
-    const double safe = std::abs(depth) < 1e-12 ? 1e-12 : depth;
+    const double safe = std::abs(depth) < LEAST_DEPTH ? LEAST_DEPTH : depth;
     const double column = line.at(0, z) / safe - 0.5, row = line.at(1, z) / safe - 0.5;
     const bool inside =
         (column > -0.5) & (column < map.columns - 0.5) & (row > -0.5) & (row < map.rows - 0.5);

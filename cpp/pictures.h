@@ -11,9 +11,10 @@ namespace smokelift {
 
 // A camera before a grid.
 struct PictureMap {
-    std::array<std::array<double, 4>, 3> to_pixel{}; // from the world to (x depth, y depth, depth), pixels
-    std::array<std::vector<double>, 3> centres;      // of the voxels along x, y and z, m
-    int rows = 0, columns = 0;                       // of the picture
+    // From the world (m) to (x depth, y depth, depth), x and y in pixels.
+    std::array<std::array<double, 4>, 3> to_pixel{};
+    std::array<std::vector<double>, 3> centres; // of the voxels along x, y and z, m
+    int rows = 0, columns = 0;                  // of the picture
 
     Shape shape() const { return {int(centres[0].size()), int(centres[1].size()), int(centres[2].size())}; }
 };

@@ -1,4 +1,5 @@
-// Orthogonal projection of face velocities on those without divergence.
+// Orthogonal projection of face velocities on those without divergence (Chorin 1968), in
+// any unit.
 #pragma once
 
 #include "poisson.h"

@@ -61,8 +61,8 @@ void fill_coarse_faces(const In &from, const Out &to, int along, int i) {
     }
 }
 
-// The twelve faces inside of a coarse cell, from the 24 on its sides: equations 5 to 8 of Toth and Roe for
-// cubes.
+// The twelve faces inside of a coarse cell, from the 24 on its sides: equations 5 to 8 of Toth and Roe (2002)
+// for cubes.
 struct CoarseCell {
     // `u`, `v` and `w` of [i, j, k] are what leaves and enters through the x, y and z sides of the eighth [i,
     // j, k].

@@ -10,7 +10,8 @@ namespace {
 
 using Pairs = std::vector<std::pair<int, int>>;
 
-constexpr std::size_t together = 64; // places whose lines are ordered at a time: some dozen fit the cache
+// Places whose lines are ordered at a time: dozens of lines fit the cache.
+constexpr std::size_t together = 64;
 
 // The lines to compare, one pair after the other, so that lines are in order: Batcher's merge exchange
 // (Knuth, The Art of Computer Programming 3, algorithm 5.2.2M).

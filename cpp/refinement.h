@@ -7,7 +7,8 @@
 namespace smokelift {
 
 // A velocity in the cells of a grid that is twice as fine: linear, ends continued, projected. Faces coincide
-// along their own axis; across it centres lie a quarter of a coarse cell off.
+// along their own axis; across it centres lie a quarter of a coarse cell off. Velocities are in cells per
+// frame, so that the numbers double.
 void refine(const StaggeredIn &coarse, const StaggeredOut &result, Workers &workers);
 
 } // namespace smokelift

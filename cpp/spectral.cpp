@@ -6,8 +6,8 @@
 namespace smokelift {
 namespace {
 
-// Removes the part along d = (dx, dy, dz[k]) and divides by the symbol; adds the products of before
-// and after.
+// Of modes (x, y, z)[k] of a velocity: removes the part along d = (dx, dy, dz[k]), the differences that make
+// its divergence, and divides by the symbol; adds the products of before and after.
 SMOKELIFT_CLONES
 void filter_row(float *__restrict x, float *__restrict y, float *__restrict z, int n, float dx, float dy,
                 const float *__restrict dz, float zeroth, float second, float fourth,

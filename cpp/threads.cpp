@@ -14,6 +14,8 @@
 namespace smokelift {
 namespace {
 
+constexpr int SPINS = 2000; // looks for the next loop before a thread goes to sleep
+
 std::atomic<int> threads_set{0};
 
 int usable_cores() {
@@ -98,8 +100,8 @@ void Workers::work() {
 void Workers::serve() {
     unsigned seen = 0;
     for (;;) {
-        // Loops follow each other within microseconds, so look a little while before going to sleep.
-        for (int spin = 0; spin < 2000 && round_ == seen && !ending_; ++spin)
+        // Loops follow each other within microseconds.
+        for (int spin = 0; spin < SPINS && round_ == seen && !ending_; ++spin)
             std::this_thread::yield();
         {
             std::unique_lock<std::mutex> lock(mutex_);
