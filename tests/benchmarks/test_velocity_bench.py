@@ -239,7 +239,8 @@ def test_a_file_that_is_no_truth_is_refused(tmp_path, capsys, idle):
     path = tmp_path / "broken.npz"
     path.write_bytes(b"PK\x03\x04 and no more")
     assert bench(path) == 2
-    assert f"{path}: cannot be read: File is not a zip file." in " ".join(capsys.readouterr().err.split())
+    said = " ".join(capsys.readouterr().err.split())
+    assert f"{path}: cannot be read: it is no NumPy archive (.npz), or cut short." in said
 
 
 def test_chart_without_matplotlib_is_refused(monkeypatch, capsys, idle):

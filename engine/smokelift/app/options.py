@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import os
 from dataclasses import replace
 from pathlib import Path
@@ -104,7 +105,10 @@ def require_new(options: argparse.Namespace) -> None:
 
 def finite(text: str) -> float:
     """Return the number that a word says."""
-    number = float(text)
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
     if not abs(number) <= LARGEST:
         raise argparse.ArgumentTypeError(f"{text}: expected a number from {-LARGEST:g} to {LARGEST:g}")
     return number

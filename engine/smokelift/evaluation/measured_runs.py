@@ -122,7 +122,9 @@ def read_runs(path: Path) -> Runs:
             missing = [name for name in (*_NEEDED, *_SAID) if name not in columns]
     except FileNotFoundError:
         raise ValueError(f"{path}: no such file.") from None
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+    except UnicodeDecodeError:
+        raise ValueError(f"{path}: is not a text file in UTF-8.") from None
+    except (OSError, csv.Error) as error:
         raise ValueError(f"{path}: cannot be read as CSV: {error}.") from error
     if missing:
         raise ValueError(f"{path}: has no column {missing[0]!r}; give the CSV of python -m benchmarks.accuracy.")

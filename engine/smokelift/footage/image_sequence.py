@@ -12,6 +12,9 @@ from smokelift.footage.frame_source import DEFAULT_FPS, ClipError, DamagedFrameE
 from smokelift.footage.images import READABLE, ImageError, Picture, Transfer, area_average, read_layer, reduction
 from smokelift.footage.layer import Layer, backdrop_of, sample_numbers
 
+_OTHER_PATTERN = re.compile(r"[*?]|%\d*d")
+"""How a shell or another program writes the number of a picture."""
+
 
 class ImageSequence:
     """Numbered pictures on disk, or a single one.
@@ -119,7 +122,8 @@ def _numbered(path: Path) -> list[Path]:
     named = hashes or digits
     if named is None or (hashes is None and not path.is_file()):
         if not path.is_file():
-            raise ClipError(f"{path}: no such file")
+            hint = "; give numbered pictures as frame_####.png" if _OTHER_PATTERN.search(path.name) else ""
+            raise ClipError(f"{path}: no such file{hint}")
         return [path]
     prefix, number, suffix = named.groups()
     found: dict[int, Path] = {}

@@ -77,7 +77,7 @@ def read_arrays(
         With the path and the reason, if it is damaged, lacks an array, or holds others than expected.
     """
     if not path.is_file():
-        raise FileNotFoundError(f"{path}: no such file")
+        raise FileNotFoundError(f"{path}: {'is a folder' if path.is_dir() else 'no such file'}")
     try:
         with zipfile.ZipFile(path) as archive:
             members = {info.filename.removesuffix(".npy"): info for info in archive.infolist()}
@@ -98,7 +98,9 @@ def read_arrays(
     # A damaged archive fails in zipfile, in any decompressor, in Python's parser or in NumPy, each with errors of
     # its own; to the caller they all say the same.
     except Exception as error:
-        raise OSError(f"{path}: cannot be read: {' '.join(str(error).split())}") from error
+        is_archive = zipfile.is_zipfile(path)
+        reason = " ".join(str(error).split()) if is_archive else "it is no NumPy archive (.npz), or cut short"
+        raise OSError(f"{path}: cannot be read: {reason}") from error
 
 
 def _array(

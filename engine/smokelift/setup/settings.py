@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
 from smokelift.density import DensitySettings
 from smokelift.scene import SCATTERINGS, Scattering
+from smokelift.scene.checks import integer, items, number
 from smokelift.velocity import VelocitySettings
 
 MethodName = Literal["default", "paper"]
@@ -119,19 +119,18 @@ class Settings:
         ):
             if getattr(self, name) not in known:
                 raise ValueError(f"{name} must be one of {', '.join(known)}, not {getattr(self, name)!r}.")
-        if not 0 <= self.transport <= 1:
-            raise ValueError(f"transport must be a number from 0 to 1, not {self.transport}.")
-        if self.axis_depth is not None and not math.isfinite(self.axis_depth):
-            raise ValueError(f"axis_depth must be a finite number of metres, not {self.axis_depth}.")
-        if not 0 <= self.detail <= 1:
-            raise ValueError(f"detail must be a number from 0 to 1, not {self.detail}.")
+        for name in ("transport", "detail"):
+            number(getattr(self, name), name, "a number from 0 to 1", lambda share: 0 <= share <= 1)
+        if self.axis_depth is not None:
+            number(self.axis_depth, "axis_depth", "a finite number of metres")
         if self.method == "paper" and self.detail > 0:
             raise ValueError(f"The paper's method makes up no detail: detail must be 0 with it, not {self.detail}.")
         if not isinstance(self.seed, int) or self.seed < 0:
             raise ValueError(f"seed must be a whole number from 0, not {self.seed}.")
-        counts = None if self.resolution == "auto" else self.resolution
-        if counts is not None and (len(counts) != 3 or min(counts) < 8):
-            raise ValueError(f"resolution must be three numbers of at least 8 voxels, not {self.resolution}.")
+        if self.resolution not in (None, "auto"):
+            expected = "three whole numbers of at least 8 voxels"
+            for count in items(self.resolution, 3, "resolution", expected):
+                integer(count, "resolution", expected, least=8)
 
     @classmethod
     def preset(

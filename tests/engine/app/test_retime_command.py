@@ -26,6 +26,8 @@ def test_mistakes_end_in_one_sentence(finished, tmp_path, capsys) -> None:
     out = ("--out", tmp_path / "out")
     assert "--speed 0" in refused(capsys, "retime", finished, *out, "--speed", 0)
     assert "--speed 1e+06" in refused(capsys, "retime", finished, *out, "--speed", 1, 1e6)
+    assert command("retime", finished, *out, "--speed", "slow") == 2
+    assert "slow: expected a number from" in capsys.readouterr().err
     assert "holds no sequence" in refused(capsys, "retime", tmp_path, *out, "--speed", 1)
     assert "not 1 to 99" in refused(capsys, "loop", finished, *out, "--frames", "1:99")
     assert "overlap" in refused(capsys, "loop", finished, *out, "--overlap", 40)

@@ -260,6 +260,7 @@ def test_an_input_before_a_changing_background_is_left_out(plume, side, tmp_path
 
 def test_no_sequence_there(tmp_path, truth, capsys) -> None:
     assert "holds no sequence" in refused(capsys, tmp_path, "--truth", truth)
+    assert "clip of another camera goes with --view" in refused(capsys, tmp_path, "--truth", tmp_path / "clip.mp4")
 
 
 def test_a_sequence_without_frames(plume, truth, tmp_path, capsys) -> None:

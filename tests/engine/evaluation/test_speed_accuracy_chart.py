@@ -128,6 +128,8 @@ def test_a_chart_is_drawn(tmp_path, capsys) -> None:
 def test_what_cannot_be_read(tmp_path, capsys) -> None:
     out = tmp_path / "chart.png"
     assert "no such file" in refused(capsys, tmp_path / "gone.csv", out)
+    (tmp_path / "clip.mp4").write_bytes(b"\xff\xfe")
+    assert "clip.mp4: is not a text file in UTF-8" in refused(capsys, tmp_path / "clip.mp4", out)
     assert "'psnr_new'" in refused(capsys, write(tmp_path, HEADER.replace("psnr_new", "psnr")), out)
     assert "no runs" in refused(capsys, write(tmp_path, HEADER), out)
     assert "must be a number" in refused(capsys, write(tmp_path, (HEADER + ROWS).replace("0.5,20", "soon,20")), out)

@@ -627,6 +627,9 @@ def test_gaps_in_picture_sequences_are_named(tmp_path: Path) -> None:
     for name in ("frame_0000.png", "still.png"):
         with pytest.raises(ClipError, match=f"{name}: no such file"):
             Clip.open(tmp_path / name)
+    for name in ("frame_*.png", "frame_%04d.png"):
+        with pytest.raises(ClipError, match=r"no such file; give numbered pictures as frame_####\.png"):
+            Clip.open(tmp_path / name)
     with pytest.raises(ClipError, match="no such pictures"):
         Clip.open(tmp_path / "#_##.png")
     Image.fromarray(flat(1, 8, 8)).save(tmp_path / "frame_0003.png")

@@ -62,9 +62,11 @@ def test_what_is_no_archive_of_ours_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.npz"
     with pytest.raises(FileNotFoundError, match="no such file"):
         read_arrays(path, {})
+    with pytest.raises(FileNotFoundError, match="is a folder"):
+        read_arrays(tmp_path, {})
     for content in (b"", b"PK", saved(DENSITY)):  # the last is a plain .npy
         path.write_bytes(content)
-        with pytest.raises(OSError, match="cannot be read"):
+        with pytest.raises(OSError, match=r"a\.npz: cannot be read: it is no NumPy archive \(\.npz\), or cut short"):
             read_arrays(path, {"density": SHAPE})
     write_arrays(path, {"density": DENSITY})
     with pytest.raises(OSError, match="it lacks velocity"):

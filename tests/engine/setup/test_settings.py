@@ -70,7 +70,12 @@ def test_json_holds_all_settings(quality: Any, method: Any) -> None:
         ({"seed": -1}, "seed must be a whole number from 0, not -1"),
         ({"seed": 1.5}, "seed must be a whole number from 0, not 1.5"),
         ({"resolution": (7, 64, 64)}, "at least 8 voxels"),
-        ({"resolution": (64, 64)}, "three numbers"),
+        ({"resolution": (64, 64)}, "three whole numbers"),
+        ({"resolution": 64}, "resolution must be three whole numbers of at least 8 voxels, not 64"),
+        ({"resolution": (64, 64, "64")}, "resolution must be three whole numbers of at least 8 voxels"),
+        ({"transport": None}, "transport must be a number from 0 to 1, not None"),
+        ({"detail": "1"}, 'detail must be a number from 0 to 1, not "1"'),
+        ({"axis_depth": "0.1"}, 'axis_depth must be a finite number of metres, not "0.1"'),
     ],
 )
 def test_bad_values_are_refused(values: dict[str, Any], words: str) -> None:

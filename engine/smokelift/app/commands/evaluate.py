@@ -50,6 +50,10 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         require_folder(path)
     if options.picture is not None and options.picture.suffix.lower() != ".png":
         raise ValueError(f"{options.picture}: the picture is written as .png.")
+    if options.truth is not None and options.truth.suffix.lower() != ".npz":
+        raise ValueError(
+            f"{options.truth}: --truth takes known volumes (truth.npz); the clip of another camera goes with --view."
+        )
     sequence = Sequence.open(options.directory)
     device.start(options.device)
     found = evaluate(sequence, options.truth, tuple((camera, clip) for camera, clip in options.view))
