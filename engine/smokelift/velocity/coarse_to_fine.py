@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -75,7 +76,7 @@ class CoarseToFine:
         finest = Level(pair.before, pair.after, weight, past=None if prediction is None else prediction.residual)
         predicted = None if prediction is None else Prediction(replace(prediction, closed=rest.closed), dt)
         sources = settings.sources if inflow is None else None
-        estimate = _estimate(finest, predicted, sources, pair, rest.closed, settings)
+        estimate = _Estimation(finest, predicted, sources, pair, rest.closed, settings).result()
         return rest if estimate is None else estimate.velocity(dt, voxel_size)
 
     def predict(self, velocity: Velocity, dt: float) -> Velocity:
@@ -84,72 +85,146 @@ class CoarseToFine:
         return smoothed(predicted) if self.settings.coarsening else predicted
 
 
-def _estimate(
-    finest: Level,
-    prediction: Prediction | None,
-    sources: SourceDetection | None,
-    pair: PreparedPair,
-    closed: tuple[Side, ...],
-    settings: VelocitySettings,
-) -> Estimate | None:
-    """From coarse to fine, or on the finest grid alone where a prediction is good enough to start from."""
-    first = _around_prediction(finest, prediction, sources, pair.noise, settings)
-    guided = first is not None
-    if not guided:
-        prediction, finest = None, replace(finest, past=None)
-    levels = [finest] if guided else pyramid(finest, settings.grids)
-    share = 1.0 if guided else settings.momentum
-    effort: Counter[str] = Counter(iterations=0, products=0, projections=0)
-    centre: Centre
-    u = StaggeredGrid.zero(levels[0].after.shape, 1.0, closed) if prediction is None else prediction.displacement()
-    coarsest = levels[0].coarseness
-    on_finest = 1 if finest.after.size > settings.large_grid else settings.linearisations
-    while levels:  # a grid is not kept after its turn
-        level = levels.pop(0)
-        if level.coarseness < coarsest:
-            u = refine(u, level.after.shape)
-        count = on_finest if level is finest else settings.linearisations
-        for number in range(count):
-            # around rest all of the change would be a source
-            from_rest = not guided and number == 0 and level.coarseness == coarsest
-            searched = None if from_rest else sources
-            linear, first = first or linearise(level, u, settings.smoke_threshold, searched), None
-            if linear is None:
-                return None
-            if from_rest and sources is not None and not pair.noisy and number < count - 1:
-                first_weight = sources.first_weight(linear.direction, linear.offset, linear.smoke)
-                linear = replace(linear, weight=linear.weight * first_weight)
-            if level.coarseness == coarsest or level is not finest:
-                centre = fit_centre(prediction, level.after, linear, u, share, settings.brightening)
-            elif number == 0:  # twelve projections are too much for the finest grid
-                centre = centre.refined()
-            around = centre.velocity(prediction, level.after, u)
-            linear = linear.with_dissipation(centre.dissipation)
-            unexplained, _ = linear.unexplained(around, pair.noise / level.coarseness**3)
-            terms = _regularisation(unexplained, settings)
-            problem, start = least_squares(linear, around, terms), around if from_rest else u
-            direction, weight, smoke = linear.direction, linear.weight, linear.smoke
-            # The solver takes most of the memory: free the linearisation before it, and the problem after it.
-            del linear, around
-            solution, figures = settings.solver.solve(problem, start)
-            del problem, start
-            last = number == count - 1 or (guided and _step(solution, u, smoke) < settings.small_step)
-            if level is finest and last:
-                source, residual = _source(level, u, weight, settings, pair)
-                confidence = _confidence(direction, weight, terms.second_order)
-            u = _clamped(solution, u, settings.largest_increment)
-            del solution, direction, weight
-            effort.update({name: figures[name] for name in ("iterations", "products", "projections")})
-            if last:
-                break
-    measures = {
-        **effort,
-        "residual": figures["residual"],
-        "unexplained": unexplained,
-        "trust": centre.trust,
-        "dissipation": pair.density_dissipation(centre.dissipation),
-    }
-    return Estimate(u, measures, confidence, source, residual)
+class _Solved(NamedTuple):
+    """What a solve found, and what of its problem is still needed.
+
+    Attributes
+    ----------
+    u
+        In voxels of its grid a frame.
+    direction, weight, smoke
+        Of the `Linearisation`.
+    smoothness
+        Weight of |grad curl v|^2.
+    """
+
+    u: StaggeredGrid
+    direction: Faces
+    weight: Array
+    smoke: npt.NDArray[np.bool_]
+    smoothness: float
+
+
+class _Estimation:
+    """One estimate: from coarse to fine, or on the finest grid alone where a prediction is good enough to start from.
+
+    Parameters
+    ----------
+    finest
+        The densities.
+    prediction
+        What the velocity should be near; None if there is none.
+    sources
+        How smoke that enters is found; None looks for none.
+    pair
+        The densities with what is known of their noise and contrast.
+    closed
+        Sides that are walls.
+    settings
+        See `VelocitySettings`.
+    """
+
+    def __init__(
+        self,
+        finest: Level,
+        prediction: Prediction | None,
+        sources: SourceDetection | None,
+        pair: PreparedPair,
+        closed: tuple[Side, ...],
+        settings: VelocitySettings,
+    ) -> None:
+        self._sources, self._pair, self._settings = sources, pair, settings
+        self._first = _around_prediction(finest, prediction, sources, pair.noise, settings)
+        self._guided = self._first is not None
+        self._prediction = prediction if self._guided else None
+        self._finest = finest if self._guided else replace(finest, past=None)
+        self._levels = [self._finest] if self._guided else pyramid(self._finest, settings.grids)
+        self._coarsest = self._levels[0].coarseness
+        if self._prediction is None:
+            self._u = StaggeredGrid.zero(self._levels[0].after.shape, 1.0, closed)
+        else:
+            self._u = self._prediction.displacement()
+        self._centre: Centre
+        self._effort: Counter[str] = Counter(iterations=0, products=0, projections=0)
+        self._figures: dict[str, float] = {}
+
+    def result(self) -> Estimate | None:
+        """The estimate; None where there is no structure to follow."""
+        settings = self._settings
+        while self._levels:  # a grid is not kept after its turn
+            level = self._levels.pop(0)
+            if level.coarseness < self._coarsest:
+                self._u = refine(self._u, level.after.shape)
+            count = self._linearisations(level)
+            for number in range(count):
+                solved = self._solve(level, number)
+                if solved is None:
+                    return None
+                last = number == count - 1 or (
+                    self._guided and _step(solved.u, self._u, solved.smoke) < settings.small_step
+                )
+                if level is self._finest and last:
+                    source, residual = _source(level, self._u, solved.weight, settings, self._pair)
+                    confidence = _confidence(solved.direction, solved.weight, solved.smoothness)
+                self._u = _clamped(solved.u, self._u, settings.largest_increment)
+                del solved  # the next linearisation needs the memory
+                if last:
+                    break
+        return Estimate(self._u, {**self._effort, **self._figures}, confidence, source, residual)
+
+    def _linearisations(self, level: Level) -> int:
+        """How many times the change is linearised on a grid, at most."""
+        settings = self._settings
+        large = level is self._finest and level.after.size > settings.large_grid
+        return 1 if large else settings.linearisations
+
+    def _solve(self, level: Level, number: int) -> _Solved | None:
+        """Linearise for the time `number`, from 0, and solve; None where there is no structure to follow."""
+        from_rest = not self._guided and number == 0 and level.coarseness == self._coarsest
+        linear = self._linearised(level, from_rest)
+        if linear is None:
+            return None
+        self._centre = self._fitted_centre(level, number, linear)
+        around = self._centre.velocity(self._prediction, level.after, self._u)
+        linear = linear.with_dissipation(self._centre.dissipation)
+        unexplained, _ = linear.unexplained(around, self._pair.noise / level.coarseness**3)
+        terms = _regularisation(unexplained, self._settings)
+        problem, start = least_squares(linear, around, terms), around if from_rest else self._u
+        direction, weight, smoke = linear.direction, linear.weight, linear.smoke
+        # The solver takes most of the memory: free the linearisation before it.
+        del linear, around
+        solution, figures = self._settings.solver.solve(problem, start)
+        self._effort.update({name: figures[name] for name in ("iterations", "products", "projections")})
+        self._figures = {
+            "residual": figures["residual"],
+            "unexplained": unexplained,
+            "trust": self._centre.trust,
+            "dissipation": self._pair.density_dissipation(self._centre.dissipation),
+        }
+        return _Solved(solution, direction, weight, smoke, terms.second_order)
+
+    def _linearised(self, level: Level, from_rest: bool) -> Linearisation | None:
+        """The change around the velocity so far."""
+        if self._first is not None:  # that around the prediction is known already
+            first, self._first = self._first, None
+            return first
+        # around rest all of the change would be a source
+        searched = None if from_rest else self._sources
+        linear = linearise(level, self._u, self._settings.smoke_threshold, searched)
+        again = self._linearisations(level) > 1
+        if linear is None or not from_rest or self._sources is None or self._pair.noisy or not again:
+            return linear
+        first_weight = self._sources.first_weight(linear.direction, linear.offset, linear.smoke)
+        return replace(linear, weight=linear.weight * first_weight)
+
+    def _fitted_centre(self, level: Level, number: int, linear: Linearisation) -> Centre:
+        """The motion that the velocity is regularised around."""
+        settings = self._settings
+        if level is self._finest and level.coarseness < self._coarsest:
+            # twelve projections are too much for the finest grid
+            return self._centre.refined() if number == 0 else self._centre
+        share = 1.0 if self._guided else settings.momentum
+        return fit_centre(self._prediction, level.after, linear, self._u, share, settings.brightening)
 
 
 def _around_prediction(
