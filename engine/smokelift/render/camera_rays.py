@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +23,9 @@ Array = NDArray[np.float64]
 
 LATERAL = ((1, 2), (0, 2), (0, 1))
 """The two other axes of each axis."""
+
+LEAST_SLOPE = 1e-9
+"""Voxels a plane. Rays of less slope stay in one column of voxels, and dividing by this instead loses nothing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,21 +89,34 @@ def camera_rays(camera: Camera, domain: Domain) -> Rays:
     )
 
 
-def _plane_range(offset: Array, slope: Array, lateral: Any, count: Any) -> tuple[Array, Array]:
+def _plane_range(
+    offset: Array, slope: Array, lateral: NDArray[np.int64], count: NDArray[np.int64]
+) -> tuple[Array, Array]:
     """First and last plane, in ascending order, where the bilinear footprint meets the grid.
 
     The footprint is open, so positions are kept a thousandth of a voxel inside (-1, n): float32 then rounds to
     the same cell everywhere.
+
+    Parameters
+    ----------
+    offset, slope : (rows, columns, 2)
+        Of the rays along the two other axes.
+    lateral : (rows, columns, 2)
+        Voxels along those.
+    count : (rows, columns)
+        Planes.
+
+    Returns
+    -------
+    (rows, columns) each; 0 and -1 where the ray misses the grid.
     """
-    low = np.full(offset.shape, -0.999) - offset
-    high = lateral - 0.001 - offset
-    steep = np.where(np.abs(slope) < 1e-9, 1e-9, slope)
-    enter = np.where(slope == 0, np.where((low <= 0) & (high >= 0), -np.inf, np.inf), low / steep)
-    leave = np.where(slope == 0, np.where((low <= 0) & (high >= 0), np.inf, -np.inf), high / steep)
-    enter, leave = np.minimum(enter, leave), np.maximum(enter, leave)
-    missed = (slope == 0) & ((low > 0) | (high < 0))
-    enter = np.where(missed, np.inf, enter).max(-1)
-    leave = np.where(missed, -np.inf, leave).min(-1)
+    low, high = -0.999 - offset, lateral - 0.001 - offset
+    steep = np.where(np.abs(slope) < LEAST_SLOPE, LEAST_SLOPE, slope)
+    one, other = low / steep, high / steep
+    # a ray along the planes' axis is beside the grid in all of them or in none
+    along, beside = slope == 0, (low > 0) | (high < 0)
+    enter = np.where(along, np.where(beside, np.inf, -np.inf), np.minimum(one, other)).max(-1)
+    leave = np.where(along, np.where(beside, -np.inf, np.inf), np.maximum(one, other)).min(-1)
     first = np.ceil(np.maximum(enter, 0))
     last = np.floor(np.minimum(leave, count - 1))
     empty = ~(first <= last)
