@@ -14,7 +14,7 @@ from smokelift.setup.background import BLACK
 from smokelift.setup.choice import UNDETERMINED, Choice
 from smokelift.setup.geometry import PICTURE_HEIGHT
 from smokelift.setup.shot import Shot
-from smokelift.setup.smoke import UNKNOWN
+from smokelift.setup.smoke import unknown_part
 
 CLEAN, NOISY = 2.0, 6.0
 """Noise in 8 bit codes up to which a clip is called clean, and from which noisy: thin smoke is lost in it
@@ -30,6 +30,7 @@ def facts(shot: Shot, given: Scene, cost: Cost) -> tuple[Fact, ...]:
     height = f"The picture is taken to be {PICTURE_HEIGHT:g} m high where the smoke is."
     return (
         _background(shot, given, plate),
+        *_mask(shot),
         _exposure(shot, plate),
         _noise(plate),
         _given_or_undetermined(
@@ -89,7 +90,7 @@ def _given_or_undetermined(what: str, value: str, is_given: bool, how: str) -> F
 def _background(shot: Shot, given: Scene, plate: Plate) -> Fact:
     if given.background is not None:
         return Fact("background", "as given", "given")
-    unknown = float((plate.confidence < UNKNOWN).mean())
+    unknown = float(unknown_part(plate, shot.clip, 0).mean())
     colour = plate.image[0, 0]
     value = "a picture"
     if (plate.image == colour).all():
@@ -100,6 +101,15 @@ def _background(shot: Shot, given: Scene, plate: Plate) -> Fact:
         "estimated",
         _note_about(shot, "Background"),
     )
+
+
+def _mask(shot: Shot) -> tuple[Fact, ...]:
+    """The line of the mask, if there is one."""
+    seen = shot.clip.seen(0, *shot.clip.size)
+    if seen is None:
+        return ()
+    how = "No smoke is made there, and nothing is learned from it."
+    return (Fact("mask", f"hides {1 - seen.mean():.0%} of the first frame", "given", how),)
 
 
 def _exposure(shot: Shot, plate: Plate) -> Fact:

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
+from scipy import ndimage
 
 from smokelift.app.page import TILE, Fact, Page, Panel, fitted
 from smokelift.checks import counted
@@ -17,12 +18,15 @@ from smokelift.output.images import eight_bit
 from smokelift.scene import SHADOWED, Camera, DirectionalLight, Domain, PointLight, Scene
 from smokelift.scene.projection import project
 from smokelift.setup.shot import Shot
-from smokelift.setup.smoke import UNKNOWN
+from smokelift.setup.smoke import unknown_part
 
 Tile = NDArray[np.uint8]
 
 BOX, LIGHT, SMOKE, HIDDEN, PATH = (90, 200, 255), (255, 220, 60), (255, 150, 40), (230, 60, 200), (120, 255, 120)
 """Colours of the box, of light, of smoke, of what is unknown and of the camera's path, sRGB."""
+
+MASK = (255, 60, 60)
+"""That of the mask's outline."""
 
 ARROW = 0.35
 """Length of the arrow of a light over the diagonal of the box."""
@@ -51,15 +55,17 @@ def inspection_page(shot: Shot, given: Scene, known: Sequence[Fact], notes: Iter
     number = shot.smoky[0] if shot.smoky else 0
     columns, rows = fitted(*shot.clip.size)
     pixels = shot.clip.size[0] * shot.clip.size[1] / (columns * rows)
-    plate = shot.views[0].plates.at(number).through(lambda whole: area_average(whole, columns, rows), pixels)
+    whole = shot.views[0].plates.through(lambda full: area_average(full, columns, rows), pixels)
+    plate = whole.at(number)
     picture = shot.clip.area_average(number, columns, rows)
     seen = matte(picture, plate)
     camera = shot.scene.camera.at(number).resized(columns, rows)
-    unknown = plate.confidence < UNKNOWN
+    unknown = unknown_part(whole, shot.clip, number)
     path = _path(shot, camera, picture)
     lit = " and the light" if _light_starts(shot, shot.scene.domain) else ""
+    masked = "" if shot.clip.mask is None else ", the mask's outline"
     panels = [
-        Panel(f"frame {number} with the box{lit}", _with_box(shot, camera, picture)),
+        Panel(f"frame {number} with the box{masked}{lit}", _with_box(shot, camera, picture, number)),
         Panel("background", eight_bit(plate.image)),
         Panel(f"smoke of frame {number}: {seen.mask.mean():.1%} of the picture", _matte_picture(seen)),
         Panel(f"unknown background: {unknown.mean():.1%} of the picture", _unknown_picture(plate, unknown)),
@@ -73,9 +79,12 @@ def inspection_page(shot: Shot, given: Scene, known: Sequence[Fact], notes: Iter
     return Page(f"{name}: {frames}", shot.doubts, panels, known, others)
 
 
-def _with_box(shot: Shot, camera: Camera, picture: NDArray[np.float32]) -> Tile:
-    """A frame with the edges of the box, and an arrow for each light whose direction is known."""
-    domain, shown = shot.scene.domain, Image.fromarray(eight_bit(picture))
+def _with_box(shot: Shot, camera: Camera, picture: NDArray[np.float32], number: int) -> Tile:
+    """A frame with the mask's outline, the edges of the box, and an arrow for each light whose direction is known."""
+    codes, seen = eight_bit(picture), shot.clip.seen(number, *camera.size)
+    if seen is not None:
+        codes[seen & ~ndimage.binary_erosion(seen, np.ones((3, 3)), border_value=1)] = MASK
+    domain, shown = shot.scene.domain, Image.fromarray(codes)
     draw = ImageDraw.Draw(shown)
     corners = domain.corners()
     # corners that differ along one axis are joined

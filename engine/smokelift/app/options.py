@@ -63,6 +63,13 @@ def add_run_options(parser: argparse.ArgumentParser) -> None:
         help="first and last frame of the clip to use, counted from 0 (default: the scene's, else all)",
     )
     parser.add_argument(
+        "--mask",
+        type=named_path,
+        metavar="PATH",
+        help="picture that is white where smoke may be and black where none is, or mask_####.png or a video with one "
+        "for each frame (default: the scene's, else none)",
+    )
+    parser.add_argument(
         "--axis-depth",
         type=float,
         metavar="METRES",
@@ -135,6 +142,8 @@ def scene_of(options: argparse.Namespace) -> tuple[Scene, ClipSource]:
     scene = Scene.load(path) if path.suffix.lower() == ".toml" else Scene(clip=ClipSource(path))
     if options.frames is not None and scene.clip is not None:
         scene = scene.with_frames(*options.frames)
+    if options.mask is not None and scene.clip is not None:
+        scene = replace(scene, clip=replace(scene.clip, mask=options.mask))
     if scene.clip is None:
         raise ValueError(f"{path}: has no [clip]; give the path of the video there.")
     return scene, scene.clip

@@ -39,7 +39,7 @@ def shortcomings(figures: Sequence[Mapping[str, Any]]) -> list[str]:
         said.append(
             "Not all that was taken for smoke may be smoke: a typical frame still differs from the clip by "
             f"{typical:.0%} of what changes in it. What moves, light that changes and labels look like smoke, too; "
-            "`smokelift inspect` shows what was taken. Crop the clip, cut its frames out of a longer file in which the "
-            "light changes, or give a clean plate in [background]."
+            "`smokelift inspect` shows what was taken. Hide what is no smoke by a mask in [clip], crop the clip, cut "
+            "its frames out of a longer file in which the light changes, or give a clean plate in [background]."
         )
     return said

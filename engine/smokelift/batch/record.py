@@ -20,6 +20,10 @@ Status = Literal["waiting", "running", "done", "refused", "crashed", "stuck", "c
 (a full disk, say) did not pass in time."""
 
 
+_MASK = "--mask="
+"""What a shot's option for a mask begins with."""
+
+
 @dataclass(frozen=True)
 class Forecast:
     """What ``smokelift inspect`` foretells of a shot: its frames, seconds, and bytes of memory at the peak."""
@@ -36,7 +40,7 @@ class Record:
     Attributes
     ----------
     of
-        Options, size and time of change of the input, when it was last run.
+        Options, size and time of change of the input and of its mask, when it was last run.
     status, sentence
         How its last run ended, and what the engine said then.
     notes
@@ -141,7 +145,10 @@ def _path(shot: Shot) -> Path:
 def _identity(shot: Shot) -> dict[str, Any]:
     """What a shot is a reconstruction of, as JSON holds it."""
     identity: dict[str, Any] = {"options": list(shot.options), "input": None}
-    with suppress(OSError):  # a pattern of pictures is no file; the engine says if there are none
-        stat = shot.input.stat()
-        identity["input"] = [stat.st_size, stat.st_mtime_ns]
+    files = [("input", shot.input)]
+    files += [("mask", Path(word.removeprefix(_MASK))) for word in shot.options if word.startswith(_MASK)]
+    for name, path in files:
+        with suppress(OSError):  # a pattern of pictures is no file; the engine says if there are none
+            stat = path.stat()
+            identity[name] = [stat.st_size, stat.st_mtime_ns]
     return identity

@@ -27,7 +27,19 @@ from smokelift.checks import shown
 from smokelift.scene.files import read_text
 from smokelift.scene.toml_lines import Place, find_lines
 
-OPTIONS = ("quality", "method", "resolution", "scattering", "frames", "axis_depth", "detail", "seed", "device", "npz")
+OPTIONS = (
+    "quality",
+    "method",
+    "resolution",
+    "scattering",
+    "frames",
+    "mask",
+    "axis_depth",
+    "detail",
+    "seed",
+    "device",
+    "npz",
+)
 """Keys of a shot that are options of ``smokelift reconstruct``."""
 
 _NAME = re.compile(r"[^\W.][^\\/:*?\"<>|\x00-\x1f]*")
@@ -143,6 +155,8 @@ class _Reader:
             if not isinstance(value, bool):
                 raise self._error((*place, key), f"npz must be true or false, not {shown(value)}")
             return ["--npz"] * value
+        if key == "mask":
+            return [f"--mask={self.path.absolute().parent / self._text(place, {key: value}, key)}"]
         between = {"frames": ":", "resolution": ","}.get(key)
         if isinstance(value, list) and between and all(type(part) is int for part in value):
             value = between.join(map(str, value))

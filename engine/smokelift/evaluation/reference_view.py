@@ -6,6 +6,8 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from smokelift.checks import counted
 from smokelift.footage.background import background_picture, open_plates
 from smokelift.footage.clip import Clip
@@ -47,8 +49,14 @@ class ReferenceView:
     first: int
 
     def picture(self, number: int) -> Image:
-        """The clip's picture of a frame of the sequence; linear radiance (rows, columns, 3)."""
-        return area_average(self.clip.frame(self.first + number - 1), *self.camera.size)
+        """The clip's picture of a frame of the sequence, with its background where a mask hides it.
+
+        Linear radiance (rows, columns, 3).
+        """
+        frame = self.first + number - 1
+        picture = area_average(self.clip.frame(frame), *self.camera.size)
+        seen = self.clip.seen(frame, *self.camera.size)
+        return picture if seen is None else np.where(seen[..., None], picture, self.background)
 
 
 def first_frame(sequence: Sequence) -> int:

@@ -28,6 +28,7 @@ from smokelift.footage.images import (
     linear_picture,
 )
 from smokelift.footage.kept_frames import KeptFrames, keep
+from smokelift.footage.mask import Mask, Masked, Seen
 from smokelift.footage.video import Video
 from smokelift.scene import ClipSource, SceneError
 from smokelift.scene.checks import file_path
@@ -81,8 +82,10 @@ class Clip:
         fps: float | None,
         frames: tuple[int, int] | None,
         size: tuple[int, int] | None = None,
+        masked: Masked | None = None,
     ) -> None:
         self.path = path
+        self._masked = masked
         self.fps = source.fps if fps is None else float(fps)
         self.warning = source.warning
         self.lens = source.lens
@@ -109,6 +112,7 @@ class Clip:
         fps: float | None = None,
         frames: tuple[int, int] | None = None,
         transfer: Transfer | None = None,
+        mask: str | Path | None = None,
     ) -> Clip:
         """Open a video, or a picture sequence.
 
@@ -124,12 +128,17 @@ class Clip:
             First and last frame to use, both included, counted from 0; None takes all.
         transfer
             ``"srgb"`` or ``"linear"``; None takes srgb for integer pixels and linear for EXR.
+        mask
+            A picture that is white where smoke may be and black where none is, or one for each frame of the file: a
+            video, or a pattern ``mask_####.png``. What it hides is continued from around it in every frame.
 
         Raises
         ------
         ClipError
-            With the path: no such file, no video in it, a picture missing, nothing that can be decoded, or a
-            range of frames outside the clip.
+            With the path: no such file, no video in it, a picture missing, nothing that can be decoded, a range of
+            frames outside the clip, a mask that hides all of them, or one of another shape.
+        ImageError
+            If the mask is a picture that cannot be read.
         """
         try:
             said = path if isinstance(path, ClipSource) else ClipSource(file_path(path, "path"))
@@ -138,13 +147,20 @@ class Clip:
                 fps=said.fps if fps is None else fps,
                 frames=said.frames if frames is None else frames,
                 transfer=said.transfer if transfer is None else transfer,
+                mask=said.mask if mask is None else file_path(mask, "mask"),
             )
         except SceneError as error:
             raise ClipError(str(error) if error.key == "path" else f"{path}: {error}") from error
         path, fps, frames, transfer = said.path, said.fps, said.frames, said.transfer
         source: FrameSource = Video(path, transfer) if is_video(path) else ImageSequence(path, transfer, fps)
         try:
-            return cls(path, KeptFrames(source), fps, frames)
+            if said.mask is None:
+                return cls(path, KeptFrames(source), fps, frames)
+            first, last = frames or (0, source.count - 1)
+            masked = Masked(KeptFrames(source), Mask(said.mask, first, min(last, source.count - 1)))
+            clip = cls(path, KeptFrames(masked), fps, frames, masked=masked)
+            masked.mask.require_shape(*clip.size)
+            return clip
         except BaseException:
             source.close()
             raise
@@ -260,6 +276,33 @@ class Clip:
             image.add_weighted(weights, edges, sums)
         else:
             add_weighted(image, weights, edges, sums)
+
+    @property
+    def mask(self) -> Mask | None:
+        """What hides a part of the frames, if anything does."""
+        return None if self._masked is None else self._masked.mask
+
+    def as_filmed(self) -> Clip:
+        """Return the clip with what a mask hides. The two share the open file."""
+        if self._masked is None:
+            return self
+        return Clip(self.path, self._masked.filmed, self.fps, (self.first, self.first + len(self) - 1), self.size)
+
+    def seen(self, n: int, width: int, height: int) -> Seen | None:
+        """Return which pixels of frame ``n`` no mask hides, at a size of (height, width); None of a clip without one.
+
+        Raises
+        ------
+        ClipError, ImageError
+            If the mask of the frame cannot be read.
+        """
+        return None if self._masked is None else self._masked.mask.seen(self.first + n, width, height)
+
+    def as_seen(self, n: int, picture: Picture) -> Picture:
+        """Return a picture (rows, columns, 3) of frame ``n`` in which what is hidden is not a number."""
+        rows, columns = picture.shape[:2]
+        seen = self.seen(n, columns, rows)
+        return picture if seen is None else np.where(seen[..., None], picture, np.float32(np.nan))
 
     def _kept_or_coded(self, n: int) -> Picture | CodedPicture:
         """Frame ``n`` as it is stored, or linear if it is not stored in codes, or has been asked for lately."""
@@ -407,13 +450,13 @@ class Clip:
 
     def whole(self) -> Clip:
         """Return all of the file, whatever part of it this clip is. The two share the open file."""
-        return Clip(self.path, self._source, self.fps, None, self.size)
+        return Clip(self.path, self._source, self.fps, None, self.size, self._masked)
 
     def part(self, first: int, last: int) -> Clip:
         """Return the frames of the file from one number to another, both included. The two share the open file."""
         if (first, last) == (self.first, self.first + len(self) - 1):
             return self
-        return Clip(self.path, self._source, self.fps, (first, last), self.size)
+        return Clip(self.path, self._source, self.fps, (first, last), self.size, self._masked)
 
     def changed(
         self,
@@ -425,7 +468,8 @@ class Clip:
         ``keeps`` says of a frame's number, and of what makes its `small` picture, that ``change`` leaves it as it is.
         """
         last = self.first + len(self) - 1
-        return Clip(self.path, _Changed(self, self._source, change, keeps), self.fps, (self.first, last), self.size)
+        source = _Changed(self, self._source, change, keeps)
+        return Clip(self.path, source, self.fps, (self.first, last), self.size, self._masked)
 
     def close(self) -> None:
         """Close the file."""

@@ -34,7 +34,7 @@ from smokelift.footage.noise import (
     some_blocks,
 )
 from smokelift.footage.plate import Plate
-from smokelift.footage.plate_estimation import clear_picture, clip_noise
+from smokelift.footage.plate_estimation import clear_picture, clip_noise, seen_of
 
 COARSER = 2
 """Pixels of a glimpse along one of the reduced pictures, which have 320 to 480 along the longer side then."""
@@ -66,12 +66,15 @@ class LargeSamples:
         By how much each is brighter than the others.
     reduced : (frames, rows, columns, 3) uint16
         As of `smokelift.footage.plate_estimation.SteadySamples`, but small.
+    seen : (frames, rows, columns) bool, optional
+        As there.
     """
 
     clip: Clip
     numbers: tuple[int, ...]
     gains: Picture
     reduced: npt.NDArray[np.uint16]
+    seen: Mask | None = None
 
     @cached_property
     def noise(self) -> Noise:
@@ -82,11 +85,12 @@ class LargeSamples:
             else self.clip.frame_through(number, encode_sample, some_blocks)
             for number, gain in zip(self.numbers[WHOLE], self.gains[WHOLE], strict=True)
         ]
-        return clip_noise(np.stack(parts))
+        seen = seen_of(self.clip, self.numbers[WHOLE], *self.clip.size)
+        return clip_noise(np.stack(parts), None if seen is None else np.stack([some_blocks(each) for each in seen]))
 
     @cached_property
     def _reduced_noise(self) -> Noise:
-        return clip_noise(self.reduced)
+        return clip_noise(self.reduced, self.seen)
 
     def backdrop(self) -> Plate | None:
         """Return the plate of a background of one colour, or None if it has more; see `backdrop_plate`."""
@@ -106,7 +110,7 @@ class LargeSamples:
     def plate(self) -> Plate:
         """Return the plate of a background of more than one colour."""
         # as many of the whole pictures' pixels as of small ones: smoke has detail of the reduced ones' itself
-        found = clear_picture(self.reduced, self._reduced_noise, detail=DETAIL / _divisor(self.clip))
+        found = clear_picture(self.reduced, self._reduced_noise, self.seen, DETAIL / _divisor(self.clip), masked=True)
         image = self._fine(found.image, found.known, found.clear[WHOLE], found.contrast)
         return Plate(image, self._spread(found.known).astype(np.float32), self.noise, found.errors)
 
@@ -181,9 +185,10 @@ def large_samples(clip: Clip) -> LargeSamples | None:
     reduced = np.empty((len(numbers), rows, columns, 3), np.uint16)
     for sample, number in zip(reduced, numbers, strict=True):
         sample[...] = as_samples(clip.glimpse_average(number, GLIMPSE, linear_to_srgb, columns, rows))
-    gains = sample_gains(np.stack([small(linear_samples(sample)) for sample in reduced]))
+    tiny = [clip.as_seen(n, small(linear_samples(sample))) for n, sample in zip(numbers, reduced, strict=True)]
+    gains = sample_gains(np.stack(tiny))
     even_out(reduced, gains)
-    return LargeSamples(clip, tuple(numbers), gains, reduced)
+    return LargeSamples(clip, tuple(numbers), gains, reduced, seen_of(clip, numbers, columns, rows))
 
 
 def _divisor(clip: Clip) -> int:

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from smokelift.footage.images import Picture, linear_to_srgb, look_up, srgb_to_linear
-from smokelift.footage.seen import quantile_of_seen
+from smokelift.footage.seen import median_of_seen, quantile_of_seen
 
 EIGHT_BIT_STEP = np.float32(1 / 255)
 """One step of 8 bit video, in sRGB values: the least noise that a clip is taken to have, since codecs shift whole
@@ -157,8 +157,9 @@ def some_blocks(picture: npt.NDArray[Any]) -> npt.NDArray[Any]:
     """Return a picture of some blocks of another, side by side, `BLOCKS_APART`."""
     step = BLOCKS_APART * BLOCK
     rows, columns = (n // step for n in picture.shape[:2])
-    whole = picture[: rows * step, : columns * step].reshape(rows, step, columns, step, 3)
-    return np.ascontiguousarray(whole[:, :BLOCK, :, :BLOCK]).reshape(rows * BLOCK, columns * BLOCK, 3)
+    values = picture.shape[2:]
+    whole = picture[: rows * step, : columns * step].reshape(rows, step, columns, step, *values)
+    return np.ascontiguousarray(whole[:, :BLOCK, :, :BLOCK]).reshape(rows * BLOCK, columns * BLOCK, *values)
 
 
 def whole_blocks(seen: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
@@ -218,8 +219,8 @@ def clipped_black(deviations: Picture, blocks: Picture) -> Picture:
     (3,) float32
     """
     apart = np.abs(deviations[:, :, 1:] - deviations[:, :, :-1])
-    explained = CLIPPED_MEAN * np.median(apart, axis=(0, 1, 2)) if apart.size else 0
-    offset = np.minimum(np.quantile(np.median(blocks, axis=0), 0.1, axis=(0, 1)), explained)
+    explained = CLIPPED_MEAN * np.nanmedian(apart, axis=(0, 1, 2)) if apart.size else 0
+    offset = np.minimum(np.nanquantile(median_of_seen(blocks), 0.1, axis=(0, 1)), explained)
     return np.where(offset < EIGHT_BIT_STEP, 0, offset).astype(np.float32)
 
 

@@ -183,8 +183,9 @@ def wide_samples(clip: Clip, place: WidePicture, count: int) -> tuple[npt.NDArra
     chosen = np.linspace(0, len(of_file) - 1, min(sampled_count(count, columns, rows), len(of_file))).round()
     numbers, rotations = zip(*(of_file[int(n)] for n in chosen), strict=True)
     place = replace(place, turns=replace(place.turns, rotations=Rotation.concatenate(rotations)))
-    inside = np.ones(clip.size[::-1], np.float32)
-    seen = np.stack([place.spread_out(inside, n) > 0.5 for n in range(len(numbers))])
+    all_of_it = np.ones(clip.size[::-1], np.float32)
+    parts = [all_of_it if (own := whole.seen(n, *clip.size)) is None else own.astype(np.float32) for n in numbers]
+    seen = np.stack([place.spread_out(part, n) > 0.5 for n, part in enumerate(parts)])
     tiny = []
     for n, (number, shown) in enumerate(zip(numbers, seen, strict=True)):
         wide = place.spread_out(whole.frame(number), n)

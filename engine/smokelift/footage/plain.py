@@ -18,7 +18,7 @@ from smokelift.footage.exposure import sample_gains, small, small_size
 from smokelift.footage.images import Picture, area_average
 from smokelift.footage.noise import BLOCK, BLOCKS_APART, Noise, encode_sample, even_out, some_blocks
 from smokelift.footage.plate import Plate
-from smokelift.footage.plate_estimation import clip_noise
+from smokelift.footage.plate_estimation import clip_noise, seen_of
 
 SAMPLES = 16
 """Frames from which the colour and the noise are taken."""
@@ -62,14 +62,18 @@ def plain_plate(clip: Clip, shot: Clip) -> Plate | None:
         return None
     numbers = clip.spread(SAMPLES)
     parts = (clip.frame_through(number, encode_sample, some_blocks) for number in numbers)
-    found = _colour(parts, [small(clip.reduced(number)) for number in numbers])
+    seen_whole = seen_of(clip, numbers, width, height)
+    shown = None if seen_whole is None else np.stack([some_blocks(each) for each in seen_whole])
+    found = _colour(parts, [clip.as_seen(number, small(clip.reduced(number))) for number in numbers], shown)
     if found is None:
         return None
     colour, noise = found
     return Plate(np.tile(colour, (height, width, 1)), np.ones((height, width), np.float32), noise)
 
 
-def _colour(encoded: Iterable[npt.NDArray[np.uint16]], whole: Sequence[Picture]) -> tuple[Picture, Noise] | None:
+def _colour(
+    encoded: Iterable[npt.NDArray[np.uint16]], whole: Sequence[Picture], seen: npt.NDArray[np.bool_] | None = None
+) -> tuple[Picture, Noise] | None:
     """The linear colour (3,) of all of the background and the noise, or None if it has other colours.
 
     Parameters
@@ -78,10 +82,12 @@ def _colour(encoded: Iterable[npt.NDArray[np.uint16]], whole: Sequence[Picture])
         Pictures of one size, as of `encode_sample`.
     whole
         What shows the exposure of each: the `small` picture of its frame.
+    seen : (frames, rows, columns) bool, optional
+        What of the pictures no mask hides, for the noise; without it all.
     """
     samples = np.stack(list(encoded))
     even_out(samples, sample_gains(np.stack(whole)))
-    noise = clip_noise(samples)
+    noise = clip_noise(samples, seen)
     found = backdrop_plate(samples, noise)
     if found is None or (found.image != found.image[0, 0]).any():
         return None

@@ -196,10 +196,13 @@ def noise_before(plates: Plates, clip: Clip, sample_count: int = 32) -> Noise:
 
 
 def _deviations(plates: Plates, clip: Clip, count: int) -> tuple[Picture, Picture]:
-    """How a clip differs from backgrounds that are known, as `temporal_noise` takes it: single pixels, block means."""
+    """How a clip differs from backgrounds that are known, as `temporal_noise` takes it: single pixels, block means.
+
+    What a mask hides is not a number.
+    """
     single, blocks = [], []
     for number in clip.spread(count):
-        behind, frame = plates.at(number).image, clip.frame(number)
+        behind, frame = plates.at(number).image, clip.as_seen(number, clip.frame(number))
         gains = gain_of(small(frame), small(behind))
         deviation = linear_to_srgb(frame / gains) - linear_to_srgb(behind)
         single.append(deviation[::NOISE_STRIDE, ::NOISE_STRIDE])

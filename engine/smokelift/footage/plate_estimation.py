@@ -11,6 +11,7 @@ Assumed: camera and background stand still. In this order:
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -76,14 +77,17 @@ class SteadySamples:
     ----------
     pictures : (frames, rows, columns, 3) uint16
         sRGB values in fixed point; `decode_samples` reads them.
+    seen : (frames, rows, columns) bool, optional
+        What no mask hides; without it all.
     """
 
     pictures: npt.NDArray[np.uint16]
+    seen: npt.NDArray[np.bool_] | None = None
 
     @cached_property
     def noise(self) -> Noise:
         """Of them."""
-        return clip_noise(self.pictures)
+        return clip_noise(self.pictures, self.seen)
 
     def backdrop(self) -> Plate | None:
         """Return the plate of a background of one colour, or None if it has more."""
@@ -91,7 +95,7 @@ class SteadySamples:
 
     def plate(self) -> Plate:
         """Return the plate of a background of more than one colour."""
-        found = clear_picture(self.pictures, self.noise)
+        found = clear_picture(self.pictures, self.noise, self.seen, masked=True)
         return Plate(found.image, found.known.astype(np.float32), self.noise, found.errors)
 
 
@@ -144,6 +148,7 @@ def clear_picture(
     noise: Noise,
     seen: npt.NDArray[np.bool_] | None = None,
     detail: float = DETAIL,
+    masked: bool = False,
 ) -> ClearPicture:
     """Return the background of samples.
 
@@ -157,6 +162,8 @@ def clear_picture(
         Which pixels each of them shows; without it all.
     detail
         Standard deviation of the Gaussian as of `DETAIL`, in pixels of the samples.
+    masked
+        Whether what no sample shows is hidden by a mask: then it is unknown. Else it lies beyond all of them.
     """
     width = smoothing(noise)
     grey = np.stack([_smooth_grey(sample, width) for sample in samples])
@@ -200,6 +207,8 @@ def clear_picture(
     mean = _mean(samples, seen)
     if seen is not None and not seen.any(0).all():
         never = ~seen.any(0)
+        if masked:
+            sure, known = sure & ~never, known & ~never
         mean[never] = push_pull(linear_to_srgb(image), sure.astype(np.float32))[never]
         image[never] = srgb_to_linear(mean[never])
     complete, contrast = completed(image, known, sure, mean, smoke.brightness, brightens, detail)
@@ -227,9 +236,15 @@ def steady_samples(clip: Clip, count: int = 32) -> SteadySamples:
     tiny = []
     for sample, number in zip(samples, numbers, strict=True):
         sample[...] = clip.frame_through(number, encode_sample)
-        tiny.append(clip.area_average(number, *small_size(width, height)))
+        tiny.append(clip.as_seen(number, clip.area_average(number, *small_size(width, height))))
     even_out(samples, sample_gains(np.stack(tiny)))
-    return SteadySamples(samples)
+    return SteadySamples(samples, seen_of(clip, numbers, width, height))
+
+
+def seen_of(clip: Clip, numbers: Sequence[int], width: int, height: int) -> npt.NDArray[np.bool_] | None:
+    """Return the `Clip.seen` of frames as one array (frames, height, width); None of a clip without a mask."""
+    seen = [each for number in numbers if (each := clip.seen(number, width, height)) is not None]
+    return np.stack(seen) if seen else None
 
 
 def clip_noise(samples: npt.NDArray[np.uint16], seen: npt.NDArray[np.bool_] | None = None) -> Noise:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import lru_cache
 from types import MappingProxyType
 
@@ -16,6 +17,9 @@ from smokelift.footage.plate import Plate, Plates
 
 MIDDLE = np.full(3, 0.5, np.float32)
 """sRGB values at which it is judged whether noise brightens a clip."""
+
+UNCOVERED = 5
+"""Frames whose median is shown where a mask hides all of them."""
 
 
 def steady(clip: Clip, plates: Plates, known: Mapping[int, Picture] = MappingProxyType({})) -> Clip:
@@ -62,6 +66,62 @@ def without_noise_light(clip: Clip, plates: Plates) -> Clip:
         return np.maximum(picture - linear_excess(linear_to_srgb(picture), noise), 0)
 
     return clip.changed(lessened)
+
+
+def cleared(clip: Clip, plates: Plates) -> Clip:
+    """Return a clip that shows its background, as it is exposed, wherever a mask hides a frame.
+
+    Parameters
+    ----------
+    clip
+        The footage. It is read when the frames of the result are.
+    plates
+        Its backgrounds.
+    """
+    if clip.mask is None:
+        return clip
+    gains_of = exposures(plates)
+
+    def change(number: int, picture: Picture) -> Picture:
+        visible = clip.as_seen(number, picture)
+        hidden = np.isnan(visible)
+        return np.where(hidden, plates.at(number).image * gains_of(number, small(visible)), picture)
+
+    return clip.changed(change)
+
+
+def uncovered(plates: Plates, clip: Clip) -> Plates:
+    """Return backgrounds that show what a clip shows where a mask hides all of it, if nothing else tells what is there.
+
+    It is no smoke, so it may stand behind the result. The background of a camera that turns stays as it is.
+
+    Parameters
+    ----------
+    plates
+        As they are known or estimated.
+    clip
+        The footage.
+
+    Raises
+    ------
+    ClipError
+        If a frame cannot be read.
+    """
+    if clip.mask is None or not isinstance(plates, Plate):
+        return plates
+    numbers = clip.spread(UNCOVERED)
+    hidden = plates.confidence == 0
+    for number in numbers:
+        seen = clip.seen(number, *clip.size)
+        hidden = hidden if seen is None else hidden & ~seen
+    filmed, gains_of = clip.as_filmed(), exposures(plates)
+    shown = []
+    for number in numbers:
+        gains = gains_of(number, small(clip.as_seen(number, clip.frame(number))))
+        shown.append(filmed.frame(number)[hidden] / gains)
+    image = plates.image.copy()
+    image[hidden] = np.median(shown, axis=0)
+    return replace(plates, image=image)
 
 
 def exposures(plates: Plates) -> Callable[[int, Picture], Picture]:

@@ -23,6 +23,7 @@ def sources(shot: Shot) -> dict[str, dict[str, Any]]:
     for number, view in enumerate(shot.views):
         table = f"views.{number - 1}." if number else ""
         files[f"{table}clip"] = view.clip.files
+        files[f"{table}mask"] = () if view.clip.mask is None else view.clip.mask.files
         given = shot.scene.views[number - 1].background if number else shot.scene.background
         files[f"{table}background"] = _background(given, view)
     for number, light in enumerate(shot.scene.lights):

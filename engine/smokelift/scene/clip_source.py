@@ -24,12 +24,16 @@ class ClipSource:
     transfer
         ``"srgb"`` or ``"linear"``; None takes what the file says, else srgb for 8 to 16 bit integers and linear for
         EXR.
+    mask
+        A garbage matte: white where smoke may be, black where none is, whatever moves there. A picture; or a video, or
+        pictures written ``mask_####.png``, whose frame n belongs to the clip's frame n.
     """
 
     path: Path
     fps: float | None = None
     frames: tuple[int, int] | None = None
     transfer: Literal["srgb", "linear"] | None = None
+    mask: Path | None = None
 
     def __post_init__(self) -> None:
         """Check the values."""
@@ -44,6 +48,8 @@ class ClipSource:
             set_fields(self, frames=(first, last))
         if self.transfer not in (None, "srgb", "linear"):
             raise unexpected(self.transfer, "transfer", '"srgb" or "linear"')
+        if self.mask is not None:
+            set_fields(self, mask=file_path(self.mask, "mask"))
 
     @property
     def first(self) -> int:

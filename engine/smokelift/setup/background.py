@@ -24,10 +24,10 @@ from smokelift.footage.panorama import estimate_panorama
 from smokelift.footage.plain import plain_plate
 from smokelift.footage.plate import Plate, Plates, known_plate
 from smokelift.footage.plate_estimation import estimate_plate, steady_samples
-from smokelift.footage.steady import exposures, without_noise_light
+from smokelift.footage.steady import cleared, exposures, uncovered, without_noise_light
 from smokelift.footage.turning import Turns, find_turns
 from smokelift.scene import Background, Camera
-from smokelift.setup.smoke import UNKNOWN, SmokeSamples
+from smokelift.setup.smoke import SmokeSamples, unknown_part
 
 BLACK = 0.001
 """Linear radiance below which a background is called black."""
@@ -66,7 +66,7 @@ class FoundPlates:
     Attributes
     ----------
     clip
-        Without the brightness that noise adds to it.
+        Without the brightness that noise adds to it, and its background where a mask hides it.
     plates
         Of the full pictures.
     background
@@ -111,17 +111,19 @@ def find_plates(
 
     @cache
     def shot() -> tuple[int, int]:
-        part = evidence(clip)  # as filmed: what noise adds to light does not change which frames belong together
-        return part.first, part.first + len(part) - 1
+        # as filmed: neither what noise adds to light nor a mask changes which frames belong together
+        part = evidence(clip.as_filmed())
+        return part.first, min(part.first + len(part), len(clip.whole())) - 1
 
     found = _find_plates(clip, camera, background, lens, shot)
     quiet = without_noise_light(clip, found.plates)
-    if quiet is clip:
-        return found
-    again = _find_plates(quiet, camera, background, lens, shot)
-    # noise is that of the pictures as they were filmed: sRGB values of the others are too low on the mean
-    plates: Any = again.plates
-    return replace(again, plates=replace(plates, noise=found.plates.noise))
+    if quiet is not clip:
+        again = _find_plates(quiet, camera, background, lens, shot)
+        # noise is that of the pictures as they were filmed: sRGB values of the others are too low on the mean
+        plates: Any = again.plates
+        found = replace(again, plates=replace(plates, noise=found.plates.noise))
+    shown = uncovered(found.plates, quiet)
+    return replace(found, clip=cleared(quiet, shown), plates=shown)
 
 
 def _find_plates(
@@ -223,12 +225,12 @@ def _estimated(clip: Clip, evidence_of: Callable[[], Clip], lens: Lens | None, t
     if len(shot) > len(clip):
         plain_everywhere = plain_plate(clip, shot)
     if plain_everywhere is not None and plain_everywhere.noise.total.max() <= ONE_COLOUR_NOISE:
-        return FoundPlates(clip, plain_everywhere, None, (_found(plain_everywhere),))
+        return FoundPlates(clip, plain_everywhere, None, (_found(plain_everywhere, clip),))
     shot = evidence_of()
     alone = colour_around(shot.frame(0)) if len(shot) == 1 else None
     if alone is not None:
         plate = known_plate(alone, clip)
-        return FoundPlates(clip, plate, None, (_found(plate),), doubts=(FROM_ONE,))
+        return FoundPlates(clip, plate, None, (_found(plate, clip),), doubts=(FROM_ONE,))
     samples = large_samples(shot) or steady_samples(shot)
     backdrop, noise = samples.backdrop(), samples.noise
     # one colour has nothing to hold on to, and is the same wherever the camera looks; in noise, texture may pass by
@@ -237,10 +239,10 @@ def _estimated(clip: Clip, evidence_of: Callable[[], Clip], lens: Lens | None, t
     if turns is None:
         plate = backdrop or samples.plate()
         few = (_from_few(len(shot)),) if backdrop is None and 1 < len(shot) < FEW else ()
-        return FoundPlates(clip, plate, None, (_found(plate),), doubts=few)
+        return FoundPlates(clip, plate, None, (_found(plate, clip),), doubts=few)
     panorama = estimate_panorama(clip, turns)
-    parts = [panorama.at(number) for number in clip.spread(EXPOSURE_SAMPLES)]
-    unknown = float(np.mean([part.confidence < UNKNOWN for part in parts]))
+    parts = [unknown_part(panorama, clip, number) for number in clip.spread(EXPOSURE_SAMPLES)]
+    unknown = float(np.mean(parts))
     moved = (
         f"The camera moves, by up to {turns.farthest:.0f} pixels: it is steadied against the background, as a camera "
         "that turns in its place, and has a matrix for every frame."
@@ -272,9 +274,9 @@ def focal_notes(lens: Lens, told: bool, focal: FocalLength | None) -> tuple[str,
     )
 
 
-def _found(plate: Plate) -> str:
-    """How a background was estimated."""
-    unknown = float(np.mean(plate.confidence < UNKNOWN))
+def _found(plate: Plate, clip: Clip) -> str:
+    """How the background of a clip was estimated."""
+    unknown = float(np.mean(unknown_part(plate, clip, 0)))
     if unknown > 0:
         return _how(unknown)
     colour = plate.image[0, 0]

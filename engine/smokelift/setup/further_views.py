@@ -82,7 +82,7 @@ def _opened(source: ClipSource, clip: Clip, scene: CompleteScene) -> Clip:
         first += source.first - (scene.clip.first if scene.clip is not None else clip.first)
     # pictures carry no rate of their own
     fps = clip.fps if source.fps is None and not is_video(source.path) else source.fps
-    with Clip.open(replace(source, fps=fps, frames=None)) as whole:
+    with Clip.open(replace(source, fps=fps, frames=None, mask=None)) as whole:
         have = len(whole)
     last = first + len(clip) - 1
     if first < 0 or last >= have:

@@ -75,6 +75,13 @@ def small_pictures(clip: Clip) -> dict[int, Picture]:
     return {number: small(clip.reduced(number)) for number in clip.spread(SAMPLES)}
 
 
+def unknown_part(plates: Plates, clip: Clip, number: int) -> NDArray[np.bool_]:
+    """Return where the background of a frame is unknown (rows, columns), and no mask hides it."""
+    unknown = plates.at(number).confidence < UNKNOWN
+    seen = clip.seen(number, *unknown.shape[::-1])
+    return unknown if seen is None else unknown & seen
+
+
 def sample_smoke(clip: Clip, plates: Plates, turns: Turns | None = None) -> SmokeSamples:
     """Find the smoke in frames spread over a clip, whose camera may turn and whose exposure may change."""
     width, height = clip.size
@@ -92,7 +99,7 @@ def sample_smoke(clip: Clip, plates: Plates, turns: Turns | None = None) -> Smok
         gains[number] = gains_of(number, shown)
         picture = clip.reduced(number) / gains[number]
         mask = matte(picture, plate).mask
-        for whole, part in ((covered, mask), (unknown, plate.confidence < UNKNOWN)):
+        for whole, part in ((covered, mask), (unknown, unknown_part(reduced, clip, number))):
             whole |= part if wide is None else wide.spread_out(part.astype(np.float32), number) > 0.5
         colours.append(picture[mask])
         behind.append(plate.image[mask])

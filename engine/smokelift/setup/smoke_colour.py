@@ -118,7 +118,7 @@ def several_colours(samples: SmokeSamples) -> tuple[str, ...]:
     return (
         f"The smoke has more than one colour: its light is {off:.0f} degrees from the nearest single one on the mean, "
         "but one is taken for all of it, so colours are wrong and the thickness may be. Crop the clip to smoke of one "
-        "colour.",
+        "colour, or give it a mask.",
     )
 
 

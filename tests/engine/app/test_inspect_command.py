@@ -96,6 +96,19 @@ def test_a_camera_that_is_given_without_its_box_has_a_box_that_is_found(plume, t
     assert (known["scale"], known["box"], known["grid"]) == ("undetermined", "estimated", "measured")
 
 
+def test_a_mask_is_outlined_and_kept(plume, tmp_path, capsys) -> None:
+    """On the page, in the facts, and in the scene file that is written."""
+    mask = np.ones((56, 40, 3))
+    mask[:, :8] = 0
+    write_image(tmp_path / "mask.png", mask)
+    scene, page = tmp_path / "scene.toml", tmp_path / "page.html"
+    clip = plume.scene.clip.path
+    assert command("inspect", clip, "--mask", tmp_path / "mask.png", "--page", page, "--write", scene, *QUICK) == 0
+    assert "the mask&#x27;s outline" in page.read_text(encoding="utf-8")
+    assert "mask: hides 20% of the first frame (given)" in scene.read_text()
+    assert Scene.load(scene).clip.mask == tmp_path / "mask.png"
+
+
 def test_a_page_of_a_moving_camera_has_its_path(tracked, tmp_path) -> None:
     """Where the box goes in the picture."""
     tracked.save(tmp_path / "scene.toml")

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from command_line import QUICK, command, events, names, refused
 
+from smokelift.output.images import write_image
 from smokelift.output.sequence import Sequence
 from smokelift.output.vdb import VdbUnavailable, vdb_module
 from smokelift.scene import completed
@@ -34,6 +35,16 @@ def test_reconstruct_writes_vdb_files(shot, tmp_path, capsys) -> None:
     out = "".join(capsys.readouterr().out.splitlines())
     assert "2 frames in" in out
     assert Sequence.open(tmp_path / "out").density(2).any()
+
+
+def test_a_wrong_mask_is_refused_in_a_sentence(shot, tmp_path, capsys) -> None:
+    """Before anything is looked at."""
+    write_image(tmp_path / "black.png", np.zeros((4, 4, 3)))
+    words = ("reconstruct", shot, "--out", tmp_path / "out", *QUICK, "--mask")
+    assert "no such file" in refused(capsys, *words, tmp_path / "none.png")
+    assert "this mask is black everywhere" in refused(capsys, *words, tmp_path / "black.png")
+    assert "holds no video stream" in refused(capsys, *words, shot)
+    assert not (tmp_path / "out").exists()
 
 
 def test_progress_as_json(plume, tmp_path, capsys) -> None:

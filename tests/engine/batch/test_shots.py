@@ -35,6 +35,7 @@ input = "pipe_####.png"
 name = "pipe 2"
 quality = "fine"
 frames = [10, 99]
+mask = "masks/pipe.png"
 axis_depth = -0.5
 npz = false
 """,
@@ -46,7 +47,8 @@ npz = false
         ("--quality=draft", "--npz"),
     )
     assert first.directory == tmp_path / "there" / "steam"
-    assert second.options == ("--quality=fine", "--frames=10:99", "--axis-depth=-0.5")
+    mask = tmp_path / "masks" / "pipe.png"
+    assert second.options == ("--quality=fine", "--frames=10:99", f"--mask={mask}", "--axis-depth=-0.5")
     assert second.name == "pipe 2"
 
 

@@ -32,6 +32,16 @@ def test_a_shot_whose_options_changed_is_run_again(make_shot, fake) -> None:
     assert not read_state(shot).finished
 
 
+def test_a_shot_whose_mask_changed_is_run_again(make_shot, fake, tmp_path) -> None:
+    mask = tmp_path / "mask.png"
+    mask.write_text("white")
+    shot = replace(make_shot(), options=(f"--mask={mask}",))
+    finish_shot(shot, threading.Event(), engine=fake)
+    assert read_state(shot).finished
+    mask.write_text("black and white")
+    assert not read_state(shot).finished
+
+
 def test_after_a_crash_the_next_run_goes_on(make_shot, fake, ledger) -> None:
     shot = make_shot(frames=4, n3="crash")
     record = finish_shot(shot, threading.Event(), engine=fake)

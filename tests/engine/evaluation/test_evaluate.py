@@ -11,6 +11,7 @@ import pytest
 from PIL import Image
 
 from smokelift.app.cli import main
+from smokelift.footage.images import read_image
 from smokelift.output.images import write_image
 from smokelift.output.writer import SequenceWriter
 from smokelift.render import render
@@ -216,6 +217,23 @@ def test_a_missing_input_clip_is_noted(plume, side, tmp_path, capsys) -> None:
     found = evaluate(capsys, write(tmp_path / "out", scene, plume.densities), "--view", *side)
     assert [view["name"] for view in found["views"]] == ["camera"]
     assert "gone.mp4" in found["notes"][0]
+
+
+def test_what_a_mask_hides_of_the_input_is_its_background(plume, side, tmp_path, capsys) -> None:
+    """A block beside the smoke is no error where a mask hides it."""
+    scene = plume.write(tmp_path / "clip", plume.densities)
+    for number in range(len(plume.densities)):
+        file = tmp_path / "clip" / f"frame_{number:04d}.png"
+        picture = read_image(file)
+        picture[4 + 8 * number : 14 + 8 * number, 1:7] = 0.3
+        write_image(file, picture)
+    mask = np.ones((56, 40, 3))
+    mask[:, :8] = 0
+    write_image(tmp_path / "mask.png", mask)
+    masked = replace(scene, clip=replace(scene.clip, mask=tmp_path / "mask.png"))
+    hidden = evaluate(capsys, write(tmp_path / "masked", masked, plume.densities), "--view", *side)["views"][0]
+    shown = evaluate(capsys, write(tmp_path / "out", scene, plume.densities), "--view", *side)["views"][0]
+    assert hidden["ssim"] > 0.99 > shown["ssim"]
 
 
 def test_a_view_before_a_background_of_its_own(plume, perfect, tmp_path, capsys) -> None:

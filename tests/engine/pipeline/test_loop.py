@@ -255,6 +255,31 @@ def test_vdb_files_hold_the_same(run, plume) -> None:
         np.testing.assert_allclose(density, frame.density, rtol=1e-3, atol=1e-6)
 
 
+BESIDE = np.s_[:, :8]
+"""Columns of the plume's pictures that its smoke does not come to."""
+
+
+def test_what_a_mask_hides_is_no_smoke(run, plume, draft, tmp_path) -> None:
+    """A block that falls beside the plume is smoke without the mask; with it the smoke is as if there were no block."""
+    alone, _ = run
+    scene = plume.write(tmp_path, plume.densities)
+    for number in range(len(plume.densities)):
+        file = tmp_path / f"frame_{number:04d}.png"
+        picture = read_image(file)
+        picture[4 + 8 * number : 14 + 8 * number, 1:7] = (0.2, 0.3, 0.25)
+        write_image(file, picture)
+    mask = np.ones((56, 40, 3))
+    mask[BESIDE] = 0
+    write_image(tmp_path / "mask.png", mask)
+    beside = project_voxels(scene.camera, scene.domain).shown((mask == 0).all(-1))
+    masked = replace(scene, clip=replace(scene.clip, mask=tmp_path / "mask.png"))
+    for frame, wanted in zip(frames_of(masked, draft), alone, strict=True):
+        assert frame.density[beside].max() <= 1e-3 * frame.density.max()
+        assert frame.density.sum() == pytest.approx(wanted.density.sum(), rel=0.02)
+        assert frame.figures["psnr"] == pytest.approx(wanted.figures["psnr"], abs=0.5)
+    assert all(frame.density[beside].max() > 0.1 * frame.density.max() for frame in frames_of(scene, draft))
+
+
 @pytest.mark.parametrize("count", [1, 3])
 def test_a_run_that_was_cut_off_goes_on_exactly(run, plume, draft, tmp_path, count) -> None:
     """Resuming gives the rest, and the files are those of an uninterrupted run bit for bit."""
@@ -271,14 +296,18 @@ def test_a_run_that_was_cut_off_goes_on_exactly(run, plume, draft, tmp_path, cou
         np.testing.assert_array_equal(other, value, err_msg=name)
 
 
-@pytest.mark.parametrize("replaced", ["clip", "background"])
-def test_a_file_that_was_replaced_under_its_name_is_not_mixed_in(plume, draft, tmp_path, replaced) -> None:
+@pytest.mark.parametrize(
+    ("replaced", "file"), [("clip", "clip/frame_0004.png"), ("background", "plate.png"), ("mask", "mask.png")]
+)
+def test_a_file_that_was_replaced_under_its_name_is_not_mixed_in(plume, draft, tmp_path, replaced, file) -> None:
     """Half a sequence of one clip and half of another would look like one."""
     scene = plume.write(tmp_path / "clip", plume.densities)
     write_image(tmp_path / "plate.png", np.zeros((56, 40, 3)))
-    scene = replace(scene, background=Background(image=tmp_path / "plate.png"))
+    write_image(tmp_path / "mask.png", np.ones((56, 40, 3)))
+    clip = replace(scene.clip, mask=tmp_path / "mask.png")
+    scene = replace(scene, clip=clip, background=Background(image=tmp_path / "plate.png"))
     cut_off(scene, draft, tmp_path / "out", 2)
-    changed = tmp_path / "clip" / "frame_0004.png" if replaced == "clip" else tmp_path / "plate.png"
+    changed = tmp_path / file
     picture = read_image(changed)
     picture[0, 0] = 0.01
     write_image(changed, picture)

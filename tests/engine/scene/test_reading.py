@@ -55,6 +55,15 @@ def test_every_table_is_read(tmp_path: Path) -> None:
     assert view.background == Background(image=tmp_path / "wall.png")
 
 
+def test_every_clip_may_have_a_mask(tmp_path: Path) -> None:
+    """Relative to the file, as the clip is; a view's is its own."""
+    own = load(tmp_path, '[clip]\npath = "a.mp4"\nmask = "masks/mask_##.png"\n').clip
+    assert own == ClipSource(tmp_path / "a.mp4", mask=tmp_path / "masks" / "mask_##.png")
+    text = GOOD.replace("[views.clip]", '[views.clip]\nmask = "side.png"', 1)
+    (view,) = load(tmp_path, text).views
+    assert view.clip.mask == tmp_path / "side.png"
+
+
 def test_walls_and_inlets_are_read(tmp_path: Path) -> None:
     """In the order of the sides, whatever the file's."""
     inlets = "[[inlet]]\ncentre = [0, 0, 0]\nradius = 0.5\n[[inlet]]\ncentre = [1, 0, 1]\nradius = 0.25\n"

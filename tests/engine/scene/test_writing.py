@@ -127,13 +127,13 @@ def test_paths_move_with_the_scene_file(tmp_path: Path) -> None:
     old, new = tmp_path / "old", tmp_path / "new"
     old.mkdir()
     Scene(
-        clip=ClipSource(old / "clips" / "a.mp4"),
+        clip=ClipSource(old / "clips" / "a.mp4", mask=old / "mask.png"),
         background=Background(image=tmp_path / "plate.png"),
         domain=Domain((0, 0, 0), (1, 1, 1), (4, 4, 4)),
     ).save(old / "scene.toml")
     old.rename(new)
     scene = Scene.load(new / "scene.toml")
-    assert scene.clip == ClipSource(new / "clips" / "a.mp4")
+    assert scene.clip == ClipSource(new / "clips" / "a.mp4", mask=new / "mask.png")
     assert scene.background == Background(image=tmp_path / "plate.png")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from typing import Any
 
 from smokelift.app.options import named_path
@@ -34,7 +35,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     out = options.out or sequence.directory
     out.mkdir(parents=True, exist_ok=True)
     framing = frame_smoke(sequence)
-    with Clip.open(sequence.scene.clip) as clip:
+    with Clip.open(replace(sequence.scene.clip, mask=None)) as clip:  # as it was filmed
         write_contact_sheet(out / CONTACT_SHEET, sequence, clip, framing)
         write_orbit(out / ORBIT, sequence, clip, framing)
         write_strip(out / STRIP, sequence, clip, framing)

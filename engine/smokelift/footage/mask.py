@@ -1,0 +1,189 @@
+"""Garbage mattes: pictures that are white where a clip may show smoke, and black where it shows none.
+
+What a mask hides is neither smoke nor anything to learn from: a head, a dog, leaves, a label. There every frame is
+continued from around it, so that what looks at whole pictures meets nothing that moves, and no edge that stays. What
+counts pixels leaves these out (`Clip.seen`). Once the background is known, it takes their place (`steady.cleared`).
+
+A pixel is hidden or it is not: the mask's value, as it is stored, counts as the nearer of black and white. A frame that
+shows a part of its smoke only would be taken for one of thinner smoke, so that soft edges have no meaning here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from smokelift.footage.behind_smoke import push_pull
+from smokelift.footage.frame_source import ClipError, FrameSource, Look
+from smokelift.footage.image_sequence import ImageSequence, is_pattern
+from smokelift.footage.images import CodedPicture, Picture, area_average, linear_picture, read_image
+from smokelift.footage.video import Video
+
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
+"""Weights of red, green and blue (Rec. 709)."""
+
+HALF = 0.5
+"""Value from which on a pixel of a mask is white."""
+
+CONTINUED = 320
+"""Pixels along the longer side of the picture that is continued: as smooth as that is, it has no more detail."""
+
+REMEMBERED = 16
+"""Masks of a size that are kept: two megabytes each of 1080p."""
+
+Seen = npt.NDArray[np.bool_]
+
+
+class Mask:
+    """A mask for all frames of a clip's file, or one for each.
+
+    Parameters
+    ----------
+    path
+        A picture; or a video, or a pattern ``mask_####.png``, whose frame n belongs to the file's frame n. Of a picture
+        with an alpha channel it is what is seen of it before black.
+    first, last
+        Frames of the file that need one.
+
+    Attributes
+    ----------
+    files
+        What it is read from.
+    count
+        Frames of the file that have one; None if they all do.
+
+    Raises
+    ------
+    ClipError, ImageError
+        If it cannot be read, lacks a frame, or hides all of them.
+    """
+
+    def __init__(self, path: Path, first: int, last: int) -> None:
+        self._path, self._first = path, first
+        self._read: Callable[[int], Picture]
+        self._video: Video | None = None
+        self.count: int | None = None
+        if not ImageSequence.reads(path):
+            self._video = video = Video(path, "linear")
+            self.files, self.count = video.files, video.count
+            self._read = lambda n: linear_picture(video.read(n))
+        elif is_pattern(path):
+            self.files = ImageSequence(path, "linear", None).files
+            self.count = len(self.files)
+            self._read = lambda n: read_image(self.files[n], "linear")
+        else:
+            still = read_image(path, "linear")
+            self.files = (path,)
+            self._read = lambda _: still
+        self._at = lru_cache(maxsize=REMEMBERED)(self._seen)
+        if self.count is not None and last >= self.count:
+            raise ClipError(
+                f"{path}: has masks for {self.count} of the frames 0 to {last} that are needed; give one for every "
+                "frame of the clip, or one picture for all."
+            )
+        missing = [file for file in self.files if is_pattern(path) and not file.is_file()]
+        if missing:
+            raise ClipError(f"{missing[0]}: this mask is missing; give one for every frame, or one picture for all.")
+        frames = range(first, last + 1) if self.count else (first,)
+        if not any((self._read(n) @ LUMINANCE >= HALF).any() for n in frames):
+            raise ClipError(
+                f"{path}: this mask is black everywhere (transparent counts as black), so that no smoke may be "
+                "anywhere; paint white where smoke may be."
+            )
+
+    def seen(self, n: int, width: int, height: int) -> Seen:
+        """Return which pixels of frame ``n`` of the file are not hidden, (height, width), for pictures of any size.
+
+        Raises
+        ------
+        ClipError, ImageError
+            If the mask of the frame cannot be read.
+        """
+        return self._at(n if self.count else 0, width, height)
+
+    def require_shape(self, width: int, height: int) -> None:
+        """Raise ClipError if it is no picture of the shape of a clip of so many pixels, whatever its size."""
+        rows, columns = self._read(self._first).shape[:2]
+        # either may be a resized copy: each side is right to a pixel
+        if abs(columns * height - rows * width) > columns + rows + width + height:
+            raise ClipError(
+                f"{self._path}: this mask is {columns} x {rows} pixels, another shape than the clip's {width} x "
+                f"{height}; paint it over a frame of the clip."
+            )
+
+    def _seen(self, n: int, width: int, height: int) -> Seen:
+        return area_average(self._read(n) @ LUMINANCE, width, height) >= HALF
+
+    def close(self) -> None:
+        """Close the file."""
+        if self._video is not None:
+            self._video.close()
+
+
+class Masked:
+    """The frames of a source, continued where a mask hides them. Those that have no mask are left out.
+
+    Attributes
+    ----------
+    filmed
+        The source.
+    mask
+        What hides them.
+    """
+
+    def __init__(self, source: FrameSource, mask: Mask) -> None:
+        self.filmed, self.mask = source, mask
+        self.count = min(source.count, mask.count or source.count)
+        self.fps, self.warning, self.files = source.fps, source.warning, source.files
+        self.lens, self.backdrop = source.lens, source.backdrop
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        return self.filmed.notes
+
+    def read(self, n: int) -> Picture | CodedPicture:
+        return self._continued(n, self.filmed.read(n))
+
+    def glimpse(self, n: int, divisor: int) -> Picture | CodedPicture:
+        return self._continued(n, self.filmed.glimpse(n, divisor))
+
+    def damaged(self, first: int, last: int, look: Look | None = None) -> tuple[int, ...]:
+        def look_at(n: int, picture: Callable[[int], Picture | CodedPicture]) -> None:
+            if look is not None:
+                look(n, lambda divisor: self._continued(n, picture(divisor)))
+
+        return self.filmed.damaged(first, last, look_at)
+
+    def close(self) -> None:
+        self.filmed.close()
+        self.mask.close()
+
+    def _continued(self, n: int, image: Picture | CodedPicture) -> Picture | CodedPicture:
+        rows, columns = (image.codes if isinstance(image, CodedPicture) else image).shape[:2]
+        seen = self.mask.seen(n, columns, rows)
+        if seen.all():
+            return image
+        around = continued(linear_picture(image), seen)
+        if isinstance(image, CodedPicture):
+            codes = image.codes.copy()
+            values = np.searchsorted(image.table, around).clip(max=len(image.table) - 1)
+            codes[~seen] = values.astype(codes.dtype)
+            return CodedPicture(codes, image.table)
+        whole = image.copy()
+        whole[~seen] = around
+        return whole
+
+
+def continued(picture: Picture, seen: Seen) -> Picture:
+    """Return the pixels (n, 3) of a linear picture (rows, columns, 3) that are not seen, smoothly from around them."""
+    rows, columns = seen.shape
+    scale = max(1.0, max(rows, columns) / CONTINUED)
+    size = max(1, round(columns / scale)), max(1, round(rows / scale))
+    share = area_average(seen.astype(np.float32), *size)
+    mean = area_average(np.where(seen[..., None], picture, 0), *size) / np.maximum(share, 1e-6)[..., None]
+    whole = area_average(push_pull(mean, (share > 0).astype(np.float32)), columns, rows)
+    return np.asarray(whole[~seen], np.float32)
