@@ -146,29 +146,49 @@ def _crossings(places: Values, shape: tuple[int, ...]) -> Crossings:
     none = np.empty(0, np.int64)
     found = [Crossings(none, none, none, none, np.empty((0, 3)))]
     for number in np.unique(batch):
-        some = near[batch == number]
-        of = np.repeat(some, counts[some])
-        within = np.arange(len(of)) - np.repeat(np.cumsum(counts[some]) - counts[some], counts[some])
-        column = low[of] + np.stack([within // size[of, 1], within % size[of, 1]], axis=-1)
-        corners = places[of]
-        areas, left = zip(
-            *(_side(corners[:, k, :2], corners[:, (k + 1) % 3, :2], column) for k in range(3)), strict=True
-        )
-        total = areas[0] + areas[1] + areas[2]
-        same = (left[0] == left[1]) & (left[1] == left[2]) & (total != 0)
-        # the area beside an edge is the weight of the corner opposite to it
-        weights = np.stack([areas[1], areas[2], areas[0]], axis=-1)[same] / total[same, None]
-        heights = (weights * corners[same, :, 2]).sum(axis=1)
-        found.append(
-            Crossings(
-                column[same] @ np.array([shape[1], 1]),
-                np.clip(np.ceil(heights), 0, shape[2]).astype(np.int64),
-                np.where(left[0][same], 1, -1),
-                of[same],
-                weights,
-            )
-        )
+        triangle, column = _pairs(near[batch == number], low, size)
+        found.append(_crossed(places[triangle], triangle, column, shape))
     return Crossings(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+
+
+def _pairs(triangles: Integers, low: Integers, size: Integers) -> tuple[Integers, Integers]:
+    """Triangles, each with every column of a rectangle.
+
+    Parameters
+    ----------
+    triangles : (m,)
+        Their numbers.
+    low, size : (n, 2)
+        The first column of each triangle's rectangle, and how many it has along both axes.
+
+    Returns
+    -------
+    triangle : (k,)
+        Numbers.
+    column : (k, 2)
+        Places of the columns.
+    """
+    counts = size[triangles].prod(axis=1)
+    triangle = np.repeat(triangles, counts)
+    within = np.arange(len(triangle)) - np.repeat(np.cumsum(counts) - counts, counts)
+    return triangle, low[triangle] + np.stack(np.divmod(within, size[triangle, 1]), axis=-1)
+
+
+def _crossed(corners: Values, triangle: Integers, column: Integers, shape: tuple[int, ...]) -> Crossings:
+    """Those of pairs of a triangle, with its corners (k, 3, 3), and a column (k, 2) that cross."""
+    areas, left = zip(*(_side(corners[:, k, :2], corners[:, (k + 1) % 3, :2], column) for k in range(3)), strict=True)
+    total = areas[0] + areas[1] + areas[2]
+    same = (left[0] == left[1]) & (left[1] == left[2]) & (total != 0)
+    # the area beside an edge is the weight of the corner opposite to it
+    weights = np.stack([areas[1], areas[2], areas[0]], axis=-1)[same] / total[same, None]
+    heights = (weights * corners[same, :, 2]).sum(axis=1)
+    return Crossings(
+        column[same] @ np.array([shape[1], 1]),
+        np.clip(np.ceil(heights), 0, shape[2]).astype(np.int64),
+        np.where(left[0][same], 1, -1),
+        triangle[same],
+        weights,
+    )
 
 
 def _side(start: Values, end: Values, point: npt.NDArray[np.int64]) -> tuple[Values, Mask]:
