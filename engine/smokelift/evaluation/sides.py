@@ -58,40 +58,62 @@ def look_from_sides(sequence: Sequence, truth: Truth | None, filmed: ReferenceVi
     found = _Densities(sequence.scene)
     true = None if truth is None else _Densities(_on_grid(sequence.scene, truth.shape))
     front = PictureSeries()
-    means = {degrees: PictureMeans(found.background(degrees)) for degrees in DEGREES}
-    series = {degrees: PictureSeries() for degrees in DEGREES}
+    views = {degrees: _View(found.background(degrees)) for degrees in DEGREES}
     pictures: dict[int, list[Image]] = {}
     for number in sequence.frames:
         density = sequence.density(number)
         ahead = found.front(density) if filmed is None else _filmed_smoke(filmed, number)
         front.add(ahead)
         images = found.look(density, ahead)
-        if truth is None or true is None:
-            for degrees, image in images.items():
-                series[degrees].add(smoke_picture(image, found.background(degrees)))
-            tiles = list(images.values())
-        else:
-            beside = true.look(truth.density(first_frame(sequence) + number - 1), ahead)
-            for degrees, image in images.items():
-                means[degrees].add(image, beside[degrees])
-            tiles = [picture for degrees in DEGREES for picture in (beside[degrees], images[degrees])]
+        true_images: dict[int, Image] = {}
+        if truth is not None and true is not None:
+            true_images = true.look(truth.density(first_frame(sequence) + number - 1), ahead)
+        for degrees, view in views.items():
+            view.add(images[degrees], true_images.get(degrees))
         if number in shown:
-            pictures[number] = tiles
+            pairs = ((true_images.get(degrees), images[degrees]) for degrees in DEGREES)
+            pictures[number] = [picture for pair in pairs for picture in pair if picture is not None]
     reference = front.statistics()
-    views: list[Figures] = []
-    for degrees in DEGREES:
-        statistics = series[degrees].statistics() if true is None else means[degrees].statistics()[0]
-        against_truth = {} if true is None else means[degrees].figures()
-        from_front = beside_references(statistics, [reference])
-        views.append({"degrees": degrees} | against_truth | _described(statistics) | from_front)
     figures: Figures = {
         "reference": "the sequence's own front" if filmed is None else "the input's pictures",
         "front": _described(reference),
-        "views": views,
+        "views": [{"degrees": degrees} | view.figures(reference) for degrees, view in views.items()],
         **found.figures(),
         **({} if true is None else {f"{name}_truth": value for name, value in true.figures().items()}),
     }
     return Sides(figures, pictures)
+
+
+class _View:
+    """Gathers what a sequence shows at one angle, beside the truth where that is known.
+
+    Parameters
+    ----------
+    background : (rows, columns, 3) or (3,)
+        Linear radiance behind the smoke.
+    """
+
+    def __init__(self, background: Image) -> None:
+        self._background = background
+        self._alone = PictureSeries()
+        self._beside_truth: PictureMeans | None = None
+
+    def add(self, image: Image, true: Image | None) -> None:
+        """Add a frame's picture, and the true one if it is known: in all frames or in none."""
+        if true is None:
+            self._alone.add(smoke_picture(image, self._background))
+            return
+        if self._beside_truth is None:
+            self._beside_truth = PictureMeans(self._background)
+        self._beside_truth.add(image, true)
+
+    def figures(self, reference: PictureStatistics) -> Figures:
+        """Return what the pictures look like, against the truth and beside a reference."""
+        if self._beside_truth is None:
+            found, against_truth = self._alone.statistics(), {}
+        else:
+            found, against_truth = self._beside_truth.statistics()[0], self._beside_truth.figures()
+        return against_truth | _described(found) | beside_references(found, [reference])
 
 
 class _Densities:

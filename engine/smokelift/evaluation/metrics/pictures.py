@@ -10,6 +10,8 @@ from scipy import fft, ndimage
 
 from smokelift.evaluation.metrics.checks import Array, counted, pair
 
+Integers = npt.NDArray[np.int64]
+
 
 def psnr(a: npt.ArrayLike, b: npt.ArrayLike, mask: npt.ArrayLike | None = None, peak: float = 1.0) -> float:
     """Return the peak signal-to-noise ratio of two pictures in dB.
@@ -107,18 +109,35 @@ def shifted_psnr(
     size = [fft.next_fast_len(n + f, real=True) for n, f in zip((rows, columns), far, strict=True)]
     waves = np.conj(fft.rfft2(first, size, axes=(0, 1))) * fft.rfft2(second, size, axes=(0, 1))
     overlap = fft.irfft2(waves.sum(axis=-1), size)
-    # sums of squares of what stays in the picture, from a table of sums
-    table = np.zeros((rows + 1, columns + 1))
-    table[1:, 1:] = (first**2).sum(axis=-1).cumsum(0).cumsum(1)
     down, right = (np.arange(-f, f + 1) for f in far)
-    top, bottom = np.maximum(0, -down), rows - np.maximum(0, down)
-    left, end = np.maximum(0, -right), columns - np.maximum(0, right)
-    kept = table[np.ix_(bottom, end)] - table[np.ix_(top, end)] - table[np.ix_(bottom, left)] + table[np.ix_(top, left)]
+    kept = _sums_inside((first**2).sum(axis=-1), down, right)
     squares = kept + float((second**2).sum()) - 2 * overlap[np.ix_(down, right)]
     row, column = np.unravel_index(int(squares.argmin()), squares.shape)
     shift = int(down[row]), int(right[column])
-    moved = np.zeros_like(first)
-    there = np.s_[max(0, shift[0]) : rows + min(0, shift[0]), max(0, shift[1]) : columns + min(0, shift[1])]
-    here = np.s_[max(0, -shift[0]) : rows - max(0, shift[0]), max(0, -shift[1]) : columns - max(0, shift[1])]
-    moved[there] = first[here]
-    return psnr(moved, second, peak=peak), shift
+    return psnr(_shifted(first, shift), second, peak=peak), shift
+
+
+def _sums_inside(values: Array, down: Integers, right: Integers) -> Array:
+    """Sums of what stays of a picture (rows, columns) after each shift down (m,) and to the right (n,), shape (m, n).
+
+    From a table of the sums over all rectangles in the first corner (Crow, "Summed-area tables for texture mapping",
+    SIGGRAPH 1984).
+    """
+    rows, columns = values.shape
+    table = np.zeros((rows + 1, columns + 1))
+    table[1:, 1:] = values.cumsum(0).cumsum(1)
+    top, bottom = np.maximum(0, -down), rows - np.maximum(0, down)
+    left, end = np.maximum(0, -right), columns - np.maximum(0, right)
+    sums: Array = table[np.ix_(bottom, end)] - table[np.ix_(top, end)] - table[np.ix_(bottom, left)]
+    sums += table[np.ix_(top, left)]
+    return sums
+
+
+def _shifted(picture: Array, shift: tuple[int, int]) -> Array:
+    """A picture (rows, columns, channels) moved down and to the right, zero where nothing comes from."""
+    (down, right), (rows, columns) = shift, picture.shape[:2]
+    moved = np.zeros_like(picture)
+    there = np.s_[max(0, down) : rows + min(0, down), max(0, right) : columns + min(0, right)]
+    here = np.s_[max(0, -down) : rows - max(0, down), max(0, -right) : columns - max(0, right)]
+    moved[there] = picture[here]
+    return moved
