@@ -24,6 +24,7 @@ class Moment:
     Attributes
     ----------
     density : (nx, ny, nz) float32
+        At voxel centres.
     velocity
         Without divergence, in m/s; it has carried the moment before to this one.
     flame : (nx, ny, nz) float32, optional

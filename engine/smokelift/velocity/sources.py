@@ -47,8 +47,8 @@ class SourceDetection:
     prominence
         The same for the mean residual as a share of the strongest source's: inlets of one scene are of one kind.
     news
-        How much the frame at hand counts in a mean over frames. Inlets stand still; what a wrong velocity leaves moves
-        on.
+        How much the frame at hand counts in an exponential moving average over frames. Inlets stand still; what a
+        wrong velocity leaves moves on.
     still
         Speed that smoke is seen to move at, in medians over the smoke, at which a first estimate believes it by half.
     """
