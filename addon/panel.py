@@ -97,6 +97,7 @@ def _draw_shot(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bp
     layout.prop(settings, "plate_mode")
     if settings.plate_mode == "FILE":
         layout.prop(settings, "plate", text=" ")
+    layout.prop(settings, "mask")
     layout.prop(settings, "camera_mode")
     if settings.camera_mode == "SCENE":
         layout.prop(settings, "box")

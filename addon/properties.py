@@ -209,6 +209,16 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
         options=PATH_OPTIONS,
         update=_changed,
     )
+    mask: StringProperty(
+        name="Mask",
+        description=(
+            "Picture that is white where smoke may be and black where none is, whatever moves there; or a video, or "
+            "mask_####.png, with one for each frame of the clip"
+        ),
+        subtype="FILE_PATH",
+        options=PATH_OPTIONS,
+        update=_changed,
+    )
     camera_mode: EnumProperty(
         name="Camera",
         description="Where the clip was filmed from",

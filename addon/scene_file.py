@@ -38,6 +38,8 @@ def shot_tables(smoke: bpy.types.Object, quick: bool = False) -> dict[str, Any]:
     """
     settings, scene = smoke.smokelift, scene_of(smoke)
     tables: dict[str, Any] = {"clip": clip_table(smoke)}
+    if settings.mask:
+        tables["clip"]["mask"] = _existing_mask(settings.mask)
     with at_frame(scene, scene.frame_current if quick else start_frame(settings)) as depsgraph:
         rotation = Matrix.Identity(3)
         if settings.camera_mode == "SCENE":
@@ -84,6 +86,13 @@ def _existing(path: str, what: str) -> str:
     if not file.is_file():
         raise ShotError(f"The {what} {file} is not there: choose it again.")
     return str(file)
+
+
+def _existing_mask(path: str) -> str:
+    mask = absolute(path)
+    if "#" not in mask.name and not mask.is_file():  # a pattern is no file; the engine says what it finds
+        raise ShotError(f"The mask {mask} is not there: choose it again, or clear Mask.")
+    return str(mask)
 
 
 def _require_moving_plate(plate: Path) -> None:

@@ -64,7 +64,7 @@ def write_directed(smoke: bpy.types.Object) -> Take:
 
 
 def update_moved_files(smoke: bpy.types.Object, take: Take) -> None:
-    """Write today's paths of clip and plate into the scene file of a take that is resumed, if the project was moved.
+    """Write today's paths of clip, mask and plate into the scene file of a resumed take, if the project was moved.
 
     Raises
     ------
@@ -73,9 +73,11 @@ def update_moved_files(smoke: bpy.types.Object, take: Take) -> None:
     """
     settings = smoke.smokelift
     if take.direction() is None:
-        files = {"clip": ("path", clip_path(settings.clip))}
+        files = {("clip", "path"): clip_path(settings.clip)}
+        if settings.mask:
+            files["clip", "mask"] = absolute(settings.mask)
         if settings.plate:
-            files["background"] = ("image", absolute(settings.plate))
+            files["background", "image"] = absolute(settings.plate)
         take.update_moved_files(files)
 
 

@@ -156,13 +156,13 @@ class Take:
             return {}
         return request if isinstance(request, dict) else {}
 
-    def update_moved_files(self, files: Mapping[str, tuple[str, Path]]) -> None:
+    def update_moved_files(self, files: Mapping[tuple[str, str], Path]) -> None:
         """Write today's paths into its scene file for files that are not where they were: the project was moved.
 
         Parameters
         ----------
         files
-            Today's path and its key, by the table it is in.
+            Today's path by the table it is in, and its key there.
 
         Raises
         ------
@@ -172,7 +172,7 @@ class Take:
         try:
             tables = tomllib.loads(self.scene_file.read_text(encoding="utf-8"))
             moved = False
-            for table, (key, path) in files.items():
+            for (table, key), path in files.items():
                 before = tables.get(table, {}).get(key)
                 if isinstance(before, str) and not Path(before).is_file() and path.is_file():
                     tables[table][key] = str(path)

@@ -92,6 +92,9 @@ class SMOKELIFT_OT_undistort(bpy.types.Operator):
         if settings.plate_mode == "FILE":
             self.report({"ERROR"}, "The clean plate is distorted too: choose Background: From the Clip first.")
             return {"CANCELLED"}
+        if settings.mask:
+            self.report({"ERROR"}, "The mask is distorted too: clear it, and paint one over the undistorted clip.")
+            return {"CANCELLED"}
         clip, kept = settings.clip, {name: getattr(settings, name) for name in ("first", "last", "folder", "fps")}
         folder = smoke_takes.output_folder(smoke) / "undistorted"
         try:

@@ -147,17 +147,21 @@ def test_a_scene_file_is_told_where_its_files_went(tmp_path) -> None:
     (tmp_path / "plate.png").write_text("picture")
     take = new_take(tmp_path)
     tables = {
-        "clip": {"path": str(tmp_path / "gone" / "clip.mp4")},
+        "clip": {"path": str(tmp_path / "gone" / "clip.mp4"), "mask": str(tmp_path / "gone" / "mask.png")},
         "background": {"image": str(tmp_path / "plate.png")},
     }
     take.write(tables, [])
-    files = {"clip": ("path", tmp_path / "clip.mp4"), "background": ("image", tmp_path / "other.png")}
+    files = {
+        ("clip", "path"): tmp_path / "clip.mp4",
+        ("clip", "mask"): tmp_path / "mask.png",
+        ("background", "image"): tmp_path / "other.png",
+    }
     take.update_moved_files(files)
     assert tomllib.loads(take.scene_file.read_text()) == tables
-    for name in ("clip.mp4", "other.png"):
+    for name in ("clip.mp4", "mask.png", "other.png"):
         (tmp_path / name).write_text("found")
     take.update_moved_files(files)
-    tables["clip"]["path"] = str(tmp_path / "clip.mp4")
+    tables["clip"] = {"path": str(tmp_path / "clip.mp4"), "mask": str(tmp_path / "mask.png")}
     assert tomllib.loads(take.scene_file.read_text()) == tables
     take.scene_file.write_text("[clip")
     with pytest.raises(TakeError, match="make the smoke again"):

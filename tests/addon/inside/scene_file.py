@@ -246,6 +246,7 @@ def test_one_picture_is_no_clean_plate_of_a_moving_camera(tracked, tmp_path) -> 
         ),
         (lambda s: setattr(smoke(s).smokelift, "plate", ""), "Choose the clean plate"),
         (lambda s: setattr(smoke(s).smokelift, "plate", "//none.png"), "none.png is not there"),
+        (lambda s: setattr(smoke(s).smokelift, "mask", "//mask.png"), "mask.png is not there"),
         (lambda s: setattr(smoke(s).smokelift, "box", None), "Make Box"),
         (lambda s: setattr(smoke(s).smokelift.box, "scale", (1.0, 0.0, 1.0)), "flat"),
         (lambda s: setattr(smoke(s).smokelift.box, "location", (30.0, 0.0, 1.5)), "not in the camera's picture"),
@@ -332,8 +333,10 @@ def test_paths_beside_the_blend(shot, tmp_path) -> None:
         (tmp_path / name).write_bytes((EXAMPLE / name).read_bytes())
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
     smoke(shot).smokelift.clip.filepath, smoke(shot).smokelift.plate = "//clip.mp4", "//plate.png"
+    smoke(shot).smokelift.mask = "//masks/mask_####.png"
     tables = shot_tables(smoke(shot))
     assert tables["clip"]["path"] == str(tmp_path / "clip.mp4")
+    assert tables["clip"]["mask"] == str(tmp_path / "masks" / "mask_####.png")
     assert tables["background"]["image"] == str(tmp_path / "plate.png")
 
 

@@ -68,6 +68,12 @@ def test_a_distorted_clean_plate_is_refused(bent, tmp_path) -> None:
         bpy.ops.smokelift.undistort()
 
 
+def test_a_distorted_mask_is_refused(bent) -> None:
+    smoke(bent).smokelift.mask = "//mask.png"
+    with pytest.raises(RuntimeError, match="mask is distorted too"):
+        bpy.ops.smokelift.undistort()
+
+
 @pytest.mark.parametrize("model", sorted(undistort.COEFFICIENTS))
 def test_every_model_of_a_lens_counts(bent, model) -> None:
     """And only its own coefficients."""
