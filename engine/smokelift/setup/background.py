@@ -24,6 +24,7 @@ from smokelift.footage.panorama import estimate_panorama
 from smokelift.footage.plain import plain_plate
 from smokelift.footage.plate import Plate, Plates, known_plate
 from smokelift.footage.plate_estimation import estimate_plate, steady_samples
+from smokelift.footage.quantiser import COARSE, median_quantiser
 from smokelift.footage.steady import cleared, exposures, uncovered, without_noise_light
 from smokelift.footage.turning import Turns, find_turns
 from smokelift.scene import Background, Camera
@@ -239,7 +240,8 @@ def _estimated(clip: Clip, evidence_of: Callable[[], Clip], lens: Lens | None, t
     if turns is None:
         plate = backdrop or samples.plate()
         few = (_from_few(len(shot)),) if backdrop is None and 1 < len(shot) < FEW else ()
-        return FoundPlates(clip, plate, None, (_found(plate, clip),), doubts=few)
+        coarse = _compressed(clip) if backdrop is None else ()
+        return FoundPlates(clip, plate, None, (_found(plate, clip),), doubts=(*few, *coarse))
     panorama = estimate_panorama(clip, turns)
     parts = [unknown_part(panorama, clip, number) for number in clip.spread(EXPOSURE_SAMPLES)]
     unknown = float(np.mean(parts))
@@ -247,7 +249,8 @@ def _estimated(clip: Clip, evidence_of: Callable[[], Clip], lens: Lens | None, t
         f"The camera moves, by up to {turns.farthest:.0f} pixels: it is steadied against the background, as a camera "
         "that turns in its place, and has a matrix for every frame."
     )
-    return FoundPlates(clip, panorama, None, (moved, *focal_notes(turns.lens, told, focal), _how(unknown)), turns)
+    notes = (moved, *focal_notes(turns.lens, told, focal), _how(unknown))
+    return FoundPlates(clip, panorama, None, notes, turns, _compressed(clip))
 
 
 def _turned(clip: Clip, lens: Lens, told: bool) -> tuple[Turns | None, FocalLength | None]:
@@ -301,6 +304,18 @@ def _from_few(frames: int) -> str:
     return (
         f"Only {frames} frames show what is behind the smoke: what is the same in all that there are counts as "
         "background, smoke too. Give a clean plate, or a color, in [background]."
+    )
+
+
+def _compressed(clip: Clip) -> tuple[str, ...]:
+    """What is to be said of a background of more than one colour in so strongly compressed a clip, if it is that."""
+    quantiser = median_quantiser(clip.path)
+    if quantiser is None or quantiser < COARSE:
+        return ()
+    return (
+        f"The clip is strongly compressed (quantiser {quantiser:.0f} of 51): faint smoke may be missing from the "
+        "result, because the codec lets it stand still as the background does. Use a copy that is compressed less, or "
+        "give a clean plate in [background].",
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+import av
 import numpy as np
 
 from smokelift.footage.clip import Clip
@@ -43,6 +44,30 @@ def film(
         codes = linear_to_srgb(clean) + random.normal(0.0, noise / 255, clean.shape)
         write_image(folder / f"frame_{n:03d}.png", srgb_to_linear(np.clip(codes, 0.0, 1.0)))
     return Clip.open(folder / "frame_###.png", fps=24)
+
+
+def coded(
+    path: Path,
+    plate: np.ndarray,
+    opacity: Callable[[int], np.ndarray],
+    colour: float,
+    qp: int | None = None,
+    codec: str = "libx264",
+    **options: str | int,
+) -> Path:
+    """Write a video of smoke of a colour before a plate, coded with a quantiser or with a codec's options."""
+    with av.open(path, "w") as out:
+        stream = out.add_stream(codec, rate=24)
+        stream.height, stream.width = plate.shape[:2]
+        stream.pix_fmt = "yuv420p"
+        told = options if qp is None else {"qp": qp, **options}
+        stream.options = {name: str(value) for name, value in told.items()}
+        for n in range(COUNT):
+            alpha = np.clip(opacity(n), 0.0, 1.0)[..., None]
+            codes = np.rint(255 * linear_to_srgb(plate * (1.0 - alpha) + colour * alpha)).astype(np.uint8)
+            out.mux(stream.encode(av.VideoFrame.from_ndarray(codes, "rgb24")))
+        out.mux(stream.encode())
+    return path
 
 
 def overlap(mask: np.ndarray, truth: np.ndarray) -> float:

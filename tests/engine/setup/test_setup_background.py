@@ -22,6 +22,7 @@ from smokelift.setup import background
 from smokelift.setup.background import between_bars, cut_notes, find_plates, focal_notes, smoke_in_plate
 from smokelift.setup.geometry import clip_lens
 from smokelift.setup.smoke import SmokeSamples, sample_smoke, small_pictures
+from tests.engine.footage.films import coded, puff, wall
 
 
 def before(floor: float, folder) -> Clip:
@@ -68,6 +69,17 @@ def test_one_colour_is_said(tmp_path) -> None:
     """Behind a puff before black."""
     found = find_plates(before(0.0, tmp_path), None, None)
     assert found.notes == ("Background not given: it is black.",)
+
+
+@pytest.mark.parametrize(("quantiser", "said"), [(36, False), (46, True)])
+def test_a_clip_that_is_strongly_compressed_is_said(tmp_path, quantiser, said) -> None:
+    """Where the codec's smoke that stands still may be in the background, which is not so before black."""
+    for plate, doubted in ((wall(0.2, 0.5), said), (np.zeros((72, 56, 3)), False)):
+        path = coded(tmp_path / f"{doubted}.mp4", plate, puff, 0.8, quantiser)
+        with Clip.open(path) as clip:
+            doubts = find_plates(clip, None, None).doubts
+            assert any(doubt.startswith("The clip is strongly compressed") for doubt in doubts) is doubted
+            assert not find_plates(clip, None, Background(color=(0.1, 0.1, 0.1))).doubts
 
 
 def test_what_never_changes_before_one_colour_is_said(tmp_path) -> None:
