@@ -161,8 +161,9 @@ def _simulated(
         obstacles = None if solid is None else solid.voxels
         figures = simulated_figures(faded, began, "simulated", vars(simulation.physics), obstacles)
         volumes = [values for values in (moment.density, moment.flame) if values is not None]
-        unfaded = dict(zip(UNFADED, volumes, strict=False))
-        writer.write(number, faded.density, moment.velocity.faces, figures, unfaded, flame=faded.flame)
+        faces, unfaded = moment.velocity.faces, dict(zip(UNFADED, volumes, strict=False))
+        state = ResumeState(number, faded.density, faces, unfaded)
+        writer.write(number, faded.density, faces, figures, flame=faded.flame, state=state)
         yield number, figures
 
 

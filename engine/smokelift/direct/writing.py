@@ -14,6 +14,7 @@ from smokelift.checks import counted
 from smokelift.direct.constraint import Mask
 from smokelift.direct.moment import Moment
 from smokelift.output.checksum import checksum
+from smokelift.output.index import Origins
 from smokelift.output.layout import INDEX
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
@@ -77,11 +78,13 @@ def directed_writer(
         out,
         scene,
         {**sequence.settings, "direct": {"job": job, **settings}},
-        choices=sequence.choices,
-        provenance=[*sequence.provenance, {"what": job, "origin": "made up", "how": how, "settings": {}}],
-        sources={"sequence": {INDEX: checksum([sequence.directory / INDEX])}},
         npz=npz,
         resume=resume,
+        origins=Origins(
+            choices=sequence.choices,
+            provenance=[*sequence.provenance, {"what": job, "origin": "made up", "how": how, "settings": {}}],
+            sources={"sequence": {INDEX: checksum([sequence.directory / INDEX])}},
+        ),
     )
 
 

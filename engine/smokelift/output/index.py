@@ -6,7 +6,7 @@ import json
 import math
 import platform
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
@@ -45,6 +45,26 @@ def software_versions() -> dict[str, str]:
 
 
 @dataclass(frozen=True)
+class Origins:
+    """Where a result comes from, in values that JSON can hold.
+
+    Attributes
+    ----------
+    choices
+        What was chosen for the clip and why. Not compared when a run goes on: what they decided is in the scene and the
+        settings.
+    provenance
+        What of the result is measured, estimated, assumed and made up. Not compared either.
+    sources
+        Size and content of the files that the run reads, by their table in a scene file.
+    """
+
+    choices: Sequence[Mapping[str, Any]] = ()
+    provenance: Sequence[Mapping[str, Any]] = ()
+    sources: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class Index:
     """The content of the file, as plain values.
 
@@ -54,14 +74,10 @@ class Index:
         The tables of a scene file.
     settings
         All settings that decide the result.
-    choices
-        What was chosen for the clip and why.
-    provenance
-        What of the result is measured, estimated, assumed and made up.
+    choices, provenance, sources
+        As in `Origins`; empty for early versions.
     frames
         The figures of every finished frame, by its number as text.
-    sources
-        Size and content of every file that was read, by its table in a scene file; empty for early versions.
     checksums
         Of the frames' files, by name (`smokelift.output.checksum`); empty for early versions.
     complete

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -28,13 +28,13 @@ class ResumeState:
     velocity
         On faces, m/s; the grid may be coarser than that of the density.
     extra
-        Further arrays by name, as they were given to `SequenceWriter.write`.
+        Further arrays by name.
     """
 
     number: int
     density: Array
     velocity: Faces
-    extra: Mapping[str, npt.NDArray[Any]]
+    extra: Mapping[str, npt.NDArray[Any]] = field(default_factory=dict)
 
     def write(self, path: Path) -> None:
         """Write the state; OSError if that fails."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
@@ -23,7 +23,7 @@ from smokelift.output.archive import FLAME, VELOCITY, write_arrays
 from smokelift.output.atomic import DISK_FULL, atomic_path
 from smokelift.output.checksum import checksum
 from smokelift.output.images import write_image
-from smokelift.output.index import DirectoryBusyError, Index, SequenceError, difference, plain, without_folders
+from smokelift.output.index import DirectoryBusyError, Index, Origins, SequenceError, difference, plain, without_folders
 from smokelift.output.layout import BACKGROUND, INDEX, LOCK, RESUME, frame_path, is_foreign
 from smokelift.output.lock import Lock
 from smokelift.output.resume import ResumeState
@@ -52,13 +52,8 @@ class SequenceWriter:
         Whether to go on from the finished frames in the directory. An empty directory starts a new run.
     background : (rows, columns, 3), optional
         An estimated background of the scene's picture, kept as `background.exr`.
-    choices
-        What was chosen for the clip and why, as JSON can hold it. Kept, and not compared when a run goes on: what they
-        decided is in the scene and the settings.
-    provenance
-        What of the result is measured, estimated, assumed and made up, as JSON can hold it. Kept, and not compared.
-    sources
-        Size and content of the files that the run reads, as JSON can hold it.
+    origins
+        Where the result comes from. Kept.
 
     Attributes
     ----------
@@ -81,9 +76,7 @@ class SequenceWriter:
         npz: bool = False,
         resume: bool = False,
         background: Array | None = None,
-        choices: Iterable[Mapping[str, Any]] = (),
-        provenance: Iterable[Mapping[str, Any]] = (),
-        sources: Mapping[str, Any] | None = None,
+        origins: Origins | None = None,
     ) -> None:
         self.directory = Path(directory)
         self.state: ResumeState | None = None
@@ -93,12 +86,7 @@ class SequenceWriter:
             scene = replace(scene, background=Background(image=self.directory.resolve() / BACKGROUND))
         # Through JSON, so that it compares equal to what is read back.
         run = {"scene": scene_to_dict(scene, self.directory.resolve()), "settings": dict(settings)}
-        self._index = Index(
-            **json.loads(json.dumps(run, allow_nan=False)),
-            choices=plain(list(choices)),
-            provenance=plain(list(provenance)),
-            sources=plain(sources or {}),
-        )
+        self._index = Index(**json.loads(json.dumps(run, allow_nan=False)), **plain(vars(origins or Origins())))
         self._npz = npz
         self._kinds: tuple[str, ...] = ()
         self._resume = resume
@@ -150,10 +138,10 @@ class SequenceWriter:
         density: npt.ArrayLike,
         velocity_faces: tuple[npt.ArrayLike, npt.ArrayLike, npt.ArrayLike],
         figures: Mapping[str, Any] | None = None,
-        extra: Mapping[str, npt.ArrayLike] | None = None,
-        ready: Mapping[str, Path] | None = None,
+        *,
         flame: npt.ArrayLike | None = None,
-        next_needs: Faces | None = None,
+        ready: Mapping[str, Path] | None = None,
+        state: ResumeState | None = None,
     ) -> None:
         """Write one frame and make it count.
 
@@ -167,14 +155,12 @@ class SequenceWriter:
             m/s, shapes (nx+1, ny, nz), (nx, ny+1, nz), (nx, ny, nz+1).
         figures
             Numbers and text about the frame by name. Numbers that are not finite become null.
-        extra
-            Further arrays that the next frame depends on, for :attr:`state`.
-        ready
-            Files that hold this frame already, by their kind ``"vdb"`` or ``"npz"``: they are copied.
         flame : (nx, ny, nz), optional
             Emission of fire, radiance per metre, not negative; None where there can be none.
-        next_needs
-            The velocity that the next frame depends on, for :attr:`state`, where it is on a coarser grid; m/s.
+        ready
+            Files that hold this frame already, by their kind ``"vdb"`` or ``"npz"``: they are copied.
+        state
+            What the next frame depends on; without it density and velocity.
 
         Raises
         ------
@@ -191,8 +177,7 @@ class SequenceWriter:
         rho, faces = _checked(density, velocity_faces, self._domain.shape)
         fire = None if flame is None else checked_volume(flame, self._domain.shape, FLAME)
         self.state = None  # a run has gone on by now, and the arrays are large
-        kept = {name: np.asarray(value) for name, value in (extra or {}).items()}
-        state = ResumeState(number, rho, next_needs or faces, kept)
+        state = state or ResumeState(number, rho, faces)
         try:
             paths = [frame_path(self.directory, number, kind) for kind in self._kinds]
             for kind, path in zip(self._kinds, paths, strict=True):

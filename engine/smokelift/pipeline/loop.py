@@ -22,6 +22,7 @@ from smokelift.density import Density, ViewSet
 from smokelift.density.flame import flame_emission
 from smokelift.density.hull import inside, project_voxels
 from smokelift.footage.clip import Clip
+from smokelift.output.index import Origins
 from smokelift.output.resume import ResumeState
 from smokelift.output.writer import SequenceWriter
 from smokelift.pipeline.method import Method, compose
@@ -154,9 +155,11 @@ def reconstruct(
         npz=npz,
         resume=resume,
         background=shot.estimated_background,
-        choices=[choice.as_dict() for choice in shot.choices],
-        provenance=[part.as_dict() for part in provenance(shot)],
-        sources=sources(shot),
+        origins=Origins(
+            choices=[choice.as_dict() for choice in shot.choices],
+            provenance=[part.as_dict() for part in provenance(shot)],
+            sources=sources(shot),
+        ),
     ) as writer:
         if writer.state is None and writer.finished:
             return
@@ -167,20 +170,20 @@ def reconstruct(
                     frame.density,
                     frame.velocity.faces,
                     frame.figures,
-                    _kept(frame),
                     flame=frame.flame,
-                    next_needs=frame.estimated.faces,
+                    state=_state(frame),
                 )
                 yield frame
             del frame  # before the next is computed: velocities take most of the memory
 
 
-def _kept(frame: Frame) -> dict[str, Array]:
-    """What the next frame needs of one besides density and velocity."""
+def _state(frame: Frame) -> ResumeState:
+    """What the next frame needs of one, for a run that goes on."""
     memory = frame.estimated.residual
     kept = {} if memory is None else {"residual_mean": memory.mean, "residual_magnitude": memory.magnitude}
     volumes = {"smooth": frame.smooth, "steady": frame.steady}
-    return kept | {name: volume for name, volume in volumes.items() if volume is not None}
+    kept |= {name: volume for name, volume in volumes.items() if volume is not None}
+    return ResumeState(frame.number, frame.density, frame.estimated.faces, kept)
 
 
 def _resumed(state: ResumeState, shot: Shot) -> Frame:

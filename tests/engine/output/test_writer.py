@@ -18,7 +18,7 @@ import pytest
 from small_sequence import SCENE, SETTINGS, frame, has_vdb, names, write
 
 from smokelift.output.archive import VELOCITY
-from smokelift.output.index import SequenceError
+from smokelift.output.index import Origins, SequenceError
 from smokelift.output.resume import ResumeState
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
@@ -35,7 +35,8 @@ def cut_off(directory: Path, numbers: Iterable[int], *, npz: bool = True, **opti
         SequenceWriter(directory, SCENE, SETTINGS, npz=npz, **options) as writer,
     ):
         for number in numbers:
-            writer.write(number, *frame(number), extra={"gain": np.float64(number)})
+            state = ResumeState(number, *frame(number), {"gain": np.array(float(number))})
+            writer.write(number, *frame(number), state=state)
         raise CutOffError
 
 
@@ -64,10 +65,10 @@ def test_a_run_that_ends_before_its_first_frame_goes_on(tmp_path: Path, no_vdb: 
 
 def test_choices_are_kept_and_not_compared(tmp_path: Path, no_vdb: None) -> None:
     """They say why; a run goes on although a figure changed. Sequences of before there were any open."""
-    cut_off(tmp_path, [1], choices=[{"what": "scattering", "measured": {"error": math.nan}}])
+    cut_off(tmp_path, [1], origins=Origins(choices=[{"what": "scattering", "measured": {"error": math.nan}}]))
     assert Sequence.open(tmp_path).choices == ({"what": "scattering", "measured": {"error": None}},)
     other = ({"what": "scattering", "measured": {"error": 0.2}},)
-    write(tmp_path, [2], resume=True, choices=other)
+    write(tmp_path, [2], resume=True, origins=Origins(choices=other))
     assert Sequence.open(tmp_path).choices == other
     index = json.loads((tmp_path / "sequence.json").read_text())
     del index["choices"]
@@ -77,10 +78,10 @@ def test_choices_are_kept_and_not_compared(tmp_path: Path, no_vdb: None) -> None
 
 def test_provenance_is_kept_and_not_compared(tmp_path: Path, no_vdb: None) -> None:
     """It says what is known, and what decides it is in the settings. Sequences of before there was any open."""
-    cut_off(tmp_path, [1], provenance=[{"what": "velocity", "origin": "estimated"}])
+    cut_off(tmp_path, [1], origins=Origins(provenance=[{"what": "velocity", "origin": "estimated"}]))
     assert Sequence.open(tmp_path).provenance == ({"what": "velocity", "origin": "estimated"},)
     other = ({"what": "velocity", "origin": "assumed"},)
-    write(tmp_path, [2], resume=True, provenance=other)
+    write(tmp_path, [2], resume=True, origins=Origins(provenance=other))
     assert Sequence.open(tmp_path).provenance == other
     index = json.loads((tmp_path / "sequence.json").read_text())
     del index["provenance"]
@@ -162,7 +163,7 @@ def test_a_coarser_velocity_is_kept_for_the_next_frame(tmp_path: Path, no_vdb: N
     """The files have the frame's own."""
     coarse = tuple(np.full(shape, 2, np.float32) for shape in face_shapes((2, 2, 3)))
     with pytest.raises(KeyboardInterrupt), SequenceWriter(tmp_path, SCENE, SETTINGS, npz=True) as writer:
-        writer.write(1, *frame(1)[:2], next_needs=coarse)
+        writer.write(1, *frame(1)[:2], state=ResumeState(1, frame(1)[0], coarse))
         raise KeyboardInterrupt
     with SequenceWriter(tmp_path, SCENE, SETTINGS, npz=True, resume=True) as writer:
         assert writer.state is not None
@@ -240,17 +241,17 @@ def test_other_files_and_other_software_are_not_resumed(
     tmp_path: Path, no_vdb: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """They would be mixed without a word. A patch of Python changes nothing; early versions kept no sources."""
-    cut_off(tmp_path, [1], sources={"clip": {"bytes": 9, "sha256": "ab"}})
+    cut_off(tmp_path, [1], origins=Origins(sources={"clip": {"bytes": 9, "sha256": "ab"}}))
     with pytest.raises(SequenceError, match=r'sources\.clip\.sha256 was "ab" and is now "cd"; choose another'):
-        write(tmp_path, [2], resume=True, sources={"clip": {"bytes": 9, "sha256": "cd"}})
+        write(tmp_path, [2], resume=True, origins=Origins(sources={"clip": {"bytes": 9, "sha256": "cd"}}))
     index = json.loads((tmp_path / "sequence.json").read_text())
     newer = {**index, "versions": {**index["versions"], "numpy": "1.0"}}
     (tmp_path / "sequence.json").write_text(json.dumps(newer))
     with pytest.raises(SequenceError, match=r'versions\.numpy was "1.0" and is now'):
-        write(tmp_path, [2], resume=True, sources=index["sources"])
+        write(tmp_path, [2], resume=True, origins=Origins(sources=index["sources"]))
     early = {**index, "sources": {}, "versions": {**index["versions"], "python": "3.11.0"}}
     (tmp_path / "sequence.json").write_text(json.dumps(early))
-    write(tmp_path, [2], resume=True, sources=index["sources"])
+    write(tmp_path, [2], resume=True, origins=Origins(sources=index["sources"]))
     assert Sequence.open(tmp_path).frames == (1, 2)
 
 
