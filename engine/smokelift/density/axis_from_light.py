@@ -23,7 +23,7 @@ from smokelift.density.axis import AxisEstimate, SmokeAxis
 from smokelift.density.hull import project_voxels, visual_hull
 from smokelift.density.observation import Observation, View
 from smokelift.density.profile import DepthProfile
-from smokelift.density.screen import upright_rows, view_frame
+from smokelift.density.screen import reach_along, upright_rows, view_frame
 from smokelift.footage.images import area_average
 from smokelift.footage.matte import matte
 from smokelift.footage.plate import noise_at
@@ -156,8 +156,7 @@ def _colour_contrast(camera: Camera, optics: Optics) -> float:
     # irradiance falls off as 1 / r^2, so along the depth by 2 depth / r^2, relatively
     slope = 2 * (offset @ along) / np.sum(offset**2, 1)
     change = (slope @ colour) / np.maximum(colour.sum(0), 1e-30)
-    reach = float(np.abs(along) @ (np.array(domain.max) - np.array(domain.centre)))
-    return float(reach * np.ptp(change))
+    return float(reach_along(domain, along) * np.ptp(change))
 
 
 class _CoarsePicture:

@@ -79,11 +79,7 @@ def camera_terms(views: ViewSet, inside: Sequence[NDArray[np.float32]]) -> list[
         Of each, the share of every ray's smoke that lies inside the domain.
     """
     return [
-        Term(
-            view,
-            renderer,
-            view.counted * np.maximum(share, LEAST_SHARE) ** 2,
-        )
+        Term(view, renderer, view.counted * np.maximum(share, LEAST_SHARE) ** 2)
         for view, renderer, share in zip(views.views, views.renderers, inside, strict=True)
     ]
 

@@ -1,4 +1,4 @@
-"""The smoke of some frames by height: how much, how far aside, and how much of a depth at its foot holds higher up."""
+"""The smoke of some frames by height: how much, how far aside, and what its depth at the base says of that above."""
 
 from __future__ import annotations
 

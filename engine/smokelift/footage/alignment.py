@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy import fft, ndimage
 from scipy.spatial.transform import Rotation
 
-from smokelift.footage.images import Picture, area_average, blurred, linear_to_srgb
+from smokelift.footage.images import Picture, area_average, blurred, channel_mean, linear_to_srgb
 
 Array = NDArray[np.float64]
 
@@ -140,8 +140,7 @@ def levels(picture: Picture, lens: Lens, count: int = LEVELS) -> tuple[Level, ..
     for halvings in range(count):
         columns, rows = level_size(lens, halvings)
         picture = area_average(picture, columns, rows)
-        encoded = linear_to_srgb(picture)
-        grey: Picture = (encoded[..., 0] + encoded[..., 1] + encoded[..., 2]) / np.float32(3)  # faster than a mean
+        grey = channel_mean(linear_to_srgb(picture))
         detail = blurred(grey, FINE) - blurred(grey, COARSE)
         contrast = np.sqrt(blurred(detail**2, AROUND) + FAINT**2)
         found.append(Level(lens.resized(columns, rows), (detail / contrast).astype(np.float32)))

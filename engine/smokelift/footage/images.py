@@ -409,6 +409,12 @@ def brightest_channel(values: npt.NDArray[Number]) -> npt.NDArray[Number]:
     return np.asarray(np.maximum(np.maximum(red, green), blue))
 
 
+def channel_mean(values: Picture) -> Picture:
+    """Return the mean of the three values along the last axis; NumPy's ``mean`` takes much longer there."""
+    red, green, blue = np.moveaxis(values, -1, 0)
+    return np.asarray((red + green + blue) / np.float32(3))
+
+
 def blurred(picture: Picture, deviation: float) -> Picture:
     """Smooth a picture (rows, columns) or (rows, columns, channels) with a Gaussian of a standard deviation in pixels.
 

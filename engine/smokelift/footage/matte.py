@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
-from smokelift.footage.images import Picture, blurred, linear_to_srgb
+from smokelift.footage.images import Picture, blurred, channel_mean, linear_to_srgb
 from smokelift.footage.noise import Noise
 from smokelift.footage.plate import Plate
 
@@ -79,8 +79,7 @@ def matte(frame: npt.ArrayLike, plate: Plate) -> Matte:
         width = float(np.sqrt(width**2 - SMOOTHING**2))
     difference = (linear_to_srgb(shown) - linear_to_srgb(behind)) / noise
     smooth = blurred(difference, width)
-    red, green, blue = np.moveaxis(smooth**2, -1, 0)
-    deviation = np.sqrt((red + green + blue) / np.float32(3))  # faster than a mean
+    deviation = np.sqrt(channel_mean(smooth**2))
     deviation /= np.clip(np.median(deviation), 1.0, GLOBAL_DEVIATION)
     certain = 2.0 * SMOKE_THRESHOLD
     patches, count = ndimage.label(deviation > SMOKE_THRESHOLD, structure=np.ones((3, 3)))

@@ -69,7 +69,6 @@ def choose_model(
     guessed
         Whether nothing tells the light, not even its strength.
     """
-
     coarsened = choose_coarsening(scene.domain, settings.velocity, settings.selection.velocity_side)
     velocity = replace(settings.velocity, coarsening=coarsened.chosen)
     coarse = CoarseClip(clip, scene, plates)

@@ -22,6 +22,7 @@ from smokelift.footage.images import (
     area_average,
     blurred,
     brightest_channel,
+    channel_mean,
     chequered_averages,
     code_values,
     decode_integers,
@@ -313,6 +314,13 @@ def test_pictures_are_smoothed_as_by_scipy(shape: tuple[int, ...], deviation: fl
 def test_the_brightest_channel_is_the_largest(shape: tuple[int, ...]) -> None:
     values = np.random.default_rng(0).standard_normal(shape).astype(np.float32)
     assert np.array_equal(brightest_channel(values), values.max(-1))
+
+
+@pytest.mark.parametrize("shape", [(0, 3), (7, 3), (4, 5, 3)])
+def test_the_mean_of_the_channels(shape: tuple[int, ...]) -> None:
+    values = np.random.default_rng(0).standard_normal(shape).astype(np.float32)
+    assert channel_mean(values).dtype == np.float32
+    assert np.allclose(channel_mean(values), values.mean(-1), atol=1e-6)
 
 
 def test_channels_are_interleaved() -> None:
