@@ -8,9 +8,8 @@ the add-on finds it beside itself.
 What the engine needs lies there as a folder, not as wheels: Blender would keep a wheel beside its unpacked files, and
 share those with other extensions, which may want another version. The engine is a process of its own.
 
-Wheels of others are downloaded, as tools/bundle.txt and bundle_gpu.txt pin them, and what the engine never imports of
-them is left out. The engine's own have been built before, here (engine_wheels.py) or on a machine of the platform they
-are for. The same sources give the same zips, byte for byte.
+The engine's own wheels have been built before, here (engine_wheels.py) or on a machine of the platform they are for.
+The same sources give the same zips, byte for byte.
 """
 
 from __future__ import annotations
@@ -24,35 +23,19 @@ import sys
 import tomllib
 import zipfile
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from importlib.metadata import distributions
 from pathlib import Path
 from typing import Any
 
 import tomli_w
-from packaging.requirements import Requirement
-from packaging.utils import canonicalize_name, parse_wheel_filename
+from packaging.utils import parse_wheel_filename
 from packaging.version import Version
 
 from engine_wheels import PYTHONS, ROOT, VERSION
-
-STAGE = ROOT / "build" / "extension"
+from extension_libraries import PINS, gather, library_faults
+from extension_products import BLENDERS, PLATFORMS, STAGE, BuildError, Platform, Product, python_tag
 
 MANUAL = ROOT / "build" / "manual"
 """The manual as web pages, which the preferences' button opens."""
-
-BLENDERS = {"3.11": ("4.2.0", "5.1.0"), "3.13": ("4.2.0", None)}
-"""First Blender that a Python's zip installs in, and the first that it does not. Official ones have Python 3.13 from
-5.1 on, Linux distributions' own earlier (Debian's 4.3): there the add-on says it if the zip is the wrong one."""
-
-NAMED = {"3.11": "blender4.2-5.0", "3.13": "blender5.1"}
-"""What a zip is called after the Blenders that it is for."""
-
-BLENDER_NUMPY = {"3.11": "1.26.4", "3.13": "2.2.0"}
-"""The numpy that Blender has beside each Python; what is bundled has to work with it."""
-
-PINS = {"smokelift": "bundle.txt", "smokelift_gpu": "bundle_gpu.txt"}
-"""The extensions, and the files in tools that pin their wheels."""
 
 LEVEL = 5
 """Of compression: takes six tenths of the time of 6, which is usual, for 1 % more bytes."""
@@ -70,109 +53,6 @@ def register() -> None:
 def unregister() -> None:
     pass
 '''
-
-UNUSED = (
-    "bin",
-    "*.data",
-    "**/tests",
-    # of pip's notes: paths of this machine, and checksums of what is changed here
-    *(f"*.dist-info/{name}" for name in ("RECORD", "REQUESTED", "INSTALLER", "direct_url.json")),
-    *(
-        f"scipy/{part}"
-        for part in ("cluster", "datasets", "differentiate", "fftpack", "integrate", "interpolate", "io")
-    ),
-    *(f"scipy/{part}" for part in ("misc", "odr", "optimize", "signal", "stats")),
-)
-"""Patterns of what no module of the engine imports; tests/blender imports them all in every Blender."""
-
-STRIPPED = ("av", "PIL")
-"""Libraries whose Linux wheels hold debugging information, a quarter of all bytes of PyAV."""
-
-
-@dataclass(frozen=True)
-class Platform:
-    """One of Blender's platforms.
-
-    Attributes
-    ----------
-    name
-        As Blender calls it.
-    tags
-        Platform tags of wheels that run there, for pip.
-    fits
-        Pattern of the platform tags that run there.
-    markers
-        What requirements may ask about it.
-    """
-
-    name: str
-    tags: tuple[str, ...]
-    fits: str
-    markers: Mapping[str, str]
-
-
-PLATFORMS = (
-    Platform(
-        "linux-x64",
-        # Blender needs glibc 2.28 itself
-        (*(f"manylinux_2_{minor}_x86_64" for minor in (28, 27, 26, 24, 17, 12, 5)), "manylinux2014_x86_64"),
-        r"(many)?linux.*_x86_64",
-        {"sys_platform": "linux", "platform_system": "Linux", "platform_machine": "x86_64", "os_name": "posix"},
-    ),
-    Platform(
-        "windows-x64",
-        ("win_amd64",),
-        r"win_amd64",
-        {"sys_platform": "win32", "platform_system": "Windows", "platform_machine": "AMD64", "os_name": "nt"},
-    ),
-    Platform(
-        "macos-arm64",
-        tuple(f"macosx_{major}_0_{kind}" for major in (14, 13, 12, 11) for kind in ("arm64", "universal2")),
-        r"macosx_.*_(arm64|universal2)",
-        {"sys_platform": "darwin", "platform_system": "Darwin", "platform_machine": "arm64", "os_name": "posix"},
-    ),
-)
-
-
-class BuildError(RuntimeError):
-    """A zip that cannot be built, and why."""
-
-
-@dataclass(frozen=True)
-class Product:
-    """One zip.
-
-    Attributes
-    ----------
-    name
-        Of the extension.
-    version
-        Of the extension.
-    platform
-        What it is for.
-    python
-        The version of Python that it is for.
-    """
-
-    name: str
-    version: str
-    platform: Platform
-    python: str
-
-    @property
-    def file(self) -> str:
-        """Name of the zip."""
-        return f"{self.name}-{self.version}-{NAMED[self.python]}-{self.platform.name.replace('-', '_')}.zip"
-
-    @property
-    def stage(self) -> Path:
-        """Folder that is zipped."""
-        return STAGE / self.file.removesuffix(".zip")
-
-    @property
-    def libraries(self) -> Path:
-        """What the engine imports from; the add-on looks for a folder of this name (addon/job.py)."""
-        return self.stage / f"python{self.python}"
 
 
 def main() -> int:
@@ -263,116 +143,9 @@ def find_engines(folders: Iterable[Path], version: str) -> dict[tuple[str, str],
             continue
         for platform in PLATFORMS:
             for python in PYTHONS:
-                if any(t.interpreter == _tag(python) and re.fullmatch(platform.fits, t.platform) for t in tags):
+                if any(t.interpreter == python_tag(python) and re.fullmatch(platform.fits, t.platform) for t in tags):
                     found[platform.name, python] = file
     return found
-
-
-def pins(name: str) -> list[str]:
-    """Return the lines of a file in tools: a requirement with the hashes of its wheels each."""
-    lines = (ROOT / "tools" / name).read_text(encoding="utf-8").replace("\\\n", "").splitlines()
-    return [line for line in lines if not line.startswith("#")]
-
-
-def requirements_of(platform: Platform, python: str, lines: Iterable[str]) -> list[str]:
-    """Return the lines of a requirements file that apply to a platform, for pip, which asks its own instead."""
-    wanted = []
-    for line in lines:
-        name, *hashes = line.split(" --hash=")
-        requirement = Requirement(name)
-        if requirement.marker is None or requirement.marker.evaluate(_markers(platform, python)):
-            hashed = " ".join(f"--hash={digits.strip()}" for digits in hashes)
-            wanted.append(f"{requirement.name}{requirement.specifier} {hashed}")
-    return wanted
-
-
-def gather(product: Product, engine: Path | None) -> None:
-    """Unpack the wheels of a product into its folder, without what is never imported.
-
-    Raises
-    ------
-    BuildError
-        If a wheel cannot be had.
-    """
-    product.libraries.mkdir(parents=True)
-    wanted = STAGE / "requirements.txt"
-    lines = requirements_of(product.platform, product.python, pins(PINS[product.name]))
-    wanted.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    sources = [["--require-hashes", "--requirement", str(wanted)]]
-    if engine is not None:
-        sources.append(["--no-index", str(engine)])
-    for source in sources:
-        command = [sys.executable, "-m", "pip", "--disable-pip-version-check", "install", "--quiet", "--no-deps"]
-        command += ["--only-binary", ":all:", "--no-compile", "--upgrade", "--target", str(product.libraries)]
-        command += ["--implementation", "cp", "--python-version", product.python]
-        command += [word for abi in (_tag(product.python), "abi3", "none") for word in ("--abi", abi)]
-        command += [word for tag in product.platform.tags for word in ("--platform", tag)]
-        if subprocess.run([*command, *source]).returncode != 0:
-            raise BuildError(
-                f"the wheels of {product.file} could not be had (see above): check the network, and the versions and "
-                f"hashes in tools/{PINS[product.name]}."
-            )
-    prune(product.libraries)
-    if product.platform.name.startswith("linux"):
-        strip(product.libraries)
-
-
-def prune(libraries: Path) -> None:
-    """Remove what is never imported."""
-    for pattern in UNUSED:
-        for found in list(libraries.glob(pattern)):
-            if found.is_dir():
-                shutil.rmtree(found)
-            else:
-                found.unlink()
-
-
-def strip(libraries: Path) -> None:
-    """Remove debugging information.
-
-    Raises
-    ------
-    BuildError
-        If the tool for that is missing.
-    """
-    files = [str(file) for part in STRIPPED for file in sorted((libraries / part).rglob("*.so"))]
-    if not files:
-        return
-    try:
-        subprocess.run(["strip", "--strip-debug", *files], check=True)
-    except (OSError, subprocess.CalledProcessError) as error:
-        raise BuildError(f"strip of binutils is needed, and failed: {error} (Debian: apt install binutils).") from error
-
-
-def library_faults(libraries: Path, imported: Iterable[Path], platform: Platform, python: str) -> list[str]:
-    """Say what of a folder of libraries would not work in Blender.
-
-    Parameters
-    ----------
-    libraries
-        The folder.
-    imported
-        All folders that are imported from together, this one among them.
-    platform, python
-        What it is for.
-
-    Returns
-    -------
-    Requirements that are not met, and numpy if it is there, which would displace Blender's own.
-    """
-    have = {"numpy": Version(BLENDER_NUMPY[python])}
-    for found in distributions(path=[str(folder) for folder in imported]):
-        have[canonicalize_name(found.name)] = Version(found.version)
-    faults = ["numpy is in it, which Blender has"] if (libraries / "numpy").exists() else []
-    for found in distributions(path=[str(libraries)]):
-        for line in found.requires or []:
-            requirement = Requirement(line)
-            if requirement.marker is not None and not requirement.marker.evaluate(_markers(platform, python)):
-                continue
-            there = have.get(canonicalize_name(requirement.name))
-            if there is None or not requirement.specifier.contains(there, prereleases=True):
-                faults.append(f"{found.name} needs {requirement.name}{requirement.specifier}, and there is {there}")
-    return faults
 
 
 def stage_add_on(product: Product, manifest: Mapping[str, Any]) -> None:
@@ -432,14 +205,6 @@ def _first(places: Iterable[Path], pattern: str) -> Path:
         for path in place.glob(pattern):
             return path
     raise BuildError("Blender's checks come with bpy, which exists for Python 3.11 and 3.13: use one of them.")
-
-
-def _tag(python: str) -> str:
-    return "cp" + python.replace(".", "")
-
-
-def _markers(platform: Platform, python: str) -> dict[str, str]:
-    return {**platform.markers, "python_version": python, "python_full_version": f"{python}.0", "extra": ""}
 
 
 if __name__ == "__main__":

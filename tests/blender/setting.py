@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from build_extension import NAMED
 from engine_wheels import ROOT
+from extension_products import NAMED
 
 DIST = ROOT / "dist"
 WORK = ROOT / "build" / "test-blender"

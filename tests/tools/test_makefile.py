@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[2]
 SOURCES = (
     *("pyproject.toml", "CMakeLists.txt", "cpp/a.cpp", "engine/a.py", "LICENSE", "blender_manifest.toml"),
     *("docs/a.md", "mkdocs.yml", "examples/a.toml", "addon/a.py"),
-    *("tools/build_extension.py", "tools/engine_wheels.py", "tools/bundle.txt"),
+    *("tools/build_extension.py", "tools/extension_libraries.py", "tools/engine_wheels.py", "tools/bundle.txt"),
 )
 MADE = (
     *(f".venv/{name}.stamp" for name in ("pip", "engine", "manual", "extension")),
@@ -30,6 +30,7 @@ STEPS = {"wheels": "engine_wheels.py --blender", "manual": "mkdocs build", "zip"
         ("addon/a.py", {"manual", "zip"}),
         ("docs/a.md", {"manual", "zip"}),
         ("tools/bundle.txt", {"manual", "zip"}),
+        ("tools/extension_libraries.py", {"manual", "zip"}),
         ("cpp/a.cpp", {"wheels", "manual", "zip"}),
     ],
 )
