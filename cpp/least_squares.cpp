@@ -200,36 +200,38 @@ std::array<double, 3> LeastSquares::symbol(Workers &workers) const {
             regularisation_.second_order};
 }
 
+// Of the data term's part in the diagonal what cell (x, y, z) adds for each of its faces across axis c.
+// Nothing outside the box.
+float LeastSquares::data_diagonal(int c, int x, int y, int z) const {
+    if (x < 0 || y < 0 || z < 0 || x >= box_.cells[0] || y >= box_.cells[1] || z >= box_.cells[2])
+        return 0;
+    const float along = 0.5f * direction_[c].row(x, y)[z];
+    return weight_.row(x, y)[z] * along * along;
+}
+
+// The weight of vorticity on the edges along axis c.
+Field LeastSquares::irrotational_edges(int c) const {
+    Field edges(box_.edges()[c]);
+    std::fill(edges.data().begin(), edges.data().end(), 0.0f);
+    for (int i = c != 0; i < box_.cells[0]; ++i)
+        edge_means_slab(irrotational_, c, slab(edges.out(), i), i);
+    return edges;
+}
+
 StaggeredField LeastSquares::diagonal(Workers &workers) const {
     StaggeredField diagonal(box_);
     const StaggeredOut out = diagonal.out();
-    const In3 &g = direction_;
-    std::array<Field, 3> edges;
-    for (int c = 0; c < 3; ++c) {
-        edges[c] = Field(box_.edges()[c]);
-        std::fill(edges[c].data().begin(), edges[c].data().end(), 0.0f);
-        for (int i = c != 0; i < box_.cells[0]; ++i)
-            edge_means_slab(irrotational_, c, slab(edges[c].out(), i), i);
-    }
+    const Regularisation &r = regularisation_;
+    // Differences of the vorticity: 4 edges times 6 neighbours, and 4 for pairs of edges.
+    const float everywhere = 6 * r.first_order + 28 * r.second_order + r.kinetic;
+    const std::array<Field, 3> edges{irrotational_edges(0), irrotational_edges(1), irrotational_edges(2)};
     for (int c = 0; c < 3; ++c) {
         const Shape n = out[c].n;
-        const int step[3] = {c == 0, c == 1, c == 2};
         workers.run(n[0], [&](int i) {
             for (int j = 0; j < n[1]; ++j)
-                for (int k = 0; k < n[2]; ++k) {
-                    // Differences of the vorticity: 4 edges times 6 neighbours, and 4 for pairs of edges.
-                    float sum = 6 * regularisation_.first_order + 28 * regularisation_.second_order +
-                                regularisation_.kinetic;
-                    for (int side = 0; side < 2; ++side) {
-                        const int x = i - side * step[0], y = j - side * step[1], z = k - side * step[2];
-                        if (x < 0 || y < 0 || z < 0 || x >= box_.cells[0] || y >= box_.cells[1] ||
-                            z >= box_.cells[2])
-                            continue;
-                        const float along = 0.5f * g[c].row(x, y)[z];
-                        sum += weight_.row(x, y)[z] * along * along;
-                    }
-                    out[c].row(i, j)[k] = sum;
-                }
+                for (int k = 0; k < n[2]; ++k)
+                    out[c].row(i, j)[k] = everywhere + data_diagonal(c, i, j, k) +
+                                          data_diagonal(c, i - (c == 0), j - (c == 1), k - (c == 2));
         });
         // A face turns around four edges: two in each of the directions across it.
         for (int e = 0; e < 3; ++e) {

@@ -43,6 +43,8 @@ private:
     void stress(Window &window, bool irrotational, int i) const;
     void along(Window &window, const StaggeredIn &u, In offset, int i) const;
     double finish(Window &window, const StaggeredIn &u, const StaggeredOut &result, int i) const;
+    float data_diagonal(int c, int x, int y, int z) const;
+    Field irrotational_edges(int c) const;
 
     Box box_;
     Regularisation regularisation_;

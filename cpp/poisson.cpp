@@ -36,6 +36,21 @@ void tridiagonal(float *f, const float *pivots, int nx, std::size_t slab, int nz
     }
 }
 
+void subtract_mean(Out f, Workers &workers) {
+    const int nx = f.n[0];
+    const std::size_t slab = f.slab_size();
+    const double mean = workers.sum(nx, [&](int i) {
+        double sum = 0;
+        for (const float *p = f.row(i, 0), *end = p + slab; p != end; ++p)
+            sum += *p;
+        return sum;
+    }) / double(volume(f.n));
+    workers.run(nx, [&](int i) {
+        for (float *p = f.row(i, 0), *end = p + slab; p != end; ++p)
+            *p -= float(mean);
+    });
+}
+
 } // namespace
 
 Poisson::Poisson(const Box &box) : box_(box) {
@@ -50,22 +65,31 @@ Poisson::Poisson(const Box &box) : box_(box) {
         z_square_.push_back(difference * difference);
 }
 
+// Reciprocal pivots [x][z] of the systems along x of the modes with number j along y.
+void Poisson::factorise(int j, std::vector<float> &pivots) const {
+    const auto [nx, ny, nz] = box_.cells;
+    thread_local std::vector<double> last;
+    pivots.resize(std::size_t(nx) * nz);
+    last.assign(nz, 0);
+    for (int i = 0; i < nx; ++i) {
+        // A missing neighbour takes 1 from the diagonal at a wall and adds 1 at an open side.
+        double end = 0;
+        if (i == 0)
+            end += box_.closed[0] ? -1 : 1;
+        if (i == nx - 1)
+            end += box_.closed[1] ? -1 : 1;
+        eliminate(pivots.data() + std::size_t(i) * nz, last.data(), z_square_.data(), y_square_[j], end, nz);
+    }
+    // The constant mode has no equation of its own: pin its last value to zero.
+    if (box_.sealed() && j == 0)
+        pivots[std::size_t(nx - 1) * nz] = 0;
+}
+
 void Poisson::solve(Out f, Workers &workers) const {
     const auto [nx, ny, nz] = box_.cells;
-    const bool singular = box_.sealed();
     const std::size_t slab = f.slab_size();
-    if (singular) {
-        const double mean = workers.sum(nx, [&](int i) {
-            double sum = 0;
-            for (const float *p = f.row(i, 0), *end = p + slab; p != end; ++p)
-                sum += *p;
-            return sum;
-        }) / double(volume(box_.cells));
-        workers.run(nx, [&](int i) {
-            for (float *p = f.row(i, 0), *end = p + slab; p != end; ++p)
-                *p -= float(mean);
-        });
-    }
+    if (box_.sealed())
+        subtract_mean(f, workers);
     workers.run(nx, [&, ny = ny, nz = nz](int i) {
         thread_local std::vector<float> scratch;
         z_.rows_to_modes(f.row(i, 0), ny, f.row(i, 0), scratch);
@@ -73,22 +97,7 @@ void Poisson::solve(Out f, Workers &workers) const {
     });
     workers.run(ny, [&, nx = nx, nz = nz](int j) {
         thread_local std::vector<float> pivots;
-        thread_local std::vector<double> last;
-        pivots.resize(std::size_t(nx) * nz);
-        last.assign(nz, 0);
-        for (int i = 0; i < nx; ++i) {
-            // A missing neighbour takes 1 from the diagonal at a wall and adds 1 at an open side.
-            double end = 0;
-            if (i == 0)
-                end += box_.closed[0] ? -1 : 1;
-            if (i == nx - 1)
-                end += box_.closed[1] ? -1 : 1;
-            eliminate(pivots.data() + std::size_t(i) * nz, last.data(), z_square_.data(), y_square_[j], end,
-                      nz);
-        }
-        // The constant mode has no equation of its own: pin its last value to zero.
-        if (singular && j == 0)
-            pivots[std::size_t(nx - 1) * nz] = 0;
+        factorise(j, pivots);
         tridiagonal(f.row(0, j), pivots.data(), nx, slab, nz);
     });
     workers.run(nx, [&, ny = ny, nz = nz](int i) {

@@ -6,6 +6,8 @@
 #include "threads.h"
 #include "trigonometric.h"
 
+#include <vector>
+
 namespace smokelift {
 
 // -laplace p = f at cell centres, each side closed (no flux) or open (p = 0 on the side itself). Eigenvectors
@@ -18,6 +20,8 @@ public:
     void solve(Out f, Workers &workers) const;
 
 private:
+    void factorise(int j, std::vector<float> &pivots) const;
+
     Box box_;
     LineTransform y_, z_;
     std::vector<double> y_square_, z_square_; // eigenvalues of -laplace along y and z

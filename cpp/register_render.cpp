@@ -276,7 +276,7 @@ void register_camera(py::module_ &module) {
         "support"_a);
 }
 
-void register_diffuse_light(py::module_ &module) {
+void register_blocks(py::module_ &module) {
     using namespace py::literals;
 
     py::class_<Blocks>(module, "Blocks")
@@ -340,6 +340,10 @@ void register_diffuse_light(py::module_ &module) {
             return values_gradient;
         },
         "gradient"_a.noconvert(), "support"_a, "factor"_a, "blocks"_a);
+}
+
+void register_diffuse_light(py::module_ &module) {
+    using namespace py::literals;
 
     module.def(
         "diffuse",
@@ -390,6 +394,7 @@ void register_render(py::module_ &module) {
     register_voxels(module);
     register_lights(module);
     register_camera(module);
+    register_blocks(module);
     register_diffuse_light(module);
 }
 
