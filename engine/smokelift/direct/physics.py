@@ -68,9 +68,9 @@ def _buoyancy(before: Moment, after: Moment, dt: float, outside: list[Mask]) -> 
     predicted = project(advect(before.velocity, before.velocity, dt))
     unit = project(lift(before.density, before.velocity))
     change_along = square = 0.0
-    for kept, now, then, pushed in zip(outside, after.velocity.faces, predicted.faces, unit.faces, strict=True):
-        change_along += float(np.vdot((now - then)[kept], pushed[kept]))
-        square += float(np.vdot(pushed[kept], pushed[kept]))
+    for kept, now, then, lifted in zip(outside, after.velocity.faces, predicted.faces, unit.faces, strict=True):
+        change_along += float(np.vdot((now - then)[kept], lifted[kept]))
+        square += float(np.vdot(lifted[kept], lifted[kept]))
     return [change_along / (dt * square)] if square > 0 else []
 
 

@@ -15,7 +15,7 @@ from smokelift.checks import counted
 from smokelift.evaluation.frame_means import Figures, PictureMeans, VolumeMeans
 from smokelift.evaluation.reference_view import INPUT, ReferenceView, first_frame, open_views
 from smokelift.evaluation.resampling import resampled
-from smokelift.evaluation.sides import DEGREES, look_from_sides
+from smokelift.evaluation.sides import DEGREES, evaluate_sides
 from smokelift.evaluation.truth import Truth
 from smokelift.output.images import eight_bit
 from smokelift.output.sequence import Sequence
@@ -100,7 +100,7 @@ def evaluate(
             figures["views"] = [_against_view(sequence, view, tiles) for view in views]
             titles += [title for view in views for title in (view.name, "sequence")]
         filmed = next((view for view in views if view.name == INPUT), None)
-        sides = look_from_sides(sequence, truth, filmed, shown)
+        sides = evaluate_sides(sequence, truth, filmed, shown)
     figures["sides"] = sides.figures
     for number, pictures in sides.pictures.items():
         tiles[number] += [_fitted(eight_bit(picture)) for picture in pictures]

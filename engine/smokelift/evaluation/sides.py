@@ -41,7 +41,7 @@ class Sides:
     pictures: dict[int, list[Image]]
 
 
-def look_from_sides(sequence: Sequence, truth: Truth | None, filmed: ReferenceView | None, shown: set[int]) -> Sides:
+def evaluate_sides(sequence: Sequence, truth: Truth | None, filmed: ReferenceView | None, shown: set[int]) -> Sides:
     """Render a sequence from the sides, and the truth beside it, and compare both with the front in their statistics.
 
     Parameters
@@ -64,10 +64,10 @@ def look_from_sides(sequence: Sequence, truth: Truth | None, filmed: ReferenceVi
         density = sequence.density(number)
         ahead = found.front(density) if filmed is None else _filmed_smoke(filmed, number)
         front.add(ahead)
-        images = found.look(density, ahead)
+        images = found.render(density, ahead)
         true_images: dict[int, Image] = {}
         if truth is not None and true is not None:
-            true_images = true.look(truth.density(first_frame(sequence) + number - 1), ahead)
+            true_images = true.render(truth.density(first_frame(sequence) + number - 1), ahead)
         for degrees, view in views.items():
             view.add(images[degrees], true_images.get(degrees))
         if number in shown:
@@ -117,7 +117,7 @@ class _View:
 
 
 class _Densities:
-    """Looks at densities (nx, ny, nz) of one scene from the sides, and keeps what is found there."""
+    """Renders densities (nx, ny, nz) of one scene from the sides, and keeps what is found there."""
 
     def __init__(self, scene: CompleteScene) -> None:
         camera = at_most(scene.camera.at(0))
@@ -132,8 +132,8 @@ class _Densities:
     def front(self, density: Volume) -> Array:
         return self._smoke(0, self._viewers[0].image(1, density))
 
-    def look(self, density: Volume, front: Array) -> dict[int, Image]:
-        """Render a frame from all of `DEGREES`, and compare these pictures with the front's."""
+    def render(self, density: Volume, front: Array) -> dict[int, Image]:
+        """Render a frame from all of `DEGREES`, (rows, columns, 3) each, and compare these with the front's smoke."""
         images = {degrees: self._viewers[degrees].image(1, density) for degrees in DEGREES}
         self._copies.add(front, *(self._smoke(degrees, images[degrees]) for degrees in (BETWEEN, SIDE)))
         self._anisotropy.append(metrics.depth_anisotropy(density, self._along_rays))

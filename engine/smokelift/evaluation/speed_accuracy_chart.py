@@ -105,6 +105,7 @@ def _at(run: Run, panel: tuple[str, str]) -> tuple[float, float] | None:
 
 
 def _panel(axes: Any, runs: Runs, panel: tuple[str, str], colours: dict[str, str]) -> None:
+    """Draw one panel: the Pareto front, every series in its colour, the default, and runs without a time as levels."""
     placed = [(run, at) for run in runs.runs if (at := _at(run, panel)) is not None]
     points = [at for _, at in placed]
     front = [points[index] for index in pareto_front(points)]
@@ -113,17 +114,7 @@ def _panel(axes: Any, runs: Runs, panel: tuple[str, str], colours: dict[str, str
         color="black", linewidth=1, marker="o", markersize=12, fillstyle="none", label="Pareto front",
     )  # fmt: skip
     for name in dict.fromkeys(run.series for run, _ in placed):
-        of_series = [(run, at) for run, at in placed if run.series == name]
-        given = sorted(at for run, at in of_series if not run.changes and not run.chosen)
-        detail = sorted((float(run.changes["detail"]), at) for run, at in of_series if [*run.changes] == ["detail"])
-        curve = [at for _, at in detail] + [at for run, at in of_series if run.name == name and detail]
-        for line, style in ((given, {"marker": "o"}), (curve, {"linestyle": "--"})):
-            if line:
-                axes.plot(*zip(*line, strict=True), color=colours[name], linewidth=0.8, **style)
-        for run, at in of_series:
-            if run.changes or run.chosen:
-                axes.plot(*at, color=colours[name], marker="s" if run.chosen else "D", fillstyle="none")
-        axes.plot([], [], color=colours[name], marker="o", label=name)
+        _series(axes, name, [(run, at) for run, at in placed if run.series == name], colours[name])
     if runs.default is not None and (at := _at(runs.default, panel)) is not None:
         axes.plot(*at, color="gold", marker="*", markersize=17, markeredgecolor="black", linestyle="none",
                   zorder=1, label="default")  # fmt: skip
@@ -137,6 +128,20 @@ def _panel(axes: Any, runs: Runs, panel: tuple[str, str], colours: dict[str, str
     _readable(axes.xaxis, [x for x, _ in points], room=1.5)
     _readable(axes.yaxis, [*(y for _, y in points), *(level for _, level in levels)], room=1.3)
     axes.grid(alpha=0.3, which="both")
+
+
+def _series(axes: Any, name: str, placed: list[tuple[Run, tuple[float, float]]], colour: str) -> None:
+    """Draw runs of one series: grids that were given as a line, the amount of detail as a dashed one, others alone."""
+    given = sorted(at for run, at in placed if not run.changes and not run.chosen)
+    detail = sorted((float(run.changes["detail"]), at) for run, at in placed if [*run.changes] == ["detail"])
+    curve = [at for _, at in detail] + [at for run, at in placed if run.name == name and detail]
+    for line, style in ((given, {"marker": "o"}), (curve, {"linestyle": "--"})):
+        if line:
+            axes.plot(*zip(*line, strict=True), color=colour, linewidth=0.8, **style)
+    for run, at in placed:
+        if run.changes or run.chosen:
+            axes.plot(*at, color=colour, marker="s" if run.chosen else "D", fillstyle="none")
+    axes.plot([], [], color=colour, marker="o", label=name)
 
 
 def _label(axes: Any, runs: Runs, panel: tuple[str, str]) -> None:

@@ -35,7 +35,7 @@ def extend_into_border(medium: ndarray4):
 
 @ti.func
 def _opacity(x):
-    """1 - exp(-x), exact to rounding for thin steps too."""
+    """1 - exp(-x), exact to rounding for thin steps too: its Taylor series, of which x^5 / 120 is left out."""
     value = x * (1.0 - x * (0.5 - x * (1.0 / 6.0 - x * (1.0 / 24.0))))
     if x > 0.04:
         value = 1.0 - ti.exp(-x)
@@ -163,6 +163,7 @@ def gather_gradient(
                 w = ti.max(p[2], 1e-6)
                 low_x, high_x = ti.min(low_x, p[0] / w), ti.max(high_x, p[0] / w)
                 low_y, high_y = ti.min(low_y, p[1] / w), ti.max(high_y, p[1] / w)
+            # pixel centres lie at halves; a hundredth of a pixel is for rounding
             first_column = ti.floor(ti.min(ti.max(low_x - 0.51, -1.0), columns + 1.0), ti.i32)
             first_row = ti.floor(ti.min(ti.max(low_y - 0.51, -1.0), rows + 1.0), ti.i32)
             last_column = ti.min(columns - 1, ti.ceil(ti.max(ti.min(high_x - 0.49, columns + 1.0), -2.0), ti.i32))
