@@ -18,7 +18,7 @@ from smokelift.footage.working_picture import CameraError, WorkingPicture, worki
 from smokelift.render import scene_optics
 from smokelift.scene import Background, Camera, CompleteScene, Domain, Scene
 from smokelift.setup.choice import Choice
-from smokelift.setup.first_look import first_look
+from smokelift.setup.first_look import FirstLook, first_look
 from smokelift.setup.further_views import disagreement, open_view
 from smokelift.setup.geometry import clip_lens, find_geometry
 from smokelift.setup.light import find_light
@@ -27,7 +27,7 @@ from smokelift.setup.model import choose_model, tried_frames
 from smokelift.setup.place import placed
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot, ShotView
-from smokelift.setup.smoke import SAMPLES, SmokeSamples
+from smokelift.setup.smoke import SAMPLES
 from smokelift.setup.view_gain import balanced
 
 
@@ -80,7 +80,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
         model = choose_model(clip, complete, plates, samples.smoky, asked is not None, settings, light.guessed)
         complete, settings, tried = model.scene, replace(settings, velocity=model.velocity), model.choices
     first = ShotView(clip, camera, plates, _working(camera, domain))
-    others, gains, said = _further_views(first, complete, samples, settings, bool(scene.lights))
+    others, gains, said = _further_views(first, complete, look, settings, bool(scene.lights))
     filmed.expect()
     shot = Shot(
         scene=complete,
@@ -148,16 +148,17 @@ def _expect(clip: Clip, scene: Scene) -> None:
 
 
 def _further_views(
-    first: ShotView, scene: CompleteScene, samples: SmokeSamples, settings: Settings, lit: bool
+    first: ShotView, scene: CompleteScene, look: FirstLook, settings: Settings, lit: bool
 ) -> tuple[list[ShotView], list[Choice[str]], list[str]]:
     """The further views of a scene, at the first one's exposure; with what was measured and is to be said of them."""
     views, notes = [], []
     gains: list[Choice[str]] = []
+    smoky = look.samples.smoky
     for number in range(len(scene.views)):
-        view, said = open_view(number, first.clip, scene)
+        view, said = open_view(number, first.clip, scene, smoky[0] if smoky and look.fire is None else None)
         notes += said
         if settings.selection.measure:
-            shows = tried_frames(samples.smoky)
+            shows = tried_frames(smoky)
             tolerance = settings.selection.scattering_error
             view, gain = balanced(number + 1, first, view, scene, lit, shows, settings.density, tolerance)
             gains += gain

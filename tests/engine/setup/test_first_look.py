@@ -7,22 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from smokelift.output.images import write_image
 from smokelift.render import render
-from smokelift.scene import ClipSource, DirectionalLight, Medium, Scene
-from tests.engine.setup.shots import burning, shot_of
+from smokelift.scene import DirectionalLight, Medium
+from tests.engine.setup.shots import burning, flickering, shot_of
 
 FLICKERS = "The exposure of the clip flickers by up to"
-
-
-def flickering(plume, folder, scene: Scene, share: float, change=lambda picture: picture) -> Scene:
-    """The clip of a scene whose exposure goes up and down, each picture changed before."""
-    folder.mkdir(exist_ok=True)
-    for number in range(8):
-        seen = render(plume.densities[number % len(plume.densities)], scene)
-        picture = np.float32(1 + share * (-1.0) ** number) * change(seen)
-        write_image(folder / f"frame_{number}.exr", picture, half=False)
-    return replace(scene, clip=ClipSource(folder / "frame_#.exr", fps=24.0), scattering=None)
 
 
 @pytest.mark.parametrize("scattering", ["single", "multiple"])
