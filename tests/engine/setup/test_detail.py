@@ -138,5 +138,5 @@ def test_a_grid_loses_what_is_finer_than_two_of_its_voxels() -> None:
 def test_settings_know_auto(tmp_path: Path) -> None:
     """And nothing else that is no three numbers."""
     assert Settings.preset(resolution="auto").as_dict()["resolution"] == "auto"
-    with pytest.raises(ValueError, match="three numbers"):
+    with pytest.raises(ValueError, match="three whole numbers"):
         Settings(resolution="64")  # type: ignore[arg-type]
