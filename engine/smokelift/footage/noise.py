@@ -45,6 +45,10 @@ BURST = 10.0
 bursts on black have 32 to 86, a rendered scene 13, codecs, hands and lights that change 9 at most
 (docs/experiments/background.md)."""
 
+FEWEST_CALM = 16
+"""Samples over time from which on a quarter of them tells how still a pixel is: the nearest two of five may be alike by
+chance, as stripes are that a moving camera sees."""
+
 SMOKE_TO_NOISE = 3.0
 """Deviation over time, in units of the stillest tenth's, above which it is smoke and not noise
 (docs/experiments/background.md)."""
@@ -232,7 +236,7 @@ def over_time(deviations: Picture) -> Picture:
     """
     size = np.abs(deviations)
     width: Picture = quantile_of_seen(size, STEADY_SHARE) / np.float32(STEADY_WIDTH)
-    if _stillest(width) > BURST * EIGHT_BIT_STEP:  # no less can exceed it
+    if len(size) >= FEWEST_CALM and _stillest(width) > BURST * EIGHT_BIT_STEP:  # no less can exceed it
         calm: Picture = quantile_of_seen(size, CALM_SHARE) / np.float32(CALM_WIDTH)
         if _stillest(width) > BURST * _stillest(calm):
             return calm
