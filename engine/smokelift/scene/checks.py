@@ -105,8 +105,9 @@ def file_path(value: Any, key: str, expected: str = "the path of a file") -> Pat
     """Return ``value`` as a path, or raise a SceneError that names ``key``."""
     if not isinstance(value, str | Path) or not str(value):
         raise SceneError(f"{key} must be {expected}, not {described(value)}", key=key)
-    if ADDRESS.match(str(value)):
+    path = Path(value)
+    if ADDRESS.match(str(value)) and not Path(path.parts[0]).exists():  # a folder may be called "http:"
         raise SceneError(
             f"{shown(str(value))} is an address; save the file on this computer and give its path", key=key
         )
-    return Path(value)
+    return path
