@@ -77,7 +77,7 @@ class Frame:
 
 @dataclass(frozen=True, eq=False)
 class Past:
-    """What a frame needs of the one before, which is whoever's it was given to.
+    """What a frame needs of the one before: not its velocity on the fine grid, which takes much memory.
 
     Attributes
     ----------
@@ -92,7 +92,7 @@ class Past:
 
     @staticmethod
     def of(frame: Frame) -> Past:
-        """Keep it of a frame."""
+        """Return what the next frame needs of a frame."""
         return Past(frame.density, frame.estimated, frame.smooth, frame.steady)
 
 

@@ -82,17 +82,10 @@ def find_geometry(
         If the scene gives a box without its camera or an inlet without its box, or no box for a camera that moves,
         looks steeply up or down, or is orthographic.
     """
-    tolerance = settings.selection.lost_detail
     given = None if scene.camera is None else fitting(scene.camera, clip)
     if given is not None and scene.domain is not None:
         camera = _turning(given, turns)
-        if settings.resolution == "auto":
-            grids = _same_shape(scene.domain, LONGEST_SIDE[settings.quality])
-            return Geometry(camera, *_resolved(clip, camera, grids, plates, samples.smoky, tolerance))
-        if settings.resolution is None:
-            return Geometry(camera, scene.domain, _resolution_by_hand(scene.domain))
-        domain = replace(scene.domain, resolution=settings.resolution)
-        return Geometry(camera, domain, _resolution_by_hand(domain))
+        return Geometry(camera, *_divided(scene.domain, clip, camera, settings, plates, samples))
     if scene.domain is not None:
         raise ValueError("The scene gives a [domain] but no [camera]; give the camera that filmed it.")
     if scene.inlets:
@@ -109,7 +102,7 @@ def find_geometry(
     if isinstance(settings.resolution, tuple):
         domain, choice = grids[-1], _resolution_by_hand(grids[-1])
     elif settings.selection.measure:
-        domain, choice = _resolved(clip, camera, grids, plates, samples.smoky, tolerance)
+        domain, choice = _resolved(clip, camera, grids, plates, samples.smoky, settings.selection.lost_detail)
     else:
         domain, choice = grids[-1], None
     size = " x ".join(f"{high - low:.2f}" for low, high in zip(domain.min, domain.max, strict=True))
@@ -120,6 +113,17 @@ def find_geometry(
         f"Domain {where}: {size} m, {' x '.join(map(str, domain.resolution))} voxels.",
     )
     return Geometry(camera, domain, choice, notes)
+
+
+def _divided(
+    box: Domain, clip: Clip, camera: Camera, settings: Settings, plates: Plates, samples: SmokeSamples
+) -> tuple[Domain, Choice[Shape]]:
+    """A box that is given, with as many voxels as are asked for, and why."""
+    if settings.resolution == "auto":
+        grids = _same_shape(box, LONGEST_SIDE[settings.quality])
+        return _resolved(clip, camera, grids, plates, samples.smoky, settings.selection.lost_detail)
+    domain = box if settings.resolution is None else replace(box, resolution=settings.resolution)
+    return domain, _resolution_by_hand(domain)
 
 
 def clip_lens(camera: Camera | None, clip: Clip) -> Lens | None:
@@ -147,6 +151,7 @@ def _focal(clip: Clip) -> float:
 
 
 def _turning(camera: Camera, turns: Turns | None) -> Camera:
+    """The camera, with a matrix for every frame if it was found to turn."""
     return camera if turns is None else turns.carried(camera)
 
 

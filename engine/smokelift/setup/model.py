@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
@@ -12,7 +12,7 @@ import numpy as np
 from smokelift.density import Density, reconstruct_density
 from smokelift.footage.clip import Clip
 from smokelift.footage.plate import Plates
-from smokelift.scene import CompleteScene
+from smokelift.scene import CompleteScene, Domain
 from smokelift.setup.choice import Choice
 from smokelift.setup.coarse import CoarseClip
 from smokelift.setup.light_model import choose_light_model
@@ -87,28 +87,38 @@ def choose_model(
         return reconstruct_density(frame.picture, own.scene, settings=settings.density, plate=frame.plate)
 
     densities = [found for found in map(density, frames) if found is not None]
-    if velocity.levels is None:
-        # before the last frame, since something has to follow
-        followed = sorted({min(number, len(clip) - 2) for number in frames if len(clip) > 1})
-        ends = [(density(number), density(number + 1)) for number in followed]
-        pairs = [(before.values, after.values) for before, after in ends if before is not None and after is not None]
-        moved = choose_levels(pairs, next(iter(frames.values())).scene.domain, scene.domain, velocity)
-    else:
-        levels = velocity.levels
-        moved = Choice[int]("velocity levels", levels, f"Velocity grids by hand: {levels}.", by_hand=True)
+    # before the last frame, since something has to follow
+    followed = sorted({min(number, len(clip) - 2) for number in frames if len(clip) > 1})
+    levels = _levels(followed, density, next(iter(frames.values())).scene.domain, scene.domain, velocity)
     choices: tuple[Choice[Any], ...] = (
         _inside(densities, scene),
         *light.choices,
         _iterations(densities, settings),
         coarsened,
-        moved,
+        levels,
     )
-    return Model(light.scene, replace(velocity, levels=moved.chosen), choices)
+    return Model(light.scene, replace(velocity, levels=levels.chosen), choices)
 
 
 def tried_frames(smoky: Sequence[int]) -> tuple[int, ...]:
     """Frames that models are tried on: the one with the most smoke, and one with a middling amount."""
     return tuple(dict.fromkeys((*smoky[:1], *smoky[len(smoky) // 2 : len(smoky) // 2 + 1])))
+
+
+def _levels(
+    numbers: Sequence[int],
+    density: Callable[[int], Density | None],
+    coarse: Domain,
+    final: Domain,
+    settings: VelocitySettings,
+) -> Choice[int]:
+    """How many grids velocities are estimated on, by the coarse densities of some frames and those after them."""
+    if settings.levels is not None:
+        reason = f"Velocity grids by hand: {settings.levels}."
+        return Choice("velocity levels", settings.levels, reason, by_hand=True)
+    ends = [(density(number), density(number + 1)) for number in numbers]
+    pairs = [(before.values, after.values) for before, after in ends if before is not None and after is not None]
+    return choose_levels(pairs, coarse, final, settings)
 
 
 def _inside(densities: Sequence[Density], scene: CompleteScene) -> Choice[tuple[int, int, int]]:

@@ -16,12 +16,12 @@ from smokelift.footage.evidence import GLIMPSE, looks
 from smokelift.footage.large_plate import large_frames
 from smokelift.footage.working_picture import CameraError, WorkingPicture, working_picture
 from smokelift.render import scene_optics
-from smokelift.scene import Background, Camera, CompleteScene, Domain, Scene
+from smokelift.scene import Background, Camera, CompleteScene, Domain, Medium, Scene
 from smokelift.setup.choice import Choice
 from smokelift.setup.first_look import FirstLook, first_look
 from smokelift.setup.further_views import disagreement, open_view
-from smokelift.setup.geometry import clip_lens, find_geometry
-from smokelift.setup.light import find_light
+from smokelift.setup.geometry import Geometry, clip_lens, find_geometry
+from smokelift.setup.light import FoundLight, find_light
 from smokelift.setup.medium import find_medium
 from smokelift.setup.model import choose_model, tried_frames
 from smokelift.setup.place import placed
@@ -49,39 +49,27 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
         If the scene contradicts the clip or itself, or lacks what cannot be estimated.
     """
     _check(clip, scene)
-    filmed = clip
     _expect(clip, scene)
     remarks = clip.remarks()
     # cameras that belong together are measured, and stand where they are said to
     lens = None if scene.views else clip_lens(scene.camera, clip)
     look = first_look(clip, scene.camera, scene.background, lens)
-    clip, plates, samples = look.clip, look.plates, look.samples
-    geometry = find_geometry(clip, scene, settings, plates, samples, look.background.turns)
+    steadied, plates, samples = look.clip, look.plates, look.samples
+    geometry = find_geometry(steadied, scene, settings, plates, samples, look.background.turns)
     camera, domain = geometry.camera, geometry.domain
     if settings.axis_depth is not None:
         SmokeAxis.given(settings.axis_depth, camera, domain)  # refuse early what cannot be
     found = find_medium(scene.medium, look, scene.lights, camera, domain)
     asked = scene.scattering if settings.scattering == "auto" else settings.scattering
     light = find_light(scene.lights, asked, found.medium, samples)
-    complete = CompleteScene(
-        camera=camera,
-        domain=domain,
-        medium=found.medium,
-        lights=light.lights,
-        background=look.background.background or Background(),
-        scattering=light.scattering,
-        clip=None if scene.clip is None else replace(scene.clip, fps=clip.fps),
-        views=scene.views,
-        closed=scene.closed,
-        inlets=scene.inlets,
-    )
+    complete = _complete(scene, look, geometry, found.medium, light)
     tried: tuple[Choice[Any], ...] = ()
     if settings.selection.measure:
-        model = choose_model(clip, complete, plates, samples.smoky, asked is not None, settings, light.guessed)
+        model = choose_model(steadied, complete, plates, samples.smoky, asked is not None, settings, light.guessed)
         complete, settings, tried = model.scene, replace(settings, velocity=model.velocity), model.choices
-    first = ShotView(clip, camera, plates, _working(camera, domain))
+    first = ShotView(steadied, camera, plates, _working(camera, domain))
     others, gains, said = _further_views(first, complete, look, settings, bool(scene.lights))
-    filmed.expect()
+    clip.expect()  # lets go of frames that are kept as they were decoded
     shot = Shot(
         scene=complete,
         optics=scene_optics(complete),
@@ -104,6 +92,22 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
         fire=None if look.fire is None else replace(first, clip=look.fire.light),
     )
     return replace(shot, notes=(*shot.notes, *disagreement(shot))) if scene.views else placed(shot)
+
+
+def _complete(scene: Scene, look: FirstLook, geometry: Geometry, medium: Medium, light: FoundLight) -> CompleteScene:
+    """The scene with all that it left open."""
+    return CompleteScene(
+        camera=geometry.camera,
+        domain=geometry.domain,
+        medium=medium,
+        lights=light.lights,
+        background=look.background.background or Background(),
+        scattering=light.scattering,
+        clip=None if scene.clip is None else replace(scene.clip, fps=look.clip.fps),
+        views=scene.views,
+        closed=scene.closed,
+        inlets=scene.inlets,
+    )
 
 
 def boundaries(scene: CompleteScene, settings: Settings) -> tuple[str, ...]:
