@@ -115,10 +115,10 @@ def _followed(first: Sequence[Points], second: Sequence[Level], moved: Array) ->
             if np.abs(step).max() < CONVERGED:
                 break
     correlation = cell_correlations(first[-1], *_seen(first[-1], second[-1], moved))
-    told, same = np.isfinite(correlation), correlation >= SAME
+    textured, same = np.isfinite(correlation), correlation >= SAME
     if same.any():
         moved[~same] = np.median(moved[same], axis=0)
-    return moved, float(same.sum() / max(told.sum(), 1))
+    return moved, float(same.sum() / max(textured.sum(), 1))
 
 
 def _seen(points: Points, level: Level, moved: Array) -> tuple[Array, NDArray[np.bool_]]:

@@ -230,19 +230,19 @@ class Video:
         context, stream = self._stream.codec_context, self._stream
         encoding, primaries = ENCODINGS.get(context.color_trc), primaries_name(context.color_primaries)
         width, height = self._size()
-        told = [f"The frame rate varies: the clip is read at its mean, {self.fps:.4g} frames a second."] * self._varies
+        notes = [f"The frame rate varies: the clip is read at its mean, {self.fps:.4g} frames a second."] * self._varies
         if encoding in ("hlg", "pq") and self._transfer is None:
-            told.append(f"Transfer {encoding.upper()}: diffuse white is brought to 1, highlights exceed it.")
+            notes.append(f"Transfer {encoding.upper()}: diffuse white is brought to 1, highlights exceed it.")
         if primaries is not None:
-            told.append(f"Primaries {primaries} are brought to BT.709.")
+            notes.append(f"Primaries {primaries} are brought to BT.709.")
         if (width, height) != (stream.width, stream.height):
             shape = float(self._pixel_shape())
             oblong = f", {shape:.3g} times as wide as high," if shape != 1 else ""
-            told.append(
+            notes.append(
                 f"Pictures of {stream.width} x {stream.height} pixels{oblong} are scaled to {width} x {height} square "
                 "ones."
             )
-        return tuple(told)
+        return tuple(notes)
 
     def close(self) -> None:
         """Close the file."""

@@ -44,12 +44,12 @@ def find_fire(clip: Clip, plates: Plates, samples: SmokeSamples) -> Fire | None:
     return Fire(share, light, fire_colour(clip, light), doused)
 
 
-def fire_choice(fire: Fire, told: Vector | None) -> Choice[str]:
-    """Say what becomes of fire, whose colour may be told."""
-    red, green, blue = told or fire.color
+def fire_choice(fire: Fire, given: Vector | None) -> Choice[str]:
+    """Say what becomes of fire, whose colour the scene may give."""
+    red, green, blue = given or fire.color
     reason = (
         f"Fire: {fire.share:.1%} of the smoke's pixels shine by themselves. The grid flame holds their light, of the "
-        f"color {red:g}, {green:g}, {blue:g}{' that is given' if told else ''}; the smoke beside it is continued over "
+        f"color {red:g}, {green:g}, {blue:g}{' that is given' if given else ''}; the smoke beside it is continued over "
         "it."
     )
     return Choice("fire", f"{fire.share:.3f}", reason, {"share": fire.share, "red": red, "green": green, "blue": blue})

@@ -29,7 +29,7 @@ class FirstLook:
     clip
         The footage at its background's exposure, or at that of the frames around each where only the smoke shows it;
         without fire and without the brightness that noise adds.
-    background
+    found
         What stands behind the smoke, and how the camera turns before it.
     samples
         Its smoke.
@@ -42,7 +42,7 @@ class FirstLook:
     """
 
     clip: Clip
-    background: FoundPlates
+    found: FoundPlates
     samples: SmokeSamples
     fire: Fire | None
     doubts: tuple[str, ...]
@@ -51,19 +51,19 @@ class FirstLook:
     @property
     def plates(self) -> Plates:
         """Of the full pictures."""
-        return self.background.plates
+        return self.found.plates
 
     @property
     def picture(self) -> Image | None:
         """The background, if it was estimated as one picture: linear, (rows, columns, 3)."""
-        if self.background.background is None and isinstance(self.plates, Plate):
+        if self.found.background is None and isinstance(self.plates, Plate):
             return self.plates.image
         return None
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What was assumed or estimated, a sentence each; the doubts are among them."""
-        return (*self.background.notes, *self.doubts, *exposure_notes(self.samples.exposure, self.flickers))
+        return (*self.found.notes, *self.doubts, *exposure_notes(self.samples.exposure, self.flickers))
 
 
 def first_look(clip: Clip, camera: Camera | None, background: Background | None, lens: Lens | None) -> FirstLook:

@@ -54,9 +54,9 @@ def find_medium(
     found = _usual(look, lights, camera, domain) if given is None else FoundMedium(given)
     if look.fire is None:
         return found
-    told = found.medium.flame_color
-    medium = replace(found.medium, flame_color=told or look.fire.color)
-    return FoundMedium(medium, (*found.choices, fire_choice(look.fire, told)), found.notes)
+    colour = found.medium.flame_color
+    medium = replace(found.medium, flame_color=colour or look.fire.color)
+    return FoundMedium(medium, (*found.choices, fire_choice(look.fire, colour)), found.notes)
 
 
 def _usual(look: FirstLook, lights: tuple[Light, ...], camera: Camera, domain: Domain) -> FoundMedium:

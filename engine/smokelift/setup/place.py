@@ -12,7 +12,7 @@ TELL = "If you know better, say it by --axis-depth, an [[inlet]] or a second vie
 
 
 def placed(shot: Shot) -> Shot:
-    """The shot with the place of its smoke, unless it is told or the method needs none."""
+    """The shot with the place of its smoke, unless it is given or the method needs none."""
     if shot.settings.method != "default" or shot.settings.axis_depth is not None:
         return shot
     place = clip_axis(shot)

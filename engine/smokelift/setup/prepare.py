@@ -55,14 +55,14 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
     lens = None if scene.views else clip_lens(scene.camera, clip)
     look = first_look(clip, scene.camera, scene.background, lens)
     steadied, plates, samples = look.clip, look.plates, look.samples
-    geometry = find_geometry(steadied, scene, settings, plates, samples, look.background.turns)
+    geometry = find_geometry(steadied, scene, settings, plates, samples, look.found.turns)
     camera, domain = geometry.camera, geometry.domain
     if settings.axis_depth is not None:
         SmokeAxis.given(settings.axis_depth, camera, domain)  # refuse early what cannot be
-    found = find_medium(scene.medium, look, scene.lights, camera, domain)
+    smoke = find_medium(scene.medium, look, scene.lights, camera, domain)
     asked = scene.scattering if settings.scattering == "auto" else settings.scattering
-    light = find_light(scene.lights, asked, found.medium, samples)
-    complete = _complete(scene, look, geometry, found.medium, light)
+    light = find_light(scene.lights, asked, smoke.medium, samples)
+    complete = _complete(scene, look, geometry, smoke.medium, light)
     tried: tuple[Choice[Any], ...] = ()
     if settings.selection.measure:
         model = choose_model(steadied, complete, plates, samples.smoky, asked is not None, settings, light.guessed)
@@ -80,12 +80,12 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
             *remarks,
             *look.notes,
             *geometry.notes,
-            *found.notes,
+            *smoke.notes,
             *light.notes(complete, tried, samples, plates.noise),
             *said,
         ),
         doubts=look.doubts,
-        choices=(*geometry.choices, *found.choices, *tried, *light.choices(complete), *gains),
+        choices=(*geometry.choices, *smoke.choices, *tried, *light.choices(complete), *gains),
         exposure=samples.exposure,
         smoky=samples.smoky,
         place=None,
@@ -101,7 +101,7 @@ def _complete(scene: Scene, look: FirstLook, geometry: Geometry, medium: Medium,
         domain=geometry.domain,
         medium=medium,
         lights=light.lights,
-        background=look.background.background or Background(),
+        background=look.found.background or Background(),
         scattering=light.scattering,
         clip=None if scene.clip is None else replace(scene.clip, fps=look.clip.fps),
         views=scene.views,

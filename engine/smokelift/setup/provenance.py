@@ -46,7 +46,7 @@ class Provenance:
 def provenance(shot: Shot) -> tuple[Provenance, ...]:
     """Where the parts of a shot's densities and velocities come from, the best known first."""
     settings, cameras = shot.settings, len(shot.views)
-    told = [
+    parts = [
         *_pictures(shot.clip),
         Provenance(
             "optical depth of every ray",
@@ -62,7 +62,7 @@ def provenance(shot: Shot) -> tuple[Provenance, ...]:
         Provenance("distribution along the rays", "assumed", _assumed(settings, cameras)),
     ]
     if shot.fire is not None:
-        told.append(
+        parts.append(
             Provenance(
                 "emission of fire",
                 "assumed",
@@ -71,7 +71,7 @@ def provenance(shot: Shot) -> tuple[Provenance, ...]:
             )
         )
     if settings.detail > 0 and _unseen(shot):
-        told.append(
+        parts.append(
             Provenance(
                 "fine structure along the rays",
                 "made up",
@@ -80,7 +80,7 @@ def provenance(shot: Shot) -> tuple[Provenance, ...]:
                 {"detail": settings.detail, "seed": settings.seed},
             )
         )
-    return tuple(told)
+    return tuple(parts)
 
 
 def made_up(shot: Shot) -> tuple[str, ...]:

@@ -84,7 +84,7 @@ class Shot:
     smoky
         Numbers of the frames, of those looked at, that show smoke, those with the most first.
     place
-        Where in depth the smoke was found to stand; None where it is told, or seen by several cameras or one
+        Where in depth the smoke was found to stand; None where it is given, or seen by several cameras or one
         that travels.
     fire
         The input with the light that fire adds to it as its clip, in the place of smoke; None where none was found.

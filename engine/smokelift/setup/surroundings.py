@@ -30,7 +30,7 @@ SIDES = ((1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0), (
 """Directions of travel that stand for all: 14 find no other density (docs/experiments/surroundings.md)."""
 
 STRENGTHS = (1.0, 0.7, 0.5)
-"""Of the light, in multiples of what is behind the smoke. No strength is told: the first is kept unless a weaker one is
+"""Of the light, in multiples of what is behind the smoke. None is known: the first is kept unless a weaker one is
 nearer by more than the tolerance."""
 
 

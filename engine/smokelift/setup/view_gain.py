@@ -185,8 +185,8 @@ def _scale(seen: Image, shown: Image) -> Gain:
     power = np.sum(np.square(shown, dtype=np.float64), 0)
     product = np.sum(np.multiply(seen, shown, dtype=np.float64), 0)
     whole = product.sum() / max(power.sum(), 1e-30)
-    told = (power > FAINTEST * power.max()) & (product > 0)
-    return np.where(told, product / np.maximum(power, 1e-30), max(whole, 1e-6)).astype(np.float32)
+    known = (power > FAINTEST * power.max()) & (product > 0)
+    return np.where(known, product / np.maximum(power, 1e-30), max(whole, 1e-6)).astype(np.float32)
 
 
 def _over(view: ShotView, gain: Gain) -> ShotView:
