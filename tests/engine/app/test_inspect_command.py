@@ -14,6 +14,7 @@ from smokelift.output.images import write_image
 from smokelift.output.sequence import Sequence
 from smokelift.scene import Background, DirectionalLight, Inlet, Medium, Scene
 from smokelift.setup.surroundings import light_around
+from tests.engine.setup.shots import flickering
 
 
 def test_inspect_says_how_smoke_gets_in_and_out(plume, tmp_path, capsys) -> None:
@@ -77,6 +78,14 @@ def test_a_page_shows_what_is_known(plume, tmp_path, capsys, kind) -> None:
     assert known["background"]["origin"] == known["box"]["origin"] == "estimated"
     assert known["scattering"]["origin"] == known["grid"]["origin"] == known["noise"]["origin"] == "measured"
     assert page.stat().st_size > 5000
+
+
+def test_exposure_that_flickers_before_black_is_called_measured(plume, tmp_path, capsys) -> None:
+    clip = flickering(plume, tmp_path / "clip", plume.scene, 0.1).clip
+    assert command("inspect", clip.path, "--page", tmp_path / "page.html", "--progress", "json", *QUICK) == 0
+    (fact,) = (fact for fact in events(capsys.readouterr().out)[-1]["facts"] if fact["what"] == "exposure")
+    assert fact["origin"] == "measured"
+    assert fact["value"].startswith("flickers by up to 1")
 
 
 def test_what_is_given_is_called_given(shot, capsys) -> None:
