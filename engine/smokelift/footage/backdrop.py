@@ -18,7 +18,16 @@ import numpy.typing as npt
 from smokelift.footage.behind_smoke import DETAIL, ISLAND
 from smokelift.footage.images import Picture, blurred, linear_to_srgb
 from smokelift.footage.matte import matte
-from smokelift.footage.noise import BLOCK, SMOKE_TO_NOISE, Noise, block_means, decode_samples, linear_samples, over_time
+from smokelift.footage.noise import (
+    BLOCK,
+    SMOKE_TO_NOISE,
+    Noise,
+    block_means,
+    decode_samples,
+    linear_samples,
+    over_time,
+    whole_blocks,
+)
 from smokelift.footage.plate import Plate
 from smokelift.footage.seen import median_of_seen, quantile_of_seen
 
@@ -54,12 +63,15 @@ its sides that have to, on three of them: 0.56 to 1 of 18 frames of public clips
 others but for stages in the dark (docs/experiments/background.md)."""
 
 
-def backdrop_plate(samples: npt.NDArray[np.uint16], noise: Noise) -> Plate | None:
+def backdrop_plate(
+    samples: npt.NDArray[np.uint16], noise: Noise, seen: npt.NDArray[np.bool_] | None = None
+) -> Plate | None:
     """Return the plate of a background of one colour, or None if it has more.
 
-    ``samples`` (frames, rows, columns, 3) are of one exposure, as of `SteadySamples`.
+    ``samples`` (frames, rows, columns, 3) are of one exposure, as of `SteadySamples`, and so is what is ``seen`` of
+    them (frames, rows, columns).
     """
-    backdrop = _backdrop(samples, noise)
+    backdrop = _backdrop(samples, noise, seen)
     return None if backdrop is None else Plate(backdrop, np.ones(backdrop.shape[:2], np.float32), noise)
 
 
@@ -91,12 +103,17 @@ def colour_around(picture: Picture) -> tuple[float, float, float] | None:
     return red, green, blue
 
 
-def _backdrop(samples: npt.NDArray[np.uint16], noise: Noise) -> Picture | None:
+def _backdrop(
+    samples: npt.NDArray[np.uint16], noise: Noise, seen_pixels: npt.NDArray[np.bool_] | None
+) -> Picture | None:
     """The linear picture (rows, columns, 3) of a background of one colour, or None if it has more.
 
     Whatever never changes and has another colour stands before the backdrop, and is part of the picture.
     """
     linear = np.concatenate([block_means(linear_samples(sample[None])) for sample in samples])
+    shown_blocks = np.ones(linear.shape[:3], np.bool_) if seen_pixels is None else whole_blocks(seen_pixels)
+    linear[~shown_blocks] = np.nan
+    visible = shown_blocks.any(0)
     blocks = linear_to_srgb(linear)
     middle, limit = median_of_seen(blocks), SMOKE_TO_NOISE * noise.averaged(BLOCK**2).total
     still = (over_time(blocks - middle) <= limit).all(-1)
@@ -112,11 +129,13 @@ def _backdrop(samples: npt.NDArray[np.uint16], noise: Noise) -> Picture | None:
         kinds.append((np.abs(middle - colours[-1]) <= settled).all(-1))
         left = left & ~kinds[-1]
     if left.sum() > (1 - ONE_COLOUR) * still.sum():
-        return _black(samples, noise, blocks)
+        return _black(samples, noise, blocks, visible)
     seen = [(np.abs(blocks - colour) <= limit).all(-1) for colour in colours]
-    covered = next((n for n, shown in enumerate(seen) if (still & kinds[n]).any() and _comes_over(shown)), None)
+    covered = next(
+        (n for n, shown in enumerate(seen) if (still & kinds[n]).any() and _comes_over(shown[:, visible])), None
+    )
     if covered is None and kinds[0][still].mean() < ONE_COLOUR:
-        return _black(samples, noise, blocks)
+        return _black(samples, noise, blocks, visible)
     alike = kinds[covered or 0]
     bare = alike if covered is None else seen[covered].any(0)
     clear = median_of_seen(linear)
@@ -130,18 +149,20 @@ def _backdrop(samples: npt.NDArray[np.uint16], noise: Noise) -> Picture | None:
     return whole
 
 
-def _black(samples: npt.NDArray[np.uint16], noise: Noise, blocks: Picture) -> Picture | None:
+def _black(
+    samples: npt.NDArray[np.uint16], noise: Noise, blocks: Picture, visible: npt.NDArray[np.bool_]
+) -> Picture | None:
     """A black picture if much of the samples is black all the time and the rest fades into that, else None.
 
-    ``blocks`` (frames, rows, columns, 3) are their block means in sRGB values.
+    ``blocks`` (frames, rows, columns, 3) are their block means in sRGB values, of which some are ``visible``.
     """
     limit = SMOKE_TO_NOISE * noise.averaged(BLOCK**2).total
-    if (over_time(blocks) <= limit).all(-1).mean() < BLACK:
+    if (over_time(blocks) <= limit).all(-1)[visible].mean() < BLACK:
         return None
     some = samples[:: -(-len(samples) // ENOUGH)]
     # smoke brightens black; one sample may be astray
     clearest = np.sort([decode_samples(sample).mean(-1) for sample in some], axis=0)[min(1, len(some) - 1)]
-    detail = np.abs(clearest - blurred(clearest, DETAIL))
+    detail = np.abs(clearest - blurred(clearest, DETAIL))[_pixels(visible, samples.shape[1:3])]
     if np.quantile(detail, SHARPEST) > SHARP + SMOKE_TO_NOISE * noise.white.max():
         return None
     return np.zeros((*samples.shape[1:3], 3), np.float32)
@@ -155,7 +176,7 @@ def _pixels(blocks: npt.NDArray[Any], shape: tuple[int, ...]) -> npt.NDArray[Any
 
 
 def _comes_over(shown: npt.NDArray[np.bool_]) -> bool:
-    """Whether what has a colour in samples (frames, rows, columns) is what smoke comes over.
+    """Whether what has a colour in samples (frames, blocks) is what smoke comes over.
 
     Ink that spreads and stays is as still as what it hides. But its own colour is never seen where it has not come to,
     and what it hides is seen everywhere. A clip that fades in from black is black everywhere at a time, too: that

@@ -136,7 +136,7 @@ class Clip:
         ------
         ClipError
             With the path: no such file, no video in it, a picture missing, nothing that can be decoded, a range of
-            frames outside the clip, a mask that hides all of them, or one of another shape.
+            frames outside the clip, a mask that hides all or nearly all of them, or one of another shape.
         ImageError
             If the mask is a picture that cannot be read.
         """
@@ -156,10 +156,10 @@ class Clip:
         try:
             if said.mask is None:
                 return cls(path, KeptFrames(source), fps, frames)
-            first, last = frames or (0, source.count - 1)
-            masked = Masked(KeptFrames(source), Mask(said.mask, first, min(last, source.count - 1)))
+            first, last = (min(n, source.count - 1) for n in frames or (0, source.count - 1))
+            masked = Masked(KeptFrames(source), Mask(said.mask, first, last))
             clip = cls(path, KeptFrames(masked), fps, frames, masked=masked)
-            masked.mask.require_shape(*clip.size)
+            masked.mask.check(*clip.size)
             return clip
         except BaseException:
             source.close()

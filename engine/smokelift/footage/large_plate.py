@@ -94,7 +94,7 @@ class LargeSamples:
 
     def backdrop(self) -> Plate | None:
         """Return the plate of a background of one colour, or None if it has more; see `backdrop_plate`."""
-        found = backdrop_plate(self.reduced, self._reduced_noise)
+        found = backdrop_plate(self.reduced, self._reduced_noise, self.seen)
         if found is None:
             return None
         colour = np.median(found.image.reshape(-1, 3), axis=0)

@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
+from scipy import ndimage
 
 from smokelift.footage.behind_smoke import push_pull
 from smokelift.footage.frame_source import ClipError, FrameSource, Look
@@ -31,6 +32,12 @@ HALF = 0.5
 
 CONTINUED = 320
 """Pixels along the longer side of the picture that is continued: as smooth as that is, it has no more detail."""
+
+ROOM = 10 / 320
+"""Side of a square that has to be white, over the longer side of the picture: blocks of it tell the clip's noise."""
+
+FARTHEST = 0.01
+"""Weight of what is seen from which on a pixel is continued from around it, and not from all of the picture."""
 
 REMEMBERED = 16
 """Masks of a size that are kept: two megabytes each of 1080p."""
@@ -63,7 +70,7 @@ class Mask:
     """
 
     def __init__(self, path: Path, first: int, last: int) -> None:
-        self._path, self._first = path, first
+        self._path = path
         self._read: Callable[[int], Picture]
         self._video: Video | None = None
         self.count: int | None = None
@@ -88,8 +95,8 @@ class Mask:
         missing = [file for file in self.files if is_pattern(path) and not file.is_file()]
         if missing:
             raise ClipError(f"{missing[0]}: this mask is missing; give one for every frame, or one picture for all.")
-        frames = range(first, last + 1) if self.count else (first,)
-        if not any((self._read(n) @ LUMINANCE >= HALF).any() for n in frames):
+        self._needed = range(first, last + 1) if self.count else (first,)
+        if not any((self._read(n) @ LUMINANCE >= HALF).any() for n in self._needed):
             raise ClipError(
                 f"{path}: this mask is black everywhere (transparent counts as black), so that no smoke may be "
                 "anywhere; paint white where smoke may be."
@@ -105,14 +112,21 @@ class Mask:
         """
         return self._at(n if self.count else 0, width, height)
 
-    def require_shape(self, width: int, height: int) -> None:
-        """Raise ClipError if it is no picture of the shape of a clip of so many pixels, whatever its size."""
-        rows, columns = self._read(self._first).shape[:2]
+    def check(self, width: int, height: int) -> None:
+        """Raise ClipError if it has another shape than a clip of so many pixels, or leaves next to nothing of it."""
+        rows, columns = self._read(self._needed[0]).shape[:2]
         # either may be a resized copy: each side is right to a pixel
         if abs(columns * height - rows * width) > columns + rows + width + height:
             raise ClipError(
                 f"{self._path}: this mask is {columns} x {rows} pixels, another shape than the clip's {width} x "
                 f"{height}; paint it over a frame of the clip."
+            )
+        side = max(1, round(ROOM * max(width, height)))
+        square = np.ones((side, side))
+        if not any(ndimage.binary_erosion(self.seen(n, width, height), square).any() for n in self._needed):
+            raise ClipError(
+                f"{self._path}: this mask leaves too little of the picture white; leave a square of {side} x {side} "
+                "pixels at least, and room around the smoke."
             )
 
     def _seen(self, n: int, width: int, height: int) -> Seen:
@@ -185,5 +199,10 @@ def continued(picture: Picture, seen: Seen) -> Picture:
     size = max(1, round(columns / scale)), max(1, round(rows / scale))
     share = area_average(seen.astype(np.float32), *size)
     mean = area_average(np.where(seen[..., None], picture, 0), *size) / np.maximum(share, 1e-6)[..., None]
-    whole = area_average(push_pull(mean, (share > 0).astype(np.float32)), columns, rows)
+    known = (share > 0).astype(np.float32)
+    # far from what is seen it fades to black, and so does white
+    fading = push_pull(np.ones_like(mean), known)
+    usual = mean[share > 0].mean(0)
+    smooth = np.where(fading > FARTHEST, push_pull(mean, known) / np.maximum(fading, FARTHEST), usual)
+    whole = area_average(smooth, columns, rows)
     return np.asarray(whole[~seen], np.float32)

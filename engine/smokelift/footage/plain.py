@@ -18,14 +18,14 @@ from smokelift.footage.exposure import sample_gains, small, small_size
 from smokelift.footage.images import Picture, area_average
 from smokelift.footage.noise import BLOCK, BLOCKS_APART, Noise, encode_sample, even_out, some_blocks
 from smokelift.footage.plate import Plate
-from smokelift.footage.plate_estimation import clip_noise, seen_of
+from smokelift.footage.plate_estimation import clip_noise
 
 SAMPLES = 16
 """Frames from which the colour and the noise are taken."""
 
 
 def plain_plate(clip: Clip, shot: Clip) -> Plate | None:
-    """Return the plate of a background that has one colour everywhere; None of others, and of small pictures.
+    """Return the plate of a background that has one colour everywhere; None of others, small and masked ones.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def plain_plate(clip: Clip, shot: Clip) -> Plate | None:
     """
     width, height = clip.size
     divisor = max(width, height) // GLIMPSE
-    if divisor < 2 or min(width, height) < BLOCKS_APART * BLOCK:
+    if clip.mask is not None or divisor < 2 or min(width, height) < BLOCKS_APART * BLOCK:
         return None
     columns, rows = round(width / divisor), max(1, round(height / divisor))
     size = small_size(columns, rows)
@@ -62,18 +62,14 @@ def plain_plate(clip: Clip, shot: Clip) -> Plate | None:
         return None
     numbers = clip.spread(SAMPLES)
     parts = (clip.frame_through(number, encode_sample, some_blocks) for number in numbers)
-    seen_whole = seen_of(clip, numbers, width, height)
-    shown = None if seen_whole is None else np.stack([some_blocks(each) for each in seen_whole])
-    found = _colour(parts, [clip.as_seen(number, small(clip.reduced(number))) for number in numbers], shown)
+    found = _colour(parts, [small(clip.reduced(number)) for number in numbers])
     if found is None:
         return None
     colour, noise = found
     return Plate(np.tile(colour, (height, width, 1)), np.ones((height, width), np.float32), noise)
 
 
-def _colour(
-    encoded: Iterable[npt.NDArray[np.uint16]], whole: Sequence[Picture], seen: npt.NDArray[np.bool_] | None = None
-) -> tuple[Picture, Noise] | None:
+def _colour(encoded: Iterable[npt.NDArray[np.uint16]], whole: Sequence[Picture]) -> tuple[Picture, Noise] | None:
     """The linear colour (3,) of all of the background and the noise, or None if it has other colours.
 
     Parameters
@@ -82,12 +78,10 @@ def _colour(
         Pictures of one size, as of `encode_sample`.
     whole
         What shows the exposure of each: the `small` picture of its frame.
-    seen : (frames, rows, columns) bool, optional
-        What of the pictures no mask hides, for the noise; without it all.
     """
     samples = np.stack(list(encoded))
     even_out(samples, sample_gains(np.stack(whole)))
-    noise = clip_noise(samples, seen)
+    noise = clip_noise(samples)
     found = backdrop_plate(samples, noise)
     if found is None or (found.image != found.image[0, 0]).any():
         return None

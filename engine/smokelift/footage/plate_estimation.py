@@ -91,7 +91,7 @@ class SteadySamples:
 
     def backdrop(self) -> Plate | None:
         """Return the plate of a background of one colour, or None if it has more."""
-        return backdrop_plate(self.pictures, self.noise)
+        return backdrop_plate(self.pictures, self.noise, self.seen)
 
     def plate(self) -> Plate:
         """Return the plate of a background of more than one colour."""

@@ -55,7 +55,8 @@ FEW = 4
 
 FROM_ONE = (
     "One frame alone does not show what moves: the colour around it counts as background, and all that has another as "
-    "smoke. If that is wrong, give a clean plate, or a color, in [background]."
+    "smoke. If that is wrong, hide what is no smoke by a mask in [clip], or give a clean plate, or a color, in "
+    "[background]."
 )
 """What is to be said of a background of one colour that a single frame shows."""
 

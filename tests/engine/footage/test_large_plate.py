@@ -7,12 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from films import codes_apart
+from PIL import Image
 
 from smokelift.footage.clip import Clip
 from smokelift.footage.evidence import GLIMPSE
 from smokelift.footage.frame_source import Look
 from smokelift.footage.images import CodedPicture, area_average, code_values, linear_to_srgb, srgb_to_linear
 from smokelift.footage.large_plate import large_frames, large_samples
+from smokelift.footage.mask import Mask, Masked
 from smokelift.footage.plate import Plate
 from smokelift.footage.plate_estimation import steady_samples
 from smokelift.setup.background import find_plates
@@ -126,6 +128,21 @@ def test_noise_is_that_of_whole_pictures(codes: float) -> None:
     samples = large_samples(clip)
     assert samples is not None
     np.testing.assert_allclose(samples.noise.total, steady_samples(clip).noise.total, rtol=0.15)
+
+
+def test_noise_and_wall_are_those_of_what_a_mask_leaves(tmp_path: Path) -> None:
+    """What it hides is continued without any noise, and is most of the picture."""
+    truth = wall()
+    values = np.zeros(SIZE, np.uint8)
+    values[:, :250] = 255
+    Image.fromarray(values).save(tmp_path / "mask.png")
+    masked = Masked(film(truth, noise=4.0)._source, Mask(tmp_path / "mask.png", 0, COUNT - 1))
+    plate = found(Clip(Path("film"), masked, 24.0, None, masked=masked))
+    np.testing.assert_allclose(255 * plate.noise.total, 4.0, rtol=0.35)
+    known = plate.confidence > 0.5
+    assert known[:, :240].mean() > 0.9
+    assert not known[:, 260:].any()
+    assert np.median(codes_apart(plate.image, truth)[:, :240][known[:, :240]]) < 2
 
 
 def test_one_colour_is_told_with_what_stands_before_it() -> None:

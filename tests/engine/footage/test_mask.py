@@ -11,10 +11,11 @@ from films import COUNT, HEIGHT, WIDTH, codes_apart, film, puff, wall
 from PIL import Image
 
 from smokelift.footage.clip import Clip, ClipError
-from smokelift.footage.images import ImageError, linear_to_srgb
-from smokelift.footage.mask import Mask
+from smokelift.footage.images import ImageError, linear_to_srgb, srgb_to_linear
+from smokelift.footage.mask import Mask, continued
+from smokelift.footage.noise import encode_sample
 from smokelift.footage.plate import Plate, known_plate
-from smokelift.footage.plate_estimation import estimate_plate
+from smokelift.footage.plate_estimation import SteadySamples, estimate_plate
 from smokelift.footage.steady import cleared, uncovered
 from smokelift.output.images import write_image
 from smokelift.output.video import write_video
@@ -103,6 +104,10 @@ def is_black(folder: Path) -> Path:
     return painted(folder / "black.png", np.zeros((4, 4)))
 
 
+def is_a_line(folder: Path) -> Path:
+    return painted(folder / "line.png", np.where(np.arange(WIDTH) == SIDE, 255, 0) * np.ones((HEIGHT, 1)))
+
+
 def is_text(folder: Path) -> Path:
     (folder / "mask.png").write_text("no picture")
     return folder / "mask.png"
@@ -123,6 +128,10 @@ def has_a_hole(folder: Path) -> Path:
     [
         (lacks, r"none\.png: no such file"),
         (is_black, r"black\.png: this mask is black everywhere"),
+        (
+            is_a_line,
+            r"line\.png: this mask leaves too little of the picture white; leave a square of 2 x 2 pixels",
+        ),
         (is_text, r"mask\.png: cannot be read"),
         (is_wide, rf"wide\.png: this mask is {2 * WIDTH} x {HEIGHT} pixels, another shape than the clip's"),
         (has_a_hole, r"mask_03\.png: this mask is missing; give one for every frame, or one picture for all"),
@@ -131,6 +140,13 @@ def has_a_hole(folder: Path) -> Path:
 def test_a_wrong_mask_is_refused(tmp_path: Path, wrong: Callable[[Path], Path], said: str) -> None:
     with pytest.raises((ClipError, ImageError), match=said):
         Clip.open(filmed(tmp_path / "clip"), mask=wrong(tmp_path))
+
+
+def test_frames_outside_the_clip_are_said_before_its_masks(tmp_path: Path) -> None:
+    for n in range(COUNT):
+        painted(tmp_path / f"mask_{n:02d}.png", np.full((HEIGHT, WIDTH), 255))
+    with pytest.raises(ClipError, match="frames 90 to 95 were asked for"):
+        Clip.open(filmed(tmp_path / "clip"), frames=(90, 95), mask=tmp_path / "mask_##.png")
 
 
 def test_frames_are_continued_where_they_are_hidden(tmp_path: Path, mask: Path) -> None:
@@ -144,6 +160,31 @@ def test_frames_are_continued_where_they_are_hidden(tmp_path: Path, mask: Path) 
             assert np.abs(clip.reduced(n) - clip.frame(n)).max() == 0
         assert np.isnan(clip.as_seen(3, clip.frame(3))[:, SIDE:]).all()
         assert plain.seen(3, WIDTH, HEIGHT) is None
+
+
+def test_what_is_far_from_all_that_is_seen_has_its_colour() -> None:
+    seen = np.zeros((40, 900), np.bool_)
+    seen[:, :40] = True
+    picture = np.where(seen[..., None], np.float32(0.3), np.float32(0.9)) * np.ones(3, np.float32)
+    np.testing.assert_allclose(continued(picture, seen), 0.3, rtol=1e-3)
+
+
+def test_what_is_hidden_speaks_for_no_background_of_one_colour() -> None:
+    """Most of a wall's picture is hidden, and as continued it never changes; before grey, grey is found."""
+    random = np.random.default_rng(0)
+    seen = np.zeros((8, 60, 800), np.bool_)
+    seen[:, :, :50] = True
+    frames = {}
+    for name, texture in (("wall", 0.1), ("grey", 0.0)):
+        encoded = 0.5 + texture * np.kron(random.standard_normal((12, 160, 3)), np.ones((5, 5, 1)))
+        linear = srgb_to_linear(np.clip(encoded, 0, 1)).astype(np.float32)
+        linear[~seen[0]] = continued(linear, seen[0])
+        shown = linear_to_srgb(linear) + random.normal(0, 1 / 255, (8, 60, 800, 3)) * seen[..., None]
+        frames[name] = np.stack([encode_sample(srgb_to_linear(np.clip(each, 0, 1))) for each in shown])
+    assert SteadySamples(frames["wall"], seen).backdrop() is None
+    grey = SteadySamples(frames["grey"], seen).backdrop()
+    assert grey is not None
+    np.testing.assert_allclose(linear_to_srgb(grey.image), 0.5, atol=0.01)
 
 
 def test_codes_are_continued_as_light_is(tmp_path: Path) -> None:

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from films import codes_apart
+from PIL import Image
 from scipy.spatial.transform import Rotation
-from turning_camera import LENS, clip_of, pan, pictures, shake, wall
+from turning_camera import COUNT, LENS, SIZE, Frames, clip_of, pan, pictures, shake, wall
 
+from smokelift.footage.clip import Clip
+from smokelift.footage.mask import Mask, Masked
 from smokelift.footage.matte import matte
 from smokelift.footage.panorama import WidePicture, estimate_panorama, warped
 from smokelift.footage.turning import Turns
@@ -65,6 +69,22 @@ def test_exposure_does_not_show_in_it() -> None:
     frames[4] *= 1.33
     plates = estimate_panorama(clip_of(frames), Turns(LENS, turns))
     assert np.percentile(codes_apart(plates.at(4).image, clear[4]), 90) < 6
+
+
+def test_what_a_mask_hides_in_some_frames_comes_from_the_others(tmp_path: Path) -> None:
+    """A block stands at the side of every picture while the camera pans past the wall."""
+    turns = pan(60)
+    frames, clear = pictures(wall(), turns)
+    frames[:, 20:100, 5:55] = 0.01
+    values = np.full((SIZE[1], SIZE[0]), 255, np.uint8)
+    values[15:105, :60] = 0
+    Image.fromarray(values).save(tmp_path / "mask.png")
+    masked = Masked(Frames(frames), Mask(tmp_path / "mask.png", 0, COUNT - 1))
+    plates = estimate_panorama(Clip(Path("turning"), masked, None, None, masked=masked), Turns(LENS, turns))
+    plate = plates.at(COUNT // 2)
+    known = (plate.confidence > 0.5)[20:100, 40:60]
+    assert known.mean() > 0.9
+    assert np.percentile(codes_apart(plate.image, clear[COUNT // 2])[20:100, 40:60][known], 90) < 6
 
 
 def test_a_homography_of_whole_pixels_copies() -> None:
