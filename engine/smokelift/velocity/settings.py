@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from smokelift.scene.checks import integer
 from smokelift.velocity.solver import ProjectedCG, Solver
 from smokelift.velocity.sources import SourceDetection
 
@@ -93,6 +94,13 @@ class VelocitySettings:
     noise: float = 0.35
     smooth: float = 0.045
     solver: Solver = field(default_factory=ProjectedCG)
+
+    def __post_init__(self) -> None:
+        """Check the counts; ValueError."""
+        integer(self.linearisations, "linearisations", "a whole number from 1", least=1)
+        for name, least in (("coarsening", 0), ("levels", 1)):
+            if getattr(self, name) is not None:
+                integer(getattr(self, name), name, f"a whole number from {least}, or None", least=least)
 
     @property
     def grids(self) -> int:

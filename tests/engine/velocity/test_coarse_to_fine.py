@@ -285,6 +285,13 @@ def test_bad_input_is_refused(change, message):
         estimate_velocity(**arguments)
 
 
+@pytest.mark.parametrize("counts", [{"linearisations": 0}, {"levels": 0}, {"coarsening": -1}, {"levels": 2.5}])
+def test_grids_and_linearisations_are_counted(counts):
+    (name,) = counts
+    with pytest.raises(ValueError, match=f"{name} must be a whole number from"):
+        VelocitySettings(**counts)
+
+
 PEAK = """
 import re, sys
 import numpy as np, psutil

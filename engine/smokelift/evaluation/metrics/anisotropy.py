@@ -7,6 +7,9 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from smokelift.checks import shown
+from smokelift.evaluation.metrics.checks import finite
+
 
 def depth_anisotropy(density: npt.ArrayLike, axis: int = 1) -> float:
     """Return how much a density changes from voxel to voxel along one axis, relative to across it.
@@ -25,13 +28,13 @@ def depth_anisotropy(density: npt.ArrayLike, axis: int = 1) -> float:
     Raises
     ------
     ValueError
-        If a value is not finite or the density has not three axes.
+        If a value is not finite, the density has not three axes, or there is no such axis.
     """
-    values = np.asarray(density, np.float64)
-    if not np.isfinite(values).all():
-        raise ValueError("values must be finite")
+    values = finite(density)
     if values.ndim != 3:
         raise ValueError(f"depth anisotropy needs a density (nx, ny, nz), not one of shape {values.shape}")
+    if axis not in range(-3, 3):
+        raise ValueError(f"axis must be 0, 1 or 2, not {shown(axis)}")
     changes = [float(np.sum(np.diff(values, axis=k) ** 2)) for k in range(3)]
     along = math.sqrt(changes.pop(axis))
     across = math.sqrt(sum(changes) / 2)

@@ -7,13 +7,18 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from smokelift.checks import numbers
+from smokelift.transport import StaggeredGrid
+
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
 
 def finite(values: npt.ArrayLike) -> Array:
-    """Return an array of float64; ValueError if a value is not finite."""
-    array = np.asarray(values, np.float64)
+    """Return an array of float64; ValueError if it holds anything but finite numbers."""
+    if isinstance(values, StaggeredGrid):
+        raise ValueError("a velocity must be an array of vectors at voxel centres: velocity.centres(), not a Velocity")
+    array = numbers(values, "values", np.float64)
     if not np.isfinite(array).all():
         raise ValueError("values must be finite")
     return array

@@ -8,6 +8,7 @@ from scipy import ndimage
 
 from smokelift.evaluation.metrics.checks import counted, finite, pair, relative
 from smokelift.evaluation.metrics.volumes import volume_error
+from smokelift.transport import require_positive
 
 
 def velocity_error(
@@ -65,9 +66,12 @@ def mean_divergence(velocity: npt.ArrayLike, voxel_size: float, mask: npt.ArrayL
     Raises
     ------
     ValueError
-        If a value is not finite, the mask does not fit, or no corner counts.
+        If a value is not finite, the size not positive, a shape does not fit, or no corner counts.
     """
+    require_positive("voxel_size", voxel_size)
     u = finite(velocity)
+    if u.ndim != 4 or u.shape[3] != 3:
+        raise ValueError(f"a velocity must have the shape (nx, ny, nz, 3), not {u.shape}")
     outflow = np.zeros([n - 1 for n in u.shape[:3]])
     for axis in range(3):
         slope = np.diff(u[..., axis], axis=axis)

@@ -9,6 +9,8 @@ import numpy.typing as npt
 from scipy import fft, ndimage
 
 from smokelift.evaluation.metrics.checks import Array, counted, pair
+from smokelift.scene.checks import number
+from smokelift.transport import require_positive
 
 Integers = npt.NDArray[np.int64]
 
@@ -32,8 +34,9 @@ def psnr(a: npt.ArrayLike, b: npt.ArrayLike, mask: npt.ArrayLike | None = None, 
     Raises
     ------
     ValueError
-        If the shapes differ, a value is not finite, or no pixel counts.
+        If the shapes differ, a value is not finite, no pixel counts, or the peak is not positive.
     """
+    require_positive("peak", peak)
     first, second = pair(a, b)
     error = (first - second) ** 2
     mean = float(error[counted(mask, error.shape)].mean())
@@ -56,8 +59,9 @@ def ssim(a: npt.ArrayLike, b: npt.ArrayLike, peak: float = 1.0) -> float:
     Raises
     ------
     ValueError
-        If the shapes differ, the pictures are too small, or a value is not finite.
+        If the shapes differ, the pictures are too small, a value is not finite, or the peak is not positive.
     """
+    require_positive("peak", peak)
     first, second = pair(a, b)
     if first.ndim not in (2, 3) or min(first.shape[:2]) < 11:
         raise ValueError(f"ssim needs pictures of at least 11 x 11 pixels, not of shape {first.shape}")
@@ -90,7 +94,7 @@ def shifted_psnr(
     a, b
         Pictures of one shape, (rows, columns) or (rows, columns, channels).
     reach
-        Largest shift, as a share of the rows and of the columns.
+        Largest shift, as a share of the rows and of the columns, 0 to 1.
     peak
         The value of white.
 
@@ -101,8 +105,9 @@ def shifted_psnr(
     Raises
     ------
     ValueError
-        If the shapes differ or a value is not finite.
+        If the shapes differ, a value is not finite, the reach is out of range, or the peak is not positive.
     """
+    number(reach, "reach", "a number from 0 to 1", lambda share: 0 <= share <= 1)
     first, second = (np.atleast_3d(picture) for picture in pair(a, b))
     rows, columns = first.shape[:2]
     far = int(reach * rows), int(reach * columns)

@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from smokelift.evaluation.metrics.checks import counted, finite, pair, relative
+from smokelift.transport import require_positive
 
 
 def volume_error(density: npt.ArrayLike, truth: npt.ArrayLike, mask: npt.ArrayLike | None = None) -> float:
@@ -38,8 +39,9 @@ def mass(density: npt.ArrayLike, voxel_size: float) -> float:
     Raises
     ------
     ValueError
-        If a value is not finite.
+        If a value is not finite, or the size not positive.
     """
+    require_positive("voxel_size", voxel_size)
     return float(finite(density).sum()) * voxel_size**3
 
 
