@@ -11,11 +11,13 @@ import io
 import os
 import sys
 from collections.abc import Sequence
-from typing import NoReturn
+from pathlib import Path
+from typing import Any, NoReturn
 
 from smokelift._core import set_threads
 from smokelift.app.commands import COMMANDS
 from smokelift.app.progress import OutputError, one_line, reporter
+from smokelift.footage.images import READABLE
 from smokelift.output.atomic import DISK_FULL
 from smokelift.output.index import DirectoryBusyError
 from smokelift.output.vdb import VdbUnavailable
@@ -42,6 +44,15 @@ class _Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         super().error(one_line(message))
+
+    def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Parse, and refuse what is left over; a shell makes many words of ``frame_*.png``."""
+        options, rest = self.parse_known_args(args, namespace)
+        if rest and all(Path(word).suffix.lower() in READABLE for word in rest):
+            self.error(f"{len(rest) + 1} pictures are named; give those of a clip as one pattern, frame_####.png")
+        if rest:
+            self.error(f"unrecognized arguments: {' '.join(rest)}")
+        return options
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -30,6 +30,13 @@ def test_an_address(capsys, words) -> None:
     assert capsys.readouterr().err.splitlines()[-1].endswith(sentence)
 
 
+def test_pictures_that_a_shell_has_named_one_by_one(capsys) -> None:
+    """As it does with frame_*.png."""
+    assert command("inspect", "frame_1.png", "frame_2.png", "frame_3.png") == 2
+    sentence = "error: 3 pictures are named; give those of a clip as one pattern, frame_####.png"
+    assert capsys.readouterr().err.splitlines()[-1].endswith(sentence)
+
+
 def test_an_unknown_key(shot, tmp_path, capsys) -> None:
     """The key and its line."""
     text = shot.read_text().replace("[medium]\n", "[medium]\ncolour = 3\n")
