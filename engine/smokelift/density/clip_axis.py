@@ -23,7 +23,6 @@ AXIS_FRAMES = 16
 LIGHT_FRAMES = 4
 """Those of them whose light is looked at as well: each costs 200 pictures on a coarse grid."""
 
-
 LONGEST = 512
 """Voxels along the longest side at most: finer grids show the place no better."""
 

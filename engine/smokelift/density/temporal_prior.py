@@ -33,15 +33,16 @@ from smokelift.render import Image, Volume
 from smokelift.scene.domain import box_around
 
 TINY = np.finfo(np.float32).tiny
+"""Smallest normal number, for divisions and logarithms."""
 
 FAINT = 1e-3
 """Optical depth, as a fraction of the largest, below which its logarithm means nothing."""
 
-GUIDED = 5.0
+GUIDED_BLUR = 5.0
 """Standard deviation (voxels) of the blur whose result the smooth answer decides; what is finer is the simulation's."""
 
-WIDTHS = 3.0
-"""Standard deviations that it reaches."""
+BLUR_REACH = 3.0
+"""Standard deviations up to which that blur reaches."""
 
 LARGEST_GAIN = 3.0
 """Bound of the factor by which carried smoke is made denser. Where that is too little the prior's smoke is added: there
@@ -117,7 +118,7 @@ class BlendCarried:
         def judged(density: Volume) -> tuple[float, Image]:
             """Squared difference from the picture, and optical depths (rows, columns)."""
             difference = renderer.image(density) - view.image
-            along_rays = -np.log(np.maximum(renderer.transmittance, np.finfo(np.float32).tiny))
+            along_rays = -np.log(np.maximum(renderer.transmittance, TINY))
             return float(np.sum(np.square(difference, dtype=np.float64))), along_rays
 
         (loss_prior, optical_depth), (loss_carried, carried_optical_depth) = judged(prior), judged(carried)
@@ -168,9 +169,9 @@ class GuidedSimulation:
         """
         if depth.smooth is None or not views.hull.any():
             return BlendCarried(self.largest).start(views, depth, carried, before)
-        box = box_around(views.hull, round(WIDTHS * GUIDED))
+        box = box_around(views.hull, round(BLUR_REACH * GUIDED_BLUR))
         hull = views.hull[box]
-        wanted, have = (_core.blur(values[box], GUIDED, WIDTHS)[hull] for values in (depth.smooth, carried))
+        wanted, have = (_core.blur(values[box], GUIDED_BLUR, BLUR_REACH)[hull] for values in (depth.smooth, carried))
         reached = np.float32(self.kept) * np.minimum(wanted, np.float32(LARGEST_GAIN) * have)
         taken_over = carried[box][hull] * reached / np.maximum(have, TINY)
         started = taken_over + (1 - reached / np.maximum(wanted, TINY)) * depth.density[box][hull]

@@ -19,7 +19,7 @@ from smokelift.density import (
     ViewSet,
     temporal_prior,
 )
-from smokelift.density.temporal_prior import GUIDED, LARGEST_GAIN
+from smokelift.density.temporal_prior import GUIDED_BLUR, LARGEST_GAIN
 from smokelift.footage.noise import lasting_noise
 from smokelift.footage.plate import Plate
 from smokelift.render import Volume, render, scene_optics
@@ -121,7 +121,7 @@ def test_nothing_carried_is_the_priors_density(moment) -> None:
 
 def blurred(density: Volume) -> Volume:
     """A density without what the simulation decides."""
-    return ndimage.gaussian_filter(density, GUIDED, truncate=3.0)
+    return ndimage.gaussian_filter(density, GUIDED_BLUR, truncate=3.0)
 
 
 @pytest.fixture(scope="module")
@@ -162,7 +162,7 @@ def test_a_simulation_works_about_the_hull_alone(moment, guess, monkeypatch) -> 
     hull = moment.views.hull.copy()
     hull[:, :, 3:] = False
     low = replace(moment, views=replace(moment.views, hull=hull))
-    monkeypatch.setattr(temporal_prior, "GUIDED", 1.0)
+    monkeypatch.setattr(temporal_prior, "GUIDED_BLUR", 1.0)
     found = guided(low, guess, moment.true).density
     monkeypatch.setattr(temporal_prior, "box_around", lambda voxels, margin: (slice(None),) * 3)
     np.testing.assert_array_equal(found, guided(low, guess, moment.true).density)
