@@ -25,7 +25,7 @@ from smokelift.scene import (
 )
 from smokelift.setup.choice import UNDETERMINED, Choice
 from smokelift.setup.smoke import SmokeSamples
-from smokelift.setup.smoke_colour import FAINTEST
+from smokelift.setup.smoke_colour import FAINTEST, line_of_colours
 from smokelift.setup.thickness import Thickness, smoke_thickness
 
 BEYOND = 0.1
@@ -156,17 +156,30 @@ def ambient_sun(samples: SmokeSamples, medium: Medium, told: NDArray[np.float64]
     if samples.colours.shape[0] == 0:
         source = np.ones(3)
     else:
-        change = np.sum(samples.colours - samples.behind, -1)
-        brightens = np.sum(np.maximum(change, 0)) >= np.sum(np.maximum(-change, 0))
-        changed = samples.colours if told is None else samples.colours[change >= 0 if brightens else change < 0]
-        bound = np.percentile(changed, 99 if brightens else 1, axis=0)
+        brightens = samples.brightens
         if told is not None:
+            change = np.sum(samples.colours - samples.behind, -1)
+            bound = np.percentile(samples.colours[(change >= 0) == brightens], 99 if brightens else 1, axis=0)
             source = np.maximum(told, bound) if brightens else np.minimum(told, bound)
+        elif brightens:
+            source = _brightest(samples)
         else:
-            source = (1 + BEYOND if brightens else 1 - BEYOND) * bound
+            source = (1 - BEYOND) * np.percentile(samples.colours, 1, axis=0)
     scattered = np.array(medium.albedos) / (4 * np.pi)
     irradiance = np.divide(source, scattered, out=np.zeros(3), where=scattered > 0)
     return DirectionalLight((0.0, 0.0, -1.0), (float(irradiance[0]), float(irradiance[1]), float(irradiance[2])))
+
+
+def _brightest(samples: SmokeSamples) -> NDArray[np.float64]:
+    """Source radiance (3,) beyond the thickest of smoke that brightens its background.
+
+    It lies on the line on which the smoke lies. The brightest of each channel may be smoke of different colours, or
+    what is behind it, and together a colour that no pixel shows.
+    """
+    colours, behind = samples.colours.astype(np.float64), samples.behind.astype(np.float64)
+    axis, start = line_of_colours(colours, behind), behind.mean(0)
+    farthest = start + (np.percentile(colours @ axis, 99) - start @ axis) * axis
+    return np.asarray(np.maximum(farthest + BEYOND * np.linalg.norm(farthest) * axis, 0))
 
 
 def light_note(scene: CompleteScene, told: bool, seen: bool) -> str:

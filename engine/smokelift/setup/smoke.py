@@ -69,6 +69,12 @@ class SmokeSamples:
         """Share by which the exposure of a sample differs from its background's at most."""
         return largest_change(list(self.gains.values()))
 
+    @property
+    def brightens(self) -> bool:
+        """Whether smoke adds more light to what is behind it than it takes away."""
+        change = np.sum(self.colours - self.behind, -1)
+        return bool(np.sum(np.maximum(change, 0)) >= np.sum(np.maximum(-change, 0)))
+
 
 def small_pictures(clip: Clip) -> dict[int, Picture]:
     """Return `smokelift.footage.exposure.small` pictures of frames spread over a clip, by their numbers, ascending."""

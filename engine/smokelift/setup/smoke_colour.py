@@ -122,6 +122,19 @@ def several_colours(samples: SmokeSamples) -> tuple[str, ...]:
     )
 
 
+def line_of_colours(colours: Array, behind: Array) -> Array:
+    """Direction (3,), of length 1, in which smoke changes what is behind it: the one that explains most of the change.
+
+    Parameters
+    ----------
+    colours, behind : (n, 3)
+        Radiance of at least one pixel with smoke, and without.
+    """
+    change = colours - behind
+    axis = np.linalg.eigh(change.T @ change)[1][:, -1]
+    return np.asarray(axis if np.sum(change @ axis) >= 0 else -axis)
+
+
 def _grey(why: str, degrees: float | None = None) -> SmokeColour:
     reason = f"Smoke colour: undetermined, grey is taken: {why}."
     measured = {} if degrees is None else {"degrees": degrees}
@@ -134,11 +147,13 @@ def _line(samples: SmokeSamples) -> tuple[Array, Array] | None:
     if clear.sum() < max(FEWEST, 0.1 * len(clear)):
         return None
     colours, behind = (values[clear].astype(np.float64) for values in (samples.colours, samples.behind))
-    red, green, blue = (colours - behind).T
-    change = np.sqrt(red**2 + green**2 + blue**2)
-    thick = change >= np.percentile(change, THICKEST)
-    seen = colours[thick].mean(0)
-    return (np.maximum(behind[thick].mean(0), 0), seen) if seen.max() >= FAINTEST else None
+    change, axis = colours - behind, line_of_colours(colours, behind)
+    # a small error of the line is all of a dark colour: that is told by the thickest pixels alone
+    amount = change @ axis if samples.brightens else np.linalg.norm(change, axis=-1)
+    thick = amount >= np.percentile(amount, THICKEST)
+    start = np.maximum(behind[thick].mean(0), 0)
+    seen = start + amount[thick].mean() * axis if samples.brightens else colours[thick].mean(0)
+    return (start, np.maximum(seen, 0)) if seen.max() >= FAINTEST else None
 
 
 def _sources(behind: Array, seen: Array) -> Array:

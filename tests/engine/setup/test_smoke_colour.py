@@ -1,15 +1,20 @@
 """The smoke's own colour: found where no light explains it, and called undetermined elsewhere."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from smokelift.scene import Medium
 from smokelift.setup.choice import UNDETERMINED
+from smokelift.setup.light import ambient_sun
 from smokelift.setup.smoke import SmokeSamples
 from smokelift.setup.smoke_colour import several_colours, smoke_colour
 
 WHITE = np.ones(3)
 RED, DUST = np.array((1.0, 0.3, 0.2)), np.array((1.0, 0.75, 0.48))
 BLACK, SKY, BRICK = np.zeros(3), np.array((0.25, 0.45, 0.9)), np.array((0.2, 0.12, 0.08))
+GREEN, PALE_SKY = np.array((0.0, 0.6, 0.01)), np.array((0.36, 0.42, 0.46))
 
 
 def samples(source, behind, thickest=0.9):
@@ -55,6 +60,45 @@ def test_what_white_balance_explains_is_the_lights():
 def test_smoke_of_the_colour_of_its_surroundings_is_undetermined():
     """All is orange at sunset."""
     assert smoke_colour(samples(0.8 * DUST, 0.4 * DUST), WHITE).choice.chosen == UNDETERMINED
+
+
+def test_a_dark_side_is_not_coloured():
+    """Thick smoke in the sun, whose shadow is darker than it is: before a sky it takes away more than it adds."""
+    rng = np.random.default_rng(2)
+    seen = samples(BLACK, PALE_SKY, 0.0)
+    opacity, lit = 1 - rng.random((500, 1)) ** 4, rng.random((500, 1))
+    lit_smoke = (1 - opacity) * PALE_SKY + opacity * 0.4 * lit**3 * np.array((1.0, 0.92, 0.84))
+    found = smoke_colour(replace(seen, colours=lit_smoke.astype("f4")), WHITE)
+    assert found.choice.chosen == UNDETERMINED
+
+
+def shredded():
+    """Red smoke that is clipped where it is thick, with a shred of pale smoke that is not."""
+    red, pale = samples(2 * RED, BLACK), samples(0.9 * WHITE, BLACK)
+    shred = slice(0, 25)
+    colours = np.concatenate([np.minimum(red.colours, 1), pale.colours[shred]])
+    return replace(red, colours=colours, behind=np.concatenate([red.behind, pale.behind[shred]]))
+
+
+def test_a_pale_shred_and_clipped_pixels_leave_the_colour():
+    assert apart(smoke_colour(shredded(), WHITE).color, RED) < 6
+
+
+@pytest.mark.parametrize("seen", [shredded(), samples(RED, GREEN)], ids=["shred", "green screen"])
+def test_the_source_has_a_colour_that_the_pixels_show_together(seen):
+    """The brightest of each channel may be other smoke, or the background, and together a colour that none shows."""
+    source = np.array(ambient_sun(seen, Medium(albedo=0.8)).irradiance)
+    assert apart(source, RED) < 12
+    assert apart(np.percentile(seen.colours, 99, axis=0), RED) > 15
+
+
+def test_the_source_is_beyond_the_thickest_smoke():
+    """Thin smoke before a background that is brighter in the one channel in which smoke is darker."""
+    source = np.array((0.4, 0.3, 0.0))
+    seen = samples(source, GREEN, 0.5)
+    amounts = (seen.colours - GREEN) @ (source - GREEN)
+    found = np.array(ambient_sun(seen, Medium(albedo=1.0)).irradiance) / (4 * np.pi)
+    assert (found - GREEN) @ (source - GREEN) > amounts.max()
 
 
 def test_a_known_light_leaves_the_smoke_the_rest():
