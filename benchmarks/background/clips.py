@@ -43,10 +43,15 @@ class Smoke:
     transmittance: Picture
 
     @staticmethod
-    def load(folder: Path) -> Smoke:
+    def load(folder: Path, view: str = "front") -> Smoke:
         """Read what `benchmarks.truth.picture` wrote."""
-        with np.load(folder / "front.npz") as file:
+        with np.load(folder / f"{view}.npz") as file:
             return Smoke(file["image"].astype(np.float32), file["transmittance"].astype(np.float32))
+
+    def thinned(self, share: float) -> Smoke:
+        """The smoke with a share of its optical depth; the source radiance of every pixel stays."""
+        clear = np.clip(self.transmittance, 1e-6, 1) ** share
+        return Smoke(self.radiance * (1 - clear) / np.maximum(1 - self.transmittance, 1e-6), clear)
 
     def darkened(self) -> Smoke:
         """Smoke that scatters a tenth of the light."""

@@ -37,16 +37,10 @@ def main() -> None:
         baked = Smoke(baked.radiance[:: options.every], baked.transmittance[:: options.every])
         shape = (baked.radiance.shape[1], baked.radiance.shape[2])
         for kind, share in (("as baked", 1.0), ("thin", THIN)):
-            smoke = _thinned(baked, share)
+            smoke = baked.thinned(share)
             for behind, plate in (("brick wall", wall(shape)), ("sky", sky(shape)), ("black", backdrop(shape, 0))):
                 print(f"| {folder.name} | {kind} | {behind} | {_row(smoke, plate, True)} |", flush=True)
             print(f"| {folder.name} | {kind} | brick wall, estimated | {_row(smoke, wall(shape), False)} |", flush=True)
-
-
-def _thinned(smoke: Smoke, share: float) -> Smoke:
-    """The smoke with a share of its optical depth; the source radiance of every pixel stays."""
-    clear = np.clip(smoke.transmittance, 1e-6, 1) ** share
-    return Smoke(smoke.radiance * (1 - clear) / np.maximum(1 - smoke.transmittance, 1e-6), clear)
 
 
 def _row(smoke: Smoke, plate: Picture, given: bool) -> str:

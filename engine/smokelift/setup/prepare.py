@@ -61,7 +61,8 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
         SmokeAxis.given(settings.axis_depth, camera, domain)  # refuse early what cannot be
     smoke = find_medium(scene.medium, look, scene.lights, camera, domain)
     asked = scene.scattering if settings.scattering == "auto" else settings.scattering
-    light = find_light(scene.lights, asked, smoke.medium, samples)
+    # a flame lights smoke from its middle
+    light = find_light(scene.lights, asked, smoke.medium, samples, not camera.moves and look.fire is None)
     complete = _complete(scene, look, geometry, smoke.medium, light)
     tried: tuple[Choice[Any], ...] = ()
     if settings.selection.measure:
