@@ -137,11 +137,19 @@ def _light(shot: Shot, given: Scene) -> tuple[Fact, ...]:
     if shot.scene.scattering == "absorption":
         return (Fact("light", "none is needed", "estimated" if given.scattering is None else "given"),)
     strength, thickness = _choice(shot, "light strength"), _choice(shot, "smoke thickness")
-    if strength is not None:
+    if strength is not None and given.lights:
         return (Fact("light", f"{strength.chosen} times as strong as given", "measured", strength.reason),)
+    colour = ", ".join(f"{v:.2g}" for v in shot.optics.unshadowed_source())
+    direction = _choice(shot, "light direction")
+    if direction is not None and direction.chosen != UNDETERMINED:
+        return (
+            Fact("light strength", f"smoke of radiance {colour}", "measured", "Light strength: as the views tell it."),
+            _chosen(shot, "light direction", "sun's direction", str(direction.chosen), False),
+            Fact("sun's color", "that of all light", UNDETERMINED),
+            Fact("ambient share", f"{direction.measured['ambient_share']:.0%}", "measured"),
+        )
     if given.lights or thickness is None:
         return (Fact("light", "as given", "given"),)
-    colour = ", ".join(f"{v:.2g}" for v in shot.optics.unshadowed_source())
     hides, origin = "as the light asks for", UNDETERMINED
     how = "Light strength: as much as the thickest smoke shows; if none is thick, the light is stronger."
     if not shot.smoky:

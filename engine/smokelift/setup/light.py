@@ -27,6 +27,7 @@ from smokelift.setup.choice import UNDETERMINED, Choice
 from smokelift.setup.light_side import LightSide, light_side
 from smokelift.setup.smoke import SmokeSamples
 from smokelift.setup.smoke_colour import FAINTEST, line_of_colours
+from smokelift.setup.sun import FoundSun
 from smokelift.setup.thickness import Thickness, smoke_thickness
 
 BEYOND = 0.1
@@ -62,30 +63,48 @@ class FoundLight:
         What the clip tells of the strength of a light that is not given; None if it is given or nothing is scattered.
     side
         From which side of the picture such a light comes, if the clip tells it. No light is made of it.
+    direction
+        From where it comes, where several cameras tell; None where nothing was asked of them.
     """
 
     lights: tuple[Light, ...]
     scattering: Scattering
     thickness: Thickness | None = None
     side: LightSide | None = None
+    direction: Choice[str] | None = None
 
     @property
     def guessed(self) -> bool:
         """Whether nothing tells the light, not even its strength."""
-        return self.thickness is not None and self.thickness.source is None
+        return self.thickness is not None and self.thickness.source is None and not self.sunny
+
+    @property
+    def sunny(self) -> bool:
+        """Whether the lights are those of a sun that was found."""
+        return self.direction is not None and self.direction.chosen != UNDETERMINED
+
+    def seen_by(self, sun: FoundSun | None) -> FoundLight:
+        """The light with what several cameras tell of a sun, if they were asked."""
+        if sun is None:
+            return self
+        if sun.lights is None:
+            return replace(self, direction=sun.choice)
+        return replace(self, lights=sun.lights, scattering="single", direction=sun.choice)
 
     def choices(self, scene: CompleteScene) -> tuple[Choice[Any], ...]:
         """What was measured of it, if the scene's model of scattering asks for light."""
         if self.thickness is None or scene.scattering == "absorption":
             return ()
+        if self.direction is not None and self.sunny:
+            return (self.direction,)
         side = () if self.side is None else (self.side.choice,)
-        return self.thickness.choice, *side, unknown_direction()
+        return self.thickness.choice, *side, self.direction or unknown_direction()
 
     def notes(
         self, scene: CompleteScene, choices: Sequence[Choice[Any]], samples: SmokeSamples, noise: Noise
     ) -> tuple[str, ...]:
         """What is to be said of it with the model that was chosen: see `light_note` and `light_doubts`."""
-        if self.thickness is None:
+        if self.thickness is None or self.sunny:
             return ()
         note = light_note(scene, not self.guessed, bool(samples.smoky))
         scattered = next((choice for choice in choices if choice.what == "scattering"), None)

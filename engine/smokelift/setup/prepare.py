@@ -28,6 +28,7 @@ from smokelift.setup.place import placed
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot, ShotView
 from smokelift.setup.smoke import SAMPLES
+from smokelift.setup.sun import find_sun
 from smokelift.setup.view_gain import balanced
 
 
@@ -64,18 +65,25 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
     # a flame lights smoke from its middle
     light = find_light(scene.lights, asked, smoke.medium, samples, not camera.moves and look.fire is None)
     complete = _complete(scene, look, geometry, smoke.medium, light)
+    first = ShotView(steadied, camera, plates, _working(camera, domain))
+    chosen = settings
     tried: tuple[Choice[Any], ...] = ()
     if settings.selection.measure:
         model = choose_model(steadied, complete, plates, samples.smoky, asked is not None, settings, light.guessed)
-        complete, settings, tried = model.scene, replace(settings, velocity=model.velocity), model.choices
-    first = ShotView(steadied, camera, plates, _working(camera, domain))
+        complete, chosen, tried = model.scene, replace(settings, velocity=model.velocity), model.choices
     others, gains, said = _further_views(first, complete, look, settings, bool(scene.lights))
+    if settings.selection.measure and asked is None and light.thickness is not None and look.fire is None:
+        light = light.seen_by(find_sun((first, *others), complete, tried_frames(samples.smoky), settings.density))
+        if light.sunny:
+            lit = _complete(scene, look, geometry, smoke.medium, light)
+            model = choose_model(steadied, lit, plates, samples.smoky, False, settings, guessed=False)
+            complete, chosen, tried = model.scene, replace(settings, velocity=model.velocity), model.choices
     clip.expect()  # lets go of frames that are kept as they were decoded
     shot = Shot(
         scene=complete,
         optics=scene_optics(complete),
         views=(first, *others),
-        settings=settings,
+        settings=chosen,
         estimated_background=look.picture,
         notes=(
             *remarks,

@@ -19,7 +19,7 @@ from smokelift.scene import Background, DirectionalLight, Inlet, Medium, Scene
 from smokelift.setup.light_side import LightSide
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.surroundings import light_around
-from tests.engine.setup.shots import flickering
+from tests.engine.setup.shots import filmed_around, flickering
 
 
 def test_inspect_says_how_smoke_gets_in_and_out(plume, tmp_path, capsys) -> None:
@@ -105,6 +105,18 @@ def test_exposure_that_flickers_before_black_is_called_measured(plume, tmp_path,
     (fact,) = (fact for fact in events(capsys.readouterr().out)[-1]["facts"] if fact["what"] == "exposure")
     assert fact["origin"] == "measured"
     assert fact["value"].startswith("flickers by up to 1")
+
+
+def test_a_sun_that_four_cameras_tell_is_called_measured(plume, tmp_path, capsys) -> None:
+    sun = DirectionalLight((-0.5, -0.6, -0.4), (12.0, 11.0, 10.0))
+    filmed_around(plume, tmp_path, (sun,)).save(tmp_path / "scene.toml")
+    written = tmp_path / "found.toml"
+    assert command("inspect", tmp_path / "scene.toml", "--write", written, "--progress", "json", *QUICK) == 0
+    known = {fact["what"]: fact for fact in events(capsys.readouterr().out)[-1]["facts"]}
+    assert known["light strength"]["origin"] == known["sun's direction"]["origin"] == "measured"
+    assert known["ambient share"]["value"].endswith("%")
+    strongest = max(Scene.load(written).lights, key=lambda light: sum(light.irradiance))
+    assert known["sun's direction"]["value"] == ", ".join(f"{value:.2f}" for value in strongest.direction)
 
 
 def test_what_is_given_is_called_given(shot, capsys) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from smokelift.footage.clip import Clip
 from smokelift.output.images import write_image
 from smokelift.render import render
-from smokelift.scene import ClipSource, Scene
+from smokelift.scene import ClipSource, Light, Scene, View, orbit
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
@@ -21,6 +21,20 @@ def shot_of(scene: Scene, settings: Settings) -> Shot:
     assert scene.clip is not None
     with Clip.open(scene.clip) as clip:
         return prepare_shot(clip, scene, settings)
+
+
+AROUND = (0.0, 45.0, 90.0, 135.0)
+"""Degrees about the smoke at which four cameras stand that see it from all sides."""
+
+
+def filmed_around(plume, folder: Path, lights: tuple[Light, ...], angles: tuple[float, ...] = AROUND) -> Scene:
+    """A scene without a light, of smoke that cameras at some angles filmed in one."""
+    views = []
+    for angle in angles:
+        camera = orbit(plume.scene.camera, plume.scene.domain, angle)
+        own = replace(plume.scene, camera=camera, lights=lights)
+        views.append(View(camera, plume.write(folder / f"{angle:g}", plume.densities, own).clip))
+    return replace(plume.scene, clip=views[0].clip, views=tuple(views[1:]), lights=())
 
 
 def burning(number: int, picture: np.ndarray) -> np.ndarray:
