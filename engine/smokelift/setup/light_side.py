@@ -21,6 +21,7 @@ from scipy.sparse.linalg import spsolve
 from smokelift.render import Renderer
 from smokelift.scene import Camera, DirectionalLight, Domain, Medium
 from smokelift.setup.choice import Choice
+from smokelift.setup.sphere import spread
 from smokelift.setup.thickness import BlockMaps, Texture
 
 Array = NDArray[np.float64]
@@ -50,7 +51,6 @@ KNOWN = 0.5
 
 FEWEST = 3
 """Frames with smoke at least."""
-
 
 SIDES = ("right", "upper right", "top", "upper left", "left", "lower left", "bottom", "lower right")
 """Names of angles, 45 degrees from one to the next."""
@@ -111,7 +111,7 @@ def light_side(frames: Sequence[Texture]) -> LightSide | None:
     bodies = [_Body.round(m) for m in maps if np.mean(m.known[m.covered > 0]) > KNOWN][:FRAMES]
     if len(bodies) < FEWEST:
         return None
-    towards = _directions()
+    towards = spread(DIRECTIONS)  # to the right, along the line of sight, up
     left, suns = _left(bodies, _lit(bodies, towards))
     weight = np.exp(-(left / max(left.min(), 1e-12) - 1) / FORGIVEN)
     weight /= weight.sum()
@@ -172,14 +172,6 @@ def _inflated(inside: NDArray[np.bool_]) -> Array:
         matrix = laplace.tocsr()[within][:, within].tocsc()
         half[inside] = np.sqrt(np.maximum(spsolve(matrix, np.full(len(within), -4.0)), 0))
     return half
-
-
-def _directions() -> Array:
-    """Directions (n, 3) spread over the sphere: to the right, along the line of sight, up."""
-    n = np.arange(DIRECTIONS)
-    z = 1 - 2 * (n + 0.5) / DIRECTIONS
-    angle, radius = np.pi * (3 - 5**0.5) * n, np.sqrt(1 - z * z)
-    return np.stack((radius * np.cos(angle), radius * np.sin(angle), z), -1)
 
 
 def _lit(bodies: Sequence[_Body], towards: Array) -> list[NDArray[np.float32]]:

@@ -25,6 +25,7 @@ from smokelift.scene.projection import voxel_width
 from smokelift.setup.choice import UNDETERMINED, Choice
 from smokelift.setup.coarse import coarse_domain
 from smokelift.setup.shot import ShotView
+from smokelift.setup.sphere import spread
 from smokelift.setup.surroundings import SIDES
 
 CAMERAS, APART = 4, 120.0
@@ -202,7 +203,7 @@ class _Lit:
     def sun(self) -> Sun:
         """The sun, with light from everywhere, that leaves least of what the smoke adds to all pictures."""
         added = self._added()
-        towards = _spread(DIRECTIONS)
+        towards = spread(DIRECTIONS)
         lit = self._pictures(towards)
         everywhere = lit.mean(0)
         best, left, strengths = _best(towards, lit, everywhere, added)
@@ -283,14 +284,6 @@ def _best(towards: Array, lit: Array, everywhere: Array, added: Array) -> tuple[
     best = int(np.argmin([left for _, left in found]))
     (strength, ambient), left = found[best]
     return towards[best], float(left), (float(strength), float(ambient))
-
-
-def _spread(count: int) -> Array:
-    """Directions (count, 3) spread evenly over the sphere, along a spiral."""
-    step = np.arange(count) + 0.5
-    z = 1 - 2 * step / count
-    angle, radius = np.pi * (1 + 5**0.5) * step, np.sqrt(1 - z * z)
-    return np.stack((radius * np.cos(angle), radius * np.sin(angle), z), -1)
 
 
 def _ring(about: Array, degrees: float) -> Array:
