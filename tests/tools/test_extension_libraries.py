@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import ast
 import re
 
 import pytest
 
-from engine_wheels import PYTHONS
-from extension_libraries import PINS, library_faults, pins, prune, requirements_of
+from engine_wheels import PYTHONS, ROOT
+from extension_libraries import PINS, UNUSED, library_faults, pins, prune, requirements_of
 from extension_products import PLATFORMS
 
 LINUX = PLATFORMS[0]
@@ -46,6 +47,20 @@ def test_what_is_never_imported_is_left_out(tmp_path) -> None:
         (tmp_path / name).touch()
     prune(tmp_path)
     assert {path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*") if path.is_file()} == set(kept)
+
+
+def test_no_part_of_scipy_that_the_engine_imports_is_left_out() -> None:
+    left_out = {pattern.partition("/")[2] for pattern in UNUSED if pattern.startswith("scipy/")}
+    imported = set()
+    for module in (ROOT / "engine").rglob("*.py"):
+        for node in ast.walk(ast.parse(module.read_text("utf-8"))):
+            if isinstance(node, ast.ImportFrom) and node.module is not None:
+                imported |= {node.module, *(f"{node.module}.{name.name}" for name in node.names)}
+            elif isinstance(node, ast.Import):
+                imported |= {name.name for name in node.names}
+    parts = {name.split(".")[1] for name in imported if name.startswith("scipy.")}
+    assert {"fft", "ndimage", "sparse"} <= parts
+    assert parts & left_out == set()
 
 
 def test_requirements_are_met_by_the_libraries_or_blenders_numpy(tmp_path) -> None:

@@ -22,6 +22,7 @@ from smokelift.render import Renderer
 from smokelift.scene import Camera, DirectionalLight, Domain, Medium
 from smokelift.setup.choice import Choice
 from smokelift.setup.sphere import spread
+from smokelift.setup.sun_and_rest import explained
 from smokelift.setup.thickness import BlockMaps, Texture
 
 Array = NDArray[np.float64]
@@ -196,14 +197,5 @@ def _left(bodies: Sequence[_Body], lit: Sequence[NDArray[np.float32]]) -> tuple[
     """Squared radiance that a sun from each direction and light from everywhere leave, and the sun's share."""
     seen = np.concatenate([body.added[body.compared] for body in bodies])
     sun = np.concatenate([pictures[:, body.compared] for body, pictures in zip(bodies, lit, strict=True)], 1)
-    everywhere = sun.mean(0)
-    of_sun, of_rest, both = sun @ seen, everywhere @ seen, sun @ everywhere
-    suns, rest = np.sum(np.square(sun, dtype=np.float64), 1), float(everywhere @ everywhere)
-    determinant = np.maximum(suns * rest - both**2, 1e-12 * suns * rest)
-    strength, share = (of_sun * rest - of_rest * both) / determinant, (of_rest * suns - of_sun * both) / determinant
-    # no light takes any away: one of the two alone, where the other would
-    alone, rest_alone = np.maximum(of_sun, 0) ** 2 / suns, max(of_rest, 0.0) ** 2 / rest
-    mixed = (strength >= 0) & (share >= 0)
-    explained = np.where(mixed, strength * of_sun + share * of_rest, np.maximum(alone, rest_alone))
-    of_all = np.where(mixed, strength / np.where(mixed, strength + share, 1), alone > rest_alone)
-    return np.asarray(seen @ seen - explained), np.asarray(of_all)
+    found = explained(sun, sun.mean(0), seen)
+    return found.left, found.share

@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import nnls
 
 from smokelift.density import Density, DensitySettings, Observation, reconstruct_density
 from smokelift.footage.matte import matte
@@ -26,6 +25,7 @@ from smokelift.setup.choice import UNDETERMINED, Choice
 from smokelift.setup.coarse import coarse_domain
 from smokelift.setup.shot import ShotView
 from smokelift.setup.sphere import spread
+from smokelift.setup.sun_and_rest import explained
 from smokelift.setup.surroundings import SIDES
 
 CAMERAS, APART = 4, 120.0
@@ -212,7 +212,8 @@ class _Lit:
             other, other_left, other_strengths = _best(ring, self._pictures(ring), everywhere, added)
             if other_left < left:
                 best, left, strengths = other, other_left, other_strengths
-        shading = nnls(everywhere[:, None], added)[1] / max(float(np.linalg.norm(added)), 1e-30)
+        ambient = max(float(everywhere @ added), 0.0) / max(float(everywhere @ everywhere), 1e-30)
+        shading = np.linalg.norm(added - ambient * everywhere) / max(float(np.linalg.norm(added)), 1e-30)
         return Sun(best, *strengths, float(shading))
 
     def _added(self) -> Array:
@@ -280,10 +281,9 @@ def _moments(
 
 def _best(towards: Array, lit: Array, everywhere: Array, added: Array) -> tuple[Array, float, tuple[float, float]]:
     """The direction that leaves least, what it leaves, and how strong the sun and the light from everywhere are."""
-    found = [nnls(np.stack([sun, everywhere], 1), added) for sun in lit]
-    best = int(np.argmin([left for _, left in found]))
-    (strength, ambient), left = found[best]
-    return towards[best], float(left), (float(strength), float(ambient))
+    found = explained(lit, everywhere, added)
+    best = int(np.argmin(found.left))
+    return towards[best], float(found.left[best]), (float(found.sun[best]), float(found.rest[best]))
 
 
 def _ring(about: Array, degrees: float) -> Array:
