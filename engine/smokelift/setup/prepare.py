@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any
 
 from smokelift.checks import counted
 from smokelift.density.axis import SmokeAxis
@@ -66,24 +65,24 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
     light = find_light(scene.lights, asked, smoke.medium, samples, not camera.moves and look.fire is None)
     complete = _complete(scene, look, geometry, smoke.medium, light)
     first = ShotView(steadied, camera, plates, _working(camera, domain))
-    chosen = settings
-    tried: tuple[Choice[Any], ...] = ()
+    model = None
     if settings.selection.measure:
         model = choose_model(steadied, complete, plates, samples.smoky, asked is not None, settings, light.guessed)
-        complete, chosen, tried = model.scene, replace(settings, velocity=model.velocity), model.choices
+        complete = model.scene
     others, gains, said = _further_views(first, complete, look, settings, bool(scene.lights))
     if settings.selection.measure and asked is None and light.thickness is not None and look.fire is None:
         light = light.seen_by(find_sun((first, *others), complete, tried_frames(samples.smoky), settings.density))
         if light.sunny:
             lit = _complete(scene, look, geometry, smoke.medium, light)
             model = choose_model(steadied, lit, plates, samples.smoky, False, settings, guessed=False)
-            complete, chosen, tried = model.scene, replace(settings, velocity=model.velocity), model.choices
+            complete = model.scene
+    tried = () if model is None else model.choices
     clip.expect()  # lets go of frames that are kept as they were decoded
     shot = Shot(
         scene=complete,
         optics=scene_optics(complete),
         views=(first, *others),
-        settings=chosen,
+        settings=settings if model is None else replace(settings, velocity=model.velocity),
         estimated_background=look.picture,
         notes=(
             *remarks,

@@ -9,7 +9,6 @@ few times in turn. Figures: docs/experiments/light-direction.md.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,7 +25,7 @@ from smokelift.setup.coarse import coarse_domain
 from smokelift.setup.shot import ShotView
 from smokelift.setup.sphere import spread
 from smokelift.setup.sun_and_rest import explained
-from smokelift.setup.surroundings import SIDES
+from smokelift.setup.surroundings import light_around
 
 CAMERAS, APART = 4, 120.0
 """Cameras at least, and degrees at least between two of them. Fewer leave the direction wrong by more than 20 degrees
@@ -87,13 +86,12 @@ class Sun:
 
     def lights(self, colour: Array) -> tuple[Light, ...]:
         """The two, of a colour (3,) whose mean is 1."""
-        lights = []
-        ways = [(-self.towards, self.strength), *((np.array(side), self.ambient / len(SIDES)) for side in SIDES)]
-        for (x, y, z), irradiance in ways:
-            if irradiance > 0:
-                red, green, blue = (float(value) for value in irradiance * colour)
-                lights.append(DirectionalLight((float(x), float(y), float(z)), (red, green, blue)))
-        return tuple(lights)
+        lights: tuple[Light, ...] = ()
+        if self.strength > 0:
+            (x, y, z), (red, green, blue) = -self.towards, self.strength * colour
+            sun = DirectionalLight((float(x), float(y), float(z)), (float(red), float(green), float(blue)))
+            lights = (sun,)
+        return (*lights, *light_around(self.ambient * colour / (4 * np.pi))) if self.ambient > 0 else lights
 
 
 @dataclass(frozen=True, eq=False)
@@ -261,22 +259,25 @@ def _moments(
     views: Sequence[ShotView], scene: CompleteScene, numbers: Sequence[int]
 ) -> tuple[CompleteScene, list[_Moment]]:
     """The scene with a coarse domain, and what the cameras that see it show of each frame that has smoke."""
-    first = views[0]
-    domain = coarse_domain(scene.domain, voxel_width(first.camera, scene.domain), COARSE)
+    domain = coarse_domain(scene.domain, voxel_width(views[0].camera, scene.domain), COARSE)
+    try:
+        small = [working_picture(view.camera, domain) for view in views]
+    except CameraError:
+        return scene, []
     moments = []
     for number in numbers:
-        seen = []
-        for view in views:
-            with suppress(CameraError):
-                working = working_picture(view.camera, domain)
-                plate = view.plates.at(number).through(working.cut, working.pixels)
-                seen.append(Observation(working.camera, working.of(view.clip, number), plate))
+        seen = [
+            Observation(
+                working.camera,
+                working.of(view.clip, number),
+                view.plates.at(number).through(working.cut, working.pixels),
+            )
+            for view, working in zip(views, small, strict=True)
+        ]
         smoke = [matte(view.image, view.plate).mask for view in seen]
-        if len(seen) == len(views) and all(mask.any() for mask in smoke):
+        if all(mask.any() for mask in smoke):
             moments.append(_Moment(seen, smoke))
-    if moments:
-        scene = replace(scene, camera=moments[0].views[0].camera, domain=domain)
-    return scene, moments
+    return replace(scene, camera=small[0].camera, domain=domain), moments
 
 
 def _best(towards: Array, lit: Array, everywhere: Array, added: Array) -> tuple[Array, float, tuple[float, float]]:
