@@ -1,8 +1,10 @@
 #include "codes.h"
+#include "patches.h"
 #include "picture_blur.h"
 #include "pictures.h"
 #include "python.h"
 #include "ranks.h"
+#include "turning.h"
 
 namespace smokelift {
 namespace {
@@ -221,12 +223,101 @@ void register_filters(py::module_ &module) {
         "values"_a, "ranks"_a);
 }
 
+void register_turning(py::module_ &module) {
+    using namespace py::literals;
+
+    module.def(
+        "project_turned",
+        [](const Array &volume, double first, std::array<double, 2> steps, int columns) {
+            const In voxels = view(volume);
+            require_fit(columns > 0);
+            Array picture({py::ssize_t(columns), volume.shape(2)});
+            float *const result = picture.mutable_data();
+            const Turned turned{first, steps[0], steps[1], columns};
+            released([&](Workers &workers) { project_turned(voxels, turned, result, workers); });
+            return picture;
+        },
+        "volume"_a, "first"_a, "steps"_a, "columns"_a);
+
+    module.def(
+        "scale_turned",
+        [](py::array_t<float, py::array::c_style> &volume, double first, std::array<double, 2> steps,
+           const Array &logarithm) {
+            const Shape n{int(volume.shape(0)), int(volume.shape(1)), int(volume.shape(2))};
+            require_fit(logarithm.ndim() == 2 && logarithm.shape(0) > 0 && logarithm.shape(1) == n[2]);
+            const Out voxels{volume.mutable_data(), n};
+            const Turned turned{first, steps[0], steps[1], int(logarithm.shape(0))};
+            released([&](Workers &workers) { scale_turned(voxels, turned, logarithm.data(), workers); });
+        },
+        py::arg("volume").noconvert(), "first"_a, "steps"_a, "logarithm"_a);
+}
+
+// The patches about some places, which have to lie in a picture (rows, columns).
+Patches patches_at(const Integers &at, int size, py::ssize_t rows, py::ssize_t columns) {
+    require_fit(at.ndim() == 2 && at.shape(0) == 2 && size > 0 && size % 2 == 1);
+    const Patches patches{at.data(), at.data() + at.shape(1), std::size_t(at.shape(1)), size};
+    const int reach = size / 2;
+    for (std::size_t n = 0; n < patches.count; ++n)
+        require_fit(patches.rows[n] >= reach && patches.rows[n] + reach < rows &&
+                    patches.columns[n] >= reach && patches.columns[n] + reach < columns);
+    return patches;
+}
+
+void register_patches(py::module_ &module) {
+    using namespace py::literals;
+
+    module.def(
+        "unfold",
+        [](const Array &picture, const Integers &at, int size) {
+            require_fit(picture.ndim() == 2);
+            const Patches patches = patches_at(at, size, picture.shape(0), picture.shape(1));
+            Array pixels({py::ssize_t(size) * size, at.shape(1)});
+            float *const result = pixels.mutable_data();
+            released([&](Workers &workers) {
+                unfold(picture.data(), int(picture.shape(1)), patches, result, workers);
+            });
+            return pixels;
+        },
+        "picture"_a, "at"_a, "size"_a);
+
+    module.def(
+        "fold",
+        [](const Array &pixels, const Integers &at, int size, std::array<int, 2> shape) {
+            const Patches patches = patches_at(at, size, shape[0], shape[1]);
+            require_fit(pixels.ndim() == 2 && pixels.shape(0) == py::ssize_t(size) * size &&
+                        pixels.shape(1) == at.shape(1));
+            Array picture({py::ssize_t(shape[0]), py::ssize_t(shape[1])});
+            float *const result = picture.mutable_data();
+            {
+                const py::gil_scoped_release unlocked;
+                fold(pixels.data(), patches, shape[0], shape[1], result);
+            }
+            return picture;
+        },
+        "pixels"_a, "at"_a, "size"_a, "shape"_a);
+
+    module.def(
+        "to_quantiles",
+        [](py::array_t<float, py::array::c_style> &values, const Array &wanted) {
+            require_fit(values.ndim() == 2 && wanted.ndim() == 2 && values.shape(0) == wanted.shape(0) &&
+                        wanted.shape(1) > 0);
+            float *const result = values.mutable_data();
+            released([&](Workers &workers) {
+                to_quantiles(result, int(values.shape(0)), std::size_t(values.shape(1)), wanted.data(),
+                             std::size_t(wanted.shape(1)), workers);
+            });
+        },
+        py::arg("values").noconvert(), "wanted"_a);
+}
+
 } // namespace
 
 void register_pictures(py::module_ &module) {
     register_places(module);
     register_codes(module);
     register_filters(module);
+    register_turning(module);
+    register_patches(module);
 }
 
 } // namespace smokelift

@@ -39,7 +39,7 @@ class EvenDepth:
         density = np.zeros(domain.resolution, np.float32)
         even = [view.projection.read(view.optical_depth, hull) / thickness(view, domain) for view in views.views]
         density[hull] = np.mean(even, axis=0) / views.optics.medium.extinction
-        return DepthEstimate(density, tuple(np.ones_like(view.optical_depth) for view in views.views))
+        return DepthEstimate(density, tuple(np.ones_like(view.optical_depth) for view in views.views), views)
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class WithoutHull:
     def fit(self, views: ViewSet, depth: DepthEstimate, initial: Volume | None) -> Density:
         """Fit within the cameras' frusta."""
         visible = np.any([view.projection.visible for view in views.views], axis=0)
-        return self.density_fit.fit(replace(views, hull=visible), depth, initial)
+        return self.density_fit.fit(views, replace(depth, views=replace(depth.views, hull=visible)), initial)
 
 
 @dataclass(frozen=True)

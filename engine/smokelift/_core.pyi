@@ -468,6 +468,28 @@ def interleave(
 def at_ranks(values: Array, ranks: Sequence[int]) -> Array:
     """Values (len(ranks), ...) that have some ranks, from 0, along the first axis of values, none of which is NaN."""
 
+def project_turned(volume: Array, first: float, steps: tuple[float, float], columns: int) -> Array:
+    """The picture (columns, nz) of a volume that is turned about its last axis, a pixel a voxel.
+
+    The column of voxels (i, j) is centred on first + i steps[0] + j steps[1], in pixels. A pixel gets what it covers of
+    the voxels' shadows, so that even smoke makes an even picture from every angle.
+    """
+
+def scale_turned(volume: Array, first: float, steps: tuple[float, float], logarithm: Array) -> None:
+    """Multiply a volume by exponentials of a picture (columns, nz), read with the weights of `project_turned`."""
+
+def unfold(picture: Array, at: npt.NDArray[np.int32], size: int) -> Array:
+    """Pixels (size * size, n) of the square patches about places (2, n), all of which lie in the picture."""
+
+def fold(pixels: Array, at: npt.NDArray[np.int32], size: int, shape: tuple[int, int]) -> Array:
+    """For each pixel of a picture the mean of what the patches that cover it hold there; 0 where none does."""
+
+def to_quantiles(values: Array, wanted: Array) -> None:
+    """Replace values (lines, n) by their distance to the quantiles of the same rank of a line of ``wanted`` (lines, m).
+
+    These are sorted. The distances are the one-dimensional optimal transport from one distribution to the other.
+    """
+
 def blur_picture(picture: Array, weights: npt.NDArray[np.floating[Any]]) -> Array:
     """A picture (rows, columns) or (rows, columns, channels), smoothed down and across.
 

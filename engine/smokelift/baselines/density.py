@@ -20,7 +20,6 @@ import numpy as np
 from smokelift.density import (
     Density,
     DepthEstimate,
-    ImposedView,
     ObservedClip,
     Start,
     ViewSet,
@@ -53,11 +52,11 @@ class OrthogonalCopy:
         fog = np.full(domain.resolution, thin, np.float32)
         inside = tuple(np.ones(view.mask.shape, np.float32) for view in views.views)
         if len(views.views) > 1:
-            return DepthEstimate(fog, inside)
+            return DepthEstimate(fog, inside, views)
         front = views.views[0]
         camera = orbit(front.camera, domain, 90)
         side = replace(front, camera=camera, projection=project_voxels(camera, domain))
-        return DepthEstimate(fog, inside, (ImposedView(side, inside[0], views.optics),))
+        return DepthEstimate(fog, inside, replace(views, views=(front, side)))
 
 
 @dataclass(frozen=True)
@@ -96,7 +95,7 @@ class FixedRateDescent:
         if not views.hull.any():
             return empty_density(views)
         optics = views.optics
-        seen = (*views.views, *(imposed.view for imposed in depth.imposed))
+        seen = depth.views.views
         everywhere = [np.ones(view.mask.shape, np.bool_) for view in views.views]
         renderers = [
             PaperRenderer(view.camera, optics.domain, optics.medium, optics.lights, view.plate.image, optics.scattering)

@@ -2,14 +2,14 @@
 
 Observation -> View (observation) -> DepthEstimate (depth_prior) -> Start (temporal_prior) -> Density (fit)
 
-The default estimate (borrowed_moments) is round, smooth smoke with pictures of its sides, whose detail is that of other
-moments of the clip. The fit meets them as far as the cameras' pictures allow.
+The default estimate (detailed_depth) is round, smooth smoke with detail: from every side it shows the distribution of
+patches that the clip shows from the front. The fit has the last word.
 """
 
 from smokelift.density.axis import AxisEstimate
-from smokelift.density.borrowed_moments import BorrowedMoments
 from smokelift.density.clip_axis import clip_axis
-from smokelift.density.depth_prior import DepthEstimate, DepthPrior, ImposedView, RoundDepth
+from smokelift.density.depth_prior import DepthEstimate, DepthPrior, Detail, RoundDepth
+from smokelift.density.detailed_depth import DetailedDepth
 from smokelift.density.fit import (
     Density,
     DensityFit,
@@ -24,15 +24,15 @@ from smokelift.density.temporal_prior import BlendCarried, GuidedSimulation, Not
 __all__ = [
     "AxisEstimate",
     "BlendCarried",
-    "BorrowedMoments",
     "Density",
     "DensityFit",
     "DensitySettings",
     "DepthEstimate",
     "DepthPrior",
+    "Detail",
+    "DetailedDepth",
     "GradientFit",
     "GuidedSimulation",
-    "ImposedView",
     "NothingCarried",
     "Observation",
     "ObservedClip",

@@ -1,7 +1,7 @@
 """What is assumed of the smoke's depth, which one picture leaves undetermined.
 
-`RoundDepth` takes the smoke to be as deep as it is wide. Its answer is smooth; the default, `BorrowedMoments`, gives it
-detail (`borrowed_moments`). It spreads the smoke of one picture about an axis that comes from the whole clip. With
+`RoundDepth` takes the smoke to be as deep as it is wide. Its answer is smooth; the default, `DetailedDepth`, gives it
+detail (`detailed_depth`). It spreads the smoke of one picture about an axis that comes from the whole clip. With
 several pictures the density is the product of their depth profiles, scaled in each horizontal layer to the optical
 depth of the view that shows most there. It need not look like any picture: the multiplicative fit scales ray by ray,
 and keeps of it only how the smoke of one ray relates to that of another.
@@ -15,43 +15,41 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from smokelift.density.axis import SmokeAxis
 from smokelift.density.clip_axis import AXIS_FRAMES
 from smokelift.density.hull import centres_of
+from smokelift.density.objective import Term
 from smokelift.density.observation import ObservedClip, View, ViewSet
 from smokelift.density.profile import DepthProfile
 from smokelift.density.screen import view_frame
-from smokelift.render import Optics, Sight, Volume
+from smokelift.render import Volume
 
 LEAST_SHAPE = 0.05
 """With several views no profile is below this share of its peak inside the hull, since another view may see smoke there
 (docs/experiments/density-profile.md)."""
 
+EXPECTED = 0.03
+"""Share of a depth profile's peak from which smoke is expected. A flat-topped profile is there 1.4 times as wide as it
+is assumed to be, which is how far its width may be wrong (docs/experiments/every-view.md)."""
 
-@dataclass(frozen=True, eq=False)
-class ImposedView:
-    """A picture that no camera took: a soft observation, which shapes the density and yields to the cameras' pictures.
 
-    It has a turn before theirs in the first multiplicative iterations of `GradientFit`, and none after these. (The
-    paper's fit takes it for another camera's.)
+class Detail(Protocol):
+    """What makes up detail that no camera shows."""
 
-    Attributes
-    ----------
-    view
-        The picture against the grid. Smoke that it does not show is not ruled out.
-    weight : (rows, columns)
-        How much each pixel counts beside a camera's, from 0: the steps towards it are as long as its square root.
-    optics
-        How light travels in it: it need not be taken in the scene's own light.
-    sight
-        Of a renderer of its camera and the hull; None lets it be found.
-    """
+    def added(self, density: Volume, cameras: Sequence[Term], *, fresh: bool) -> Volume:
+        """Return a density (nx, ny, nz) with detail, as far as the cameras' pictures allow.
 
-    view: View
-    weight: NDArray[np.float32]
-    optics: Optics
-    sight: Sight | None = None
+        Parameters
+        ----------
+        density : (nx, ny, nz)
+            Zero outside the hull.
+        cameras
+            Terms of the cameras' pictures.
+        fresh
+            Whether nothing of it is carried on from the frame before.
+        """
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,16 +62,19 @@ class DepthEstimate:
         A plausible density that shows about what the pictures do; where a fit starts.
     inside : tuple of (rows, columns)
         Of each view, the share of every ray's smoke that lies inside the domain.
-    imposed
-        Pictures to be met as far as the cameras' allow.
+    views
+        The pictures to fit, against the voxels where it expects smoke.
     smooth : (nx, ny, nz) float32, optional
         A density that shows about what the pictures do, without what the prior makes up; None if it makes nothing up.
+    detail
+        What makes that up; None as well.
     """
 
     density: Volume
     inside: tuple[NDArray[np.float32], ...]
-    imposed: tuple[ImposedView, ...] = ()
+    views: ViewSet
     smooth: Volume | None = None
+    detail: Detail | None = None
 
 
 class DepthPrior(Protocol):
@@ -120,10 +121,25 @@ class RoundDepth:
             DepthProfile(view.optical_depth, view.camera, views.optics.domain, axis)
             for view, axis in zip(views.views, axes, strict=True)
         ]
-        extinction = np.float32(views.optics.medium.extinction)
-        density = _spread(views, profiles)
-        np.divide(density, extinction, out=density, where=views.hull)
-        return DepthEstimate(density, tuple(p.share_inside() for p in profiles))
+        expected = replace(views, hull=_expected(views, profiles))
+        density = _spread(expected, profiles)
+        np.divide(density, np.float32(views.optics.medium.extinction), out=density, where=expected.hull)
+        return DepthEstimate(density, tuple(p.share_inside() for p in profiles), expected)
+
+
+def _expected(views: ViewSet, profiles: Sequence[DepthProfile]) -> NDArray[np.bool_]:
+    """Voxels (nx, ny, nz) of the hull where any profile expects smoke, and their neighbours.
+
+    A profile says along each ray by itself where its smoke may be, so that a thin veil beside thick smoke stays.
+    """
+    hull = views.hull
+    expected = np.zeros(hull.shape, np.bool_)
+    shapes = [
+        np.where(view.projection.visible[hull], profile.shape(view.projection, hull), 0)
+        for view, profile in zip(views.views, profiles, strict=True)
+    ]
+    expected[hull] = np.max(shapes, axis=0) > EXPECTED
+    return np.asarray(ndimage.binary_dilation(expected)) & hull
 
 
 def _spread(views: ViewSet, profiles: Sequence[DepthProfile]) -> Volume:

@@ -1,8 +1,8 @@
 """Density from pictures (algorithm 3): views and a scene's optics in, a volume that renders to the pictures out.
 
-A depth prior gives the start, and pictures of sides that no camera sees. `multiplicative` scales the start ray by ray
-until it is nearly right, at first towards those pictures as well. From there `descent` follows the exact gradient of
-the cameras' pictures alone.
+A depth prior gives the start, the voxels that may hold smoke, and what makes up detail that no camera sees.
+`multiplicative` scales the start with that detail ray by ray until it is nearly right. From there `descent` follows the
+exact gradient of the cameras' pictures.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.checks import listed, numbers, require_kind
-from smokelift.density.depth_prior import DepthEstimate, DepthPrior, ImposedView, RoundDepth
+from smokelift.density.depth_prior import DepthEstimate, DepthPrior, RoundDepth
 from smokelift.density.descent import descend
 from smokelift.density.hull import inside
-from smokelift.density.multiplicative import fit_multiplicative, take_turns
-from smokelift.density.objective import Term, camera_terms
+from smokelift.density.multiplicative import fit_multiplicative
+from smokelift.density.objective import camera_terms
 from smokelift.density.observation import BLACK, Observation, ViewSet, eight_bit_plate
 from smokelift.footage.background import background_picture
 from smokelift.footage.plate import Plate
-from smokelift.render import Image, Renderer, Volume, scene_optics
+from smokelift.render import Image, Volume, scene_optics
 from smokelift.render.blas import products_on_one_thread
 from smokelift.scene import CompleteScene, Domain, Scene, completed
 
@@ -103,7 +103,7 @@ class DensityFit(Protocol):
         Parameters
         ----------
         views
-            The pictures.
+            The cameras' pictures.
         depth
             What the depth prior says of them.
         initial : (nx, ny, nz), optional
@@ -125,22 +125,18 @@ class GradientFit:
 
     def fit(self, views: ViewSet, depth: DepthEstimate, initial: Volume | None) -> Density:
         """Find a density; see `DensityFit`."""
-        hull, settings = views.hull, self.settings
+        views, settings = depth.views, self.settings
+        hull = views.hull
         if not hull.any():
             return empty_density(views)
         cameras = camera_terms(views, depth.inside)
         start = inside(hull, depth.density if initial is None else initial)
-        # The terms take turns, so several cameras need as many times more iterations. Imposed pictures yield: the last
-        # third of the iterations and the descent are the cameras' alone. What is carried along has met imposed pictures
-        # before, so that it meets them in half as many rounds.
-        iterations, rounds = settings.fit_iterations * len(cameras), 0
-        if depth.imposed:
-            shared = 2 * iterations // 3
-            iterations -= shared
-            rounds = shared if initial is None else -(-shared // 2)
-            imposed = [Term(each.view, _renderer(each, hull), each.weight) for each in depth.imposed]
-            start = take_turns([*imposed, *cameras], start, rounds)
-            del imposed  # renderers take most of the memory, and the descent needs more of it
+        # The terms take turns, so several cameras need as many times more iterations.
+        iterations = settings.fit_iterations * len(cameras)
+        if depth.detail is not None:
+            fresh = initial is None
+            start = depth.detail.added(start, cameras, fresh=fresh)
+            iterations *= 1 + fresh  # detail that is all new is far from the pictures
         scaled = fit_multiplicative(cameras, start, iterations, settings.tolerance, recorded=True)
         final = descend(
             cameras,
@@ -152,8 +148,8 @@ class GradientFit:
             bound=float(max(settings.bound * depth.density.max(), start.max())),
             recorded=scaled.recorded,
         )
-        figures = fit_figures(views, final.residuals, rounds + scaled.iterations + final.iterations)
-        steady = scaled.density if depth.imposed else None
+        figures = fit_figures(views, final.residuals, scaled.iterations + final.iterations)
+        steady = scaled.density if depth.detail is not None else None
         return Density(without_traces(final.density), hull, figures, depth.smooth, steady)
 
 
@@ -231,11 +227,6 @@ def _with_plate(observation: Observation, scene: CompleteScene) -> Observation:
         return observation
     camera = observation.camera
     return replace(observation, plate=eight_bit_plate(background_picture(scene, camera), camera.size))
-
-
-def _renderer(imposed: ImposedView, hull: NDArray[np.bool_]) -> Renderer:
-    """The renderer of an imposed picture, in its own light."""
-    return imposed.optics.renderer(imposed.view.camera, imposed.view.plate.image, hull, imposed.sight)
 
 
 def empty_density(views: ViewSet) -> Density:

@@ -160,7 +160,7 @@ class GuidedSimulation:
     """
 
     largest: float
-    kept: float = 0.9
+    kept: float = 0.97
 
     def start(self, views: ViewSet, depth: DepthEstimate, carried: Volume, before: Volume) -> Start:
         """The carried density in the smooth answer's amounts; see `TemporalPrior`.

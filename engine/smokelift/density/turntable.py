@@ -1,4 +1,4 @@
-"""What is seen of the smoke when it is turned about the view's height, at a pixel a voxel."""
+"""What is seen of the smoke when it is turned about an axis of the grid, at a pixel a voxel."""
 
 from __future__ import annotations
 
@@ -7,9 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.density.row_shape import Array
+import smokelift._core as _core
 from smokelift.density.screen import seen_at, view_frame
 from smokelift.scene import Camera, Domain, as_matrix
+
+Array = NDArray[np.float64]
+Volume = NDArray[np.float32]
+Picture = NDArray[np.float32]
+"""(columns, voxels along the axis), a pixel a voxel, upwards."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,7 +24,8 @@ class Turntable:
     Attributes
     ----------
     lateral, depth, height : (3,)
-        Directions (unit, world) of the view that faces the screen; see `view_frame`.
+        Directions (unit, world) of the view that faces the screen. The domain turns about the last, which is an axis of
+        the grid.
     domain
         Its centre is on the axis.
     """
@@ -30,28 +36,39 @@ class Turntable:
     domain: Domain
 
     @staticmethod
-    def before(camera: Camera, domain: Domain) -> Turntable:
-        """Put a domain before a camera."""
-        return Turntable(*view_frame(camera), domain)
+    def before(camera: Camera, domain: Domain, axis: int | None = None) -> Turntable:
+        """Put a domain before a camera; the axis is the one that is nearest to the view's height unless it is given."""
+        _, depth, up = view_frame(camera)
+        axis = int(np.argmax(np.abs(up))) if axis is None else axis
+        height = np.zeros(3)
+        # of a lying axis the end to the right is the top, so that the screen is the picture on its side
+        along = up[axis] if abs(up[axis]) > 1e-6 else np.cross(depth, up)[axis]
+        height[axis] = 1.0 if along >= 0 else -1.0
+        depth = depth - (depth @ height) * height
+        depth /= np.linalg.norm(depth)
+        return Turntable(np.cross(depth, height), depth, height, domain)
+
+    @property
+    def axis(self) -> int:
+        """The grid's axis that the domain turns about."""
+        return int(np.argmax(np.abs(self.height)))
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Rows and columns of the screen, which holds the domain however it is turned."""
+        """Columns of the screen, which holds the domain however it is turned, and voxels along the axis."""
         corners = (self.domain.corners() - np.array(self.domain.centre)) / self.domain.voxel_size
-        rows = np.max(corners @ self.height)
         columns = np.max(np.hypot(corners @ self.lateral, corners @ self.depth))
-        return int(np.ceil(2 * rows - 1e-6)), int(np.ceil(2 * columns - 1e-6))
+        return int(np.ceil(2 * columns - 1e-6)), self.domain.resolution[self.axis]
 
     def camera(self, degrees: float) -> Camera:
         """Return the orthographic camera that sees the domain turned; it stands to the right at 90 degrees."""
-        turn = np.radians(degrees)
-        right = np.cos(turn) * self.lateral + np.sin(turn) * self.depth
+        right = self._right(degrees)
         back = np.cross(right, self.height)
         distance = np.linalg.norm(np.array(self.domain.max) - self.domain.min)
         matrix = np.eye(4)
         matrix[:3, :3] = np.stack([right, self.height, back], -1)
         matrix[:3, 3] = np.array(self.domain.centre) + distance * back
-        rows, columns = self.shape
+        columns, rows = self.shape
         scale = 1 / self.domain.voxel_size
         return Camera("orthographic", as_matrix(matrix), (columns, rows), scale, scale, columns / 2, rows / 2)
 
@@ -60,11 +77,45 @@ class Turntable:
         back = np.array(camera.matrix)[:3, 2]
         return float(np.degrees(np.arctan2(back @ self.lateral, -(back @ self.depth))))
 
-    def screen(self, picture: NDArray[np.float32], camera: Camera) -> Array:
-        """Put a camera's picture (rows, columns) on the screen (rows, columns); zero where it shows nothing."""
-        rows, columns = self.shape
+    def screen(self, picture: NDArray[np.float32], camera: Camera) -> Picture:
+        """Put a camera's picture (rows, columns) on the screen; zero where it shows nothing."""
+        columns, voxels = self.shape
         h = self.domain.voxel_size
         side = (np.arange(columns) + 0.5 - columns / 2) * h
-        up = (rows / 2 - np.arange(rows) - 0.5) * h
-        points = np.array(self.domain.centre) + side[None, :, None] * self.lateral + up[:, None, None] * self.height
-        return seen_at(points, picture, camera)
+        up = (np.arange(voxels) + 0.5 - voxels / 2) * h
+        points = np.array(self.domain.centre) + side[:, None, None] * self.lateral + up[:, None] * self.height
+        return seen_at(points, picture, camera).astype(np.float32)
+
+    def upright(self, volume: Volume) -> Volume:
+        """A volume (nx, ny, nz) with its axis last, upwards; made so that the inverse is a view."""
+        turned = np.moveaxis(volume, self.axis, -1)
+        return np.ascontiguousarray(turned if self.height[self.axis] > 0 else turned[..., ::-1])
+
+    def lying(self, upright: Volume) -> Volume:
+        """The inverse of `upright`."""
+        turned = upright if self.height[self.axis] > 0 else upright[..., ::-1]
+        return np.ascontiguousarray(np.moveaxis(turned, -1, self.axis))
+
+    def project(self, upright: Volume, degrees: float, corner: tuple[int, int] = (0, 0)) -> Picture:
+        """Sums (columns, voxels along the axis) of an upright volume, or part of it, along the rays of a turned view.
+
+        ``corner`` is the part's first column of voxels.
+        """
+        return _core.project_turned(upright, *self._turned(degrees, corner), self.shape[0])
+
+    def scale(self, upright: Volume, logarithm: Picture, degrees: float, corner: tuple[int, int] = (0, 0)) -> None:
+        """Multiply an upright volume along the rays of a turned view by exponentials of a picture; see `project`."""
+        _core.scale_turned(upright, *self._turned(degrees, corner), logarithm)
+
+    def _right(self, degrees: float) -> Array:
+        turn = np.radians(degrees)
+        return np.asarray(np.cos(turn) * self.lateral + np.sin(turn) * self.depth)
+
+    def _turned(self, degrees: float, corner: tuple[int, int]) -> tuple[float, tuple[float, float]]:
+        """Column of the first column of voxels, and the steps to the next ones along both other axes."""
+        right = self._right(degrees)
+        a, b = (axis for axis in range(3) if axis != self.axis)
+        steps = float(right[a]), float(right[b])
+        middles = [(corner[n] - (self.domain.resolution[axis] - 1) / 2) for n, axis in enumerate((a, b))]
+        first = middles[0] * steps[0] + middles[1] * steps[1] + (self.shape[0] - 1) / 2
+        return first, steps

@@ -275,7 +275,7 @@ def _density(
     depth = method.depth_prior.estimate(views)
     if before is None or carried is None:
         return method.density_fit.fit(views, depth, None), {}
-    start = method.temporal_prior.start(views, depth, carried, before.density)
+    start = method.temporal_prior.start(depth.views, depth, carried, before.density)
     density = method.density_fit.fit(views, depth, start.density)
     if shot.moves:
         # what a moving camera does not see now it may have seen before

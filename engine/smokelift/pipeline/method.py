@@ -12,9 +12,9 @@ from smokelift.baselines.velocity import PaperVelocity
 from smokelift.checks import require_kind
 from smokelift.density import (
     BlendCarried,
-    BorrowedMoments,
     DensityFit,
     DepthPrior,
+    DetailedDepth,
     GradientFit,
     GuidedSimulation,
     NothingCarried,
@@ -64,7 +64,7 @@ def _default(settings: Settings) -> Method:
 
 def _depth_prior(settings: Settings) -> DepthPrior:
     smooth = RoundDepth(axis_depth=settings.axis_depth)
-    return BorrowedMoments(smooth, settings.detail, settings.seed) if settings.detail > 0 else smooth
+    return DetailedDepth(smooth, settings.detail, settings.seed) if settings.detail > 0 else smooth
 
 
 def _temporal_prior(settings: Settings) -> TemporalPrior:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
-from smokelift.density.borrowed_moments import unseen_sides
+from smokelift.density.detailed_depth import unseen_sides
 from smokelift.density.turntable import Turntable
 from smokelift.footage.clip import Clip, numbered
 from smokelift.setup.settings import Settings
@@ -75,8 +75,8 @@ def provenance(shot: Shot) -> tuple[Provenance, ...]:
             Provenance(
                 "fine structure along the rays",
                 "made up",
-                f"The detail of sides that no camera is near to is borrowed from {_lender(shot)}. Another seed borrows "
-                "differently, detail 0 not at all.",
+                "From sides that no camera is near to the smoke has the texture of the clip's own pictures. Another "
+                "seed makes it differently, detail 0 not at all.",
                 {"detail": settings.detail, "seed": settings.seed},
             )
         )
@@ -108,14 +108,9 @@ def _assumed(settings: Settings, cameras: int) -> str:
 
 
 def _unseen(shot: Shot) -> bool:
-    """Whether the depth prior has anything to borrow for: a side that no camera is near to."""
+    """Whether there is a side that no camera is near to."""
     cameras = [view.working.camera for view in shot.views]
-    turntable = Turntable.before(cameras[0], shot.optics.domain)
-    return bool(unseen_sides(turntable, cameras, shot.settings.seed))
-
-
-def _lender(shot: Shot) -> str:
-    return "other moments of the clip" if shot.length > 1 else "the clip's only picture"
+    return unseen_sides(Turntable.before(cameras[0], shot.optics.domain), cameras)
 
 
 def _cameras(count: int) -> str:

@@ -12,7 +12,6 @@ from smokelift.density import (
     Density,
     DensitySettings,
     GradientFit,
-    ImposedView,
     Observation,
     RoundDepth,
     View,
@@ -571,23 +570,6 @@ def test_views_that_contradict_each_other_leave_nothing(plume, small) -> None:
     assert found.figures["hull_share"] == 0
     assert found.figures["loss"] == pytest.approx(np.square(target, dtype=np.float64).sum(), rel=1e-3)
     assert found.figures["psnr"] < 30
-
-
-def test_an_imposed_picture_is_met_as_far_as_its_weight_says(plume, small) -> None:
-    """A depth prior may add pictures that no camera took: they shape the depth and yield to the camera's."""
-    truth = moved(plume.densities[1], 5)
-    views = views_of(small, Observation(small.camera, render(truth, small)))
-    side = View.of(observed(truth, small, 90), views.optics)
-    depth = RoundDepth().estimate(views)
-    middles, decibels = [], []
-    for weight in (0.0, 0.1, 1.0):
-        imposed = ImposedView(side, np.full(side.mask.shape, weight, np.float32), views.optics)
-        found = GradientFit(QUICK).fit(views, replace(depth, imposed=(imposed,)), None)
-        middles.append(mean_place(found.values)[1])
-        decibels.append(found.figures["psnr"])
-    assert middles[0] + 0.4 < middles[1] < middles[2] - 0.4
-    assert min(decibels) > 45
-    assert "psnr_view_1" not in found.figures
 
 
 # what is refused

@@ -29,7 +29,7 @@ def test_the_domain_fits_into_every_picture_at_a_pixel_a_voxel(degrees) -> None:
     pixels, _ = project(camera, DOMAIN.corners())
     assert (pixels > -1e-6).all()
     assert (pixels < np.array(camera.size) + 1e-6).all()
-    assert (camera.size[1], camera.size[0]) == turntable.shape == (32, 29)
+    assert camera.size == turntable.shape == (29, 32)
     assert camera.fx * DOMAIN.voxel_size == pytest.approx(1)
 
 
@@ -43,10 +43,52 @@ def test_the_screen_shows_what_stands_on_it_where_it_stands() -> None:
     screen = turntable.screen(picture, CAMERA)
     (column, row), _ = project(turntable.camera(0), point)
     found = np.array(np.unravel_index(screen.argmax(), screen.shape))
-    np.testing.assert_allclose(found + 0.5, (row, column), atol=1.1)
+    np.testing.assert_allclose(found + 0.5, (column, screen.shape[1] - row), atol=1.1)
 
 
 def test_nothing_is_seen_behind_the_camera() -> None:
     """A screen that reaches behind a camera inside the domain shows zero there."""
     inside = Camera.look_at((0, 0.1, 0.8), (0, 1, 0.8), fov_y_degrees=60, size=(20, 20))
     assert not Turntable.before(inside, DOMAIN).screen(np.ones((20, 20), np.float32), inside).any()
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_volume_comes_back_from_standing_upright(axis) -> None:
+    """Whatever the axis, and whichever of its ends is the top."""
+    camera = Camera.look_at((3, -4, 1.1), (0, 0, 0.8), up=(0, 0, -1), fov_y_degrees=27, size=(40, 56))
+    volume = np.random.default_rng(0).random(DOMAIN.resolution, np.float32)
+    for each in (CAMERA, camera):
+        turntable = Turntable.before(each, DOMAIN, axis)
+        assert turntable.axis == axis
+        assert turntable.upright(volume).shape[2] == DOMAIN.resolution[axis]
+        np.testing.assert_array_equal(turntable.lying(turntable.upright(volume)), volume)
+
+
+@pytest.mark.parametrize("degrees", [0.0, 20.0, 45.0, 90.0, 137.0])
+def test_even_smoke_makes_an_even_picture(degrees) -> None:
+    """A cylinder is seen as its chords: no pattern of the grid shows, and nothing is lost."""
+    domain = Domain((-1, -1, 0), (1, 1, 0.5), (64, 64, 16))
+    turntable = Turntable.before(CAMERA, domain)
+    x, y, _ = domain.offsets(domain.centre)
+    volume = np.broadcast_to(np.clip((0.8 - np.hypot(x, y)) / domain.voxel_size + 0.5, 0, 1), domain.resolution)
+    picture = turntable.project(turntable.upright(np.ascontiguousarray(volume, np.float32)), degrees)
+    side = (np.arange(len(picture)) + 0.5 - len(picture) / 2) * domain.voxel_size
+    inside = np.abs(side) < 0.7
+    chords = 2 * np.sqrt(0.64 - side[inside] ** 2) / domain.voxel_size
+    np.testing.assert_allclose(picture[inside, 8], chords, rtol=0.01)
+    assert picture.sum() == pytest.approx(volume.sum(), rel=1e-5)
+
+
+def test_a_projection_and_its_scale_are_adjoint() -> None:
+    """Small exponents change a sum as the picture's product with them says, also of a part of the domain."""
+    turntable = Turntable.before(CAMERA, DOMAIN)
+    random = np.random.default_rng(1)
+    whole = turntable.upright(random.random(DOMAIN.resolution, np.float32))
+    part = np.ascontiguousarray(whole[5:20, 3:12])
+    step = random.random(turntable.shape, np.float32) * np.float32(1e-3)
+    scaled = part.copy()
+    turntable.scale(scaled, step, 33.0, (5, 3))
+    changed = float((scaled - part).sum(dtype=np.float64))
+    assert changed == pytest.approx(float((turntable.project(part, 33.0, (5, 3)) * step).sum()), rel=2e-3)
+    whole[:5], whole[20:], whole[:, :3], whole[:, 12:] = 0, 0, 0, 0
+    np.testing.assert_allclose(turntable.project(part, 33.0, (5, 3)), turntable.project(whole, 33.0), atol=1e-5)

@@ -1,0 +1,24 @@
+// A volume on a turntable: its picture from any angle, a pixel a voxel, and factors along the rays of that
+// picture.
+#pragma once
+
+#include "grid.h"
+#include "threads.h"
+
+namespace smokelift {
+
+// Where the columns of voxels stand in the picture of a turned volume: that of (i, j) is centred on
+// first + i step_x + j step_y, in pixels, pixel centres at integers; a voxel is as wide as a pixel.
+struct Turned {
+    double first, step_x, step_y;
+    int columns; // of the picture
+};
+
+// Adds the voxels up along the rays into a picture (columns, nz). A pixel gets what it covers of the shadow
+// of a voxel, a turned square, so that even smoke makes an even picture from every angle.
+void project_turned(In volume, const Turned &turned, float *picture, Workers &workers);
+
+// Multiplies every voxel by the exponential of a picture (columns, nz), read with the same weights.
+void scale_turned(Out volume, const Turned &turned, const float *logarithm, Workers &workers);
+
+} // namespace smokelift

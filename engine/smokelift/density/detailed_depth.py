@@ -1,0 +1,268 @@
+"""Detail in depth: smoke that looks like the clip from every side.
+
+The smooth answer of `RoundDepth` is the mean of all smokes that show one picture. From the side it is a spindle without
+detail. A plausible smoke shows from every side what the clip shows from the front: not one of its pictures, but the
+distribution of their patches (`patches`). Noise breaks the spindle's symmetry. Then, from coarse to fine, pictures of
+the smoke from many azimuths are moved towards that distribution, and the smoke is scaled along their rays to follow.
+The rows of every picture keep the amounts of the smooth answer, and after each round the cameras' pictures have their
+turn. What is carried on from the frame before has met the clip's statistics already and needs one round.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+import smokelift._core as _core
+from smokelift.density.clip_texture import ClipTexture
+from smokelift.density.depth_prior import DepthEstimate, RoundDepth
+from smokelift.density.hull import inside
+from smokelift.density.multiplicative import fit_multiplicative, take_turns
+from smokelift.density.objective import Term, camera_terms
+from smokelift.density.observation import ObservedClip, ViewSet
+from smokelift.density.patches import Exemplar, enlarged, reduced
+from smokelift.density.turntable import Turntable
+from smokelift.render import Volume
+from smokelift.scene import Camera
+from smokelift.scene.domain import box_around
+
+SMOOTH_ITERATIONS = 4
+"""Multiplicative iterations for the smooth answer; the sides' rows keep its amounts."""
+
+SMOOTH_TOLERANCE = 0.02
+"""Share of the objective that one of them has to gain for another to follow, as in the fit."""
+
+NOISE = 1.5
+"""Standard deviation of the logarithm of the noise that breaks the smooth answer's symmetry
+(docs/experiments/every-view.md)."""
+
+LATTICE = 32
+"""Nodes along each side of the noise's lattice, which repeats."""
+
+FINEST_NOISE = 1.5
+"""Voxels between nodes of the finest noise."""
+
+AMOUNTS = 4.0
+"""Standard deviation (voxels) of the blur that noise does not change."""
+
+LARGEST_GAIN = 5.0
+"""Bound of the factor that brings those amounts back."""
+
+FRESH_ROUNDS = 4
+"""Rounds on each scale for smoke that nothing is carried for."""
+
+AZIMUTHS = 5
+"""Azimuths in a round (docs/experiments/every-view.md)."""
+
+NEAR = 10.0
+"""Degrees from a camera within which its own picture says what is seen."""
+
+GOLDEN = (np.sqrt(5) - 1) / 2
+"""Multiples of it, less their whole parts, are spread evenly however many there are."""
+
+FRESH, CARRIED = 0.6, 0.4
+"""Shares of a step towards a picture that are made, for smoke that nothing is carried for and for what is carried: more
+of the second flickers (docs/experiments/every-view.md)."""
+
+STEP_RANGE = (0.3, 3.0)
+"""Largest change of a ray's smoke in one step."""
+
+ROW_RANGE = (0.5, 2.0)
+"""Largest factor that gives a row of a picture the smooth answer's amount."""
+
+OUTLINE = 0.02
+"""Share of the largest optical depth of the smooth answer, blurred, below which a picture's smoke fades: it does not
+leave the outline that the smooth answer has from there."""
+
+OUTLINE_BLUR = 3.0
+"""Standard deviation (voxels) of that blur."""
+
+
+ENDS = 3.0
+"""Voxels at both ends of the axis over which detail fades in: they hold what the domain cuts off."""
+
+
+@dataclass(frozen=True, eq=False)
+class DetailedDepth:
+    """Round smoke with detail; see the module.
+
+    Attributes
+    ----------
+    smooth
+        The prior of the smooth answer.
+    detail
+        Strength, from 0 (the smooth answer) to 1.
+    seed
+        Of another plausible smoke of the same clip.
+    texture
+        Of the clip; None makes no detail.
+    """
+
+    smooth: RoundDepth
+    detail: float = 1.0
+    seed: int = 0
+    texture: ClipTexture | None = None
+
+    def of_clip(self, clip: ObservedClip) -> DetailedDepth:
+        """Look at a clip's texture, unless there is no detail to make."""
+        texture = ClipTexture.of(clip) if self.detail > 0 else None
+        return replace(self, smooth=self.smooth.of_clip(clip), texture=texture)
+
+    def estimate(self, views: ViewSet) -> DepthEstimate:
+        """The smooth answer, the same with noise, and what gives it the clip's texture."""
+        estimate = self.smooth.estimate(views)
+        narrowed = estimate.views
+        if self.texture is None or not narrowed.hull.any():
+            return estimate
+        if not unseen_sides(self.texture.turntable, [view.camera for view in views.views]):
+            return estimate
+        smooth = fit_multiplicative(
+            camera_terms(narrowed, estimate.inside), estimate.density, SMOOTH_ITERATIONS, SMOOTH_TOLERANCE
+        ).density
+        return replace(
+            estimate,
+            density=self._noisy(smooth, narrowed, self.texture),
+            smooth=smooth,
+            detail=EveryView(self.texture, narrowed, smooth, self.detail),
+        )
+
+    def _noisy(self, smooth: Volume, views: ViewSet, texture: ClipTexture) -> Volume:
+        """The smooth answer with noise that travels with the smoke, its coarse amounts kept."""
+        hull = views.hull
+        box = box_around(hull, 0)
+        table = texture.turntable
+        moved = table.height * texture.drift * views.frame
+        places = [np.nonzero(hull)[axis] - moved[axis] for axis in range(3)]
+        noisy = smooth.copy()
+        noisy[hull] *= np.exp(np.float32(NOISE * self.detail) * _noise(places, texture.width, self.seed))
+        amounts, now = (_core.blur(values[box], AMOUNTS, 3.0) for values in (smooth, noisy))
+        tiny = np.finfo(np.float32).tiny
+        noisy[box] *= np.minimum((amounts + tiny) / (now + tiny), np.float32(LARGEST_GAIN))
+        return inside(hull, noisy)
+
+
+@dataclass(frozen=True, eq=False)
+class EveryView:
+    """Makes smoke look like the clip from every side.
+
+    Attributes
+    ----------
+    texture
+        Of the clip.
+    views
+        Of the moment.
+    smooth : (nx, ny, nz)
+        The smooth answer.
+    strength
+        From 0 to 1.
+    """
+
+    texture: ClipTexture
+    views: ViewSet
+    smooth: Volume
+    strength: float
+
+    def added(self, density: Volume, cameras: Sequence[Term], *, fresh: bool) -> Volume:
+        """Scale a density towards the clip's texture and the cameras' pictures in turn.
+
+        Parameters
+        ----------
+        density : (nx, ny, nz)
+            Zero outside the hull.
+        cameras
+            Terms of the cameras' pictures.
+        fresh
+            Whether nothing of it is carried on from the frame before.
+        """
+        table, hull = self.texture.turntable, self.views.hull
+        part = tuple(span for axis, span in enumerate(box_around(hull, 0)) if axis != table.axis)
+        smooth = np.ascontiguousarray(table.upright(self.smooth)[part])
+        corner = part[0].start, part[1].start
+        azimuths, relaxation = self.azimuths(), self.strength * (FRESH if fresh else CARRIED)
+        # what is carried has the finest detail already, and renewing it would flicker
+        scales = self.texture.exemplars if fresh else self.texture.exemplars[:-1]
+        for exemplar in scales:
+            for _ in range(FRESH_ROUNDS if fresh else 1):
+                upright = table.upright(density)
+                turned = np.ascontiguousarray(upright[part])
+                for _ in range(AZIMUTHS):
+                    self._step(turned, smooth, exemplar, next(azimuths), corner, relaxation)
+                upright[part] = turned
+                density = take_turns(cameras, inside(hull, table.lying(upright)), 1)
+        return density
+
+    def _step(
+        self,
+        now: Volume,
+        smooth: Volume,
+        exemplar: Exemplar,
+        azimuth: tuple[int, float],
+        corner: tuple[int, int],
+        relaxation: float,
+    ) -> None:
+        """Scale smoke (upright, a part of the domain) along the rays of one azimuth towards the clip's texture."""
+        table, scale = self.texture.turntable, exemplar.scale
+        thickness = np.float32(self.views.optics.medium.extinction * table.domain.voxel_size)
+        turn, degrees = azimuth
+        whole = table.project(now, degrees, corner)
+        shown, known = (
+            reduced(thickness * picture, scale) for picture in (whole, table.project(smooth, degrees, corner))
+        )
+        if not shown.any():
+            return
+        wanted = exemplar.towards(shown, turn)
+        outline = ndimage.gaussian_filter(known, OUTLINE_BLUR / scale)
+        wanted *= np.clip(outline / (OUTLINE * outline.max()) - 0.5, 0, 1)
+        amounts, have = (ndimage.gaussian_filter1d(picture.sum(0), 1) for picture in (known, wanted))
+        wanted *= np.clip(amounts / np.maximum(have, 1e-9), *ROW_RANGE)
+        faint = 1e-3 * wanted.max()
+        rows = (np.arange(wanted.shape[1]) + 0.5) * scale
+        fade = np.clip(np.minimum(rows, table.shape[1] - rows) / ENDS, 0, 1)
+        step = np.log(np.clip((wanted + faint) / (shown + faint), *STEP_RANGE))
+        step = (relaxation * fade * step).astype(np.float32)
+        table.scale(now, np.ascontiguousarray(enlarged(step, scale, whole.shape)), degrees, corner)
+
+    def azimuths(self) -> Iterator[tuple[int, float]]:
+        """Numbers and degrees of azimuths that no camera is near to, spread evenly over all frames."""
+        cameras = [self.texture.turntable.degrees(view.camera) for view in self.views.views]
+        # a frame never takes as many, and 997 is prime to the number of the bases
+        turn = 997 * self.views.frame
+        while True:
+            turn += 1
+            degrees = 180 * (GOLDEN * turn % 1)
+            if _unseen(degrees, cameras):
+                yield turn, degrees
+
+
+def unseen_sides(turntable: Turntable, cameras: Sequence[Camera]) -> bool:
+    """Whether there are sides that no camera is near to."""
+    seen_from = [turntable.degrees(camera) for camera in cameras]
+    return any(_unseen(degrees, seen_from) for degrees in range(180))
+
+
+def _unseen(degrees: float, cameras: Sequence[float]) -> bool:
+    """Whether no camera, in degrees, is near to an azimuth."""
+    return all(_apart(degrees, camera) >= NEAR for camera in cameras)
+
+
+def _apart(a: float, b: float) -> float:
+    """Degrees between two directions; what is seen from the back is what is seen from the front."""
+    return abs((a - b + 90) % 180 - 90)
+
+
+def _noise(places: Sequence[NDArray[np.float64]], width: float, seed: int) -> NDArray[np.float32]:
+    """Noise (n,) of unit variance at some places (voxels), in octaves from about the smoke's width to single voxels."""
+    random = np.random.default_rng(seed)
+    total = np.zeros(places[0].shape, np.float32)
+    spacing, octaves = 0.8 * width, 0
+    while octaves == 0 or spacing >= FINEST_NOISE:
+        lattice = random.standard_normal((LATTICE,) * 3).astype(np.float32)
+        at = [place / spacing + shift for place, shift in zip(places, random.uniform(0, LATTICE, 3), strict=True)]
+        values = ndimage.map_coordinates(lattice, at, output=np.float32, order=1, mode="grid-wrap")
+        total += values / values.std()
+        spacing, octaves = spacing / 2, octaves + 1
+    return np.asarray(total / np.float32(np.sqrt(octaves)))
