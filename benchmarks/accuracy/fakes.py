@@ -17,48 +17,38 @@ from scipy import ndimage
 
 from benchmarks import tables
 from benchmarks.accuracy.scenes import BakedViews
-from benchmarks.accuracy.score import BETWEEN, BLACK, FRONT, SIDE
-from smokelift.evaluation.copies import SideCopies
-from smokelift.evaluation.frame_means import Figures, PictureMeans, smoke_picture
-from smokelift.evaluation.picture_statistics import PictureSeries, beside_references
+from benchmarks.accuracy.score import FRONT, SIDE
+from smokelift.evaluation.frame_means import Figures, PictureMeans
+from smokelift.evaluation.metrics import PatchStatistics, flicker, mean_gradient
+from smokelift.evaluation.orbit import grey
 from smokelift.evaluation.series import finite_mean
+from smokelift.footage.images import area_average
 from smokelift.render import Image
+from smokelift.transport import Array
 
 BLUR = 8.0
 """Standard deviation (pixels) of the blurred side: two voxels."""
 
-SHIFT = (6, -15)
-"""Rows and columns by which copies are moved."""
-
-LATER = 6
-"""Frames between a copy and the front that it shows; at the clip's end it runs backward."""
+VOXEL = 4
+"""Pixels: the measures look at a pixel a voxel."""
 
 COLUMNS = (
     ("PSNR", "psnr", ".1f"),
-    ("spectrum", "spectrum_distance", ".1f"),
-    ("from own front", "front_distance", ".1f"),
-    ("row-constant detail", "row_constant_detail", ".2f"),
-    ("front in side", "detail_correlation", ".2f"),
-    ("copied from front", "copied_detail", ".2f"),
-    ("from any moment", "copied_detail_moments", ".2f"),
-    ("flicker", "flicker", ".4f"),
-    ("flow speed", "flow_speed", ".2f"),
-    ("flow divergence", "flow_divergence", ".3f"),
-    ("flow warp error", "flow_warp_error", ".3f"),
+    ("patches", "patches", ".3f"),
+    ("patches, from the front", "patches_front", ".3f"),
+    ("edges", "edges", ".2f"),
+    ("flicker", "flicker", ".2f"),
 )
 
 
 def fakes(views: BakedViews, other: BakedViews, frames: int) -> Iterator[tuple[str, list[Image]]]:
     """Yield names and pictures, linear (rows, columns, 3) of every frame, that are shown as the side."""
     side, front = ([views.seen(view, frame) for frame in range(frames)] for view in (SIDE, FRONT))
-    mirrored = [np.roll(picture[:, ::-1], SHIFT, (0, 1)) for picture in front]
     smooth = [np.asarray(ndimage.gaussian_filter(picture, (BLUR, BLUR, 0)), np.float32) for picture in side]
     yield "truth", side
     yield "blurred truth", smooth
     yield "rows of the truth's means", [_lathe(picture) for picture in side]
     yield "front", front
-    yield "front, mirrored and shifted", mirrored
-    yield f"the same of {LATER} frames later", mirrored[LATER:] + mirrored[-2 : -2 - LATER : -1]
     yield "blurred truth with new noise in every frame", _noisy(side, smooth)
     yield "front of other smoke", [other.seen(FRONT, frame) for frame in range(frames)]
 
@@ -85,14 +75,24 @@ def main() -> None:
 
 def measured(views: BakedViews, pictures: list[Image]) -> Figures:
     """Return the figures of pictures of consecutive frames that are shown as a scene's side."""
-    side, front, copies = PictureMeans(BLACK), PictureSeries(), SideCopies()
+    means = PictureMeans()
     for frame, picture in enumerate(pictures):
-        side.add(picture, views.seen(SIDE, frame))
-        ahead = smoke_picture(views.seen(FRONT, frame), BLACK)
-        front.add(ahead)
-        copies.add(ahead, *(smoke_picture(shown, BLACK) for shown in (views.seen(BETWEEN, frame), picture)))
-    beside = beside_references(side.statistics()[0], [front.statistics()])
-    return side.figures() | copies.figures() | {"front_distance": beside["reference_distance"]}
+        means.add(picture, views.seen(SIDE, frame))
+    shown = [_grey(picture) for picture in pictures]
+    side, front = ([_grey(views.seen(view, frame)) for frame in range(len(shown))] for view in (SIDE, FRONT))
+    found, true, ahead = ([PatchStatistics.of(picture) for picture in clip] for clip in (shown, side, front))
+    return {
+        "psnr": means.figures()["psnr"],
+        "patches": finite_mean(one.distance(other) for one, other in zip(found, true, strict=True)),
+        "patches_front": finite_mean(one.distance(other) for one, other in zip(found, ahead, strict=True)),
+        "edges": finite_mean(mean_gradient(a) / mean_gradient(b) for a, b in zip(shown, side, strict=True)),
+        "flicker": flicker(np.stack(shown)) / flicker(np.stack(side)),
+    }
+
+
+def _grey(picture: Image) -> Array:
+    rows, columns = picture.shape[:2]
+    return grey(area_average(picture, columns // VOXEL, rows // VOXEL))
 
 
 def _cell(value: float | None, form: str) -> str:

@@ -31,31 +31,22 @@ def found() -> dict[str, dict[str, float | None]]:
     return {name: measured(views, pictures) for name, pictures in fakes(views, other, FRAMES)}
 
 
-def test_the_mean_of_all_smokes_lacks_fine_octaves(found) -> None:
-    assert found["blurred truth"]["front_distance"] > found["truth"]["front_distance"] + 3
+def test_blur_lacks_edges_and_texture(found) -> None:
+    blurred = found["blurred truth"]
+    assert blurred["patches"] > 0.2 and blurred["edges"] < 0.9
 
 
-def test_copies_are_found_under_shift_mirror_and_moment(found) -> None:
-    names = ("front", "front, mirrored and shifted", "the same of 6 frames later")
-    assert found["front"]["detail_correlation"] == pytest.approx(1)
-    for name in names[:2]:
-        assert found[name]["copied_detail"] > 0.9 > found["truth"]["copied_detail"] + 0.2
-    assert found[names[2]]["copied_detail_moments"] > found["truth"]["copied_detail_moments"] + 0.2
+def test_rows_of_means_have_other_edges(found) -> None:
+    assert abs(found["rows of the truth's means"]["edges"] - 1) > 0.1
 
 
-def test_noise_does_not_flow(found) -> None:
-    noise = found["blurred truth with new noise in every frame"]
-    assert noise["flow_warp_error"] > 3 * found["truth"]["flow_warp_error"]
-    assert noise["flow_divergence"] > 3 * found["truth"]["flow_divergence"]
+def test_noise_flickers(found) -> None:
+    assert found["blurred truth with new noise in every frame"]["flicker"] > 2
 
 
-def test_rows_of_means_have_detail_constant_along_rows(found) -> None:
-    assert found["rows of the truth's means"]["row_constant_detail"] > 2 * found["truth"]["row_constant_detail"]
-
-
-def test_other_smoke_differs_in_psnr_alone(found) -> None:
-    other, truth = found["front of other smoke"], found["truth"]
+def test_other_smoke_of_the_kind_differs_in_psnr_alone(found) -> None:
+    other = found["front of other smoke"]
     assert other["psnr"] < 30
-    assert other["front_distance"] < 2
-    for name in ("copied_detail", "flow_warp_error", "flow_divergence", "row_constant_detail"):
-        assert other[name] < 1.5 * truth[name] + 0.05
+    assert other["patches"] < 1.5 * found["front"]["patches"]
+    assert other["edges"] == pytest.approx(1, abs=0.2)
+    assert other["flicker"] == pytest.approx(1, abs=0.3)

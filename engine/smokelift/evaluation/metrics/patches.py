@@ -1,0 +1,110 @@
+"""Whether pictures of smoke have the same texture, wherever its parts are: distributions of small patches."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from numpy.lib.stride_tricks import sliding_window_view
+
+from smokelift.evaluation.metrics.checks import Array, finite, relative
+
+PATCH = 7
+"""Pixels along a patch: the finest structure with its surroundings; a patch of scale 4 spans a lobe."""
+
+SCALES = (1, 2, 4)
+"""Pixels that are averaged into one, in both directions, before patches are taken."""
+
+DIRECTIONS = 32
+"""Random directions, orthogonal to each other, on which patches are projected; always the same ones."""
+
+QUANTILES = 512
+"""At which distributions on a direction are compared."""
+
+SMOKE = 0.05
+"""Share of a picture's largest value: a patch without a brighter pixel shows no smoke."""
+
+_BASIS = np.linalg.qr(np.random.default_rng(1).standard_normal((PATCH**2, PATCH**2)))[0][:, :DIRECTIONS]
+
+
+@dataclass(frozen=True, eq=False)
+class PatchStatistics:
+    """The distributions of a picture's patches, each without its mean, on some directions.
+
+    Attributes
+    ----------
+    quantiles
+        Of each of `SCALES` and each direction, [scale, quantile, direction].
+    spread
+        Standard deviation of each scale over all directions, [scale].
+    """
+
+    quantiles: Array
+    spread: Array
+
+    @staticmethod
+    def of(picture: npt.ArrayLike) -> PatchStatistics:
+        """Return the statistics of a picture (rows, columns) of smoke before black.
+
+        Raises
+        ------
+        ValueError
+            If a value is not finite or the picture has not two axes.
+        """
+        values = finite(picture)
+        if values.ndim != 2:
+            raise ValueError(f"patches need a picture (rows, columns), not one of shape {values.shape}")
+        projected = [_patches(_averaged(values, scale)) @ _BASIS for scale in SCALES]
+        quantiles = np.stack([_quantiles(scale) for scale in projected])
+        return PatchStatistics(quantiles, np.array([scale.std() for scale in projected]))
+
+    def distance(self, reference: PatchStatistics) -> float:
+        """Return the sliced Wasserstein distance from a reference, in units of its spread; the mean over the scales.
+
+        Elnekave and Weiss, "Generating natural images with direct patch distributions matching" (ECCV 2022).
+
+        Returns
+        -------
+        0 for the same texture, about 1 for none; infinity if only the reference has no smoke.
+        """
+        away = np.sqrt(np.mean((self.quantiles - reference.quantiles) ** 2, axis=(1, 2)))
+        return float(np.mean([relative(*pair) for pair in zip(away.tolist(), reference.spread.tolist(), strict=True)]))
+
+
+def mean_gradient(picture: npt.ArrayLike) -> float:
+    """Return the sum of a picture's gradients over that of its values: how sharp it is; 0 for a black one.
+
+    Raises
+    ------
+    ValueError
+        If a value is not finite or the picture has not two axes of two pixels at least.
+    """
+    values = finite(picture)
+    down, right = np.gradient(values)
+    total = float(values.sum())
+    return float(np.hypot(down, right).sum()) / total if total > 0 else 0.0
+
+
+def _averaged(picture: Array, scale: int) -> Array:
+    """Means of squares of so many pixels; what is missing at the end is black."""
+    rows, columns = (-(-count // scale) for count in picture.shape)
+    whole = np.zeros((rows * scale, columns * scale))
+    whole[: picture.shape[0], : picture.shape[1]] = picture
+    return np.asarray(whole.reshape(rows, scale, columns, scale).mean((1, 3)))
+
+
+def _patches(picture: Array) -> Array:
+    """The patches around pixels with smoke near them, each without its mean, [patch, pixel]; one of zeros if none."""
+    around = sliding_window_view(np.pad(picture, PATCH // 2), (PATCH, PATCH))
+    chosen = around[around.max((2, 3)) > SMOKE * picture.max()].reshape(-1, PATCH**2)
+    return chosen - chosen.mean(1, keepdims=True) if len(chosen) else np.zeros((1, PATCH**2))
+
+
+def _quantiles(values: Array) -> Array:
+    """Quantiles of each column (rows, columns), interpolated linearly, shape (`QUANTILES`, columns)."""
+    ordered = np.sort(values, axis=0)
+    place = (np.arange(QUANTILES) + 0.5) / QUANTILES * (len(values) - 1)
+    below = place.astype(int)
+    share = (place - below)[:, None]
+    return np.asarray((1 - share) * ordered[below] + share * ordered[np.minimum(below + 1, len(values) - 1)])
