@@ -30,7 +30,8 @@ _COST: list[Column] = [
 
 ORBIT_COLUMNS: list[Column] = [
     ("patches, worst", ["patches", "patches_worst"], ".3f"),
-    ("the reference's own", ["patches_own"], ".3f"),
+    ("(own)", ["patches_own"], ".3f"),
+    ("texture (own)", ["texture", "texture_own"], ".2f"),
     ("edges", ["edges"], ".2f"),
     ("halo", ["halo"], ".1%"),
     ("flicker", ["flicker"], ".2f"),

@@ -43,7 +43,7 @@ it is the best for camera 00 of the ScalarFlow capture, with and without a gain.
 BLACK = np.zeros(3, np.float32)
 
 VIEW_FIGURES = ("psnr", "ssim")
-ORBIT_FIGURES = ("patches", "patches_worst", "patches_own", "edges", "halo", "flicker")
+ORBIT_FIGURES = ("patches", "patches_worst", "patches_own", "texture", "texture_own", "edges", "halo", "flicker")
 """Of the orbit beside the truth's, or beside the front where that is not known."""
 
 VOLUME_FIGURES = (

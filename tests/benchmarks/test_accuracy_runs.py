@@ -93,5 +93,6 @@ def test_the_table_shows_a_dash_for_a_figure_that_is_not_there():
 
 def test_scores_of_the_orbit_have_a_table_of_their_own():
     row = {"scene": "plume-1", "run": "draft", "patches": 0.2284, "patches_worst": 0.3, "patches_own": 0.16}
-    line = markdown([row | {"edges": 0.81, "halo": 0.042, "flicker": 0.72}], ORBIT_COLUMNS).splitlines()[-1]
-    assert line == "| plume-1 | draft | 0.228 / 0.300 | 0.160 | 0.81 | 4.2% | 0.72 |"
+    row |= {"texture": 0.5, "texture_own": 0.18, "edges": 0.81, "halo": 0.042, "flicker": 0.72}
+    line = markdown([row], ORBIT_COLUMNS).splitlines()[-1]
+    assert line == "| plume-1 | draft | 0.228 / 0.300 | 0.160 | 0.50 / 0.18 | 0.81 | 4.2% | 0.72 |"

@@ -59,46 +59,57 @@ def orbit_scores(
 
     Returns
     -------
-    ``patches``, the distance of `PatchStatistics`, mean over azimuths, ``patches_worst`` its largest, and by azimuth;
-    ``patches_own``, that of the truth from itself `ON` azimuths on, or of the front from the front half the clip on;
-    ``edges`` and ``flicker``, mean gradients and second differences in time over the reference's; ``halo``, the share
-    of the light outside the outlines that the truth has at any azimuth. None where there is nothing to say.
+    ``patches`` and ``texture``, the distances of `PatchStatistics`, means over azimuths, and by azimuth;
+    ``patches_worst``, the largest of an azimuth; ``patches_own`` and ``texture_own``, those of the truth from itself
+    `ON` azimuths on, or of the front from the front half the clip on; ``edges`` and ``flicker``, mean gradients and
+    second differences in time over the reference's; ``halo``, the share of the light outside the outlines that the
+    truth has at any azimuth. None where there is nothing to say.
     """
     orbit = Orbit(scene, lights_turn=truth is None)
     moments = _moments(count)
-    patches, own, edges, halo = [], [], [], []
+    found: dict[str, list[list[float | None]]] = {name: [] for name in ("patches", "texture", "edges", "halo")}
+    own: dict[str, list[list[float | None]]] = {"patches": [], "texture": []}
     fronts: list[PatchStatistics] = []
     for moment in moments:
-        found = _pictures(orbit, density(moment), AZIMUTHS)
-        true = _pictures(orbit, density(moment), (0,)) if truth is None else _pictures(orbit, truth(moment), AZIMUTHS)
+        smoke = density(moment)
+        pictures = _pictures(orbit, smoke, AZIMUTHS)
+        true = _pictures(orbit, smoke, (0,)) if truth is None else _pictures(orbit, truth(moment), AZIMUTHS)
         references = [PatchStatistics.of(picture) for picture in true]
-        fronts += references[:1]
         sharp = [mean_gradient(picture) for picture in true]
         if truth is None:
+            fronts += references
             references, sharp = len(AZIMUTHS) * references, len(AZIMUTHS) * sharp
         else:
-            own.append([_next(references, index).distance(one) for index, one in enumerate(references)])
-            halo.append([_outside(picture, _outline(true)) for picture in found])
-        patches.append([PatchStatistics.of(a).distance(b) for a, b in zip(found, references, strict=True)])
-        edges.append([_ratio(mean_gradient(a), b) for a, b in zip(found, sharp, strict=True)])
-    if truth is None and len(fronts) > 1:
+            _add(own, [*references[ON:], *references[:ON]], references)
+            outline = _outline(true)
+            found["halo"].append([_outside(picture, outline) for picture in pictures])
+        _add(found, [PatchStatistics.of(picture) for picture in pictures], references)
+        edges = zip(map(mean_gradient, pictures), sharp, strict=True)
+        found["edges"].append([_ratio(value, reference) for value, reference in edges])
+    if len(fronts) > 1:
         half = len(fronts) // 2
-        own = [[fronts[(index + half) % len(fronts)].distance(front)] for index, front in enumerate(fronts)]
-    by_azimuth = _means(patches)
-    known = [value for value in by_azimuth if value is not None]
+        _add(own, [*fronts[half:], *fronts[:half]], fronts)
+    by_azimuth = {name: _means(values) for name, values in found.items()}
+    known = [value for value in by_azimuth["patches"] if value is not None]
     return {
         "reference": "front" if truth is None else "truth",
-        "patches": finite_mean(by_azimuth),
+        **{name: finite_mean(values) for name, values in by_azimuth.items()},
         "patches_worst": max(known, default=None),
-        "patches_own": finite_mean(_means(own)),
-        "edges": finite_mean(_means(edges)),
-        "halo": finite_mean(_means(halo)),
+        **{f"{name}_own": finite_mean(_means(values)) for name, values in own.items()},
         "flicker": _relative_flicker(orbit, moments, count, density, truth),
         "azimuths": list(AZIMUTHS),
-        "patches_by_azimuth": by_azimuth,
-        "patches_own_by_azimuth": None if truth is None else _means(own),
-        "edges_by_azimuth": _means(edges),
+        **{f"{name}_by_azimuth": by_azimuth[name] for name in ("patches", "texture", "edges")},
+        "patches_own_by_azimuth": None if truth is None else _means(own["patches"]),
     }
+
+
+def _add(
+    figures: dict[str, list[list[float | None]]], found: list[PatchStatistics], references: list[PatchStatistics]
+) -> None:
+    """Add the distances of a moment's pictures."""
+    pairs = list(zip(found, references, strict=True))
+    figures["patches"].append([one.distance(reference) for one, reference in pairs])
+    figures["texture"].append([one.texture_distance(reference) for one, reference in pairs])
 
 
 def _moments(count: int) -> list[int]:
@@ -135,10 +146,6 @@ def _pictures(orbit: Orbit, density: Volume, azimuths: tuple[int, ...]) -> list[
     return [orbit.picture(density, degrees) for degrees in azimuths]
 
 
-def _next(references: list[PatchStatistics], index: int) -> PatchStatistics:
-    return references[(index + ON) % len(references)]
-
-
 def _outline(pictures: list[Array]) -> npt.NDArray[np.bool_]:
     """Pixels (rows, columns) of the turntable's screen that show smoke at any azimuth, with a margin."""
     brightest = np.max(pictures, axis=0)
@@ -153,6 +160,6 @@ def _ratio(value: float, reference: float) -> float | None:
     return value / reference if reference > 0 else None
 
 
-def _means(moments: list[list[Any]]) -> list[float | None]:
+def _means(moments: list[list[float | None]]) -> list[float | None]:
     """Means over the moments of what there is at each azimuth."""
     return [finite_mean(values) for values in zip(*moments, strict=True)]

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 from numpy.lib.stride_tricks import sliding_window_view
+from scipy import fft
 
 from smokelift.evaluation.metrics.checks import Array, finite, relative
 
@@ -25,19 +26,24 @@ QUANTILES = 512
 SMOKE = 0.05
 """Share of a picture's largest value: a patch without a brighter pixel shows no smoke."""
 
-_BASIS = np.linalg.qr(np.random.default_rng(1).standard_normal((PATCH**2, PATCH**2)))[0][:, :DIRECTIONS]
+_RANDOM = np.linalg.qr(np.random.default_rng(1).standard_normal((PATCH**2, PATCH**2)))[0][:, :DIRECTIONS]
+_COSINES = fft.dct(np.eye(PATCH), norm="ortho", axis=0)
+_WAVES = np.einsum("ax,by->xyab", _COSINES, _COSINES).reshape(PATCH**2, PATCH**2)[:, 1:]
+"""All but the constant one: every size and direction of detail has one of its own."""
+
+_BASIS = np.concatenate([_RANDOM, _WAVES], axis=1)
 
 
 @dataclass(frozen=True, eq=False)
 class PatchStatistics:
-    """The distributions of a picture's patches, each without its mean, on some directions.
+    """The distributions of a picture's patches, each without its mean, on random directions and on waves.
 
     Attributes
     ----------
     quantiles
-        Of each of `SCALES` and each direction, [scale, quantile, direction].
+        Of each of `SCALES` on the random directions, then on the waves, [scale, quantile, direction].
     spread
-        Standard deviation of each scale over all directions, [scale].
+        Standard deviations, [scale, direction].
     """
 
     quantiles: Array
@@ -57,19 +63,37 @@ class PatchStatistics:
             raise ValueError(f"patches need a picture (rows, columns), not one of shape {values.shape}")
         projected = [_patches(_averaged(values, scale)) @ _BASIS for scale in SCALES]
         quantiles = np.stack([_quantiles(scale) for scale in projected])
-        return PatchStatistics(quantiles, np.array([scale.std() for scale in projected]))
+        return PatchStatistics(quantiles, np.stack([scale.std(axis=0) for scale in projected]))
 
     def distance(self, reference: PatchStatistics) -> float:
         """Return the sliced Wasserstein distance from a reference, in units of its spread; the mean over the scales.
 
-        Elnekave and Weiss, "Generating natural images with direct patch distributions matching" (ECCV 2022).
+        Elnekave and Weiss, "Generating natural images with direct patch distributions matching" (ECCV 2022). Every
+        random direction holds something of every wave, so what is strongest decides: outlines and slow shading.
 
         Returns
         -------
-        0 for the same texture, about 1 for none; infinity if only the reference has no smoke.
+        0 for equal distributions, about 1 if only the reference has smoke; infinity if only the reference has none.
         """
-        away = np.sqrt(np.mean((self.quantiles - reference.quantiles) ** 2, axis=(1, 2)))
-        return float(np.mean([relative(*pair) for pair in zip(away.tolist(), reference.spread.tolist(), strict=True)]))
+        away, spread = (np.sqrt(np.mean(values[:, :DIRECTIONS] ** 2, axis=1)) for values in self._beside(reference))
+        return _mean_ratio(away, spread)
+
+    def texture_distance(self, reference: PatchStatistics) -> float:
+        """Return the distance on the waves, each in units of its own spread; the mean over scales and waves.
+
+        All sizes and directions of detail count alike, so it sees what is constant along rows, soft or noisy, however
+        faint.
+
+        Returns
+        -------
+        As `distance`.
+        """
+        away, spread = (values[:, DIRECTIONS:].ravel() for values in self._beside(reference))
+        return _mean_ratio(away, spread)
+
+    def _beside(self, reference: PatchStatistics) -> tuple[Array, Array]:
+        """Distances on every direction, and the reference's spread there, [scale, direction]."""
+        return np.sqrt(np.mean((self.quantiles - reference.quantiles) ** 2, axis=1)), reference.spread
 
 
 def mean_gradient(picture: npt.ArrayLike) -> float:
@@ -84,6 +108,10 @@ def mean_gradient(picture: npt.ArrayLike) -> float:
     down, right = np.gradient(values)
     total = float(values.sum())
     return float(np.hypot(down, right).sum()) / total if total > 0 else 0.0
+
+
+def _mean_ratio(values: Array, references: Array) -> float:
+    return float(np.mean([relative(*pair) for pair in zip(values.tolist(), references.tolist(), strict=True)]))
 
 
 def _averaged(picture: Array, scale: int) -> Array:
