@@ -23,6 +23,10 @@ DIRECTIONS = 32
 QUANTILES = 512
 """At which distributions on a direction are compared."""
 
+PATCHES = 20_000
+"""Of a picture and scale about so many count, evenly chosen: forty a quantile say enough, and large grids have ten
+times as many."""
+
 SMOKE = 0.05
 """Share of a picture's largest value: a patch without a brighter pixel shows no smoke."""
 
@@ -41,7 +45,7 @@ class PatchStatistics:
     Attributes
     ----------
     quantiles
-        Of each of `SCALES` on the random directions, then on the waves, [scale, quantile, direction].
+        Of each of `SCALES` on the random directions, then on the waves, [scale, direction, quantile].
     spread
         Standard deviations, [scale, direction].
     """
@@ -61,9 +65,9 @@ class PatchStatistics:
         values = finite(picture)
         if values.ndim != 2:
             raise ValueError(f"patches need a picture (rows, columns), not one of shape {values.shape}")
-        projected = [_patches(_averaged(values, scale)) @ _BASIS for scale in SCALES]
+        projected = [_BASIS.T @ _patches(_averaged(values, scale)).T for scale in SCALES]
         quantiles = np.stack([_quantiles(scale) for scale in projected])
-        return PatchStatistics(quantiles, np.stack([scale.std(axis=0) for scale in projected]))
+        return PatchStatistics(quantiles, np.stack([scale.std(axis=1) for scale in projected]))
 
     def distance(self, reference: PatchStatistics) -> float:
         """Return the sliced Wasserstein distance from a reference, in units of its spread; the mean over the scales.
@@ -93,7 +97,7 @@ class PatchStatistics:
 
     def _beside(self, reference: PatchStatistics) -> tuple[Array, Array]:
         """Distances on every direction, and the reference's spread there, [scale, direction]."""
-        return np.sqrt(np.mean((self.quantiles - reference.quantiles) ** 2, axis=1)), reference.spread
+        return np.sqrt(np.mean((self.quantiles - reference.quantiles) ** 2, axis=2)), reference.spread
 
 
 def mean_gradient(picture: npt.ArrayLike) -> float:
@@ -125,14 +129,17 @@ def _averaged(picture: Array, scale: int) -> Array:
 def _patches(picture: Array) -> Array:
     """The patches around pixels with smoke near them, each without its mean, [patch, pixel]; one of zeros if none."""
     around = sliding_window_view(np.pad(picture, PATCH // 2), (PATCH, PATCH))
-    chosen = around[around.max((2, 3)) > SMOKE * picture.max()].reshape(-1, PATCH**2)
+    rows, columns = np.nonzero(around.max((2, 3)) > SMOKE * picture.max())
+    step = max(1, len(rows) // PATCHES)
+    chosen = around[rows[::step], columns[::step]].reshape(-1, PATCH**2)
     return chosen - chosen.mean(1, keepdims=True) if len(chosen) else np.zeros((1, PATCH**2))
 
 
 def _quantiles(values: Array) -> Array:
-    """Quantiles of each column (rows, columns), interpolated linearly, shape (`QUANTILES`, columns)."""
-    ordered = np.sort(values, axis=0)
-    place = (np.arange(QUANTILES) + 0.5) / QUANTILES * (len(values) - 1)
+    """Quantiles of each row (rows, columns), interpolated linearly, shape (rows, `QUANTILES`)."""
+    ordered = np.sort(values.astype(np.float32), axis=1)
+    place = (np.arange(QUANTILES) + 0.5) / QUANTILES * (values.shape[1] - 1)
     below = place.astype(int)
-    share = (place - below)[:, None]
-    return np.asarray((1 - share) * ordered[below] + share * ordered[np.minimum(below + 1, len(values) - 1)])
+    share = place - below
+    above = np.minimum(below + 1, values.shape[1] - 1)
+    return np.asarray((1 - share) * ordered[:, below] + share * ordered[:, above])
