@@ -6,15 +6,15 @@
 A SCENE is a folder with a truth.npz and what `benchmarks.truth.picture` makes of it. A run is a reconstruction, as
 `benchmarks.accuracy.runs` reads its name, or one of four references: `billboard` (the front picture, unshifted, in
 every view), `blurred` (the same, blurred), `truth` (the true density in Smokelift's renderer), `black`. Each
-reconstruction has a process of its own; one that is in OUT already is not repeated. The statistics of views are
-compared with the fronts of the other scenes, or with the scene's own if it is the only one.
+reconstruction has a process of its own; one that is in OUT already is not repeated.
 
 The FOLDER of the ScalarFlow capture has scene.toml and any number of cameraNN.toml. Every tenth frame of 10 to 110 is
 compared at 270 x 480, as the cameras are calibrated and registered (the recordings moved as FluidNexus moves them), and
 each also with one gain a camera.
 
-OUT gets accuracy.md, accuracy.csv and accuracy.png (real.* with --real); of a SCENE also accuracy_orbit.png, one moment
-from twelve angles, and accuracy_strip.png, consecutive frames from the side, with truth and runs below each other.
+OUT gets accuracy.md, accuracy.csv and accuracy.png (real.* with --real); of SCENEs also orbit_NAME.png, one moment from
+ten azimuths with the scores by azimuth, and accuracy_strip.png, consecutive frames from the side, with truth and runs
+below each other.
 """
 
 from __future__ import annotations
@@ -26,9 +26,10 @@ from pathlib import Path
 from benchmarks.accuracy.report import contact_sheet, markdown, table_columns, write
 from benchmarks.accuracy.runs import SMEAR
 from benchmarks.accuracy.scenes import KnownScene, baked_scene, captured_scene
-from benchmarks.accuracy.score import front_statistics, score
-from benchmarks.accuracy.sheets import ORBIT_ANGLES, Row, orbit_rows, strip_rows, write_rows
+from benchmarks.accuracy.score import score
+from benchmarks.accuracy.sheets import Row, strip_rows, write_orbits
 from benchmarks.machine import describe
+from smokelift.output.sheet import write_sheet
 
 PLAUSIBLE_AND_SMOOTH = ("balanced", "balanced:detail=0")
 """The default, whose detail in depth is made up, and the answer without it, which is the nearer one in PSNR."""
@@ -65,24 +66,20 @@ def main() -> None:
 
     computer = describe()
     where = {"machine": f"{computer['processor']}, {computer['cores']} cores", "date": date.today().isoformat()}
-    fronts = {known.name: front_statistics(known) for known in scenes}
     rows = []
-    orbits: list[Row] = []
     strips: list[Row] = []
     for done, known in enumerate(scenes, 1):  # written after every scene: the next may take an hour
-        others = [front for name, front in fronts.items() if name != known.name] or [fronts[known.name]]
         for run in runs:
-            rows.append(score(known, run, folder(known, run), others) | where)
+            rows.append(score(known, run, folder(known, run)) | where)
             for columns in table_columns(known):
                 print(markdown(rows[-1:], columns).splitlines()[-1], flush=True)
         write(out, name, rows, scenes[:done])
         shown = options.show or [run for run in dict.fromkeys([runs[0], *SHOWN]) if run in runs]
         contact_sheet(scenes[:done], shown, folder, out / f"{name}.png")
         if known.truth is not None:
-            orbits += orbit_rows(known, shown, folder)
+            write_orbits(known, shown, folder, out / f"orbit_{known.name}.png")
             strips += strip_rows(known, shown, folder)
-            write_rows(out / f"{name}_orbit.png", orbits, [f"{angle}\N{DEGREE SIGN}" for angle in ORBIT_ANGLES])
-            write_rows(out / f"{name}_strip.png", strips, [])
+            write_sheet(out / f"{name}_strip.png", [tiles for _, tiles in strips], [], [label for label, _ in strips])
 
 
 if __name__ == "__main__":

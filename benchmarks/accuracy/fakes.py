@@ -1,66 +1,73 @@
-"""What the measures of a side view say about sides that are made to please one of them.
+"""What the scores of an orbit say about densities that are wrong in one way only.
 
     python -m benchmarks.accuracy.fakes SCENE OTHER [SCENE OTHER ...] [--frames 24]
 
-SCENE and OTHER are folders of `benchmarks.truth.picture`. Every fake is a series of pictures in place of SCENE's view
-from 90 degrees; OTHER is a clip of other smoke. Prints means over the SCENEs as a Markdown table.
+SCENE and OTHER are folders of `benchmarks.truth.picture`, OTHER of other smoke of the same kind. Every fake is made of
+SCENE's truth. Prints means over the SCENEs as a Markdown table, beside the truth and beside the fake's own front.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 from scipy import ndimage
 
 from benchmarks import tables
-from benchmarks.accuracy.scenes import BakedViews
-from benchmarks.accuracy.score import BETWEEN, BLACK, FRONT, SIDE
-from smokelift.evaluation.copies import SideCopies
-from smokelift.evaluation.frame_means import Figures, PictureMeans, smoke_picture
-from smokelift.evaluation.picture_statistics import PictureSeries, beside_references
+from benchmarks.accuracy.scenes import baked_scene
+from benchmarks.accuracy.score import known_densities
+from smokelift.evaluation.frame_means import SMOKE, Figures
+from smokelift.evaluation.orbit_scores import Densities, orbit_scores
 from smokelift.evaluation.series import finite_mean
-from smokelift.render import Image
+from smokelift.evaluation.truth import Truth
+from smokelift.render import Volume
+from smokelift.scene import CompleteScene
 
-BLUR = 8.0
-"""Standard deviation (pixels) of the blurred side: two voxels."""
+BLUR = 2.0
+"""Standard deviation (voxels) of the blurred truth."""
 
-SHIFT = (6, -15)
-"""Rows and columns by which copies are moved."""
-
-LATER = 6
-"""Frames between a copy and the front that it shows; at the clip's end it runs backward."""
+HAZE = 0.1
+"""Share of the mass that is spread evenly over the box."""
 
 COLUMNS = (
-    ("PSNR", "psnr", ".1f"),
-    ("spectrum", "spectrum_distance", ".1f"),
-    ("from own front", "front_distance", ".1f"),
-    ("row-constant detail", "row_constant_detail", ".2f"),
-    ("front in side", "detail_correlation", ".2f"),
-    ("copied from front", "copied_detail", ".2f"),
-    ("from any moment", "copied_detail_moments", ".2f"),
-    ("flicker", "flicker", ".4f"),
-    ("flow speed", "flow_speed", ".2f"),
-    ("flow divergence", "flow_divergence", ".3f"),
-    ("flow warp error", "flow_warp_error", ".3f"),
+    ("patches", "patches", ".3f"),
+    ("worst", "patches_worst", ".3f"),
+    ("own", "patches_own", ".3f"),
+    ("texture", "texture", ".2f"),
+    ("own", "texture_own", ".2f"),
+    ("edges", "edges", ".2f"),
+    ("halo", "halo", ".1%"),
+    ("flicker", "flicker", ".2f"),
+    ("patches, from the front", "front_patches", ".3f"),
+    ("own", "front_patches_own", ".3f"),
+    ("texture, from the front", "front_texture", ".2f"),
+    ("own", "front_texture_own", ".2f"),
+    ("edges", "front_edges", ".2f"),
+    ("flicker", "front_flicker", ".2f"),
 )
 
 
-def fakes(views: BakedViews, other: BakedViews, frames: int) -> Iterator[tuple[str, list[Image]]]:
-    """Yield names and pictures, linear (rows, columns, 3) of every frame, that are shown as the side."""
-    side, front = ([views.seen(view, frame) for frame in range(frames)] for view in (SIDE, FRONT))
-    mirrored = [np.roll(picture[:, ::-1], SHIFT, (0, 1)) for picture in front]
-    smooth = [np.asarray(ndimage.gaussian_filter(picture, (BLUR, BLUR, 0)), np.float32) for picture in side]
-    yield "truth", side
-    yield "blurred truth", smooth
-    yield "rows of the truth's means", [_lathe(picture) for picture in side]
-    yield "front", front
-    yield "front, mirrored and shifted", mirrored
-    yield f"the same of {LATER} frames later", mirrored[LATER:] + mirrored[-2 : -2 - LATER : -1]
-    yield "blurred truth with new noise in every frame", _noisy(side, smooth)
-    yield "front of other smoke", [other.seen(FRONT, frame) for frame in range(frames)]
+def fakes(truth: Truth, other: Truth) -> dict[str, Densities]:
+    """Return what to call each fake, and the density (nx, ny, nz) that it has in a frame of the truth, from 0."""
+    true = truth.density
+    return {
+        "truth": true,
+        "turned by 90 degrees": lambda frame: np.ascontiguousarray(np.rot90(true(frame))),
+        "other smoke": other.density,
+        "blurred": lambda frame: _blurred(true(frame)),
+        "turned on a lathe": lambda frame: _lathe(true(frame)),
+        "front drawn out in depth": lambda frame: _drawn_out(true(frame)),
+        "haze": lambda frame: (1 - HAZE) * true(frame) + np.float32(HAZE * true(frame).mean()),
+        "blurred, new noise in every frame": lambda frame: _noisy(true(frame), frame),
+        "every other frame twice": lambda frame: true(frame - frame % 2),
+    }
+
+
+def measured(scene: CompleteScene, count: int, truth: Truth, density: Densities) -> Figures:
+    """Return the scores of a density in so many frames, beside the truth's and, named front, beside its own front."""
+    front = orbit_scores(scene, count, density)
+    return orbit_scores(scene, count, density, truth.density) | {f"front_{name}": front[name] for name in front}
 
 
 def main() -> None:
@@ -73,50 +80,52 @@ def main() -> None:
         parser.error("give each SCENE with its OTHER")
     found: dict[str, list[Figures]] = {}
     for folder, other in zip(options.scenes[::2], options.scenes[1::2], strict=True):
-        views = BakedViews.load(folder)
-        for name, pictures in fakes(views, BakedViews.load(other), options.frames):
-            found.setdefault(name, []).append(measured(views, pictures))
+        known = baked_scene(folder, options.frames)
+        truth = Truth.load(folder / "truth.npz")
+        about = known_densities(known, "truth", folder)
+        assert about is not None
+        for name, density in fakes(truth, Truth.load(other / "truth.npz")).items():
+            found.setdefault(name, []).append(measured(about.scene, len(known.scored), truth, density))
     rows = [
         [name, *(_cell(finite_mean(figures[key] for figures in scenes), form) for _, key, form in COLUMNS)]
         for name, scenes in found.items()
     ]
-    print(tables.markdown(["side", *(heading for heading, _, _ in COLUMNS)], rows))
-
-
-def measured(views: BakedViews, pictures: list[Image]) -> Figures:
-    """Return the figures of pictures of consecutive frames that are shown as a scene's side."""
-    side, front, copies = PictureMeans(BLACK), PictureSeries(), SideCopies()
-    for frame, picture in enumerate(pictures):
-        side.add(picture, views.seen(SIDE, frame))
-        ahead = smoke_picture(views.seen(FRONT, frame), BLACK)
-        front.add(ahead)
-        copies.add(ahead, *(smoke_picture(shown, BLACK) for shown in (views.seen(BETWEEN, frame), picture)))
-    beside = beside_references(side.statistics()[0], [front.statistics()])
-    return side.figures() | copies.figures() | {"front_distance": beside["reference_distance"]}
+    print(tables.markdown(["density", *(heading for heading, _, _ in COLUMNS)], rows))
 
 
 def _cell(value: float | None, form: str) -> str:
     return "-" if value is None else f"{value:{form}}"
 
 
-def _lathe(picture: Image) -> Image:
-    """A picture whose rows have their mean over the smoke's width."""
-    smoke = picture > 0.05 * picture.max()
-    widths = np.maximum(smoke.sum(1, keepdims=True), 1)
-    return np.asarray(np.where(smoke, (picture * smoke).sum(1, keepdims=True) / widths, 0), np.float32)
+def _blurred(density: Volume) -> Volume:
+    return np.asarray(ndimage.gaussian_filter(density, BLUR), np.float32)
 
 
-def _noisy(side: list[Image], smooth: list[Image]) -> list[Image]:
-    """Smooth pictures with noise in place of the detail, as strong and as fine."""
-    random = np.random.default_rng(0)
-    found = []
-    for picture, blurred in zip(side, smooth, strict=True):
-        detail = np.fft.fft2(picture[..., 0] - blurred[..., 0])
-        noise = np.fft.fft2(random.standard_normal(detail.shape))
-        other = np.fft.ifft2(np.abs(detail) * noise / np.abs(noise)).real
-        masked = blurred[..., 0] + np.where(blurred[..., 0] > 0.05 * blurred.max(), other, 0)
-        found.append(np.repeat(np.maximum(masked, 0)[..., None], 3, axis=-1).astype(np.float32))
-    return found
+def _lathe(density: Volume) -> Volume:
+    """Every layer has its means over circles about its middle."""
+    x, y = np.indices(density.shape[:2])
+    turned = np.zeros_like(density)
+    for z, layer in enumerate(np.moveaxis(density, 2, 0)):
+        if (mass := float(layer.sum())) > 0:
+            radius = np.hypot(x - (x * layer).sum() / mass, y - (y * layer).sum() / mass).round().astype(int)
+            means = np.bincount(radius.ravel(), layer.ravel()) / np.maximum(np.bincount(radius.ravel()), 1)
+            turned[..., z] = means[radius]
+    return turned
+
+
+def _drawn_out(density: Volume) -> Volume:
+    """Every ray's smoke is spread evenly over the depth that its layer has."""
+    deep = np.any(density > SMOKE * density.max(), axis=0)
+    evenly = density.sum(1, keepdims=True) / np.maximum(deep.sum(0), 1)
+    return np.asarray(np.where(deep[None], evenly, 0), np.float32)
+
+
+def _noisy(density: Volume, frame: int) -> Volume:
+    """The blurred density with other noise in place of the detail, as strong as that where it is."""
+    smooth = _blurred(density)
+    strength = np.sqrt(_blurred((density - smooth) ** 2))
+    noise = np.random.default_rng(frame).standard_normal(density.shape)
+    return np.asarray(np.maximum(smooth + strength * noise, 0), np.float32)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -18,20 +18,17 @@ from benchmarks.accuracy.scenes import KnownScene
 from benchmarks.process import run_module
 from smokelift import Scene
 from smokelift.evaluation import metrics
-from smokelift.evaluation.copies import SideCopies
-from smokelift.evaluation.frame_means import PictureMeans, VolumeMeans, eight_bit_values, smoke_picture
-from smokelift.evaluation.picture_statistics import MOTION, PictureSeries, PictureStatistics, beside_references
+from smokelift.evaluation.frame_means import PictureMeans, VolumeMeans, eight_bit_values
+from smokelift.evaluation.orbit_scores import orbit_scores
+from smokelift.evaluation.resampling import on_grid, resampled
 from smokelift.evaluation.series import finite_mean
 from smokelift.evaluation.truth import Truth
 from smokelift.render import Image, scene_renderer
 from smokelift.scene import CompleteScene, completed
 from smokelift.transport import Array
 
-FRONT, BETWEEN, SIDE = "0", "45", "90"
-"""The input's view, one between, and the one in which a wrong distribution along the rays shows most."""
-
-ALONG_RAYS = 1
-"""Axis of the voxels that the front camera looks along."""
+FRONT, SIDE = "0", "90"
+"""The input's view, and the one in which a wrong distribution along the rays shows most."""
 
 BILLBOARDS = ("billboard", "blurred")
 """The input picture in every view, as it is and blurred."""
@@ -45,13 +42,9 @@ it is the best for camera 00 of the ScalarFlow capture, with and without a gain.
 
 BLACK = np.zeros(3, np.float32)
 
-VIEW_FIGURES = (
-    "psnr", "ssim", "psnr_shifted", "spectrum_distance", *(f"spectrum_{low:.0f}" for low, _ in metrics.OCTAVES),
-    "row_constant_detail", "row_constant_detail_truth", "front_distance", "front_distance_truth",
-    "reference_distance", "reference_distance_truth",
-)  # fmt: skip
-CONSECUTIVE_FIGURES = tuple(f"{name}{which}" for name in ("flicker", *MOTION) for which in ("", "_truth"))
-"""Of views, from frames that follow each other."""
+VIEW_FIGURES = ("psnr", "ssim")
+ORBIT_FIGURES = ("patches", "patches_worst", "patches_own", "texture", "texture_own", "edges", "halo", "flicker")
+"""Of the orbit beside the truth's, or beside the front where that is not known."""
 
 VOLUME_FIGURES = (
     "density_error", "height_mass_error", "mass_ratio", "velocity_error", "velocity_cosine", "velocity_error_around",
@@ -113,24 +106,15 @@ def known_densities(known: KnownScene, run: str, folder: Path) -> KnownDensities
         if known.truth is None:
             sys.exit(f"{known.name}: its volumes are not known, so there is no run truth.")
         scene = replace(Scene.load(known.scene_path), scattering="single")
-        return KnownDensities(_on_grid(scene, known.truth.shape), known.truth.density)
+        return KnownDensities(on_grid(completed(scene), known.truth.shape), known.truth.density)
     about = json.loads((folder / "run.json").read_text())
     scene = replace(Scene.load(folder / "scene.toml"), scattering=about["scattering"])
     return KnownDensities(
-        _on_grid(scene, tuple(about["resolution"])), lambda frame: _volume(folder, known, frame)["density"]
+        on_grid(completed(scene), tuple(about["resolution"])), lambda frame: _volume(folder, known, frame)["density"]
     )
 
 
-def front_statistics(known: KnownScene) -> PictureStatistics:
-    """Return what a scene's clip looks like from the front: what its views from elsewhere should look like."""
-    front = next(iter(known.cameras))
-    series = PictureSeries()
-    for frame in known.scored:
-        series.add(smoke_picture(known.seen(front, frame), BLACK))
-    return series.statistics()
-
-
-def score(known: KnownScene, run: str, folder: Path, references: Sequence[PictureStatistics]) -> dict[str, Any]:
+def score(known: KnownScene, run: str, folder: Path) -> dict[str, Any]:
     """Return the figures of a run by the names of the columns; means over all new views end in _new.
 
     Parameters
@@ -141,8 +125,6 @@ def score(known: KnownScene, run: str, folder: Path, references: Sequence[Pictur
         The name of the run.
     folder
         Of its files.
-    references
-        Fronts of other clips, to compare the views with in their statistics.
     """
     row: dict[str, Any] = {"scene": known.name, "run": run, "frames": len(known.scored)}
     baseline = run_name(run) in BASELINES
@@ -151,7 +133,10 @@ def score(known: KnownScene, run: str, folder: Path, references: Sequence[Pictur
         about = reconstructed(known, run, folder)
         row |= {name: about[name] for name in (*RUN_FIGURES, "method")}
         row["resolution"] = "x".join(map(str, about["resolution"]))
-    row |= _view_figures(known, run, folder, references)
+    row |= _view_figures(known, run, folder)
+    if (densities := known_densities(known, run, folder)) is not None:
+        scores = around(known, densities)
+        row |= {name: scores[name] for name in ORBIT_FIGURES}
     if known.truth is None:
         row |= _exposure_figures(known, run, folder)
     elif not baseline:
@@ -159,34 +144,32 @@ def score(known: KnownScene, run: str, folder: Path, references: Sequence[Pictur
     return row
 
 
-def _view_figures(known: KnownScene, run: str, folder: Path, references: Sequence[PictureStatistics]) -> dict[str, Any]:
+def around(known: KnownScene, densities: KnownDensities) -> dict[str, Any]:
+    """Return the `orbit_scores` of a run over the frames from the first to the last that is scored."""
+    truth, frames = known.truth, range(known.scored[0], known.scored[-1] + 1)
+    if truth is None:
+        return orbit_scores(densities.scene, len(frames), lambda index: densities.of_frame(frames[index]))
+    shape = truth.shape
+    return orbit_scores(
+        on_grid(densities.scene, shape),
+        len(frames),
+        lambda index: resampled(densities.of_frame(frames[index]), shape),
+        lambda index: truth.density(frames[index]),
+    )
+
+
+def _view_figures(known: KnownScene, run: str, folder: Path) -> dict[str, Any]:
     """Return the figures of the pictures in every view, and their means over the new views."""
-    scores = {view: PictureMeans(BLACK) for view in known.cameras}
-    side, true_side = SideCopies(), SideCopies()
+    scores = {view: PictureMeans() for view in known.cameras}
     for frame, shown in images(known, run, folder, known.scored):
-        seen = {view: known.seen(view, frame) for view in known.cameras}
         for view, image in shown.items():
-            scores[view].add(image, seen[view])
-        if SIDE in shown:
-            side.add(*(smoke_picture(shown[view], BLACK) for view in (FRONT, BETWEEN, SIDE)))
-            true_side.add(*(smoke_picture(seen[view], BLACK) for view in (FRONT, BETWEEN, SIDE)))
-    found: dict[str, dict[str, Any]] = {}
-    _, own_front = scores[next(iter(known.cameras))].statistics()
-    for view, pictures in scores.items():
-        figures = pictures.figures()
-        octaves = figures["spectrum_octaves"] or [None] * len(metrics.OCTAVES)
-        figures |= {f"spectrum_{low:.0f}": ratio for (low, _), ratio in zip(metrics.OCTAVES, octaves, strict=True)}
-        for which, statistics in zip(("", "_truth"), pictures.statistics(), strict=True):
-            for name, fronts in (("front", [own_front]), ("reference", references)):
-                figures[f"{name}_distance{which}"] = beside_references(statistics, fronts)["reference_distance"]
-        found[view] = figures
+            scores[view].add(image, known.seen(view, frame))
+    found = {view: pictures.figures() for view, pictures in scores.items()}
     used = {next(iter(known.cameras)), *run_views(run)}
     row: dict[str, Any] = {}
-    for name in (*VIEW_FIGURES, *(CONSECUTIVE_FIGURES if known.scored.step == 1 else ())):
+    for name in VIEW_FIGURES:
         row |= {f"{name}_{view}": figures[name] for view, figures in found.items()}
         row[f"{name}_new"] = finite_mean(figures[name] for view, figures in found.items() if view not in used)
-    if SIDE in known.cameras:
-        row |= side.figures() | {f"{name}_truth": value for name, value in true_side.figures().items()}
     return row
 
 
@@ -213,30 +196,17 @@ def _exposure_figures(known: KnownScene, run: str, folder: Path) -> dict[str, An
 def _volume_figures(known: KnownScene, truth: Truth, folder: Path) -> dict[str, Any]:
     """Return the figures of densities and velocities."""
     volumes = VolumeMeans(truth)
-    changes, true_changes = [], []
     for frame in known.scored:
         arrays = _volume(folder, known, frame)
         volumes.add(frame, arrays["density"], arrays.get("velocity"))
-        changes.append(metrics.depth_anisotropy(arrays["density"], ALONG_RAYS))
-        true_changes.append(metrics.depth_anisotropy(truth.density(frame), ALONG_RAYS))
     figures = volumes.figures()
-    return {
-        **{name: figures.get(name) for name in VOLUME_FIGURES},
-        **{f"layer_{name}": figures[name] for name in ("flicker", "flicker_truth")},
-        "depth_anisotropy": finite_mean(changes),
-        "depth_anisotropy_truth": finite_mean(true_changes),
-    }
+    return {name: figures.get(name) for name in VOLUME_FIGURES}
 
 
 def _blurred(picture: Image, width: float) -> Image:
     """Return a picture (rows, columns, 3) after a Gaussian, as wide as a share of its longer side."""
     sigma = width * max(picture.shape[:2])
     return np.asarray(ndimage.gaussian_filter(picture, (sigma, sigma, 0)), np.float32)
-
-
-def _on_grid(scene: Scene, shape: tuple[int, int, int]) -> CompleteScene:
-    complete = completed(scene)
-    return replace(complete, domain=replace(complete.domain, resolution=shape))
 
 
 def _volume(folder: Path, known: KnownScene, frame: int) -> dict[str, Array]:

@@ -1,42 +1,38 @@
-"""Pictures of runs beside the truth from where no camera stands: orbits of one moment, and strips from the side."""
+"""Pictures of runs beside the truth from where no camera stands: a page of orbits, and strips from the side."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
-import numpy.typing as npt
-
 from benchmarks.accuracy.scenes import KnownScene
-from benchmarks.accuracy.score import BLACK, FRONT, SIDE, known_densities
+from benchmarks.accuracy.score import BLACK, SIDE, around, known_densities
+from smokelift.evaluation.orbit import Orbit
+from smokelift.evaluation.orbit_page import orbit_curves, orbit_tiles, write_orbit_page
+from smokelift.evaluation.orbit_scores import AZIMUTHS
 from smokelift.footage.images import area_average
 from smokelift.output.images import eight_bit
-from smokelift.output.sheet import write_sheet
+from smokelift.output.sheet import Tile
 from smokelift.render import Image, scene_renderer
-from smokelift.scene import orbit
-
-ORBIT_ANGLES = range(0, 360, 30)
-"""Degrees."""
 
 STRIP_FRAMES = 8
 
-Row = tuple[str, list[npt.NDArray[np.uint8]]]
+Row = tuple[str, list[Tile]]
 """A label, and sRGB tiles of one size."""
 
 
-def orbit_rows(known: KnownScene, runs: list[str], folder: Callable[[KnownScene, str], Path]) -> list[Row]:
-    """Return a late moment of the truth and of some runs from twelve angles; only what has densities is there."""
+def write_orbits(known: KnownScene, runs: list[str], folder: Callable[[KnownScene, str], Path], path: Path) -> None:
+    """Write a late moment of the truth and of some runs from all around, with their scores; only what has densities."""
     frame = known.scored[3 * (len(known.scored) - 1) // 4]
-    rows = []
+    rows: dict[str, list[Tile]] = {}
+    curves: dict[str, list[float | None]] = {}
     for run in dict.fromkeys(["truth", *runs]):
-        if (densities := known_densities(known, run, folder(known, run))) is None:
-            continue
-        scene, density = densities.scene, densities.of_frame(frame)
-        cameras = [orbit(known.cameras[FRONT], scene.domain, angle) for angle in ORBIT_ANGLES]
-        pictures = [scene_renderer(scene, camera, BLACK).image(density) for camera in cameras]
-        rows.append((f"{known.name}, frame {frame}: {run}", [_tile(picture) for picture in pictures]))
-    return rows
+        if (densities := known_densities(known, run, folder(known, run))) is not None:
+            label = f"{known.name}, frame {frame}: {run}"
+            rows[label] = orbit_tiles(Orbit(densities.scene), densities.of_frame(frame))
+            if run != "truth":
+                curves |= orbit_curves(around(known, densities), run)
+    write_orbit_page(path, rows, AZIMUTHS, curves)
 
 
 def strip_rows(known: KnownScene, runs: list[str], folder: Callable[[KnownScene, str], Path]) -> list[Row]:
@@ -53,11 +49,6 @@ def strip_rows(known: KnownScene, runs: list[str], folder: Callable[[KnownScene,
     return rows
 
 
-def write_rows(path: Path, rows: list[Row], titles: list[str]) -> None:
-    """Write rows below each other as a PNG."""
-    write_sheet(path, [tiles for _, tiles in rows], titles, [label for label, _ in rows])
-
-
-def _tile(picture: Image) -> npt.NDArray[np.uint8]:
+def _tile(picture: Image) -> Tile:
     rows, columns = picture.shape[:2]
     return eight_bit(area_average(picture, columns // 2, rows // 2))

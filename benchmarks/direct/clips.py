@@ -37,7 +37,7 @@ def picture_psnr(known: KnownScene, densities: Sequence[Array], frames: Sequence
     """Return the PSNR (dB) of densities in the views that are not the input's, over some frames of a scene."""
     about: KnownDensities | None = known_densities(known, run, folder)
     assert about is not None
-    means = PictureMeans(BLACK)
+    means = PictureMeans()
     for view, camera in list(known.cameras.items())[1:]:
         renderer = scene_renderer(about.scene, camera, BLACK)
         for frame, density in zip(frames, densities, strict=True):

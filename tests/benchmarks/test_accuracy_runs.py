@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks.accuracy.ablations import EvenDepth, UnprojectedPrediction, WithoutHull, leave_out
-from benchmarks.accuracy.report import error_columns, markdown, realism_columns
+from benchmarks.accuracy.report import ORBIT_COLUMNS, error_columns, markdown
 from benchmarks.accuracy.runs import run_method, run_settings, run_views
 from benchmarks.accuracy.scenes import picture_on_screen
 from smokelift.density import (
@@ -91,12 +91,8 @@ def test_the_table_shows_a_dash_for_a_figure_that_is_not_there():
     assert "| 1.25 |" in line
 
 
-def test_statistics_stand_beside_those_of_the_truth():
-    row = {"scene": "plume-1", "run": "draft", "spectrum_distance_new": 2.84, "copied_detail": 0.41}
-    row |= {"copied_detail_truth": 0.31, "row_constant_detail_90": 0.36, "row_constant_detail_truth_90": 0.17}
-    row |= {f"spectrum_{low}_new": value for low, value in ((2, 0.2), (4, -1.0), (8, -3.0), (16, None))}
-    line = markdown([row], realism_columns(["0", "90"])).splitlines()[-1]
-    assert "| 2.8 |" in line
-    assert "| +0.2 / -1.0 / -3.0 / - |" in line
-    assert "| 0.36 / 0.17 |" in line
-    assert "| 0.41 / 0.31 |" in line
+def test_scores_of_the_orbit_have_a_table_of_their_own():
+    row = {"scene": "plume-1", "run": "draft", "patches": 0.2284, "patches_worst": 0.3, "patches_own": 0.16}
+    row |= {"texture": 0.5, "texture_own": 0.18, "edges": 0.81, "halo": 0.042, "flicker": 0.72}
+    line = markdown([row], ORBIT_COLUMNS).splitlines()[-1]
+    assert line == "| plume-1 | draft | 0.228 / 0.300 | 0.160 | 0.50 / 0.18 | 0.81 | 4.2% | 0.72 |"

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.accuracy.blind import ANGLES, trial
-from benchmarks.accuracy.blind import FRAMES as TRIAL_FRAMES
+from benchmarks.accuracy import blind
+from benchmarks.accuracy.blind import FIRST, moments, trial
 from benchmarks.accuracy.drift import course, parts_of, watched
 from benchmarks.accuracy.scenes import KnownScene
-from benchmarks.accuracy.score import BLACK, front_statistics, score
-from benchmarks.accuracy.sheets import ORBIT_ANGLES, STRIP_FRAMES, orbit_rows, strip_rows, write_rows
+from benchmarks.accuracy.score import BLACK, score
+from benchmarks.accuracy.sheets import STRIP_FRAMES, strip_rows, write_orbits
 from smokelift.evaluation.truth import Truth
 from smokelift.footage.images import read_image
 from smokelift.render import scene_renderer
@@ -78,54 +78,68 @@ def drawn_out(tmp_path_factory) -> Path:
     return folder
 
 
-def test_the_truth_has_the_truth_s_statistics(known, tmp_path) -> None:
-    row = score(known, "truth", tmp_path, [front_statistics(known)])
+def test_the_truth_has_the_truth_s_orbit(known, tmp_path) -> None:
+    row = score(known, "truth", tmp_path)
     assert row["ssim_new"] == pytest.approx(1)
-    assert row["spectrum_distance_new"] == pytest.approx(0, abs=1e-6)
-    compared = [name for name in row if "_truth" in name]
-    assert {"copied_detail_truth", "copied_detail_moments_truth", "flow_speed_truth_90"} < set(compared)
-    for name in compared:
-        assert row[name] == pytest.approx(row[name.replace("_truth", "")], abs=1e-6)
+    assert row["patches"] == 0 < row["patches_own"]
+    assert (row["edges"], row["flicker"]) == pytest.approx((1, 1))
 
 
-def test_a_front_drawn_out_in_depth_shows_in_its_side(known, drawn_out) -> None:
-    row = score(known, "draft", drawn_out, [front_statistics(known)])
-    assert row["depth_anisotropy"] < 0.01 < 0.7 < row["depth_anisotropy_truth"]
-    assert row["spectrum_distance_90"] > 2
-    for name in ("front_distance", "reference_distance"):
-        assert row[f"{name}_90"] > row[f"{name}_truth_90"]
-    assert row["front_distance_truth_0"] == pytest.approx(0, abs=1e-6)
+def test_a_front_drawn_out_in_depth_shows_in_its_orbit(known, drawn_out) -> None:
+    row = score(known, "draft", drawn_out)
+    assert row["patches_worst"] > row["patches"] > row["patches_own"]
+    assert row["halo"] > 0.02
 
 
-def test_frames_that_do_not_follow_each_other_have_no_motion(known, tmp_path) -> None:
-    row = score(replace(known, scored=range(0, FRAMES, 3)), "truth", tmp_path, [front_statistics(known)])
-    assert not [name for name in row if name.startswith(("flow", "flicker"))]
+def test_a_run_without_densities_has_no_orbit(known, tmp_path) -> None:
+    assert "patches" not in score(known, "black", tmp_path)
 
 
-def test_orbits_and_strips_show_truth_and_runs_below_each_other(known, drawn_out, tmp_path) -> None:
+def test_pages_and_strips_show_truth_and_runs_below_each_other(known, drawn_out, tmp_path) -> None:
     """Runs without densities are left out."""
     runs = ["draft", "billboard", "truth"]
-    orbits, strips = (rows(known, runs, lambda *_: drawn_out) for rows in (orbit_rows, strip_rows))
-    assert [label.rpartition(": ")[2] for label, _ in orbits] == ["truth", "draft"]
-    assert [label for label, _ in strips] == ["ball, frames 2 to 9: truth", "ball, frames 2 to 9: draft"]
-    assert {len(tiles) for _, tiles in orbits} == {len(ORBIT_ANGLES)}
-    assert {len(tiles) for _, tiles in strips} == {STRIP_FRAMES}
-    front, side = (np.abs(orbits[0][1][n].astype(float) - orbits[1][1][n]).mean() for n in (0, 3))
+    write_orbits(known, runs, lambda *_: drawn_out, tmp_path / "orbit.png")
+    page = read_image(tmp_path / "orbit.png")
+    truth, run = (page[top : top + 240] for top in (32, 32 + 260))
+    width = page.shape[1] // 10
+    front, side = (np.abs(truth - run)[:, column : column + width].mean() for column in (0, 5 * width))
     assert side > front
-    write_rows(tmp_path / "orbit.png", orbits, [])
-    assert read_image(tmp_path / "orbit.png").shape[1] > len(ORBIT_ANGLES) * 24
+    strips = strip_rows(known, runs, lambda *_: drawn_out)
+    assert [label for label, _ in strips] == ["ball, frames 2 to 9: truth", "ball, frames 2 to 9: draft"]
+    assert {len(tiles) for _, tiles in strips} == {STRIP_FRAMES}
 
 
 def test_a_blind_trial_shows_every_run_once_in_any_order(known, drawn_out) -> None:
     orders = set()
     for seed in range(4):
-        rows, order = trial(known, ["truth", drawn_out.name], drawn_out.parent, np.random.default_rng(seed))
+        rng = np.random.default_rng(seed)
+        rows, order = trial(known, ["truth", drawn_out.name], drawn_out.parent, 5, rng)
         assert sorted(order) == sorted(["truth", drawn_out.name])
-        assert [len(row) for row in rows] == [len(ANGLES) * TRIAL_FRAMES] * 2
-        lit = {run: (row[-1] > 8).mean() for run, row in zip(order, rows, strict=True)}
+        assert [len(row) for row in rows] == [10, 10]
+        lit = {run: (row[5] > 8).mean() for run, row in zip(order, rows, strict=True)}
         assert lit["truth"] < lit[drawn_out.name]  # from the side that is drawn out
         orders.add(tuple(order))
     assert len(orders) == 2
+
+
+def test_the_moments_of_a_blind_trial_differ(known) -> None:
+    for count in (1, 2, 6):
+        shown = moments(known, count, np.random.default_rng(0))
+        assert len(set(shown)) == count and set(shown) <= set(known.scored)
+    assert min(moments(known, 2, np.random.default_rng(0))) >= FIRST
+
+
+def test_the_key_of_a_blind_trial_lies_beside_its_sheets(known, drawn_out, tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(blind, "baked_scene", lambda *_: known)
+    (tmp_path / "runs").mkdir()
+    (tmp_path / "runs" / "ball").symlink_to(drawn_out.parent)
+    words = [tmp_path / "sheets", tmp_path / "runs", "ball", "--runs", drawn_out.name, "--sheets", "2"]
+    monkeypatch.setattr("sys.argv", ["blind", *map(str, words)])
+    blind.main()
+    assert sorted(path.name for path in (tmp_path / "sheets").iterdir()) == ["01.png", "02.png"]
+    key = json.loads((tmp_path / "sheets_key.json").read_text())
+    assert key["01"]["frame"] != key["02"]["frame"]
+    assert {key["01"][letter] for letter in "AB"} == {"truth", drawn_out.name}
 
 
 def test_a_long_run_is_scored_by_its_parts(known, tmp_path) -> None:

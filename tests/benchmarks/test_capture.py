@@ -11,7 +11,7 @@ import pytest
 from benchmarks.accuracy.exposure import best_gain
 from benchmarks.accuracy.report import capture_columns, markdown
 from benchmarks.accuracy.scenes import REAL_FRAMES, REAL_SIZE, KnownScene, captured_scene, moved
-from benchmarks.accuracy.score import front_statistics, images, score
+from benchmarks.accuracy.score import images, score
 from smokelift import Camera, ClipSource, Scene
 from smokelift.output.images import write_image
 from smokelift.scene import Domain
@@ -71,7 +71,7 @@ def test_the_gain_is_that_of_the_exposure():
 
 
 def test_a_camera_with_another_exposure_is_met_with_a_gain(known: KnownScene, tmp_path: Path):
-    row = score(known, "billboard", tmp_path, [front_statistics(known)])
+    row = score(known, "billboard", tmp_path)
     assert row["gain_camera05"] == pytest.approx(0.5, rel=0.02)
     assert row["gain_psnr_camera05"] > row["psnr_camera05"] + 10
     line = markdown([row], capture_columns(list(known.cameras))).splitlines()

@@ -1,35 +1,25 @@
-"""How near a sequence is to known volumes and other cameras' clips, and whether its sides look like smoke."""
+"""How near a sequence is to known volumes and other cameras' clips, and whether it looks like smoke from all around."""
 
 from __future__ import annotations
 
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from PIL import Image as Pillow
 
 from smokelift.checks import counted
 from smokelift.evaluation.frame_means import Figures, PictureMeans, VolumeMeans
-from smokelift.evaluation.reference_view import INPUT, ReferenceView, first_frame, open_views
-from smokelift.evaluation.resampling import resampled
-from smokelift.evaluation.sides import DEGREES, evaluate_sides
+from smokelift.evaluation.orbit import Orbit
+from smokelift.evaluation.orbit_page import orbit_curves, orbit_tiles, write_orbit_page
+from smokelift.evaluation.orbit_scores import orbit_scores
+from smokelift.evaluation.reference_view import ReferenceView, first_frame, open_views
+from smokelift.evaluation.resampling import on_grid, resampled
 from smokelift.evaluation.truth import Truth
-from smokelift.output.images import eight_bit
 from smokelift.output.sequence import Sequence
-from smokelift.output.sheet import write_sheet
 from smokelift.output.viewer import Viewer
 from smokelift.render import Volume
-
-TILE_HEIGHT = 320
-"""Pixels."""
-
-SHEET_ROWS = 5
-"""Frames that are shown at most."""
-
-Tiles = dict[int, list[npt.NDArray[np.uint8]]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,25 +30,35 @@ class Evaluation:
     ----------
     figures
         Nested plain values, as JSON holds them; None where there is nothing to say.
-    titles, tiles
-        Columns of a picture: for some frames, by number, the truth and the sequence side by side.
+    sequence
+        What was looked at.
+    truth
+        Of its box, if it is known.
     """
 
     figures: Figures
-    titles: tuple[str, ...]
-    tiles: Tiles
+    sequence: Sequence
+    truth: Truth | None
 
     def write_picture(self, path: Path) -> None:
-        """Write the tiles as a PNG."""
-        write_sheet(path, list(self.tiles.values()), self.titles, [f"frame {number}" for number in self.tiles])
+        """Write a late moment from all around, above the truth's where it is known, with its scores, as a PNG."""
+        sequence = self.sequence
+        number = sequence.frames[3 * (len(sequence.frames) - 1) // 4]
+        rows = {}
+        if self.truth is not None:
+            true = _true_density(sequence, self.truth, number)
+            rows[f"truth, frame {number}"] = orbit_tiles(Orbit(on_grid(sequence.scene, self.truth.shape)), true)
+        rows[f"sequence, frame {number}"] = orbit_tiles(Orbit(sequence.scene), sequence.density(number))
+        scores = self.figures["orbit"]
+        write_orbit_page(path, rows, scores["azimuths"], orbit_curves(scores, "sequence"))
 
 
 def evaluate(
     sequence: Sequence, truth_path: Path | None = None, view_paths: tuple[tuple[Path, Path], ...] = ()
 ) -> Evaluation:
-    """Compare a sequence with the truth and with other views, and its sides with its front in their statistics.
+    """Compare a sequence with the truth and with other views, and its orbit with the truth's or with its own front.
 
-    The last needs neither truth nor view: what smoke looks like from another side is, in its statistics, what its front
+    The last needs neither truth nor view: what smoke looks like from another side is, in its texture, what its front
     looks like.
 
     Parameters
@@ -84,29 +84,31 @@ def evaluate(
             f"{sequence.directory}: its frames are no longer those of the clip; evaluate the sequence that it was made "
             "from."
         )
-    frames = sequence.frames
-    shown = {frames[i] for i in np.linspace(0, len(frames) - 1, SHEET_ROWS).round().astype(int)}
-    tiles: Tiles = {number: [] for number in sorted(shown)}
-    figures: Figures = {"directory": str(sequence.directory), "frames": len(frames), "notes": []}
-    titles: list[str] = []
+    figures: Figures = {"directory": str(sequence.directory), "frames": len(sequence.frames), "notes": []}
     truth = None
     if truth_path is not None:
         truth = _load_truth(sequence, truth_path)
-        figures["truth"] = {"path": str(truth_path), **_against_truth(sequence, truth, tiles)}
-        titles += ["truth, along y", "sequence", "truth, along x", "sequence"]
+        figures["truth"] = {"path": str(truth_path), **_against_truth(sequence, truth)}
     with ExitStack() as stack:
         views = open_views(sequence, view_paths, stack, figures["notes"])
         if view_paths or truth is None:
-            figures["views"] = [_against_view(sequence, view, tiles) for view in views]
-            titles += [title for view in views for title in (view.name, "sequence")]
-        filmed = next((view for view in views if view.name == INPUT), None)
-        sides = evaluate_sides(sequence, truth, filmed, shown)
-    figures["sides"] = sides.figures
-    for number, pictures in sides.pictures.items():
-        tiles[number] += [_fitted(eight_bit(picture)) for picture in pictures]
-    turned = [f"{degrees}\N{DEGREE SIGN}" for degrees in DEGREES]
-    titles += turned if truth is None else [title for name in turned for title in (f"truth, {name}", "sequence")]
-    return Evaluation(figures, tuple(titles), tiles)
+            figures["views"] = [_against_view(sequence, view) for view in views]
+    figures["orbit"] = _around(sequence, truth)
+    return Evaluation(figures, sequence, truth)
+
+
+def _around(sequence: Sequence, truth: Truth | None) -> Figures:
+    """Compare the orbit with the truth's, on its grid, or with the front."""
+    frames = sequence.frames
+    if truth is None:
+        return orbit_scores(sequence.scene, len(frames), lambda index: sequence.density(frames[index]))
+    shape = truth.shape
+    return orbit_scores(
+        on_grid(sequence.scene, shape),
+        len(frames),
+        lambda index: resampled(sequence.density(frames[index]), shape),
+        lambda index: _true_density(sequence, truth, frames[index]),
+    )
 
 
 def _load_truth(sequence: Sequence, path: Path) -> Truth:
@@ -120,18 +122,16 @@ def _load_truth(sequence: Sequence, path: Path) -> Truth:
     return truth
 
 
-def _against_truth(sequence: Sequence, truth: Truth, tiles: Tiles) -> Figures:
-    offset = first_frame(sequence) - 1
+def _true_density(sequence: Sequence, truth: Truth, number: int) -> Volume:
+    return truth.density(number + first_frame(sequence) - 1)
+
+
+def _against_truth(sequence: Sequence, truth: Truth) -> Figures:
     means = VolumeMeans(truth)
-    white = max(float(_projection(truth.density(n + offset), axis).max()) for n in tiles for axis in (0, 1))
     for number in sequence.frames:
-        density = sequence.density(number)
         # the first frame's velocity is the second's
-        means.add(number + offset, density, sequence.velocity(number) if number > sequence.frames[0] else None)
-        if number in tiles:
-            true, found = truth.density(number + offset), resampled(density, truth.shape)
-            for axis in (1, 0):
-                tiles[number] += [_tile(_projection(volume, axis) / max(white, 1e-30)) for volume in (true, found)]
+        velocity = sequence.velocity(number) if number > sequence.frames[0] else None
+        means.add(number + first_frame(sequence) - 1, sequence.density(number), velocity)
     return means.figures()
 
 
@@ -155,28 +155,9 @@ def _metres(size: npt.NDArray[np.float64]) -> str:
     return " x ".join(f"{length:.3g}" for length in size) + " m"
 
 
-def _against_view(sequence: Sequence, view: ReferenceView, tiles: Tiles) -> Figures:
+def _against_view(sequence: Sequence, view: ReferenceView) -> Figures:
     viewer = Viewer(sequence.scene, view.camera, view.background)
-    means = PictureMeans(view.background)
+    means = PictureMeans()
     for number in sequence.frames:
-        pictures = view.picture(number), viewer.image(number, sequence.density(number), sequence.flame(number))
-        means.add(pictures[1], pictures[0])
-        if number in tiles:
-            tiles[number] += [_fitted(eight_bit(picture)) for picture in pictures]
+        means.add(viewer.image(number, sequence.density(number), sequence.flame(number)), view.picture(number))
     return {"name": view.name, "clip": str(view.clip.path), "size": list(view.camera.size), **means.figures()}
-
-
-def _projection(volume: Volume, axis: int) -> npt.NDArray[Any]:
-    """Mean density along y or x as a picture, z up."""
-    return np.asarray(volume.mean(axis=axis).T[::-1])
-
-
-def _tile(values: npt.NDArray[Any]) -> npt.NDArray[np.uint8]:
-    grey = np.rint(255 * np.sqrt(np.clip(values, 0, 1))).astype(np.uint8)
-    return _fitted(np.repeat(grey[..., None], 3, axis=-1))
-
-
-def _fitted(tile: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
-    rows, columns = tile.shape[:2]
-    size = max(1, round(columns * TILE_HEIGHT / rows)), TILE_HEIGHT
-    return np.asarray(Pillow.fromarray(tile).resize(size, Pillow.Resampling.BILINEAR))

@@ -9,9 +9,8 @@ import numpy.typing as npt
 from scipy import ndimage
 
 from smokelift.evaluation import metrics
-from smokelift.evaluation.picture_statistics import PictureSeries, PictureStatistics
 from smokelift.evaluation.resampling import resampled
-from smokelift.evaluation.series import finite_mean, flicker_of
+from smokelift.evaluation.series import finite_mean
 from smokelift.evaluation.truth import Truth
 from smokelift.footage.images import linear_to_srgb
 from smokelift.render import Image, Volume
@@ -27,18 +26,10 @@ AROUND = 2
 
 
 class PictureMeans:
-    """Pictures from one camera beside the true ones, in 8-bit sRGB values over the whole picture.
+    """Pictures from one camera beside the true ones, in 8-bit sRGB values over the whole picture."""
 
-    Parameters
-    ----------
-    background : (rows, columns, 3) or (3,)
-        Linear radiance behind the smoke, of both.
-    """
-
-    def __init__(self, background: Image) -> None:
-        self._background = np.asarray(background, np.float32)
+    def __init__(self) -> None:
         self._frames: list[Figures] = []
-        self._found, self._true = PictureSeries(), PictureSeries()
 
     def add(self, image: Image, truth: Image) -> Figures:
         """Add a frame, linear radiance (rows, columns, 3), and return its own metrics.
@@ -48,38 +39,14 @@ class PictureMeans:
         ValueError
             If the shapes differ or a value is not finite.
         """
-        found, true, behind = (eight_bit_values(picture) for picture in _without_copies(image, truth, self._background))
-        smoke, true_smoke = found - behind, true - behind
-        shifted, shift = metrics.shifted_psnr(smoke, true_smoke)
-        figures = {
-            "psnr": metrics.psnr(found, true),
-            "ssim": metrics.ssim(found, true),
-            "psnr_shifted": shifted,
-            "shift": list(shift),
-        }
-        self._found.add(smoke.mean(axis=-1))
-        self._true.add(true_smoke.mean(axis=-1))
+        found, true = (eight_bit_values(picture) for picture in _without_copies(image, truth))
+        figures = {"psnr": metrics.psnr(found, true), "ssim": metrics.ssim(found, true)}
         self._frames.append(figures)
         return figures
 
-    def statistics(self) -> tuple[PictureStatistics, PictureStatistics]:
-        """Return what the pictures and the true ones look like, each on its own."""
-        return self._found.statistics(), self._true.statistics()
-
     def figures(self) -> Figures:
-        """Means over the frames (of decibels, those that are finite), and the statistics of them all."""
-        found, true = self.statistics()
-        distance, octaves = None, None
-        if true.power.sum() > 0:
-            distance, ratios = metrics.spectrum_distance(found.power, true.power)
-            octaves = ratios.tolist()
-        return {
-            **{name: finite_mean(f[name] for f in self._frames) for name in ("psnr", "ssim", "psnr_shifted")},
-            "spectrum_distance": distance,
-            "spectrum_octaves": octaves,
-            **found.figures,
-            **{f"{name}_truth": value for name, value in true.figures.items()},
-        }
+        """Means over the frames; of decibels, those that are finite."""
+        return {name: finite_mean(frame[name] for frame in self._frames) for name in ("psnr", "ssim")}
 
 
 class VolumeMeans:
@@ -94,8 +61,6 @@ class VolumeMeans:
     def __init__(self, truth: Truth) -> None:
         self._truth = truth
         self._frames: list[Figures] = []
-        self._layers: list[Array] = []
-        self._layers_truth: list[Array] = []
         self._before: tuple[int, Volume] | None = None
 
     def add(self, frame: int, density: Volume, velocity: Array | None = None) -> Figures:
@@ -127,8 +92,6 @@ class VolumeMeans:
         before, self._before = self._before, (frame, found)
         if velocity is not None and before is not None and before[0] == frame - 1 and smoke.any():
             figures |= self._motion(frame, before[1], found, resampled(velocity, truth.shape), smoke)
-        self._layers.append(found.sum(axis=(0, 1)))
-        self._layers_truth.append(true.sum(axis=(0, 1)))
         self._frames.append(figures)
         return figures
 
@@ -158,24 +121,14 @@ class VolumeMeans:
         }
 
     def figures(self) -> Figures:
-        """Means over the frames that are finite, and the flicker of the mass in every layer."""
+        """Means over the frames that are finite."""
         names = dict.fromkeys(name for figures in self._frames for name in figures)
-        return {
-            **{name: finite_mean(f[name] for f in self._frames if name in f) for name in names},
-            "flicker": flicker_of(self._layers),
-            "flicker_truth": flicker_of(self._layers_truth),
-        }
+        return {name: finite_mean(f[name] for f in self._frames if name in f) for name in names}
 
 
 def eight_bit_values(image: npt.ArrayLike) -> Array:
     """Linear radiance as the sRGB values (1 is white) that an 8-bit picture holds."""
     return np.asarray(np.rint(255 * np.clip(linear_to_srgb(image), 0, 1)) / 255, np.float32)
-
-
-def smoke_picture(image: Image, background: Image) -> Array:
-    """Return the smoke alone, (rows, columns): mean over the channels of the 8-bit sRGB values above the background."""
-    shown, behind = (eight_bit_values(picture) for picture in _without_copies(image, background))
-    return np.asarray((shown - behind).mean(axis=-1))
 
 
 def _without_copies(*pictures: Image) -> tuple[Image, ...]:

@@ -12,7 +12,7 @@ import numpy as np
 ERRORS = {
     "input_error": "error of the input view (RMS of sRGB values, white is 1)",
     "view_error": "error of new views (RMS of sRGB values, white is 1)",
-    "spectrum_error": "spectrum of new views against the truth's (RMS of four octaves, dB)",
+    "patches": "patches of the orbit, distance from the truth's",
     "density_error": "error of the density (relative L2)",
     "velocity_error": "error of the velocity in smoke (relative L2)",
 }
@@ -152,8 +152,8 @@ def _mean(path: Path, name: str, rows: list[dict[str, str]], decibels: dict[str,
         return float(np.mean(values)) if len(values) == len(rows) and np.isfinite(values).all() else None
 
     errors = {"density_error": mean("density_error"), "velocity_error": mean("velocity_error")}
-    if "spectrum_distance_new" in rows[0]:
-        errors["spectrum_error"] = mean("spectrum_distance_new")
+    if "patches" in rows[0]:
+        errors["patches"] = mean("patches")
     for key, column in decibels.items():
         if (value := mean(column)) is not None:
             errors[key] = 10 ** (-value / 20)

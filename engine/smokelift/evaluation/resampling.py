@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from smokelift.footage.images import area_average
+from smokelift.scene import CompleteScene
 from smokelift.transport import Array
+
+
+def on_grid(scene: CompleteScene, shape: tuple[int, int, int]) -> CompleteScene:
+    """Return a scene whose box has so many voxels."""
+    return replace(scene, domain=replace(scene.domain, resolution=shape))
 
 
 def resampled(values: Array, shape: tuple[int, int, int]) -> Array:

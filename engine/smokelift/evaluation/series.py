@@ -2,22 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 import numpy as np
-
-from smokelift.evaluation import metrics
-from smokelift.transport import Array
 
 
 def finite_mean(values: Iterable[float | None]) -> float | None:
     """The mean of what is known and finite (equal pictures have infinite decibels); None where nothing is."""
     finite = [value for value in values if value is not None and np.isfinite(value)]
     return float(np.mean(finite)) if finite else None
-
-
-def flicker_of(series: Sequence[Array]) -> float | None:
-    """Return `metrics.flicker` of arrays of one shape; None for fewer than three of them."""
-    if len(series) < 3:
-        return None
-    return finite_mean([metrics.flicker(np.stack(series))])

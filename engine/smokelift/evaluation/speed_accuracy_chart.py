@@ -19,12 +19,12 @@ SECONDS = "seconds"
 PANELS = (
     (SECONDS, "input_error"),
     (SECONDS, "view_error"),
-    (SECONDS, "spectrum_error"),
-    ("view_error", "spectrum_error"),
+    (SECONDS, "patches"),
+    ("view_error", "patches"),
     (SECONDS, "density_error"),
     (SECONDS, "velocity_error"),
 )
-"""What is across and what is up: every error against time, and how like smoke a side looks against how right it is."""
+"""What is across and what is up: every error against time, and how like smoke it looks against how right it is."""
 
 NAMES = {SECONDS: "processor seconds a frame", **ERRORS}
 

@@ -13,8 +13,11 @@ from smokelift.output.atomic import atomic_path
 
 Tile = NDArray[np.uint8]
 
-_GAP, _LINE = 4, 16
-"""Pixels between tiles, and of a line of text."""
+GAP = 4
+"""Pixels between tiles."""
+
+_LINE = 16
+"""Pixels of a line of text."""
 
 
 def write_sheet(path: Path, rows: Sequence[Sequence[Tile]], titles: Sequence[str], labels: Sequence[str]) -> None:
@@ -25,22 +28,21 @@ def write_sheet(path: Path, rows: Sequence[Sequence[Tile]], titles: Sequence[str
     path
         The file, whatever its suffix.
     rows
-        sRGB tiles (rows, columns, 3) of one height, as wide as the others in their column.
+        sRGB tiles (rows, columns, 3) of one height in a row, as wide as those of the first row or across all columns.
     titles
         Above the columns.
     labels
         Above the rows.
     """
-    height = rows[0][0].shape[0]
-    lefts = _GAP + np.cumsum([0, *(tile.shape[1] + _GAP for tile in rows[0])])
-    whole = Image.new("RGB", (int(lefts[-1]), _LINE + len(rows) * (height + _LINE + _GAP)), (32, 32, 32))
+    lefts = GAP + np.cumsum([0, *(tile.shape[1] + GAP for tile in rows[0])])
+    tops = _LINE + np.cumsum([0, *(tiles[0].shape[0] + _LINE + GAP for tiles in rows)])
+    whole = Image.new("RGB", (int(lefts[-1]), int(tops[-1])), (32, 32, 32))
     draw = ImageDraw.Draw(whole)
     for title, left in zip(titles, lefts, strict=False):
         draw.text((left, 2), title, fill=(230, 230, 230))
-    for row, (tiles, label) in enumerate(zip(rows, labels, strict=True)):
-        top = _LINE + row * (height + _LINE + _GAP)
-        draw.text((_GAP, top + 2), label, fill=(170, 170, 170))
+    for top, tiles, label in zip(tops, rows, labels, strict=False):
+        draw.text((GAP, top + 2), label, fill=(170, 170, 170))
         for tile, left in zip(tiles, lefts, strict=False):
-            whole.paste(Image.fromarray(tile), (int(left), top + _LINE))
+            whole.paste(Image.fromarray(tile), (int(left), int(top) + _LINE))
     with atomic_path(path) as aside:
         whole.save(aside, format="PNG")

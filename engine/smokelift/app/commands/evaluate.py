@@ -1,4 +1,4 @@
-"""``smokelift evaluate``: whether a sequence looks like smoke, and how near it is to the truth and to other views."""
+"""``smokelift evaluate``: whether a sequence looks like smoke from all around, and how near it is to what is known."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
     parser = commands.add_parser(
         "evaluate",
         parents=[common],
-        help="compare the smoke's sides with its front, with known volumes or with other cameras",
+        help="compare the smoke from all around with its front or with known volumes, and with other cameras",
     )
     parser.add_argument("directory", type=named_path, help="of the sequence")
     parser.add_argument("--truth", type=named_path, metavar="truth.npz", help="known densities and velocities")
@@ -39,7 +39,7 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
         "--picture",
         type=named_path,
         metavar="FILE.png",
-        help="draw the smoke's sides; with --truth, truth and sequence side by side",
+        help="draw the smoke from all around; with --truth, below the truth",
     )
     parser.set_defaults(run=run)
 

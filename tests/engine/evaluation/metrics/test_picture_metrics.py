@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from smokelift.evaluation.metrics import psnr, shifted_psnr, ssim
+from smokelift.evaluation.metrics import psnr, ssim
 
 
 def test_psnr() -> None:
@@ -47,27 +47,3 @@ def test_ssim_limits() -> None:
     assert ssim(picture, np.roll(picture, 7, 1)) < ssim(picture, blurred) < 1.0
     with pytest.raises(ValueError, match="at least 11 x 11"):
         ssim(picture[:10], picture[:10])
-
-
-def test_shifted_psnr_against_all_shifts() -> None:
-    random = np.random.default_rng(6)
-    a, b = random.random((2, 12, 9, 3))
-    best = -math.inf
-    for down in range(-3, 4):
-        for right in range(-2, 3):
-            moved = np.zeros_like(a)
-            for row in range(12):
-                for column in range(9):
-                    if 0 <= row - down < 12 and 0 <= column - right < 9:
-                        moved[row, column] = a[row - down, column - right]
-            best = max(best, psnr(moved, b))
-    assert shifted_psnr(a, b)[0] == pytest.approx(best)
-
-
-def test_shifted_psnr_finds_the_shift() -> None:
-    a = np.zeros((40, 30))
-    a[10:20, 8:15] = np.random.default_rng(7).random((10, 7))
-    decibels, shift = shifted_psnr(np.roll(a, (6, -5), (0, 1)), a)
-    assert decibels == math.inf
-    assert shift == (-6, 5)
-    assert shifted_psnr(np.roll(a, 15, 0), a)[0] < 40  # beyond its reach

@@ -1,0 +1,165 @@
+"""Whether smoke looks like smoke from every azimuth: beside the truth, or beside its own front."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy import ndimage
+
+from smokelift.evaluation.metrics import PatchStatistics, flicker, mean_gradient
+from smokelift.evaluation.orbit import Orbit
+from smokelift.evaluation.series import finite_mean
+from smokelift.render import Volume
+from smokelift.scene import CompleteScene
+from smokelift.transport import Array
+
+Densities = Callable[[int], Volume]
+"""Returns the density (nx, ny, nz) of a frame, from 0."""
+
+AZIMUTHS = tuple(range(15, 180, 15))
+"""Degrees. From behind smoke has nearly the outline that it has from the front, so half a turn says all."""
+
+ON = 5
+"""Azimuths, of 15 degrees each, from one picture of the truth to the one that it is compared with for its own distance:
+pictures that far from each other share next to no detail."""
+
+STEADY = (45, 75, 105, 135)
+"""Azimuths at which three consecutive frames are compared."""
+
+MOMENTS, SETTLED = 6, 4
+"""Frames that are looked at, spread over the clip, and the first ones, which have hardly any before them to start from
+and are left out."""
+
+OUTLINE, MARGIN = 0.08, 2
+"""Share of the truth's largest value from which on a pixel is within its outline, and the pixels around that are, too:
+a linear interpolation and a pixel's rounding reach no farther."""
+
+
+def orbit_scores(
+    scene: CompleteScene, count: int, density: Densities, truth: Densities | None = None
+) -> dict[str, Any]:
+    """Compare lit pictures from `AZIMUTHS` with the truth's, or with those from the front.
+
+    Beside the truth all are lit as the scene is. Beside the front the lights go around with the camera, for what counts
+    is the texture of the smoke, and not on which side the sun stands. The front is the sequence's own, rendered at
+    azimuth 0, and not the clip's frames: camera, light and resolution are then the same, there is no grain, and a
+    blurred front shows in its PSNR.
+
+    Parameters
+    ----------
+    scene
+        On the grid of all densities.
+    count
+        Consecutive frames, at least one.
+    density, truth
+        Of these frames, on one grid.
+
+    Returns
+    -------
+    ``patches`` and ``texture``, the distances of `PatchStatistics`, means over azimuths, and by azimuth;
+    ``patches_worst``, the largest of an azimuth; ``patches_own`` and ``texture_own``, those of the truth from itself
+    `ON` azimuths on, or of the front from the front half the clip on; ``edges`` and ``flicker``, mean gradients and
+    second differences in time over the reference's; ``halo``, the share of the light outside the outlines that the
+    truth has at any azimuth. None where there is nothing to say.
+    """
+    orbit = Orbit(scene, lights_turn=truth is None)
+    moments = _moments(count)
+    found: dict[str, list[list[float | None]]] = {name: [] for name in ("patches", "texture", "edges", "halo")}
+    own: dict[str, list[list[float | None]]] = {"patches": [], "texture": []}
+    fronts: list[PatchStatistics] = []
+    for moment in moments:
+        smoke = density(moment)
+        pictures = _pictures(orbit, smoke, AZIMUTHS)
+        true = _pictures(orbit, smoke, (0,)) if truth is None else _pictures(orbit, truth(moment), AZIMUTHS)
+        references = [PatchStatistics.of(picture) for picture in true]
+        sharp = [mean_gradient(picture) for picture in true]
+        if truth is None:
+            fronts += references
+            references, sharp = len(AZIMUTHS) * references, len(AZIMUTHS) * sharp
+        else:
+            _add(own, [*references[ON:], *references[:ON]], references)
+            outline = _outline(true)
+            found["halo"].append([_outside(picture, outline) for picture in pictures])
+        _add(found, [PatchStatistics.of(picture) for picture in pictures], references)
+        edges = zip(map(mean_gradient, pictures), sharp, strict=True)
+        found["edges"].append([_ratio(value, reference) for value, reference in edges])
+    if len(fronts) > 1:
+        half = len(fronts) // 2
+        _add(own, [*fronts[half:], *fronts[:half]], fronts)
+    by_azimuth = {name: _means(values) for name, values in found.items()}
+    known = [value for value in by_azimuth["patches"] if value is not None]
+    return {
+        "reference": "front" if truth is None else "truth",
+        **{name: finite_mean(values) for name, values in by_azimuth.items()},
+        "patches_worst": max(known, default=None),
+        **{f"{name}_own": finite_mean(_means(values)) for name, values in own.items()},
+        "flicker": _relative_flicker(orbit, moments, count, density, truth),
+        "azimuths": list(AZIMUTHS),
+        **{f"{name}_by_azimuth": by_azimuth[name] for name in ("patches", "texture", "edges")},
+        "patches_own_by_azimuth": None if truth is None else _means(own["patches"]),
+    }
+
+
+def _add(
+    figures: dict[str, list[list[float | None]]], found: list[PatchStatistics], references: list[PatchStatistics]
+) -> None:
+    """Add the distances of a moment's pictures."""
+    pairs = list(zip(found, references, strict=True))
+    figures["patches"].append([one.distance(reference) for one, reference in pairs])
+    figures["texture"].append([one.texture_distance(reference) for one, reference in pairs])
+
+
+def _moments(count: int) -> list[int]:
+    first = SETTLED if count > 2 * SETTLED else 0
+    spread = np.linspace(first, count - 1, min(MOMENTS, count - first))
+    return sorted({round(float(moment)) for moment in spread})
+
+
+def _relative_flicker(
+    orbit: Orbit, moments: list[int], count: int, density: Densities, truth: Densities | None
+) -> float | None:
+    """Flicker over that of the reference, each the mean over moments and azimuths."""
+    if count < 3:
+        return None
+    found, reference = [], []
+    for middle in np.unique(np.clip(moments, 1, count - 2)).tolist():
+        around = range(middle - 1, middle + 2)
+        densities = [density(frame) for frame in around]
+        found.append(_flicker(orbit, densities, STEADY))
+        if truth is None:
+            reference.append(_flicker(orbit, densities, (0,)))
+        else:
+            reference.append(_flicker(orbit, [truth(frame) for frame in around], STEADY))
+    a, b = finite_mean(found), finite_mean(reference)
+    return None if a is None or b is None else _ratio(a, b)
+
+
+def _flicker(orbit: Orbit, densities: list[Volume], azimuths: tuple[int, ...]) -> float | None:
+    frames = [_pictures(orbit, density, azimuths) for density in densities]
+    return finite_mean(flicker(np.stack(pictures)) for pictures in zip(*frames, strict=True))
+
+
+def _pictures(orbit: Orbit, density: Volume, azimuths: tuple[int, ...]) -> list[Array]:
+    return [orbit.picture(density, degrees) for degrees in azimuths]
+
+
+def _outline(pictures: list[Array]) -> npt.NDArray[np.bool_]:
+    """Pixels (rows, columns) of the turntable's screen that show smoke at any azimuth, with a margin."""
+    brightest = np.max(pictures, axis=0)
+    return np.asarray(ndimage.binary_dilation(brightest > OUTLINE * brightest.max(), iterations=MARGIN))
+
+
+def _outside(picture: Array, outline: npt.NDArray[np.bool_]) -> float | None:
+    return _ratio(float(picture[~outline].sum()), float(picture.sum()))
+
+
+def _ratio(value: float, reference: float) -> float | None:
+    return value / reference if reference > 0 else None
+
+
+def _means(moments: list[list[float | None]]) -> list[float | None]:
+    """Means over the moments of what there is at each azimuth."""
+    return [finite_mean(values) for values in zip(*moments, strict=True)]

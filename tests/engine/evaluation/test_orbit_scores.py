@@ -1,0 +1,81 @@
+"""Scores by azimuth: what is perfect, what each figure catches, and clips too short to say anything."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from smokelift.evaluation.orbit_scores import AZIMUTHS, orbit_scores
+from smokelift.scene import CompleteScene, completed
+
+
+@pytest.fixture(scope="module")
+def scene(plume) -> CompleteScene:
+    return completed(plume.scene)
+
+
+@pytest.fixture(scope="module")
+def perfect(plume, scene) -> dict:
+    truth = plume.densities.__getitem__
+    return orbit_scores(scene, 5, truth, truth)
+
+
+def drawn_out(density: np.ndarray) -> np.ndarray:
+    """The front's smoke, constant along the rays."""
+    return np.repeat(density.mean(1, keepdims=True), density.shape[1], 1)
+
+
+def test_the_truth_is_perfect(perfect):
+    assert perfect["reference"] == "truth" and perfect["azimuths"] == list(AZIMUTHS)
+    assert perfect["patches"] == perfect["patches_worst"] == 0 < perfect["patches_own"]
+    assert perfect["edges"] == perfect["flicker"] == 1
+    assert perfect["halo"] < 0.005
+    assert len(perfect["patches_own_by_azimuth"]) == len(perfect["edges_by_azimuth"]) == len(AZIMUTHS)
+
+
+def test_smoke_drawn_out_in_depth_is_unlike_the_truth_and_outside_it(plume, scene, perfect):
+    truth = plume.densities.__getitem__
+    found = orbit_scores(scene, 5, lambda frame: drawn_out(truth(frame)), truth)
+    assert found["patches"] > 1.5 * perfect["patches_own"]
+    assert found["patches_worst"] == max(found["patches_by_azimuth"]) == found["patches_by_azimuth"][5]  # 90 degrees
+    assert found["edges"] < 0.9
+    assert found["halo"] > 0.05
+
+
+def test_without_the_truth_it_is_unlike_its_front_as_well(plume, scene):
+    truth = plume.densities.__getitem__
+    own, other = (orbit_scores(scene, 5, density) for density in (truth, lambda frame: drawn_out(truth(frame))))
+    assert own["reference"] == "front" and own["halo"] is own["patches_own_by_azimuth"] is None
+    assert own["patches"] < 0.5 * other["patches"]
+    assert own["patches_own"] > 0
+    assert own["edges"] == pytest.approx(1, abs=0.2) and other["edges"] < own["edges"]
+    assert own["flicker"] == pytest.approx(1, abs=0.3)
+
+
+def test_detail_that_changes_at_random_flickers(plume, scene):
+    def noisy(frame: int) -> np.ndarray:
+        noise = np.random.default_rng(frame).random((6, 6, 8), np.float32)
+        return plume.densities[frame] * np.kron(2 * noise, np.ones((4, 4, 4), np.float32))
+
+    found = orbit_scores(scene, 5, noisy, plume.densities.__getitem__)
+    assert found["flicker"] > 1.3
+    assert found["edges"] > 1.05
+
+
+def test_few_frames_say_nothing_of_motion_and_no_smoke_nothing_at_all(plume, scene):
+    one = orbit_scores(scene, 1, plume.densities.__getitem__)
+    assert one["flicker"] is one["patches_own"] is None
+    assert one["patches"] > 0
+    empty = orbit_scores(scene, 3, lambda _: np.zeros(scene.domain.resolution, np.float32))
+    assert {empty[name] for name in ("patches_own", "edges", "halo", "flicker")} <= {None, 0}
+
+
+def test_the_first_frames_of_a_clip_are_not_looked_at(plume, scene):
+    seen = []
+
+    def density(frame: int) -> np.ndarray:
+        seen.append(frame)
+        return plume.densities[frame % 5]
+
+    orbit_scores(scene, 100, density)
+    assert min(seen) == 3 and max(seen) == 99  # the motion of the fifth frame begins with the fourth
