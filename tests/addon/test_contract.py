@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 from pathlib import Path
 from typing import get_args
 
@@ -45,7 +44,7 @@ def test_origins() -> None:
 
 def test_resolutions() -> None:
     """Limits of the qualities can be reached in the box's proportions; the least that is accepted."""
-    limits = [each for limit in LIMITS.values() for each in (limit.least, limit.most) if 0 < each < math.inf]
+    limits = [each for limit in LIMITS.values() for each in (limit.least, limit.most)]
     assert all(limit % (contract.BOX_VOXELS // 4) == 0 for limit in limits)
     fewest = contract.FEWEST_VOXELS
     Settings.preset("draft", "default", (fewest,) * 3)

@@ -15,13 +15,16 @@ import scipy.fft
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from smokelift.footage.images import linear_to_srgb
+from smokelift.footage.images import area_average, linear_to_srgb
 from smokelift.footage.matte import matte
 from smokelift.footage.plate import Plate
 from smokelift.render.renderer import Image
 
+OUTLINE = 320
+"""Pixels along the longer side of the picture, at most, in which the smoke is found. Noise is measured beside it."""
+
 EDGE = 3
-"""Pixels around the smoke in which there may be some that is too thin to be found."""
+"""Of these pixels, around the smoke, in which there may be some that is too thin to be found."""
 
 LEAST_STILL = 0.05
 """Share of the picture without smoke from which its noise is measured there."""
@@ -77,10 +80,19 @@ def smoke_detail(frames: Iterable[tuple[Image, Plate]], pixels: float) -> Detail
     energy = np.zeros(RINGS)
     for picture, plate in frames:
         change = (linear_to_srgb(picture) - linear_to_srgb(plate.image)).mean(-1, dtype=np.float64)
-        still = ~ndimage.binary_dilation(matte(picture, plate).mask, iterations=EDGE)
-        noise = _noise(change, still, float(plate.noise.total.mean()))
+        noise = _noise(change, _still(picture, plate), float(plate.noise.total.mean()))
         energy += _beyond_noise(change, noise)
     return Detail(energy, pixels)
+
+
+def _still(picture: Image, plate: Plate) -> NDArray[np.bool_]:
+    """Pixels (rows, columns) that show no smoke for certain."""
+    sides = np.array(picture.shape[:2])
+    rows, columns = np.maximum(sides * min(1.0, OUTLINE / sides.max()), 1).astype(int)
+    pixels = float(sides.prod() / (rows * columns))
+    small = plate.through(lambda full: area_average(full, columns, rows), pixels)
+    still = ~ndimage.binary_dilation(matte(area_average(picture, columns, rows), small).mask, iterations=EDGE)
+    return np.asarray(still[np.ix_(*(np.arange(n) * m // n for n, m in zip(sides, still.shape, strict=True)))])
 
 
 def _noise(change: NDArray[np.float64], still: NDArray[np.bool_], otherwise: float) -> float:

@@ -10,6 +10,7 @@ from typing import Any, Literal
 from smokelift.density import DensitySettings
 from smokelift.scene import SCATTERINGS, Scattering
 from smokelift.scene.checks import integer, items, number
+from smokelift.scene.domain import LONGEST
 from smokelift.velocity import VelocitySettings
 
 MethodName = Literal["default", "paper"]
@@ -34,8 +35,8 @@ class GridLimit:
     """
 
     share: float
-    least: float
-    most: float
+    least: int
+    most: int
 
     def voxels(self, pixels: float) -> int:
         """Return how many are allowed where the clip has so many pixels; a multiple of four, as grids of pyramids."""
@@ -46,7 +47,7 @@ LIMITS: Mapping[Quality, GridLimit] = {
     "draft": GridLimit(1 / 6, 64, 64),
     "balanced": GridLimit(1 / 3, 96, 128),
     "fine": GridLimit(1 / 2, 144, 256),
-    "final": GridLimit(1, 0, math.inf),
+    "final": GridLimit(1, 0, LONGEST),
 }
 """Of each quality. What a share loses is much the same whatever the clip's size; the bounds keep the time of a frame,
 which goes with the voxels, from growing with the size of the clip (docs/experiments/resolution-selection.md)."""
