@@ -58,7 +58,7 @@ class Row:
 
 def detail_shares(beside: BesideClip) -> tuple[float, ...]:
     """Return the energy of a density's picture inside the smoke, over that of the clip's, of each of `SCALES`."""
-    smoke = [(picture - beside.behind).mean(-1) * beside.inside for picture in (beside.shown, beside.seen)]
+    smoke = [(picture - beside.behind).mean(-1) for picture in (beside.shown, beside.seen)]
     shares = []
     for low, high in SCALES:
         bands = [ndimage.gaussian_filter(each, low) - ndimage.gaussian_filter(each, high) for each in smoke]

@@ -23,7 +23,7 @@ OUTLINE = 320
 (docs/experiments/clip-pixels.md)."""
 
 RAYS_A_VOXEL = 2.0
-"""Rays along a voxel, at least, where it has as many pixels: what interpolation leaves repeats from voxel to voxel, and
+"""Rays along a voxel, about, where it has as many pixels: what interpolation leaves repeats from voxel to voxel, and
 two rays a voxel see both its ends and its middle (docs/experiments/clip-pixels.md)."""
 
 
@@ -132,5 +132,5 @@ def clip_psnr(shot: Shot, frame: int, density: Volume) -> dict[str, float]:
 
 
 def _step(working: WorkingPicture) -> int:
-    """The largest odd number of pixels that leaves `RAYS_A_VOXEL` rays along a voxel, 1 at least."""
-    return max(1, 2 * math.floor((math.sqrt(working.pixels) / RAYS_A_VOXEL - 1) / 2) + 1)
+    """The odd number of pixels that leaves about `RAYS_A_VOXEL` rays along a voxel, 1 at least."""
+    return max(1, 2 * round((math.sqrt(working.pixels) / RAYS_A_VOXEL - 1) / 2) + 1)
