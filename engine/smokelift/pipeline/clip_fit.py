@@ -75,7 +75,7 @@ def beside_clip(
     working = view.working_at(frame, optics.domain)
     if working is None:
         return None
-    step = step or _step(working)
+    step = min(step or _step(working), _odd(min(working.width, working.height)))
     columns, rows = working.width // step, working.height // step
     # what is left over of a step is left out on both sides
     left, top = (working.width - columns * step) // 2, (working.height - rows * step) // 2
@@ -93,16 +93,9 @@ def beside_clip(
     shown = renderer.image(density)
     seen = view.clip.area_average(frame, columns, rows, cut)
     shrink = max(1.0, max(working.width, working.height) / OUTLINE)
-    small = working.resized(round(working.width / shrink), round(working.height / shrink))
+    small = working.resized(*(max(1, round(side / shrink)) for side in (working.width, working.height)))
     smoke = matte(small.of(view.clip, frame), plate.through(small.cut, small.pixels)).mask
-    inside = smoke[
-        np.ix_(
-            *(
-                ((places + 0.5) * n / size).astype(int)
-                for places, n, size in ((down, smoke.shape[0], working.height), (across, smoke.shape[1], working.width))
-            )
-        )
-    ]
+    inside = smoke[np.ix_(down * smoke.shape[0] // working.height, across * smoke.shape[1] // working.width)]
     return BesideClip(seen, shown, behind, inside)
 
 
@@ -134,3 +127,8 @@ def clip_psnr(shot: Shot, frame: int, density: Volume) -> dict[str, float]:
 def _step(working: WorkingPicture) -> int:
     """The odd number of pixels that leaves about `RAYS_A_VOXEL` rays along a voxel, 1 at least."""
     return max(1, 2 * round((math.sqrt(working.pixels) / RAYS_A_VOXEL - 1) / 2) + 1)
+
+
+def _odd(pixels: int) -> int:
+    """The largest odd number up to so many pixels."""
+    return pixels - 1 + pixels % 2

@@ -99,6 +99,17 @@ def test_a_moving_camera_is_followed(plume, tracked, draft) -> None:
             assert clip_psnr(shot, number, density)["psnr"] > 40
 
 
+@pytest.mark.parametrize("width", [1, 2, 7])
+def test_a_sliver_of_the_box_is_enough(shot, sharp, width) -> None:
+    """Of which fewer pixels are left than there are to a step."""
+    view = shot.views[0]
+    sliver = replace(view, working=replace(view.working, left=view.working.left + 90, width=width))
+    beside = beside_clip(sliver, shot.optics, 1, sharp.densities[1], step=9)
+    assert beside.seen.shape == beside.shown.shape
+    assert 0 < beside.seen.shape[1] <= width
+    assert beside.inside.any()
+
+
 def test_no_smoke_has_no_figure(plume, draft, tmp_path) -> None:
     """Nor has a frame whose picture shows nothing; one in which a density is missing has a bad one."""
     nothing = np.zeros_like(plume.densities[0])
