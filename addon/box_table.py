@@ -7,7 +7,7 @@ import bpy
 from mathutils import Matrix, Vector
 
 from .blender_scene import ShotError
-from .contract import FEWEST_VOXELS, LONGEST_SIDE
+from .contract import BOX_VOXELS, FEWEST_VOXELS
 from .smoke import scene_of
 
 
@@ -35,7 +35,7 @@ def domain_table(box: bpy.types.Object, rotation: Matrix, settings: bpy.types.Pr
     extent = high - low
     if min(extent) <= 1e-6 * max(*extent, 1e-6):
         raise ShotError("The box is flat: give it a width, a depth and a height.")
-    voxel = max(extent) / (settings.longest_side or LONGEST_SIDE[settings.quality])
+    voxel = max(extent) / (settings.longest_side or BOX_VOXELS)
     counts = [max(FEWEST_VOXELS, 4 * math.ceil(length / voxel / 4 - 1e-4)) for length in extent]
     size = [count * voxel for count in counts]
     middle = (low + high) / 2

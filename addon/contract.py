@@ -25,8 +25,12 @@ PROXY_FILE = "proxy_{:04d}.vdb"
 ASSET_FILE = "smoke.blend"
 """In a folder with an export: the add-on's own file, which the engine leaves alone."""
 
-LONGEST_SIDE = {"draft": 64, "balanced": 96, "fine": 144}
-"""Voxels along the box's longest side, at most, by quality."""
+QUALITIES = ("draft", "balanced", "fine", "final")
+"""How much of the clip's detail is kept."""
+
+BOX_VOXELS = 64
+"""Voxels along the box's longest side that give it its proportions where the engine chooses how many it really has:
+it takes multiples of a quarter of them, which all of its own limits are."""
 
 FEWEST_VOXELS = 8
 """Voxels along any side, at least."""

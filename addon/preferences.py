@@ -5,6 +5,7 @@ from pathlib import Path
 import bpy
 from bpy.props import EnumProperty, IntProperty, StringProperty
 
+from .contract import QUALITIES
 from .paths import absolute
 
 MANUAL = Path(__file__).parent / "manual" / "index.html"
@@ -48,7 +49,7 @@ class SmokeliftPreferences(bpy.types.AddonPreferences):
     quality: EnumProperty(
         name="Quality",
         description="Quality of new smokes",
-        items=[("draft", "Draft", ""), ("balanced", "Balanced", ""), ("fine", "Fine", "")],
+        items=[(name, name.capitalize(), "") for name in QUALITIES],
         default="balanced",
     )
     threads: IntProperty(

@@ -262,6 +262,7 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
             ("draft", "Draft", "A quick look"),
             ("balanced", "Balanced", "Good for most shots"),
             ("fine", "Fine", "More of the clip's detail, several times slower"),
+            ("final", "Final", "All of the clip's detail, a voxel a pixel: much memory, seconds to minutes a frame"),
         ],
         default="balanced",
         update=_changed,

@@ -130,7 +130,7 @@ def measure(job: Job) -> Run:
         seconds_velocity=median([found["seconds_velocity"] for found in figures]),
         solves=times.solves,
         memory_mib=peak_mib(),
-        psnr=float(np.mean([found["psnr"] for found in figures[UNTIMED:]])),
+        psnr=float(np.mean([found["psnr_working"] for found in figures[UNTIMED:]])),
         occupied=float(np.mean([found["hull_share"] for found in figures[UNTIMED:]])),
     )
 

@@ -11,7 +11,7 @@ const JOB_TYPE = {
           description: "Video, scene file (.toml) or frame_####.png, where the workers see it" },
         { key: "output", type: "string", subtype: "dir_path", required: true,
           description: "Directory for the sequence, where the workers see it" },
-        { key: "quality", type: "string", choices: ["draft", "balanced", "fine"], default: "balanced" },
+        { key: "quality", type: "string", choices: ["draft", "balanced", "fine", "final"], default: "balanced" },
         { key: "frames", type: "string", default: "",
           description: "First and last frame of the clip from 0, as 10:99; all of them if empty" },
         { key: "detail", type: "float", default: 1.0,

@@ -17,7 +17,7 @@ from smokelift.output.export import ASSET, NOTE, proxy_name
 from smokelift.output.layout import INDEX, frame_path
 from smokelift.scene import SIDES, EnvironmentLight, SceneError
 from smokelift.setup.provenance import Origin
-from smokelift.setup.settings import LONGEST_SIDE, Settings
+from smokelift.setup.settings import LIMITS, QUALITIES, Settings
 
 
 def test_exit_statuses() -> None:
@@ -43,12 +43,18 @@ def test_origins() -> None:
 
 
 def test_resolutions() -> None:
-    """Of every quality, in the order of the qualities, and the least that is accepted."""
-    assert list(contract.LONGEST_SIDE.items()) == list(LONGEST_SIDE.items())
+    """Limits of the qualities can be reached in the box's proportions; the least that is accepted."""
+    limits = [each for limit in LIMITS.values() for each in (limit.least, limit.most)]
+    assert all(limit % (contract.BOX_VOXELS // 4) == 0 for limit in limits)
     fewest = contract.FEWEST_VOXELS
     Settings.preset("draft", "default", (fewest,) * 3)
     with pytest.raises(ValueError, match="resolution"):
         Settings.preset("draft", "default", (fewest, fewest, fewest - 1))
+
+
+def test_qualities() -> None:
+    """In their order."""
+    assert contract.QUALITIES == QUALITIES
 
 
 def test_sides() -> None:

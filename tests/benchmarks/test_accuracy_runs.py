@@ -12,7 +12,7 @@ from benchmarks.accuracy.report import ORBIT_COLUMNS, error_columns, markdown
 from benchmarks.accuracy.runs import run_method, run_settings, run_views
 from benchmarks.accuracy.scenes import picture_on_screen
 from smokelift.density import (
-    BorrowedMoments,
+    DetailedDepth,
     DensitySettings,
     GradientFit,
     NothingCarried,
@@ -51,7 +51,7 @@ def test_a_method_without_a_part_is_a_composition():
     assert leave_out("transport", usual) == replace(usual, temporal_prior=NothingCarried())
     assert leave_out("hull", usual) == replace(usual, density_fit=WithoutHull(usual.density_fit))
     assert leave_out("depth", usual) == replace(usual, depth_prior=EvenDepth())
-    assert isinstance(run_method("draft", settings).depth_prior, BorrowedMoments)
+    assert isinstance(run_method("draft", settings).depth_prior, DetailedDepth)
     assert isinstance(run_method("draft", replace(settings, detail=0.0)).depth_prior, RoundDepth)
     both = run_method("draft:without=projection,without=sources", settings).velocity_estimator
     assert both == UnprojectedPrediction(replace(settings.velocity, sources=None))

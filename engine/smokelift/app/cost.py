@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +20,7 @@ from smokelift.setup.settings import Quality, Settings
 
 Resolution = tuple[int, int, int]
 
-SOLVES_A_FRAME: Mapping[Quality, float] = {"draft": 54.0, "balanced": 58.0, "fine": 63.0}
+SOLVES_A_FRAME: Mapping[Quality, float] = {"draft": 54.0, "balanced": 58.0, "fine": 63.0, "final": 63.0}
 """Poisson solves that take as long as a frame."""
 
 SHARE_A_VIEW = 0.5
@@ -113,8 +113,10 @@ def memory_free() -> int:
     return int(psutil.virtual_memory().available)
 
 
-def require_memory(domain: Domain, frames: int, settings: Settings) -> None:
+def require_memory(domain: Domain, frames: int, settings: Settings, *, given: bool = True) -> None:
     """Check that a run over so many frames fits into the memory that is free.
+
+    A box that is ``given`` keeps its proportions, so that voxels stay cubes; one that was found follows its voxels.
 
     Raises
     ------
@@ -126,7 +128,8 @@ def require_memory(domain: Domain, frames: int, settings: Settings) -> None:
     if needed <= free:
         return
     shape = " x ".join(map(str, domain.resolution))
-    fits = _largest(domain.resolution, lambda smaller: memory_needed(smaller, frames, settings) <= free)
+    smaller = _same_proportions(domain.resolution) if given else _about_the_same(domain.resolution)
+    fits = next((each for each in smaller if memory_needed(each, frames, settings) <= free), None)
     advice = (
         f"the largest that fits is --resolution {','.join(map(str, fits))}"
         if fits
@@ -137,12 +140,20 @@ def require_memory(domain: Domain, frames: int, settings: Settings) -> None:
     )
 
 
-def _largest(resolution: Resolution, fits: Callable[[Resolution], bool]) -> Resolution | None:
-    """Return the largest resolution that fits, of the same proportions so that voxels stay cubes."""
+def _same_proportions(resolution: Resolution) -> Iterator[Resolution]:
+    """Smaller resolutions of exactly the same proportions, the largest first."""
     common = math.gcd(*resolution)
     x, y, z = (n // common for n in resolution)
     candidates = ((x * times, y * times, z * times) for times in range(common - 1, 0, -1))
-    return next((c for c in candidates if min(c) >= LEAST_VOXELS and fits(c)), None)
+    return (each for each in candidates if min(each) >= LEAST_VOXELS)
+
+
+def _about_the_same(resolution: Resolution) -> Iterator[Resolution]:
+    """Smaller resolutions of the same proportions but for multiples of four, the largest first."""
+    for longest in range(max(resolution) - 4, 0, -4):
+        x, y, z = (4 * math.ceil(n * longest / max(resolution) / 4) for n in resolution)
+        if min(x, y, z) >= LEAST_VOXELS:
+            yield x, y, z
 
 
 def _solve_seconds(resolution: Resolution) -> float:

@@ -36,7 +36,8 @@ def add_run_options(parser: argparse.ArgumentParser) -> None:
         "--quality",
         choices=QUALITIES,
         default="balanced",
-        help="how much of the clip's detail is kept, and how long a run takes (default: balanced)",
+        help="how much of the clip's detail is kept (final: a voxel a pixel), and how long a run takes "
+        "(default: balanced)",
     )
     parser.add_argument(
         "--method",

@@ -8,6 +8,7 @@ import os
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from statistics import median
 from types import TracebackType
 from typing import Any, Literal, Protocol
 
@@ -104,6 +105,7 @@ class _Text:
             console=self._console,
             speed_estimate_period=120,
         )
+        self._decibels: list[float] = []
         self._task = self._bar.add_task("frames", start=False, fit="")
 
     def __enter__(self) -> _Text:
@@ -130,7 +132,10 @@ class _Text:
             self._bar.start()
 
     def frame(self, number: int, figures: Mapping[str, Any]) -> None:
-        fit = f"fit {figures['psnr']:.1f} dB" if "psnr" in figures else figures.get("origin", "no smoke")
+        fit = figures.get("origin", "no smoke")
+        if "psnr" in figures:  # the last one stays, and stands for the run
+            self._decibels.append(figures["psnr"])
+            fit = f"fit {median(self._decibels):.1f} dB"
         with _output():
             self._bar.update(self._task, advance=1, fit=fit)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +36,10 @@ class WorkingPicture:
         """Pixels of the full picture of which each small one is the mean."""
         columns, rows = self.camera.size
         return self.width * self.height / (columns * rows)
+
+    def resized(self, columns: int, rows: int) -> WorkingPicture:
+        """Return the picture of the same part with another number of pixels."""
+        return replace(self, camera=self.camera.resized(columns, rows))
 
     def part(self, picture: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return the part of a full picture (rows, columns, ...), at its own resolution."""

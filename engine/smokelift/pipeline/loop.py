@@ -25,6 +25,7 @@ from smokelift.footage.clip import Clip
 from smokelift.output.index import Origins
 from smokelift.output.resume import ResumeState
 from smokelift.output.writer import SequenceWriter
+from smokelift.pipeline.clip_fit import clip_psnr
 from smokelift.pipeline.method import Method, compose
 from smokelift.pipeline.sources import sources
 from smokelift.render import Volume
@@ -52,7 +53,8 @@ class Frame:
         In m/s, from the frame before to this one; the first frame has the second's. Zero where no smoke is near, if it
         was estimated on a coarser grid.
     figures
-        Measures of the fit and seconds spent.
+        Measures of the fit and seconds spent: ``psnr`` of the clip's own pixels inside the smoke (`clip_psnr`),
+        ``psnr_working`` and what else `smokelift.density.Density` says of the working pictures.
     estimated
         The velocity on the grid of its estimate, all over the domain.
     smooth : (nx, ny, nz) float32, optional
@@ -233,6 +235,7 @@ def _frame(index: int, before: Past | None, shot: Shot, method: Method) -> Frame
         carried = inside(carried > 0, carried)
     density, taken_over = _density(index, before, carried, shot, method)
     flame = _flame(index, density.values, shot)
+    fit = _fit_figures(index, density, shot)
     fitted = time.perf_counter()
     velocity = estimated = Velocity.zero(domain.resolution, domain.voxel_size, shot.scene.closed)
     if before is not None:
@@ -247,7 +250,7 @@ def _frame(index: int, before: Past | None, shot: Shot, method: Method) -> Frame
         velocity = near_smoke(estimated, (before.density > 0) | (density.values > 0), dt, domain.voxel_size)
     done = time.perf_counter()
     figures = {
-        **density.figures,
+        **fit,
         "mass": float(density.values.sum(dtype=np.float64)) * domain.voxel_size**3,
         "transport": dict(taken_over),
         "velocity": dict(velocity.figures),
@@ -255,6 +258,14 @@ def _frame(index: int, before: Past | None, shot: Shot, method: Method) -> Frame
         "seconds_velocity": done - fitted,
     }
     return Frame(index + 1, density.values, velocity, figures, estimated, density.smooth, density.steady, flame)
+
+
+def _fit_figures(index: int, density: Density, shot: Shot) -> dict[str, float]:
+    """The figures of a fit; what it calls ``psnr`` is that of the working pictures."""
+    working = {name.replace("psnr", "psnr_working"): value for name, value in density.figures.items()}
+    if "psnr_working" not in working:  # frames without smoke cost nothing
+        return working
+    return {**clip_psnr(shot, index, density.values), **working}
 
 
 def _measured(before: Past, density: Density) -> tuple[Volume, Volume]:

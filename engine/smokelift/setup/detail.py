@@ -1,4 +1,4 @@
-"""How much of the smoke's detail a grid loses, in so far as that detail stands out from the noise.
+"""How much of the smoke's detail in a clip a grid loses, in so far as that detail stands out from the noise.
 
 The spectrum of what the smoke changes in the picture (cosine transform, in sRGB values, where a clip's noise is even)
 is compared with that of the noise, which is measured in pixels without smoke. A grid shows
@@ -15,19 +15,25 @@ import scipy.fft
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from smokelift.footage.images import linear_to_srgb
+from smokelift.footage.images import area_average, linear_to_srgb
 from smokelift.footage.matte import matte
 from smokelift.footage.plate import Plate
 from smokelift.render.renderer import Image
 
+OUTLINE = 320
+"""Pixels along the longer side of the picture, at most, in which the smoke is found. Noise is measured beside it."""
+
 EDGE = 3
-"""Voxels around the smoke in which there may be some that is too thin to be found."""
+"""Of these pixels, around the smoke, in which there may be some that is too thin to be found."""
 
 LEAST_STILL = 0.05
 """Share of the picture without smoke from which its noise is measured there."""
 
-RINGS = 96
-"""Into which spatial frequencies are sorted."""
+RINGS_AN_OCTAVE = 16
+"""Into which spatial frequencies are sorted: 4 % wide, about as far apart as the grids are."""
+
+RINGS = 6 * RINGS_AN_OCTAVE
+"""From single pixels of the picture down to a 64th of their frequency, where what is coarser counts as well."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,41 +43,56 @@ class Detail:
     Attributes
     ----------
     energy : (RINGS,)
-        In rings from no detail to that of single voxels of the finest grid.
-    finest
-        Voxels along the longest side of that grid.
+        In rings of the logarithm of the frequency, up to that of single pixels.
+    pixels
+        Along the longest side of the box.
     """
 
     energy: NDArray[np.float64]
-    finest: int
+    pixels: float
 
-    def lost(self, longest: int) -> float:
-        """Share of the contrast (root of the energy) that is finer than a grid of so many voxels shows."""
+    def lost(self, longest: float, finest: float | None = None) -> float:
+        """Share of the contrast (root of the energy) that is finer than a grid of so many voxels shows.
+
+        Of what the clip shows, or a grid of ``finest`` voxels.
+        """
         whole = float(self.energy.sum())
         if whole <= 0:
             return 0.0
-        above = self.energy[round(RINGS * min(longest / self.finest, 1.0)) :]
-        return float(np.sqrt(above.sum() / whole))
+        between = self.energy[self._ring(longest) : RINGS if finest is None else self._ring(finest)]
+        return float(np.sqrt(between.sum() / whole))
+
+    def _ring(self, longest: float) -> int:
+        """The first ring that a grid does not show."""
+        return round(float(np.clip(RINGS + RINGS_AN_OCTAVE * np.log2(longest / self.pixels), 0, RINGS)))
 
 
-def smoke_detail(frames: Iterable[tuple[Image, Plate, float]], finest: int) -> Detail:
+def smoke_detail(frames: Iterable[tuple[Image, Plate]], pixels: float) -> Detail:
     """Measure the detail in some frames.
 
     Parameters
     ----------
     frames
-        Of each: the part of the picture (rows, columns, 3) where the box is, linear; the plate behind it; and the
-        pixels along a voxel of the finest grid, 1 at most.
-    finest
-        Voxels along the longest side of the finest grid.
+        Of each: the part of the picture (rows, columns, 3) where the box is, linear; and the plate behind it.
+    pixels
+        Along the longest side of the box.
     """
     energy = np.zeros(RINGS)
-    for picture, plate, pixels in frames:
+    for picture, plate in frames:
         change = (linear_to_srgb(picture) - linear_to_srgb(plate.image)).mean(-1, dtype=np.float64)
-        still = ~ndimage.binary_dilation(matte(picture, plate).mask, iterations=EDGE)
-        noise = _noise(change, still, float(plate.noise.total.mean()))
-        energy += _beyond_noise(change, noise, pixels)
-    return Detail(energy, finest)
+        noise = _noise(change, _still(picture, plate), float(plate.noise.total.mean()))
+        energy += _beyond_noise(change, noise)
+    return Detail(energy, pixels)
+
+
+def _still(picture: Image, plate: Plate) -> NDArray[np.bool_]:
+    """Pixels (rows, columns) that show no smoke for certain."""
+    sides = np.array(picture.shape[:2])
+    rows, columns = np.maximum(sides * min(1.0, OUTLINE / sides.max()), 1).astype(int)
+    pixels = float(sides.prod() / (rows * columns))
+    small = plate.through(lambda full: area_average(full, columns, rows), pixels)
+    still = ~ndimage.binary_dilation(matte(area_average(picture, columns, rows), small).mask, iterations=EDGE)
+    return np.asarray(still[np.ix_(*(np.arange(n) * m // n for n, m in zip(sides, still.shape, strict=True)))])
 
 
 def _noise(change: NDArray[np.float64], still: NDArray[np.bool_], otherwise: float) -> float:
@@ -79,14 +100,14 @@ def _noise(change: NDArray[np.float64], still: NDArray[np.bool_], otherwise: flo
     return float(np.sqrt(np.mean(change[still] ** 2))) if still.mean() > LEAST_STILL else otherwise
 
 
-def _beyond_noise(change: NDArray[np.float64], noise: float, pixels: float) -> NDArray[np.float64]:
+def _beyond_noise(change: NDArray[np.float64], noise: float) -> NDArray[np.float64]:
     """Energy of a picture in each ring, less that of white noise of a standard deviation."""
     # a cosine transform goes on beyond the edge as in a mirror, so that smoke which is cut off there is no detail
     power = np.square(scipy.fft.dctn(change, norm="ortho"))
     across = [np.arange(n) / n for n in change.shape]
-    # in voxels of the finest grid: 1 alternates from voxel to voxel
-    frequency = np.hypot(across[0][:, None], across[1]) * pixels
-    ring = np.minimum((frequency * RINGS).astype(int), RINGS - 1)
+    # 1 alternates from pixel to pixel
+    frequency = np.hypot(across[0][:, None], across[1])
+    ring = RINGS + np.floor(RINGS_AN_OCTAVE * np.log2(np.maximum(frequency, 2.0**-6))).astype(int)
     inside = frequency < 1
     total = np.bincount(ring[inside], power[inside], RINGS)
     count = np.bincount(ring[inside], minlength=RINGS)

@@ -19,7 +19,7 @@ from smokelift.scene import Camera, Domain, Scene, as_matrix
 from smokelift.scene.projection import voxel_width
 from smokelift.setup.choice import Choice
 from smokelift.setup.detail import Detail, smoke_detail
-from smokelift.setup.settings import LONGEST_SIDE, Settings
+from smokelift.setup.settings import LIMITS, Settings
 from smokelift.setup.smoke import SmokeSamples
 
 Shape = tuple[int, int, int]
@@ -102,7 +102,7 @@ def find_geometry(
     if isinstance(settings.resolution, tuple):
         domain, choice = grids[-1], _resolution_by_hand(grids[-1])
     elif settings.selection.measure:
-        domain, choice = _resolved(clip, camera, grids, plates, samples.smoky, settings.selection.lost_detail)
+        domain, choice = _resolved(clip, camera, grids, plates, samples.smoky, settings)
     else:
         domain, choice = grids[-1], None
     size = " x ".join(f"{high - low:.2f}" for low, high in zip(domain.min, domain.max, strict=True))
@@ -120,8 +120,8 @@ def _divided(
 ) -> tuple[Domain, Choice[Shape]]:
     """A box that is given, with as many voxels as are asked for, and why."""
     if settings.resolution == "auto":
-        grids = _same_shape(box, LONGEST_SIDE[settings.quality])
-        return _resolved(clip, camera, grids, plates, samples.smoky, settings.selection.lost_detail)
+        allowed = LIMITS[settings.quality].voxels(_pixels(camera.at(next(iter(samples.smoky), 0)), box))
+        return _resolved(clip, camera, _same_shape(box, allowed), plates, samples.smoky, settings)
     domain = box if settings.resolution is None else replace(box, resolution=settings.resolution)
     return domain, _resolution_by_hand(domain)
 
@@ -240,7 +240,8 @@ def _around(camera: Camera, samples: SmokeSamples, settings: Settings) -> tuple[
         nx, ny, nz = settings.resolution
         return (box(max(across / nx, across / ny, up / nz), settings.resolution),)
     grids = []
-    for longest in range(COARSEST, LONGEST_SIDE[settings.quality] + 1, 4):
+    allowed = LIMITS[settings.quality].voxels(max(across, up) / metres)
+    for longest in range(COARSEST, max(allowed, COARSEST) + 1, 4):
         voxel = max(across, up) / longest
         grids.append(box(voxel, (_voxels(across, voxel), _voxels(across, voxel), _voxels(up, voxel))))
     return tuple(grids)
@@ -275,36 +276,40 @@ def _same_shape(domain: Domain, most: int) -> tuple[Domain, ...]:
 
 
 def _resolved(
-    clip: Clip, camera: Camera, grids: tuple[Domain, ...], plates: Plates, smoky: tuple[int, ...], tolerance: float
+    clip: Clip, camera: Camera, grids: tuple[Domain, ...], plates: Plates, smoky: tuple[int, ...], settings: Settings
 ) -> tuple[Domain, Choice[Shape]]:
-    """The coarsest grid of some that loses no more of the smoke's detail than tolerated, and why."""
+    """The coarsest grid of some that loses no more of what the finest shows than tolerated, and why."""
     if not smoky:
         said = " x ".join(map(str, grids[0].resolution))
         return grids[0], Choice(
             "resolution", grids[0].resolution, f"Resolution: {said} voxels, since no smoke is seen."
         )
-    finest = max(grids[-1].resolution)
+    tolerance, finest = settings.selection.lost_detail, max(grids[-1].resolution)
     detail = _detail(clip, camera, grids[-1], plates, smoky)
-    domain = next((grid for grid in grids if detail.lost(max(grid.resolution)) <= tolerance), grids[-1])
-    lost = detail.lost(max(domain.resolution))
+    domain = next((grid for grid in grids if detail.lost(max(grid.resolution), finest) <= tolerance), grids[-1])
+    longest = max(domain.resolution)
+    lost = detail.lost(longest)
     reason = (
-        f"Resolution: {' x '.join(map(str, domain.resolution))} voxels, which lose {lost:.1%} of the smoke's contrast "
-        f"against {finest} along the longest side, the most at this quality."
+        f"Resolution: {' x '.join(map(str, domain.resolution))} voxels for {detail.pixels:.0f} pixels along the "
+        f"longest side: {settings.quality} loses {lost:.1%} of the smoke's contrast in the clip."
     )
-    return domain, Choice("resolution", domain.resolution, reason, {"lost": lost}, tolerance)
+    measured = {"lost": lost, "lost_beside_finest": detail.lost(longest, finest), "pixels": detail.pixels}
+    return domain, Choice("resolution", domain.resolution, reason, measured, tolerance)
 
 
-def _detail(clip: Clip, camera: Camera, finest: Domain, plates: Plates, smoky: tuple[int, ...]) -> Detail:
-    """The detail of the smoke in some frames, up to that of a grid."""
+def _detail(clip: Clip, camera: Camera, box: Domain, plates: Plates, smoky: tuple[int, ...]) -> Detail:
+    """The detail of the smoke in some frames, at the clip's own pixels."""
     frames = []
     for number in smoky[:DETAIL_FRAMES]:
         with suppress(CameraError):
-            now = camera.at(number)
-            working, pixels = working_picture(now, finest), voxel_width(now, finest)
-            plate = plates.at(number).through(working.cut, max(pixels, 1.0) ** 2)
-            picture = working.of(clip, number)
-            frames.append((picture, plate, min(pixels, 1.0)))
-    return smoke_detail(frames, max(finest.resolution))
+            part = working_picture(camera.at(number), box).part
+            frames.append((part(clip.frame(number)), plates.at(number).through(part)))
+    return smoke_detail(frames, _pixels(camera.at(smoky[0]), box))
+
+
+def _pixels(camera: Camera, box: Domain) -> float:
+    """How many pixels of a still camera's picture lie along the longest side of a box."""
+    return voxel_width(camera, box) * max(box.resolution)
 
 
 def _voxels(extent: float, voxel: float) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
@@ -9,22 +10,55 @@ from typing import Any, Literal
 from smokelift.density import DensitySettings
 from smokelift.scene import SCATTERINGS, Scattering
 from smokelift.scene.checks import integer, items, number
+from smokelift.scene.domain import LONGEST
 from smokelift.velocity import VelocitySettings
 
 MethodName = Literal["default", "paper"]
-Quality = Literal["draft", "balanced", "fine"]
+Quality = Literal["draft", "balanced", "fine", "final"]
 
 METHODS: tuple[MethodName, ...] = ("default", "paper")
-QUALITIES: tuple[Quality, ...] = ("draft", "balanced", "fine")
+QUALITIES: tuple[Quality, ...] = ("draft", "balanced", "fine", "final")
 
-LONGEST_SIDE: Mapping[Quality, int] = {"draft": 64, "balanced": 96, "fine": 144}
-"""Voxels along the domain's longest side at most, where they are chosen; 96 is the paper's smallest grid."""
 
-LOST_DETAIL: Mapping[Quality, float] = {"draft": 0.02, "balanced": 0.01, "fine": 0.005}
-"""Share of the smoke's contrast that a chosen grid may lose: a quality loses half as much as the one before, for three
-to four times the voxels (docs/experiments/resolution-selection.md)."""
+@dataclass(frozen=True)
+class GridLimit:
+    """How many voxels a quality allows along the domain's longest side, where they are chosen.
 
-ITERATIONS: Mapping[Quality, tuple[int, int]] = {"draft": (4, 4), "balanced": (6, 8), "fine": (8, 14)}
+    Attributes
+    ----------
+    share
+        Of the clip's pixels along that side.
+    least
+        Voxels that are allowed in any case, if the clip has as many pixels.
+    most
+        Voxels that are allowed whatever the clip has.
+    """
+
+    share: float
+    least: int
+    most: int
+
+    def voxels(self, pixels: float) -> int:
+        """Return how many are allowed where the clip has so many pixels; a multiple of four, as grids of pyramids."""
+        return 4 * math.ceil(min(pixels, max(self.least, min(self.share * pixels, self.most))) / 4)
+
+
+LIMITS: Mapping[Quality, GridLimit] = {
+    "draft": GridLimit(1 / 6, 64, 64),
+    "balanced": GridLimit(1 / 3, 96, 128),
+    "fine": GridLimit(1 / 2, 144, 256),
+    "final": GridLimit(1, 0, LONGEST),
+}
+"""Of each quality. What a share loses is much the same whatever the clip's size; the bounds keep the time of a frame,
+which goes with the voxels, from growing with the size of the clip (docs/experiments/resolution-selection.md)."""
+
+LOST_DETAIL: Mapping[Quality, float] = {"draft": 0.02, "balanced": 0.01, "fine": 0.005, "final": 0.0025}
+"""Share of the smoke's contrast that a chosen grid may lose beside the finest of its quality: each loses half as
+much as the one before (docs/experiments/resolution-selection.md)."""
+
+ITERATIONS: Mapping[Quality, tuple[int, int]] = {
+    "draft": (4, 4), "balanced": (6, 8), "fine": (8, 14), "final": (8, 14)
+}  # fmt: skip
 """Multiplicative iterations and steps of descent at most (docs/experiments/density-descent.md)."""
 
 
@@ -38,8 +72,8 @@ class SelectionSettings:
         Measure open choices on the clip. Without it a guessed box gets the finest grid of the quality, and the richest
         model of scattering that the known light allows is taken.
     lost_detail
-        Share of the smoke's contrast that a grid may lose against the finest of the quality; a preset has that of
-        `LOST_DETAIL`.
+        Share of the smoke's contrast that a grid may lose of what the finest of the quality shows; a preset has that
+        of `LOST_DETAIL`.
     scattering_error
         Error, as a share of what the smoke changes in the picture, that a cheaper model of scattering may add. Without
         shadows that is reached at an optical depth of about 0.15, where the mass comes out 5 % too small
@@ -64,8 +98,8 @@ class Settings:
     method
         ``"default"``, or ``"paper"``: the paper's loop as it is, for comparison.
     quality
-        ``"draft"``, ``"balanced"`` or ``"fine"``: how much of the clip's detail the grid shows (unless it is
-        given), and iterations.
+        ``"draft"``, ``"balanced"``, ``"fine"`` or ``"final"`` (a voxel a pixel): how much of the clip's detail the
+        grid shows (unless it is given), and iterations.
     resolution
         Voxels along x, y, z. ``"auto"`` takes as few as the detail of the clip's smoke allows, up to the quality's
         limit. None takes the scene's, or ``"auto"`` if it has none.

@@ -39,17 +39,24 @@ class ShotView:
 
     def observe(self, frame: int, domain: Domain) -> Observation | None:
         """What the camera saw in a frame, from 0, as a small picture; None if nothing of the domain is in it."""
-        working = self.working
+        working = self.working_at(frame, domain)
+        if working is None:
+            return None
         if self.camera.moves:
-            try:
-                working = working_picture(self.camera.at(frame), domain)
-            except CameraError:
-                return None
             plate = self.plates.at(frame).through(working.cut, working.pixels)
         else:
             plate = self._still_plates.at(frame)
         image = working.of(self.clip, frame)
         return Observation(working.camera, image, plate)
+
+    def working_at(self, frame: int, domain: Domain) -> WorkingPicture | None:
+        """The small picture of a frame, from 0; None if nothing of the domain is in it."""
+        if not self.camera.moves:
+            return self.working
+        try:
+            return working_picture(self.camera.at(frame), domain)
+        except CameraError:
+            return None
 
     @cached_property
     def _still_plates(self) -> Plates:

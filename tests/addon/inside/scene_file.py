@@ -14,6 +14,7 @@ from mathutils import Euler, Matrix, Vector
 from addon.blender_scene import ShotError
 from addon.box_table import box_corners, engine_to_world
 from addon.clip_table import use_frames
+from addon.contract import BOX_VOXELS
 from addon.scene_file import options, shot_tables
 from addon.take import Take
 from smokelift.scene import Scene
@@ -352,12 +353,10 @@ def test_guessing_leaves_camera_and_box_to_the_engine(shot, tmp_path) -> None:
 # box
 
 
-@pytest.mark.parametrize(("quality", "longest"), [("draft", 64), ("balanced", 96), ("fine", 144)])
-def test_the_box_becomes_cubes(shot, tmp_path, quality, longest) -> None:
-    """As many as the engine would choose; the box holds all of the user's, and keeps its floor."""
-    smoke(shot).smokelift.quality = quality
+def test_the_box_becomes_cubes(shot, tmp_path) -> None:
+    """The engine chooses how many in these proportions; the box holds all of the user's, and keeps its floor."""
     domain = engines(shot, tmp_path).domain
-    assert max(domain.resolution) == longest
+    assert max(domain.resolution) == BOX_VOXELS
     assert all(low <= -1.0 + 1e-6 for low in domain.min[:2])
     assert all(high >= 1.0 - 1e-6 for high in domain.max[:2])
     assert (domain.min[2], domain.max[2]) == pytest.approx((0.0, 3.0))

@@ -85,6 +85,22 @@ def test_the_suggestion_has_the_same_shape(monkeypatch, domain, gigabytes) -> No
     assert replace(domain, resolution=suggestion(domain)).voxel_size > domain.voxel_size
 
 
+def test_a_box_that_was_found_follows_its_voxels(monkeypatch) -> None:
+    """Nearly all that fits is suggested, where a given box can only be divided evenly."""
+    free(monkeypatch, 8)
+    large = replace(DOMAINS["paper"], resolution=(516, 516, 948), max=(1, 1, 2 * 948 / 516))
+    sizes = []
+    for given in (True, False):
+        with pytest.raises(NotEnoughMemoryError) as caught:
+            require_memory(large, FRAMES, DETAILED, given=given)
+        x, y, z = (int(n) for n in str(caught.value).rpartition(" ")[2].strip(".").split(","))
+        assert memory_needed((x, y, z), FRAMES, DETAILED) <= 8 * 2**30
+        assert x / z == pytest.approx(516 / 948, rel=0.02)
+        sizes.append(z)
+    assert sizes[0] < sizes[1]
+    assert memory_needed((x + 8, y + 8, z + 8), FRAMES, DETAILED) > 8 * 2**30
+
+
 def test_the_sentence_says_how_much(monkeypatch) -> None:
     """What is wanted, what is needed and what is free."""
     free(monkeypatch, 0.4)

@@ -10,9 +10,9 @@ import pytest
 from smokelift.app.progress import reporter
 
 
-def figures(seconds: float, hull_share: float = 0.1) -> dict[str, Any]:
+def figures(seconds: float, hull_share: float = 0.1, psnr: float = 41.23) -> dict[str, Any]:
     return {
-        **({"psnr": 41.23} if hull_share > 0 else {}),
+        **({"psnr": psnr} if hull_share > 0 else {}),
         "hull_share": hull_share,
         "seconds_density": seconds / 2,
         "seconds_velocity": seconds / 2,
@@ -67,6 +67,16 @@ def test_text_names_what_matters(capsys) -> None:
     assert "2/2" in out
     assert "no smoke" in out
     assert "2 frames in out." in out
+
+
+def test_the_fit_that_stays_on_the_terminal_is_the_runs(capsys) -> None:
+    """The median, not the last frame's."""
+    with reporter("text") as say:
+        say.start(3, 0)
+        for number, psnr in enumerate((40.0, 30.0, 20.0), 1):
+            say.frame(number, figures(1.0, psnr=psnr))
+        say.finish("done.", {})
+    assert "fit 30.0 dB" in capsys.readouterr().out
 
 
 def test_text_errors_go_to_standard_error(capsys) -> None:

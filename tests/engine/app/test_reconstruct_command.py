@@ -65,6 +65,9 @@ def test_progress_as_json(plume, tmp_path, capsys) -> None:
     assert all(event["figures"]["psnr"] > 30 for event in frames)
     assert told[-2]["seconds_left"] == 0
     assert (told[-1]["directory"], told[-1]["frames"]) == (str(out), 5)
+    middle = float(np.median([event["figures"]["psnr"] for event in frames]))
+    assert told[-1]["psnr"] == pytest.approx(middle)
+    assert f"{middle:.1f} dB inside the smoke at the clip's pixels (median)" in told[-1]["text"]
 
 
 def test_further_views_of_a_scene_file_are_used(two_views, tmp_path, capsys) -> None:

@@ -39,7 +39,7 @@ def test_a_sequence_renders_to_its_fits_own_figure(name, tmp_path) -> None:
         for frame in frames:
             (view,) = ViewSet.of(shot.observe(frame.number - 1), shot.optics).views
             again = sequence.render(frame.number, camera=view.camera)
-            assert decibels(again, view.image, view.counted) == pytest.approx(frame.figures["psnr"], abs=0.1)
+            assert decibels(again, view.image, view.counted) == pytest.approx(frame.figures["psnr_working"], abs=0.1)
             np.testing.assert_array_equal(
                 render(sequence.density(frame.number), sequence.scene, camera=view.camera), again
             )

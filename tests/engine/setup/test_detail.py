@@ -16,9 +16,10 @@ from smokelift.footage.noise import EIGHT_BIT_NOISE, EIGHT_BIT_STEP, lasting_noi
 from smokelift.footage.plate import Plate
 from smokelift.output.images import write_image
 from smokelift.scene import Camera, ClipSource, Domain, Scene
+from smokelift.scene.projection import voxel_width
 from smokelift.setup.detail import Detail, smoke_detail
 from smokelift.setup.prepare import prepare_shot
-from smokelift.setup.settings import LONGEST_SIDE, Settings
+from smokelift.setup.settings import LIMITS, Settings
 from smokelift.setup.shot import Shot
 
 SIZE = (192, 256)
@@ -70,13 +71,14 @@ def test_a_blurred_clip_gets_a_coarser_grid(filmed) -> None:
     """A sharp one gets what the quality allows; in the box that was given, with its proportions."""
     sharp, soft, blurred = (shot_of(filmed(blur), AUTO) for blur in (0.0, 4.0, 12.0))
     sides = [max(shot.scene.domain.resolution) for shot in (sharp, soft, blurred)]
-    assert sides[0] >= LONGEST_SIDE["draft"] - 3
+    assert sides[0] >= LIMITS["draft"].most - 3
     assert sides[0] > sides[1] >= sides[2]
     assert sides[2] <= 36
     for shot in (sharp, soft, blurred):
         (choice,) = (choice for choice in shot.choices if choice.what == "resolution")
         assert choice.chosen == shot.scene.domain.resolution
-        assert choice.measured["lost"] <= choice.tolerance
+        assert choice.measured["lost_beside_finest"] <= choice.tolerance
+        assert f"draft loses {choice.measured['lost']:.1%} of the smoke's contrast in the clip" in choice.reason
         assert not choice.by_hand
         assert (shot.scene.domain.min, shot.scene.domain.max) == ((-1, -1, 0), (1, 1, 3))
         x, y, z = shot.scene.domain.resolution
@@ -91,7 +93,7 @@ def test_noise_is_no_detail() -> None:
     noisy = srgb_to_linear((linear_to_srgb(clean) + noise).astype(np.float32))
     clear = np.ones((256, 192), np.float32)
     lost = [
-        smoke_detail([(picture, Plate(grey, clear, lasting_noise(deviation)), 1.0)], 256).lost(64)
+        smoke_detail([(picture, Plate(grey, clear, lasting_noise(deviation)))], 256).lost(64)
         for picture, deviation in ((clean, EIGHT_BIT_STEP), (noisy, np.float32(3 / 255)))
     ]
     assert lost[0] < 0.01
@@ -120,7 +122,36 @@ def test_quality_is_the_limit(filmed) -> None:
     """More than it is never chosen."""
     scene = filmed(0.0, grain=0.8)
     sides = [longest(scene, Settings.preset(quality, resolution="auto")) for quality in ("draft", "balanced")]
-    assert sides[0] <= LONGEST_SIDE["draft"] < sides[1] <= LONGEST_SIDE["balanced"]
+    assert sides[0] <= LIMITS["draft"].most < sides[1] <= LIMITS["balanced"].most
+
+
+@pytest.mark.parametrize("box", [True, False])
+def test_final_has_a_voxel_a_pixel(filmed, box) -> None:
+    """Of a sharp clip, in a box that is given or found; of a blurred one fewer, and it loses nothing."""
+    for blur in (0.0, 12.0):
+        scene = filmed(blur, grain=0.3)
+        scene = scene if box else Scene(clip=scene.clip, background=scene.background)
+        shot = shot_of(scene, Settings.preset("final", resolution="auto"))
+        (choice,) = (choice for choice in shot.choices if choice.what == "resolution")
+        pixels = choice.measured["pixels"]
+        across = voxel_width(shot.scene.camera, shot.scene.domain) * max(choice.chosen)
+        assert pixels == pytest.approx(across, rel=1e-3)
+        if blur:
+            assert max(choice.chosen) < 0.6 * pixels
+        else:
+            assert max(choice.chosen) == pytest.approx(pixels, rel=0.05)
+        assert choice.measured["lost"] < 0.005
+
+
+def test_what_is_lost_is_measured_against_the_clip(filmed) -> None:
+    """A quality says what its own finest grid loses, and finer ones lose less."""
+    scene = filmed(0.0, grain=0.8)
+    lost = [
+        next(c for c in shot_of(scene, Settings.preset(quality, resolution="auto")).choices if c.what == "resolution")
+        for quality in ("draft", "balanced", "final")
+    ]
+    assert lost[0].measured["lost"] > 0.05
+    assert lost[0].measured["lost"] > 1.2 * lost[1].measured["lost"] > 1.2 * lost[2].measured["lost"]
 
 
 def test_a_grid_loses_what_is_finer_than_two_of_its_voxels() -> None:
@@ -128,10 +159,12 @@ def test_a_grid_loses_what_is_finer_than_two_of_its_voxels() -> None:
     columns = np.indices((192, 192))[1]
     wave = (0.3 + 0.1 * np.cos(2 * np.pi * (columns + 0.5) / 6)).astype(np.float32)
     plate = Plate(np.zeros((192, 192, 3), np.float32), np.ones((192, 192), np.float32), EIGHT_BIT_NOISE)
-    detail = smoke_detail([(np.repeat(wave[..., None], 3, -1), plate, 1.0)], 192)
+    detail = smoke_detail([(np.repeat(wave[..., None], 3, -1), plate)], 192)
     assert detail.lost(192 // 3 + 4) < 0.05
     assert detail.lost(192 // 4) > 0.1
-    assert detail.lost(192) == 0
+    assert detail.lost(192) == detail.lost(192 // 4, 192 // 4) == 0
+    assert detail.lost(100, 192) < 0.01
+    assert detail.lost(192 // 4, 192) == detail.lost(192 // 4)
     assert Detail(np.zeros(96), 64).lost(32) == 0
 
 

@@ -27,7 +27,7 @@ from smokelift.scene.projection import project
 from smokelift.setup.choice import UNDETERMINED
 from smokelift.setup.geometry import COARSEST
 from smokelift.setup.prepare import boundaries, prepare_shot
-from smokelift.setup.settings import LONGEST_SIDE, Settings
+from smokelift.setup.settings import LIMITS, Settings
 from smokelift.setup.shot import Shot
 from tests.engine.setup.shots import shot_of
 
@@ -126,7 +126,7 @@ def test_the_domain_holds_the_smoke(guessed, passing, draft) -> None:
     domain = guessed.scene.domain
     edges = (np.array(domain.max) - domain.min) / domain.resolution
     np.testing.assert_allclose(edges, edges[0], rtol=1e-6)
-    assert COARSEST <= max(domain.resolution) <= LONGEST_SIDE[draft.quality] + 4
+    assert COARSEST <= max(domain.resolution) <= LIMITS[draft.quality].most + 4
     pixels, depth = project(guessed.scene.camera, domain.corners())
     assert (depth > 0).all()
     with Clip.open(passing.clip) as clip:

@@ -9,18 +9,32 @@ from typing import Any
 
 import pytest
 
-from smokelift.setup.settings import LONGEST_SIDE, METHODS, QUALITIES, Settings
+from smokelift.setup.settings import LIMITS, METHODS, QUALITIES, GridLimit, Settings
 
 
 def test_better_qualities_cost_more() -> None:
-    """Resolution, the detail that it keeps, and iterations rise from draft to fine."""
+    """Voxels and the detail that they keep rise from draft to final, and iterations never fall."""
     presets = [Settings.preset(quality) for quality in QUALITIES]
-    costs = [
-        (LONGEST_SIDE[p.quality], -p.selection.lost_detail, p.density.fit_iterations, p.density.descent_iterations)
-        for p in presets
-    ]
-    for less, more in itertools.pairwise(costs):
-        assert all(a < b for a, b in zip(less, more, strict=True))
+    for less, more in itertools.pairwise(presets):
+        for pixels in (300, 600, 4000):
+            assert LIMITS[less.quality].voxels(pixels) < LIMITS[more.quality].voxels(pixels)
+        assert less.selection.lost_detail > more.selection.lost_detail
+        assert less.density.fit_iterations <= more.density.fit_iterations
+        assert less.density.descent_iterations <= more.density.descent_iterations
+
+
+@pytest.mark.parametrize(
+    ("pixels", "allowed"),
+    [(40, (40, 40, 40, 40)), (128, (64, 96, 128, 128)), (360, (64, 120, 180, 360)), (2000, (64, 128, 256, 2000))],
+)
+def test_qualities_are_shares_of_the_clips_pixels(pixels, allowed) -> None:
+    """Never more than a voxel a pixel; a small clip gets all that it has, a large one no more than can be afforded."""
+    assert tuple(LIMITS[quality].voxels(pixels) for quality in QUALITIES) == allowed
+
+
+def test_a_share_is_rounded_up_to_a_multiple_of_four() -> None:
+    """Pyramids halve it."""
+    assert GridLimit(1 / 2, 0, 1000).voxels(203) == 104
 
 
 def test_the_default_is_balanced() -> None:
@@ -86,7 +100,7 @@ def test_bad_values_are_refused(values: dict[str, Any], words: str) -> None:
 
 def test_a_quality_that_there_is_not_is_refused() -> None:
     """Before it is looked up."""
-    with pytest.raises(ValueError, match="quality must be one of draft, balanced, fine, not 'ultra'"):
+    with pytest.raises(ValueError, match="quality must be one of draft, balanced, fine, final, not 'ultra'"):
         Settings.preset("ultra")  # type: ignore[arg-type]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import time
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 import numpy as np
@@ -63,7 +64,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     with Clip.open(source) as clip:
         written_kinds(options.npz)  # before the clip is looked at, which takes minutes
         shot = prepare_shot(clip, scene, settings)
-        require_memory(shot.scene.domain, len(clip), settings)
+        require_memory(shot.scene.domain, len(clip), settings, given=scene.domain is not None)
         for note in (*shot.notes, *(choice.reason for choice in shot.choices), *made_up(shot)):
             say.note(note)
         frames = reconstruct(clip, scene, settings, options.out, npz=options.npz, resume=options.resume, shot=shot)
@@ -88,9 +89,12 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     for note in shortcomings(figures):
         say.note(note)
     seconds = time.monotonic() - began
+    decibels = [of_frame["psnr"] for of_frame in figures if of_frame.get("psnr") is not None]
+    fit = median(decibels) if decibels else None
+    met = "" if fit is None else f", {fit:.1f} dB inside the smoke at the clip's pixels (median)"
     say.finish(
-        f"{counted(len(sequence.frames), 'frame')} in {options.out} ({seconds:.0f} s).",
-        {"directory": str(options.out), "frames": len(sequence.frames), "seconds": round(seconds, 1)},
+        f"{counted(len(sequence.frames), 'frame')} in {options.out} ({seconds:.0f} s){met}.",
+        {"directory": str(options.out), "frames": len(sequence.frames), "seconds": round(seconds, 1), "psnr": fit},
     )
 
 

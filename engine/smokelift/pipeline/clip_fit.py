@@ -1,0 +1,134 @@
+"""How closely a density renders to its clip, at the clip's own pixels.
+
+A fit is judged on the working picture, a pixel a voxel; what is finer than the grid shows here only. So that it costs
+little, rays go through every n-th pixel of every n-th row, n odd: the ray through the middle of a block of n x n pixels
+is that of its middle pixel, so these pixels are rendered exactly, and the mean over them stands for that over all.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smokelift.footage.matte import matte
+from smokelift.footage.working_picture import WorkingPicture
+from smokelift.render import Image, Optics, Volume
+from smokelift.setup.shot import Shot, ShotView
+
+OUTLINE = 320
+"""Pixels along the longer side of the picture, at most, in which the smoke is found: its outline needs no more
+(docs/experiments/clip-pixels.md)."""
+
+RAYS_A_VOXEL = 2.0
+"""Rays along a voxel, about, where it has as many pixels: what interpolation leaves repeats from voxel to voxel, and
+two rays a voxel see both its ends and its middle (docs/experiments/clip-pixels.md)."""
+
+
+@dataclass(frozen=True, eq=False)
+class BesideClip:
+    """Pixels of a clip's frame where the domain is, and what a density shows there.
+
+    Attributes
+    ----------
+    seen, shown, behind : (rows, columns, 3)
+        The clip's, the density's and the clean plate's; linear radiance.
+    inside : (rows, columns) bool
+        Which of them show smoke in the clip.
+    """
+
+    seen: Image
+    shown: Image
+    behind: Image
+    inside: NDArray[np.bool_]
+
+    @property
+    def psnr(self) -> float | None:
+        """Of linear radiance inside the smoke (dB, peak 1); None without smoke."""
+        left = np.square((self.seen - self.shown)[self.inside], dtype=np.float64)
+        return float(-10 * np.log10(max(left.mean(), 1e-12))) if left.size else None
+
+
+def beside_clip(
+    view: ShotView, optics: Optics, frame: int, density: Volume, step: int | None = None
+) -> BesideClip | None:
+    """Render a density beside a frame of a view's clip, at the clip's own pixels.
+
+    Parameters
+    ----------
+    view
+        The camera, its clip and its plates.
+    optics
+        How light travels through the domain.
+    frame
+        Counted from 0.
+    density : (nx, ny, nz) float32
+    step
+        Every so many pixels along and across, an odd number; 1 for all. By default as many as leave `RAYS_A_VOXEL`.
+
+    Returns
+    -------
+    None if nothing of the domain is in the frame's picture.
+    """
+    working = view.working_at(frame, optics.domain)
+    if working is None:
+        return None
+    step = min(step or _step(working), _odd(min(working.width, working.height)))
+    columns, rows = working.width // step, working.height // step
+    # what is left over of a step is left out on both sides
+    left, top = (working.width - columns * step) // 2, (working.height - rows * step) // 2
+    camera = view.camera.at(frame).cropped(working.left + left, working.top + top, columns * step, rows * step)
+    across = left + step // 2 + step * np.arange(columns)
+    down = top + step // 2 + step * np.arange(rows)
+
+    def cut(picture: NDArray[np.float32]) -> NDArray[np.float32]:
+        part = working.part(picture)
+        return part[down[0] : down[-1] + 1 : step, across[0] : across[-1] + 1 : step]
+
+    plate = view.plates.at(frame)
+    behind = cut(plate.image)
+    renderer = optics.renderer(camera.resized(columns, rows), behind, density > 0)
+    shown = renderer.image(density)
+    seen = view.clip.area_average(frame, columns, rows, cut)
+    shrink = max(1.0, max(working.width, working.height) / OUTLINE)
+    small = working.resized(*(max(1, round(side / shrink)) for side in (working.width, working.height)))
+    smoke = matte(small.of(view.clip, frame), plate.through(small.cut, small.pixels)).mask
+    inside = smoke[np.ix_(down * smoke.shape[0] // working.height, across * smoke.shape[1] // working.width)]
+    return BesideClip(seen, shown, behind, inside)
+
+
+def clip_psnr(shot: Shot, frame: int, density: Volume) -> dict[str, float]:
+    """Return the PSNR of a frame's density at its clips' own pixels inside the smoke.
+
+    Parameters
+    ----------
+    shot
+        With its cameras.
+    frame
+        Counted from 0.
+    density : (nx, ny, nz) float32
+
+    Returns
+    -------
+    ``psnr`` of the input, ``psnr_view_1``, ... of further views, in dB of linear radiance with peak 1; each absent
+    where its picture shows no smoke. Smoke alone: fire is left out of the pictures before.
+    """
+    figures = {}
+    for number, view in enumerate(shot.views):
+        beside = beside_clip(view, shot.optics, frame, density)
+        psnr = None if beside is None else beside.psnr
+        if psnr is not None:
+            figures[f"psnr_view_{number}" if number else "psnr"] = psnr
+    return figures
+
+
+def _step(working: WorkingPicture) -> int:
+    """The odd number of pixels that leaves about `RAYS_A_VOXEL` rays along a voxel, 1 at least."""
+    return max(1, 2 * round((math.sqrt(working.pixels) / RAYS_A_VOXEL - 1) / 2) + 1)
+
+
+def _odd(pixels: int) -> int:
+    """The largest odd number up to so many pixels."""
+    return pixels - 1 + pixels % 2

@@ -1,0 +1,123 @@
+"""The fit at the clip's own pixels: exact where rays are sampled, and blind to nothing that the grid lacks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from smokelift import Clip, Scene, reconstruct, render
+from smokelift.footage.matte import matte
+from smokelift.output.images import write_image
+from smokelift.pipeline.clip_fit import beside_clip, clip_psnr
+from smokelift.scene import ClipSource
+from smokelift.setup.prepare import prepare_shot
+from smokelift.setup.settings import Settings
+from smokelift.setup.shot import Shot
+from tests.engine.conftest import Plume
+
+SHARPER = 6
+"""Pixels of the clip along one of the plume's."""
+
+
+@pytest.fixture(scope="module")
+def sharp(plume, tmp_path_factory) -> Plume:
+    """The plume's first frames with more pixels than its grid has voxels, and a fine grain in the smoke."""
+    folder = tmp_path_factory.mktemp("sharp")
+    width, height = plume.scene.camera.size
+    camera = plume.scene.camera.resized(SHARPER * width, SHARPER * height)
+    scene = replace(plume.scene, camera=camera)
+    grain = 1 + np.random.default_rng(3).normal(0, 0.15, (*camera.size[::-1], 1))
+    for number, density in enumerate(plume.densities[:3]):
+        picture = render(density, scene) * grain
+        write_image(folder / f"frame_{number:04d}.exr", picture.astype(np.float32))
+    return replace(plume, scene=replace(scene, clip=ClipSource(folder / "frame_####.exr", fps=24.0)))
+
+
+@pytest.fixture(scope="module")
+def shot(sharp, draft) -> Iterator[Shot]:
+    with Clip.open(sharp.scene.clip) as clip:
+        yield prepare_shot(clip, sharp.scene, draft)
+
+
+def test_all_pixels_are_those_of_the_clips_camera(shot, sharp) -> None:
+    """The part of the picture where the box is, and the smoke's pixels in it."""
+    beside = beside_clip(shot.views[0], shot.optics, 1, sharp.densities[1], step=1)
+    part = shot.views[0].working.part
+    whole = render(sharp.densities[1], sharp.scene)
+    np.testing.assert_allclose(beside.shown, part(whole), atol=1e-5)
+    np.testing.assert_array_equal(beside.seen, part(shot.clip.frame(1)))
+    plate = shot.views[0].plates.at(1).through(part)
+    smoke = matte(beside.seen, plate).mask
+    assert np.count_nonzero(beside.inside & smoke) > 0.9 * np.count_nonzero(beside.inside | smoke)
+    wanted = -10 * np.log10(np.square(beside.seen - beside.shown)[beside.inside].mean())
+    assert beside.psnr == pytest.approx(wanted, abs=1e-3)
+
+
+@pytest.mark.parametrize("step", [3, 5])
+def test_rays_between_pixels_are_left_out_and_none_is_moved(shot, sharp, step) -> None:
+    """Every n-th pixel is as it is among all; the mean over them stands for that over all."""
+    every, some = (beside_clip(shot.views[0], shot.optics, 1, sharp.densities[1], n) for n in (1, step))
+    rows, columns = every.inside.shape
+    down, right = (n % step // 2 + step // 2 for n in (rows, columns))
+    for name in ("seen", "shown", "behind", "inside"):
+        wanted = getattr(every, name)[down::step, right::step][: rows // step, : columns // step]
+        np.testing.assert_allclose(getattr(some, name), wanted, atol=1e-5, err_msg=name)
+    assert some.psnr == pytest.approx(every.psnr, abs=0.5)
+
+
+def test_detail_that_the_grid_lacks_counts(sharp, draft) -> None:
+    """The working picture has none of it, and is met far better."""
+    with Clip.open(sharp.scene.clip) as clip:
+        for frame in reconstruct(clip, sharp.scene, draft):
+            assert 15 < frame.figures["psnr"] < frame.figures["psnr_working"] - 5
+
+
+def test_the_truth_is_as_good_as_the_clips_detail(shot, sharp) -> None:
+    """What is left is the grain: 0.15 of the smoke's radiance, root mean square."""
+    beside = beside_clip(shot.views[0], shot.optics, 1, sharp.densities[1], step=1)
+    error = np.square(0.15 * beside.shown)[beside.inside].mean()
+    assert beside.psnr == pytest.approx(-10 * np.log10(error), abs=0.1)
+    assert clip_psnr(shot, 1, sharp.densities[1])["psnr"] == pytest.approx(beside.psnr, abs=1)
+
+
+def test_every_view_has_a_figure(two_views, draft) -> None:
+    """Named as the working picture's is."""
+    with Clip.open(two_views.clip) as clip:
+        for frame in reconstruct(clip, two_views, draft):
+            names = {name for name in frame.figures if name.startswith("psnr")}
+            assert names == {"psnr", "psnr_view_1", "psnr_working", "psnr_working_view_1"}
+
+
+def test_a_moving_camera_is_followed(plume, tracked, draft) -> None:
+    """The true density has hardly any error in the picture of any frame."""
+    with Clip.open(tracked.clip) as clip:
+        shot = prepare_shot(clip, tracked, draft)
+        for number, density in enumerate(plume.densities):
+            assert clip_psnr(shot, number, density)["psnr"] > 40
+
+
+@pytest.mark.parametrize("width", [1, 2, 7])
+def test_a_sliver_of_the_box_is_enough(shot, sharp, width) -> None:
+    """Of which fewer pixels are left than there are to a step."""
+    view = shot.views[0]
+    sliver = replace(view, working=replace(view.working, left=view.working.left + 90, width=width))
+    beside = beside_clip(sliver, shot.optics, 1, sharp.densities[1], step=9)
+    assert beside.seen.shape == beside.shown.shape
+    assert 0 < beside.seen.shape[1] <= width
+    assert beside.inside.any()
+
+
+def test_no_smoke_has_no_figure(plume, draft, tmp_path) -> None:
+    """Nor has a frame whose picture shows nothing; one in which a density is missing has a bad one."""
+    nothing = np.zeros_like(plume.densities[0])
+    scene: Scene = plume.write(tmp_path, [*plume.densities[:2], nothing])
+    with Clip.open(scene.clip) as clip:
+        shot = prepare_shot(clip, scene, Settings.preset("draft"))
+        assert clip_psnr(shot, 2, nothing) == {}
+        assert clip_psnr(shot, 1, nothing)["psnr"] < 25
+        figures = [frame.figures for frame in reconstruct(clip, scene, draft, shot=shot)]
+    assert ["psnr" in each for each in figures] == [True, True, False]
+    assert "psnr_working" not in figures[2]
