@@ -91,11 +91,11 @@ def found(scene: Scene, settings: Settings, numbers: Iterable[int]) -> tuple[Res
             frame = next(reconstruct(view.clip, scene, settings, shot=one))
             densities[number] = frame.density
             seen = view.observe(0, shot.scene.domain)
-            if seen is not None and "psnr" in frame.figures:
+            if seen is not None and "psnr_working" in frame.figures:
                 behind = seen.plate.image
                 renderer = scene_renderer(shot.scene, seen.camera, behind)
                 shown = renderer.image(frame.density)
-                whole = front_figures(shown, seen.image, behind, renderer.transmittance, frame.figures["psnr"])
+                whole = front_figures(shown, seen.image, behind, renderer.transmittance, frame.figures["psnr_working"])
                 figures += [whole] if whole else []
         return Result(shot.scene, densities), figures
 

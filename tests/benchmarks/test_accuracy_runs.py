@@ -12,8 +12,8 @@ from benchmarks.accuracy.report import ORBIT_COLUMNS, error_columns, markdown
 from benchmarks.accuracy.runs import run_method, run_settings, run_views
 from benchmarks.accuracy.scenes import picture_on_screen
 from smokelift.density import (
-    DetailedDepth,
     DensitySettings,
+    DetailedDepth,
     GradientFit,
     NothingCarried,
     Observation,

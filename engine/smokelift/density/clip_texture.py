@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from smokelift.density.exemplar import SIZE, Exemplar, Picture
 from smokelift.density.observation import ObservedClip, View
-from smokelift.density.patches import SIZE, Exemplar, Picture
 from smokelift.density.turntable import Turntable
 
 FRAMES = 12

@@ -2,7 +2,7 @@
 
 The smooth answer of `RoundDepth` is the mean of all smokes that show one picture. From the side it is a spindle without
 detail. A plausible smoke shows from every side what the clip shows from the front: not one of its pictures, but the
-distribution of their patches (`patches`). Noise breaks the spindle's symmetry. Then, from coarse to fine, pictures of
+distribution of their patches (`exemplar`). Noise breaks the spindle's symmetry. Then, from coarse to fine, pictures of
 the smoke from many azimuths are moved towards that distribution, and the smoke is scaled along their rays to follow.
 The rows of every picture keep the amounts of the smooth answer, and after each round the cameras' pictures have their
 turn. What is carried on from the frame before has met the clip's statistics already and needs one round.
@@ -20,11 +20,11 @@ from scipy import ndimage
 import smokelift._core as _core
 from smokelift.density.clip_texture import ClipTexture
 from smokelift.density.depth_prior import DepthEstimate, RoundDepth
+from smokelift.density.exemplar import Exemplar, enlarged, reduced
 from smokelift.density.hull import inside
 from smokelift.density.multiplicative import fit_multiplicative, take_turns
 from smokelift.density.objective import Term, camera_terms
 from smokelift.density.observation import ObservedClip, ViewSet
-from smokelift.density.patches import Exemplar, enlarged, reduced
 from smokelift.density.turntable import Turntable
 from smokelift.render import Volume
 from smokelift.scene import Camera

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 from smokelift import _core
-from smokelift.density.patches import SIZE, Exemplar, enlarged, reduced
+from smokelift.density.exemplar import SIZE, Exemplar, enlarged, reduced
 
 
 def smoke(seed: int, fineness: float, shape: tuple[int, int] = (48, 64)) -> np.ndarray:
