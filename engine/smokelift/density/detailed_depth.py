@@ -36,15 +36,18 @@ SMOOTH_ITERATIONS = 4
 SMOOTH_TOLERANCE = 0.02
 """Share of the objective that one of them has to gain for another to follow, as in the fit."""
 
-NOISE = 1.5
-"""Standard deviation of the logarithm of the noise that breaks the smooth answer's symmetry
-(docs/experiments/every-view.md)."""
+NOISE = 2.0
+"""Standard deviation of the logarithm of the noise that breaks the smooth answer's symmetry: stronger than the smoke's
+own detail, for the pictures from all sides level most of it (docs/experiments/every-view.md)."""
 
 LATTICE = 32
 """Nodes along each side of the noise's lattice, which repeats."""
 
-FINEST_NOISE = 1.5
-"""Voxels between nodes of the finest noise."""
+COARSEST_NOISE = 2.0
+"""Distance between nodes of the coarsest noise, in standard deviations of the smoke's width: a lobe is as large."""
+
+FINEST_NOISE = 3.5
+"""Voxels between nodes of the finest noise, at least: finer noise stays as grains (docs/experiments/every-view.md)."""
 
 AMOUNTS = 4.0
 """Standard deviation (voxels) of the blur that noise does not change."""
@@ -258,7 +261,7 @@ def _noise(places: Sequence[NDArray[np.float64]], width: float, seed: int) -> ND
     """Noise (n,) of unit variance at some places (voxels), in octaves from about the smoke's width to single voxels."""
     random = np.random.default_rng(seed)
     total = np.zeros(places[0].shape, np.float32)
-    spacing, octaves = 0.8 * width, 0
+    spacing, octaves = COARSEST_NOISE * width, 0
     while octaves == 0 or spacing >= FINEST_NOISE:
         lattice = random.standard_normal((LATTICE,) * 3).astype(np.float32)
         at = [place / spacing + shift for place, shift in zip(places, random.uniform(0, LATTICE, 3), strict=True)]
