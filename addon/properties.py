@@ -270,7 +270,7 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
     detail: FloatProperty(
         name="Depth Detail",
         description=(
-            "How much fine structure in depth is made up from other frames, since the clip does not show it. "
+            "How much fine structure in depth is made up in the clip's texture, since no camera shows it. "
             "At 0 the smoke is smooth from the side, which is best for measuring; at 1 it is as detailed as in the clip"
         ),
         subtype="FACTOR",

@@ -15,7 +15,7 @@ const JOB_TYPE = {
         { key: "frames", type: "string", default: "",
           description: "First and last frame of the clip from 0, as 10:99; all of them if empty" },
         { key: "detail", type: "float", default: 1.0,
-          description: "Fine structure in depth, made up from other moments of the clip: 0 (smooth) to 1" },
+          description: "Fine structure in depth, made up in the texture of the clip: 0 (smooth) to 1" },
         { key: "seed", type: "int32", default: 0, description: "Which of the plausible smokes of the clip" },
         { key: "preview_script", type: "string", subtype: "file_path", default: "",
           description: "cycles_preview.py, where the workers see it; without it nothing is rendered" },

@@ -81,7 +81,7 @@ def add_run_options(parser: argparse.ArgumentParser) -> None:
         "--detail",
         type=float,
         metavar="0..1",
-        help="how much fine structure in depth is made up from other moments of the clip: 0 (none: smooth, best for "
+        help="how much fine structure in depth is made up, in the texture of the clip: 0 (none: smooth, best for "
         "measuring) to 1 (default; with --method paper 0)",
     )
     parser.add_argument(

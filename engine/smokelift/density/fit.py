@@ -73,7 +73,7 @@ class Density:
     ----------
     values : (nx, ny, nz) float32
     hull : (nx, ny, nz) bool
-        Voxels that the pictures allow to hold smoke.
+        Voxels that the pictures allow to hold smoke and in which the depth prior expects any.
     figures
         ``loss`` (sum of squared differences over all cameras' pictures) and ``psnr`` (dB, peak 1) of the input's
         picture, in linear radiance, over the pixels that its smoke's voxels can change, all counted alike;

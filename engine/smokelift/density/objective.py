@@ -3,10 +3,10 @@
     E(rho) = sum over terms, pixels of  w (L(rho) - I) C (L(rho) - I),    0 <= rho <= bound,  rho = 0 outside the hull
 
 A term is a picture I with the weight w of its pixels and C of their colours (3 x 3, the identity before a background
-that is known; `colour_weight`). Both stay as they are during a fit. There is one term a camera. The pictures that a
-depth prior imposes (soft observations) are no part of it: before, the start is scaled towards them in turn with the
-cameras' pictures, and what is left of them is what those allow. A prior has no penalty term. Beyond its pictures it
-acts through the start and, with it, the preconditioner of the descent.
+that is known; `colour_weight`). Both stay as they are during a fit. There is one term a camera. What a
+depth prior makes up (`Detail`) is no part of it: before, the start is scaled towards it in turn with the cameras'
+pictures, and what is left of it is what those allow. A prior has no penalty term. It acts through the voxels that may
+hold smoke, the start and, with it, the preconditioner of the descent.
 
 Noise of standard deviation s leaves E = sum w c s^2 at the true density, c of C's diagonal. Below that a fit reproduces
 noise, so it stops there (discrepancy principle: Morozov 1966). The figures that a fit reports are plain: unweighted, of

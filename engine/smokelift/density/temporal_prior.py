@@ -39,7 +39,8 @@ FAINT = 1e-3
 """Optical depth, as a fraction of the largest, below which its logarithm means nothing."""
 
 GUIDED_BLUR = 5.0
-"""Standard deviation (voxels) of the blur whose result the smooth answer decides; what is finer is the simulation's."""
+"""Standard deviation (voxels) of the blur whose result the smooth answer decides; what is finer is the simulation's
+(docs/experiments/guided-simulation.md)."""
 
 BLUR_REACH = 3.0
 """Standard deviations up to which that blur reaches."""
@@ -149,7 +150,7 @@ class GuidedSimulation:
         B(rho_s)' = min(B(rho_s), LARGEST_GAIN B(rho_c))
 
     Detail is born where nothing is carried, at inlets above all, and moves on from there. In every frame `kept` leaves
-    some to be renewed (docs/experiments/guided-simulation.md).
+    some to be renewed (docs/experiments/every-view.md).
 
     Attributes
     ----------

@@ -120,7 +120,8 @@ class Settings:
         Further views show it better than either.
     detail
         How much of the fine structure along the rays, which no camera shows, is made up, from 0 to 1. At 0 the density
-        is the smooth answer, which is best for measuring; at 1 it is a plausible smoke, as detailed in depth as across.
+        is the smooth answer, which is best for measuring; at 1 it is a plausible smoke, with the clip's texture from
+        every side.
         The paper's method makes up none.
     seed
         Which of the plausible smokes, a whole number from 0. All show the same pictures; without `detail` there is one.

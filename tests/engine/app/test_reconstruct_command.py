@@ -13,6 +13,12 @@ from smokelift.output.sequence import Sequence
 from smokelift.output.vdb import VdbUnavailable, vdb_module
 from smokelift.scene import completed
 
+MADE_UP = "the texture of the clip's own pictures"
+"""In the sentence on fine structure that no camera shows."""
+
+GOOD_FRONT = 38.0
+"""PSNR (dB) of a front that is fitted: seeds 0 and 1 have 40.7 and 42.8."""
+
 
 def test_reconstruct_writes_a_sequence(finished, plume) -> None:
     """All frames, complete, with the scene as it was given; a NumPy twin each."""
@@ -146,12 +152,13 @@ def test_what_is_made_up_is_chosen_said_and_kept(shot, finished, tmp_path, capsy
 def test_another_seed_is_another_smoke_with_the_same_front(shot, finished, tmp_path) -> None:
     """The pictures fit as well; the depth differs, and from that of the smooth answer too."""
     first = Sequence.open(finished)
+    assert first.figures(2)["psnr"] > GOOD_FRONT
     others = []
     for number, words in enumerate((("--seed", "1"), ("--detail", "0"), ("--detail", "0", "--seed", "1"))):
         out = tmp_path / str(number)
         assert command("reconstruct", shot, "--out", out, "--npz", "--frames", "0:1", *words, *QUICK) == 0
         others.append(Sequence.open(out))
-        assert others[-1].figures(2)["psnr"] == pytest.approx(first.figures(2)["psnr"], abs=2)
+        assert others[-1].figures(2)["psnr"] > GOOD_FRONT
     size = np.linalg.norm(first.density(2))
     again, smooth, same = (other.density(2) for other in others)
     assert np.linalg.norm(again - first.density(2)) > 0.02 * size
@@ -163,9 +170,9 @@ def test_without_detail_nothing_is_said_to_be_made_up(shot, capsys) -> None:
     """Neither is it with the paper's method, which cannot be told to."""
     for words in (("--detail", "0", *QUICK), ("--method", "paper", *QUICK)):
         assert command("inspect", shot, *words) == 0
-        assert "borrowed" not in capsys.readouterr().out
+        assert MADE_UP not in " ".join(capsys.readouterr().out.split())
     assert command("inspect", shot, *QUICK) == 0
-    assert "borrowed" in capsys.readouterr().out
+    assert MADE_UP in " ".join(capsys.readouterr().out.split())
     assert "detail must be 0" in refused(capsys, "inspect", shot, "--method", "paper", "--detail", "1")
 
 
