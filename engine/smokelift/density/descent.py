@@ -27,7 +27,7 @@ Values = NDArray[np.float32]
 MEMORY = 3
 """Steps that the direction remembers: as good as six, for half the memory (docs/experiments/density-descent.md)."""
 
-FLOOR = 0.02
+FLOOR = 0.1
 """Scale of an empty voxel of the hull, in mean densities of the start: it may fill, but more slowly than others
 (docs/experiments/density-descent.md)."""
 

@@ -36,7 +36,7 @@ SMOOTH_ITERATIONS = 4
 SMOOTH_TOLERANCE = 0.02
 """Share of the objective that one of them has to gain for another to follow, as in the fit."""
 
-NOISE = 2.0
+NOISE = 1.5
 """Standard deviation of the logarithm of the noise that breaks the smooth answer's symmetry: stronger than the smoke's
 own detail, for the pictures from all sides level most of it (docs/experiments/every-view.md)."""
 

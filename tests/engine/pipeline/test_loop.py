@@ -650,11 +650,11 @@ def test_without_transport_every_picture_stands_alone(plume, draft) -> None:
 
 
 def test_transport_keeps_the_mass_of_every_height(plume, draft) -> None:
-    """What is taken over moves smoke along the rays: per height it stays within a tenth of what the picture says."""
+    """What is taken over moves smoke along the rays: per height it stays within an eighth of what the picture says."""
     alone, carried = (frames_of(plume.scene, replace(draft, transport=share)) for share in (0.0, 1.0))
     for one, other in zip(alone, carried, strict=True):
         expected, found = one.density.sum((0, 1)), other.density.sum((0, 1))
-        assert np.abs(found - expected).sum() < 0.1 * expected.sum()
+        assert np.abs(found - expected).sum() < 0.125 * expected.sum()
 
 
 def test_fire_is_a_second_grid(plume, draft, tmp_path) -> None:
