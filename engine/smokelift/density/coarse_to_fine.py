@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from smokelift.density.halves import LARGE, any_of_two, means_of_two, prolonged
 from smokelift.density.objective import Term, camera_terms
 from smokelift.density.observation import Observation, View, ViewSet
 from smokelift.footage.images import area_average
@@ -22,9 +23,6 @@ from smokelift.render import Image, Volume
 from smokelift.scene import Domain
 from smokelift.scene.domain import box_around
 from smokelift.scene.projection import voxel_width
-
-LARGE = 1_000_000
-"""Voxels that may hold smoke, above which a grid has a coarser one (docs/experiments/clip-pixels.md)."""
 
 TINY = np.finfo(np.float32).tiny
 """Smallest normal number, for divisions."""
@@ -57,7 +55,7 @@ class Level:
         optics = replace(views.optics, domain=_halved(views.optics.domain))
         seen = tuple(View.of(_shrunk(view, optics.domain), optics) for view in views.views)
         inside = tuple(area_average(share, *view.camera.size) for share, view in zip(self.inside, seen, strict=True))
-        return Level(ViewSet(seen, _any_of_two(views.hull), optics, views.frame), inside, 2 * self.coarseness)
+        return Level(ViewSet(seen, any_of_two(views.hull), optics, views.frame), inside, 2 * self.coarseness)
 
     def terms(self) -> list[Term]:
         """Terms of the cameras' pictures; see `camera_terms`."""
@@ -66,7 +64,7 @@ class Level:
     def finer(self, values: Volume, of: Level) -> NDArray[np.float32]:
         """Values of this grid at the voxels (n,) that may hold smoke on the next finer one, linear between middles."""
         fine, box = self._boxes(of)
-        finer: NDArray[np.float32] = _prolonged(values[box])[_inner(fine)][of.views.hull[fine]]
+        finer: NDArray[np.float32] = prolonged(values[box])[_inner(fine)][of.views.hull[fine]]
         return finer
 
     def changed(self, density: Volume, of: Level, change: Callable[[Volume], Volume]) -> Volume:
@@ -75,8 +73,8 @@ class Level:
         means = self.means(density, of)
         after = change(means)
         hull = of.views.hull[fine]
-        factor = _prolonged(after[box])[_inner(fine)][hull]
-        factor /= np.maximum(_prolonged(means[box])[_inner(fine)][hull], TINY)
+        factor = prolonged(after[box])[_inner(fine)][hull]
+        factor /= np.maximum(prolonged(means[box])[_inner(fine)][hull], TINY)
         result = np.zeros(density.shape, np.float32)
         result[fine][hull] = density[fine][hull] * factor
         return result
@@ -85,7 +83,7 @@ class Level:
         """Means of a density of the next finer grid on this one."""
         fine, box = self._boxes(of)
         means = np.zeros(self.views.hull.shape, np.float32)
-        means[box] = _means(density[fine])
+        means[box] = means_of_two(density[fine])
         return means
 
     def _boxes(self, of: Level) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
@@ -114,44 +112,6 @@ def _shrunk(view: View, domain: Domain) -> Observation:
 
     pixels = math.prod(view.camera.size) / (columns * rows)
     return Observation(view.camera.resized(columns, rows), cut(view.image), view.plate.through(cut, pixels))
-
-
-def _any_of_two(voxels: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Whether any of two voxels along every axis is marked."""
-    for axis in range(3):
-        lead = (slice(None),) * axis
-        second = voxels[(*lead, slice(1, None, 2))]
-        voxels = voxels[(*lead, slice(0, None, 2))].copy()
-        voxels[(*lead, slice(0, second.shape[axis]))] |= second
-    return voxels
-
-
-def _means(values: Volume) -> Volume:
-    """Means of two along every axis; beyond the grid there is nothing."""
-    for axis in range(3):
-        lead = (slice(None),) * axis
-        second = values[(*lead, slice(1, None, 2))]
-        values = values[(*lead, slice(0, None, 2))] * np.float32(0.5)
-        values[(*lead, slice(0, second.shape[axis]))] += np.float32(0.5) * second
-    return values
-
-
-def _prolonged(values: Volume) -> Volume:
-    """Twice as many values along every axis, linear between their middles."""
-    for axis in (2, 1, 0):
-        near = np.moveaxis(values, axis, 0)
-        shape = list(values.shape)
-        shape[axis] *= 2
-        result = np.empty(shape, np.float32)
-        finer = np.moveaxis(result, axis, 0)
-        finer[0::2] = finer[1::2] = np.float32(0.75) * near
-        quarter = np.float32(0.25) * near
-        finer[2::2] += quarter[:-1]
-        finer[1:-1:2] += quarter[1:]
-        finer[0] += quarter[0]
-        finer[-1] += quarter[-1]
-        values = result
-    return values
 
 
 def _inner(box: tuple[slice, ...]) -> tuple[slice, ...]:
