@@ -20,9 +20,9 @@ from scipy import ndimage
 
 import smokelift._core as _core
 from smokelift.density.clip_texture import ClipTexture
-from smokelift.density.coarse_to_fine import Level
 from smokelift.density.depth_prior import DepthEstimate, RoundDepth
 from smokelift.density.exemplar import Exemplar, enlarged, reduced
+from smokelift.density.moment_levels import Level
 from smokelift.density.multiplicative import fit_multiplicative, take_turns
 from smokelift.density.objective import Term
 from smokelift.density.observation import ObservedClip, ViewSet

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from smokelift.density import DetailedDepth, GradientFit, RoundDepth, ViewSet
-from smokelift.density import coarse_to_fine as module
 from smokelift.density import depth_prior as expecting
-from smokelift.density.coarse_to_fine import Level
+from smokelift.density import moment_levels as module
+from smokelift.density.moment_levels import Level
 from smokelift.footage.clip import Clip
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import Settings
