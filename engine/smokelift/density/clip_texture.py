@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +13,7 @@ from scipy import ndimage
 from smokelift.density.exemplar import SIZE, Exemplar, Picture
 from smokelift.density.observation import ObservedClip, View
 from smokelift.density.turntable import Turntable
+from smokelift.scene import Domain
 
 FRAMES = 12
 """Frames at most, spread over the clip, whose patches are taken: a thousand each are enough of a scale."""
@@ -65,6 +66,11 @@ class ClipTexture:
             scales.insert(0, 2 * scales[0])
         exemplars = tuple(Exemplar.of(pictures, scale) for scale in scales)
         return ClipTexture(shown[0].turntable, exemplars, width, abs(float(motion[1])))
+
+    def halved(self, domain: Domain) -> ClipTexture:
+        """The texture on a domain with voxels twice as wide, without the scale that these do not hold."""
+        exemplars = tuple(replace(each, scale=each.scale // 2) for each in self.exemplars if each.scale > 1)
+        return ClipTexture(replace(self.turntable, domain=domain), exemplars, self.width / 2, self.drift / 2)
 
 
 class _Shown(NamedTuple):

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,9 +22,9 @@ import smokelift._core as _core
 from smokelift.density.clip_texture import ClipTexture
 from smokelift.density.depth_prior import DepthEstimate, RoundDepth
 from smokelift.density.exemplar import Exemplar, enlarged, reduced
-from smokelift.density.hull import inside
+from smokelift.density.moment_levels import Level
 from smokelift.density.multiplicative import fit_multiplicative, take_turns
-from smokelift.density.objective import Term, camera_terms
+from smokelift.density.objective import Term
 from smokelift.density.observation import ObservedClip, ViewSet
 from smokelift.density.turntable import Turntable
 from smokelift.render import Volume
@@ -118,34 +119,41 @@ class DetailedDepth:
     def estimate(self, views: ViewSet) -> DepthEstimate:
         """The smooth answer, the same with noise, and what gives it the clip's texture."""
         estimate = self.smooth.estimate(views)
-        narrowed = estimate.views
-        if self.texture is None or not narrowed.hull.any():
+        level = Level(estimate.views, estimate.inside)
+        if self.texture is None or not level.views.hull.any():
             return estimate
         if not unseen_sides(self.texture.turntable, [view.camera for view in views.views]):
             return estimate
-        smooth = fit_multiplicative(
-            camera_terms(narrowed, estimate.inside), estimate.density, SMOOTH_ITERATIONS, SMOOTH_TOLERANCE
-        ).density
+        smooth = _smooth_answer(level, estimate.density)
         return replace(
             estimate,
-            density=self._noisy(smooth, narrowed, self.texture),
+            density=self._noisy(smooth, level, self.texture),
             smooth=smooth,
-            detail=EveryView(self.texture, narrowed, smooth, self.detail),
+            detail=EveryView(self.texture, level, smooth, self.detail),
         )
 
-    def _noisy(self, smooth: Volume, views: ViewSet, texture: ClipTexture) -> Volume:
+    def _noisy(self, smooth: Volume, level: Level, texture: ClipTexture) -> Volume:
         """The smooth answer with noise that travels with the smoke, its coarse amounts kept."""
-        hull = views.hull
-        box = box_around(hull, 0)
-        table = texture.turntable
-        moved = table.height * texture.drift * views.frame
-        places = [np.nonzero(hull)[axis] - moved[axis] for axis in range(3)]
-        noisy = smooth.copy()
-        noisy[hull] *= np.exp(np.float32(NOISE * self.detail) * _noise(places, texture.width, self.seed))
-        amounts, now = (_core.blur(values[box], AMOUNTS, 3.0) for values in (smooth, noisy))
+        box = box_around(level.views.hull, 0)
+        hull = level.views.hull[box]
+        moved = texture.turntable.height * texture.drift * level.views.frame
+        octaves = _Octaves(moved, texture.width, self.seed)
+        noisy, amounts = smooth[box].copy(), _core.blur(smooth[box], AMOUNTS, 3.0)
+        noisy[hull] *= np.exp(np.float32(NOISE * self.detail) * octaves.noise(level))
+        now = _core.blur(noisy, AMOUNTS, 3.0)
         tiny = np.finfo(np.float32).tiny
-        noisy[box] *= np.minimum((amounts + tiny) / (now + tiny), np.float32(LARGEST_GAIN))
-        return inside(hull, noisy)
+        noisy *= np.minimum((amounts + tiny) / (now + tiny), np.float32(LARGEST_GAIN))
+        result = np.zeros(smooth.shape, np.float32)
+        np.copyto(result[box], noisy, where=hull)
+        return result
+
+
+def _smooth_answer(level: Level, density: Volume) -> Volume:
+    """A density in the amounts that the cameras' pictures show; those of a large grid are found on the coarsest."""
+    coarser = level.coarser
+    if coarser is None:
+        return fit_multiplicative(level.terms(), density, SMOOTH_ITERATIONS, SMOOTH_TOLERANCE).density
+    return coarser.changed(density, level, lambda means: _smooth_answer(coarser, means))
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,8 +164,8 @@ class EveryView:
     ----------
     texture
         Of the clip.
-    views
-        Of the moment.
+    level
+        The moment.
     smooth : (nx, ny, nz)
         The smooth answer.
     strength
@@ -165,9 +173,18 @@ class EveryView:
     """
 
     texture: ClipTexture
-    views: ViewSet
+    level: Level
     smooth: Volume
     strength: float
+
+    @cached_property
+    def coarser(self) -> EveryView | None:
+        """The same on a grid half as fine, of the scales that it holds; None where the smoke has few voxels."""
+        coarser, texture = self.level.coarser, self.texture
+        if coarser is None or len(texture.exemplars) == 1:
+            return None
+        texture = texture.halved(coarser.views.optics.domain)
+        return EveryView(texture, coarser, coarser.means(self.smooth, self.level), self.strength)
 
     def added(self, density: Volume, cameras: Sequence[Term], *, fresh: bool) -> Volume:
         """Scale a density towards the clip's texture and the cameras' pictures in turn.
@@ -181,21 +198,44 @@ class EveryView:
         fresh
             Whether nothing of it is carried on from the frame before.
         """
-        table, hull = self.texture.turntable, self.views.hull
-        part = tuple(span for axis, span in enumerate(box_around(hull, 0)) if axis != table.axis)
-        smooth = np.ascontiguousarray(table.upright(self.smooth)[part])
-        corner = part[0].start, part[1].start
-        azimuths, relaxation = self.azimuths(), self.strength * (FRESH if fresh else CARRIED)
         # what is carried has the finest detail already, and renewing it would flicker
-        scales = self.texture.exemplars if fresh else self.texture.exemplars[:-1]
-        for exemplar in scales:
+        exemplars = self.texture.exemplars if fresh else self.texture.exemplars[:-1]
+        return self._rounds(density, cameras, exemplars, self.azimuths(), fresh)
+
+    def _rounds(
+        self,
+        density: Volume,
+        cameras: Sequence[Term],
+        exemplars: Sequence[Exemplar],
+        azimuths: Iterator[tuple[int, float]],
+        fresh: bool,
+    ) -> Volume:
+        """The rounds of some scales; those that a coarser grid holds are done there."""
+        coarser = self.coarser
+        if coarser is not None:
+            density = coarser.level.changed(
+                density,
+                self.level,
+                lambda means: coarser._rounds(means, coarser.level.terms(), coarser.texture.exemplars, azimuths, fresh),
+            )
+            exemplars = [exemplar for exemplar in exemplars if exemplar.scale == 1]
+        if not exemplars:
+            return density
+        table, hull = self.texture.turntable, self.level.views.hull
+        box = box_around(hull, 0)
+        part = tuple(span for axis, span in enumerate(box) if axis != table.axis)
+        # rays turn about the axis, along which all of the grid stays
+        kept = tuple(slice(None) if axis == table.axis else span for axis, span in enumerate(box))
+        corner = part[0].start, part[1].start
+        smooth, relaxation = table.upright(self.smooth[kept]), self.strength * (FRESH if fresh else CARRIED)
+        for exemplar in exemplars:
             for _ in range(FRESH_ROUNDS if fresh else 1):
-                upright = table.upright(density)
-                turned = np.ascontiguousarray(upright[part])
+                turned = np.array(table.upright(density[kept]))
                 for _ in range(AZIMUTHS):
                     self._step(turned, smooth, exemplar, next(azimuths), corner, relaxation)
-                upright[part] = turned
-                density = take_turns(cameras, inside(hull, table.lying(upright)), 1)
+                changed = np.zeros(hull.shape, np.float32)
+                np.copyto(changed[kept], table.lying(turned), where=hull[kept])
+                density = take_turns(cameras, changed, 1)
         return density
 
     def _step(
@@ -209,7 +249,7 @@ class EveryView:
     ) -> None:
         """Scale smoke (upright, a part of the domain) along the rays of one azimuth towards the clip's texture."""
         table, scale = self.texture.turntable, exemplar.scale
-        thickness = np.float32(self.views.optics.medium.extinction * table.domain.voxel_size)
+        thickness = np.float32(self.level.views.optics.medium.extinction * table.domain.voxel_size)
         turn, degrees = azimuth
         whole = table.project(now, degrees, corner)
         shown, known = (
@@ -218,22 +258,22 @@ class EveryView:
         if not shown.any():
             return
         wanted = exemplar.towards(shown, turn)
-        outline = ndimage.gaussian_filter(known, OUTLINE_BLUR / scale)
+        outline = ndimage.gaussian_filter(known, OUTLINE_BLUR / (scale * self.level.coarseness))
         wanted *= np.clip(outline / (OUTLINE * outline.max()) - 0.5, 0, 1)
         amounts, have = (ndimage.gaussian_filter1d(picture.sum(0), 1) for picture in (known, wanted))
         wanted *= np.clip(amounts / np.maximum(have, 1e-9), *ROW_RANGE)
         faint = 1e-3 * wanted.max()
         rows = (np.arange(wanted.shape[1]) + 0.5) * scale
-        fade = np.clip(np.minimum(rows, table.shape[1] - rows) / ENDS, 0, 1)
+        fade = np.clip(np.minimum(rows, table.shape[1] - rows) * self.level.coarseness / ENDS, 0, 1)
         step = np.log(np.clip((wanted + faint) / (shown + faint), *STEP_RANGE))
         step = (relaxation * fade * step).astype(np.float32)
         table.scale(now, np.ascontiguousarray(enlarged(step, scale, whole.shape)), degrees, corner)
 
     def azimuths(self) -> Iterator[tuple[int, float]]:
         """Numbers and degrees of azimuths that no camera is near to, spread evenly over all frames."""
-        cameras = [self.texture.turntable.degrees(view.camera) for view in self.views.views]
+        cameras = [self.texture.turntable.degrees(view.camera) for view in self.level.views.views]
         # a frame never takes as many, and 997 is prime to the number of the bases
-        turn = 997 * self.views.frame
+        turn = 997 * self.level.views.frame
         while True:
             turn += 1
             degrees = 180 * (GOLDEN * turn % 1)
@@ -257,15 +297,47 @@ def _apart(a: float, b: float) -> float:
     return abs((a - b + 90) % 180 - 90)
 
 
-def _noise(places: Sequence[NDArray[np.float64]], width: float, seed: int) -> NDArray[np.float32]:
-    """Noise (n,) of unit variance at some places (voxels), in octaves from about the smoke's width to single voxels."""
-    random = np.random.default_rng(seed)
-    total = np.zeros(places[0].shape, np.float32)
-    spacing, octaves = COARSEST_NOISE * width, 0
-    while octaves == 0 or spacing >= FINEST_NOISE:
-        lattice = random.standard_normal((LATTICE,) * 3).astype(np.float32)
-        at = [place / spacing + shift for place, shift in zip(places, random.uniform(0, LATTICE, 3), strict=True)]
-        values = ndimage.map_coordinates(lattice, at, output=np.float32, order=1, mode="grid-wrap")
-        total += values / values.std()
-        spacing, octaves = spacing / 2, octaves + 1
-    return np.asarray(total / np.float32(np.sqrt(octaves)))
+@dataclass(frozen=True, eq=False)
+class _Octaves:
+    """Noise in octaves from about the smoke's width to single voxels.
+
+    Attributes
+    ----------
+    moved : (3,)
+        How far it has moved, in voxels of the finest grid.
+    width
+        Of the smoke, in voxels.
+    seed
+        Of the noise.
+    """
+
+    moved: NDArray[np.float64]
+    width: float
+    seed: int
+
+    def noise(self, level: Level) -> NDArray[np.float32]:
+        """Noise (n,) of unit variance at the voxels that may hold smoke."""
+        total, octaves, _ = self._sum(level, np.random.default_rng(self.seed))
+        return np.asarray(total / np.float32(np.sqrt(octaves)))
+
+    def _sum(self, level: Level, random: np.random.Generator) -> tuple[NDArray[np.float32], int, float]:
+        """The sum (n,) of the octaves that a grid holds, their number and the next spacing of nodes (voxels)."""
+        total = np.zeros(np.count_nonzero(level.views.hull), np.float32)
+        octaves, spacing = 0, COARSEST_NOISE * self.width
+        if level.coarser is not None:
+            coarse, octaves, spacing = self._sum(level.coarser, random)
+            field = np.zeros(level.coarser.views.hull.shape, np.float32)
+            field[level.coarser.views.hull] = coarse
+            total = level.coarser.finer(field, level)
+        size = level.coarseness
+        if octaves and spacing < FINEST_NOISE * size:
+            return total, octaves, spacing
+        voxels = np.nonzero(level.views.hull)
+        places = [size * voxels[axis] + (size - 1) / 2 - self.moved[axis] for axis in range(3)]
+        while octaves == 0 or spacing >= FINEST_NOISE * size:
+            lattice = random.standard_normal((LATTICE,) * 3).astype(np.float32)
+            at = [place / spacing + shift for place, shift in zip(places, random.uniform(0, LATTICE, 3), strict=True)]
+            values = ndimage.map_coordinates(lattice, at, output=np.float32, order=1, mode="grid-wrap")
+            total += values / values.std()
+            spacing, octaves = spacing / 2, octaves + 1
+        return total, octaves, spacing

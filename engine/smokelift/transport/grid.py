@@ -142,7 +142,7 @@ class Velocity(StaggeredGrid):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not all(np.isfinite(component).all() for component in self.faces):
+        if not all(map(_finite, self.faces)):
             raise ValueError("the velocity holds values that are not finite.")
 
     def displacement(self, dt: float) -> StaggeredGrid:
@@ -159,6 +159,12 @@ class Velocity(StaggeredGrid):
         if not all((np.abs(component) <= LARGEST).all() for component in (x, y, z)):
             raise ValueError(f"the velocity moves smoke by more than {LARGEST:g} voxels in {dt:g} s.")
         return StaggeredGrid((x, y, z), 1.0, self.closed)
+
+
+def _finite(values: Array) -> bool:
+    """Whether all values are finite. Their sum says so at once, unless it is too large itself."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return bool(np.isfinite(values.sum())) or bool(np.isfinite(values).all())
 
 
 def face_shapes(shape: tuple[int, ...]) -> tuple[tuple[int, int, int], ...]:

@@ -11,6 +11,12 @@ from smokelift.scene.domain import box_around
 from smokelift.transport import Array, Velocity, VoxelBox, advect, faces_in
 from smokelift.velocity.estimator import Mask, refined_in
 
+LARGE = 4_000_000
+"""Voxels of a box around smoke, above which it is cut into slabs: each is as narrow as the smoke is there."""
+
+SLAB = 64
+"""Voxels across a slab, many beside how far smoke moves in a step."""
+
 
 def carry(density: Array, velocity: Velocity, dt: float, voxel_size: float, *, conserve: bool = False) -> Array:
     """Carry a density along by a velocity of its grid or of a coarser one.
@@ -34,10 +40,12 @@ def carry(density: Array, velocity: Velocity, dt: float, voxel_size: float, *, c
         What `advect` makes of it with `refined_to`, but for rounding.
     """
     result: Array = np.zeros(density.shape, np.float32)
-    box = _reached(density > 0, velocity, dt / voxel_size)
-    if result[box].size:
-        x, y, z = density.shape
-        result[box] = advect(density[box], refined_in(velocity, (x, y, z), box), dt, conserve=conserve)
+    reach = _reach(velocity, dt / voxel_size)
+    x, y, z = density.shape
+    for box, source in _boxes(density > 0, reach, whole=conserve):
+        moved = advect(density[source], refined_in(velocity, (x, y, z), source), dt, conserve=conserve)
+        inner = tuple(slice(a.start - b.start, a.stop - b.start) for a, b in zip(box, source, strict=True))
+        result[box] = moved[inner]
     return result
 
 
@@ -63,28 +71,52 @@ def near_smoke(velocity: Velocity, smoke: Mask, dt: float, voxel_size: float) ->
     x, y, z = smoke.shape
     if velocity.shape == smoke.shape:
         return velocity
-    box = _reached(smoke, velocity, dt / voxel_size)
     near = Velocity.zero(smoke.shape, voxel_size, velocity.closed)
-    if not smoke[box].size:
-        return near
-    part = refined_in(velocity, (x, y, z), box)
-    for component, found in zip(faces_in(near.faces, box), part.faces, strict=True):
-        component[...] = found
-    confidence, source = (_placed(values, box, smoke.shape) for values in (part.confidence, part.source))
-    return replace(near, figures=part.figures, confidence=confidence, source=source, residual=velocity.residual)
+    confidence, source = (None if values is None else np.zeros(smoke.shape, np.float32) for values in _known(velocity))
+    figures: dict[str, float] = {}
+    for box, _ in _boxes(smoke, _reach(velocity, dt / voxel_size)):
+        part = refined_in(velocity, (x, y, z), box)
+        for component, found in zip(faces_in(near.faces, box), part.faces, strict=True):
+            component[...] = found
+        for values, found_values in zip((confidence, source), _known(part), strict=True):
+            if values is not None:
+                values[box] = found_values
+        largest = max(figures.get("divergence", 0.0), part.figures.get("divergence", 0.0))
+        figures = {**part.figures, **({"divergence": largest} if "divergence" in part.figures else {})}
+    return replace(near, figures=figures, confidence=confidence, source=source, residual=velocity.residual)
 
 
-def _placed(values: Array | None, box: VoxelBox, shape: tuple[int, ...]) -> Array | None:
-    """Values of a box in all of the grid, zero elsewhere."""
-    if values is None:
-        return None
-    result: Array = np.zeros(shape, np.float32)
-    result[box] = values
-    return result
+def _known(velocity: Velocity) -> tuple[Array | None, Array | None]:
+    """What is known of a velocity beside it."""
+    return velocity.confidence, velocity.source
 
 
-def _reached(smoke: Mask, velocity: Velocity, voxels_at_one: float) -> VoxelBox:
-    """The box of the voxels where smoke can arrive; at 1 m/s it moves by so many voxels."""
+def _reach(velocity: Velocity, voxels_at_one: float) -> int:
+    """Voxels that smoke can arrive in or come from; at 1 m/s it moves by so many."""
     fastest = max(float(np.abs(component).max()) for component in velocity.faces) * voxels_at_one
     # what arrives was a step away, and the correction of advection looks a step further
-    return box_around(smoke, 2 * (math.ceil(fastest) + 1))
+    return 2 * (math.ceil(fastest) + 1)
+
+
+def _boxes(smoke: Mask, reach: int, *, whole: bool = False) -> list[tuple[VoxelBox, VoxelBox]]:
+    """Boxes of the voxels where smoke can arrive, each in the one that it comes from.
+
+    There is one, or slabs along the longest side of a large one.
+    """
+    box = box_around(smoke, reach)
+    sides = [side.stop - side.start for side in box]
+    if math.prod(sides) == 0:
+        return []
+    if whole or math.prod(sides) <= LARGE:
+        return [(box, box)]
+    axis, boxes = int(np.argmax(sides)), []
+    lead = (slice(None),) * axis
+    for start in range(box[axis].start, box[axis].stop, SLAB):
+        slab = slice(start, min(start + SLAB, box[axis].stop))
+        beside = slice(max(slab.start - reach, 0), min(slab.stop + reach, smoke.shape[axis]))
+        spans = list(box_around(smoke[(*lead, beside)], reach))
+        if spans[axis].stop:
+            x, y, z = (slab if n == axis else span for n, span in enumerate(spans))
+            i, j, k = (beside if n == axis else span for n, span in enumerate(spans))
+            boxes.append(((x, y, z), (i, j, k)))
+    return boxes

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from smokelift.transport import Velocity, advect, face_shapes, halved, project
+from smokelift.velocity import near_smoke as module
 from smokelift.velocity.estimator import refined_to
 from smokelift.velocity.near_smoke import carry, near_smoke
 
@@ -54,3 +55,19 @@ def test_velocity_is_right_where_smoke_can_arrive_and_zero_far_away() -> None:
     carried = advect(puff(), near, 1.0)
     np.testing.assert_allclose(carried, advect(puff(), whole, 1.0), atol=1e-5)
     assert near_smoke(whole, smoke, 1.0, 1.0) is whole
+
+
+def test_slabs_of_a_large_box_are_as_the_box(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two puffs apart, so that slabs have other sides, and one is empty."""
+    density, velocity = puff(), flow(1.0)
+    density[30:34, 28:32, 40:44] = 0.5
+    carried, near = carry(density, velocity, 1.0, 1.0), near_smoke(velocity, density > 0, 1.0, 1.0)
+    monkeypatch.setattr(module, "LARGE", 0)
+    monkeypatch.setattr(module, "SLAB", 3)
+    np.testing.assert_allclose(carry(density, velocity, 1.0, 1.0), carried, atol=1e-5)
+    again = near_smoke(velocity, density > 0, 1.0, 1.0)
+    assert np.count_nonzero(again.centres()) < np.count_nonzero(near.centres())
+    for axis, slabs in enumerate(again.faces):
+        given = slabs != 0
+        np.testing.assert_array_equal(slabs[given], near.faces[axis][given])
+    np.testing.assert_allclose(advect(density, again, 1.0), carried, atol=1e-5)

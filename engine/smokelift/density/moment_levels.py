@@ -1,0 +1,119 @@
+"""A moment on grids that are each half as fine, and what was found there on the finer grid.
+
+Detail of several voxels needs no single voxels: on a grid half as fine it takes an eighth of the work and the memory.
+What changes there changes the finer density by the same factor, linear between the voxels' middles, so that what the
+finer density holds of its own stays. Only the last octave is left for it to find.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smokelift.density.halves import LARGE, any_of_two, means_of_two, prolonged
+from smokelift.density.objective import Term, camera_terms
+from smokelift.density.observation import Observation, View, ViewSet
+from smokelift.footage.images import area_average
+from smokelift.render import Image, Volume
+from smokelift.scene import Domain
+from smokelift.scene.domain import box_around
+from smokelift.scene.projection import voxel_width
+
+TINY = np.finfo(np.float32).tiny
+"""Smallest normal number, for divisions."""
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """A moment on one grid.
+
+    Attributes
+    ----------
+    views
+        The pictures.
+    inside : tuple of (rows, columns)
+        Of each, the share of every ray's smoke that lies inside the domain.
+    coarseness
+        Voxels of the finest grid along one of this.
+    """
+
+    views: ViewSet
+    inside: tuple[NDArray[np.float32], ...]
+    coarseness: int = 1
+
+    @cached_property
+    def coarser(self) -> Level | None:
+        """The same on a grid half as fine; None where the smoke has few voxels."""
+        views = self.views
+        if np.count_nonzero(views.hull) <= LARGE:
+            return None
+        optics = replace(views.optics, domain=_halved(views.optics.domain))
+        seen = tuple(View.of(_shrunk(view, optics.domain), optics) for view in views.views)
+        inside = tuple(area_average(share, *view.camera.size) for share, view in zip(self.inside, seen, strict=True))
+        return Level(ViewSet(seen, any_of_two(views.hull), optics, views.frame), inside, 2 * self.coarseness)
+
+    def terms(self) -> list[Term]:
+        """Terms of the cameras' pictures; see `camera_terms`."""
+        return camera_terms(self.views, self.inside)
+
+    def finer(self, values: Volume, of: Level) -> NDArray[np.float32]:
+        """Values of this grid at the voxels (n,) that may hold smoke on the next finer one, linear between middles."""
+        fine, box = self._boxes(of)
+        finer: NDArray[np.float32] = prolonged(values[box])[_inner(fine)][of.views.hull[fine]]
+        return finer
+
+    def changed(self, density: Volume, of: Level, change: Callable[[Volume], Volume]) -> Volume:
+        """A density of the next finer grid, changed as its means on this grid are by `change`."""
+        fine, box = self._boxes(of)
+        means = self.means(density, of)
+        after = change(means)
+        hull = of.views.hull[fine]
+        factor = prolonged(after[box])[_inner(fine)][hull]
+        factor /= np.maximum(prolonged(means[box])[_inner(fine)][hull], TINY)
+        result = np.zeros(density.shape, np.float32)
+        result[fine][hull] = density[fine][hull] * factor
+        return result
+
+    def means(self, density: Volume, of: Level) -> Volume:
+        """Means of a density of the next finer grid on this one."""
+        fine, box = self._boxes(of)
+        means = np.zeros(self.views.hull.shape, np.float32)
+        means[box] = means_of_two(density[fine])
+        return means
+
+    def _boxes(self, of: Level) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
+        """The box around the smoke on the finer grid and on this one."""
+        box = box_around(self.views.hull, 0)
+        shape = of.views.hull.shape
+        fine = tuple(slice(2 * span.start, min(2 * span.stop, count)) for span, count in zip(box, shape, strict=True))
+        return fine, box
+
+
+def _halved(domain: Domain) -> Domain:
+    """The domain with voxels twice as wide; along an odd number of them it is larger by one."""
+    x, y, z = ((count + 1) // 2 for count in domain.resolution)
+    edge = 2 * domain.voxel_size
+    a, b, c = (low + count * edge for low, count in zip(domain.min, (x, y, z), strict=True))
+    return Domain(domain.min, (a, b, c), (x, y, z))
+
+
+def _shrunk(view: View, domain: Domain) -> Observation:
+    """What a view's camera saw, at a pixel a voxel of a domain if its pixels are finer."""
+    shrink = max(1.0, voxel_width(view.camera, domain))
+    columns, rows = (max(1, round(side / shrink)) for side in view.camera.size)
+
+    def cut(picture: Image) -> Image:
+        return area_average(picture, columns, rows)
+
+    pixels = math.prod(view.camera.size) / (columns * rows)
+    return Observation(view.camera.resized(columns, rows), cut(view.image), view.plate.through(cut, pixels))
+
+
+def _inner(box: tuple[slice, ...]) -> tuple[slice, ...]:
+    """The same box counted from its own corner: along an odd number of voxels the finer grid ends before the last."""
+    return tuple(slice(0, span.stop - span.start) for span in box)

@@ -1,0 +1,109 @@
+"""A moment on a grid half as fine, and what was found there on the finer one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from smokelift.density import DetailedDepth, GradientFit, RoundDepth, ViewSet
+from smokelift.density import depth_prior as expecting
+from smokelift.density import moment_levels as module
+from smokelift.density.moment_levels import Level
+from smokelift.footage.clip import Clip
+from smokelift.setup.prepare import prepare_shot
+from smokelift.setup.settings import Settings
+from smokelift.setup.shot import Shot
+
+SHAPE = (24, 24, 32)
+
+
+@pytest.fixture(scope="module")
+def shot(plume, tmp_path_factory) -> Iterator[Shot]:
+    """A column with stripes along its height."""
+    x, y, z = np.meshgrid(*(np.arange(n) + 0.5 - n / 2 for n in SHAPE), indexing="ij")
+    column = np.exp(-((np.hypot(x, y) / 6) ** 4) - (z / 12) ** 4)
+    moments = [(0.2 * column * (1.5 + np.sin(z + n))).astype(np.float32) for n in range(3)]
+    scene = plume.write(tmp_path_factory.mktemp("striped"), moments)
+    with Clip.open(scene.clip) as clip:
+        yield prepare_shot(clip, scene, Settings.preset("draft"))
+
+
+@pytest.fixture
+def large(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let every grid of this size count as large, and one half as fine as small."""
+    monkeypatch.setattr(module, "LARGE", 2500)
+    monkeypatch.setattr(expecting, "LARGE", 2500)
+
+
+def level(shot: Shot) -> Level:
+    estimate = RoundDepth().of_clip(shot).estimate(ViewSet.of(shot.observe(1), shot.optics, 1))
+    return Level(estimate.views, estimate.inside)
+
+
+def test_small_smoke_has_no_coarser_grid(shot) -> None:
+    assert level(shot).coarser is None
+
+
+def test_a_coarser_grid_covers_the_smoke_once(shot, large) -> None:
+    fine = level(shot)
+    coarser = fine.coarser
+    assert coarser is not None
+    assert coarser.coarser is None
+    assert coarser.views.hull.shape == (12, 12, 16)
+    assert not (fine.views.hull & ~coarser.views.hull.repeat(2, 0).repeat(2, 1).repeat(2, 2)).any()
+    assert coarser.views.optics.domain.voxel_size == pytest.approx(2 * fine.views.optics.domain.voxel_size)
+    picture, small = fine.views.views[0].image, coarser.views.views[0].image
+    assert small.shape[0] == round(picture.shape[0] / 2)
+    assert small.mean() == pytest.approx(picture.mean(), rel=0.01)
+
+
+def test_what_stays_there_stays_here(shot, large) -> None:
+    """To rounding; a factor is carried over, and what the finer grid holds of its own stays."""
+    fine = level(shot)
+    coarser = fine.coarser
+    assert coarser is not None
+    density = np.zeros(SHAPE, np.float32)
+    density[fine.views.hull] = np.random.default_rng(0).random(np.count_nonzero(fine.views.hull), np.float32)
+    np.testing.assert_allclose(coarser.changed(density, fine, lambda means: means), density, rtol=1e-5)
+    np.testing.assert_allclose(coarser.changed(density, fine, lambda means: 3 * means), 3 * density, rtol=1e-5)
+    means = coarser.means(density, fine)
+    assert 8 * means.sum(dtype=np.float64) == pytest.approx(density.sum(dtype=np.float64), rel=1e-5)
+
+
+def test_values_between_middles_are_linear(shot, large) -> None:
+    fine = level(shot)
+    coarser = fine.coarser
+    assert coarser is not None
+    ramp = np.broadcast_to(2 * np.arange(16, dtype=np.float32) + 0.5, (12, 12, 16))
+    inner = coarser.finer(np.ascontiguousarray(ramp), fine)
+    heights = np.nonzero(fine.views.hull)[2]
+    within = (heights > heights.min() + 1) & (heights < heights.max() - 1)
+    np.testing.assert_allclose(inner[within], heights[within], atol=1e-5)
+
+
+def test_expected_smoke_is_the_same(shot, monkeypatch: pytest.MonkeyPatch) -> None:
+    """But for few voxels at its edge."""
+    before = level(shot).views.hull
+    monkeypatch.setattr(expecting, "LARGE", 2500)
+    after = level(shot).views.hull
+    assert not (after & ~before).any()
+    assert np.count_nonzero(after) > 0.99 * np.count_nonzero(before)
+
+
+def test_the_front_is_met_as_without_it(shot, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And the same seed is the same smoke."""
+
+    def fitted() -> tuple[np.ndarray, float]:
+        views = ViewSet.of(shot.observe(1), shot.optics, 1)
+        found = GradientFit().fit(views, DetailedDepth(RoundDepth()).of_clip(shot).estimate(views), None)
+        return found.values, found.figures["psnr"]
+
+    plain, psnr = fitted()
+    monkeypatch.setattr(module, "LARGE", 2500)
+    density, coarse_to_fine = fitted()
+    again, _ = fitted()
+    np.testing.assert_array_equal(density, again)
+    assert coarse_to_fine > psnr - 1
+    assert density.sum() == pytest.approx(plain.sum(), rel=0.1)
