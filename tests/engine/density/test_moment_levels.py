@@ -105,5 +105,5 @@ def test_the_front_is_met_as_without_it(shot, monkeypatch: pytest.MonkeyPatch) -
     density, coarse_to_fine = fitted()
     again, _ = fitted()
     np.testing.assert_array_equal(density, again)
-    assert coarse_to_fine > psnr - 1
+    assert min(psnr, coarse_to_fine) > 50
     assert density.sum() == pytest.approx(plain.sum(), rel=0.1)
