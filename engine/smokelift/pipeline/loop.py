@@ -203,7 +203,8 @@ def _resumed(state: ResumeState, shot: Shot) -> Frame:
 def _frames(shot: Shot, method: Method, start: Frame | None) -> Iterator[Frame]:
     """Frames after ``start``; the first is held back until the second gives it a velocity."""
     count = len(shot.clip)
-    method = replace(method, depth_prior=method.depth_prior.of_clip(shot))
+    with products_on_one_thread():
+        method = replace(method, depth_prior=method.depth_prior.of_clip(shot))
     number, before = (0, None) if start is None else (start.number, Past.of(start))
     del start
     first: Frame | None = None

@@ -649,6 +649,14 @@ def test_without_transport_every_picture_stands_alone(plume, draft) -> None:
     assert all(frame.figures["transport"] == {} for frame in frames)
 
 
+def test_the_threads_of_products_change_nothing(plume, draft) -> None:
+    """Another program's settings of the linear algebra are no part of a run: it can be resumed anywhere."""
+    with threadpool_limits(limits=1):
+        one = frames_of(plume.scene, draft)
+    for alone, as_ever in zip(one, frames_of(plume.scene, draft), strict=True):
+        np.testing.assert_array_equal(alone.density, as_ever.density)
+
+
 def test_transport_keeps_the_mass_of_every_height(plume, draft) -> None:
     """What is taken over moves smoke along the rays: per height it stays within an eighth of what the picture says."""
     alone, carried = (frames_of(plume.scene, replace(draft, transport=share)) for share in (0.0, 1.0))
