@@ -282,14 +282,14 @@ class EveryView:
 
 
 def unseen_sides(turntable: Turntable, cameras: Sequence[Camera]) -> bool:
-    """Whether there are sides that no camera is near to."""
+    """Whether there are sides that no camera is near to, over a degree at least: fewer are hardly ever come by."""
     seen_from = [turntable.degrees(camera) for camera in cameras]
-    return any(_unseen(degrees, seen_from) for degrees in range(180))
+    return any(_unseen(degrees, seen_from, NEAR + 0.5) for degrees in range(180))
 
 
-def _unseen(degrees: float, cameras: Sequence[float]) -> bool:
+def _unseen(degrees: float, cameras: Sequence[float], near: float = NEAR) -> bool:
     """Whether no camera, in degrees, is near to an azimuth."""
-    return all(_apart(degrees, camera) >= NEAR for camera in cameras)
+    return all(_apart(degrees, camera) >= near for camera in cameras)
 
 
 def _apart(a: float, b: float) -> float:
