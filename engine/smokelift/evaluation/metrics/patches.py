@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -29,13 +30,6 @@ times as many."""
 
 SMOKE = 0.05
 """Share of a picture's largest value: a patch without a brighter pixel shows no smoke."""
-
-_RANDOM = np.linalg.qr(np.random.default_rng(1).standard_normal((PATCH**2, PATCH**2)))[0][:, :DIRECTIONS]
-_COSINES = fft.dct(np.eye(PATCH), norm="ortho", axis=0)
-_WAVES = np.einsum("ax,by->xyab", _COSINES, _COSINES).reshape(PATCH**2, PATCH**2)[:, 1:]
-"""All but the constant one: every size and direction of detail has one of its own."""
-
-_BASIS = np.concatenate([_RANDOM, _WAVES], axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +59,7 @@ class PatchStatistics:
         values = finite(picture)
         if values.ndim != 2:
             raise ValueError(f"patches need a picture (rows, columns), not one of shape {values.shape}")
-        projected = [_BASIS.T @ _patches(_averaged(values, scale)).T for scale in SCALES]
+        projected = [_basis().T @ _patches(_averaged(values, scale)).T for scale in SCALES]
         quantiles = np.stack([_quantiles(scale) for scale in projected])
         return PatchStatistics(quantiles, np.stack([scale.std(axis=1) for scale in projected]))
 
@@ -112,6 +106,18 @@ def mean_gradient(picture: npt.ArrayLike) -> float:
     down, right = np.gradient(values)
     total = float(values.sum())
     return float(np.hypot(down, right).sum()) / total if total > 0 else 0.0
+
+
+@lru_cache(maxsize=1)
+def _basis() -> Array:
+    """Random directions, then all waves but the constant one: each size and direction of detail has one of its own.
+
+    They are made where they are used: on import, linear algebra would begin threads of its own.
+    """
+    random = np.linalg.qr(np.random.default_rng(1).standard_normal((PATCH**2, PATCH**2)))[0][:, :DIRECTIONS]
+    cosines = fft.dct(np.eye(PATCH), norm="ortho", axis=0)
+    waves = np.einsum("ax,by->xyab", cosines, cosines).reshape(PATCH**2, PATCH**2)
+    return np.concatenate([random, waves[:, 1:]], axis=1)
 
 
 def _mean_ratio(values: Array, references: Array) -> float:
