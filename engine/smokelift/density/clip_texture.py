@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -13,7 +13,7 @@ from scipy import ndimage
 from smokelift.density.exemplar import SIZE, Exemplar, Picture
 from smokelift.density.observation import ObservedClip, View
 from smokelift.density.turntable import Turntable
-from smokelift.scene import Domain
+from smokelift.scene import Camera, Domain
 
 FRAMES = 12
 """Frames at most, spread over the clip, whose patches are taken: a thousand each are enough of a scale."""
@@ -49,16 +49,20 @@ class ClipTexture:
     @staticmethod
     def of(clip: ObservedClip) -> ClipTexture | None:
         """Look at frames of a clip; None if none shows smoke."""
-        frames = clip.spread(FRAMES)
-        front = next((found[0].turntable for number in frames if (found := _pictures(clip, number))), None)
+        frames, domain = clip.spread(FRAMES), clip.optics.domain
+        # each frame is looked at once, the ones that follow for the motion alone
+        needed = sorted({number + ahead for number in frames for ahead in (0, 1) if number + ahead < clip.length})
+        seen = {number: _seen(clip, number) for number in needed}
+        upright = {number: _on_screens(views, domain) for number, views in seen.items()}
+        front = next((upright[number][0].turntable for number in frames if upright[number]), None)
         if front is None:
             return None
-        motion = _motion(clip)
+        motion = _motion([(upright[number], upright.get(number + 1, [])) for number in frames])
         axis = front.axis
         if abs(motion[0]) > abs(motion[1]):
             axis = int(np.argmax(np.abs(front.lateral)))
             motion = motion[::-1]
-        shown = [each for number in frames for each in _pictures(clip, number, axis)]
+        shown = [each for number in frames for each in _on_screens(seen[number], domain, axis)]
         pictures = [each.picture for each in shown]
         width = float(np.mean([_width(picture) for picture in pictures]))
         scales = [1]
@@ -80,40 +84,40 @@ class _Shown(NamedTuple):
     picture: Picture
 
 
-def _pictures(clip: ObservedClip, number: int, axis: int | None = None) -> list[_Shown]:
-    """What the cameras saw in a frame, the input's first; only pictures that show smoke."""
+def _seen(clip: ObservedClip, number: int) -> list[tuple[Camera, NDArray[np.float32]]]:
+    """Cameras and the optical depths (rows, columns) that they saw in a frame, the input's first."""
+    views = [View.of(observation, clip.optics) for observation in clip.observe(number)]
+    return [(view.camera, view.optical_depth) for view in views]
+
+
+def _on_screens(
+    seen: Sequence[tuple[Camera, NDArray[np.float32]]], domain: Domain, axis: int | None = None
+) -> list[_Shown]:
+    """What cameras saw, on screens of an axis of the grid or of their own height; only pictures that show smoke."""
     found = []
-    for observation in clip.observe(number):
-        view = View.of(observation, clip.optics)
-        if view.optical_depth.any():
-            turntable = Turntable.before(view.camera, clip.optics.domain, axis)
-            picture = turntable.screen(view.optical_depth, view.camera)
+    for camera, optical_depth in seen:
+        if optical_depth.any():
+            turntable = Turntable.before(camera, domain, axis)
+            picture = turntable.screen(optical_depth, camera)
             if picture.any():
                 found.append(_Shown(turntable, picture))
     return found
 
 
-def _motion(clip: ObservedClip) -> NDArray[np.float64]:
+def _motion(pairs: Sequence[tuple[Sequence[_Shown], Sequence[_Shown]]]) -> NDArray[np.float64]:
     """Mean motion across and along the axis, in voxels a frame, that explains most of the change between frames.
 
-    It is the least squares solution of p' - p + u . grad p = 0 over pairs of frames that follow each other.
+    It is the least squares solution of p' - p + u . grad p = 0 over pairs of frames that follow each other, of the
+    input's pictures, compressed and smoothed.
     """
     normal, change = np.zeros((2, 2)), np.zeros(2)
-    for before, after in _pairs(clip):
-        slopes = np.array(np.gradient((before + after) / 2))
-        normal += np.einsum("iab,jab->ij", slopes, slopes)
-        change += np.einsum("iab,ab->i", slopes, before - after)
+    for pair in pairs:
+        if all(pair):
+            before, after = (ndimage.gaussian_filter(np.log1p(shown[0].picture), SMOOTHING) for shown in pair)
+            slopes = np.array(np.gradient((before + after) / 2))
+            normal += np.einsum("iab,jab->ij", slopes, slopes)
+            change += np.einsum("iab,ab->i", slopes, before - after)
     return np.asarray(np.linalg.lstsq(normal, change, rcond=None)[0])
-
-
-def _pairs(clip: ObservedClip) -> Iterator[tuple[Picture, Picture]]:
-    """The input's pictures in frames that follow each other, spread over the clip, compressed and smoothed."""
-    for number in clip.spread(FRAMES):
-        if number + 1 < clip.length:
-            seen = [_pictures(clip, each) for each in (number, number + 1)]
-            if all(seen):
-                before, after = (ndimage.gaussian_filter(np.log1p(pictures[0].picture), SMOOTHING) for pictures in seen)
-                yield before, after
 
 
 def _width(picture: Picture) -> float:

@@ -85,7 +85,6 @@ leave the outline that the smooth answer has from there."""
 OUTLINE_BLUR = 3.0
 """Standard deviation (voxels) of that blur."""
 
-
 ENDS = 3.0
 """Voxels at both ends of the axis over which detail fades in: they hold what the domain cuts off."""
 
@@ -187,17 +186,7 @@ class EveryView:
         return EveryView(texture, coarser, coarser.means(self.smooth, self.level), self.strength)
 
     def added(self, density: Volume, cameras: Sequence[Term], *, fresh: bool) -> Volume:
-        """Scale a density towards the clip's texture and the cameras' pictures in turn.
-
-        Parameters
-        ----------
-        density : (nx, ny, nz)
-            Zero outside the hull.
-        cameras
-            Terms of the cameras' pictures.
-        fresh
-            Whether nothing of it is carried on from the frame before.
-        """
+        """Scale a density towards the clip's texture and the cameras' pictures in turn; see `Detail`."""
         # what is carried has the finest detail already, and renewing it would flicker
         exemplars = self.texture.exemplars if fresh else self.texture.exemplars[:-1]
         return self._rounds(density, cameras, exemplars, self.azimuths(), fresh)
