@@ -2,8 +2,8 @@
 
     python -m benchmarks.example.render TRUTH.npz SCENE.toml [--views DIR] [--check 12 30 46]
 
-The pictures are single scattering, integrated at half-voxel steps instead of sampled, so they carry no noise;
-the camera's rays, the light and the trilinear density are Mitsuba's own. `--check` compares with `volpath`.
+The pictures are single scattering, integrated at half-voxel steps instead of sampled, so they carry no noise; what
+arrives of the light is kept at the voxels' centres. The camera's rays, the light and the trilinear density are Mitsuba's own. `--check` compares with `volpath`.
 """
 
 import argparse
@@ -201,7 +201,7 @@ class Renderer:
         texture = mi.load_dict(volume(part, low, high))
         step, extinction, g = voxel / 2, self.medium["extinction"], self.medium["anisotropy"]
 
-        axes = [a + (np.arange(2 * n) + 0.5) * voxel / 2 for a, n in zip(low, part.shape, strict=True)]
+        axes = [a + (np.arange(n) + 0.5) * voxel for a, n in zip(low, part.shape, strict=True)]
         nodes = mi.Point3f(*(p.ravel() for p in np.meshgrid(*axes, indexing="ij")))
         views = [
             (pixel_rays(self.camera | {"matrix": matrix}), np.zeros((height, width, 3)), None) for matrix in matrices
@@ -209,8 +209,8 @@ class Renderer:
         for source in self.mitsuba.emitters():
             sample, irradiance = source.sample_direction(dr.zeros(mi.Interaction3f), mi.Point2f(0.5))
             to_light = mi.Vector3f(sample.d)
-            depth = integral(texture, box, nodes, to_light, step).numpy()
-            shade = mi.load_dict(volume(depth.reshape([2 * n for n in part.shape]), low, high))
+            depth = integral(texture, box, nodes, to_light, voxel).numpy()
+            shade = mi.load_dict(volume(depth.reshape(part.shape), low, high))
 
             def arriving(where: Any, shade: Any = shade) -> Any:
                 return dr.exp(-extinction * shade.eval_1(where))
@@ -267,7 +267,7 @@ def write_video(path: Path, pictures: list[np.ndarray], fps: float, crf: int) ->
 def main() -> None:
     """Render a clip and its plate beside the scene file, and whatever else is asked for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("truth", type=Path, help="baked by bake.py")
+    parser.add_argument("truth", type=Path, help="baked by benchmarks.truth.bake")
     parser.add_argument("scene", type=Path)
     parser.add_argument("--views", type=Path, help="folder for linear reference images from four sides")
     parser.add_argument("--check", type=int, nargs="*", default=[], help="frames to compare with volpath")
@@ -276,7 +276,7 @@ def main() -> None:
     options = parser.parse_args()
 
     scene = tomllib.loads(options.scene.read_text())
-    densities = np.load(options.truth)["density"].astype(np.float32)
+    densities = np.load(options.truth)["density"]
     renderer = Renderer(scene)
     views = {name: turned(scene["camera"], yaw) for name, yaw in YAWS.items()}
     if options.views is None:
@@ -285,8 +285,8 @@ def main() -> None:
     front = matrices[0]
 
     for frame in options.check:
-        traced = renderer.path_traced(densities[frame], front)
-        marched = blocks(renderer.images(densities[frame], [front])[0][0])
+        traced = renderer.path_traced(np.float32(densities[frame]), front)
+        marched = blocks(renderer.images(np.float32(densities[frame]), [front])[0][0])
         difference = np.sqrt(np.mean((marched - traced) ** 2) / np.mean(traced**2))
         total = marched.sum() / traced.sum() - 1
         print(f"frame {frame}: against volpath {difference:.2%} RMS over blocks, {total:+.2%} in all")
@@ -296,7 +296,7 @@ def main() -> None:
     write_png(folder / scene["background"]["image"], plate)
     pictures, stored = [], {name: [] for name in views}
     for frame, density in enumerate(densities):
-        rendered = renderer.images(density, matrices)
+        rendered = renderer.images(np.float32(density), matrices)
         radiance, transmittance = rendered[0]
         seen = radiance + transmittance[..., None] * srgb_decode(plate)
         pictures.append(srgb_encode(seen))

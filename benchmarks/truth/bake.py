@@ -1,6 +1,6 @@
 """Bake scenes with a known flow by Mantaflow, in a Blender of Debian that is installed for it.
 
-    python -m benchmarks.truth.bake OUT [choose | report | NAME ...] [--resolution 64x64x96]
+    python -m benchmarks.truth.bake OUT [choose | report | NAME ...] [--resolution 64x64x96] [--steps 1]
 
 writes OUT/NAME/truth.npz for each scene that is not there yet. Needs root on Linux and mmdebstrap.
 """
@@ -37,7 +37,7 @@ def debian_root() -> Path:
     return ROOT
 
 
-def bake(name: str, across: int, frames: int, folder: Path) -> None:
+def bake(name: str, across: int, frames: int, steps: int, folder: Path) -> None:
     """Bake a scene into a folder, which appears whole or not at all."""
     part = folder.with_suffix(".part")
     shutil.rmtree(part, ignore_errors=True)
@@ -45,7 +45,7 @@ def bake(name: str, across: int, frames: int, folder: Path) -> None:
     # the root sees one folder only, so the scripts are copied into it
     scripts = [shutil.copy(HERE / script, part) for script in ("manta_scene.py", "mantaflow.py", "scenes.py")]
     blender = ("blender", "-b", "--factory-startup", "--python-exit-code", "1", "-P", scripts[0])
-    command = [ENTER, debian_root(), part, *blender, "--", name, str(across), str(frames), part / "truth.npz"]
+    command = [ENTER, debian_root(), part, *blender, "--", name, *map(str, (across, frames, steps)), part / "truth.npz"]
     log = part / "bake.log"
     with log.open("w") as stream:
         done = subprocess.run(command, stdout=stream, stderr=subprocess.STDOUT)
@@ -73,6 +73,7 @@ def main() -> None:
     parser.add_argument("scenes", nargs="+", help="a use (choose, report) or names such as plume-1")
     parser.add_argument("--resolution", type=voxels_across, default=64, help="as 48x48x72; 64x64x96 unless said")
     parser.add_argument("--frames", type=int, default=FRAMES, help=f"{FRAMES} unless said")
+    parser.add_argument("--steps", type=int, default=1, help="of the solver, a frame; with more than one no velocity is kept")
     options = parser.parse_args()
     wanted = [name for word in options.scenes for name in (names(word) if word in SEEDS else [word])]
     try:
@@ -84,7 +85,7 @@ def main() -> None:
         folder = options.out.resolve() / name
         if not folder.exists():
             began = time.monotonic()
-            bake(name, options.resolution, options.frames, folder)
+            bake(name, options.resolution, options.frames, options.steps, folder)
             print(f"{folder / 'truth.npz'}: {time.monotonic() - began:.0f} s", flush=True)
 
 

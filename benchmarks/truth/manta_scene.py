@@ -1,7 +1,9 @@
-"""Bake a scene with Mantaflow: ``blender -b --factory-startup -P manta_scene.py -- NAME ACROSS OUT``, Blender 3.4.
+"""Bake a scene with Mantaflow in Blender 3.4.
 
-ACROSS is the number of voxels along x; OUT is the file to write, in the format that truth.py reads. One step is one
-frame. A voxel on every side is simulated and cut off, so that the floor and the open sides lie on the box's sides.
+    blender -b --factory-startup -P manta_scene.py -- NAME ACROSS FRAMES STEPS OUT
+
+ACROSS is the number of voxels along x, STEPS that of solver steps a frame; OUT is the file to write, in the format that
+truth.py reads. The velocity of a frame carries its smoke to the next one if a step is a frame; with more it is left out. A voxel on every side is simulated and cut off, so that the floor and the open sides lie on the box's sides.
 """
 
 import json
@@ -16,12 +18,12 @@ sys.path.insert(0, str(Path(__file__).parent))
 from mantaflow import boot, view
 from scenes import BOX_MIN, BOX_SIZE, FPS, Inlet, Scene, scene
 
-DT = 1 / FPS
 COOLING = 0.4  # decay of the heat (1/s)
 DRAFT = 0.06  # strength of the air's first motion (m/s)
 FAINTEST = 1e-3  # densities below it are not smoke
 MARGIN = 6  # voxels around the smoke within which the velocity is kept
 KEPT = slice(1, -1)
+MULTIGRID = 3  # Mantaflow's PcMGStatic: the flags never change
 
 
 class Noise:
@@ -61,13 +63,15 @@ class Simulation:
         What to simulate.
     across
         Voxels along x.
+    step_time
+        Length of a step (s).
     """
 
-    def __init__(self, manta: Any, scene: Scene, across: int) -> None:
-        self.manta, self.scene = manta, scene
+    def __init__(self, manta: Any, scene: Scene, across: int, step_time: float) -> None:
+        self.manta, self.scene, self.step_time = manta, scene, step_time
         self.voxel = BOX_SIZE[0] / across
         self.shape = tuple(round(size / self.voxel) + 2 for size in BOX_SIZE)
-        self.scale = DT / self.voxel  # m/s -> voxels a frame, Mantaflow's unit here
+        self.scale = step_time / self.voxel  # m/s -> voxels a step, Mantaflow's unit here
         axes = [
             low + np.arange(-0.5, count - 1, dtype=np.float32) * self.voxel
             for low, count in zip(BOX_MIN, self.shape, strict=True)
@@ -100,7 +104,9 @@ class Simulation:
     def make_incompressible(self) -> None:
         """Project the velocity."""
         self.manta.setWallBcs(flags=self.flags, vel=self.velocity)
-        self.manta.solvePressure(flags=self.flags, vel=self.velocity, pressure=self.pressure, cgAccuracy=1e-4)
+        self.manta.solvePressure(
+            flags=self.flags, vel=self.velocity, pressure=self.pressure, cgAccuracy=1e-4, preconditioner=MULTIGRID
+        )
         # Mantaflow leaves out the faces of the open sides that belong to cells beyond the box
         velocity, pressure = view(self.velocity, self.shape, 3), view(self.pressure, self.shape)
         velocity[-1, KEPT, KEPT, 0] += pressure[-2, KEPT, KEPT]
@@ -108,7 +114,7 @@ class Simulation:
         velocity[KEPT, KEPT, -1, 2] += pressure[KEPT, KEPT, -2]
 
     def step(self, time: float) -> np.ndarray:
-        """Advance by a frame, to a time (s); return the cells [x, y, z] where smoke was put in."""
+        """Advance by a step, to a time (s); return the cells [x, y, z] where smoke was put in."""
         manta, fields = self.manta, {"flags": self.flags, "vel": self.velocity}
         for grid in (self.smoke, self.heat, self.velocity):
             manta.advectSemiLagrange(**fields, grid=grid, order=2)
@@ -117,10 +123,10 @@ class Simulation:
 
         smoke, heat = view(self.smoke, self.shape), view(self.heat, self.shape)
         velocity = view(self.velocity, self.shape, 3)
-        lift = self.scene.buoyancy * DT * self.scale
+        lift = self.scene.buoyancy * self.step_time * self.scale
         velocity[:, :, 1:, 2] += lift * 0.5 * (heat[:, :, 1:] + heat[:, :, :-1])
-        heat *= np.exp(-COOLING * DT)
-        smoke *= np.exp(-self.scene.dissipation * DT)
+        heat *= np.exp(-COOLING * self.step_time)
+        smoke *= np.exp(-self.scene.dissipation * self.step_time)
         self.blow_wind(velocity)
         cells = np.zeros(self.shape, bool)
         if time < self.scene.blowing:
@@ -159,10 +165,13 @@ class Simulation:
             velocity[..., component][cells] = self.scale * blown
         return cells
 
-    def record(self) -> tuple[np.ndarray, list[np.ndarray]]:
-        """Return the density and the velocity on x, y and z faces (m/s) near the smoke, in the box."""
+    def density(self) -> np.ndarray:
+        """Return the smoke's density [x, y, z] in the box."""
         smoke = view(self.smoke, self.shape)[KEPT, KEPT, KEPT]
-        smoke = np.where(smoke > FAINTEST, smoke, 0).astype(np.float16)
+        return np.where(smoke > FAINTEST, smoke, 0).astype(np.float16)
+
+    def faces(self, smoke: np.ndarray) -> list[np.ndarray]:
+        """Return the velocity on x, y and z faces (m/s) near a density [x, y, z], in the box."""
         near = np.pad(smoke > 0, MARGIN)
         for axis in range(3):  # as far as MARGIN along each axis: a cube around every cell
             count = smoke.shape[axis]
@@ -177,31 +186,39 @@ class Simulation:
             padded = np.pad(near, ends)
             low, high = (padded.take(range(s, s + near.shape[axis] + 1), axis) for s in (0, 1))
             faces.append(np.where(low | high, velocity[(*kept, axis)], 0).astype(np.float16))
-        return smoke, faces
+        return faces
 
 
 def main() -> None:
     """Bake one scene."""
-    name, across, frames, out = sys.argv[sys.argv.index("--") + 1 :]
-    made = scene(name)
-    simulation = Simulation(boot(), made, int(across))
+    name, across, frames, steps, out = sys.argv[sys.argv.index("--") + 1 :]
+    made, frames, steps = scene(name), int(frames), int(steps)
+    step_time = 1 / (FPS * steps)
+    simulation = Simulation(boot(), made, int(across), step_time)
     warm_up = round(made.warm_up * FPS)
     densities, faces, inflows = [], [], []
-    for frame in range(-warm_up, int(frames)):
-        cells = simulation.step((frame + warm_up) * DT)
-        if frame >= 0:
-            density, velocity = simulation.record()
-            densities.append(density)
-            faces.append(velocity)
+    for step in range((warm_up + frames) * steps):
+        cells = simulation.step(step * step_time)
+        frame, within = divmod(step, steps)
+        if within:
+            continue
+        print(f"frame {frame - warm_up}", flush=True)
+        if frame < warm_up:
+            continue
+        densities.append(simulation.density())
+        if steps == 1:
+            faces.append(simulation.faces(densities[-1]))
             inflows.append(np.packbits(cells))
+    flow = {}
+    if steps == 1:
+        flow = {f"velocity_{axis}": np.stack([f[i] for f in faces]) for i, axis in enumerate("xyz")}
+        flow |= {"velocity_frames": np.arange(frames), "inflow_packed": np.stack(inflows)}
     np.savez_compressed(
         out,
         density=np.stack(densities),
-        **{f"velocity_{axis}": np.stack([f[i] for f in faces]) for i, axis in enumerate("xyz")},
-        velocity_frames=np.arange(int(frames)),
+        **flow,
         voxel_size=simulation.voxel,
         fps=FPS,
-        inflow_packed=np.stack(inflows),
         closed=np.array(["z-"]),
         made_by=json.dumps(asdict(made)),
     )

@@ -160,8 +160,14 @@ def draw_tempo(rng: np.random.Generator) -> float:
     return float(0.65 * 2.3 ** (rng.uniform() ** 2))
 
 
+EXAMPLE = Scene("example", 1, (Inlet((-0.14, 0.10, 0.14), 0.21, (0.0, 0.0, 1.1)),), 6.5, warm_up=1.0, gust=0.3)
+"""The plume of the example clip; its inlet is in the bowl that its background shows."""
+
+
 def scene(name: str) -> Scene:
-    """The scene of a name, "plume-1"; ValueError if there is none."""
+    """The scene of a name, "plume-1" or "example"; ValueError if there is none."""
+    if name == EXAMPLE.name:
+        return EXAMPLE
     kind, _, seed = name.partition("-")
     if kind not in KINDS or not seed.isdigit():
         raise ValueError(f"no scene is called {name!r}: say a kind ({', '.join(KINDS)}), a hyphen and a seed.")

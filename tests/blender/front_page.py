@@ -1,0 +1,92 @@
+"""Make the picture of the front page, docs/blender_render.png: ``python tests/blender/front_page.py SEQUENCE``.
+
+It takes a Python with bpy, and frame 36 of the example at full size:
+``smokelift reconstruct examples/plume/scene.toml --quality final --frames 33:37 --out SEQUENCE``.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+import tempfile
+from pathlib import Path
+
+import bpy
+from looks import rendered
+from mathutils import Matrix, Vector
+from pictures import beside, save
+from PIL import Image
+from room import painted, panel
+
+import addon
+from addon import volume
+from addon.take import Take
+from smokelift.footage.clip import Clip
+from smokelift.footage.images import area_average, linear_to_srgb
+from tests.example_shot import EXAMPLE, set_up_example, smoke
+
+FRAME = 36
+PERCENT, SAMPLES = 75, 64
+
+TURNS = (40, 90)
+"""Degrees by which the clip's camera is carried around the smoke."""
+
+SUNS = ((0.57, 0.46, -0.68), (-0.75, -0.55, -0.35))
+"""Directions of the clip's sun, and of a low one from the right and behind."""
+
+
+def main() -> None:
+    """Render and write it: the clip, the front, two turned cameras, and another sun."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    addon.register()
+    scene = set_up_example(bpy.context.scene)
+    obj = smoke(scene)
+    volume.show(obj, Take(Path(sys.argv[1]).absolute()))
+    scene.cycles.samples, scene.cycles.use_denoising = SAMPLES, True
+    if hasattr(scene.cycles, "volume_biased"):
+        scene.cycles.volume_biased = True  # marching through the volume is ten times as fast
+    scene.frame_set(FRAME)
+    with tempfile.TemporaryDirectory() as folder, Clip.open(EXAMPLE / "clip.mp4") as clip:
+        bpy.ops.smokelift.set_up()
+        front = rendered(scene, Path(folder), PERCENT)
+        filmed = 255 * linear_to_srgb(area_average(clip.frame(FRAME - 1), *front.size)) + 0.5
+        pictures = [Image.fromarray(filmed.astype("uint8")), front]
+        build_stage(scene, keep={obj, scene.camera})
+        for degrees, sun in [*((turn, SUNS[0]) for turn in TURNS), (TURNS[0], SUNS[1])]:
+            light(scene, sun, degrees)
+            camera, place = scene.camera, scene.camera.matrix_world.copy()
+            camera.matrix_world = Matrix.Rotation(math.radians(degrees), 4, "Z") @ place
+            pictures.append(rendered(scene, Path(folder), PERCENT))
+            camera.matrix_world = place
+    save("blender_render.png", beside(pictures))
+
+
+def build_stage(scene: bpy.types.Scene, keep: set[bpy.types.Object]) -> None:
+    """Leave the smoke and the camera only, and put a dark floor below them."""
+    for obj in list(scene.objects):
+        if obj not in keep:
+            bpy.data.objects.remove(obj)
+    scene.render.film_transparent = False
+    panel(scene, [(-20, -20, 0), (20, -20, 0), (20, 20, 0), (-20, 20, 0)], (0.05, 0.048, 0.045))
+    bpy.ops.mesh.primitive_cylinder_add(radius=0.3, depth=0.1, location=(-0.14, 0.10, 0.05))
+    bpy.context.object.data.materials.append(painted((0.03, 0.03, 0.03)))
+    world = scene.world = bpy.data.worlds.new("Stage")
+    if world.node_tree is None:
+        world.use_nodes = True
+    world.node_tree.nodes["Background"].inputs["Color"].default_value = (0.012, 0.015, 0.02, 1.0)
+
+
+def light(scene: bpy.types.Scene, direction: tuple[float, float, float], degrees: float) -> None:
+    """One sun, which shines in a direction as the turned camera sees it."""
+    for obj in [obj for obj in scene.objects if obj.type == "LIGHT"]:
+        bpy.data.objects.remove(obj)
+    data = bpy.data.lights.new("Sun", "SUN")
+    data.energy, data.angle = 18.0, math.radians(1.0)
+    sun = bpy.data.objects.new("Sun", data)
+    scene.collection.objects.link(sun)
+    turned = Matrix.Rotation(math.radians(degrees), 3, "Z") @ Vector(direction)
+    sun.rotation_euler = turned.to_track_quat("-Z", "Y").to_euler()
+
+
+if __name__ == "__main__":
+    main()
