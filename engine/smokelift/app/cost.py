@@ -20,7 +20,7 @@ from smokelift.density.halves import LARGE
 
 Resolution = tuple[int, int, int]
 
-START_SECONDS = 5.0
+START_SECONDS = 3.5
 """Seconds to start, to estimate what is not given and to look at the clip's texture."""
 
 VOXELS_A_FRAME = 1.2e7
@@ -49,13 +49,13 @@ BYTES_A_SMOKY_VOXEL_ON_DISK = 16
 """Bytes of a density and three velocities at 16 bits, for each voxel that may hold smoke, and of the velocities around
 it: 8.6 to 16 are usual."""
 
-BASE_BYTES = 200 * 2**20
+BASE_BYTES = 190 * 2**20
 """Bytes of memory for the interpreter, libraries and kernels."""
 
-BYTES_A_PIXEL = 170
+BYTES_A_PIXEL = 210
 """Bytes of memory for each pixel of the clips' frames: those that are decoded, and what was estimated from them."""
 
-BYTES_A_VOXEL = 18, 320
+BYTES_A_VOXEL = 12, 380
 """Bytes at a run's peak for each voxel of the box, and for each that may hold smoke in addition."""
 
 SMALL = 2**23

@@ -14,7 +14,7 @@ from smokelift.setup.smoke import SAMPLES
 
 LONGEST = 96
 """Voxels along the longest side of the grid on which the smoke is looked at, at most: it takes a rim of one of them
-with it, which makes shares up to a quarter too large (docs/experiments/memory-and-time.md)."""
+with it, which makes shares up to two fifths too large (docs/experiments/memory-and-time.md)."""
 
 LOOKED_AT = 4
 """Frames with smoke that are looked at, from the one with the most on."""
