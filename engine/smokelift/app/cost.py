@@ -1,60 +1,75 @@
 """What a run takes, known before it is spent: time, memory and disk.
 
-Time is counted in Poisson solves by cosine transforms. A frame takes about as many whatever the grid, and what a solve
-takes on this machine is measured. All constants: docs/experiments/memory-and-time.md.
+It follows the voxels of the box, and more so those that may hold smoke. Time is counted in Poisson solves by cosine
+transforms, as long as one takes a voxel on this machine now. All constants: docs/experiments/memory-and-time.md.
 """
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 import psutil
 import scipy.fft
 
-from smokelift.scene import Domain
-from smokelift.setup.settings import Quality, Settings
+from smokelift.app.workload import Workload
+from smokelift.density.halves import LARGE
 
 Resolution = tuple[int, int, int]
 
-SOLVES_A_FRAME: Mapping[Quality, float] = {"draft": 54.0, "balanced": 58.0, "fine": 63.0, "final": 20.0}
-"""Poisson solves that take as long as a frame. On the large grids of `final` smoke takes a small part of the box, and
-its detail is found from coarse to fine."""
+START_SECONDS = 3.5
+"""Seconds to start, to estimate what is not given and to look at the clip's texture."""
+
+VOXELS_A_FRAME = 1.2e7
+"""Voxels whose solve takes as long as what every frame takes, however small its grid: decoding and files."""
+
+SOLVES_A_VOXEL = 12.0
+"""Solves that take as long as what a frame takes for each voxel of the box."""
+
+SOLVES_A_SMOKY_VOXEL = 250.0, 130.0
+"""Solves that take as long as what a frame takes for each voxel that may hold smoke in addition: as many of them as are
+fitted on their own grid, and those beyond, whose detail is found from coarse to fine."""
 
 SHARE_A_VIEW = 0.5
 """Part of a frame's time that each further view adds."""
 
-SHARE_OF_DETAIL = 0.4
-"""Part of a frame's time that detail in depth adds: the smooth answer, and two rounds of three pictures more. It is
-less where the fit to the clip takes longer."""
+WITHOUT_DETAIL = 0.55
+"""Part of a frame's time that is left without detail in depth."""
 
-START_SECONDS = 5.0
-"""Seconds to start, to compile and to estimate the background."""
+FRESH_FRAMES = 2.0
+"""Frames that take as long as what the first two take in addition, for whose detail nothing is carried."""
 
-BYTES_A_VOXEL_ON_DISK = 8
-"""Bytes of a density and three velocities at 16 bits, where smoke fills the box. A quarter is usual."""
+PAPER_SOLVES = 1100.0
+"""Solves that take as long as what a frame takes for each voxel by the paper's method."""
 
-BYTES_A_VOXEL = 85
-"""Bytes of memory at a run's peak, where two fifths of the voxels may hold smoke: what fills the box, and what a fit
-needs of the voxels that may hold smoke (docs/experiments/memory-and-time.md)."""
+BYTES_A_SMOKY_VOXEL_ON_DISK = 16
+"""Bytes of a density and three velocities at 16 bits, for each voxel that may hold smoke, and of the velocities around
+it: 8.6 to 16 are usual."""
+
+BASE_BYTES = 190 * 2**20
+"""Bytes of memory for the interpreter, libraries and kernels."""
+
+BYTES_A_PIXEL = 210
+"""Bytes of memory for each pixel of the clips' frames: those that are decoded, and what was estimated from them."""
+
+BYTES_A_VOXEL = 12, 380
+"""Bytes at a run's peak for each voxel of the box, and for each that may hold smoke in addition."""
+
+SMALL = 2**23
+"""Voxels whose array takes 32 MiB. The C library gives smaller arrays of memory that it kept, which has to be cleared,
+so that they take their memory whether smoke is there or not."""
+
+BYTES_A_VOXEL_OF_SMALL = 80, 100
+"""The same as `BYTES_A_VOXEL` for such a grid."""
 
 BYTES_A_VOXEL_OF_SOLVER = 145
-"""Bytes that a velocity adds whose estimate has the grid of the density: its solver's arrays."""
+"""Bytes for each voxel of the box that a velocity adds whose estimate has the grid of the density."""
 
-BYTES_A_VOXEL_OF_DETAIL = 20
-"""Bytes that detail in depth adds: places and records of three pictures more, and the smooth answer of two frames."""
-
-BYTES_A_PIXEL_OF_DETAIL = 4
-"""Bytes of a pixel of every frame on the turntable's screen, 16 bits that are held twice while they are gathered."""
-
-BASE_BYTES = 250 * 2**20
-"""Bytes of memory for the interpreter, libraries, compiled kernels and decoded pictures."""
-
-LARGEST_TIMED = 64
-"""Voxels along a side of the grid whose solve is timed. Larger ones take as much longer as they have more voxels."""
+TIMED = (64, 64, 64)
+"""Voxels of the grid whose solve is timed."""
 
 LEAST_VOXELS = 8
 """Voxels along the shortest side of a grid that is suggested."""
@@ -71,11 +86,11 @@ class Cost:
     Attributes
     ----------
     seconds
-        Right to a factor of two.
+        Right to a factor of one and a half on a machine whose load does not change.
     memory, memory_free
         Bytes at the peak, and bytes that are free now.
     disk
-        Bytes at most.
+        Bytes of the OpenVDB files, at most.
     """
 
     seconds: float
@@ -84,29 +99,37 @@ class Cost:
     disk: int
 
 
-def estimate_cost(domain: Domain, frames: int, settings: Settings, further_views: int = 0) -> Cost:
-    """Estimate the cost of a run over so many frames; it takes up to a second."""
-    solves = frames * SOLVES_A_FRAME[settings.quality] * (1 + SHARE_A_VIEW * further_views)
-    if settings.detail > 0:
-        solves *= 1 + SHARE_OF_DETAIL
+def estimate_cost(resolution: Resolution, work: Workload) -> Cost:
+    """Estimate the cost of a run; it takes a part of a second."""
     return Cost(
-        seconds=START_SECONDS + solves * _solve_seconds(domain.resolution),
-        memory=memory_needed(domain.resolution, frames, settings),
+        seconds=START_SECONDS + voxel_solves(resolution, work) * _seconds_a_voxel(),
+        memory=memory_needed(resolution, work),
         memory_free=memory_free(),
-        disk=frames * math.prod(domain.resolution) * BYTES_A_VOXEL_ON_DISK,
+        disk=round(work.frames * work.mean * math.prod(resolution) * BYTES_A_SMOKY_VOXEL_ON_DISK),
     )
 
 
-def memory_needed(resolution: Resolution, frames: int, settings: Settings) -> int:
-    """Return the bytes that a run over so many frames takes at its peak."""
+def voxel_solves(resolution: Resolution, work: Workload) -> float:
+    """Return the voxels of Poisson solves that take as long as the frames of a run."""
     voxels = math.prod(resolution)
-    needed = BASE_BYTES + BYTES_A_VOXEL * voxels
-    if settings.method == "paper" or settings.velocity.coarsening == 0:
-        needed += BYTES_A_VOXEL_OF_SOLVER * voxels
-    if settings.detail > 0:
-        x, y, z = resolution
-        needed += BYTES_A_VOXEL_OF_DETAIL * voxels + BYTES_A_PIXEL_OF_DETAIL * frames * math.ceil(math.hypot(x, y)) * z
-    return needed
+    if work.settings.method == "paper":
+        return work.frames * PAPER_SOLVES * voxels
+    on_own_grid, beyond = SOLVES_A_SMOKY_VOXEL
+    smoky = work.mean * voxels
+    fitted = on_own_grid * min(smoky, LARGE) + beyond * max(smoky - LARGE, 0)
+    a_frame = (VOXELS_A_FRAME + SOLVES_A_VOXEL * voxels + fitted) * (1 + SHARE_A_VIEW * (work.views - 1))
+    if work.settings.detail == 0:
+        return work.frames * WITHOUT_DETAIL * a_frame
+    return (work.frames + FRESH_FRAMES) * a_frame
+
+
+def memory_needed(resolution: Resolution, work: Workload) -> int:
+    """Return the bytes that a run takes at its peak."""
+    voxels = math.prod(resolution)
+    a_voxel, a_smoky_voxel = BYTES_A_VOXEL_OF_SMALL if voxels < SMALL else BYTES_A_VOXEL
+    if work.settings.method == "paper" or work.settings.velocity.coarsening == 0:
+        a_voxel += BYTES_A_VOXEL_OF_SOLVER
+    return round(BASE_BYTES + BYTES_A_PIXEL * work.pixels + (a_voxel + work.largest * a_smoky_voxel) * voxels)
 
 
 def memory_free() -> int:
@@ -114,8 +137,8 @@ def memory_free() -> int:
     return int(psutil.virtual_memory().available)
 
 
-def require_memory(domain: Domain, frames: int, settings: Settings, *, given: bool = True) -> None:
-    """Check that a run over so many frames fits into the memory that is free.
+def require_memory(resolution: Resolution, work: Workload, *, given: bool = True) -> None:
+    """Check that a run fits into the memory that is free.
 
     A box that is ``given`` keeps its proportions, so that voxels stay cubes; one that was found follows its voxels.
 
@@ -125,12 +148,12 @@ def require_memory(domain: Domain, frames: int, settings: Settings, *, given: bo
         With the largest resolution of the same shape that fits.
     """
     free = memory_free()
-    needed = memory_needed(domain.resolution, frames, settings)
+    needed = memory_needed(resolution, work)
     if needed <= free:
         return
-    shape = " x ".join(map(str, domain.resolution))
-    smaller = _same_proportions(domain.resolution) if given else _about_the_same(domain.resolution)
-    fits = next((each for each in smaller if memory_needed(each, frames, settings) <= free), None)
+    shape = " x ".join(map(str, resolution))
+    smaller = _same_proportions(resolution) if given else _about_the_same(resolution)
+    fits = next((each for each in smaller if memory_needed(each, work) <= free), None)
     advice = (
         f"the largest that fits is --resolution {','.join(map(str, fits))}"
         if fits
@@ -157,13 +180,12 @@ def _about_the_same(resolution: Resolution) -> Iterator[Resolution]:
             yield x, y, z
 
 
-def _solve_seconds(resolution: Resolution) -> float:
-    """Return the seconds that a Poisson solve takes on this machine now."""
-    timed = [min(n, LARGEST_TIMED) for n in resolution]
-    field = np.zeros(timed, np.float32)
+def _seconds_a_voxel() -> float:
+    """Return the seconds that a Poisson solve takes on this machine now, for each voxel."""
+    field = np.zeros(TIMED, np.float32)
     spent = []
     for _ in range(5):
         began = time.perf_counter()
         scipy.fft.idctn(scipy.fft.dctn(field, workers=2), workers=2)
         spent.append(time.perf_counter() - began)
-    return float(np.median(spent)) * math.prod(resolution) / math.prod(timed)
+    return float(np.median(spent)) / field.size

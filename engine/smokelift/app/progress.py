@@ -92,6 +92,12 @@ def say_frames(say: Reporter, written: Iterable[tuple[int, Mapping[str, Any]]], 
         say.frame(number, figures)
 
 
+def median_psnr(figures: Iterable[Mapping[str, Any]]) -> float | None:
+    """Return the median of ``psnr`` over the figures of frames; None if none has any."""
+    decibels = [of_frame["psnr"] for of_frame in figures if of_frame.get("psnr") is not None]
+    return median(decibels) if decibels else None
+
+
 class _Text:
     def __init__(self) -> None:
         self._console = _Console(highlight=False)
@@ -105,7 +111,7 @@ class _Text:
             console=self._console,
             speed_estimate_period=120,
         )
-        self._decibels: list[float] = []
+        self._shown: list[Mapping[str, Any]] = []
         self._task = self._bar.add_task("frames", start=False, fit="")
 
     def __enter__(self) -> _Text:
@@ -134,8 +140,8 @@ class _Text:
     def frame(self, number: int, figures: Mapping[str, Any]) -> None:
         fit = figures.get("origin", "no smoke")
         if "psnr" in figures:  # the last one stays, and stands for the run
-            self._decibels.append(figures["psnr"])
-            fit = f"fit {median(self._decibels):.1f} dB"
+            self._shown.append(figures)
+            fit = f"fit {median_psnr(self._shown):.1f} dB"
         with _output():
             self._bar.update(self._task, advance=1, fit=fit)
 

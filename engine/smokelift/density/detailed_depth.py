@@ -26,6 +26,7 @@ from smokelift.density.moment_levels import Level
 from smokelift.density.multiplicative import fit_multiplicative, take_turns
 from smokelift.density.objective import Term
 from smokelift.density.observation import ObservedClip, ViewSet
+from smokelift.density.temporal_prior import BLUR_REACH, TINY
 from smokelift.density.turntable import Turntable
 from smokelift.render import Volume
 from smokelift.scene import Camera
@@ -137,11 +138,10 @@ class DetailedDepth:
         hull = level.views.hull[box]
         moved = texture.turntable.height * texture.drift * level.views.frame
         octaves = _Octaves(moved, texture.width, self.seed)
-        noisy, amounts = smooth[box].copy(), _core.blur(smooth[box], AMOUNTS, 3.0)
+        noisy, amounts = smooth[box].copy(), _core.blur(smooth[box], AMOUNTS, BLUR_REACH)
         noisy[hull] *= np.exp(np.float32(NOISE * self.detail) * octaves.noise(level))
-        now = _core.blur(noisy, AMOUNTS, 3.0)
-        tiny = np.finfo(np.float32).tiny
-        noisy *= np.minimum((amounts + tiny) / (now + tiny), np.float32(LARGEST_GAIN))
+        now = _core.blur(noisy, AMOUNTS, BLUR_REACH)
+        noisy *= np.minimum((amounts + TINY) / (now + TINY), np.float32(LARGEST_GAIN))
         result = np.zeros(smooth.shape, np.float32)
         np.copyto(result[box], noisy, where=hull)
         return result
@@ -211,17 +211,16 @@ class EveryView:
         if not exemplars:
             return density
         table, hull = self.texture.turntable, self.level.views.hull
-        box = box_around(hull, 0)
-        part = tuple(span for axis, span in enumerate(box) if axis != table.axis)
-        # rays turn about the axis, along which all of the grid stays
-        kept = tuple(slice(None) if axis == table.axis else span for axis, span in enumerate(box))
-        corner = part[0].start, part[1].start
+        box = list(box_around(hull, 0))
+        box[table.axis] = slice(None)  # rays turn about the axis, along which all of the grid stays
+        kept = tuple(box)
+        first, second = (span.start for span in kept if span != slice(None))
         smooth, relaxation = table.upright(self.smooth[kept]), self.strength * (FRESH if fresh else CARRIED)
         for exemplar in exemplars:
             for _ in range(FRESH_ROUNDS if fresh else 1):
                 turned = np.array(table.upright(density[kept]))
                 for _ in range(AZIMUTHS):
-                    self._step(turned, smooth, exemplar, next(azimuths), corner, relaxation)
+                    self._step(turned, smooth, exemplar, next(azimuths), (first, second), relaxation)
                 changed = np.zeros(hull.shape, np.float32)
                 np.copyto(changed[kept], table.lying(turned), where=hull[kept])
                 density = take_turns(cameras, changed, 1)

@@ -18,14 +18,12 @@ from numpy.typing import NDArray
 from smokelift.density.halves import LARGE, any_of_two, means_of_two, prolonged
 from smokelift.density.objective import Term, camera_terms
 from smokelift.density.observation import Observation, View, ViewSet
+from smokelift.density.temporal_prior import TINY
 from smokelift.footage.images import area_average
 from smokelift.render import Image, Volume
 from smokelift.scene import Domain
 from smokelift.scene.domain import box_around
 from smokelift.scene.projection import voxel_width
-
-TINY = np.finfo(np.float32).tiny
-"""Smallest normal number, for divisions."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -43,7 +43,7 @@ GUIDED_BLUR = 5.0
 (docs/experiments/guided-simulation.md)."""
 
 BLUR_REACH = 3.0
-"""Standard deviations up to which that blur reaches."""
+"""Standard deviations up to which a blur reaches."""
 
 LARGEST_GAIN = 3.0
 """Bound of the factor by which carried smoke is made denser. Where that is too little the prior's smoke is added: there

@@ -27,7 +27,7 @@ class GridLimit:
     Attributes
     ----------
     share
-        Of the clip's pixels along that side.
+        Of the clip's pixels along that side, between the bounds; 0 for a number of voxels whatever the clip has.
     least
         Voxels that are allowed in any case, if the clip has as many pixels.
     most
@@ -44,7 +44,7 @@ class GridLimit:
 
 
 LIMITS: Mapping[Quality, GridLimit] = {
-    "draft": GridLimit(1 / 6, 64, 64),
+    "draft": GridLimit(0, 64, 64),
     "balanced": GridLimit(1 / 3, 96, 128),
     "fine": GridLimit(1 / 2, 144, 256),
     "final": GridLimit(1, 0, LONGEST),

@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -19,11 +20,19 @@ import pytest
 from command_line import ENVIRONMENT, MODULE, QUICK, command, events, names, refused
 
 from smokelift.app import cost
+from smokelift.app.workload import Workload
+from smokelift.footage.clip import Clip
 from smokelift.output.sequence import Sequence
 from smokelift.render import device
+from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import Settings
 
-DRAFT = Settings.preset("draft")
+
+def workload(plume) -> Workload:
+    """Of the plume's shot, quickly."""
+    draft = Settings.preset("draft")
+    with Clip.open(plume.scene.clip) as clip:
+        return Workload.of(prepare_shot(clip, plume.scene, draft), draft)
 
 
 def test_a_gpu_that_is_not_there(shot, tmp_path) -> None:
@@ -63,13 +72,14 @@ def test_a_grid_too_large_for_the_memory(plume, tmp_path, capsys) -> None:
     named = re.search(r"--resolution (\d+),(\d+),(\d+)", sentence)
     assert named
     x, y, z = (int(count) for count in named.groups())
-    assert cost.memory_needed((x, y, z), 3, DRAFT) < 1.1 * cost.psutil.virtual_memory().available + 2**30
+    even_without_smoke = cost.memory_needed((x, y, z), replace(workload(plume), largest=0.0))
+    assert even_without_smoke < 1.1 * cost.psutil.virtual_memory().available + 2**30
     assert not (tmp_path / "out").exists()
 
 
-def test_the_named_resolution_is_accepted(shot, tmp_path, capsys, monkeypatch) -> None:
+def test_the_named_resolution_is_accepted(plume, shot, tmp_path, capsys, monkeypatch) -> None:
     """Whoever follows the advice on a calibrated domain gets a sequence."""
-    little = SimpleNamespace(available=cost.memory_needed((23, 23, 31), 3, DRAFT))
+    little = SimpleNamespace(available=cost.memory_needed((23, 23, 31), workload(plume)))
     monkeypatch.setattr(cost.psutil, "virtual_memory", lambda: little)
     sentence = refused(capsys, "reconstruct", shot, "--out", tmp_path / "out", "--npz", *QUICK, status=3)
     named = re.search(r"--resolution (\S+?)\.?$", sentence)

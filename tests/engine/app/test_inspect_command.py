@@ -11,6 +11,7 @@ from command_line import QUICK, command, events, refused
 
 from smokelift.app.cost import estimate_cost
 from smokelift.app.facts import facts
+from smokelift.app.workload import Workload
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import read_image
 from smokelift.output.images import write_image
@@ -90,7 +91,7 @@ def test_the_side_that_the_light_comes_from_is_a_line_of_its_own(plume, draft) -
     given = replace(plume.scene, lights=())
     with Clip.open(plume.scene.clip) as clip:
         shot = prepare_shot(clip, given, draft)
-    cost = estimate_cost(shot.scene.domain, 2, shot.settings, 0)
+        cost = estimate_cost(shot.scene.domain.resolution, Workload.of(shot, draft))
     assert "sun's side" not in {fact.what for fact in facts(shot, given, cost)}
     side = LightSide(124.2, 0.9, 0.8).choice
     known = {fact.what: fact for fact in facts(replace(shot, choices=(side, *shot.choices)), given, cost)}

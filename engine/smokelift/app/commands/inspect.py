@@ -14,6 +14,7 @@ from smokelift.app.inspection import inspection_page
 from smokelift.app.options import add_run_options, named_path, require_folder, scene_of, settings_of
 from smokelift.app.page import PAGE_KINDS, Fact, write_page
 from smokelift.app.progress import Reporter
+from smokelift.app.workload import Workload
 from smokelift.checks import counted
 from smokelift.footage.clip import Clip
 from smokelift.output.images import write_image
@@ -69,7 +70,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         notes = [*shot.notes, *boundaries(shot.scene, settings), *choices, *made_up(shot)]
         for note in notes:
             say.note(note)
-        cost = estimate_cost(domain, frames, settings, len(shot.views) - 1)
+        cost = estimate_cost(domain.resolution, Workload.of(shot, settings))
         known = facts(shot, scene, cost)
         files = list(options.page)
         if options.page:

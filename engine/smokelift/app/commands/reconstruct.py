@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import time
 from pathlib import Path
-from statistics import median
 from typing import Any
 
 import numpy as np
@@ -13,8 +12,9 @@ from PIL import Image
 
 from smokelift.app.cost import require_memory
 from smokelift.app.options import add_run_options, named_path, require_folder, scene_of, settings_of
-from smokelift.app.progress import Reporter
+from smokelift.app.progress import Reporter, median_psnr
 from smokelift.app.shortcomings import count_empty, shortcomings
+from smokelift.app.workload import Workload
 from smokelift.checks import counted
 from smokelift.footage.clip import Clip
 from smokelift.footage.matte import SMOKE_THRESHOLD
@@ -64,7 +64,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     with Clip.open(source) as clip:
         written_kinds(options.npz)  # before the clip is looked at, which takes minutes
         shot = prepare_shot(clip, scene, settings)
-        require_memory(shot.scene.domain, len(clip), settings, given=scene.domain is not None)
+        require_memory(shot.scene.domain.resolution, Workload.of(shot, settings), given=scene.domain is not None)
         for note in (*shot.notes, *(choice.reason for choice in shot.choices), *made_up(shot)):
             say.note(note)
         frames = reconstruct(clip, scene, settings, options.out, npz=options.npz, resume=options.resume, shot=shot)
@@ -89,8 +89,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     for note in shortcomings(figures):
         say.note(note)
     seconds = time.monotonic() - began
-    decibels = [of_frame["psnr"] for of_frame in figures if of_frame.get("psnr") is not None]
-    fit = median(decibels) if decibels else None
+    fit = median_psnr(figures)
     met = "" if fit is None else f", {fit:.1f} dB inside the smoke at the clip's pixels (median)"
     say.finish(
         f"{counted(len(sequence.frames), 'frame')} in {options.out} ({seconds:.0f} s){met}.",

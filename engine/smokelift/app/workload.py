@@ -1,0 +1,79 @@
+"""What of a shot decides what a run of it takes: above all how many voxels of its box may hold smoke."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from statistics import fmean
+
+from smokelift.density import RoundDepth, ViewSet
+from smokelift.scene import Domain
+from smokelift.setup.settings import Settings
+from smokelift.setup.shot import Shot
+from smokelift.setup.smoke import SAMPLES
+
+LONGEST = 96
+"""Voxels along the longest side of the grid on which the smoke is looked at, at most: it takes a rim of one of them
+with it, which makes shares up to two fifths too large (docs/experiments/memory-and-time.md)."""
+
+LOOKED_AT = 4
+"""Frames with smoke that are looked at, from the one with the most on."""
+
+
+@dataclass(frozen=True)
+class Workload:
+    """What decides what a run takes, besides the resolution.
+
+    Attributes
+    ----------
+    settings
+        As they are given: a velocity's grid that is chosen is coarse, and takes no memory to speak of.
+    frames
+        How many.
+    views
+        Cameras.
+    pixels
+        Of all their pictures of one moment.
+    largest, mean
+        Shares of the box's voxels that may hold smoke: in the frame with the most of it, and on the mean of all frames.
+    """
+
+    settings: Settings
+    frames: int
+    views: int
+    pixels: int
+    largest: float
+    mean: float
+
+    @staticmethod
+    def of(shot: Shot, settings: Settings) -> Workload:
+        """Look at a shot that was prepared with settings: at the smoke of some frames, on a coarse grid."""
+        shares = _shares(shot, settings)
+        smoky = len(shot.smoky) / len(shot.spread(SAMPLES))
+        return Workload(
+            settings=settings,
+            frames=shot.length,
+            views=len(shot.views),
+            pixels=sum(width * height for width, height in (view.clip.size for view in shot.views)),
+            largest=max(shares, default=0.0),
+            mean=smoky * fmean(shares) if shares else 0.0,
+        )
+
+
+def _shares(shot: Shot, settings: Settings) -> list[float]:
+    """Shares of the voxels that may hold smoke, in some of the frames that show smoke."""
+    if settings.method == "paper":  # its densities are anywhere in the box
+        return [1.0]
+    optics = replace(shot.optics, domain=_coarse(shot.optics.domain))
+    prior = RoundDepth(axis_depth=settings.axis_depth).of_clip(shot)
+    step = -(-len(shot.smoky) // LOOKED_AT) or 1
+    moments = ((frame, shot.observe(frame)) for frame in shot.smoky[::step])
+    seen = [ViewSet.of(observations, optics, frame) for frame, observations in moments if observations]
+    return [float(prior.estimate(views).views.hull.mean()) for views in seen]
+
+
+def _coarse(domain: Domain) -> Domain:
+    """The box, or a little less of it, with voxels that do not depend on those of a large grid, nor do its shares."""
+    times = max(1.0, max(domain.resolution) / LONGEST)
+    x, y, z = (max(1, math.floor(n / times + 1e-6)) for n in domain.resolution)
+    return domain.about_centre((x, y, z), domain.voxel_size * times)
