@@ -44,7 +44,6 @@ def _modules() -> tuple[ModuleType, ...]:
         editors,
         export,
         instances,
-        look,
         look_panel,
         operators,
         panel,
@@ -54,12 +53,11 @@ def _modules() -> tuple[ModuleType, ...]:
         results_panel,
         run,
         setup_panel,
-        smoke,
         undistort,
         volume,
     )
 
-    data = (preferences, properties, smoke, look, volume, run)
+    data = (preferences, properties, volume, run)
     buttons = (operators, box, editors, instances, undistort, drop, presets)
     panels = (panel, results_panel, advanced_panel, look_panel, setup_panel, direct_panel, export)
     return (*data, *buttons, *panels, batch)

@@ -86,9 +86,8 @@ def _smoke(choices: argparse.Namespace) -> bpy.types.Object:
     """The smoke, with its settings overridden by the options; it is active then."""
     from .blender_scene import ShotError
     from .clip_table import use_frames
-    from .smoke import activate, active_smoke, migrate, new_smoke, smokes
+    from .smoke import activate, active_smoke, new_smoke, smokes
 
-    migrate()  # the file may have been opened before the add-on was registered
     scene = bpy.context.scene
     smoke = active_smoke(scene)
     if choices.smoke:
@@ -216,8 +215,8 @@ def unregister() -> None:
 def _run_as_script() -> int:
     """Run the enabled add-on, else the one that holds this script."""
     words = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
-    if hasattr(bpy.types.Scene, "smokelift"):
-        package = type(bpy.context.scene.smokelift).__module__.rpartition(".")[0]
+    if hasattr(bpy.types.WindowManager, "smokelift"):
+        package = type(bpy.context.window_manager.smokelift).__module__.rpartition(".")[0]
         return importlib.import_module(f"{package}.batch").main(words)
     init = Path(__file__).resolve().parent / "__init__.py"
     name = "smokelift_addon"  # not the folder's name, which an extension shares with the engine

@@ -135,11 +135,6 @@ class Job:
         """Whether its state is final."""
         return self.outcome in ENDED
 
-    @property
-    def cancelling(self) -> bool:
-        """Whether it was cancelled and still runs."""
-        return self._kill_at is not None and not self.ended
-
     def start(self) -> None:
         """Start the process; a failure to start is an outcome too."""
         try:

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import bpy
-from bpy.app.handlers import persistent
 
 from .kept import set_and_remember, set_unless_changed
 from .nodes import Input, add_node, new_group, own_group
@@ -150,24 +149,20 @@ def fit_look(volume: bpy.types.Volume, scene: dict[str, Any]) -> None:
         volume.materials.clear()
         volume.materials.append(material)
     material = volume.materials[0]
-    upgrade(material)
     node = node_of(volume)
     if node is None:
         return
     medium, domain = scene["medium"], scene["domain"]
-    fitted = {"Anisotropy": medium["anisotropy"]}
-    # earlier versions of the engine know no coloured smoke
-    color = medium.get("color", [1.0, 1.0, 1.0])
-    albedo = (*[medium["albedo"] * share for share in color], 1.0)
-    if node.type == "GROUP":
-        fitted |= {"Extinction": medium["extinction"], "Albedo": albedo}
-        width = min(high - low for low, high in zip(domain["min"], domain["max"], strict=True))
+    width = min(high - low for low, high in zip(domain["min"], domain["max"], strict=True))
+    fitted = {
+        "Extinction": medium["extinction"],
+        "Albedo": (*[medium["albedo"] * share for share in medium["color"]], 1.0),
+        "Anisotropy": medium["anisotropy"],
         # smoke that could fill the box and would still let 1/e of the light through
-        fitted["Edge Density"] = 1.0 / (medium["extinction"] * width)
-        if "flame_color" in medium:
-            fitted["Flame Color"] = (*medium["flame_color"], 1.0)
-    else:
-        fitted |= {"Density": medium["extinction"], "Color": albedo}
+        "Edge Density": 1.0 / (medium["extinction"] * width),
+    }
+    if "flame_color" in medium:
+        fitted["Flame Color"] = (*medium["flame_color"], 1.0)
     for name, value in fitted.items():
         set_unless_changed(material, _key(name), node.inputs[name], "default_value", value)
 
@@ -175,7 +170,8 @@ def fit_look(volume: bpy.types.Volume, scene: dict[str, Any]) -> None:
 def node_of(volume: bpy.types.Volume) -> bpy.types.ShaderNode | None:
     """The node with the values of a Volume's smoke; None if its material is the artist's own."""
     material = volume.materials[0] if volume.materials else None
-    return material.node_tree.nodes.get(NODE) if material is not None and material.node_tree else None
+    node = material.node_tree.nodes.get(NODE) if material is not None and material.node_tree else None
+    return node if node is not None and node.type == "GROUP" else None
 
 
 def controls(volume: bpy.types.Volume) -> list[bpy.types.NodeSocket]:
@@ -188,48 +184,13 @@ def controls(volume: bpy.types.Volume) -> list[bpy.types.NodeSocket]:
 def use_preset(volume: bpy.types.Volume, name: str, fitted_anisotropy: float) -> bool:
     """Set the artist's inputs to a preset's; returns whether the material has them."""
     node = node_of(volume)
-    if node is None or node.type != "GROUP":
+    if node is None:
         return False
     socket = node.inputs["Anisotropy"]
     set_and_remember(volume.materials[0], _key(socket.name), socket, "default_value", fitted_anisotropy)
     for key, value in PRESETS[name][2].inputs().items():
         node.inputs[key].default_value = value
     return True
-
-
-def upgrade(material: bpy.types.Material) -> None:
-    """Put our group in the place of the Principled Volume of earlier versions, which looks the same.
-
-    One that the artist connected with other nodes, or whose other inputs were changed, stays as it is.
-    """
-    tree = material.node_tree
-    old = tree.nodes.get(NODE) if tree is not None and material.library is None else None
-    if old is None or old.type != "PRINCIPLED_VOLUME" or not _is_default(old):
-        return
-    node = _add_group(tree)
-    node.location = old.location
-    renamed = {"Density": "Extinction", "Color": "Albedo", "Anisotropy": "Anisotropy"}
-    for before, name in renamed.items():
-        node.inputs[name].default_value = old.inputs[before].default_value
-        fitted = material.get(f"smokelift_{_key(before)}")
-        if fitted is not None:
-            material[f"smokelift_{_key(name)}"] = fitted
-    node.inputs["Absorption Color"].default_value = old.inputs["Absorption Color"].default_value
-    for link in list(old.outputs[0].links):
-        tree.links.new(node.outputs[0], link.to_socket)
-    for name in ("Density", "Color"):
-        material.pop(f"smokelift_{_key(name)}", None)
-    tree.nodes.remove(old)
-    node.name = node.label = NODE
-
-
-def _is_default(shader: bpy.types.ShaderNode) -> bool:
-    """Whether a Principled Volume has only values that our group takes over."""
-    if any(socket.is_linked for socket in shader.inputs):
-        return False
-    names = {name: shader.inputs[name].default_value for name in ("Density Attribute", "Color Attribute")}
-    glow = shader.inputs["Emission Strength"].default_value + shader.inputs["Blackbody Intensity"].default_value
-    return names == {"Density Attribute": "density", "Color Attribute": ""} and glow == 0.0
 
 
 def _key(name: str) -> str:
@@ -334,19 +295,3 @@ def _albedo(formulas: _Formulas, source: Any) -> bpy.types.NodeSocket:
     share = formulas.math("DIVIDE", 2, 5, 1.0, formulas.math("MAXIMUM", 1, 5, source["Brightness"], 1.0))
     absorbed = formulas.scaled(4, 3, formulas.vector("SUBTRACT", 3, 3, white, darker), share)
     return formulas.vector("SUBTRACT", 5, 3, white, absorbed)
-
-
-@persistent
-def upgrade_all(_file: str = "") -> None:
-    """Upgrade the materials of the file's smokes."""
-    for volume in bpy.data.volumes:
-        if volume.library is None and volume.materials and volume.materials[0] is not None:
-            upgrade(volume.materials[0])
-
-
-def register() -> None:
-    bpy.app.handlers.load_post.append(upgrade_all)
-
-
-def unregister() -> None:
-    bpy.app.handlers.load_post.remove(upgrade_all)

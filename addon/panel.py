@@ -10,7 +10,7 @@ from .blender_scene import frame_rate
 from .box_table import box_of
 from .clip_table import clip_path
 from .job import ENDED
-from .smoke import active_smoke, find_smoke, migrate_soon, smokes
+from .smoke import active_smoke, find_smoke, smokes
 from .undistort import is_distorted
 
 POINTS_A_LETTER = 6.5
@@ -31,7 +31,6 @@ class _Main:
         layout.use_property_decorate = False
         smoke = active_smoke(context.scene)
         _draw_smokes(layout, context, smoke)
-        migrate_soon(context.scene)
         if smoke is None:
             draw_text(layout, context, "Choose a video or an image sequence of smoke. If its camera moves, track it.")
             return

@@ -17,7 +17,7 @@ from bpy.props import (
 from . import volume
 from .contract import FASTEST, SIDES, SLOWEST
 from .paths import PATH_OPTIONS
-from .smoke import close_floor, free_folder
+from .smoke import free_folder
 
 SEEDS = 2**31
 """Numbers of variations: as many as Blender's whole numbers have from 0."""
@@ -46,11 +46,6 @@ def _box_chosen(settings: "SmokeliftSettings", context: bpy.types.Context) -> No
 
 def _speed_chosen(_settings: "SmokeliftSettings", _context: bpy.types.Context) -> None:
     volume.keep_step()
-
-
-def _floor_chosen(settings: "SmokeliftSettings", context: bpy.types.Context) -> None:
-    """A preset of an earlier version sets the floor."""
-    close_floor(settings)
 
 
 def _closed(description: str, **options: Any) -> Any:
@@ -246,7 +241,6 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
         "Sides of the box, along its own axes, that are solid: no air flows through them. -Z is a floor",
         update=_changed,
     )
-    floor: BoolProperty(name="Floor", description="The floor of an earlier version's file", update=_floor_chosen)
     light_mode: EnumProperty(
         name="Light",
         description="What lights the smoke in the clip",
@@ -424,15 +418,6 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
     )
 
 
-class SmokeliftSceneSettings(bpy.types.PropertyGroup):
-    """The settings of a scene's only smoke, as version 1.0 saved them; `smoke.migrate` reads them."""
-
-    __annotations__ = {
-        **SmokeliftSettings.__annotations__,
-        "volume": PointerProperty(name="Result", description="Volume object of the smoke", type=bpy.types.Object),
-    }
-
-
 class SmokeliftJob(bpy.types.PropertyGroup):
     """One run in the panel."""
 
@@ -464,20 +449,18 @@ class SmokeliftState(bpy.types.PropertyGroup):
     disk: FloatProperty(description="MB")
 
 
-_CLASSES = (SmokeliftDirecting, SmokeliftSettings, SmokeliftSceneSettings, SmokeliftJob, SmokeliftState)
+_CLASSES = (SmokeliftDirecting, SmokeliftSettings, SmokeliftJob, SmokeliftState)
 
 
 def register() -> None:
     for cls in _CLASSES:
         bpy.utils.register_class(cls)
     bpy.types.Object.smokelift = PointerProperty(type=SmokeliftSettings)
-    bpy.types.Scene.smokelift = PointerProperty(type=SmokeliftSceneSettings)
     bpy.types.WindowManager.smokelift = PointerProperty(type=SmokeliftState)
 
 
 def unregister() -> None:
     del bpy.types.WindowManager.smokelift
-    del bpy.types.Scene.smokelift
     del bpy.types.Object.smokelift
     for cls in reversed(_CLASSES):
         bpy.utils.unregister_class(cls)

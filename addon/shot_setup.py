@@ -125,8 +125,7 @@ def _scatter_as_fitted(scene: bpy.types.Scene, index: dict[str, Any]) -> None:
 
 def _scattering(index: dict[str, Any]) -> str | None:
     """The model of scattering that the smoke was fitted with, where the take says it."""
-    # sequences of version 1.0 keep it in their settings
-    return index["scene"]["medium"].get("scattering") or index["settings"].get("density", {}).get("scattering")
+    return index["scene"]["medium"].get("scattering")
 
 
 def _estimated_suns(scene: bpy.types.Scene, index: dict[str, Any]) -> None:

@@ -3,10 +3,8 @@
 import itertools
 import os.path
 from pathlib import Path
-from typing import Any
 
 import bpy
-from bpy.app.handlers import persistent
 from mathutils import Matrix
 
 from . import preferences
@@ -115,55 +113,3 @@ def hide_default_cube(scene: bpy.types.Scene) -> None:
     places = {tuple(vertex.co) for vertex in cube.data.vertices}
     if places == {(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)}:
         cube.hide_viewport = cube.hide_render = True
-
-
-@persistent
-def migrate(_file: str = "") -> None:
-    """Give the settings of scenes, where version 1.0 kept them, to their smokes. A floor becomes a closed side."""
-    for scene in bpy.data.scenes:
-        old = scene.smokelift
-        if scene.library is not None or (old.clip is None and old.volume is None):
-            continue
-        smoke = old.volume
-        if smoke is None or smoke.type != "VOLUME" or smoke.name not in scene.objects:
-            smoke = new_smoke(scene)
-        for name in _kept(old):
-            setattr(smoke.smokelift, name, getattr(old, name))
-        smoke.smokelift.is_smoke = True
-        camera = scene.objects.get(GUESSED_CAMERA)
-        if camera is not None and camera.type == "CAMERA":
-            smoke.smokelift.assumed_camera = camera
-        scene.property_unset("smokelift")
-    for smoke in filter(is_smoke, bpy.data.objects):
-        close_floor(smoke.smokelift)
-
-
-def close_floor(settings: Any) -> None:
-    """Close the bottom of a box whose settings say so in the way of earlier versions."""
-    if settings.floor:
-        settings.closed |= {"z-"}
-        settings.property_unset("floor")
-
-
-def migrate_soon(scene: bpy.types.Scene) -> None:
-    """Migrate a file that was open before the add-on was enabled. Drawing code may call this."""
-    old = scene.smokelift.clip is not None or any(smoke.smokelift.floor for smoke in smokes(scene))
-    if old and not bpy.app.timers.is_registered(migrate):
-        bpy.app.timers.register(migrate)
-
-
-def _kept(old: Any) -> list[str]:
-    """Names of the settings of version 1.0; those first that change others when they are set."""
-    left_out = ("name", "volume", "is_smoke", "folder", "before", "assumed_camera")
-    names = [setting.identifier for setting in old.bl_rna.properties if not setting.is_readonly]
-    return sorted(set(names) - set(left_out), key=lambda name: (name not in ("clip", "box"), name))
-
-
-def register() -> None:
-    bpy.app.handlers.load_post.append(migrate)
-
-
-def unregister() -> None:
-    bpy.app.handlers.load_post.remove(migrate)
-    if bpy.app.timers.is_registered(migrate):
-        bpy.app.timers.unregister(migrate)

@@ -7,6 +7,6 @@
 - ``stability``: damaged files, hostile values and failing systems against the command line
 - ``truth``, ``example``: make the scenes that are known, and the example clip
 
-``python -m benchmarks renderer|velocity|pipeline`` runs the first three (so does ``smokelift bench``); the other
-commands are modules of their own, such as ``python -m benchmarks.accuracy``. All run in the folder of the checkout.
+``python -m benchmarks renderer|velocity|pipeline`` runs the first three; the other commands are
+modules of their own, such as ``python -m benchmarks.accuracy``. All run in the folder of the checkout.
 """

@@ -1,7 +1,7 @@
-"""``python -m benchmarks renderer | velocity | pipeline``: the same as ``smokelift bench``."""
+"""``python -m benchmarks renderer | velocity | pipeline``: speed and error, beside others on the same machine."""
 
 import sys
 
-from smokelift.app.cli import main
+from benchmarks.command import main
 
-sys.exit(main(["bench", *sys.argv[1:]]))
+sys.exit(main())

@@ -1,4 +1,4 @@
-"""The options of ``smokelift bench renderer | velocity | pipeline``, and what they run."""
+"""The options of ``python -m benchmarks renderer | velocity | pipeline``, and what they run."""
 
 from __future__ import annotations
 
@@ -12,8 +12,10 @@ from typing import Any
 from benchmarks import charts
 from benchmarks.renderer.peers import PEERS
 from benchmarks.tables import size_text
-from smokelift.app.progress import Reporter
+from smokelift.app.cli import BAD_INPUT, CANCELLED, DONE, NO_DEVICE
+from smokelift.app.progress import Reporter, reporter
 from smokelift.evaluation.truth import Truth
+from smokelift.output.vdb import VdbUnavailable
 from smokelift.render import device
 from smokelift.setup.settings import METHODS, QUALITIES
 
@@ -29,8 +31,26 @@ SHAPES = ((64, 64, 96), (128, 128, 192), (256, 256, 288))
 Save = Callable[[dict[str, Any]], None]
 
 
-def run(arguments: Sequence[str], say: Reporter) -> None:
-    """Run the benchmark that the words of a command line ask for; its table is the last thing printed.
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a benchmark and return the exit status, as the command line ``smokelift`` does."""
+    options, say = bench_parser().parse_args(arguments), reporter("text")
+    try:
+        with say:
+            run(options, say)
+    except KeyboardInterrupt:
+        say.fail("Cancelled.", CANCELLED)
+        return CANCELLED
+    except (device.DeviceError, MemoryError) as error:
+        say.fail(str(error) or "Out of memory; choose smaller --sizes.", NO_DEVICE)
+        return NO_DEVICE
+    except (ValueError, OSError, VdbUnavailable) as error:
+        say.fail(str(error), BAD_INPUT)
+        return BAD_INPUT
+    return DONE
+
+
+def run(options: argparse.Namespace, say: Reporter) -> None:
+    """Run the benchmark that the options ask for; its table is the last thing printed.
 
     Raises
     ------
@@ -39,7 +59,6 @@ def run(arguments: Sequence[str], say: Reporter) -> None:
     DeviceError
         If a GPU is asked for and there is none.
     """
-    options = bench_parser().parse_args(arguments)
     chart: Path | None = getattr(options, "chart", None)
     for path in (options.json, chart):
         if path is not None and not path.absolute().parent.is_dir():
@@ -55,9 +74,9 @@ def run(arguments: Sequence[str], say: Reporter) -> None:
 
 
 def bench_parser() -> argparse.ArgumentParser:
-    """Return the parser of the words after ``smokelift bench``."""
+    """Return the parser of the words after ``python -m benchmarks``."""
     parser = argparse.ArgumentParser(
-        prog="smokelift bench", description="Measure speed and error, beside others on the same machine."
+        prog="python -m benchmarks", description="Measure speed and error, beside others on the same machine."
     )
     subjects = parser.add_subparsers(required=True)
 

@@ -53,20 +53,18 @@ def mentions(page: Path) -> Iterator[list[str]]:
 
 
 def parse(words: list[str]) -> None:
-    """Parse a command as the command line does; `bench` hands on the words after it."""
+    """Parse the words after the program as the command line does, or as the benchmarks after `python -m benchmarks`."""
+    parser, given = (bench_parser(), words[3:]) if words[0] == "python" else (command_parser(), words[1:])
     try:
-        if words[0] == "bench":
-            bench_parser().parse_args(words[1:])
-        else:
-            command_parser().parse_args(words)
+        parser.parse_args(given)
     except SystemExit as refused:
-        pytest.fail(f"refused: smokelift {' '.join(words)}: {refused}")
+        pytest.fail(f"refused: {' '.join(words)}: {refused}")
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name)
 def test_commands_of_a_page_are_taken(page: Path) -> None:
-    for line in commands(page, "smokelift"):
-        parse(shlex.split(line)[1:])
+    for line in (*commands(page, "smokelift"), *commands(page, "python -m benchmarks")):
+        parse(shlex.split(line))
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name)
@@ -76,7 +74,7 @@ def test_commands_in_sentences_exist_with_their_options(page: Path) -> None:
         assert command in known, command
         options = {option for action in known[command]._actions for option in action.option_strings}
         given = {re.split(r"[=|.,]", word.strip("[]"))[0] for word in words if word.lstrip("[").startswith("--")}
-        assert command == "bench" or given <= options, (command, given - options)
+        assert given <= options, (command, given - options)
 
 
 def test_a_wrong_command_is_found(tmp_path: Path) -> None:
@@ -85,9 +83,9 @@ def test_a_wrong_command_is_found(tmp_path: Path) -> None:
         "    smokelift reconstruct clip.mp4 \\\n        --out smoke  # comment\n\n```\nsmokelift nothing\n```\n"
     )
     taken, wrong = commands(page, "smokelift")
-    parse(shlex.split(taken)[1:])
+    parse(shlex.split(taken))
     with pytest.raises(pytest.fail.Exception):
-        parse(shlex.split(wrong)[1:])
+        parse(shlex.split(wrong))
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name)
@@ -235,7 +233,7 @@ def test_the_command_reference_has_every_option() -> None:
 def test_every_argument_says_what_it_is_and_its_default_once() -> None:
     for command, parser in command_reference.subcommands().items():
         for action in parser._actions:
-            assert command == "bench" or action.help, (command, action.dest)
+            assert action.help, (command, action.dest)
             if action.option_strings and isinstance(action.default, str | int | float) and action.default is not False:
                 meaning = command_reference._meaning(action)
                 said = re.findall(r"default(?: `|\)|:| \d|;)", meaning)

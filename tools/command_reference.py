@@ -20,12 +20,11 @@ def subcommands() -> dict[str, argparse.ArgumentParser]:
 
 
 def markdown() -> str:
-    """Return the arguments of all commands as Markdown; those of `bench` are its own."""
+    """Return the arguments of all commands as Markdown."""
     parts = []
     for name, parser in subcommands().items():
         rows = [f"| {_written(action)} | {_meaning(action)} |" for action in parser._actions if _shown(action)]
-        if rows:
-            parts.append("\n".join([f"### smokelift {name}", "", "| argument | meaning |", "| --- | --- |", *rows]))
+        parts.append("\n".join([f"### smokelift {name}", "", "| argument | meaning |", "| --- | --- |", *rows]))
     return "\n\n".join(parts)
 
 

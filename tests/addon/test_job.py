@@ -223,7 +223,6 @@ def test_cancelling_a_polite_engine(own_engine) -> None:
     until(lambda: job.poll() and job.total == 9)
     job.cancel()
     job.cancel()
-    assert job.cancelling
     finished(job)
     assert (job.outcome, job.status) == ("cancelled", 130)
     assert job.sentence == "Cancelled; finished frames stay: 2."

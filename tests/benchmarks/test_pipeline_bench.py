@@ -1,4 +1,4 @@
-"""``smokelift bench pipeline``: what is timed, the table, and what is refused."""
+"""``python -m benchmarks pipeline``: what is timed, the table, and what is refused."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.command import main
 from benchmarks.pipeline import clip, run
 from benchmarks.pipeline.clip import with_grid, write_clip
 from benchmarks.pipeline.table import text
 from benchmarks.pipeline.worker import Job, Run, measure
 from benchmarks.velocity.flow import built_in_densities, built_in_pair
-from smokelift.app.cli import main
 from smokelift.output.vdb import VdbUnavailable, vdb_module
 
 SHAPE = (16, 16, 24)
@@ -48,9 +48,7 @@ def test_a_run_is_timed_in_a_process_of_its_own(tmp_path, capsys):
         vdb_module()
     except VdbUnavailable as missing:
         pytest.skip(str(missing))
-    status = main(
-        [*("bench", "pipeline", "--sizes", "16x16x24", "--frames", "1"), "--json", str(tmp_path / "found.json")]
-    )
+    status = main([*("pipeline", "--sizes", "16x16x24", "--frames", "1"), "--json", str(tmp_path / "found.json")])
     assert status == 0
     found = json.loads((tmp_path / "found.json").read_text())
     assert found["clip"] == "built-in"
@@ -118,11 +116,11 @@ def test_the_papers_times_stand_beside_ours():
 )
 def test_what_cannot_be_timed_is_refused(arguments, expected, capsys):
     with pytest.raises(SystemExit) as ended:
-        main(["bench", "pipeline", *arguments])
+        main(["pipeline", *arguments])
     assert ended.value.code == 2
     assert expected in capsys.readouterr().err
 
 
 def test_a_scene_that_is_not_there_is_one_sentence(tmp_path, capsys):
-    assert main(["bench", "pipeline", str(tmp_path / "none.toml")]) == 2
+    assert main(["pipeline", str(tmp_path / "none.toml")]) == 2
     assert "none.toml" in capsys.readouterr().err

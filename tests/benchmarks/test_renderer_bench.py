@@ -1,4 +1,4 @@
-"""``smokelift bench renderer``: the figures, the table, and peers that fail or are wrong."""
+"""``python -m benchmarks renderer``: the figures, the table, and peers that fail or are wrong."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from benchmarks import charts
+from benchmarks.command import main
 from benchmarks.renderer import run, worker
 from benchmarks.renderer.peers import OURS, PEERS
 from benchmarks.renderer.scene import bench_scene
-from smokelift.app.cli import main
 from smokelift.render import device
 
 
@@ -49,7 +49,7 @@ def peers(monkeypatch):
 
 def bench(*words: object) -> int:
     try:
-        return main(["bench", "renderer", *map(str, words)])
+        return main(["renderer", *map(str, words)])
     except SystemExit as leaving:
         assert isinstance(leaving.code, int)
         return leaving.code

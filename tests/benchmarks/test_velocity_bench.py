@@ -1,4 +1,4 @@
-"""``smokelift bench velocity``: the two solvers, the figures, the table, the chart and what is refused."""
+"""``python -m benchmarks velocity``: the two solvers, the figures, the table, the chart and what is refused."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from benchmarks import machine
+from benchmarks.command import main
 from benchmarks.velocity import run
 from benchmarks.velocity.flow import built_in_pair
 from benchmarks.velocity.linear import LinearProblem, endless
 from benchmarks.velocity.table import estimate_name, solves_to_reach
-from smokelift.app.cli import main
 from smokelift.transport import Velocity
 
 SHAPE = (16, 16, 24)
@@ -66,7 +66,7 @@ def write_truth(path: Path, shape=SHAPE, frames: int = FRAMES, **changes: object
 
 def bench(*words: object) -> int:
     try:
-        return main(["bench", "velocity", *map(str, words)])
+        return main(["velocity", *map(str, words)])
     except SystemExit as leaving:
         assert isinstance(leaving.code, int)
         return leaving.code

@@ -162,18 +162,9 @@ def _light(shot: Shot, given: Scene) -> tuple[Fact, ...]:
     return (
         Fact("light strength", f"smoke of radiance {colour}", origin, how),
         _chosen(shot, "smoke thickness", "smoke thickness", hides, False),
-        *_side(shot),
         _chosen(shot, "light direction", "sun's direction", "no sun", False),
         _chosen(shot, "light direction", "sun's color", "that of all light", False),
         _chosen(shot, "light direction", "ambient share", "all light is from everywhere", False),
-    )
-
-
-def _side(shot: Shot) -> tuple[Fact, ...]:
-    """The line of the side from which the light comes, if the clip tells it."""
-    side = _choice(shot, "light side")
-    return (
-        () if side is None else (Fact("sun's side", f"{side.chosen} degrees in the picture", "measured", side.reason),)
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ from smokelift.output.layout import INDEX, frame_path
 from smokelift.output.vdb import read_flame, read_vdb
 from smokelift.output.viewer import Viewer
 from smokelift.render import Image
-from smokelift.scene import Camera, CompleteScene, Scene, completed, scene_from_dict
+from smokelift.scene import Camera, CompleteScene, completed, scene_from_dict
 from smokelift.scene.checks import file_path
 from smokelift.transport import Array, Velocity, face_shapes, on_faces
 
@@ -74,8 +74,7 @@ class Sequence:
             raise SequenceError(f"{directory}: is a file; give the directory of the sequence")
         index = Index.read(directory)
         try:
-            described = scene_from_dict(index.scene, str(directory / INDEX), directory)
-            scene = completed(_with_scattering(described, index.settings))
+            scene = completed(scene_from_dict(index.scene, str(directory / INDEX), directory))
         except ValueError as error:
             raise SequenceError(str(error)) from error
         return cls(
@@ -243,11 +242,3 @@ class Sequence:
         except OSError as error:
             raise SequenceError(str(error)) from error
         return {"density": density, "velocity": velocity}
-
-
-def _with_scattering(scene: Scene, settings: Mapping[str, Any]) -> Scene:
-    """The scene with its model of scattering, which sequences of version 1.0 keep in their settings alone."""
-    density = settings.get("density")
-    if scene.scattering or not isinstance(density, dict):
-        return scene
-    return replace(scene, scattering=density.get("scattering"))

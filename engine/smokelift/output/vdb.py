@@ -14,7 +14,6 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import json
-import os
 import sys
 from collections.abc import Mapping
 from functools import cache
@@ -277,9 +276,3 @@ def read_flame(path: str | Path, shape: tuple[int, int, int]) -> Array | None:
     except (OSError, RuntimeError, LookupError, TypeError) as error:
         raise OSError(f"{path}: is damaged: {error}") from error
     return flame
-
-
-def read_settings(path: str | Path) -> dict[str, Any]:
-    """Return the settings kept in a file that :func:`write_vdb` wrote; empty if there are none."""
-    grid = vdb_module().read(os.fspath(path), gridname="density")
-    return dict(json.loads(grid.metadata.get(SETTINGS, "{}")))

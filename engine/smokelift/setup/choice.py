@@ -21,7 +21,7 @@ class Choice(Generic[Chosen]):
     what
         ``"scattering"``, ``"light strength"``, ``"resolution"``, ``"domain"``, ``"environment directions"``,
         ``"iterations"``, ``"velocity grid coarsening"``, ``"velocity levels"``, ``"axis depth"``, ``"smoke colour"``,
-        ``"smoke thickness"``, ``"light side"``, ``"light direction"``, ``"gain of view 1"`` or ``"fire"``.
+        ``"smoke thickness"``, ``"light direction"``, ``"gain of view 1"`` or ``"fire"``.
     chosen
         What will be used, or `UNDETERMINED`.
     reason

@@ -24,7 +24,6 @@ from smokelift.scene import (
     Scattering,
 )
 from smokelift.setup.choice import UNDETERMINED, Choice
-from smokelift.setup.light_side import LightSide, light_side
 from smokelift.setup.smoke import SmokeSamples
 from smokelift.setup.smoke_colour import FAINTEST, line_of_colours
 from smokelift.setup.sun import FoundSun
@@ -61,8 +60,6 @@ class FoundLight:
         The richest model that they allow, or the one that is asked for.
     thickness
         What the clip tells of the strength of a light that is not given; None if it is given or nothing is scattered.
-    side
-        From which side of the picture such a light comes, if the clip tells it. No light is made of it.
     direction
         From where it comes, where several cameras tell; None where nothing was asked of them.
     """
@@ -70,7 +67,6 @@ class FoundLight:
     lights: tuple[Light, ...]
     scattering: Scattering
     thickness: Thickness | None = None
-    side: LightSide | None = None
     direction: Choice[str] | None = None
 
     @property
@@ -97,8 +93,7 @@ class FoundLight:
             return ()
         if self.direction is not None and self.sunny:
             return (self.direction,)
-        side = () if self.side is None else (self.side.choice,)
-        return self.thickness.choice, *side, self.direction or unknown_direction()
+        return self.thickness.choice, self.direction or unknown_direction()
 
     def notes(
         self, scene: CompleteScene, choices: Sequence[Choice[Any]], samples: SmokeSamples, noise: Noise
@@ -111,25 +106,19 @@ class FoundLight:
         return (note,) if scattered is None else (note, *light_doubts(scattered, samples, noise))
 
 
-def find_light(
-    given: tuple[Light, ...], asked: Scattering | None, medium: Medium, samples: SmokeSamples, one_side: bool
-) -> FoundLight:
+def find_light(given: tuple[Light, ...], asked: Scattering | None, medium: Medium, samples: SmokeSamples) -> FoundLight:
     """Complete the light.
 
     Parameters
     ----------
     given, asked, medium, samples
         As in `richest_scattering` and `ambient_sun`, which say what is refused.
-    one_side
-        Whether the light would come from the same side of the picture in all frames.
     """
     richest = richest_scattering(asked, given, medium)
     if given or richest == "absorption":
         return FoundLight(given, richest)
     thickness = smoke_thickness(samples.textures)
-    side = light_side(samples.textures) if one_side and thickness.source is not None else None
-    light = ambient_sun(samples, medium, thickness.source)
-    return FoundLight((light,), richest, thickness, side if side is not None and side.told else None)
+    return FoundLight((ambient_sun(samples, medium, thickness.source),), richest, thickness)
 
 
 def richest_scattering(asked: Scattering | None, lights: tuple[Light, ...], medium: Medium) -> Scattering:

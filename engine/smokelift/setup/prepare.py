@@ -61,8 +61,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
         SmokeAxis.given(settings.axis_depth, camera, domain)  # refuse early what cannot be
     smoke = find_medium(scene.medium, look, scene.lights, camera, domain)
     asked = scene.scattering if settings.scattering == "auto" else settings.scattering
-    # a flame lights smoke from its middle
-    light = find_light(scene.lights, asked, smoke.medium, samples, not camera.moves and look.fire is None)
+    light = find_light(scene.lights, asked, smoke.medium, samples)
     complete = _complete(scene, look, geometry, smoke.medium, light)
     first = ShotView(steadied, camera, plates, _working(camera, domain))
     model = None

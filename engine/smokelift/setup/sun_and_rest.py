@@ -27,12 +27,6 @@ class Explained:
     sun: Array
     rest: Array
 
-    @property
-    def share(self) -> Array:
-        """That of the sun (directions,) in the two, 0 where there is neither."""
-        both = self.sun + self.rest
-        return np.asarray(self.sun / np.where(both > 0, both, 1))
-
 
 def explained(lit: NDArray[Any], everywhere: NDArray[Any], added: Array) -> Explained:
     """Return how strong a sun from each direction and light from everywhere are.

@@ -43,28 +43,6 @@ FEWEST = 3
 
 
 @dataclass(frozen=True, eq=False)
-class BlockMaps:
-    """What the blocks of a frame show, (rows, columns) each.
-
-    Attributes
-    ----------
-    passed
-        Share of light that comes through the smoke.
-    added
-        Radiance that the smoke adds, mean of the channels.
-    known : bool
-        Whether texture tells the two.
-    covered
-        Share of the block that shows smoke.
-    """
-
-    passed: Array
-    added: Array
-    known: NDArray[np.bool_]
-    covered: Array
-
-
-@dataclass(frozen=True, eq=False)
 class Texture:
     """What a frame shows of the texture behind its smoke, sums over blocks.
 
@@ -76,8 +54,6 @@ class Texture:
         Weight of its blocks, and how much of that has a background that may be smoke itself.
     clear, missing
         Weight of the blocks without smoke, and how much of the texture is missing from them, where all should be seen.
-    maps
-        Of the single blocks.
     """
 
     hidden: float
@@ -86,7 +62,6 @@ class Texture:
     unsure: float
     clear: float
     missing: float
-    maps: BlockMaps
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,8 +96,7 @@ def seen_texture(picture: NDArray[np.float32], plate: Plate, smoke: NDArray[np.b
     known, power, confidence = behind.known, behind.power, behind.confidence
     covered = _blocks(smoke.astype(np.float64))
     if not known.any():
-        nothing = BlockMaps(np.ones(known.shape), np.zeros(known.shape), known, covered)
-        return Texture(0.0, np.zeros(3), 0.0, 0.0, 0.0, 0.0, nothing)
+        return Texture(0.0, np.zeros(3), 0.0, 0.0, 0.0, 0.0)
     before = np.asarray(picture, np.float64)
     shared = _texture(_differences(before), behind.differences)
     smoky, clear = known & (covered > 0.5), known & (covered == 0)
@@ -138,7 +112,6 @@ def seen_texture(picture: NDArray[np.float32], plate: Plate, smoke: NDArray[np.b
         unsure=float(np.sum((weight * (1 - confidence))[smoky])),
         clear=float(np.sum(weight[clear])),
         missing=float(np.sum((weight * (1 - passed))[clear])),
-        maps=BlockMaps(passed, added.mean(-1), known, covered),
     )
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from addon import look, volume
-from conftest import made, quietly, rendered
+from conftest import made, rendered
 from smokelift.output.vdb import vdb_module
 from smokelift.scene import Medium
 from tests.example_shot import add, add_camera, smoke
@@ -36,29 +36,6 @@ def lit(scene) -> bpy.types.Scene:
 def node(scene: bpy.types.Scene) -> bpy.types.ShaderNode:
     """The one with the values of the scene's smoke."""
     return look.node_of(smoke(scene).data)
-
-
-def as_before(obj: bpy.types.Object) -> bpy.types.ShaderNode:
-    """The material of `MEDIUM` as version 1.0 made it."""
-    material = bpy.data.materials.new("Old")
-    if material.node_tree is None:
-        material.use_nodes = True
-    tree = material.node_tree
-    tree.nodes.clear()
-    output = tree.nodes.new("ShaderNodeOutputMaterial")
-    shader = tree.nodes.new("ShaderNodeVolumePrincipled")
-    shader.name = shader.label = look.NODE
-    shader.inputs["Density Attribute"].default_value = "density"
-    shader.inputs["Absorption Color"].default_value = (0.0, 0.0, 0.0, 1.0)
-    tree.links.new(shader.outputs["Volume"], output.inputs["Volume"])
-    values = {"Density": 4.0, "Color": (0.8, 0.8, 0.8, 1.0), "Anisotropy": 0.3}
-    for name, value in values.items():
-        shader.inputs[name].default_value = value
-        remembered = shader.inputs[name].default_value
-        material[f"smokelift_{name.lower()}"] = list(remembered) if name == "Color" else [remembered]
-    obj.data.materials.clear()
-    obj.data.materials.append(material)
-    return shader
 
 
 def test_presets_look_different(lit, tmp_path) -> None:
@@ -184,38 +161,6 @@ def test_fire_is_as_bright_as_the_grid_says_in_the_color_of_the_clip(lit, tmp_pa
     node(lit).inputs["Flame Color"].default_value = (0.0, 0.0, 1.0, 1.0)
     volume.show(smoke(lit), made(tmp_path, medium=Medium(1.0, 0.8, flame_color=(1.0, 0.5, 0.2)), number=2))
     assert node(lit).inputs["Flame Color"].default_value[:] == (0.0, 0.0, 1.0, 1.0)
-
-
-def test_a_material_of_an_earlier_version_looks_the_same_with_our_group(lit, tmp_path) -> None:
-    """It takes the group when its file is opened, with what the artist had changed."""
-    obj = volume.show(smoke(lit), made(tmp_path, medium=MEDIUM))
-    shader = as_before(obj)
-    shader.inputs["Color"].default_value = (0.9, 0.6, 0.3, 1.0)
-    before = rendered(lit, tmp_path / "before.exr")
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
-    quietly(lambda: bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend")))
-    scene = bpy.context.scene
-    assert node(scene).type == "GROUP"
-    np.testing.assert_allclose(rendered(scene, tmp_path / "after.exr"), before, rtol=0.02, atol=1e-3)
-    volume.show(smoke(scene), made(tmp_path, medium=Medium(9.0, 0.5, -0.2), number=2))
-    inputs = node(scene).inputs
-    assert inputs["Extinction"].default_value == 9.0
-    assert list(inputs["Albedo"].default_value) == pytest.approx([0.9, 0.6, 0.3, 1.0])
-    assert inputs["Anisotropy"].default_value == pytest.approx(-0.2)
-
-
-def test_an_old_material_that_the_artist_built_upon_stays(lit, tmp_path) -> None:
-    """Its values still follow the newest result."""
-    obj = volume.show(smoke(lit), made(tmp_path, medium=MEDIUM))
-    shader = as_before(obj)
-    tree = shader.id_data
-    tree.links.new(tree.nodes.new("ShaderNodeRGB").outputs[0], shader.inputs["Emission Color"])
-    volume.show(smoke(lit), made(tmp_path, medium=Medium(9.0, 0.5, -0.2), number=2))
-    assert node(lit) == shader
-    assert shader.inputs["Density"].default_value == 9.0
-    assert [socket.name for socket in look.controls(obj.data)] == ["Density", "Color", "Absorption Color", "Anisotropy"]
-    with pytest.raises(RuntimeError, match="material is your own"):
-        bpy.ops.smokelift.use_look(preset="SOOT")
 
 
 def test_all_smokes_share_one_group(lit, tmp_path) -> None:

@@ -87,16 +87,6 @@ def test_settings_are_kept_as_a_preset(scene, clip, monkeypatch, tmp_path) -> No
     assert second.smokelift.first == 1
 
 
-def test_a_preset_of_an_earlier_version_closes_the_floor(scene, clip, tmp_path) -> None:
-    """And leaves the other sides alone."""
-    obj = new_smoke(scene, clip)
-    obj.smokelift.closed = {"x+"}
-    file = tmp_path / "old.py"
-    file.write_text("import bpy\nbpy.context.object.smokelift.floor = True\n")
-    bpy.ops.script.execute_preset(filepath=str(file), menu_idname="SMOKELIFT_PT_presets")
-    assert obj.smokelift.closed == {"x+", "z-"} and not obj.smokelift.floor
-
-
 def test_presets_are_of_a_smoke(scene) -> None:
     """With another object active there is nothing to keep; every setting in a preset exists."""
     assert not bpy.ops.smokelift.add_preset.poll()

@@ -10,7 +10,6 @@ import pytest
 from addon import results_panel, run, smoke_takes, volume
 from addon.smoke import active_smoke, find_smoke, hide_default_cube, new_smoke, smokes
 from addon.take import Take, takes
-from conftest import quietly
 from tests.example_shot import EXAMPLE, add, add_box, add_camera, smoke
 
 
@@ -130,8 +129,8 @@ def with_takes(scene: bpy.types.Scene, folder, count: int) -> list[Take]:
         (take.directory / "smoke_0001.vdb").write_bytes(b"x" * 1000)
         (take.directory / "sequence.json").write_text(
             '{"complete": true, "frames": {"1": {}}, "scene": {"clip": {"fps": 24.0}, "medium": '
-            '{"extinction": 1.0, "albedo": 1.0, "anisotropy": 0.0}, "domain": {"min": [0, 0, 0], "max": [1, 1, 1], '
-            '"resolution": [8, 8, 8]}}}'
+            '{"extinction": 1.0, "albedo": 1.0, "anisotropy": 0.0, "color": [1, 1, 1]}, "domain": '
+            '{"min": [0, 0, 0], "max": [1, 1, 1], "resolution": [8, 8, 8]}}}'
         )
     return made
 
@@ -173,45 +172,3 @@ def test_what_is_freed_is_said_before_it_is_deleted(shot, tmp_path) -> None:
     assert takes(tmp_path / "out") == found
     assert bpy.ops.smokelift.remove_takes() == {"FINISHED"}
     assert takes(tmp_path / "out") == found[3:]
-
-
-# files of version 1.0
-
-
-def test_settings_of_a_scene_become_those_of_its_smoke(scene, clip, tmp_path) -> None:
-    """As version 1.0 saved them, with the Volume that showed the result or without one."""
-    obj = add(scene, "Smoke clip.mp4", bpy.data.volumes.new("Smoke"))
-    other = bpy.data.scenes.new("Other")
-    for where, result in ((scene, obj), (other, None)):
-        old = where.smokelift
-        old.clip, old.volume = clip, result
-        old.box, old.camera_mode = add_box(where, (0, 0, 0), (1, 1, 1)), "GUESS"
-        old.first, old.last, old.quality, old.output, old.extinction = 3, 8, "fine", "//out", 7.0
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
-    quietly(lambda: bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend")))
-    for name in ("Scene", "Other"):
-        scene = bpy.data.scenes[name]
-        (found,) = smokes(scene)
-        settings = found.smokelift
-        assert (settings.clip.name, settings.first, settings.last) == ("clip.mp4", 3, 8)
-        assert (settings.box.name[:3], settings.camera_mode) == ("Box", "GUESS")
-        assert (settings.quality, settings.output, settings.extinction) == ("fine", "//out", 7.0)
-    assert smokes(bpy.data.scenes["Scene"])[0].name == "Smoke clip.mp4"
-    bpy.ops.wm.save_mainfile()
-    quietly(lambda: bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend")))
-    assert [len(smokes(scene)) for scene in bpy.data.scenes] == [1, 1]
-
-
-def test_a_floor_becomes_a_closed_side(scene, clip, tmp_path) -> None:
-    """Of a smoke, and of a scene that had the settings of its smoke."""
-    obj, other = new_smoke(scene, clip), bpy.data.scenes.new("Other")
-    for settings in (obj.smokelift, other.smokelift):
-        # as it lies in a file of that version; set from Python it would be taken over at once
-        stored = settings.bl_system_properties_get(do_create=True) if bpy.app.version >= (5, 0) else settings
-        stored["floor"] = 1
-    other.smokelift.clip = clip
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
-    quietly(lambda: bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend")))
-    for name in ("Scene", "Other"):
-        (found,) = smokes(bpy.data.scenes[name])
-        assert (found.smokelift.closed, found.smokelift.floor) == ({"z-"}, False)

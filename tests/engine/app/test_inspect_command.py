@@ -9,16 +9,10 @@ import numpy as np
 import pytest
 from command_line import QUICK, command, events, refused
 
-from smokelift.app.cost import estimate_cost
-from smokelift.app.facts import facts
-from smokelift.app.workload import Workload
-from smokelift.footage.clip import Clip
 from smokelift.footage.images import read_image
 from smokelift.output.images import write_image
 from smokelift.output.sequence import Sequence
 from smokelift.scene import Background, DirectionalLight, Inlet, Medium, Scene
-from smokelift.setup.light_side import LightSide
-from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.surroundings import light_around
 from tests.engine.setup.shots import filmed_around, flickering
 
@@ -84,20 +78,6 @@ def test_a_page_shows_what_is_known(plume, tmp_path, capsys, kind) -> None:
     assert known["background"]["origin"] == known["box"]["origin"] == "estimated"
     assert known["scattering"]["origin"] == known["grid"]["origin"] == known["noise"]["origin"] == "measured"
     assert page.stat().st_size > 5000
-
-
-def test_the_side_that_the_light_comes_from_is_a_line_of_its_own(plume, draft) -> None:
-    """Where the clip tells it; the direction stays undetermined."""
-    given = replace(plume.scene, lights=())
-    with Clip.open(plume.scene.clip) as clip:
-        shot = prepare_shot(clip, given, draft)
-        cost = estimate_cost(shot.scene.domain.resolution, Workload.of(shot, draft))
-    assert "sun's side" not in {fact.what for fact in facts(shot, given, cost)}
-    side = LightSide(124.2, 0.9, 0.8).choice
-    known = {fact.what: fact for fact in facts(replace(shot, choices=(side, *shot.choices)), given, cost)}
-    assert (known["sun's side"].value, known["sun's side"].origin) == ("124 degrees in the picture", "measured")
-    assert "upper left" in known["sun's side"].how
-    assert known["sun's direction"].origin == "undetermined"
 
 
 def test_exposure_that_flickers_before_black_is_called_measured(plume, tmp_path, capsys) -> None:

@@ -21,4 +21,3 @@ def test_strengths_are_the_least_squares_of_lights_that_add(seed: int) -> None:
             strengths, left = nnls(np.stack([sun, everywhere], 1), added)
             np.testing.assert_allclose((found.sun[n], found.rest[n]), strengths, atol=1e-9)
             assert found.left[n] == pytest.approx(left**2, abs=1e-9)
-            assert found.share[n] == pytest.approx(strengths[0] / max(strengths.sum(), 1e-30), abs=1e-9)

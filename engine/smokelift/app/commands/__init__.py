@@ -5,7 +5,6 @@ A module's `add_parser` adds the command with its options to the parser; the opt
 
 from smokelift.app.commands import (
     batch,
-    bench,
     chart,
     check,
     continue_,
@@ -34,7 +33,6 @@ MODULES = (
     export,
     chart,
     doctor,
-    bench,
 )
 
 COMMANDS = tuple(module.add_parser for module in MODULES)
