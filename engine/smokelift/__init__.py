@@ -3,13 +3,6 @@
 The data flows footage -> setup -> density (render) <-> velocity (transport) -> output; `pipeline` is the loop.
 """
 
-import sys
-
-from smokelift_command import cancelled
-
-if sys.argv[:1] == ["-m"]:  # Python loads this for `python -m smokelift`, before its main program can take an interrupt
-    sys.excepthook = cancelled
-
 from smokelift.density import Density, DensitySettings, Observation, reconstruct_density
 from smokelift.evaluation import metrics
 from smokelift.footage.clip import Clip
