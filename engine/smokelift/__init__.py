@@ -7,7 +7,7 @@ from smokelift.density import Density, DensitySettings, Observation, reconstruct
 from smokelift.evaluation import metrics
 from smokelift.footage.clip import Clip
 from smokelift.output.sequence import Sequence
-from smokelift.pipeline import Frame, Method, compose, reconstruct
+from smokelift.pipeline import Frame, Method, Reconstruction, compose, reconstruct
 from smokelift.render import render, render_gradient
 from smokelift.scene import (
     Background,
@@ -23,7 +23,9 @@ from smokelift.scene import (
     Scene,
     View,
 )
+from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import Settings
+from smokelift.setup.shot import Shot
 from smokelift.transport import Velocity, advect, project
 from smokelift.velocity import VelocitySettings, estimate_velocity
 
@@ -46,9 +48,11 @@ __all__ = [
     "Method",
     "Observation",
     "PointLight",
+    "Reconstruction",
     "Scene",
     "Sequence",
     "Settings",
+    "Shot",
     "Velocity",
     "VelocitySettings",
     "View",
@@ -57,6 +61,7 @@ __all__ = [
     "compose",
     "estimate_velocity",
     "metrics",
+    "prepare_shot",
     "project",
     "reconstruct",
     "reconstruct_density",

@@ -12,31 +12,20 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from smokelift.checks import require_kind
 from smokelift.density import Density, ViewSet
 from smokelift.density.flame import flame_emission
 from smokelift.density.hull import inside, project_voxels
-from smokelift.footage.clip import Clip
-from smokelift.output.index import Origins
-from smokelift.output.resume import ResumeState
-from smokelift.output.writer import SequenceWriter
 from smokelift.pipeline.clip_fit import clip_psnr
-from smokelift.pipeline.method import Method, compose
-from smokelift.pipeline.sources import sources
+from smokelift.pipeline.method import Method
 from smokelift.render import Volume
 from smokelift.render.blas import products_on_one_thread
-from smokelift.scene import Domain, Scene
-from smokelift.scene.checks import file_path
-from smokelift.setup.prepare import prepare_shot
-from smokelift.setup.provenance import provenance
-from smokelift.setup.settings import Settings
+from smokelift.scene import Domain
 from smokelift.setup.shot import Shot
-from smokelift.transport import Array, ResidualMeans, Velocity, halved
+from smokelift.transport import Array, Velocity
 from smokelift.velocity.near_smoke import carry, near_smoke
 
 
@@ -98,110 +87,8 @@ class Past:
         return Past(frame.density, frame.estimated, frame.smooth, frame.steady)
 
 
-def reconstruct(
-    clip: Clip,
-    scene: Scene,
-    settings: Settings | None = None,
-    out: str | Path | None = None,
-    *,
-    npz: bool = False,
-    resume: bool = False,
-    shot: Shot | None = None,
-    method: Method | None = None,
-) -> Iterator[Frame]:
-    """Reconstruct a clip frame by frame.
-
-    Parameters
-    ----------
-    clip
-        The footage.
-    scene
-        Whatever is known of the shot; the rest is estimated (see `prepare_shot`).
-    settings
-        `Settings.preset` of a quality and a method; balanced by default.
-    out
-        Directory for the sequence; without it frames are only yielded.
-    npz
-        Write NumPy twins as well.
-    resume
-        Go on from the frames in ``out``. The frames that are there are not yielded again.
-    shot
-        The result of `prepare_shot`, if it has been computed already.
-    method
-        Another composition than that of the settings, for an experiment.
-
-    Yields
-    ------
-    Frame
-        In the clip's order, each already written when it is yielded.
-
-    Raises
-    ------
-    ValueError
-        For bad input (`SceneError`, `ClipError`, `SequenceError` are ValueErrors too).
-    """
-    require_kind(clip, Clip, "clip", 'a Clip (Clip.open("clip.mp4") opens one)')
-    require_kind(scene, Scene, "scene", "a Scene (Scene() leaves all open, Scene.load reads a file)")
-    require_kind(settings, Settings | None, "settings", "Settings (Settings.preset makes them)")
-    require_kind(shot, Shot | None, "shot", "a Shot (prepare_shot makes one)")
-    require_kind(method, Method | None, "method", "a Method (compose makes one)")
-    shot = shot or prepare_shot(clip, scene, settings or Settings.preset())
-    method = method or compose(shot.settings)
-    if out is None:
-        yield from _frames(shot, method, None)
-        return
-    with SequenceWriter(
-        file_path(out, "out", "the path of a directory"),
-        shot.scene,
-        shot.settings.as_dict(),
-        npz=npz,
-        resume=resume,
-        background=shot.estimated_background,
-        origins=Origins(
-            choices=[choice.as_dict() for choice in shot.choices],
-            provenance=[part.as_dict() for part in provenance(shot)],
-            sources=sources(shot),
-        ),
-    ) as writer:
-        if writer.state is None and writer.finished:
-            return
-        for frame in _frames(shot, method, None if writer.state is None else _resumed(writer.state, shot)):
-            if frame.number not in writer.finished:
-                writer.write(
-                    frame.number,
-                    frame.density,
-                    frame.velocity.faces,
-                    frame.figures,
-                    flame=frame.flame,
-                    state=_state(frame),
-                )
-                yield frame
-            del frame  # before the next is computed: velocities take most of the memory
-
-
-def _state(frame: Frame) -> ResumeState:
-    """What the next frame needs of one, for a run that goes on."""
-    memory = frame.estimated.residual
-    kept = {} if memory is None else {"residual_mean": memory.mean, "residual_magnitude": memory.magnitude}
-    volumes = {"smooth": frame.smooth, "steady": frame.steady}
-    kept |= {name: volume for name, volume in volumes.items() if volume is not None}
-    return ResumeState(frame.number, frame.density, frame.estimated.faces, kept)
-
-
-def _resumed(state: ResumeState, shot: Shot) -> Frame:
-    """The last finished frame of a run that goes on."""
-    mean, magnitude = state.extra.get("residual_mean"), state.extra.get("residual_magnitude")
-    residual = None if mean is None or magnitude is None else ResidualMeans(mean, magnitude)
-    velocity = Velocity(state.velocity, shot.optics.domain.voxel_size, shot.scene.closed, residual=residual)
-    shape = shot.optics.domain.resolution
-    while shape != velocity.shape:
-        shape, velocity = halved(shape), replace(velocity, voxel_size=2 * velocity.voxel_size)
-    smooth, steady = state.extra.get("smooth"), state.extra.get("steady")
-    return Frame(state.number, state.density, velocity, {}, velocity, smooth, steady)
-
-
-def _frames(shot: Shot, method: Method, start: Frame | None) -> Iterator[Frame]:
-    """Frames after ``start``; the first is held back until the second gives it a velocity."""
+def frames_after(start: Frame | None, shot: Shot, method: Method) -> Iterator[Frame]:
+    """Yield a shot's frames after one, or all; the first is held back until the second gives it a velocity."""
     count = len(shot.clip)
     with products_on_one_thread():
         method = replace(method, depth_prior=method.depth_prior.of_clip(shot))

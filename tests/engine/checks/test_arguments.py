@@ -67,14 +67,19 @@ def refused(words: str, function: Callable[..., Any], *arguments: Any, **named: 
             'scene must be a Scene (Scene() leaves all open, Scene.load reads a file), not "scene',
         ),
         ({"settings": "draft"}, 'settings must be Settings (Settings.preset makes them), not "draft"'),
-        ({"shot": 3}, "shot must be a Shot"),
         ({"method": "paper"}, "method must be a Method"),
-        ({"out": 3}, "out must be the path of a directory, not 3"),
     ],
 )
 def test_a_run_of_something_else(clip: Clip, given: dict[str, Any], words: str) -> None:
     arguments = {"clip": clip, "scene": SCENE, "settings": Settings.preset("draft"), **given}
-    refused(words, lambda: next(smokelift.reconstruct(**nonsense(arguments))))
+    refused(words, lambda: smokelift.reconstruct(**nonsense(arguments)))
+
+
+def test_a_reconstruction_of_something_else(clip: Clip) -> None:
+    run = smokelift.reconstruct(clip, SCENE, Settings.preset("draft"))
+    refused("shot must be a Shot", smokelift.Reconstruction, clip, run.method)
+    refused("method must be a Method", smokelift.Reconstruction, run.shot, "paper")
+    refused("directory must be the path of a directory, not 3", run.write, 3)
 
 
 @pytest.mark.parametrize(
