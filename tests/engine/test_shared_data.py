@@ -64,9 +64,9 @@ def test_real_smoke_before_a_textured_wall():
         shot = prepare_shot(clip, scene, settings)
         (seen,) = shot.observe(60)
     image, scene = seen.image, replace(shot.scene, camera=seen.camera)
-    density = smokelift.reconstruct_density(image, scene, settings=settings.density, plate=seen.plate)
+    fitted = smokelift.reconstruct_density(image, scene, settings=settings.density, plate=seen.plate)
     renderer = shot.optics.renderer(seen.camera, seen.plate.image)
     rows, columns = np.nonzero(matte(image, seen.plate).mask)
     box = np.s_[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
-    rendered = linear_to_srgb(np.clip(renderer.image(density.values)[box], 0, 1))
+    rendered = linear_to_srgb(np.clip(renderer.image(fitted.density)[box], 0, 1))
     assert psnr(rendered, linear_to_srgb(image[box])) > 30

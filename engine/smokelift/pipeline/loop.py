@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from smokelift.density import Density, ViewSet
+from smokelift.density import FittedDensity, ViewSet
 from smokelift.density.flame import flame_emission
 from smokelift.density.hull import inside, project_voxels
 from smokelift.pipeline.clip_fit import clip_psnr
@@ -43,14 +43,14 @@ class Frame:
         was estimated on a coarser grid.
     figures
         Measures of the fit and seconds spent: ``psnr`` of the clip's own pixels inside the smoke (`clip_psnr`),
-        ``psnr_working`` and what else `smokelift.density.Density` says of the working pictures.
+        ``psnr_working`` and what else `smokelift.density.FittedDensity` says of the working pictures.
     estimated
         The velocity on the grid of its estimate, all over the domain.
     smooth : (nx, ny, nz) float32, optional
         The density without what the depth prior makes up, which the velocity is estimated from; None if that is all of
         it.
     steady : (nx, ny, nz) float32, optional
-        What the next frame carries along, if not the density: see `smokelift.density.Density`.
+        What the next frame carries along, if not the density: see `smokelift.density.FittedDensity`.
     flame : (nx, ny, nz) float32, optional
         Emission of fire, radiance per metre of the color ``flame_color`` of the scene's medium; None where the clip
         shows no fire.
@@ -121,51 +121,51 @@ def _frame(index: int, before: Past | None, shot: Shot, method: Method) -> Frame
         moved = before.density if before.steady is None else before.steady
         carried = carry(moved, predicted, dt, domain.voxel_size, conserve=shot.moves)
         carried = inside(carried > 0, carried)
-    density, taken_over = _density(index, before, carried, shot, method)
-    flame = _flame(index, density.values, shot)
-    fit = _fit_figures(index, density, shot)
-    fitted = time.perf_counter()
+    fitted, taken_over = _density(index, before, carried, shot, method)
+    flame = _flame(index, fitted.density, shot)
+    fit = _fit_figures(index, fitted, shot)
+    fit_done = time.perf_counter()
     velocity = estimated = Velocity.zero(domain.resolution, domain.voxel_size, shot.scene.closed)
     if before is not None:
         estimated = method.velocity_estimator.estimate(
-            *_measured(before, density),
+            *_measured(before, fitted),
             dt,
             domain.voxel_size,
             closed=shot.scene.closed,
             inflow=shot.scene.inflow(),
             prediction=predicted,
         )
-        velocity = near_smoke(estimated, (before.density > 0) | (density.values > 0), dt, domain.voxel_size)
+        velocity = near_smoke(estimated, (before.density > 0) | (fitted.density > 0), dt, domain.voxel_size)
     done = time.perf_counter()
     figures = {
         **fit,
-        "mass": float(density.values.sum(dtype=np.float64)) * domain.voxel_size**3,
+        "mass": float(fitted.density.sum(dtype=np.float64)) * domain.voxel_size**3,
         "transport": dict(taken_over),
         "velocity": dict(velocity.figures),
-        "seconds_density": fitted - began,
-        "seconds_velocity": done - fitted,
+        "seconds_density": fit_done - began,
+        "seconds_velocity": done - fit_done,
     }
-    return Frame(index + 1, density.values, velocity, figures, estimated, density.smooth, density.steady, flame)
+    return Frame(index + 1, fitted.density, velocity, figures, estimated, fitted.smooth, fitted.steady, flame)
 
 
-def _fit_figures(index: int, density: Density, shot: Shot) -> dict[str, float]:
+def _fit_figures(index: int, fitted: FittedDensity, shot: Shot) -> dict[str, float]:
     """The figures of a fit; what it calls ``psnr`` is that of the working pictures."""
-    working = {name.replace("psnr", "psnr_working"): value for name, value in density.figures.items()}
+    working = {name.replace("psnr", "psnr_working"): value for name, value in fitted.figures.items()}
     if "psnr_working" not in working:  # frames without smoke cost nothing
         return working
-    return {**clip_psnr(shot, index, density.values), **working}
+    return {**clip_psnr(shot, index, fitted.density), **working}
 
 
-def _measured(before: Past, density: Density) -> tuple[Volume, Volume]:
+def _measured(before: Past, fitted: FittedDensity) -> tuple[Volume, Volume]:
     """The densities of two frames, without what is made up if that is known of both: it shows no motion of its own."""
-    if before.smooth is None or density.smooth is None:
-        return before.density, density.values
-    return before.smooth, density.smooth
+    if before.smooth is None or fitted.smooth is None:
+        return before.density, fitted.density
+    return before.smooth, fitted.smooth
 
 
 def _density(
     index: int, before: Past | None, carried: Volume | None, shot: Shot, method: Method
-) -> tuple[Density, Mapping[str, float]]:
+) -> tuple[FittedDensity, Mapping[str, float]]:
     """The density of a frame, and what was taken over of the carried one."""
     observations = shot.observe(index)
     if not observations:
@@ -175,12 +175,12 @@ def _density(
     if before is None or carried is None:
         return method.density_fit.fit(views, depth, None), {}
     start = method.temporal_prior.start(depth.views, depth, carried, before.density)
-    density = method.density_fit.fit(views, depth, start.density)
+    fitted = method.density_fit.fit(views, depth, start.density)
     if shot.moves:
         # what a moving camera does not see now it may have seen before
         visible = project_voxels(observations[0].camera, shot.optics.domain).visible
-        density = replace(density, values=np.where(visible, density.values, carried), steady=None)
-    return density, start.figures
+        fitted = replace(fitted, density=np.where(visible, fitted.density, carried), steady=None)
+    return fitted, start.figures
 
 
 def _flame(index: int, density: Volume, shot: Shot) -> Volume | None:
@@ -194,8 +194,8 @@ def _flame(index: int, density: Volume, shot: Shot) -> Volume | None:
     return flame_emission(seen.image @ colour / (colour @ colour), seen.camera, density, shot.optics)
 
 
-def _unseen(domain: Domain, carried: Volume | None) -> Density:
+def _unseen(domain: Domain, carried: Volume | None) -> FittedDensity:
     """The density of a frame whose picture shows nothing of the domain: what was carried along."""
     nothing: Array = np.zeros(domain.resolution, np.float32)
     figures = {"loss": 0.0, "iterations": 0.0, "hull_share": 0.0}
-    return Density(nothing if carried is None else carried, nothing > 0, figures)
+    return FittedDensity(nothing if carried is None else carried, nothing > 0, figures)

@@ -143,11 +143,8 @@ def reconstruct(
     ValueError
         For bad input (`SceneError` and `ClipError` are ValueErrors too).
     """
-    require_kind(clip, Clip, "clip", 'a Clip (Clip.open("clip.mp4") opens one)')
-    require_kind(scene, Scene, "scene", "a Scene (Scene() leaves all open, Scene.load reads a file)")
-    require_kind(settings, Settings | None, "settings", "Settings (Settings.preset makes them)")
     require_kind(method, Method | None, "method", "a Method (compose makes one)")
-    shot = prepare_shot(clip, scene, settings or Settings.preset())
+    shot = prepare_shot(clip, scene, settings)
     return Reconstruction(shot, method or compose(shot.settings))
 
 

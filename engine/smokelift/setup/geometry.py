@@ -120,8 +120,12 @@ def _divided(
     box: Box, clip: Clip, camera: Camera, settings: Settings, plates: Plates, samples: SmokeSamples
 ) -> tuple[Domain, Choice[Shape]]:
     """A box that is given, with as many voxels as are asked for, and why."""
+    floor, size = np.array([*box.centre[:2], box.min[2]]), np.subtract(box.max, box.min)
     if isinstance(settings.resolution, tuple):
-        domain = Domain(box.min, box.max, settings.resolution)
+        if isinstance(box, Domain):
+            domain = replace(box, resolution=settings.resolution)
+        else:
+            domain = _filled(floor, size, settings.resolution)
         return domain, _resolution_by_hand(domain)
     if isinstance(box, Domain) and settings.resolution is None:
         return box, _resolution_by_hand(box)
@@ -129,8 +133,6 @@ def _divided(
     if isinstance(box, Domain):
         grids = _same_shape(box, LIMITS[settings.quality].voxels(_pixels(still, box)))
     else:
-        floor = np.array([*box.centre[:2], box.min[2]])
-        size = np.subtract(box.max, box.min)
         (coarsest,) = _grids(floor, size, COARSEST, 1)
         grids = _grids(floor, size, LIMITS[settings.quality].voxels(_pixels(still, coarsest)), 1)
     return _resolved(clip, camera, grids, plates, samples.smoky, settings)
@@ -239,9 +241,14 @@ def _around(camera: Camera, samples: SmokeSamples, settings: Settings) -> tuple[
     base[2] = eye[2] + height.min()
     size = np.array([across, across, up])
     if isinstance(settings.resolution, tuple):
-        return (_standing_on(base, float((size / settings.resolution).max()), settings.resolution),)
+        return (_filled(base, size, settings.resolution),)
     # multiples of four, so that pyramids halve them evenly
     return _grids(base, size, LIMITS[settings.quality].voxels(max(across, up) / metres), 4)
+
+
+def _filled(floor: Array, size: Array, resolution: Shape) -> Domain:
+    """The box of so many voxels that holds one of a size in metres about the middle of its floor."""
+    return _standing_on(floor, float((size / resolution).max()), resolution)
 
 
 def _grids(floor: Array, size: Array, allowed: int, multiple: int) -> tuple[Domain, ...]:

@@ -8,9 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from smokelift import Clip, Reconstruction, Scene, compose, reconstruct, render
+from smokelift import Clip, Reconstruction, Scene, reconstruct, render
 from smokelift.footage.matte import matte
 from smokelift.output.images import write_image
+from smokelift.pipeline import compose
 from smokelift.pipeline.clip_fit import beside_clip, clip_psnr
 from smokelift.scene import ClipSource
 from smokelift.setup.prepare import prepare_shot

@@ -121,8 +121,14 @@ def test_a_box_without_a_resolution_gets_that_of_the_quality(filmed, size) -> No
     over = np.subtract(domain.max, box.max)
     assert np.all((over > -1e-6) & (over < domain.voxel_size)) and domain.min[2] == 0
     assert (np.abs(over).max() > 1e-6) == any("The box grows" in note for note in shot.notes)
-    by_hand = shot_of(replace(scene, domain=Box((-1, -1, 0), (1, 1, 3))), Settings.preset(resolution=(20, 20, 30)))
-    assert by_hand.scene.domain == Domain((-1, -1, 0), (1, 1, 3), (20, 20, 30))
+
+
+def test_a_box_without_a_resolution_holds_whatever_is_given_by_hand(filmed) -> None:
+    scene = replace(filmed(0.0), domain=Box((-1, -1, 0), (1, 1, 3)))
+    for resolution, top in (((20, 20, 30), 3.0), ((20, 20, 40), 4.0)):
+        domain = shot_of(scene, Settings.preset(resolution=resolution)).scene.domain
+        assert domain.resolution == resolution
+        np.testing.assert_allclose([domain.min, domain.max], [(-1, -1, 0), (1, 1, top)], atol=1e-9)
 
 
 def test_a_box_that_is_found_is_chosen_for_too(filmed) -> None:

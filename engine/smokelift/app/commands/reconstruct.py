@@ -24,6 +24,7 @@ from smokelift.output.images import eight_bit
 from smokelift.output.writer import check_directory, written_kinds
 from smokelift.pipeline import Frame, reconstruct
 from smokelift.render import device
+from smokelift.scene import Domain
 from smokelift.setup.background import cut_notes
 from smokelift.setup.no_smoke import what_helps
 from smokelift.setup.provenance import made_up
@@ -64,7 +65,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         written_kinds(options.npz)  # before the clip is looked at, which takes minutes
         reconstruction = reconstruct(clip, scene, settings)
         shot = reconstruction.shot
-        require_memory(shot.scene.domain, len(clip), settings, given=scene.domain is not None)
+        require_memory(shot.scene.domain, len(clip), settings, given=isinstance(scene.domain, Domain))
         for note in (*shot.notes, *(choice.reason for choice in shot.choices), *made_up(shot)):
             say.note(note)
         report = _report(shot, options.thumbnail, say)
