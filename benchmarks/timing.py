@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable
 from typing import TypeVar
 
 import numpy as np
@@ -33,15 +33,18 @@ class FrameTimes:
         self._seconds: list[float] = []
         self._units: list[float] = []
 
-    def over(self, frames: Iterable[Frame]) -> Iterator[Frame]:
-        """Yield frames and time the making of each; what is done with a frame is not timed."""
+    def before(self, action: Callable[[Frame], object]) -> Callable[[Frame], None]:
+        """Return what to call with each frame once it is made: it times the making from now on, but not the action."""
         began = self._clock()
-        for frame in frames:
+
+        def timed(frame: Frame) -> None:
+            nonlocal began
             self._seconds.append(self._clock() - began)
             self._units.append(poisson_seconds(self._shape, self._clock))
-            yield frame
-            del frame  # while the next is made its memory is free
+            action(frame)
             began = self._clock()
+
+        return timed
 
     @property
     def seconds(self) -> float:

@@ -48,10 +48,12 @@ CAMERA: Mapping[str, Row] = {
 def tables() -> dict[str, tuple[str, list[Row]]]:
     """Return what stands under each header of a scene file: a sentence, and a row for each key."""
     of_scene = {row[0]: row for row in rows(Scene)}
+    of_box = {row[0]: row for row in rows(Domain)}
+    of_box["resolution"] = (*of_box["resolution"][:2], "by the quality", of_box["resolution"][3])
     found = {
         "[clip]": (summary(ClipSource), rows(ClipSource)),
         "[camera]": ("The camera that filmed the clip; estimated if it is left out.", list(CAMERA.values())),
-        "[domain]": (summary(Domain), [*rows(Domain), of_scene["closed"]]),
+        "[domain]": (summary(Domain), [*of_box.values(), of_scene["closed"]]),
         "[[inlet]]": (summary(Inlet), rows(Inlet)),
         "[medium]": (summary(Medium), [*rows(Medium), of_scene["scattering"]]),
         "[background]": (summary(Background), rows(Background)),

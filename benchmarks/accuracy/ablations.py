@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from smokelift.density import (
-    Density,
     DensityFit,
     DepthEstimate,
+    FittedDensity,
     GradientFit,
     NothingCarried,
     ObservedClip,
@@ -48,7 +48,7 @@ class WithoutHull:
 
     density_fit: DensityFit
 
-    def fit(self, views: ViewSet, depth: DepthEstimate, initial: Volume | None) -> Density:
+    def fit(self, views: ViewSet, depth: DepthEstimate, initial: Volume | None) -> FittedDensity:
         """Fit within the cameras' frusta."""
         visible = np.any([view.projection.visible for view in views.views], axis=0)
         return self.density_fit.fit(views, replace(depth, views=replace(depth.views, hull=visible)), initial)
@@ -97,7 +97,7 @@ def smear(views: ViewSet, fit: GradientFit) -> Volume:
     optics = views.optics
     fog = 0.5 / (optics.medium.extinction * thickness(views.views[0], optics.domain))
     start = np.full(optics.domain.resolution, fog, np.float32)
-    return fit.fit(views, RoundDepth().estimate(views), start).values
+    return fit.fit(views, RoundDepth().estimate(views), start).density
 
 
 def thickness(view: View, domain: Domain) -> float:

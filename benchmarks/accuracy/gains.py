@@ -89,10 +89,10 @@ def _third(folder: Path, scene: CompleteScene, front: ShotView, side: ShotView) 
     assert seen is not None
     assert other is not None
     lit = replace(scene, camera=seen.camera)
-    density = reconstruct_density(seen.image, lit, plate=seen.plate, views=(other,))
+    fitted = reconstruct_density(seen.image, lit, plate=seen.plate, views=(other,))
     working = working_picture(_camera(folder, UNSEEN), scene.domain)
     truth = working.cut(np.repeat(_radiance(folder, UNSEEN)[frame][..., None], 3, -1))
-    shown = scene_optics(scene).renderer(working.camera, np.zeros(3, np.float32)).image(density.values)
+    shown = scene_optics(scene).renderer(working.camera, np.zeros(3, np.float32)).image(fitted.density)
     wrong = (shown - truth)[np.maximum(shown, truth).max(-1) > 0.01]
     return float(-10 * np.log10(np.mean(np.square(wrong))))
 

@@ -24,11 +24,12 @@ from typing import Any, Literal, get_args
 
 from benchmarks.accuracy.ablations import leave_out, smear
 from benchmarks.accuracy.scenes import VIEWS, BakedViews, camera_of
-from smokelift import ClipSource, Scene, Settings, View
+from smokelift import ClipSource, Scene, Settings
 from smokelift.density import DensitySettings, GradientFit, ViewSet
 from smokelift.output.images import write_image
 from smokelift.pipeline import Method, compose
 from smokelift.render import Volume
+from smokelift.scene import View
 from smokelift.setup.settings import Quality
 from smokelift.setup.shot import Shot
 from smokelift.velocity import PrimalDual, ProjectedCG

@@ -28,7 +28,7 @@ from benchmarks.accuracy.scenes import VIEWS, BakedViews
 from benchmarks.errors import relative_error
 from benchmarks.tables import markdown
 from benchmarks.timing import UNTIMED
-from smokelift import Clip, Frame, Scene, Settings, reconstruct
+from smokelift import Clip, Frame, Scene, Settings, prepare_shot, reconstruct
 from smokelift.evaluation.metrics import psnr
 from smokelift.evaluation.resampling import resampled
 from smokelift.evaluation.truth import Truth
@@ -37,7 +37,6 @@ from smokelift.output.images import eight_bit
 from smokelift.output.sheet import write_sheet
 from smokelift.render import Image, Volume, scene_renderer
 from smokelift.scene import EnvironmentLight, Scattering, completed
-from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import QUALITIES, Quality
 from smokelift.setup.shot import Shot
 from smokelift.velocity.settings import LEVELS
@@ -117,9 +116,9 @@ class Side:
         clocks = []
         for each in (Settings.preset(settings.quality, "paper"), settings):
             began = time.process_time()
-            shot = prepare_shot(clip, scene, each)
+            reconstruction = reconstruct(clip, scene, each)
             clocks.append(time.process_time() - began)
-        return Side(shot, clocks[1] - clocks[0], iter(reconstruct(clip, scene, settings, shot=shot)), [], [])
+        return Side(reconstruction.shot, clocks[1] - clocks[0], iter(reconstruction), [], [])
 
     def step(self) -> None:
         """One more frame."""

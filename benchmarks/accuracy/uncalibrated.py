@@ -26,12 +26,12 @@ from benchmarks.accuracy.exchange import Told, partly
 from benchmarks.accuracy.laying import Result, Score, Seen, best_laid, scores, starts
 from benchmarks.accuracy.runs import run_settings
 from benchmarks.accuracy.scenes import REAL_SIZE, camera_of
-from smokelift import Clip, Scene, Settings, reconstruct
+from smokelift import Clip, Reconstruction, Scene, Settings, prepare_shot
 from smokelift.evaluation.metrics import psnr
 from smokelift.footage.images import area_average, linear_to_srgb
+from smokelift.pipeline import compose
 from smokelift.render import Image, Volume, scene_renderer
 from smokelift.scene import CompleteScene
-from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import SelectionSettings
 
 RUN = "balanced:detail=0"
@@ -88,7 +88,7 @@ def found(scene: Scene, settings: Settings, numbers: Iterable[int]) -> tuple[Res
         for number in numbers:
             view = replace(shot.views[0], clip=shot.clip.part(number, number))
             one = replace(shot, views=(view,))
-            frame = next(reconstruct(view.clip, scene, settings, shot=one))
+            (frame,) = Reconstruction(one, compose(one.settings))
             densities[number] = frame.density
             seen = view.observe(0, shot.scene.domain)
             if seen is not None and "psnr_working" in frame.figures:

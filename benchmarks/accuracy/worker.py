@@ -10,11 +10,11 @@ are the processor's, over all cores, so that other work on the machine changes n
 
 from __future__ import annotations
 
+import itertools
 import json
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,9 +23,8 @@ import numpy as np
 from benchmarks.accuracy.runs import SMEAR, further_view, run_method, run_settings, run_views, smeared
 from benchmarks.machine import peak_mib
 from benchmarks.timing import FrameTimes
-from smokelift import Clip, Scene, Settings, reconstruct
-from smokelift.setup.prepare import prepare_shot
-from smokelift.transport import Array
+from smokelift import Clip, Reconstruction, Scene, Settings, prepare_shot
+from smokelift.render import Volume
 
 
 def main() -> None:
@@ -41,19 +40,29 @@ def main() -> None:
         scene = replace(scene, views=views)
         shot = prepare_shot(clip, scene, settings)
         shot.scene.save(out / "scene.toml")
-        if run == SMEAR:
-            found: Iterator[dict[str, Array]] = ({"density": density} for density in smeared(shot))
-        else:
-            frames = reconstruct(
-                clip, scene, out=Path(folder) / "smoke", shot=shot, method=run_method(run, shot.settings)
-            )
-            found = ({"density": frame.density, "velocity": frame.velocity.centres()} for frame in frames)
         shape = shot.scene.domain.resolution
         times = FrameTimes(shape, time.process_time)
-        for number, arrays in enumerate(times.over(found), 1):
-            np.savez(out / f"{number:04d}.npz", **arrays)
+        if run == SMEAR:
+            numbers = itertools.count(1)
+
+            def save(density: Volume) -> None:
+                np.savez(out / f"{next(numbers):04d}.npz", density=density)
+
+            keep = times.before(save)
+            for density in smeared(shot):
+                keep(density)
+        else:
+            reconstruction = Reconstruction(shot, run_method(run, shot.settings))
+            reconstruction.write(
+                Path(folder) / "smoke",
+                on_frame=times.before(
+                    lambda frame: np.savez(
+                        out / f"{frame.number:04d}.npz", density=frame.density, velocity=frame.velocity.centres()
+                    )
+                ),
+            )
     result = {
-        "frames": number,
+        "frames": shot.length,
         "seconds": times.seconds,
         "solves": times.solves,
         "memory_mib": peak_mib(),

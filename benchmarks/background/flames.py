@@ -33,7 +33,6 @@ from smokelift.render import scene_optics
 from smokelift.render.emission import emitted
 from smokelift.scene import ClipSource, CompleteScene, Scene, completed, orbit
 from smokelift.scene.projection import ray_through_pixels
-from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
 from smokelift.transport import at_centres
@@ -194,9 +193,9 @@ def _reconstructed(clip: Clip, scene: CompleteScene, depth: float | None) -> tup
         background=scene.background,
     )
     settings = replace(Settings.preset("draft"), detail=0.0, axis_depth=depth)
-    shot = prepare_shot(clip, known, settings)
-    (frame,) = reconstruct(clip, known, settings, shot=shot)
-    return shot, frame
+    reconstruction = reconstruct(clip, known, settings)
+    (frame,) = reconstruction
+    return reconstruction.shot, frame
 
 
 def reactants(truth: Truth) -> Iterator[Array]:

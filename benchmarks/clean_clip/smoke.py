@@ -9,7 +9,7 @@ import numpy as np
 
 from benchmarks.accuracy.scenes import VIEWS, camera_of
 from benchmarks.background.clips import Smoke
-from smokelift import Camera, Scene
+from smokelift import Camera, Domain, Scene
 from smokelift.evaluation.truth import Truth
 from smokelift.footage.images import Picture, area_average
 from smokelift.render import scene_renderer
@@ -78,7 +78,7 @@ class Baked:
                 )
         return Baked(
             name=folder.name,
-            scene=replace(scene, clip=None, background=None, domain=replace(scene.domain, resolution=GRID)),
+            scene=replace(scene, clip=None, background=None, domain=Domain(scene.domain.min, scene.domain.max, GRID)),
             front=Smoke.load(folder),
             cameras={view: camera_of(folder / f"{name}.toml").resized(*SIZE) for view, name in VIEWS.items()},
             radiance=radiance,

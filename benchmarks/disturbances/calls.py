@@ -62,7 +62,7 @@ def wrong_start(known: Known, factor: float, method: MethodName) -> Figures:
     views = ViewSet.of(shot.observe(0), shot.optics, 0)
     depth = composed.depth_prior.of_clip(shot).estimate(views)
     start = np.float32(factor) * resampled(known.densities[FIRST], GRID)
-    density = composed.density_fit.fit(views, depth, start).values
+    density = composed.density_fit.fit(views, depth, start).density
     found: Figures = {}
     for view, camera in known.cameras.items():
         shown = scene_renderer(shot.scene, camera, BLACK).image(density)[..., :1]

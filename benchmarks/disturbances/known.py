@@ -85,7 +85,7 @@ class Known:
                 described,
                 clip=None,
                 camera=cameras[FRONT],
-                domain=replace(described.domain, resolution=GRID),
+                domain=Domain(described.domain.min, described.domain.max, GRID),
             ),
             cameras=cameras,
             radiance=radiance,
@@ -118,7 +118,7 @@ class Known:
     @property
     def domain(self) -> Domain:
         """The box with the voxels of the reconstructions."""
-        assert self.scene.domain is not None
+        assert isinstance(self.scene.domain, Domain)
         return self.scene.domain
 
     @property

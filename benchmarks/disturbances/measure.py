@@ -8,15 +8,14 @@ import numpy as np
 
 from benchmarks.background.clips import filmed
 from benchmarks.disturbances.known import FRONT, GRID, Known, Take
-from smokelift import Settings, reconstruct
+from smokelift import Reconstruction, Settings, prepare_shot
 from smokelift.evaluation.frame_means import SMOKE, eight_bit_values
 from smokelift.evaluation.metrics import psnr, velocity_error, volume_error
 from smokelift.evaluation.resampling import resampled
 from smokelift.evaluation.series import finite_mean
-from smokelift.pipeline import Frame
+from smokelift.pipeline import Frame, compose
 from smokelift.render import scene_renderer
 from smokelift.scene import CompleteScene
-from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import MethodName
 from smokelift.transport import Array
 
@@ -48,7 +47,7 @@ def _measured(take: Take, method: MethodName) -> Figures:
     clip = filmed(take.pictures, "clip")
     try:
         shot = prepare_shot(clip, take.told, settings)
-        frames = list(reconstruct(clip, take.told, shot=shot))
+        frames = list(Reconstruction(shot, compose(shot.settings)))
     except ValueError as error:
         return {"refused": str(error)}
     figures = _picture_figures(take, shot.scene, frames)

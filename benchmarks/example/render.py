@@ -3,7 +3,8 @@
     python -m benchmarks.example.render TRUTH.npz SCENE.toml [--views DIR] [--check 12 30 46]
 
 The pictures are single scattering, integrated at half-voxel steps instead of sampled, so they carry no noise; what
-arrives of the light is kept at the voxels' centres. The camera's rays, the light and the trilinear density are Mitsuba's own. `--check` compares with `volpath`.
+arrives of the light is kept at the voxels' centres. The camera's rays, the light and the trilinear density are
+Mitsuba's own. `--check` compares with `volpath`.
 """
 
 import argparse

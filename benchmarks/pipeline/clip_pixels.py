@@ -23,7 +23,6 @@ from benchmarks.timing import UNTIMED
 from smokelift import Clip, ClipSource, Scene, Settings, reconstruct
 from smokelift.app.options import frame_range
 from smokelift.pipeline.clip_fit import BesideClip, beside_clip
-from smokelift.setup.prepare import prepare_shot
 
 SCALES = ((1.0, 2.0), (2.0, 4.0))
 """Sizes of detail in pixels: what a Gaussian of the smaller standard deviation leaves and one of the larger takes away.
@@ -72,10 +71,10 @@ def measure(scene: Scene, settings: Settings) -> Row:
     assert scene.clip is not None
     psnr, working, shares, seconds = [], [], [], []
     with Clip.open(scene.clip) as clip:
-        shot = prepare_shot(clip, scene, settings)
-        frames = reconstruct(clip, scene, shot=shot)
+        reconstruction = reconstruct(clip, scene, settings)
+        shot = reconstruction.shot
         began = time.process_time()
-        for frame in frames:
+        for frame in reconstruction:
             spent = time.process_time() - began
             beside = beside_clip(shot.views[0], shot.optics, frame.number - 1, frame.density, step=1)
             # the first frame comes with the second

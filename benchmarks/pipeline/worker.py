@@ -11,10 +11,10 @@ import json
 import sys
 import tempfile
 import time
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
-from operator import attrgetter
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -120,8 +120,9 @@ def measure(job: Job) -> Run:
     settings = replace(Settings.preset(job.quality, job.method, job.size), detail=job.detail)
     times = FrameTimes(job.size, CLOCKS[job.clock])
     with tempfile.TemporaryDirectory() as out, Clip.open(source) as clip:
-        frames = times.over(reconstruct(clip, scene, settings, Path(out) / "smoke"))
-        figures = list(map(attrgetter("figures"), frames))  # no name holds a frame while the next is made
+        figures: list[Mapping[str, Any]] = []
+        run = reconstruct(clip, scene, settings)
+        run.write(Path(out) / "smoke", on_frame=times.before(lambda frame: figures.append(frame.figures)))
     return Run(
         size=job.size,
         method=job.method,

@@ -104,7 +104,7 @@ def by_the_paper(target: Image) -> Volume:
     views = ViewSet((seen(target),), np.ones(DOMAIN.resolution, bool), OPTICS)
     fog = np.full(DOMAIN.resolution, 0.1 / MEDIUM.extinction, np.float32)
     depth = DepthEstimate(fog, (np.ones(target.shape[:2], np.float32),), views)
-    return FixedRateDescent(PAPER_RATE, PAPER_STEPS, 1e-6).fit(views, depth, rabbit()).values
+    return FixedRateDescent(PAPER_RATE, PAPER_STEPS, 1e-6).fit(views, depth, rabbit()).density
 
 
 def rabbit() -> Volume:

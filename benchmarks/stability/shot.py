@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import numpy as np
 from smokelift import Background, Camera, Clip, ClipSource, DirectionalLight, Domain, Medium, Scene, Settings
 from smokelift.output.images import write_image
 from smokelift.output.video import write_video
-from smokelift.pipeline import reconstruct
+from smokelift.pipeline import Frame, reconstruct
 from smokelift.render import render
 
 FRAMES = 3
@@ -67,9 +68,13 @@ def tiny_shot(folder: Path) -> TinyShot:
         if place in (shot.finished, shot.filmed, shot.begun):
             assert known.clip is not None
             with Clip.open(known.clip) as opened:
-                frames = reconstruct(opened, known, Settings.preset("draft"), place / "out", npz=True)
-                for frame in frames:
-                    if place == shot.begun and frame.number == FRAMES - 1:
-                        frames.close()  # type: ignore[attr-defined]  # a generator: as if the run were cancelled
-                        break
+                run = reconstruct(opened, known, Settings.preset("draft"))
+                with suppress(KeyboardInterrupt):
+                    run.write(place / "out", npz=True, on_frame=_cancelled if place == shot.begun else None)
     return shot
+
+
+def _cancelled(frame: Frame) -> None:
+    """Interrupt a run before its last frame."""
+    if frame.number == FRAMES - 1:
+        raise KeyboardInterrupt

@@ -73,7 +73,9 @@ def main() -> None:
     parser.add_argument("scenes", nargs="+", help="a use (choose, report) or names such as plume-1")
     parser.add_argument("--resolution", type=voxels_across, default=64, help="as 48x48x72; 64x64x96 unless said")
     parser.add_argument("--frames", type=int, default=FRAMES, help=f"{FRAMES} unless said")
-    parser.add_argument("--steps", type=int, default=1, help="of the solver, a frame; with more than one no velocity is kept")
+    parser.add_argument(
+        "--steps", type=int, default=1, help="of the solver, a frame; with more than one no velocity is kept"
+    )
     options = parser.parse_args()
     wanted = [name for word in options.scenes for name in (names(word) if word in SEEDS else [word])]
     try:

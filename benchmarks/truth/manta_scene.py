@@ -3,7 +3,8 @@
     blender -b --factory-startup -P manta_scene.py -- NAME ACROSS FRAMES STEPS OUT
 
 ACROSS is the number of voxels along x, STEPS that of solver steps a frame; OUT is the file to write, in the format that
-truth.py reads. The velocity of a frame carries its smoke to the next one if a step is a frame; with more it is left out. A voxel on every side is simulated and cut off, so that the floor and the open sides lie on the box's sides.
+truth.py reads. The velocity of a frame carries its smoke to the next one if a step is a frame; with several it is left
+out. A voxel on every side is simulated and cut off, so that the floor and the open sides lie on the box's sides.
 """
 
 import json

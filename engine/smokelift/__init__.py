@@ -3,36 +3,28 @@
 The data flows footage -> setup -> density (render) <-> velocity (transport) -> output; `pipeline` is the loop.
 """
 
-import sys
-
-from smokelift_command import cancelled
-
-if sys.argv[:1] == ["-m"]:  # Python loads this for `python -m smokelift`, before its main program can take an interrupt
-    sys.excepthook = cancelled
-
-from smokelift.density import Density, DensitySettings, Observation, reconstruct_density
+from smokelift.density import reconstruct_density
 from smokelift.evaluation import metrics
 from smokelift.footage.clip import Clip
 from smokelift.output.sequence import Sequence
-from smokelift.pipeline import Frame, Method, compose, reconstruct
+from smokelift.pipeline import Frame, Reconstruction, reconstruct
 from smokelift.render import render, render_gradient
 from smokelift.scene import (
     Background,
     Camera,
     ClipSource,
-    CompleteScene,
     DirectionalLight,
     Domain,
     EnvironmentLight,
-    Inlet,
     Medium,
     PointLight,
     Scene,
-    View,
 )
+from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import Settings
+from smokelift.setup.shot import Shot
 from smokelift.transport import Velocity, advect, project
-from smokelift.velocity import VelocitySettings, estimate_velocity
+from smokelift.velocity import estimate_velocity
 
 __version__ = "1.0.0"
 
@@ -41,29 +33,22 @@ __all__ = [
     "Camera",
     "Clip",
     "ClipSource",
-    "CompleteScene",
-    "Density",
-    "DensitySettings",
     "DirectionalLight",
     "Domain",
     "EnvironmentLight",
     "Frame",
-    "Inlet",
     "Medium",
-    "Method",
-    "Observation",
     "PointLight",
+    "Reconstruction",
     "Scene",
     "Sequence",
     "Settings",
+    "Shot",
     "Velocity",
-    "VelocitySettings",
-    "View",
-    "__version__",
     "advect",
-    "compose",
     "estimate_velocity",
     "metrics",
+    "prepare_shot",
     "project",
     "reconstruct",
     "reconstruct_density",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from types import FrameType, TracebackType
+from types import FrameType
 
 CANCELLED = 130
 
@@ -44,11 +44,3 @@ def main() -> int:
             raise
     print("Cancelled.", file=sys.stderr)
     return CANCELLED
-
-
-def cancelled(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
-    """For ``sys.excepthook``: Ctrl-C is no fault that a traceback would explain."""
-    if issubclass(kind, KeyboardInterrupt):
-        print("Cancelled.", file=sys.stderr)
-    else:
-        sys.__excepthook__(kind, error, trace)

@@ -81,7 +81,7 @@ def light(scene: bpy.types.Scene, direction: tuple[float, float, float], degrees
     for obj in [obj for obj in scene.objects if obj.type == "LIGHT"]:
         bpy.data.objects.remove(obj)
     data = bpy.data.lights.new("Sun", "SUN")
-    data.energy, data.angle = 18.0, math.radians(1.0)
+    data.energy, data.angle = 16.0, math.radians(1.0)
     sun = bpy.data.objects.new("Sun", data)
     scene.collection.objects.link(sun)
     turned = Matrix.Rotation(math.radians(degrees), 3, "Z") @ Vector(direction)

@@ -14,7 +14,6 @@ from smokelift import (
     Camera,
     DirectionalLight,
     Domain,
-    Inlet,
     Medium,
     PointLight,
     Scene,
@@ -26,7 +25,7 @@ from smokelift import (
     render,
     render_gradient,
 )
-from smokelift.scene import orbit
+from smokelift.scene import Inlet, orbit
 from tests.engine.transport.random_fields import random_faces
 
 SHAPE = (8, 8, 8)
@@ -60,7 +59,7 @@ def pictured(**changes: Any) -> np.ndarray:
 
 def found(**changes: Any) -> np.ndarray:
     scene = replace(SCENE, **changes)
-    return reconstruct_density(render(SMOKE, scene), scene).values
+    return reconstruct_density(render(SMOKE, scene), scene).density
 
 
 CALLS: dict[str, Callable[[float], Any]] = {
@@ -95,8 +94,8 @@ CALLS: dict[str, Callable[[float], Any]] = {
     "render_gradient": lambda v: render_gradient(SMOKE, SCENE, np.full((10, 10, 3), min(v, 1e20), np.float32)),
     "reconstruct_density, extinction": lambda v: found(medium=Medium(extinction=v)),
     "reconstruct_density, irradiance": lambda v: found(lights=(DirectionalLight((0, 1, -1), (v, v, v)),)),
-    "reconstruct_density, picture": lambda v: reconstruct_density(np.full((10, 10, 3), v), SCENE).values,
-    "reconstruct_density, start": lambda v: reconstruct_density(pictured(), SCENE, scaled(SMOKE, v)).values,
+    "reconstruct_density, picture": lambda v: reconstruct_density(np.full((10, 10, 3), v), SCENE).density,
+    "reconstruct_density, start": lambda v: reconstruct_density(pictured(), SCENE, scaled(SMOKE, v)).density,
     "inlet": lambda v: Inlet((0, 0, 0), v).voxels(SCENE.domain),
 }
 

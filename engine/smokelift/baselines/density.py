@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from smokelift.density import (
-    Density,
     DepthEstimate,
+    FittedDensity,
     ObservedClip,
     Start,
     ViewSet,
@@ -88,7 +88,7 @@ class FixedRateDescent:
         if not device.has_taichi():
             raise DeviceError(f"The paper's method cannot run, as {device.NO_TAICHI}.")
 
-    def fit(self, views: ViewSet, depth: DepthEstimate, initial: Volume | None) -> Density:
+    def fit(self, views: ViewSet, depth: DepthEstimate, initial: Volume | None) -> FittedDensity:
         """Find a density anywhere in the domain; see `smokelift.density.DensityFit`."""
         from smokelift.baselines.renderer import PaperRenderer  # here, because Taichi takes long to import
 
@@ -109,7 +109,7 @@ class FixedRateDescent:
             views=tuple(replace(view, counted=every) for view, every in zip(views.views, everywhere, strict=True)),
             hull=np.ones_like(views.hull),
         )
-        return Density(without_traces(density), judged.hull, fit_figures(judged, residuals, done))
+        return FittedDensity(without_traces(density), judged.hull, fit_figures(judged, residuals, done))
 
     def _descend(
         self, renderers: Sequence[PaperRenderer], pictures: Sequence[Image], density: Volume, thin: Volume

@@ -1,6 +1,6 @@
 """Density from pictures: views, what is assumed of their depth, and the fit.
 
-Observation -> View (observation) -> DepthEstimate (depth_prior) -> Start (temporal_prior) -> Density (fit)
+Observation -> View (observation) -> DepthEstimate (depth_prior) -> Start (temporal_prior) -> FittedDensity (fit)
 
 The default estimate (detailed_depth) is round, smooth smoke with detail: from every side it shows the distribution of
 patches that the clip shows from the front. The fit has the last word.
@@ -11,9 +11,9 @@ from smokelift.density.clip_axis import clip_axis
 from smokelift.density.depth_prior import DepthEstimate, DepthPrior, Detail, RoundDepth
 from smokelift.density.detailed_depth import DetailedDepth
 from smokelift.density.fit import (
-    Density,
     DensityFit,
     DensitySettings,
+    FittedDensity,
     GradientFit,
     empty_density,
     reconstruct_density,
@@ -24,13 +24,13 @@ from smokelift.density.temporal_prior import BlendCarried, GuidedSimulation, Not
 __all__ = [
     "AxisEstimate",
     "BlendCarried",
-    "Density",
     "DensityFit",
     "DensitySettings",
     "DepthEstimate",
     "DepthPrior",
     "Detail",
     "DetailedDepth",
+    "FittedDensity",
     "GradientFit",
     "GuidedSimulation",
     "NothingCarried",

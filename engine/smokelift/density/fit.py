@@ -66,12 +66,12 @@ class DensitySettings:
 
 
 @dataclass(frozen=True, eq=False)
-class Density:
-    """A reconstructed density.
+class FittedDensity:
+    """A density that was fitted to pictures, and how well it fits.
 
     Attributes
     ----------
-    values : (nx, ny, nz) float32
+    density : (nx, ny, nz) float32
     hull : (nx, ny, nz) bool
         Voxels that the pictures allow to hold smoke and in which the depth prior expects any.
     figures
@@ -83,11 +83,11 @@ class Density:
     smooth : (nx, ny, nz) float32, optional
         The depth prior's `DepthEstimate.smooth`.
     steady : (nx, ny, nz) float32, optional
-        The density before the descent, which a next frame carries along; None if that is `values`. What the descent
+        The density before the descent, which a next frame carries along; None if that is `density`. What the descent
         makes of single pixels would pile up along the rays from frame to frame.
     """
 
-    values: Volume
+    density: Volume
     hull: NDArray[np.bool_]
     figures: Mapping[str, float] = field(default_factory=dict)
     smooth: Volume | None = None
@@ -97,7 +97,7 @@ class Density:
 class DensityFit(Protocol):
     """A way to find a density that renders to given pictures."""
 
-    def fit(self, views: ViewSet, depth: DepthEstimate, initial: Volume | None) -> Density:
+    def fit(self, views: ViewSet, depth: DepthEstimate, initial: Volume | None) -> FittedDensity:
         """Find a density.
 
         Parameters
@@ -123,7 +123,7 @@ class GradientFit:
 
     settings: DensitySettings = DensitySettings()
 
-    def fit(self, views: ViewSet, depth: DepthEstimate, initial: Volume | None) -> Density:
+    def fit(self, views: ViewSet, depth: DepthEstimate, initial: Volume | None) -> FittedDensity:
         """Find a density; see `DensityFit`."""
         views, settings = depth.views, self.settings
         hull = views.hull
@@ -150,7 +150,7 @@ class GradientFit:
         )
         figures = fit_figures(views, final.residuals, scaled.iterations + final.iterations)
         steady = scaled.density if depth.detail is not None else None
-        return Density(without_traces(final.density), hull, figures, depth.smooth, steady)
+        return FittedDensity(without_traces(final.density), hull, figures, depth.smooth, steady)
 
 
 def reconstruct_density(
@@ -162,7 +162,7 @@ def reconstruct_density(
     plate: Plate | None = None,
     views: Sequence[Observation] = (),
     depth_prior: DepthPrior | None = None,
-) -> Density:
+) -> FittedDensity:
     """Find a density that renders to a picture, or to several (algorithm 3).
 
     Parameters
@@ -184,7 +184,7 @@ def reconstruct_density(
 
     Returns
     -------
-    Density
+    FittedDensity
 
     Raises
     ------
@@ -204,8 +204,8 @@ def reconstruct_density(
     >>> x, y, z = scene.domain.offsets(scene.domain.centre)
     >>> ball = np.exp(-(x**2 + y**2 + z**2) / 0.04)
     >>> picture = smokelift.render(ball, scene)
-    >>> density = smokelift.reconstruct_density(picture, scene)
-    >>> bool(smokelift.metrics.psnr(smokelift.render(density.values, scene), picture) > 30)
+    >>> fitted = smokelift.reconstruct_density(picture, scene)
+    >>> bool(smokelift.metrics.psnr(smokelift.render(fitted.density, scene), picture) > 30)
     True
     """
     complete = completed(scene)
@@ -229,10 +229,10 @@ def _with_plate(observation: Observation, scene: CompleteScene) -> Observation:
     return replace(observation, plate=eight_bit_plate(background_picture(scene, camera), camera.size))
 
 
-def empty_density(views: ViewSet) -> Density:
+def empty_density(views: ViewSet) -> FittedDensity:
     """The empty result: no smoke is seen, or the views have no voxel in common."""
     residuals = [view.plate.image - view.image for view in views.views]
-    return Density(np.zeros(views.hull.shape, np.float32), views.hull, fit_figures(views, residuals, 0))
+    return FittedDensity(np.zeros(views.hull.shape, np.float32), views.hull, fit_figures(views, residuals, 0))
 
 
 def without_traces(density: Volume) -> Volume:
@@ -241,7 +241,7 @@ def without_traces(density: Volume) -> Volume:
 
 
 def fit_figures(views: ViewSet, residuals: Sequence[Image], iterations: int) -> dict[str, float]:
-    """Figures of a fit that leaves residuals (rows, columns, 3), one a view at least; see `Density`."""
+    """Figures of a fit that leaves residuals (rows, columns, 3), one a view at least; see `FittedDensity`."""
     losses, decibels = [], {}
     for number, (view, residual) in enumerate(zip(views.views, residuals, strict=False)):
         left = residual[view.counted]

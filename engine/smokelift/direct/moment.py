@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -44,7 +44,7 @@ def read_moment(sequence: Sequence, number: int) -> Moment:
     SequenceError
         If there is no such frame, or its file is missing or damaged.
     """
-    velocity = replace(sequence.staggered_velocity(number), closed=sequence.scene.closed)
+    velocity = sequence.velocity(number)
     return Moment(sequence.density(number), complete_velocity(velocity), sequence.flame(number))
 
 

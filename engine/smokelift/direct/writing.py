@@ -93,7 +93,7 @@ def write_copy(
 ) -> Written:
     """Write the frame `source` of a sequence unchanged as the frame `number` of another, with further figures."""
     figures = {**sequence.figures(source), "origin": "clip", **further}
-    faces = sequence.staggered_velocity(source).faces
+    faces = sequence.velocity(source).faces
     density, flame = sequence.density(source), sequence.flame(source)
     writer.write(number, density, faces, figures, ready=sequence.files(source), flame=flame)
     return number, {**figures, "seconds_density": 0.0, "seconds_velocity": 0.0}

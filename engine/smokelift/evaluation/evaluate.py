@@ -130,7 +130,7 @@ def _against_truth(sequence: Sequence, truth: Truth) -> Figures:
     means = VolumeMeans(truth)
     for number in sequence.frames:
         # the first frame's velocity is the second's
-        velocity = sequence.velocity(number) if number > sequence.frames[0] else None
+        velocity = sequence.velocity_at_centres(number) if number > sequence.frames[0] else None
         means.add(number + first_frame(sequence) - 1, sequence.density(number), velocity)
     return means.figures()
 

@@ -179,7 +179,7 @@ def _write_frame(sequence: Sequence, number: int, out: Path, settings: ExportSet
     """Write the files of a frame; returns their bytes."""
     domain, extinction = sequence.scene.domain, sequence.scene.medium.extinction
     density = sequence.density(number)
-    velocity = sequence.velocity(number) if settings.velocity else None
+    velocity = sequence.velocity_at_centres(number) if settings.velocity else None
     paths = [frame_path(out, number, "vdb")]
     rho = _thinned(density, domain, extinction)
     if settings.precision == "quantised":

@@ -127,24 +127,8 @@ class Sequence:
             raise SequenceError(f"{self.directory}: frame {number} holds a negative emission")
         return flame
 
-    def velocity(self, number: int) -> Array:
-        """Return the velocity of a frame in m/s at voxel centres, shape (nx, ny, nz, 3).
-
-        From an OpenVDB file it is zero further than two voxels from smoke.
-
-        Raises
-        ------
-        SequenceError
-            If there is no such frame, or its file is missing or damaged.
-        """
-        arrays = self._read(number, *VELOCITY)
-        if "velocity" in arrays:
-            return arrays["velocity"]
-        x, y, z = (arrays[name] for name in VELOCITY)
-        return Velocity((x, y, z), self.scene.domain.voxel_size).centres()
-
-    def staggered_velocity(self, number: int) -> Velocity:
-        """Return the velocity of a frame in m/s on faces, with the walls of the scene.
+    def velocity(self, number: int) -> Velocity:
+        """Return the velocity of a frame in m/s, with the walls of the scene.
 
         It is the NumPy twin's; from an OpenVDB file it is the mean of the values at the centres beside a face, zero
         further than two voxels from smoke and not free of divergence.
@@ -160,6 +144,20 @@ class Sequence:
         else:
             x, y, z = (arrays[name] for name in VELOCITY)
         return Velocity((x, y, z), self.scene.domain.voxel_size, self.scene.closed)
+
+    def velocity_at_centres(self, number: int) -> Array:
+        """Return the velocity of a frame in m/s at voxel centres, shape (nx, ny, nz, 3).
+
+        These are the values of an OpenVDB file as it holds them; those of :meth:`velocity` are smoothed by the way to
+        faces and back.
+
+        Raises
+        ------
+        SequenceError
+            If there is no such frame, or its file is missing or damaged.
+        """
+        arrays = self._read(number, *VELOCITY)
+        return arrays["velocity"] if "velocity" in arrays else self.velocity(number).centres()
 
     def files(self, number: int) -> Mapping[str, Path]:
         """Return the files of a frame by their kind, ``"vdb"`` or ``"npz"``.

@@ -12,31 +12,20 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from smokelift.checks import require_kind
-from smokelift.density import Density, ViewSet
+from smokelift.density import FittedDensity, ViewSet
 from smokelift.density.flame import flame_emission
 from smokelift.density.hull import inside, project_voxels
-from smokelift.footage.clip import Clip
-from smokelift.output.index import Origins
-from smokelift.output.resume import ResumeState
-from smokelift.output.writer import SequenceWriter
 from smokelift.pipeline.clip_fit import clip_psnr
-from smokelift.pipeline.method import Method, compose
-from smokelift.pipeline.sources import sources
+from smokelift.pipeline.method import Method
 from smokelift.render import Volume
 from smokelift.render.blas import products_on_one_thread
-from smokelift.scene import Domain, Scene
-from smokelift.scene.checks import file_path
-from smokelift.setup.prepare import prepare_shot
-from smokelift.setup.provenance import provenance
-from smokelift.setup.settings import Settings
+from smokelift.scene import Domain
 from smokelift.setup.shot import Shot
-from smokelift.transport import Array, ResidualMeans, Velocity, halved
+from smokelift.transport import Array, Velocity
 from smokelift.velocity.near_smoke import carry, near_smoke
 
 
@@ -54,14 +43,14 @@ class Frame:
         was estimated on a coarser grid.
     figures
         Measures of the fit and seconds spent: ``psnr`` of the clip's own pixels inside the smoke (`clip_psnr`),
-        ``psnr_working`` and what else `smokelift.density.Density` says of the working pictures.
+        ``psnr_working`` and what else `smokelift.density.FittedDensity` says of the working pictures.
     estimated
         The velocity on the grid of its estimate, all over the domain.
     smooth : (nx, ny, nz) float32, optional
         The density without what the depth prior makes up, which the velocity is estimated from; None if that is all of
         it.
     steady : (nx, ny, nz) float32, optional
-        What the next frame carries along, if not the density: see `smokelift.density.Density`.
+        What the next frame carries along, if not the density: see `smokelift.density.FittedDensity`.
     flame : (nx, ny, nz) float32, optional
         Emission of fire, radiance per metre of the color ``flame_color`` of the scene's medium; None where the clip
         shows no fire.
@@ -98,110 +87,8 @@ class Past:
         return Past(frame.density, frame.estimated, frame.smooth, frame.steady)
 
 
-def reconstruct(
-    clip: Clip,
-    scene: Scene,
-    settings: Settings | None = None,
-    out: str | Path | None = None,
-    *,
-    npz: bool = False,
-    resume: bool = False,
-    shot: Shot | None = None,
-    method: Method | None = None,
-) -> Iterator[Frame]:
-    """Reconstruct a clip frame by frame.
-
-    Parameters
-    ----------
-    clip
-        The footage.
-    scene
-        Whatever is known of the shot; the rest is estimated (see `prepare_shot`).
-    settings
-        `Settings.preset` of a quality and a method; balanced by default.
-    out
-        Directory for the sequence; without it frames are only yielded.
-    npz
-        Write NumPy twins as well.
-    resume
-        Go on from the frames in ``out``. The frames that are there are not yielded again.
-    shot
-        The result of `prepare_shot`, if it has been computed already.
-    method
-        Another composition than that of the settings, for an experiment.
-
-    Yields
-    ------
-    Frame
-        In the clip's order, each already written when it is yielded.
-
-    Raises
-    ------
-    ValueError
-        For bad input (`SceneError`, `ClipError`, `SequenceError` are ValueErrors too).
-    """
-    require_kind(clip, Clip, "clip", 'a Clip (Clip.open("clip.mp4") opens one)')
-    require_kind(scene, Scene, "scene", "a Scene (Scene() leaves all open, Scene.load reads a file)")
-    require_kind(settings, Settings | None, "settings", "Settings (Settings.preset makes them)")
-    require_kind(shot, Shot | None, "shot", "a Shot (prepare_shot makes one)")
-    require_kind(method, Method | None, "method", "a Method (compose makes one)")
-    shot = shot or prepare_shot(clip, scene, settings or Settings.preset())
-    method = method or compose(shot.settings)
-    if out is None:
-        yield from _frames(shot, method, None)
-        return
-    with SequenceWriter(
-        file_path(out, "out", "the path of a directory"),
-        shot.scene,
-        shot.settings.as_dict(),
-        npz=npz,
-        resume=resume,
-        background=shot.estimated_background,
-        origins=Origins(
-            choices=[choice.as_dict() for choice in shot.choices],
-            provenance=[part.as_dict() for part in provenance(shot)],
-            sources=sources(shot),
-        ),
-    ) as writer:
-        if writer.state is None and writer.finished:
-            return
-        for frame in _frames(shot, method, None if writer.state is None else _resumed(writer.state, shot)):
-            if frame.number not in writer.finished:
-                writer.write(
-                    frame.number,
-                    frame.density,
-                    frame.velocity.faces,
-                    frame.figures,
-                    flame=frame.flame,
-                    state=_state(frame),
-                )
-                yield frame
-            del frame  # before the next is computed: velocities take most of the memory
-
-
-def _state(frame: Frame) -> ResumeState:
-    """What the next frame needs of one, for a run that goes on."""
-    memory = frame.estimated.residual
-    kept = {} if memory is None else {"residual_mean": memory.mean, "residual_magnitude": memory.magnitude}
-    volumes = {"smooth": frame.smooth, "steady": frame.steady}
-    kept |= {name: volume for name, volume in volumes.items() if volume is not None}
-    return ResumeState(frame.number, frame.density, frame.estimated.faces, kept)
-
-
-def _resumed(state: ResumeState, shot: Shot) -> Frame:
-    """The last finished frame of a run that goes on."""
-    mean, magnitude = state.extra.get("residual_mean"), state.extra.get("residual_magnitude")
-    residual = None if mean is None or magnitude is None else ResidualMeans(mean, magnitude)
-    velocity = Velocity(state.velocity, shot.optics.domain.voxel_size, shot.scene.closed, residual=residual)
-    shape = shot.optics.domain.resolution
-    while shape != velocity.shape:
-        shape, velocity = halved(shape), replace(velocity, voxel_size=2 * velocity.voxel_size)
-    smooth, steady = state.extra.get("smooth"), state.extra.get("steady")
-    return Frame(state.number, state.density, velocity, {}, velocity, smooth, steady)
-
-
-def _frames(shot: Shot, method: Method, start: Frame | None) -> Iterator[Frame]:
-    """Frames after ``start``; the first is held back until the second gives it a velocity."""
+def frames_after(start: Frame | None, shot: Shot, method: Method) -> Iterator[Frame]:
+    """Yield a shot's frames after one, or all; the first is held back until the second gives it a velocity."""
     count = len(shot.clip)
     with products_on_one_thread():
         method = replace(method, depth_prior=method.depth_prior.of_clip(shot))
@@ -234,51 +121,51 @@ def _frame(index: int, before: Past | None, shot: Shot, method: Method) -> Frame
         moved = before.density if before.steady is None else before.steady
         carried = carry(moved, predicted, dt, domain.voxel_size, conserve=shot.moves)
         carried = inside(carried > 0, carried)
-    density, taken_over = _density(index, before, carried, shot, method)
-    flame = _flame(index, density.values, shot)
-    fit = _fit_figures(index, density, shot)
-    fitted = time.perf_counter()
+    fitted, taken_over = _density(index, before, carried, shot, method)
+    flame = _flame(index, fitted.density, shot)
+    fit = _fit_figures(index, fitted, shot)
+    fit_done = time.perf_counter()
     velocity = estimated = Velocity.zero(domain.resolution, domain.voxel_size, shot.scene.closed)
     if before is not None:
         estimated = method.velocity_estimator.estimate(
-            *_measured(before, density),
+            *_measured(before, fitted),
             dt,
             domain.voxel_size,
             closed=shot.scene.closed,
             inflow=shot.scene.inflow(),
             prediction=predicted,
         )
-        velocity = near_smoke(estimated, (before.density > 0) | (density.values > 0), dt, domain.voxel_size)
+        velocity = near_smoke(estimated, (before.density > 0) | (fitted.density > 0), dt, domain.voxel_size)
     done = time.perf_counter()
     figures = {
         **fit,
-        "mass": float(density.values.sum(dtype=np.float64)) * domain.voxel_size**3,
+        "mass": float(fitted.density.sum(dtype=np.float64)) * domain.voxel_size**3,
         "transport": dict(taken_over),
         "velocity": dict(velocity.figures),
-        "seconds_density": fitted - began,
-        "seconds_velocity": done - fitted,
+        "seconds_density": fit_done - began,
+        "seconds_velocity": done - fit_done,
     }
-    return Frame(index + 1, density.values, velocity, figures, estimated, density.smooth, density.steady, flame)
+    return Frame(index + 1, fitted.density, velocity, figures, estimated, fitted.smooth, fitted.steady, flame)
 
 
-def _fit_figures(index: int, density: Density, shot: Shot) -> dict[str, float]:
+def _fit_figures(index: int, fitted: FittedDensity, shot: Shot) -> dict[str, float]:
     """The figures of a fit; what it calls ``psnr`` is that of the working pictures."""
-    working = {name.replace("psnr", "psnr_working"): value for name, value in density.figures.items()}
+    working = {name.replace("psnr", "psnr_working"): value for name, value in fitted.figures.items()}
     if "psnr_working" not in working:  # frames without smoke cost nothing
         return working
-    return {**clip_psnr(shot, index, density.values), **working}
+    return {**clip_psnr(shot, index, fitted.density), **working}
 
 
-def _measured(before: Past, density: Density) -> tuple[Volume, Volume]:
+def _measured(before: Past, fitted: FittedDensity) -> tuple[Volume, Volume]:
     """The densities of two frames, without what is made up if that is known of both: it shows no motion of its own."""
-    if before.smooth is None or density.smooth is None:
-        return before.density, density.values
-    return before.smooth, density.smooth
+    if before.smooth is None or fitted.smooth is None:
+        return before.density, fitted.density
+    return before.smooth, fitted.smooth
 
 
 def _density(
     index: int, before: Past | None, carried: Volume | None, shot: Shot, method: Method
-) -> tuple[Density, Mapping[str, float]]:
+) -> tuple[FittedDensity, Mapping[str, float]]:
     """The density of a frame, and what was taken over of the carried one."""
     observations = shot.observe(index)
     if not observations:
@@ -288,12 +175,12 @@ def _density(
     if before is None or carried is None:
         return method.density_fit.fit(views, depth, None), {}
     start = method.temporal_prior.start(depth.views, depth, carried, before.density)
-    density = method.density_fit.fit(views, depth, start.density)
+    fitted = method.density_fit.fit(views, depth, start.density)
     if shot.moves:
         # what a moving camera does not see now it may have seen before
         visible = project_voxels(observations[0].camera, shot.optics.domain).visible
-        density = replace(density, values=np.where(visible, density.values, carried), steady=None)
-    return density, start.figures
+        fitted = replace(fitted, density=np.where(visible, fitted.density, carried), steady=None)
+    return fitted, start.figures
 
 
 def _flame(index: int, density: Volume, shot: Shot) -> Volume | None:
@@ -307,8 +194,8 @@ def _flame(index: int, density: Volume, shot: Shot) -> Volume | None:
     return flame_emission(seen.image @ colour / (colour @ colour), seen.camera, density, shot.optics)
 
 
-def _unseen(domain: Domain, carried: Volume | None) -> Density:
+def _unseen(domain: Domain, carried: Volume | None) -> FittedDensity:
     """The density of a frame whose picture shows nothing of the domain: what was carried along."""
     nothing: Array = np.zeros(domain.resolution, np.float32)
     figures = {"loss": 0.0, "iterations": 0.0, "hull_share": 0.0}
-    return Density(nothing if carried is None else carried, nothing > 0, figures)
+    return FittedDensity(nothing if carried is None else carried, nothing > 0, figures)

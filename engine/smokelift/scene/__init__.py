@@ -10,7 +10,7 @@ from smokelift.scene.clip_source import ClipSource
 from smokelift.scene.complete import CompleteScene, completed, require_scene
 from smokelift.scene.description import Scene
 from smokelift.scene.dictionary import scene_from_dict, scene_to_dict
-from smokelift.scene.domain import SIDES, Domain, Inlet, Side
+from smokelift.scene.domain import SIDES, Box, Domain, Inlet, Side
 from smokelift.scene.environment_light import EnvironmentLight
 from smokelift.scene.finite_lights import DirectionalLight, FiniteLight, PointLight
 from smokelift.scene.lights import Light
@@ -23,6 +23,7 @@ __all__ = [
     "SHADOWED",
     "SIDES",
     "Background",
+    "Box",
     "Camera",
     "ClipSource",
     "CompleteScene",

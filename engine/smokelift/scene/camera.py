@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from smokelift.checks import shown
 from smokelift.scene.checks import SceneError, Vector, integer, items, number, positive, set_fields, unexpected, vector
-from smokelift.scene.domain import Domain
+from smokelift.scene.domain import Box
 
 Matrix = tuple[tuple[float, float, float, float], ...]
 """4x4, row-major."""
@@ -117,7 +117,7 @@ class Camera:
         """Whether it has a matrix for every frame."""
         return bool(self.matrices)
 
-    def require_outside(self, domain: Domain) -> None:
+    def require_outside(self, domain: Box) -> None:
         """Refuse a perspective camera that stands inside a box in any frame: nothing bounds the smoke around it.
 
         Raises
@@ -220,7 +220,7 @@ def as_matrix(values: NDArray[np.float64]) -> Matrix:
     return tuple((r[0], r[1], r[2], r[3]) for r in rows)
 
 
-def orbit(camera: Camera, domain: Domain, yaw_degrees: float, pitch_degrees: float = 0.0) -> Camera:
+def orbit(camera: Camera, domain: Box, yaw_degrees: float, pitch_degrees: float = 0.0) -> Camera:
     """Return the camera turned about the domain's centre, which stays at the same distance and place of the picture.
 
     A camera that moves is turned in every frame.
@@ -259,7 +259,7 @@ def shared_part(whole: Camera, camera: Camera) -> tuple[slice, slice] | None:
     return np.s_[top:bottom, left:right] if inside and right > left and bottom > top else None
 
 
-def _turned(matrix: NDArray[np.float64], domain: Domain, yaw_degrees: float, pitch_degrees: float) -> Matrix:
+def _turned(matrix: NDArray[np.float64], domain: Box, yaw_degrees: float, pitch_degrees: float) -> Matrix:
     """A camera's matrix after `orbit`."""
     centre = np.array(domain.centre)
     right = matrix[:3, 0]

@@ -85,8 +85,9 @@ def completed(scene: Scene | CompleteScene, camera: Camera | None = None) -> Com
     camera = camera or scene.camera
     if camera is None:
         raise ValueError("The scene has no camera; give one.")
-    if scene.domain is None:
-        raise ValueError("The scene has no domain; give its corners and its resolution.")
+    if not isinstance(scene.domain, Domain):
+        lacks = "no domain" if scene.domain is None else "a domain without a resolution"
+        raise ValueError(f"The scene has {lacks}; give its corners and its resolution.")
     return CompleteScene(
         camera=camera,
         domain=scene.domain,

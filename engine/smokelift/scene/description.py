@@ -19,7 +19,7 @@ from smokelift.scene.background import Background
 from smokelift.scene.camera import Camera
 from smokelift.scene.checks import SceneError, file_path, integer, set_fields
 from smokelift.scene.clip_source import ClipSource
-from smokelift.scene.domain import Domain, Inlet, Side, checked_sides
+from smokelift.scene.domain import Box, Inlet, Side, checked_sides
 from smokelift.scene.environment_light import EnvironmentLight
 from smokelift.scene.finite_lights import PointLight
 from smokelift.scene.lights import Light
@@ -42,7 +42,7 @@ class Scene:
     clip
         The footage.
     camera, domain, medium, lights, background
-        What is in front of the lens.
+        What is in front of the lens. A `Box` in place of a `Domain` leaves the resolution to the quality.
     views
         Further cameras and their clips.
     closed
@@ -62,7 +62,7 @@ class Scene:
 
     clip: ClipSource | None = None
     camera: Camera | None = None
-    domain: Domain | None = None
+    domain: Box | None = None
     medium: Medium | None = None
     lights: tuple[Light, ...] = ()
     background: Background | None = None
@@ -85,7 +85,7 @@ class Scene:
         """Refuse a part that is of another kind, and make tuples of lists."""
         require_kind(self.clip, ClipSource | None, "clip", 'a ClipSource, such as ClipSource("clip.mp4")')
         require_kind(self.camera, Camera | None, "camera", "a Camera")
-        require_kind(self.domain, Domain | None, "domain", "a Domain")
+        require_kind(self.domain, Box | None, "domain", "a Domain")
         require_kind(self.medium, Medium | None, "medium", "a Medium")
         require_kind(self.background, Background | None, "background", "a Background")
         set_fields(
@@ -95,7 +95,7 @@ class Scene:
             inlets=listed(self.inlets, Inlet, "inlets", "a list of Inlets"),
         )
 
-    def _check_places(self, domain: Domain) -> None:
+    def _check_places(self, domain: Box) -> None:
         """Refuse an inlet outside the domain, a light inside it, and a camera that does not see it."""
         for index, inlet in enumerate(self.inlets):
             if not inlet.reaches(domain):

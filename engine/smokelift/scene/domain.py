@@ -20,7 +20,52 @@ LONGEST = 4096
 
 
 @dataclass(frozen=True)
-class Domain:
+class Box:
+    """A box in metres; as the domain of a `Scene` it leaves the resolution to the quality.
+
+    Attributes
+    ----------
+    min, max
+        Corners in metres.
+
+    Raises
+    ------
+    SceneError
+        If the box is empty.
+    """
+
+    min: Vector
+    max: Vector
+
+    def __post_init__(self) -> None:
+        """Check every value and store plain tuples."""
+        set_fields(self, min=vector(self.min, "min"), max=vector(self.max, "max"))
+        for axis, low, high in zip("xyz", self.min, self.max, strict=True):
+            if not low < high:
+                raise SceneError(
+                    f"max must be above min on every axis; along {axis} min is {low:g} and max {high:g}",
+                    key="max",
+                )
+
+    @property
+    def centre(self) -> Vector:
+        """Middle of the box in metres."""
+        x, y, z = ((low + high) / 2 for low, high in zip(self.min, self.max, strict=True))
+        return x, y, z
+
+    def contains(self, point: Vector) -> bool:
+        """Return whether a point lies inside the box or on its surface."""
+        return all(low <= p <= high for low, p, high in zip(self.min, point, self.max, strict=True))
+
+    def corners(self) -> np.ndarray[Any, np.dtype[np.float64]]:
+        """Return the eight corners in metres, shape (8, 3)."""
+        axes = np.meshgrid(*zip(self.min, self.max, strict=True), indexing="ij")
+        corners: np.ndarray[Any, np.dtype[np.float64]] = np.stack(axes, axis=-1).reshape(8, 3)
+        return corners
+
+
+@dataclass(frozen=True)
+class Domain(Box):
     """The box that holds the smoke; voxels are cubes.
 
     Attributes
@@ -42,22 +87,14 @@ class Domain:
     0.03125
     """
 
-    min: Vector
-    max: Vector
     resolution: tuple[int, int, int]
 
     def __post_init__(self) -> None:
         """Check every value and store plain tuples."""
-        set_fields(self, min=vector(self.min, "min"), max=vector(self.max, "max"))
+        super().__post_init__()
         key, expected = "resolution", f"three whole numbers [nx, ny, nz], all at least 1 and at most {LONGEST}"
         counts = tuple(integer(v, key, expected, 1, LONGEST) for v in items(self.resolution, 3, key, expected))
         set_fields(self, resolution=counts)
-        for axis, low, high in zip("xyz", self.min, self.max, strict=True):
-            if not low < high:
-                raise SceneError(
-                    f"max must be above min on every axis; along {axis} min is {low:g} and max {high:g}",
-                    key="max",
-                )
         edges = [(high - low) / n for low, high, n in zip(self.min, self.max, counts, strict=True)]
         if max(edges) > 1.001 * min(edges):
             raise SceneError(
@@ -75,12 +112,6 @@ class Domain:
         return (self.max[0] - self.min[0]) / self.resolution[0]
 
     @property
-    def centre(self) -> Vector:
-        """Middle of the box in metres."""
-        x, y, z = ((low + high) / 2 for low, high in zip(self.min, self.max, strict=True))
-        return x, y, z
-
-    @property
     def shape(self) -> tuple[int, int, int]:
         """Shape of an array of voxels, the same as ``resolution``."""
         return self.resolution
@@ -90,21 +121,11 @@ class Domain:
         (x, y, z), (a, b, c) = self.centre, (n * voxel_size / 2 for n in resolution)
         return Domain((x - a, y - b, z - c), (x + a, y + b, z + c), resolution)
 
-    def contains(self, point: Vector) -> bool:
-        """Return whether a point lies inside the box or on its surface."""
-        return all(low <= p <= high for low, p, high in zip(self.min, point, self.max, strict=True))
-
     def offsets(self, point: Vector) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Return the metres from a point to the voxels' centres along x, y and z, ready to be broadcast."""
         places = zip(self.min, point, self.resolution, strict=True)
         x, y, z = np.ix_(*(low + (np.arange(n) + 0.5) * self.voxel_size - at for low, at, n in places))
         return x, y, z
-
-    def corners(self) -> np.ndarray[Any, np.dtype[np.float64]]:
-        """Return the eight corners in metres, shape (8, 3)."""
-        axes = np.meshgrid(*zip(self.min, self.max, strict=True), indexing="ij")
-        corners: np.ndarray[Any, np.dtype[np.float64]] = np.stack(axes, axis=-1).reshape(8, 3)
-        return corners
 
 
 @dataclass(frozen=True)
@@ -127,7 +148,7 @@ class Inlet:
         radius = positive(self.radius, "radius", "a number of metres above 0")
         set_fields(self, centre=vector(self.centre, "centre"), radius=radius)
 
-    def reaches(self, domain: Domain) -> bool:
+    def reaches(self, domain: Box) -> bool:
         """Return whether a part of it lies in a box."""
         nearest = np.clip(self.centre, domain.min, domain.max)
         return math.dist(self.centre, nearest) <= self.radius

@@ -8,7 +8,7 @@ from typing import Protocol, runtime_checkable
 
 from smokelift.checks import shown
 from smokelift.scene.checks import SceneError, Vector, colour, set_fields, vector
-from smokelift.scene.domain import Domain
+from smokelift.scene.domain import Box, Domain
 
 FARTHEST = 1e6
 """Voxels between a point light and the box, at most: its rays are parallel long before."""
@@ -79,12 +79,12 @@ class PointLight:
         red, green, blue = self.intensity
         return replace(self, intensity=(factor * red, factor * green, factor * blue))
 
-    def require_place(self, domain: Domain) -> None:
+    def require_place(self, domain: Box) -> None:
         """Refuse a place from which no light can be swept through a box: inside it, or too far away."""
         at = f"position {shown(list(self.position))} is"
         if domain.contains(self.position):
             raise SceneError(f"{at} inside the domain; it must be outside", key="position")
-        if math.dist(self.position, domain.centre) > FARTHEST * domain.voxel_size:
+        if isinstance(domain, Domain) and math.dist(self.position, domain.centre) > FARTHEST * domain.voxel_size:
             raise SceneError(f"{at} more than a million voxels away; give a directional light instead", key="position")
 
 

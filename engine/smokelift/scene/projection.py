@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.scene.camera import Camera
-from smokelift.scene.domain import Domain
+from smokelift.scene.domain import Box, Domain
 
 Array = NDArray[np.float64]
 
@@ -66,7 +66,7 @@ def voxel_width(camera: Camera, domain: Domain) -> float:
     return max(camera.fx, camera.fy) * domain.voxel_size / max(float(depth), near)
 
 
-def sees(camera: Camera, domain: Domain) -> bool:
+def sees(camera: Camera, domain: Box) -> bool:
     """Return False if all of the box lies outside one side of what a still camera sees.
 
     That test is exact for every box except one that passes by a corner of the picture, which counts as seen.

@@ -3,7 +3,8 @@
 A scene file holds the tables [clip], [camera], [domain], [[inlet]], [medium], [[lights]], [background] and [[views]],
 each of them optional. Their keys are the fields of the classes of the same names, with these exceptions:
 
-- ``[domain] closed`` lists the walls of the box. A ``[domain]`` that holds nothing else leaves the box to be estimated.
+- ``[domain] closed`` lists the walls of the box. A ``[domain]`` that holds nothing else leaves the box to be estimated,
+  one without ``resolution`` leaves that to the quality.
 - ``[medium] scattering`` is how light is scattered: ``"multiple"`` (any number of times), ``"single"`` (once, with
   shadows), ``"unshadowed"`` (once, without) or ``"absorption"`` (not at all). A ``[medium]`` that holds nothing else
   leaves the medium to be estimated.
@@ -24,7 +25,7 @@ from smokelift.scene.background import Background
 from smokelift.scene.camera import Camera, focal_length, look_at_matrix, picture_size
 from smokelift.scene.checks import SceneError, file_path, positive, unexpected
 from smokelift.scene.clip_source import ClipSource
-from smokelift.scene.domain import Domain, Inlet
+from smokelift.scene.domain import Box, Domain, Inlet
 from smokelift.scene.files import read_text
 from smokelift.scene.lights import LIGHT_TYPES, Light
 from smokelift.scene.medium import Medium
@@ -80,7 +81,7 @@ class _Reader:
         readers: dict[str, Callable[[Place, Any], Any]] = {
             "clip": self._table(self._part(ClipSource)),
             "camera": self._table(self._camera),
-            "domain": self._table(self._part(Domain, "closed")),
+            "domain": self._table(self._domain),
             "inlet": self._tables(self._part(Inlet)),
             "medium": self._table(self._part(Medium, "scattering")),
             "lights": self._tables(self._light),
@@ -164,6 +165,12 @@ class _Reader:
             return kind(**values)
 
         return read
+
+    def _domain(self, place: Place, data: Table) -> Box | None:
+        """Return a domain, or a box where the table holds no resolution."""
+        read = self._part(Domain, "closed") if "resolution" in data else self._part(Box, "resolution", "closed")
+        box: Box | None = read(place, data)
+        return box
 
     def _light(self, place: Place, data: Table) -> Light:
         _require(data, "type")

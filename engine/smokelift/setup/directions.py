@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from smokelift.density import Density, DensitySettings, reconstruct_density
+from smokelift.density import DensitySettings, FittedDensity, reconstruct_density
 from smokelift.render import Image, Optics
 from smokelift.render.environment_count import FEWEST, TOLERANCE, lights_needed
 from smokelift.scene import CompleteScene, EnvironmentLight, FiniteLight
@@ -75,7 +75,9 @@ def _by_hand(light: EnvironmentLight) -> Choice[int] | None:
     return Choice("environment directions", light.directions, reason, by_hand=True)
 
 
-def _measured(light: EnvironmentLight, frames: Sequence[CoarseFrame], densities: Sequence[Density]) -> Choice[int]:
+def _measured(
+    light: EnvironmentLight, frames: Sequence[CoarseFrame], densities: Sequence[FittedDensity]
+) -> Choice[int]:
     def picture(lights: Sequence[FiniteLight]) -> Image:
         return _pictures(frames, densities, lights)
 
@@ -84,11 +86,13 @@ def _measured(light: EnvironmentLight, frames: Sequence[CoarseFrame], densities:
     return Choice("environment directions", count, reason, {"change": change}, TOLERANCE)
 
 
-def _pictures(frames: Sequence[CoarseFrame], densities: Sequence[Density], lights: Sequence[FiniteLight]) -> Image:
+def _pictures(
+    frames: Sequence[CoarseFrame], densities: Sequence[FittedDensity], lights: Sequence[FiniteLight]
+) -> Image:
     """What the light alone shows of the densities, before black, all pixels in a row."""
     shown = []
-    for frame, density in zip(frames, densities, strict=True):
+    for frame, fitted in zip(frames, densities, strict=True):
         scene = frame.scene
         optics = Optics(scene.domain, scene.medium, tuple(lights), scene.scattering)
-        shown.append(optics.renderer(scene.camera, np.zeros(3, np.float32), density.hull).image(density.values).ravel())
+        shown.append(optics.renderer(scene.camera, np.zeros(3, np.float32), fitted.hull).image(fitted.density).ravel())
     return np.concatenate(shown)

@@ -15,7 +15,7 @@ from smokelift.footage.lens import FILM_DIAGONAL, FILM_WIDTH
 from smokelift.footage.plate import Plates
 from smokelift.footage.turning import Turns
 from smokelift.footage.working_picture import CameraError, working_picture
-from smokelift.scene import Camera, Domain, Scene, as_matrix
+from smokelift.scene import Box, Camera, Domain, Scene, as_matrix
 from smokelift.scene.projection import voxel_width
 from smokelift.setup.choice import Choice
 from smokelift.setup.detail import Detail, smoke_detail
@@ -85,7 +85,8 @@ def find_geometry(
     given = None if scene.camera is None else fitting(scene.camera, clip)
     if given is not None and scene.domain is not None:
         camera = _turning(given, turns)
-        return Geometry(camera, *_divided(scene.domain, clip, camera, settings, plates, samples))
+        box, division = _divided(scene.domain, clip, camera, settings, plates, samples)
+        return Geometry(camera, box, division, _grown(scene.domain, box))
     if scene.domain is not None:
         raise ValueError("The scene gives a [domain] but no [camera]; give the camera that filmed it.")
     if scene.inlets:
@@ -116,14 +117,25 @@ def find_geometry(
 
 
 def _divided(
-    box: Domain, clip: Clip, camera: Camera, settings: Settings, plates: Plates, samples: SmokeSamples
+    box: Box, clip: Clip, camera: Camera, settings: Settings, plates: Plates, samples: SmokeSamples
 ) -> tuple[Domain, Choice[Shape]]:
     """A box that is given, with as many voxels as are asked for, and why."""
-    if settings.resolution == "auto":
-        allowed = LIMITS[settings.quality].voxels(_pixels(camera.at(next(iter(samples.smoky), 0)), box))
-        return _resolved(clip, camera, _same_shape(box, allowed), plates, samples.smoky, settings)
-    domain = box if settings.resolution is None else replace(box, resolution=settings.resolution)
-    return domain, _resolution_by_hand(domain)
+    floor, size = np.array([*box.centre[:2], box.min[2]]), np.subtract(box.max, box.min)
+    if isinstance(settings.resolution, tuple):
+        if isinstance(box, Domain):
+            domain = replace(box, resolution=settings.resolution)
+        else:
+            domain = _filled(floor, size, settings.resolution)
+        return domain, _resolution_by_hand(domain)
+    if isinstance(box, Domain) and settings.resolution is None:
+        return box, _resolution_by_hand(box)
+    still = camera.at(next(iter(samples.smoky), 0))
+    if isinstance(box, Domain):
+        grids = _same_shape(box, LIMITS[settings.quality].voxels(_pixels(still, box)))
+    else:
+        (coarsest,) = _grids(floor, size, COARSEST, 1)
+        grids = _grids(floor, size, LIMITS[settings.quality].voxels(_pixels(still, coarsest)), 1)
+    return _resolved(clip, camera, grids, plates, samples.smoky, settings)
 
 
 def clip_lens(camera: Camera | None, clip: Clip) -> Lens | None:
@@ -227,24 +239,47 @@ def _around(camera: Camera, samples: SmokeSamples, settings: Settings) -> tuple[
     across *= 1 + across / (2 * distance)
     base = eye + distance * along + (aside.min() + aside.max()) / 2 * lateral
     base[2] = eye[2] + height.min()
-
-    def box(voxel: float, resolution: tuple[int, int, int]) -> Domain:
-        size = np.array(resolution) * voxel
-        low = base - size * (0.5, 0.5, 0)
-        high = low + size
-        return Domain(
-            (float(low[0]), float(low[1]), float(low[2])), (float(high[0]), float(high[1]), float(high[2])), resolution
-        )
-
+    size = np.array([across, across, up])
     if isinstance(settings.resolution, tuple):
-        nx, ny, nz = settings.resolution
-        return (box(max(across / nx, across / ny, up / nz), settings.resolution),)
+        return (_filled(base, size, settings.resolution),)
+    # multiples of four, so that pyramids halve them evenly
+    return _grids(base, size, LIMITS[settings.quality].voxels(max(across, up) / metres), 4)
+
+
+def _filled(floor: Array, size: Array, resolution: Shape) -> Domain:
+    """The box of so many voxels that holds one of a size in metres about the middle of its floor."""
+    return _standing_on(floor, float((size / resolution).max()), resolution)
+
+
+def _grids(floor: Array, size: Array, allowed: int, multiple: int) -> tuple[Domain, ...]:
+    """A box of a size in metres about the middle of its floor, with every number of voxels, the fewest first.
+
+    Where multiples of so many cubes do not fill it, it grows upward and to all sides.
+    """
     grids = []
-    allowed = LIMITS[settings.quality].voxels(max(across, up) / metres)
     for longest in range(COARSEST, max(allowed, COARSEST) + 1, 4):
-        voxel = max(across, up) / longest
-        grids.append(box(voxel, (_voxels(across, voxel), _voxels(across, voxel), _voxels(up, voxel))))
+        voxel = float(size.max() / longest)
+        x, y, z = (max(8, multiple * math.ceil(side / voxel / multiple - 1e-6)) for side in size)
+        grids.append(_standing_on(floor, voxel, (x, y, z)))
     return tuple(grids)
+
+
+def _grown(given: Box, domain: Domain) -> tuple[str, ...]:
+    """A note where a box that is given without a resolution grows to whole voxels."""
+    if np.allclose([domain.min, domain.max], [given.min, given.max], rtol=0, atol=1e-3 * domain.voxel_size):
+        return ()
+    size = " x ".join(f"{high - low:.4g}" for low, high in zip(domain.min, domain.max, strict=True))
+    return (f"The box grows to {size} m, a whole number of cubic voxels along every side.",)
+
+
+def _standing_on(floor: Array, voxel: float, resolution: Shape) -> Domain:
+    """The box of voxels of a size in metres about the middle of its floor."""
+    size = np.array(resolution) * voxel
+    low = floor - size * (0.5, 0.5, 0)
+    high = low + size
+    return Domain(
+        (float(low[0]), float(low[1]), float(low[2])), (float(high[0]), float(high[1]), float(high[2])), resolution
+    )
 
 
 def _covered(samples: SmokeSamples) -> tuple[float, float, float, float]:
@@ -310,8 +345,3 @@ def _detail(clip: Clip, camera: Camera, box: Domain, plates: Plates, smoky: tupl
 def _pixels(camera: Camera, box: Domain) -> float:
     """How many pixels of a still camera's picture lie along the longest side of a box."""
     return voxel_width(camera, box) * max(box.resolution)
-
-
-def _voxels(extent: float, voxel: float) -> int:
-    """Voxels that cover an extent: a multiple of four, so that pyramids halve it evenly."""
-    return max(8, 4 * int(np.ceil(extent / voxel / 4 - 1e-6)))

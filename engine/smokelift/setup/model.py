@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from smokelift.density import Density, reconstruct_density
+from smokelift.density import FittedDensity, reconstruct_density
 from smokelift.footage.clip import Clip
 from smokelift.footage.plate import Plates
 from smokelift.scene import CompleteScene, Domain
@@ -79,7 +79,7 @@ def choose_model(
     light = choose_light_model(coarse, frames, by_hand, guessed, settings)
 
     @cache
-    def density(number: int) -> Density | None:
+    def density(number: int) -> FittedDensity | None:
         frame = coarse.frame(number)
         if frame is None:
             return None
@@ -107,7 +107,7 @@ def tried_frames(smoky: Sequence[int]) -> tuple[int, ...]:
 
 def _levels(
     numbers: Sequence[int],
-    density: Callable[[int], Density | None],
+    density: Callable[[int], FittedDensity | None],
     coarse: Domain,
     final: Domain,
     settings: VelocitySettings,
@@ -117,11 +117,11 @@ def _levels(
         reason = f"Velocity grids by hand: {settings.levels}."
         return Choice("velocity levels", settings.levels, reason, by_hand=True)
     ends = [(density(number), density(number + 1)) for number in numbers]
-    pairs = [(before.values, after.values) for before, after in ends if before is not None and after is not None]
+    pairs = [(before.density, after.density) for before, after in ends if before is not None and after is not None]
     return choose_levels(pairs, coarse, final, settings)
 
 
-def _inside(densities: Sequence[Density], scene: CompleteScene) -> Choice[tuple[int, int, int]]:
+def _inside(densities: Sequence[FittedDensity], scene: CompleteScene) -> Choice[tuple[int, int, int]]:
     """The part of the box that is worked on."""
     share = float(np.mean([density.hull.mean() for density in densities]))
     reason = (
@@ -131,7 +131,7 @@ def _inside(densities: Sequence[Density], scene: CompleteScene) -> Choice[tuple[
     return Choice("domain", scene.domain.resolution, reason, {"hull_share": share})
 
 
-def _iterations(densities: Sequence[Density], settings: Settings) -> Choice[int]:
+def _iterations(densities: Sequence[FittedDensity], settings: Settings) -> Choice[int]:
     """How long a density is fitted."""
     fit = settings.density
     most = fit.fit_iterations + fit.descent_iterations

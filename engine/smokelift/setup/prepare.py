@@ -8,7 +8,7 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import replace
 
-from smokelift.checks import counted
+from smokelift.checks import counted, require_kind
 from smokelift.density.axis import SmokeAxis
 from smokelift.footage.clip import Clip
 from smokelift.footage.evidence import GLIMPSE, looks
@@ -31,7 +31,7 @@ from smokelift.setup.sun import find_sun
 from smokelift.setup.view_gain import balanced
 
 
-def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
+def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> Shot:
     """Complete a scene from its clip.
 
     Parameters
@@ -41,13 +41,17 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings) -> Shot:
     scene
         Whatever is known.
     settings
-        Anything unset is measured on the clip.
+        `Settings.preset` of a quality and a method, balanced by default; anything unset is measured on the clip.
 
     Raises
     ------
     ValueError
         If the scene contradicts the clip or itself, or lacks what cannot be estimated.
     """
+    require_kind(clip, Clip, "clip", 'a Clip (Clip.open("clip.mp4") opens one)')
+    require_kind(scene, Scene, "scene", "a Scene (Scene() leaves all open, Scene.load reads a file)")
+    require_kind(settings, Settings | None, "settings", "Settings (Settings.preset makes them)")
+    settings = settings or Settings.preset()
     _check(clip, scene)
     _expect(clip, scene)
     remarks = clip.remarks()

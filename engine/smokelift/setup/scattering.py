@@ -173,10 +173,10 @@ def held_out(frames: Sequence[CoarseFrame], model: Scattering, judge: Scattering
     asked, power = np.zeros((2, 3))
     for frame in frames:
         scene, plate, halves = frame.scattered_by(model).scene, frame.plate, frame.halves
-        density = reconstruct_density(halves.fitted, scene, settings=settings, plate=plate)
+        fitted = reconstruct_density(halves.fitted, scene, settings=settings, plate=plate)
         optics = replace(scene_optics(scene), scattering=judge)
-        renderer = optics.renderer(scene.camera, plate.image, density.hull)
-        shown = renderer.image(density.values)
+        renderer = optics.renderer(scene.camera, plate.image, fitted.hull)
+        shown = renderer.image(fitted.density)
         seen = reached(matte(frame.picture, plate).mask, project_voxels(scene.camera, scene.domain))
         # the light that the smoke scatters itself, and what it should be beside what it lets through
         behind = renderer.transmittance[..., None] * plate.image

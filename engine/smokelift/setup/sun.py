@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.density import Density, DensitySettings, Observation, reconstruct_density
+from smokelift.density import DensitySettings, FittedDensity, Observation, reconstruct_density
 from smokelift.footage.matte import matte
 from smokelift.footage.working_picture import CameraError, working_picture
 from smokelift.render import Image, Optics
@@ -169,7 +169,7 @@ class _Moment:
     views: Sequence[Observation]
     smoke: Sequence[NDArray[np.bool_]]
 
-    def fitted(self, scene: CompleteScene, settings: DensitySettings) -> Density:
+    def fitted(self, scene: CompleteScene, settings: DensitySettings) -> FittedDensity:
         """The density that the pictures show in the light of a scene."""
         first, *others = self.views
         return reconstruct_density(first.image, scene, settings=settings, plate=first.plate, views=others)
@@ -196,7 +196,7 @@ class _Lit:
 
     scene: CompleteScene
     moments: Sequence[_Moment]
-    densities: Sequence[Density]
+    densities: Sequence[FittedDensity]
 
     def sun(self) -> Sun:
         """The sun, with light from everywhere, that leaves least of what the smoke adds to all pictures."""
@@ -218,9 +218,9 @@ class _Lit:
         """What the smoke adds to the pixels (n,) that show it."""
         optics = Optics(self.scene.domain, self.scene.medium, (), "absorption")
 
-        def added(view: Observation, density: Density) -> Image:
-            renderer = optics.renderer(view.camera, view.plate.image, density.hull)
-            return view.image - renderer.image(density.values)
+        def added(view: Observation, fitted: FittedDensity) -> Image:
+            renderer = optics.renderer(view.camera, view.plate.image, fitted.hull)
+            return view.image - renderer.image(fitted.density)
 
         return self._pixels(added)
 
@@ -233,12 +233,12 @@ class _Lit:
         sun = DirectionalLight((x, y, z), (1.0, 1.0, 1.0))
         optics = Optics(self.scene.domain, self.scene.medium, (sun,), "single")
 
-        def shown(view: Observation, density: Density) -> Image:
-            return optics.renderer(view.camera, np.zeros(3, np.float32), density.hull).image(density.values)
+        def shown(view: Observation, fitted: FittedDensity) -> Image:
+            return optics.renderer(view.camera, np.zeros(3, np.float32), fitted.hull).image(fitted.density)
 
         return self._pixels(shown)
 
-    def _pixels(self, picture: Callable[[Observation, Density], Image]) -> Array:
+    def _pixels(self, picture: Callable[[Observation, FittedDensity], Image]) -> Array:
         """A picture of every view of every moment, its pixels that show smoke."""
         return np.concatenate(
             [

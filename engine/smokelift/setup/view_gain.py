@@ -65,12 +65,12 @@ class _Moment:
         scene, own = self.input.scene, Observation(self.input.scene.camera, self.input.picture, self.input.plate)
         plate = self.other.plate.through(lambda part: part / gain if part.ndim == 3 else part)
         views = (own, replace(self.other, image=self.other.image / gain, plate=plate))
-        density = reconstruct_density(own.image, scene, settings=settings, plate=own.plate, views=views[1:])
+        fitted = reconstruct_density(own.image, scene, settings=settings, plate=own.plate, views=views[1:])
         optics = scene_optics(scene)
         error, scales = 0.0, []
         for view in views:
-            renderer = optics.renderer(view.camera, view.plate.image, density.hull)
-            shown = renderer.image(density.values)
+            renderer = optics.renderer(view.camera, view.plate.image, fitted.hull)
+            shown = renderer.image(fitted.density)
             seen = reached(matte(view.image, view.plate).mask, project_voxels(view.camera, scene.domain))
             change = float(np.sum(np.square(view.image - view.plate.image, dtype=np.float64)[seen]))
             error += float(np.sum(np.square(shown - view.image, dtype=np.float64)[seen])) / max(change, 1e-30)

@@ -49,6 +49,17 @@ def choose(scene: bpy.types.Scene, folder: Path) -> None:
     settings.output = str(folder)
 
 
+def cut_off(run: smokelift.Reconstruction, folder: Path, count: int) -> None:
+    """A run that ends after so many frames."""
+
+    def cancel(frame: smokelift.Frame) -> None:
+        if frame.number == count:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run.write(folder, on_frame=cancel)
+
+
 def make(scene: bpy.types.Scene, folder: Path) -> bpy.types.PropertyGroup:
     """Press the button; without a window that waits for the end."""
     choose(scene, folder)
@@ -302,9 +313,7 @@ def test_going_on_with_what_was_stopped(shot, tmp_path) -> None:
     take = smoke_takes.write_take(smoke(shot))
     stopped = Scene.load(take.scene_file)
     with Clip.open(stopped.clip) as clip:
-        frames = smokelift.reconstruct(clip, stopped, Settings.preset("draft"), take.directory)
-        next(frames), next(frames)
-        frames.close()
+        cut_off(smokelift.reconstruct(clip, stopped, Settings.preset("draft")), take.directory, 2)
     settings.quality = "fine"
     assert smoke_takes.unfinished(smoke(shot)) == take
     assert bpy.ops.smokelift.resume() == {"FINISHED"}
@@ -333,9 +342,7 @@ def test_going_on_where_the_output_is_not_beside_the_file(shot, tmp_path, saved_
     stopped = smoke_takes.write_take(smoke(shot))
     known = Scene.load(stopped.scene_file)
     with Clip.open(known.clip) as clip:
-        frames = smokelift.reconstruct(clip, known, Settings.preset("draft"), stopped.directory)
-        next(frames)
-        frames.close()
+        cut_off(smokelift.reconstruct(clip, known, Settings.preset("draft")), stopped.directory, 1)
     smoke_takes.present(smoke(shot), stopped)
     save()
     quietly(lambda: bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath))
@@ -359,9 +366,7 @@ def test_going_on_after_the_project_was_moved(shot, tmp_path) -> None:
     take = smoke_takes.write_take(smoke(shot))
     stopped = Scene.load(take.scene_file)
     with Clip.open(stopped.clip) as clip:
-        frames = smokelift.reconstruct(clip, stopped, Settings.preset("draft"), take.directory)
-        next(frames)
-        frames.close()
+        cut_off(smokelift.reconstruct(clip, stopped, Settings.preset("draft")), take.directory, 1)
     bpy.ops.wm.save_mainfile()
     moved = project.rename(tmp_path / "moved")
     quietly(lambda: bpy.ops.wm.open_mainfile(filepath=str(moved / "shot.blend")))
@@ -436,9 +441,7 @@ def test_two_smokes_through_an_hour_of_work(shot, tmp_path) -> None:
     stopped = smoke_takes.write_take(right)
     known = Scene.load(stopped.scene_file)
     with Clip.open(known.clip) as clip:
-        frames = smokelift.reconstruct(clip, known, Settings.preset("draft"), stopped.directory)
-        next(frames)
-        frames.close()
+        cut_off(smokelift.reconstruct(clip, known, Settings.preset("draft")), stopped.directory, 1)
     smoke_takes.present(right, stopped)
     (tmp_path / "root" / "elsewhere").mkdir()
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "root" / "elsewhere" / "shot.blend"))

@@ -173,7 +173,7 @@ def test_what_cannot_be_written_is_refused_before_the_clip_is_looked_at(
     def look(*_arguments: object) -> None:
         raise AssertionError("the clip was looked at")
 
-    monkeypatch.setattr("smokelift.app.commands.reconstruct.prepare_shot", look)
+    monkeypatch.setattr("smokelift.app.commands.reconstruct.reconstruct", look)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "file").touch()
     for folder in ("others", "damaged", "deep"):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import errno
 import json
 import os
-import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -105,23 +104,19 @@ sys.exit(smokelift_command.main())
     assert (done.returncode, done.stderr) == (130, b"Cancelled.\n")
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGINT to send")
-def test_an_interrupt_while_the_module_is_loaded_leaves_no_traceback(tmp_path) -> None:
-    """`python -m smokelift` loads the engine before anything of ours runs; Python ends as shells expect it."""
-    (tmp_path / "sitecustomize.py").write_text("""
+def test_an_import_changes_nothing_of_the_process() -> None:
+    """A program that imports the engine keeps its own hook and handlers, in `python -m` of its own too."""
+    code = """
 import os, signal, sys
-
-class Finder:
-    def find_spec(self, name, path=None, target=None):
-        if name == "smokelift.density":
-            os.kill(os.getpid(), signal.SIGINT)
-
-signal.signal(signal.SIGINT, signal.default_int_handler)
-sys.meta_path.insert(0, Finder())
-""")
-    paths = os.pathsep.join([str(tmp_path), ENVIRONMENT["PYTHONPATH"]])
-    status, lines = ended("doctor", env={**ENVIRONMENT, "PYTHONPATH": paths})
-    assert (status, lines) == (-signal.SIGINT, ["Cancelled."])
+sys.argv = ["-m"]
+handlers, environment = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)], dict(os.environ)
+import smokelift
+assert sys.excepthook is sys.__excepthook__
+assert handlers == [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
+assert environment == dict(os.environ)
+"""
+    done = subprocess.run([sys.executable, "-c", code], env=ENVIRONMENT, capture_output=True, timeout=60, check=False)
+    assert (done.returncode, done.stderr) == (0, b"")
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from smokelift.baselines.density import AllCarried, FixedRateDescent, OrthogonalCopy
-from smokelift.density import Density, Observation, ViewSet
+from smokelift.density import FittedDensity, Observation, ViewSet
 from smokelift.render import DeviceError, device, render, scene_optics
 from smokelift.scene import Scene, completed, orbit
 
@@ -21,7 +21,7 @@ def small(plume) -> Scene:
 
 def fitted(
     scene: Scene, images: dict[float, np.ndarray], iterations: int, initial: np.ndarray | None = None
-) -> Density:
+) -> FittedDensity:
     """The density found from pictures, by the degrees by which their cameras are carried around the box."""
     observations = [Observation(orbit(scene.camera, scene.domain, angle), image) for angle, image in images.items()]
     views = ViewSet.of(observations, scene_optics(completed(scene)))
@@ -40,7 +40,7 @@ def test_an_empty_picture_gives_zeros(small) -> None:
     nothing = np.zeros((42, 30, 3), np.float32)
     for initial in (None, np.ones(small.domain.resolution, np.float32)):
         found = fitted(small, {0.0: nothing}, 5, initial)
-        assert not found.values.any()
+        assert not found.density.any()
         assert found.figures["hull_share"] == 0
 
 
@@ -51,7 +51,7 @@ def test_the_descent_goes_on_from_its_own_result(plume, small) -> None:
     """
     target = render(plume.densities[1], small)
     first = fitted(small, {0.0: target}, 20)
-    second = fitted(small, {0.0: target}, 20, first.values)
+    second = fitted(small, {0.0: target}, 20, first.density)
     assert second.figures["loss"] <= 1.01 * first.figures["loss"]
 
 
@@ -61,7 +61,7 @@ def test_the_descent_lowers_the_loss(plume, small) -> None:
     found = [fitted(small, {0.0: target}, count) for count in (0, 5, 15)]
     losses = [density.figures["loss"] for density in found]
     assert losses[0] > losses[1] > losses[2]
-    assert found[-1].values.min() >= 0
+    assert found[-1].density.min() >= 0
 
 
 def test_true_views_take_the_place_of_the_copy(plume, small) -> None:
@@ -70,7 +70,8 @@ def test_true_views_take_the_place_of_the_copy(plume, small) -> None:
     front = {0.0: render(truth, small)}
     both = front | {90.0: render(truth, small, orbit(small.camera, small.domain, 90))}
     places = [
-        np.average(np.indices(truth.shape)[1], weights=fitted(small, pictures, 15).values) for pictures in (front, both)
+        np.average(np.indices(truth.shape)[1], weights=fitted(small, pictures, 15).density)
+        for pictures in (front, both)
     ]
     assert places[1] > places[0] + 1
 

@@ -16,16 +16,16 @@ from smokelift import (
     ClipSource,
     DirectionalLight,
     Domain,
-    Inlet,
-    Observation,
     Scene,
     Sequence,
     Settings,
     Velocity,
-    View,
 )
 from smokelift.checks import numbers, radiance
+from smokelift.density import Observation
 from smokelift.output.images import write_image
+from smokelift.pipeline import compose
+from smokelift.scene import Inlet, View
 
 CAMERA = Camera.look_at((0, -4, 0.8), (0, 0, 0.8), fov_y_degrees=27, size=(6, 8))
 SCENE = Scene(camera=CAMERA, domain=Domain((-0.6, -0.6, 0), (0.6, 0.6, 1.6), (3, 3, 4)))
@@ -67,14 +67,21 @@ def refused(words: str, function: Callable[..., Any], *arguments: Any, **named: 
             'scene must be a Scene (Scene() leaves all open, Scene.load reads a file), not "scene',
         ),
         ({"settings": "draft"}, 'settings must be Settings (Settings.preset makes them), not "draft"'),
-        ({"shot": 3}, "shot must be a Shot"),
         ({"method": "paper"}, "method must be a Method"),
-        ({"out": 3}, "out must be the path of a directory, not 3"),
     ],
 )
 def test_a_run_of_something_else(clip: Clip, given: dict[str, Any], words: str) -> None:
     arguments = {"clip": clip, "scene": SCENE, "settings": Settings.preset("draft"), **given}
-    refused(words, lambda: next(smokelift.reconstruct(**nonsense(arguments))))
+    refused(words, lambda: smokelift.reconstruct(**nonsense(arguments)))
+    if "method" not in given:
+        refused(words, lambda: smokelift.prepare_shot(**nonsense(arguments)))
+
+
+def test_a_reconstruction_of_something_else(clip: Clip) -> None:
+    run = smokelift.reconstruct(clip, SCENE, Settings.preset("draft"))
+    refused("shot must be a Shot", smokelift.Reconstruction, clip, run.method)
+    refused("method must be a Method", smokelift.Reconstruction, run.shot, "paper")
+    refused("directory must be the path of a directory, not 3", run.write, 3)
 
 
 @pytest.mark.parametrize(
@@ -242,7 +249,7 @@ def test_what_carries_and_is_carried() -> None:
 
 
 def test_a_method_of_no_settings() -> None:
-    refused('settings must be Settings (Settings.preset makes them), not "draft"', smokelift.compose, "draft")
+    refused('settings must be Settings (Settings.preset makes them), not "draft"', compose, "draft")
 
 
 def test_numbers_that_fit_are_not_copied() -> None:

@@ -118,7 +118,7 @@ def test_noise_leaves_what_the_fit_stops_at(small, optics, picture) -> None:
 def test_the_other_colours_tell_smoke_from_a_wall_that_is_continued_too_dark(truth, small, picture) -> None:
     def errors(deviation: float) -> tuple[float, float]:
         settings = DensitySettings(fit_iterations=4, descent_iterations=6)
-        found = reconstruct_density(picture, small, settings=settings, plate=found_plate(deviation)).values
+        found = reconstruct_density(picture, small, settings=settings, plate=found_plate(deviation)).density
         return abs(found.sum() / truth.sum() - 1), psnr(render(found, small), render(truth, small))
 
     told, plain = errors(0.2), errors(0.0)

@@ -43,7 +43,7 @@ def fitted(shot: Shot, prior: DetailedDepth, frame: int = 2) -> tuple[np.ndarray
     """The density of a frame, and its picture's PSNR."""
     views = ViewSet.of(shot.observe(frame), shot.optics, frame)
     found = FIT.fit(views, prior.of_clip(shot).estimate(views), None)
-    return found.values, found.figures["psnr"]
+    return found.density, found.figures["psnr"]
 
 
 def fine(density: np.ndarray, axis: int) -> np.ndarray:
@@ -94,7 +94,7 @@ def test_what_is_known_of_the_side_is_kept(shot) -> None:
     views = ViewSet.of(shot.observe(2), shot.optics, 2)
     estimate = DetailedDepth(RoundDepth()).of_clip(shot).estimate(views)
     assert estimate.smooth is not None
-    found = FIT.fit(views, estimate, None).values
+    found = FIT.fit(views, estimate, None).density
     layers, kept = (density.sum((0, 1), dtype=np.float64) for density in (found, estimate.smooth))
     assert np.abs(layers - kept).sum() < 0.1 * kept.sum()
     place, smooth = (float(d.sum((0, 2)) @ np.arange(24) / d.sum()) for d in (found, estimate.smooth))
@@ -135,4 +135,4 @@ def test_a_frame_without_smoke_stays_empty(plume, tmp_path) -> None:
         prior = DetailedDepth(RoundDepth())
         views = ViewSet.of(shot.observe(3), shot.optics, 3)
         found = FIT.fit(views, prior.of_clip(shot).estimate(views), None)
-    assert not found.values.any()
+    assert not found.density.any()

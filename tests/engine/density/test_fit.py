@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from smokelift.density import (
-    Density,
     DensitySettings,
+    FittedDensity,
     GradientFit,
     Observation,
     RoundDepth,
@@ -228,7 +228,7 @@ def views_of(scene: Scene, *observations: Observation) -> ViewSet:
 def test_smoke_through_floor_and_ceiling_makes_no_spikes() -> None:
     """A column as high as the box is not much denser at its ends, where rays cross few of its voxels."""
     scene, column = tall_column(0.06, (-0.6, 0.4, -0.7))
-    layers = reconstruct_density(render(column, scene), scene).values.max((0, 1))
+    layers = reconstruct_density(render(column, scene), scene).density.max((0, 1))
     assert layers.max() < 1.7 * np.median(layers)
 
 
@@ -240,10 +240,10 @@ def test_smoke_that_the_picture_hardly_shows_does_not_grow() -> None:
     density = depth.density
     for _ in range(8):
         fitted = GradientFit(QUICK).fit(views, depth, (3 * depth.density + density) / 4)
-        density = fitted.values
+        density = fitted.density
     assert density.max() < 3.01 * depth.density.max()
     through = depth.inside[0] > 0.99  # rays that do not leave through floor or ceiling
-    assert psnr(render(fitted.values, scene)[through], views.views[0].image[through]) > 42
+    assert psnr(render(fitted.density, scene)[through], views.views[0].image[through]) > 42
 
 
 # fit and descent
@@ -356,10 +356,10 @@ def test_the_figures_are_those_of_the_density(plume, small) -> None:
     """The loss is what a render of the result shows, the PSNR that of the pixels that the hull can change."""
     target = render(plume.densities[1], small)
     found = reconstruct_density(target, small, settings=QUICK)
-    error = np.square(render(found.values, small) - target, dtype=np.float64)
+    error = np.square(render(found.density, small) - target, dtype=np.float64)
     assert found.figures["loss"] == pytest.approx(error.sum(), rel=1e-3)
     pixels = error.sum() / 3 * 10 ** (found.figures["psnr"] / 10)
-    assert np.count_nonzero(render(found.values, small).any(-1)) <= 1.01 * pixels < error[..., 0].size
+    assert np.count_nonzero(render(found.density, small).any(-1)) <= 1.01 * pixels < error[..., 0].size
     assert found.figures["hull_share"] == pytest.approx(found.hull.mean())
 
 
@@ -369,8 +369,8 @@ def test_the_unit_of_density_does_not_matter(plume, small, factor) -> None:
     target = render(plume.densities[1], small)
     medium = small.medium
     other = replace(small, medium=replace(medium, extinction=factor * medium.extinction))
-    usual = reconstruct_density(target, small, settings=QUICK).values
-    scaled = reconstruct_density(target, other, settings=QUICK).values
+    usual = reconstruct_density(target, small, settings=QUICK).density
+    scaled = reconstruct_density(target, other, settings=QUICK).density
     assert np.abs(scaled * factor - usual).max() <= 0.01 * usual.max()
 
 
@@ -381,24 +381,24 @@ def test_every_model_of_scattering_is_met(plume, small, scattering) -> None:
     target = render(plume.densities[1], replace(scene, scattering=scattering))
     found = reconstruct_density(target, replace(scene, scattering=scattering), settings=QUICK)
     assert found.figures["psnr"] >= 35
-    assert found.values.sum() == pytest.approx(plume.densities[1].sum(), rel=0.15)
+    assert found.density.sum() == pytest.approx(plume.densities[1].sum(), rel=0.15)
 
 
 def test_an_initial_density_is_used(plume, small) -> None:
     """From the truth, nothing moves far; the depth that one picture cannot know survives."""
     truth = plume.densities[1]
     target = render(truth, small)
-    found = reconstruct_density(target, small, truth, QUICK).values
+    found = reconstruct_density(target, small, truth, QUICK).density
     assert np.abs(found - truth).max() < 0.1 * truth.max()
 
 
 def test_the_result_is_inside_the_hull(plume, small) -> None:
     """Not negative, finite, and zero outside the hull."""
     found = reconstruct_density(render(plume.densities[1], small), small, settings=QUICK)
-    assert found.values.dtype == np.float32
-    assert np.isfinite(found.values).all()
-    assert found.values.min() >= 0
-    assert not found.values[~found.hull].any()
+    assert found.density.dtype == np.float32
+    assert np.isfinite(found.density).all()
+    assert found.density.min() >= 0
+    assert not found.density[~found.hull].any()
 
 
 def test_an_empty_picture_gives_zeros(small) -> None:
@@ -407,7 +407,7 @@ def test_an_empty_picture_gives_zeros(small) -> None:
     full = np.ones(small.domain.resolution, np.float32)
     for initial in (None, full):
         found = reconstruct_density(nothing, small, initial)
-        assert not found.values.any()
+        assert not found.density.any()
         assert found.figures["hull_share"] == 0
 
 
@@ -433,11 +433,13 @@ def test_a_pattern_behind_the_smoke_does_not_print_through(plume, small, scatter
     scene = replace(small, medium=medium, background=None)
     optics = scene_optics(completed(replace(scene, scattering=scattering)))
     target = optics.renderer(scene.camera, plate.image).image(plume.densities[1])
-    found: Density = reconstruct_density(target, replace(scene, scattering=scattering), settings=QUICK, plate=plate)
+    found: FittedDensity = reconstruct_density(
+        target, replace(scene, scattering=scattering), settings=QUICK, plate=plate
+    )
     assert found.figures["psnr"] >= 35
     truth = recovered_depth(plume.densities[1], scene)
     inside = truth > 0.1
-    error = (recovered_depth(found.values, scene) - truth)[inside]
+    error = (recovered_depth(found.density, scene) - truth)[inside]
     assert abs(np.corrcoef(error, pattern[inside])[0, 1]) < 0.25
     # and the error is small against the smoke itself
     assert error.std() < 0.2 * truth[inside].mean()
@@ -467,14 +469,14 @@ def test_a_second_view_tells_the_depth(plume, small, degrees) -> None:
     """Smoke off the middle of the box stands where it stood, which one picture cannot know; all pictures are met."""
     truth = moved(plume.densities[1], 5)
     target = render(truth, small)
-    alone = reconstruct_density(target, small).values
+    alone = reconstruct_density(target, small).density
     found = reconstruct_density(target, small, views=[observed(truth, small, degrees)])
     assert mean_place(alone)[1] < mean_place(truth)[1] - 4
-    np.testing.assert_allclose(mean_place(found.values), mean_place(truth), atol=0.5)
+    np.testing.assert_allclose(mean_place(found.density), mean_place(truth), atol=0.5)
     assert min(found.figures["psnr"], found.figures["psnr_view_1"]) > 35
     new = orbit(small.camera, small.domain, degrees / 2)
-    assert psnr(render(found.values, small, new), render(truth, small, new)) > 30
-    assert np.abs(found.values - truth).sum() < 0.5 * np.abs(alone - truth).sum()
+    assert psnr(render(found.density, small, new), render(truth, small, new)) > 30
+    assert np.abs(found.density - truth).sum() < 0.5 * np.abs(alone - truth).sum()
 
 
 @pytest.mark.parametrize("way", ["multiplicative", "descent"])
@@ -529,7 +531,7 @@ def test_the_figures_of_further_views_are_their_pictures(plume, small) -> None:
     target = render(plume.densities[1], small)
     found = reconstruct_density(target, small, settings=QUICK, views=[side])
     errors = [
-        np.square(render(found.values, small, camera) - image, dtype=np.float64).sum()
+        np.square(render(found.density, small, camera) - image, dtype=np.float64).sum()
         for camera, image in ((None, target), (side.camera, side.image))
     ]
     assert found.figures["loss"] == pytest.approx(sum(errors), rel=1e-3)
@@ -557,7 +559,7 @@ def test_what_views_disagree_about_is_not_put_where_only_one_looks(plume, small)
     darker = Observation(side, 0.7 * render(plume.densities[1], small, side))
     beside = ~project_voxels(side, small.domain).visible
     assert not plume.densities[1][beside].any()
-    found = reconstruct_density(render(plume.densities[1], small), small, views=[darker]).values
+    found = reconstruct_density(render(plume.densities[1], small), small, views=[darker]).density
     assert found[beside].sum() < 0.01 * found.sum()
 
 
@@ -566,7 +568,7 @@ def test_views_that_contradict_each_other_leave_nothing(plume, small) -> None:
     target = render(plume.densities[1], small)
     side = observed(np.zeros_like(plume.densities[1]), small, 90)
     found = reconstruct_density(target, small, views=[side])
-    assert not found.values.any()
+    assert not found.density.any()
     assert found.figures["hull_share"] == 0
     assert found.figures["loss"] == pytest.approx(np.square(target, dtype=np.float64).sum(), rel=1e-3)
     assert found.figures["psnr"] < 30
@@ -627,7 +629,7 @@ def test_density_holds_no_traces(plume):
     """A voxel has smoke that a picture can show, or none: denormal numbers differ from process to process."""
     scene = plume.scene
     picture = render(plume.densities[0], scene)
-    values = reconstruct_density(picture, scene).values
+    values = reconstruct_density(picture, scene).density
     assert (values[values > 0] >= 1e-20).all()
 
 
@@ -640,7 +642,7 @@ def test_thick_smoke_before_something_as_bright_as_its_lit_side(small) -> None:
     scene = replace(lit, background=Background(color=tuple(np.percentile(alone[alone[..., 0] > 0.01], 90, axis=0))))
     found = reconstruct_density(render(smoke, scene), scene)
     assert found.figures["relative_error"] < 0.3
-    assert found.values.sum() > 0.5 * smoke.sum()
+    assert found.density.sum() > 0.5 * smoke.sum()
 
 
 @pytest.mark.parametrize("resolution", [(1, 1, 1), (1, 1, 2), (3, 1, 1), (1, 2, 3)])
@@ -656,8 +658,8 @@ def test_a_grid_of_a_few_voxels(resolution) -> None:
     smoke = np.full(resolution, 0.5, np.float32)
     picture = render(smoke, scene)
     found = reconstruct_density(picture, scene, settings=QUICK)
-    assert np.isfinite(found.values).all()
-    assert np.square(render(found.values, scene) - picture).sum() < np.square(picture).sum()
+    assert np.isfinite(found.density).all()
+    assert np.square(render(found.density, scene) - picture).sum() < np.square(picture).sum()
 
 
 def test_a_camera_inside_the_domain_is_refused(small) -> None:

@@ -98,7 +98,7 @@ def test_the_front_is_met_as_without_it(shot, monkeypatch: pytest.MonkeyPatch) -
     def fitted() -> tuple[np.ndarray, float]:
         views = ViewSet.of(shot.observe(1), shot.optics, 1)
         found = GradientFit().fit(views, DetailedDepth(RoundDepth()).of_clip(shot).estimate(views), None)
-        return found.values, found.figures["psnr"]
+        return found.density, found.figures["psnr"]
 
     plain, psnr = fitted()
     monkeypatch.setattr(module, "LARGE", 2500)

@@ -85,7 +85,7 @@ def test_sides_become_walls(source, tmp_path):
             break
     run(source, tmp_path / "shut", Continuation(4, closed=walls), resume=True)
     run(source, tmp_path / "open", Continuation(4))
-    shut, open_ = (Sequence.open(tmp_path / name).staggered_velocity(14).faces for name in ("shut", "open"))
+    shut, open_ = (Sequence.open(tmp_path / name).velocity(14).faces for name in ("shut", "open"))
     assert not any(np.take(shut[axis], (0, -1), axis).any() for axis in range(3))
     assert all(np.take(open_[axis], (0, -1), axis).any() for axis in range(3))
 

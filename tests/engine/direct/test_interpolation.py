@@ -74,7 +74,8 @@ def test_a_sequence_at_half_its_speed(tmp_path):
     assert slow.frames == tuple(range(1, 10))
     for number in source.frames:
         np.testing.assert_allclose(slow.density(2 * number - 1), source.density(number), rtol=1e-6)
-        np.testing.assert_allclose(slow.velocity(2 * number - 1), 0.5 * source.velocity(number), atol=1e-5)
+        found, known = slow.velocity(2 * number - 1), source.velocity(number)
+        np.testing.assert_allclose(found.centres(), 0.5 * known.centres(), atol=1e-5)
     masses = [slow.figures(number)["mass"] for number in (3, 4, 5)]
     assert masses[1] == pytest.approx((masses[0] + masses[2]) / 2, rel=0.02)
     assert max(slow.figures(number)["divergence"] for number in slow.frames) < 1e-3

@@ -56,7 +56,7 @@ def test_thin_air_is_left_out_and_smoke_is_kept(sequence: Sequence, tmp_path: Pa
     rho, u = vdb.read_vdb(tmp_path / "out" / "smoke_0002.vdb", DOMAIN.shape)
     assert not rho[:, :, 6:].any() and not u[:, :, 8:].any()
     np.testing.assert_allclose(rho[:, :, :6], sequence.density(2)[:, :, :6], atol=1e-3)
-    np.testing.assert_allclose(u[:, :, :6], sequence.velocity(2)[:, :, :6], atol=2e-3)
+    np.testing.assert_allclose(u[:, :, :6], sequence.velocity_at_centres(2)[:, :, :6], atol=2e-3)
 
 
 @needs_vdb
@@ -70,7 +70,7 @@ def test_quantised_shows_in_no_picture_of_8_bits(sequence: Sequence, tmp_path: P
         assert np.abs(seen - wanted).max() < 1 / 255
     voxels_a_frame = DOMAIN.voxel_size * 24
     near = rho > 0
-    assert np.abs(u - sequence.velocity(1))[near].max() <= voxels_a_frame / 32
+    assert np.abs(u - sequence.velocity_at_centres(1))[near].max() <= voxels_a_frame / 32
 
 
 @needs_vdb

@@ -8,9 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from smokelift import Clip, Scene, reconstruct, render
+from smokelift import Clip, Reconstruction, Scene, reconstruct, render
 from smokelift.footage.matte import matte
 from smokelift.output.images import write_image
+from smokelift.pipeline import compose
 from smokelift.pipeline.clip_fit import beside_clip, clip_psnr
 from smokelift.scene import ClipSource
 from smokelift.setup.prepare import prepare_shot
@@ -118,6 +119,6 @@ def test_no_smoke_has_no_figure(plume, draft, tmp_path) -> None:
         shot = prepare_shot(clip, scene, Settings.preset("draft"))
         assert clip_psnr(shot, 2, nothing) == {}
         assert clip_psnr(shot, 1, nothing)["psnr"] < 25
-        figures = [frame.figures for frame in reconstruct(clip, scene, draft, shot=shot)]
+        figures = [frame.figures for frame in Reconstruction(shot, compose(shot.settings))]
     assert ["psnr" in each for each in figures] == [True, True, False]
     assert "psnr_working" not in figures[2]

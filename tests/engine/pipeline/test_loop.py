@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import inspect
 import weakref
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 import pytest
@@ -25,7 +24,7 @@ from smokelift.output.images import write_image
 from smokelift.output.index import SequenceError
 from smokelift.output.sequence import Sequence
 from smokelift.output.vdb import VdbUnavailable, read_vdb, vdb_module
-from smokelift.pipeline import Frame, Method, compose, reconstruct
+from smokelift.pipeline import Frame, Method, Reconstruction, compose, reconstruct
 from smokelift.render import render, scene_renderer
 from smokelift.scene import (
     Background,
@@ -47,21 +46,31 @@ from tests.engine.conftest import Plume
 from tests.engine.setup.shots import burning
 
 
-def frames_of(scene: Scene, settings: Settings, out: Path | None = None, **options: Any) -> list[Frame]:
+def frames_of(scene: Scene, settings: Settings, method: Method | None = None) -> list[Frame]:
     assert scene.clip is not None
     with Clip.open(scene.clip) as clip:
-        return list(reconstruct(clip, scene, settings, out, **options))
+        return list(reconstruct(clip, scene, settings, method=method))
+
+
+def frames_written(scene: Scene, settings: Settings, out: Path, resume: bool = False) -> list[Frame]:
+    """The frames that a run writes."""
+    assert scene.clip is not None
+    frames: list[Frame] = []
+    with Clip.open(scene.clip) as clip:
+        reconstruct(clip, scene, settings).write(out, npz=True, resume=resume, on_frame=frames.append)
+    return frames
 
 
 def cut_off(scene: Scene, settings: Settings, out: Path, count: int) -> None:
     """A run that ends after so many frames."""
+
+    def cancel(frame: Frame) -> None:
+        if frame.number == count:
+            raise KeyboardInterrupt
+
     assert scene.clip is not None
-    with Clip.open(scene.clip) as clip:
-        frames = reconstruct(clip, scene, settings, out, npz=True)
-        for _ in range(count):
-            next(frames)
-        assert inspect.isgenerator(frames)
-        frames.close()
+    with Clip.open(scene.clip) as clip, pytest.raises(KeyboardInterrupt):
+        reconstruct(clip, scene, settings).write(out, npz=True, on_frame=cancel)
 
 
 def axis_of(shot: Shot) -> SmokeAxis:
@@ -82,7 +91,7 @@ def saved(directory: Path) -> Iterator[tuple[str, np.ndarray]]:
 def run(plume, draft, tmp_path_factory) -> tuple[list[Frame], Path]:
     """An uninterrupted run: its frames, and where they were written."""
     out = tmp_path_factory.mktemp("run") / "out"
-    return frames_of(plume.scene, draft, out, npz=True), out
+    return frames_written(plume.scene, draft, out), out
 
 
 def test_density_is_carried_from_the_third_frame_on(plume, draft) -> None:
@@ -216,7 +225,8 @@ def test_walls_and_inlets_of_the_scene_are_kept(plume, draft, tmp_path) -> None:
     with Clip.open(scene.clip) as clip:
         shot = prepare_shot(clip, scene, draft)
         method = replace(compose(shot.settings), velocity_estimator=Watched(shot.settings.velocity))
-        frames = list(reconstruct(clip, scene, out=tmp_path / "out", npz=True, shot=shot, method=method))
+        frames: list[Frame] = []
+        Reconstruction(shot, method).write(tmp_path / "out", npz=True, on_frame=frames.append)
     for frame in frames:
         assert not frame.velocity.faces[2][:, :, 0].any()
         assert frame.estimated.faces[2][:, :, -1].any()
@@ -225,7 +235,7 @@ def test_walls_and_inlets_of_the_scene_are_kept(plume, draft, tmp_path) -> None:
         np.testing.assert_array_equal(inflow, shot.scene.inflow())
     sequence = Sequence.open(tmp_path / "out")
     assert (sequence.scene.closed, sequence.scene.inlets) == (scene.closed, scene.inlets)
-    assert frames_of(scene, draft, tmp_path / "out", npz=True, resume=True) == []
+    assert frames_written(scene, draft, tmp_path / "out", resume=True) == []
 
 
 def test_what_is_written_is_what_was_yielded(run, plume) -> None:
@@ -239,7 +249,8 @@ def test_what_is_written_is_what_was_yielded(run, plume) -> None:
     for frame in frames:
         assert (out / f"smoke_{frame.number:04d}.npz").is_file()
         np.testing.assert_array_equal(sequence.density(frame.number), frame.density)
-        np.testing.assert_allclose(sequence.velocity(frame.number), frame.velocity.centres())
+        for found, wanted in zip(sequence.velocity(frame.number).faces, frame.velocity.faces, strict=True):
+            np.testing.assert_array_equal(found, wanted)
         assert sequence.figures(frame.number)["psnr"] == pytest.approx(frame.figures["psnr"])
 
 
@@ -288,7 +299,7 @@ def test_a_run_that_was_cut_off_goes_on_exactly(run, plume, draft, tmp_path, cou
     cut_off(plume.scene, draft, out, count)
     assert Sequence.open(out).frames == tuple(range(1, count + 1))
     assert not Sequence.open(out).complete
-    rest = frames_of(plume.scene, draft, out, npz=True, resume=True)
+    rest = frames_written(plume.scene, draft, out, resume=True)
     assert [frame.number for frame in rest] == list(range(count + 1, 6))
     wanted, found = list(saved(uninterrupted)), list(saved(out))
     assert [name for name, _ in found] == [name for name, _ in wanted]
@@ -312,7 +323,7 @@ def test_a_file_that_was_replaced_under_its_name_is_not_mixed_in(plume, draft, t
     picture[0, 0] = 0.01
     write_image(changed, picture)
     with pytest.raises(SequenceError, match=rf"begun differently .* sources\.{replaced}\."):
-        frames_of(scene, draft, tmp_path / "out", npz=True, resume=True)
+        frames_written(scene, draft, tmp_path / "out", resume=True)
     assert Sequence.open(tmp_path / "out").frames == (1, 2)
 
 
@@ -329,7 +340,7 @@ def test_a_run_is_resumed_after_its_project_was_moved(plume, draft, tmp_path) ->
     write_image(project / "plate.png", np.zeros((56, 40, 3)))
     cut_off(shot(project), draft, project / "out", 3)
     moved = project.rename(tmp_path / "moved")
-    rest = frames_of(shot(moved), draft, moved / "out", npz=True, resume=True)
+    rest = frames_written(shot(moved), draft, moved / "out", resume=True)
     assert [frame.number for frame in rest] == [4, 5]
     assert Sequence.open(moved / "out").scene.clip.path.is_relative_to(moved)
 
@@ -340,9 +351,9 @@ def test_an_estimated_background_resumes_and_moves(plume, draft, tmp_path) -> No
     filmed = plume.write(tmp_path / "clip", [plume.blob(plume.scene, height) for height in heights])
     scene = Scene(clip=filmed.clip)
     settings = replace(draft, resolution=(16, 16, 24))
-    whole = frames_of(scene, settings, tmp_path / "whole", npz=True)
+    whole = frames_written(scene, settings, tmp_path / "whole")
     cut_off(scene, settings, tmp_path / "out", 3)
-    assert [f.number for f in frames_of(scene, settings, tmp_path / "out", npz=True, resume=True)] == [4, 5, 6, 7, 8]
+    assert [f.number for f in frames_written(scene, settings, tmp_path / "out", resume=True)] == [4, 5, 6, 7, 8]
     (tmp_path / "out").rename(tmp_path / "moved")
     sequence = Sequence.open(tmp_path / "moved")
     for frame in whole:
@@ -361,7 +372,7 @@ def test_further_views_put_the_smoke_in_its_place(plume, two_views, draft, tmp_p
     voxel = two_views.domain.voxel_size
     truth = [centroid(np.roll(density, 5, axis=1), two_views) for density in plume.densities]
     alone = frames_of(replace(two_views, views=()), draft)
-    both = frames_of(two_views, draft, tmp_path / "out", npz=True)
+    both = frames_written(two_views, draft, tmp_path / "out")
     for frames, near in ((alone, False), (both, True)):
         off = [np.linalg.norm(centroid(f.density, two_views) - t) / voxel for f, t in zip(frames, truth, strict=True)]
         assert max(off) < 0.7 if near else min(off) > 3
@@ -370,11 +381,11 @@ def test_further_views_put_the_smoke_in_its_place(plume, two_views, draft, tmp_p
     for number in sequence.frames:
         assert min(sequence.figures(number)["psnr"], sequence.figures(number)["psnr_view_1"]) > 35
     cut_off(two_views, draft, tmp_path / "again", 3)
-    rest = frames_of(two_views, draft, tmp_path / "again", npz=True, resume=True)
+    rest = frames_written(two_views, draft, tmp_path / "again", resume=True)
     np.testing.assert_array_equal(rest[-1].density, both[-1].density)
     with pytest.raises(SequenceError, match="was begun differently"):
         cut_off(two_views, draft, tmp_path / "cut", 3)
-        frames_of(replace(two_views, views=()), draft, tmp_path / "cut", npz=True, resume=True)
+        frames_written(replace(two_views, views=()), draft, tmp_path / "cut", resume=True)
 
 
 def test_with_nothing_carried_along_a_frame_is_that_of_its_pictures(two_views, draft) -> None:
@@ -386,7 +397,7 @@ def test_with_nothing_carried_along_a_frame_is_that_of_its_pictures(two_views, d
         shot = prepare_shot(clip, scene, settings)
         views = ViewSet.of(shot.observe(2), shot.optics)
         alone = GradientFit(settings.density).fit(views, RoundDepth().estimate(views), None)
-    np.testing.assert_array_equal(frames[2].density, alone.values)
+    np.testing.assert_array_equal(frames[2].density, alone.density)
 
 
 def test_detail_that_is_made_up_shows_no_motion(plume, draft) -> None:
@@ -441,8 +452,8 @@ def test_a_moving_camera_resumes_on_its_own_path_only(tracked, draft, tmp_path) 
     poses = tracked.camera.matrices
     other = replace(tracked.camera, matrices=(*poses[:-1], poses[0]))
     with pytest.raises(SequenceError, match=r"scene\.camera\.matrices\[4\]\[0\]\[0\] was 0\.\d+ and is now 0\.\d+;"):
-        frames_of(replace(tracked, camera=other), draft, out, npz=True, resume=True)
-    frames_of(tracked, draft, out, npz=True, resume=True)
+        frames_written(replace(tracked, camera=other), draft, out, resume=True)
+    frames_written(tracked, draft, out, resume=True)
     sequence = Sequence.open(out)
     assert sequence.scene == completed(tracked)
     for frame in whole:
@@ -471,7 +482,7 @@ def test_a_clean_plate_for_every_frame(plume, tracked, draft, tmp_path) -> None:
         write_image(tmp_path / f"frame_{n}.exr", renderer.image(density))
     clip = ClipSource(tmp_path / "frame_#.exr", fps=24)
     scene = replace(tracked, clip=clip, background=Background(image=tmp_path / "plate_#.exr"))
-    frames = frames_of(scene, draft, tmp_path / "out", npz=True)
+    frames = frames_written(scene, draft, tmp_path / "out")
     assert all(frame.figures["psnr"] >= 35 for frame in frames)
     assert all(frame.figures["hull_share"] < 0.5 for frame in frames)
     assert Sequence.open(tmp_path / "out").scene == completed(scene)
@@ -480,23 +491,23 @@ def test_a_clean_plate_for_every_frame(plume, tracked, draft, tmp_path) -> None:
 def test_an_exception_of_the_caller_leaves_what_can_be_resumed(plume, draft, tmp_path) -> None:
     """Whoever uses the frames may fail: the finished ones stay, and the directory is free again."""
     out = tmp_path / "out"
+
+    def fail(_frame: Frame) -> NoReturn:
+        raise RuntimeError
+
     with Clip.open(plume.scene.clip) as clip:
-        frames = reconstruct(clip, plume.scene, draft, out, npz=True)
-        try:
-            for _ in frames:
-                raise RuntimeError
-        except RuntimeError:
-            assert inspect.isgenerator(frames)
-            frames.close()
+        run = reconstruct(clip, plume.scene, draft)
+        with pytest.raises(RuntimeError):
+            run.write(out, npz=True, on_frame=fail)
     assert Sequence.open(out).frames == (1,)
-    assert frames_of(plume.scene, draft, out, npz=True, resume=True)[-1].number == 5
+    assert frames_written(plume.scene, draft, out, resume=True)[-1].number == 5
 
 
 def test_resuming_what_is_complete_yields_nothing(run, plume, draft) -> None:
     """There is nothing left to do, and nothing is changed."""
     _, out = run
     before = {path.name: path.read_bytes() for path in out.glob("smoke_*")}
-    assert frames_of(plume.scene, draft, out, npz=True, resume=True) == []
+    assert frames_written(plume.scene, draft, out, resume=True) == []
     assert {path.name: path.read_bytes() for path in out.glob("smoke_*")} == before
     assert Sequence.open(out).complete
 
@@ -505,21 +516,21 @@ def test_a_second_run_needs_resume(run, plume, draft) -> None:
     """Finished frames are not overwritten."""
     _, out = run
     with pytest.raises(SequenceError, match="--resume"):
-        frames_of(plume.scene, draft, out, npz=True)
+        frames_written(plume.scene, draft, out)
 
 
 def test_other_settings_do_not_resume(run, plume, draft) -> None:
     """A run goes on only as it began; the sentence names the difference."""
     _, out = run
     with pytest.raises(SequenceError, match=r"transport was .* and is now 0\.125"):
-        frames_of(plume.scene, replace(draft, transport=0.125), out, npz=True, resume=True)
+        frames_written(plume.scene, replace(draft, transport=0.125), out, resume=True)
 
 
 def test_frames_without_smoke_are_empty(plume, draft, tmp_path) -> None:
     """Smoke that comes, goes and comes again: zeros in between, and no failure."""
     nothing = np.zeros_like(plume.densities[0])
     clip = [nothing, nothing, plume.densities[0], nothing, nothing, plume.densities[1], plume.densities[2]]
-    frames = frames_of(plume.write(tmp_path / "clip", clip), draft, tmp_path / "out", npz=True)
+    frames = frames_written(plume.write(tmp_path / "clip", clip), draft, tmp_path / "out")
     assert [bool(frame.density.any()) for frame in frames] == [bool(density.any()) for density in clip]
     for frame in frames:
         assert all(np.isfinite(face).all() for face in frame.velocity.faces)
@@ -529,7 +540,7 @@ def test_frames_without_smoke_are_empty(plume, draft, tmp_path) -> None:
 def test_a_clip_of_one_frame_works(plume, draft, tmp_path) -> None:
     """One picture gives one frame at rest."""
     scene = plume.write(tmp_path / "clip", plume.densities[:1])
-    (frame,) = frames_of(scene, draft, tmp_path / "out", npz=True)
+    (frame,) = frames_written(scene, draft, tmp_path / "out")
     assert frame.number == 1
     assert frame.figures["psnr"] >= 35
     assert not any(face.any() for face in frame.velocity.faces)
@@ -584,7 +595,7 @@ def test_every_part_of_a_method_can_be_exchanged(plume, draft) -> None:
     class Idle:
         def fit(self, views: ViewSet, depth: Any, initial: np.ndarray | None) -> Any:
             found = GradientFit(draft.density).fit(views, depth, initial)
-            return found if initial is None else replace(found, values=initial)
+            return found if initial is None else replace(found, density=initial)
 
     default = compose(draft)
     method = Method(Idle(), default.depth_prior, default.velocity_estimator, Stubborn())
@@ -636,9 +647,8 @@ def test_a_frame_that_is_let_go_takes_no_memory(plume, draft, tmp_path) -> None:
     with Clip.open(plume.scene.clip) as clip:
         shot = prepare_shot(clip, plume.scene, draft)
         method = replace(compose(shot.settings), velocity_estimator=Watched(shot.settings.velocity))
-        for frame in reconstruct(clip, plume.scene, out=tmp_path / "out", npz=True, shot=shot, method=method):
-            given.append(weakref.ref(frame))
-            del frame
+        run = Reconstruction(shot, method)
+        run.write(tmp_path / "out", npz=True, on_frame=lambda frame: given.append(weakref.ref(frame)))
     assert len(given) == 5
     assert alive == [0, 0, 0]
 
@@ -671,8 +681,8 @@ def test_fire_is_a_second_grid(plume, draft, tmp_path) -> None:
     scene = replace(plume.write(tmp_path / "clip", plume.densities[:2], dim), lights=())
     with Clip.open(scene.clip) as clip:
         burnt = clip.changed(burning)
-        frames = list(reconstruct(burnt, scene, draft, tmp_path / "out", npz=True))
-        sequence = Sequence.open(tmp_path / "out")
+        frames: list[Frame] = []
+        sequence = reconstruct(burnt, scene, draft).write(tmp_path / "out", npz=True, on_frame=frames.append)
         for frame in frames:
             np.testing.assert_array_equal(sequence.flame(frame.number), frame.flame)
             fire = burnt.frame(frame.number - 1)[..., 0] > 0.5

@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from smokelift import Clip, Scene, Sequence, Settings, reconstruct, render
+from smokelift import Clip, Scene, Settings, reconstruct, render
 from smokelift.density import ViewSet
-from smokelift.setup.prepare import prepare_shot
 
 ROOT = Path(__file__).parents[3]
 CLIPS = {
@@ -33,9 +32,8 @@ def test_a_sequence_renders_to_its_fits_own_figure(name, tmp_path) -> None:
     scene = Scene.load(path).with_frames(first, first + 1)
     settings = Settings.preset("draft")
     with Clip.open(scene.clip) as clip:
-        shot = prepare_shot(clip, scene, settings)
-        frames = list(reconstruct(clip, scene, settings, tmp_path / "out", npz=True, shot=shot))
-        sequence = Sequence.open(tmp_path / "out")
+        run, frames = reconstruct(clip, scene, settings), []
+        shot, sequence = run.shot, run.write(tmp_path / "out", npz=True, on_frame=frames.append)
         for frame in frames:
             (view,) = ViewSet.of(shot.observe(frame.number - 1), shot.optics).views
             again = sequence.render(frame.number, camera=view.camera)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from scene_examples import FRONT, GOOD, load
 
 from smokelift.scene import (
     Background,
+    Box,
     ClipSource,
     DirectionalLight,
     Domain,
@@ -21,6 +23,7 @@ from smokelift.scene import (
     PointLight,
     Scene,
     SceneError,
+    completed,
 )
 
 AIMED = "position = [0, -7, 1.5]\ntarget = [0, 0, 1.5]"
@@ -80,6 +83,18 @@ def test_walls_of_a_box_that_is_not_given(tmp_path: Path) -> None:
     assert scene == Scene(closed=("z-",))
     with pytest.raises(SceneError, match="lacks min"):
         load(tmp_path, "[domain]\n")
+
+
+def test_a_box_without_a_resolution(tmp_path: Path) -> None:
+    """It follows from the quality; a renderer needs one."""
+    scene = load(tmp_path, re.sub(r"resolution = \[[^]]*\]", "", GOOD))
+    assert scene.domain == Box((-1, -1, 0), (1, 1, 3))
+    scene.save(tmp_path / "again.toml")
+    assert Scene.load(tmp_path / "again.toml") == scene
+    with pytest.raises(ValueError, match="a domain without a resolution; give"):
+        completed(scene)
+    with pytest.raises(SceneError, match="max must be above min"):
+        load(tmp_path, "[domain]\nmin = [0, 0, 0]\nmax = [1, 1, 0]\n")
 
 
 def test_the_scattering_stands_with_the_medium(tmp_path: Path) -> None:

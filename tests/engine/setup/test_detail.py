@@ -15,7 +15,7 @@ from smokelift.footage.images import linear_to_srgb, srgb_to_linear
 from smokelift.footage.noise import EIGHT_BIT_NOISE, EIGHT_BIT_STEP, lasting_noise
 from smokelift.footage.plate import Plate
 from smokelift.output.images import write_image
-from smokelift.scene import Camera, ClipSource, Domain, Scene
+from smokelift.scene import Box, Camera, ClipSource, Domain, Scene
 from smokelift.scene.projection import voxel_width
 from smokelift.setup.detail import Detail, smoke_detail
 from smokelift.setup.prepare import prepare_shot
@@ -107,6 +107,28 @@ def test_a_given_resolution_wins(filmed) -> None:
     by_hand = shot_of(scene, Settings.preset("draft", resolution=(20, 20, 30)))
     assert by_hand.scene.domain.resolution == (20, 20, 30)
     assert by_hand.choices[0].by_hand
+
+
+@pytest.mark.parametrize("size", [(2, 2, 3), (1.97, 2, 2.9)])
+def test_a_box_without_a_resolution_gets_that_of_the_quality(filmed, size) -> None:
+    """The voxels that fill it may stand over by less than one, never below its floor."""
+    box = Box((-size[0] / 2, -1, 0), (size[0] / 2, 1, size[2]))
+    scene = replace(filmed(0.0), domain=box)
+    shot = shot_of(scene, Settings.preset("draft"))
+    domain = shot.scene.domain
+    assert LIMITS["draft"].most - 8 <= max(domain.resolution) <= LIMITS["draft"].most
+    assert not shot.choices[0].by_hand
+    over = np.subtract(domain.max, box.max)
+    assert np.all((over > -1e-6) & (over < domain.voxel_size)) and domain.min[2] == 0
+    assert (np.abs(over).max() > 1e-6) == any("The box grows" in note for note in shot.notes)
+
+
+def test_a_box_without_a_resolution_holds_whatever_is_given_by_hand(filmed) -> None:
+    scene = replace(filmed(0.0), domain=Box((-1, -1, 0), (1, 1, 3)))
+    for resolution, top in (((20, 20, 30), 3.0), ((20, 20, 40), 4.0)):
+        domain = shot_of(scene, Settings.preset(resolution=resolution)).scene.domain
+        assert domain.resolution == resolution
+        np.testing.assert_allclose([domain.min, domain.max], [(-1, -1, 0), (1, 1, top)], atol=1e-9)
 
 
 def test_a_box_that_is_found_is_chosen_for_too(filmed) -> None:

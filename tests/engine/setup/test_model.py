@@ -17,7 +17,7 @@ from smokelift.footage.matte import matte
 from smokelift.footage.noise import EIGHT_BIT_NOISE
 from smokelift.footage.plate import Plate
 from smokelift.output.images import write_image
-from smokelift.pipeline import compose, reconstruct
+from smokelift.pipeline import Reconstruction, compose
 from smokelift.render import scene_optics
 from smokelift.scene import (
     Background,
@@ -415,7 +415,7 @@ def test_frames_without_smoke_cost_nothing(plume, draft, tmp_path) -> None:
     with Clip.open(scene.clip) as opened:
         shot = prepare_shot(opened, scene, draft)
         method = replace(compose(shot.settings), velocity_estimator=Counted(shot.settings.velocity))
-        frames = list(reconstruct(opened, scene, shot=shot, method=method))
+        frames = list(Reconstruction(shot, method))
     assert not predicted
     assert [frame.figures["iterations"] > 0 for frame in frames] == [True, False, False, False, True]
 

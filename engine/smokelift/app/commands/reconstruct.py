@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -20,13 +21,12 @@ from smokelift.footage.clip import Clip
 from smokelift.footage.matte import SMOKE_THRESHOLD
 from smokelift.output.atomic import atomic_path
 from smokelift.output.images import eight_bit
-from smokelift.output.sequence import Sequence
 from smokelift.output.writer import check_directory, written_kinds
 from smokelift.pipeline import Frame, reconstruct
 from smokelift.render import device
+from smokelift.scene import Domain
 from smokelift.setup.background import cut_notes
 from smokelift.setup.no_smoke import what_helps
-from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.provenance import made_up
 from smokelift.setup.shot import Shot
 from smokelift.setup.smoke import small_pictures
@@ -63,21 +63,15 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     device.start(options.device)
     with Clip.open(source) as clip:
         written_kinds(options.npz)  # before the clip is looked at, which takes minutes
-        shot = prepare_shot(clip, scene, settings)
-        require_memory(shot.scene.domain.resolution, Workload.of(shot, settings), given=scene.domain is not None)
+        reconstruction = reconstruct(clip, scene, settings)
+        shot = reconstruction.shot
+        require_memory(
+            shot.scene.domain.resolution, Workload.of(shot, settings), given=isinstance(scene.domain, Domain)
+        )
         for note in (*shot.notes, *(choice.reason for choice in shot.choices), *made_up(shot)):
             say.note(note)
-        frames = reconstruct(clip, scene, settings, options.out, npz=options.npz, resume=options.resume, shot=shot)
-        started = False
-        for frame in frames:
-            if not started:
-                say.start(len(clip), frame.number - 1)
-                started = True
-            if options.thumbnail:
-                _write_thumbnail(options.thumbnail, shot, frame)
-            say.frame(frame.number, frame.figures)
-            del frame  # while the next is computed its memory is free
-    sequence = Sequence.open(options.out)
+        report = _report(shot, options.thumbnail, say)
+        sequence = reconstruction.write(options.out, npz=options.npz, resume=options.resume, on_frame=report)
     figures = [sequence.figures(number) for number in sequence.frames]
     if count_empty(figures) == len(figures):
         cuts = cut_notes(shot.clip, small_pictures(shot.clip))
@@ -95,6 +89,22 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         f"{counted(len(sequence.frames), 'frame')} in {options.out} ({seconds:.0f} s){met}.",
         {"directory": str(options.out), "frames": len(sequence.frames), "seconds": round(seconds, 1), "psnr": fit},
     )
+
+
+def _report(shot: Shot, thumbnail: Path | None, say: Reporter) -> Callable[[Frame], None]:
+    """What happens with each frame once it is written."""
+    started = False
+
+    def report(frame: Frame) -> None:
+        nonlocal started
+        if not started:
+            say.start(shot.length, frame.number - 1)
+            started = True
+        if thumbnail:
+            _write_thumbnail(thumbnail, shot, frame)
+        say.frame(frame.number, frame.figures)
+
+    return report
 
 
 def _check_outputs(options: argparse.Namespace) -> None:

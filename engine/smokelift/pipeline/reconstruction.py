@@ -1,0 +1,169 @@
+"""A clip's reconstruction: checked and prepared when it is made, computed when it is iterated over or written."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from smokelift.checks import require_kind
+from smokelift.footage.clip import Clip
+from smokelift.output.index import Origins
+from smokelift.output.resume import ResumeState
+from smokelift.output.sequence import Sequence
+from smokelift.output.writer import SequenceWriter
+from smokelift.pipeline.loop import Frame, frames_after
+from smokelift.pipeline.method import Method, compose
+from smokelift.pipeline.sources import sources
+from smokelift.scene import Scene
+from smokelift.scene.checks import file_path
+from smokelift.setup.prepare import prepare_shot
+from smokelift.setup.provenance import provenance
+from smokelift.setup.settings import Settings
+from smokelift.setup.shot import Shot
+from smokelift.transport import ResidualMeans, Velocity, halved
+
+
+@dataclass(frozen=True, eq=False)
+class Reconstruction:
+    """What is to be reconstructed, and how. Its clip has to stay open while it is computed.
+
+    Iterating over it yields a `Frame` for each of the clip's, in its order; every time anew.
+
+    Attributes
+    ----------
+    shot
+        The clip with everything about it decided.
+    method
+        The parts that compute it, as `compose` takes them from the shot's settings, or others for an experiment.
+    """
+
+    shot: Shot
+    method: Method
+
+    def __post_init__(self) -> None:
+        """Refuse parts of another kind."""
+        require_kind(self.shot, Shot, "shot", "a Shot (prepare_shot makes one)")
+        require_kind(self.method, Method, "method", "a Method (compose makes one)")
+
+    def __iter__(self) -> Iterator[Frame]:
+        return frames_after(None, self.shot, self.method)
+
+    def write(
+        self,
+        directory: str | Path,
+        *,
+        npz: bool = False,
+        resume: bool = False,
+        on_frame: Callable[[Frame], object] | None = None,
+    ) -> Sequence:
+        """Compute and write all frames, as the command line does.
+
+        Parameters
+        ----------
+        directory
+            For the sequence. It must be empty, or hold the same run unfinished with ``resume``.
+        npz
+            Write NumPy twins as well.
+        resume
+            Go on after the frames that are finished in the directory.
+        on_frame
+            Is called with each frame once it is written, but not with those that were finished before. What it raises
+            ends the run; the finished frames stay.
+
+        Raises
+        ------
+        SequenceError
+            If the directory cannot be written to or holds something else, or no file could be written because there is
+            no OpenVDB module.
+        """
+        shot = self.shot
+        directory = file_path(directory, "directory", "the path of a directory")
+        with SequenceWriter(
+            directory,
+            shot.scene,
+            shot.settings.as_dict(),
+            npz=npz,
+            resume=resume,
+            background=shot.estimated_background,
+            origins=Origins(
+                choices=[choice.as_dict() for choice in shot.choices],
+                provenance=[part.as_dict() for part in provenance(shot)],
+                sources=sources(shot),
+            ),
+        ) as writer:
+            if writer.state is not None or not writer.finished:
+                self._write_rest(writer, on_frame)
+        return Sequence.open(directory)
+
+    def _write_rest(self, writer: SequenceWriter, on_frame: Callable[[Frame], object] | None) -> None:
+        """Write the frames that are not finished."""
+        # no name here holds a frame or its velocities while the next is computed: they take most of the memory
+        frames = frames_after(
+            None if writer.state is None else _resumed(writer.state, self.shot), self.shot, self.method
+        )
+        for frame in frames:
+            if frame.number not in writer.finished:
+                writer.write(
+                    frame.number,
+                    frame.density,
+                    frame.velocity.faces,
+                    frame.figures,
+                    flame=frame.flame,
+                    state=_state(frame),
+                )
+                if on_frame is not None:
+                    on_frame(frame)
+            del frame
+
+
+def reconstruct(
+    clip: Clip, scene: Scene, settings: Settings | None = None, *, method: Method | None = None
+) -> Reconstruction:
+    """Prepare the reconstruction of a clip: everything is checked and decided here, frames are computed later.
+
+    Parameters
+    ----------
+    clip
+        The footage; it has to stay open while frames are computed.
+    scene
+        Whatever is known of the shot; the rest is estimated (see `prepare_shot`).
+    settings
+        `Settings.preset` of a quality and a method; balanced by default.
+    method
+        Another composition than that of the settings, for an experiment.
+
+    Returns
+    -------
+    Reconstruction
+        Iterate over it for frames in memory, or `Reconstruction.write` a sequence.
+
+    Raises
+    ------
+    ValueError
+        For bad input (`SceneError` and `ClipError` are ValueErrors too).
+    """
+    require_kind(method, Method | None, "method", "a Method (compose makes one)")
+    shot = prepare_shot(clip, scene, settings)
+    return Reconstruction(shot, method or compose(shot.settings))
+
+
+def _state(frame: Frame) -> ResumeState:
+    """What the next frame needs of one, for a run that goes on."""
+    memory = frame.estimated.residual
+    kept = {} if memory is None else {"residual_mean": memory.mean, "residual_magnitude": memory.magnitude}
+    volumes = {"smooth": frame.smooth, "steady": frame.steady}
+    kept |= {name: volume for name, volume in volumes.items() if volume is not None}
+    return ResumeState(frame.number, frame.density, frame.estimated.faces, kept)
+
+
+def _resumed(state: ResumeState, shot: Shot) -> Frame:
+    """The last finished frame of a run that goes on."""
+    mean, magnitude = state.extra.get("residual_mean"), state.extra.get("residual_magnitude")
+    residual = None if mean is None or magnitude is None else ResidualMeans(mean, magnitude)
+    velocity = Velocity(state.velocity, shot.optics.domain.voxel_size, shot.scene.closed, residual=residual)
+    shape = shot.optics.domain.resolution
+    while shape != velocity.shape:
+        shape, velocity = halved(shape), replace(velocity, voxel_size=2 * velocity.voxel_size)
+    smooth, steady = state.extra.get("smooth"), state.extra.get("steady")
+    return Frame(state.number, state.density, velocity, {}, velocity, smooth, steady)

@@ -1,0 +1,70 @@
+"""What reconstruct returns: checked and prepared at once, computed when it is iterated over or written."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from smokelift.density import GradientFit
+from smokelift.footage.clip import Clip
+from smokelift.output.index import SequenceError
+from smokelift.output.sequence import Sequence
+from smokelift.pipeline import Frame, Reconstruction, compose, reconstruct
+from smokelift.scene import Scene, completed
+from smokelift.setup.prepare import prepare_shot
+
+
+def test_what_cannot_be_is_refused_at_the_call(plume, draft) -> None:
+    """Not when the first frame is computed."""
+    scene = Scene(clip=plume.scene.clip, domain=plume.scene.domain)
+    with (
+        Clip.open(plume.scene.clip) as clip,
+        pytest.raises(ValueError, match="gives a \\[domain\\] but no \\[camera\\]"),
+    ):
+        reconstruct(clip, scene, draft)
+
+
+def test_nothing_is_computed_before_it_is_wanted(plume, draft, tmp_path) -> None:
+    """What was decided is there at once; a directory that cannot be written to costs no frame."""
+    computed = []
+
+    class Counted:
+        def fit(self, *given: Any) -> Any:
+            computed.append(given)
+            return GradientFit().fit(*given)
+
+    with Clip.open(plume.scene.clip) as clip:
+        method = replace(compose(draft), density_fit=Counted())
+        run = reconstruct(clip, plume.scene, draft, method=method)
+        assert run.shot.scene == completed(plume.scene)
+        assert run.method == method
+        (tmp_path / "mine.txt").touch()
+        with pytest.raises(SequenceError, match="other files"):
+            run.write(tmp_path, npz=True)
+        assert computed == []
+        frames = iter(run)
+        assert next(frames).number == 1
+        assert len(computed) == 2  # the first has the second's velocity
+
+
+def test_frames_in_memory_and_written_are_the_same(plume, draft, tmp_path) -> None:
+    """Each way computes them anew, and density and velocity have one type in memory and from files."""
+    scene = plume.scene.with_frames(0, 1)
+    written: list[Frame] = []
+    with Clip.open(scene.clip) as clip:
+        shot = prepare_shot(clip, scene, draft)
+        run = Reconstruction(shot, compose(shot.settings))
+        sequence = run.write(tmp_path / "out", npz=True, on_frame=written.append)
+        frames = list(run)
+    assert isinstance(sequence, Sequence) and sequence.complete
+    assert [frame.number for frame in written] == [frame.number for frame in frames] == [1, 2]
+    for frame in frames:
+        density, velocity = sequence.density(frame.number), sequence.velocity(frame.number)
+        assert (type(density), type(velocity)) == (type(frame.density), type(frame.velocity))
+        np.testing.assert_array_equal(density, frame.density)
+        for found, wanted in zip(velocity.faces, frame.velocity.faces, strict=True):
+            np.testing.assert_array_equal(found, wanted)
+        assert (velocity.voxel_size, velocity.closed) == (frame.velocity.voxel_size, frame.velocity.closed)
