@@ -147,6 +147,7 @@ class GradientFit:
             settings.patience,
             bound=float(max(settings.bound * depth.density.max(), start.max())),
             recorded=scaled.recorded,
+            expected=depth.density if depth.smooth is None else depth.smooth,
         )
         figures = fit_figures(views, final.residuals, scaled.iterations + final.iterations)
         steady = scaled.density if depth.detail is not None else None

@@ -28,6 +28,10 @@ FLATNESS = 3.5
 """q: between a Gaussian (2) and a box; 3 to 4 were equally good over four scenes
 (docs/experiments/density-profile.md)."""
 
+EXPECTED = 0.03
+"""Share of the profile's peak from which smoke is expected. It is there 1.4 times as wide as it is assumed to be, which
+is how far its width may be wrong (docs/experiments/every-view.md)."""
+
 SILHOUETTE = 0.05
 """Share of the smoke's usual amount from which a pixel belongs to the silhouette
 (docs/experiments/density-profile.md)."""
@@ -128,10 +132,14 @@ class DepthProfile:
         self._balls = ball_spread(amount, camera, domain)
 
     def at(self, projection: Projection, voxels: NDArray[np.bool_]) -> NDArray[np.float64]:
-        """The profile g (1/m), of unit integral along the depth, at the marked voxels (n,)."""
+        """The profile (1/m), of unit integral along the depth, at the marked voxels (n,): g - `EXPECTED`, down to 0.
+
+        Smoke that ends where none is expected fades there; cut off, it shows a shell from the side.
+        """
         profile, width = self._shape_and_width(projection, voxels)
-        profile /= 2 * width * gamma(1 + 1 / FLATNESS)
-        return np.asarray(profile)
+        steep = np.log(1 / EXPECTED)
+        area = gamma(1 + 1 / FLATNESS) * gammainc(1 / FLATNESS, steep) - EXPECTED * steep ** (1 / FLATNESS)
+        return np.asarray(np.maximum(profile - EXPECTED, 0) / (2 * area * width))
 
     def shape(self, projection: Projection, voxels: NDArray[np.bool_]) -> NDArray[np.float64]:
         """The profile at the marked voxels (n,), in units of its height in the middle."""
