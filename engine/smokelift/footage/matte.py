@@ -90,7 +90,8 @@ def matte(frame: npt.ArrayLike, plate: Plate) -> Matte:
     deviation = np.sqrt(channel_mean(smooth**2))
     deviation /= np.clip(np.median(deviation), 1.0, GLOBAL_DEVIATION)
     mask = _around_certain(deviation, SMOKE_THRESHOLD)
-    share = np.clip(deviation / FAINTEST - 1, 0, 1) * _around_certain(deviation, FAINTEST)
+    share = np.clip(deviation / FAINTEST - 1, 0, 1)
+    share[~_around_certain(deviation, FAINTEST)] = 0
     return Matte(deviation, mask, share)
 
 
