@@ -23,7 +23,7 @@ from smokelift.density.halves import LARGE, any_of_two, every_second, spread_to_
 from smokelift.density.hull import centres_of
 from smokelift.density.objective import Term
 from smokelift.density.observation import ObservedClip, View, ViewSet
-from smokelift.density.profile import DepthProfile
+from smokelift.density.profile import EXPECTED, DepthProfile
 from smokelift.density.screen import view_frame
 from smokelift.render import Volume
 from smokelift.scene.domain import box_around
@@ -31,10 +31,6 @@ from smokelift.scene.domain import box_around
 LEAST_SHAPE = 0.05
 """With several views no profile is below this share of its peak inside the hull, since another view may see smoke there
 (docs/experiments/density-profile.md)."""
-
-EXPECTED = 0.03
-"""Share of a depth profile's peak from which smoke is expected. A flat-topped profile is there 1.4 times as wide as it
-is assumed to be, which is how far its width may be wrong (docs/experiments/every-view.md)."""
 
 
 class Detail(Protocol):

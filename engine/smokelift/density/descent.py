@@ -28,8 +28,8 @@ MEMORY = 3
 """Steps that the direction remembers: as good as six, for half the memory (docs/experiments/density-descent.md)."""
 
 FLOOR = 0.1
-"""Scale of an empty voxel of the hull, in mean densities of the start: it may fill, but more slowly than others
-(docs/experiments/density-descent.md)."""
+"""Scale of an empty voxel of the hull, in mean densities of the start, or as much as the prior expects there if that is
+less: it may fill, but more slowly than others (docs/experiments/density-descent.md)."""
 
 SUFFICIENT = 1e-4
 """Armijo's constant: share of the linear prediction that a step has to gain."""
@@ -58,6 +58,7 @@ def descend(
     *,
     bound: float = np.inf,
     recorded: tuple[Image, ...] = (),
+    expected: Volume | None = None,
 ) -> Fit:
     """Minimise the objective from a start.
 
@@ -79,11 +80,15 @@ def descend(
         What no voxel may exceed; where the start does it is cut.
     recorded
         Of each term what is left of the start's picture, L - I, if the renderers hold the records of these pictures.
+    expected : (nx, ny, nz), optional
+        What bounds the scale of an empty voxel, so that smoke fades where a prior expects none.
     """
-    where = np.flatnonzero(hull)
+    where = np.flatnonzero(hull if expected is None else hull & ((density > 0) | (expected > 0)))
     began = density.ravel()[where]
     current = np.minimum(began, np.float32(bound))
-    floor = np.float32(FLOOR * (current.mean() if current.size else 0.0))
+    floor = np.full(current.shape, FLOOR * current.mean() if current.size else 0, np.float32)
+    if expected is not None:
+        np.minimum(floor, expected.ravel()[where], out=floor)
     shape = hull.shape
     problem = _Problem(terms, where, np.zeros(shape, np.float32), np.zeros(shape, np.float32), current + floor)
     if recorded and np.array_equal(current, began):

@@ -109,10 +109,13 @@ class View:
 
     Attributes
     ----------
-    camera, image, plate
+    camera, plate
         As in `Observation`.
+    image : (rows, columns, 3)
+        The observation's, faded to the plate as far as it is uncertain that a pixel shows smoke: so a faint rim ends
+        where its light does, not at the mask.
     mask : (rows, columns) bool
-        Pixels that show smoke.
+        Pixels that may show smoke.
     optical_depth : (rows, columns)
         Of smoke without shadows that explains the picture, or as much as can be told where only smoke in its own shadow
         does; 0 outside the mask.
@@ -139,7 +142,9 @@ class View:
         camera, image, plate = observation.camera, observation.image, observation.plate
         if plate is BLACK:
             plate = eight_bit_plate(np.zeros(3, np.float32), camera.size)
-        mask = matte(image, plate).mask
+        share = matte(image, plate).share
+        image = plate.image + share[..., None] * (image - plate.image)
+        mask = share > 0
         projection = project_voxels(camera, optics.domain)
         depth = apparent_optical_depth(image, plate, mask, optics)
         colours = ColourWeight.of(image, plate, depth)

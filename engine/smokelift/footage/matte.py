@@ -28,6 +28,10 @@ SMOOTHING = 1.5
 MOST_SMOOTHING = 4.0
 """The same at most, in noise: more hides the smoke's own shape."""
 
+FAINTEST = 1.5
+"""Deviation from which on a pixel around certain smoke counts as smoke, in units of noise; with twice as much it counts
+fully (docs/experiments/faint-rim.md)."""
+
 GLOBAL_DEVIATION = 2.0
 """Units of noise. A median deviation of a frame up to this is treated as drift of exposure or of the codec, not as
 smoke that fills the picture."""
@@ -43,10 +47,14 @@ class Matte:
         From the plate, in units of noise, smoothed over two pixels. About 1 or less without smoke.
     mask : (rows, columns) bool
         Patches of a deviation above `SMOKE_THRESHOLD` in which `CERTAIN_AREA` of the picture exceeds twice as much.
+    share : (rows, columns)
+        How certain a pixel shows smoke, from 0 to 1: 1 in the mask, and around it as much as the deviation is above
+        `FAINTEST`.
     """
 
     deviation: Picture
     mask: npt.NDArray[np.bool_]
+    share: Picture
 
 
 def matte(frame: npt.ArrayLike, plate: Plate) -> Matte:
@@ -81,11 +89,17 @@ def matte(frame: npt.ArrayLike, plate: Plate) -> Matte:
     smooth = blurred(difference, width)
     deviation = np.sqrt(channel_mean(smooth**2))
     deviation /= np.clip(np.median(deviation), 1.0, GLOBAL_DEVIATION)
-    certain = 2.0 * SMOKE_THRESHOLD
-    patches, count = ndimage.label(deviation > SMOKE_THRESHOLD, structure=np.ones((3, 3)))
-    certain_pixels = np.bincount(patches[deviation > certain], minlength=count + 1)
-    is_smoke = certain_pixels > CERTAIN_AREA * patches.size
-    return Matte(deviation, is_smoke[patches])
+    mask = _around_certain(deviation, SMOKE_THRESHOLD)
+    share = np.clip(deviation / FAINTEST - 1, 0, 1)
+    share[~_around_certain(deviation, FAINTEST)] = 0
+    return Matte(deviation, mask, share)
+
+
+def _around_certain(deviation: Picture, threshold: float) -> npt.NDArray[np.bool_]:
+    """Patches (rows, columns) of a deviation above a threshold that hold enough smoke that is certain."""
+    patches, count = ndimage.label(deviation > threshold, structure=np.ones((3, 3)))
+    certain = np.bincount(patches[deviation > 2.0 * SMOKE_THRESHOLD], minlength=count + 1)
+    return np.asarray((certain > CERTAIN_AREA * patches.size)[patches])
 
 
 def smoothing(noise: Noise) -> float:

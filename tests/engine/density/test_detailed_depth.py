@@ -96,7 +96,7 @@ def test_what_is_known_of_the_side_is_kept(shot) -> None:
     assert estimate.smooth is not None
     found = FIT.fit(views, estimate, None).density
     layers, kept = (density.sum((0, 1), dtype=np.float64) for density in (found, estimate.smooth))
-    assert np.abs(layers - kept).sum() < 0.1 * kept.sum()
+    assert np.abs(layers - kept).sum() < 0.12 * kept.sum()
     place, smooth = (float(d.sum((0, 2)) @ np.arange(24) / d.sum()) for d in (found, estimate.smooth))
     assert place == pytest.approx(smooth, abs=0.6)
 

@@ -25,8 +25,8 @@ from smokelift.density.multiplicative import fit_multiplicative, take_turns
 from smokelift.density.objective import Term
 from smokelift.density.profile import DepthProfile, inflated
 from smokelift.evaluation.metrics import psnr
-from smokelift.footage.images import linear_to_srgb
-from smokelift.footage.noise import lasting_noise, linear_per_srgb
+from smokelift.footage.images import linear_to_srgb, srgb_to_linear
+from smokelift.footage.noise import EIGHT_BIT_NOISE, lasting_noise, linear_per_srgb
 from smokelift.footage.plate import Plate
 from smokelift.render import render, scene_optics
 from smokelift.scene import Background, Camera, DirectionalLight, Domain, Medium, Scene, completed, orbit
@@ -91,6 +91,47 @@ def test_voxels_outside_the_picture_are_out(plume) -> None:
     hull = visual_hull(np.ones((32, 12), np.bool_), project_voxels(half, plume.scene.domain))
     assert hull[:12].all()
     assert not hull[12:].any()
+
+
+# a faint rim
+
+
+def test_a_faint_rim_fades() -> None:
+    """A veil of 6 codes in noise of one fades to nothing beside thick smoke: most of its light stays, without a step in
+    it or beads along the hull."""
+    camera = Camera("orthographic", FRONT, (72, 32), 20.0, 20.0, 36.0, 16.0)
+    scene = Scene(
+        camera=camera,
+        domain=Domain((-1.2, -0.6, 0), (1.2, 0.6, 1.6), (48, 24, 32)),
+        medium=Medium(extinction=8.0),
+        lights=(DirectionalLight((0.3, 0.8, -0.4), (12.0, 12.0, 12.0)),),
+    )
+    columns = np.arange(72)
+    codes = np.where(columns < 24, 130 * (columns >= 16), 6 * np.clip((54 - columns) / 30, 0, 1)) * np.ones((32, 1))
+    codes[[0, 1, 2, -3, -2, -1]] = 0
+    black = srgb_to_linear(np.float32(4 / 255))
+    code = float(srgb_to_linear(np.float32(5 / 255)) - black)
+    filmed = np.rint(np.random.default_rng(0).normal(4 + codes, 1)).clip(0)[..., None].repeat(3, -1)
+    plate = Plate(np.full((32, 72, 3), black, np.float32), np.ones((32, 72), np.float32), EIGHT_BIT_NOISE)
+    found = reconstruct_density(srgb_to_linear((filmed / 255).astype(np.float32)), scene, settings=QUICK, plate=plate)
+    before = replace(scene, background=Background(color=(float(black),) * 3))
+    shown = (render(found.values, before)[5:-5, :, 0] - black).mean(0) / code
+    assert 0.75 < shown[25:].sum() / codes[16, 25:].sum() < 1.1
+    assert np.abs(np.diff(shown[26:60])).max() < 1.5
+    for height in range(8, 24):
+        across = np.flatnonzero(found.hull[:, :, height].any(1))
+        densest = found.values[:, :, height].max(1)[across]
+        assert densest[-3:].max() < np.median(densest[-9:-4])
+
+
+def test_smoke_fades_where_none_is_expected_in_depth(plume, small) -> None:
+    """It ends without a shell along its support: what is outermost on a ray is next to nothing."""
+    found = reconstruct_density(render(plume.densities[1], small), small, settings=QUICK)
+    deep = found.hull.sum(1) >= 8
+    first, last = found.hull.argmax(1)[deep], 23 - found.hull[:, ::-1].argmax(1)[deep]
+    rays = np.moveaxis(found.values, 1, 2)[deep]
+    ends = sum(np.take_along_axis(rays, at[:, None], 1)[:, 0] for at in (first, last))
+    assert ends.sum() < 0.002 * rays.sum()
 
 
 # profile

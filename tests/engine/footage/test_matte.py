@@ -5,11 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 from films import HEIGHT, WIDTH, film, overlap, wall
 
-from smokelift.footage.matte import MOST_SMOOTHING, SMOOTHING, matte, smoothing
+from smokelift.footage.images import srgb_to_linear
+from smokelift.footage.matte import FAINTEST, MOST_SMOOTHING, SMOOTHING, matte, smoothing
 from smokelift.footage.noise import Noise, lasting_noise
-from smokelift.footage.plate import known_plate
+from smokelift.footage.plate import Plate, known_plate
 from smokelift.footage.plate_estimation import estimate_plate
 from smokelift.footage.steady import without_noise_light
 
@@ -53,3 +55,20 @@ def test_faint_smoke_is_seen_in_noise(tmp_path: Path) -> None:
     plate = known_plate(truth, clip)
     found = matte(without_noise_light(clip, plate).frame(5), plate).mask
     assert overlap(found, veil > 0) > 0.7
+
+
+@pytest.mark.parametrize("noise", [1.0, 3.0, 8.0])
+def test_a_faint_rim_counts_as_far_as_it_is_certain(noise: float) -> None:
+    """Beside smoke the share falls to nothing with the light; a veil by itself and a clear background have none."""
+    columns = np.broadcast_to(np.arange(260), (120, 260))
+    light = np.where(columns < 40, 25 * noise, 6 * noise * np.clip((100 - columns) / 60, 0, 1))
+    light[:, 200:220] = 3 * noise
+    values = np.random.default_rng(0).normal(40 + light, noise)[..., None].repeat(3, -1)
+    behind = np.full((120, 260, 3), srgb_to_linear(np.float32(40 / 255)), np.float32)
+    plate = Plate(behind, np.ones((120, 260), np.float32), lasting_noise(noise / 255))
+    found = matte(srgb_to_linear((values / 255).astype(np.float32)), plate)
+    share = found.share.mean(0)
+    assert (found.share[found.mask] == 1).all()
+    np.testing.assert_allclose(share[:120], np.clip(light[0, :120] / noise / FAINTEST - 1, 0, 1), atol=0.2)
+    assert np.diff(share[45:95:5]).max() < 0.02
+    assert not found.share[:, 105:].any()
