@@ -19,7 +19,7 @@ from addon.take import Take
 from tests.example_shot import set_up_example, smoke
 
 FRAME = 30
-PERCENT, SAMPLES = 30, 24
+PERCENT, SAMPLES = 75, 24
 RIM = 0.3
 """Metres from the floor to the bowl's rim, where the smoke's box begins."""
 
@@ -40,22 +40,22 @@ def main() -> None:
         bpy.ops.smokelift.set_up()
         for preset in look.PRESETS:
             bpy.ops.smokelift.use_look(preset=preset)
-            pictures.append(rendered(scene, Path(folder), PERCENT))
+            pictures.append(rendered(scene, Path(folder)))
         obj.smokelift.plate_place = "COMPOSITE"
         bpy.ops.smokelift.set_up()
         scene.objects[compositing.FLOOR].location.z -= RIM
         bpy.ops.smokelift.use_look(preset="SMOKE")
-        pictures.append(rendered(scene, Path(folder), PERCENT))
+        pictures.append(rendered(scene, Path(folder)))
         obj.location.x += 0.55
         bpy.data.objects["Sun"].rotation_euler = (0.9, 0.0, 0.9)
         bpy.ops.smokelift.use_look(preset="SOOT")
-        pictures.append(rendered(scene, Path(folder), PERCENT))
+        pictures.append(rendered(scene, Path(folder)))
     save("blender_looks.png", beside(pictures))
 
 
-def rendered(scene: bpy.types.Scene, folder: Path, percent: int) -> Image.Image:
-    """The current frame, at a share of its size."""
-    scene.render.resolution_percentage = percent
+def rendered(scene: bpy.types.Scene, folder: Path) -> Image.Image:
+    """The current frame, small."""
+    scene.render.resolution_percentage = PERCENT
     scene.render.image_settings.file_format = "PNG"
     scene.render.filepath = str(folder / "render.png")
     bpy.ops.render.render(write_still=True)

@@ -22,7 +22,7 @@ from addon.smoke import new_smoke
 from addon.take import Take
 from tests.example_shot import EXAMPLE, add, add_camera
 
-SIZE, PERCENT, SAMPLES = (640, 400), 75, 32
+SIZE, SAMPLES = (640, 400), 32
 FRAME = 40
 SHOWN = (32, 5)
 """Frames of the two sequences that are seen at once."""
@@ -56,7 +56,7 @@ def main() -> None:
         bpy.context.object.data.materials.append(painted((0.04, 0.04, 0.04)))
     scene.frame_set(FRAME)
     with tempfile.TemporaryDirectory() as folder:
-        save("blender_room.png", rendered(scene, Path(folder), PERCENT))
+        save("blender_room.png", rendered(scene, Path(folder)))
 
 
 def make_room(scene: bpy.types.Scene) -> None:

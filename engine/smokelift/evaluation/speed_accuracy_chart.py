@@ -16,15 +16,8 @@ from smokelift.output.atomic import atomic_path
 
 SECONDS = "seconds"
 
-PANELS = (
-    (SECONDS, "input_error"),
-    (SECONDS, "view_error"),
-    (SECONDS, "patches"),
-    ("view_error", "patches"),
-    (SECONDS, "density_error"),
-    (SECONDS, "velocity_error"),
-)
-"""What is across and what is up: every error against time, and how like smoke it looks against how right it is."""
+PANELS = ((SECONDS, "view_error"), ("view_error", "patches"))
+"""Across and up in each: speed against accuracy, and how right new views are against how like smoke they look."""
 
 NAMES = {SECONDS: "processor seconds a frame", **ERRORS}
 

@@ -94,7 +94,7 @@ def test_no_label_lies_over_another_or_leaves_its_panel() -> None:
     ]
     figure = chart(Runs((*runs, Run("billboard", "baseline", "", None, error)), "crowded"))
     panels = [axes for axes in figure.axes if axes.axison]
-    assert len(panels) == 3
+    assert len(panels) == 2
     for axes in panels:
         window = axes.get_window_extent()
         boxes = [text.get_window_extent() for text in axes.texts]
