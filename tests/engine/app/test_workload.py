@@ -9,8 +9,7 @@ import pytest
 
 from smokelift.app.workload import LONGEST, Workload
 from smokelift.footage.clip import Clip
-from smokelift.pipeline import reconstruct
-from smokelift.scene import Scene
+from smokelift.pipeline import Reconstruction, compose
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
@@ -24,13 +23,13 @@ def shot(plume) -> Iterator[Shot]:
         yield prepare_shot(clip, plume.scene, SMOOTH)
 
 
-def shares_of_a_run(shot: Shot, scene: Scene) -> list[float]:
-    return [frame.figures["hull_share"] for frame in reconstruct(shot.clip, scene, shot=shot)]
+def shares_of_a_run(shot: Shot) -> list[float]:
+    return [frame.figures["hull_share"] for frame in Reconstruction(shot, compose(shot.settings))]
 
 
 def test_shares_are_those_of_the_run(plume, shot) -> None:
     """Of a grid that is looked at as it is."""
-    found, shares = Workload.of(shot, SMOOTH), shares_of_a_run(shot, plume.scene)
+    found, shares = Workload.of(shot, SMOOTH), shares_of_a_run(shot)
     assert found.largest == pytest.approx(max(shares), rel=0.02)
     assert found.mean == pytest.approx(sum(shares) / len(shares), rel=0.1)
     assert (found.frames, found.views, found.pixels) == (len(shares), 1, 40 * 56)
@@ -41,7 +40,7 @@ def test_a_large_grid_is_looked_at_coarsely(plume) -> None:
     with Clip.open(plume.scene.clip) as clip:
         shot = prepare_shot(clip, plume.scene, replace(SMOOTH, resolution=(96, 96, 128)))
         assert max(shot.optics.domain.resolution) > LONGEST
-        assert 1 < Workload.of(shot, SMOOTH).largest / max(shares_of_a_run(shot, plume.scene)) < 1.4
+        assert 1 < Workload.of(shot, SMOOTH).largest / max(shares_of_a_run(shot)) < 1.4
 
 
 def test_frames_without_smoke_count_in_the_mean(shot) -> None:

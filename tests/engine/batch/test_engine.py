@@ -15,7 +15,7 @@ PYTHON = (sys.executable, "-c")
 
 
 def test_what_is_no_message_is_told_of_one_that_ends_by_itself(tmp_path) -> None:
-    code = "import sys; print('loading'); print('no such thing', file=sys.stderr); sys.exit(5)"
+    code = "import sys; print('loading', flush=True); print('no such thing', file=sys.stderr); sys.exit(5)"
     ended = run_engine([], threading.Event(), tmp_path / "log", (*PYTHON, code))
     assert (ended.status, ended.sentence) == (5, "The engine ended by itself (status 5): no such thing")
     assert "no such thing" in (tmp_path / "log").read_text()

@@ -115,12 +115,12 @@ def test_a_faint_rim_fades() -> None:
     plate = Plate(np.full((32, 72, 3), black, np.float32), np.ones((32, 72), np.float32), EIGHT_BIT_NOISE)
     found = reconstruct_density(srgb_to_linear((filmed / 255).astype(np.float32)), scene, settings=QUICK, plate=plate)
     before = replace(scene, background=Background(color=(float(black),) * 3))
-    shown = (render(found.values, before)[5:-5, :, 0] - black).mean(0) / code
+    shown = (render(found.density, before)[5:-5, :, 0] - black).mean(0) / code
     assert 0.75 < shown[25:].sum() / codes[16, 25:].sum() < 1.1
     assert np.abs(np.diff(shown[26:60])).max() < 1.5
     for height in range(8, 24):
         across = np.flatnonzero(found.hull[:, :, height].any(1))
-        densest = found.values[:, :, height].max(1)[across]
+        densest = found.density[:, :, height].max(1)[across]
         assert densest[-3:].max() < np.median(densest[-9:-4])
 
 
@@ -129,7 +129,7 @@ def test_smoke_fades_where_none_is_expected_in_depth(plume, small) -> None:
     found = reconstruct_density(render(plume.densities[1], small), small, settings=QUICK)
     deep = found.hull.sum(1) >= 8
     first, last = found.hull.argmax(1)[deep], 23 - found.hull[:, ::-1].argmax(1)[deep]
-    rays = np.moveaxis(found.values, 1, 2)[deep]
+    rays = np.moveaxis(found.density, 1, 2)[deep]
     ends = sum(np.take_along_axis(rays, at[:, None], 1)[:, 0] for at in (first, last))
     assert ends.sum() < 0.002 * rays.sum()
 
