@@ -1,7 +1,6 @@
-"""Make the picture of the front page, docs/blender_render.png: ``python tests/blender/front_page.py SEQUENCE``.
+"""Make the picture of the front page, docs/blender_render.png: ``python tests/blender/front_page.py demo/sequence``.
 
-It takes a Python with bpy, and frame 36 of the example at full size:
-``smokelift reconstruct examples/plume/scene.toml --quality final --frames 33:36 --out SEQUENCE``.
+It takes a Python with bpy, and the example's sequence from `make demo`.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ from smokelift.footage.images import area_average, linear_to_srgb
 from tests.example_shot import EXAMPLE, set_up_example, smoke
 
 FRAME = 36
-SIZE, SAMPLES = (640, 960), 64  # three quarters of it are rendered
+SIZE, SAMPLES = (640, 960), 32  # three quarters of it are rendered
 
 TURNS = (40, 90)
 """Degrees by which the clip's camera is carried around the smoke."""
@@ -68,13 +67,13 @@ def build_stage(scene: bpy.types.Scene, keep: set[bpy.types.Object]) -> None:
         if obj not in keep:
             bpy.data.objects.remove(obj)
     scene.render.film_transparent = False
-    panel(scene, [(-20, -20, 0), (20, -20, 0), (20, 20, 0), (-20, 20, 0)], (0.05, 0.048, 0.045))
+    panel(scene, [(-20, -20, 0), (20, -20, 0), (20, 20, 0), (-20, 20, 0)], (0.012, 0.0115, 0.011))
     bpy.ops.mesh.primitive_cylinder_add(radius=0.3, depth=0.1, location=(-0.14, 0.10, 0.05))
-    bpy.context.object.data.materials.append(painted((0.03, 0.03, 0.03)))
+    bpy.context.object.data.materials.append(painted((0.01, 0.01, 0.01)))
     world = scene.world = bpy.data.worlds.new("Stage")
     if world.node_tree is None:
         world.use_nodes = True
-    world.node_tree.nodes["Background"].inputs["Color"].default_value = (0.012, 0.015, 0.02, 1.0)
+    world.node_tree.nodes["Background"].inputs["Color"].default_value = (0.006, 0.0075, 0.01, 1.0)
 
 
 def light(scene: bpy.types.Scene, direction: tuple[float, float, float], degrees: float) -> None:

@@ -51,8 +51,9 @@ COARSEST_NOISE = 2.0
 FINEST_NOISE = 3.5
 """Voxels between nodes of the finest noise, at least: finer noise stays as grains (docs/experiments/every-view.md)."""
 
-AMOUNTS = 4.0
-"""Standard deviation (voxels) of the blur that noise does not change."""
+AMOUNTS = 0.5
+"""Standard deviation of the blur that noise does not change, in standard deviations of the smoke's width: noise makes
+lobes, and leaves each where the smoke is (docs/experiments/every-view.md)."""
 
 LARGEST_GAIN = 5.0
 """Bound of the factor that brings those amounts back."""
@@ -134,17 +135,26 @@ class DetailedDepth:
 
     def _noisy(self, smooth: Volume, level: Level, texture: ClipTexture) -> Volume:
         """The smooth answer with noise that travels with the smoke, its coarse amounts kept."""
-        box = box_around(level.views.hull, 0)
-        hull = level.views.hull[box]
+        hull = level.views.hull
         moved = texture.turntable.height * texture.drift * level.views.frame
         octaves = _Octaves(moved, texture.width, self.seed)
-        noisy, amounts = smooth[box].copy(), _core.blur(smooth[box], AMOUNTS, BLUR_REACH)
-        noisy[hull] *= np.exp(np.float32(NOISE * self.detail) * octaves.noise(level))
-        now = _core.blur(noisy, AMOUNTS, BLUR_REACH)
-        noisy *= np.minimum((amounts + TINY) / (now + TINY), np.float32(LARGEST_GAIN))
-        result = np.zeros(smooth.shape, np.float32)
-        np.copyto(result[box], noisy, where=hull)
-        return result
+        noisy = np.zeros(smooth.shape, np.float32)
+        noisy[hull] = smooth[hull] * np.exp(np.float32(NOISE * self.detail) * octaves.noise(level))
+        return _with_amounts(noisy, smooth, level, AMOUNTS * texture.width)
+
+
+def _with_amounts(noisy: Volume, smooth: Volume, level: Level, blur: float) -> Volume:
+    """Noisy smoke with the amounts of the smooth answer, blurred by so many voxels; on the coarsest grid."""
+    coarser = level.coarser
+    if coarser is not None:
+        means = coarser.means(smooth, level)
+        return coarser.changed(noisy, level, lambda changed: _with_amounts(changed, means, coarser, blur / 2))
+    box = box_around(level.views.hull, 0)
+    amounts, now = (_core.blur(volume[box], blur, BLUR_REACH) for volume in (smooth, noisy))
+    result = np.zeros(smooth.shape, np.float32)
+    gain = np.minimum((amounts + TINY) / (now + TINY), np.float32(LARGEST_GAIN))
+    np.copyto(result[box], noisy[box] * gain, where=level.views.hull[box])
+    return result
 
 
 def _smooth_answer(level: Level, density: Volume) -> Volume:
