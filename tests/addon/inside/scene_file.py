@@ -469,7 +469,7 @@ def test_a_sun(shot) -> None:
     sun.scale = (3.0, 3.0, 3.0)
     (table,) = lights(shot)
     assert table["type"] == "directional"
-    assert table["irradiance"] == pytest.approx([18.0, 9.0, 4.5])
+    assert table["irradiance"] == pytest.approx([20.0, 10.0, 5.0])
     assert table["direction"] == pytest.approx(list(Vector((0.57, 0.46, -0.68)).normalized()), abs=1e-6)
 
 
