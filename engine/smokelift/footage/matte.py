@@ -47,14 +47,20 @@ class Matte:
         From the plate, in units of noise, smoothed over two pixels. About 1 or less without smoke.
     mask : (rows, columns) bool
         Patches of a deviation above `SMOKE_THRESHOLD` in which `CERTAIN_AREA` of the picture exceeds twice as much.
-    share : (rows, columns)
-        How certain a pixel shows smoke, from 0 to 1: 1 in the mask, and around it as much as the deviation is above
-        `FAINTEST`.
     """
 
     deviation: Picture
     mask: npt.NDArray[np.bool_]
-    share: Picture
+
+    @property
+    def share(self) -> Picture:
+        """How certain a pixel (rows, columns) shows smoke, from 0 to 1.
+
+        It is 1 in the mask, and around it as much as the deviation is above `FAINTEST`.
+        """
+        share = np.clip(self.deviation / FAINTEST - 1, 0, 1)
+        share[~_around_certain(self.deviation, FAINTEST)] = 0
+        return np.asarray(share)
 
 
 def matte(frame: npt.ArrayLike, plate: Plate) -> Matte:
@@ -89,10 +95,7 @@ def matte(frame: npt.ArrayLike, plate: Plate) -> Matte:
     smooth = blurred(difference, width)
     deviation = np.sqrt(channel_mean(smooth**2))
     deviation /= np.clip(np.median(deviation), 1.0, GLOBAL_DEVIATION)
-    mask = _around_certain(deviation, SMOKE_THRESHOLD)
-    share = np.clip(deviation / FAINTEST - 1, 0, 1)
-    share[~_around_certain(deviation, FAINTEST)] = 0
-    return Matte(deviation, mask, share)
+    return Matte(deviation, _around_certain(deviation, SMOKE_THRESHOLD))
 
 
 def _around_certain(deviation: Picture, threshold: float) -> npt.NDArray[np.bool_]:
