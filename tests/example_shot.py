@@ -22,10 +22,7 @@ def set_up_example(scene: bpy.types.Scene, folder: Path = EXAMPLE) -> bpy.types.
     folder
         Where the clip and the plate lie.
     """
-    world = scene.world = bpy.data.worlds.new("World")
-    if world.node_tree is None:
-        world.use_nodes = True
-    world.node_tree.nodes["Background"].inputs["Color"].default_value = (0.0, 0.0, 0.0, 1.0)
+    set_world(scene, (0.0, 0.0, 0.0))
     camera = add_camera(scene, (0.0, -7.0, 1.5), (math.pi / 2, 0.0, 0.0))
     camera.data.sensor_fit, camera.data.sensor_height = "VERTICAL", 24.0
     camera.data.lens = 12.0 / math.tan(math.radians(15.0))
@@ -50,6 +47,14 @@ def smoke(scene: bpy.types.Scene) -> bpy.types.Object:
     obj = add(scene, "Smoke", bpy.data.volumes.new("Smoke"))
     obj.smokelift.is_smoke = True
     return obj
+
+
+def set_world(scene: bpy.types.Scene, color: tuple[float, float, float]) -> None:
+    """Give a scene a new world of one color."""
+    world = scene.world = bpy.data.worlds.new("World")
+    if world.node_tree is None:
+        world.use_nodes = True
+    world.node_tree.nodes["Background"].inputs["Color"].default_value = (*color, 1.0)
 
 
 def add(scene: bpy.types.Scene, name: str, data: Any) -> bpy.types.Object:

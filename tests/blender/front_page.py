@@ -11,18 +11,15 @@ import tempfile
 from pathlib import Path
 
 import bpy
-from looks import rendered
+from looks import rendered, shown_example
 from mathutils import Matrix, Vector
 from pictures import beside, save
 from PIL import Image
 from room import painted, panel
 
-import addon
-from addon import volume
-from addon.take import Take
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import area_average, linear_to_srgb
-from tests.example_shot import EXAMPLE, set_up_example, smoke
+from tests.example_shot import EXAMPLE, add, set_world
 
 FRAME = 36
 SIZE, SAMPLES = (640, 960), 32  # three quarters of it are rendered
@@ -36,16 +33,8 @@ SUNS = ((0.57, 0.46, -0.68), (-0.75, -0.55, -0.35))
 
 def main() -> None:
     """Render and write it: the clip, the front, two turned cameras, and another sun."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    addon.register()
-    scene = set_up_example(bpy.context.scene)
-    obj = smoke(scene)
-    volume.show(obj, Take(Path(sys.argv[1]).absolute()))
+    scene, obj = shown_example(Path(sys.argv[1]), SAMPLES, FRAME)
     scene.render.resolution_x, scene.render.resolution_y = SIZE
-    scene.cycles.samples, scene.cycles.use_denoising = SAMPLES, True
-    if hasattr(scene.cycles, "volume_biased"):
-        scene.cycles.volume_biased = True  # marching through the volume is ten times as fast
-    scene.frame_set(FRAME)
     with tempfile.TemporaryDirectory() as folder, Clip.open(EXAMPLE / "clip.mp4") as clip:
         bpy.ops.smokelift.set_up()
         front = rendered(scene, Path(folder))
@@ -70,20 +59,15 @@ def build_stage(scene: bpy.types.Scene, keep: set[bpy.types.Object]) -> None:
     panel(scene, [(-20, -20, 0), (20, -20, 0), (20, 20, 0), (-20, 20, 0)], (0.012, 0.0115, 0.011))
     bpy.ops.mesh.primitive_cylinder_add(radius=0.3, depth=0.1, location=(-0.14, 0.10, 0.05))
     bpy.context.object.data.materials.append(painted((0.01, 0.01, 0.01)))
-    world = scene.world = bpy.data.worlds.new("Stage")
-    if world.node_tree is None:
-        world.use_nodes = True
-    world.node_tree.nodes["Background"].inputs["Color"].default_value = (0.006, 0.0075, 0.01, 1.0)
+    set_world(scene, (0.006, 0.0075, 0.01))
 
 
 def light(scene: bpy.types.Scene, direction: tuple[float, float, float], degrees: float) -> None:
     """One sun, which shines in a direction as the turned camera sees it."""
     for obj in [obj for obj in scene.objects if obj.type == "LIGHT"]:
         bpy.data.objects.remove(obj)
-    data = bpy.data.lights.new("Sun", "SUN")
-    data.energy, data.angle = 20.0, math.radians(1.0)
-    sun = bpy.data.objects.new("Sun", data)
-    scene.collection.objects.link(sun)
+    sun = add(scene, "Sun", bpy.data.lights.new("Sun", "SUN"))
+    sun.data.energy, sun.data.angle = 20.0, math.radians(1.0)
     turned = Matrix.Rotation(math.radians(degrees), 3, "Z") @ Vector(direction)
     sun.rotation_euler = turned.to_track_quat("-Z", "Y").to_euler()
 

@@ -26,15 +26,7 @@ RIM = 0.3
 
 def main() -> None:
     """Render and write it."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    addon.register()
-    scene = set_up_example(bpy.context.scene)
-    obj = smoke(scene)
-    volume.show(obj, Take(Path(sys.argv[1]).absolute()))
-    scene.cycles.samples, scene.cycles.use_denoising = SAMPLES, True
-    if hasattr(scene.cycles, "volume_biased"):
-        scene.cycles.volume_biased = True  # marching through the volume is ten times as fast
-    scene.frame_set(FRAME)
+    scene, obj = shown_example(Path(sys.argv[1]), SAMPLES, FRAME)
     with tempfile.TemporaryDirectory() as folder:
         pictures = []
         bpy.ops.smokelift.set_up()
@@ -51,6 +43,20 @@ def main() -> None:
         bpy.ops.smokelift.use_look(preset="SOOT")
         pictures.append(rendered(scene, Path(folder)))
     save("blender_looks.png", beside(pictures))
+
+
+def shown_example(sequence: Path, samples: int, frame: int) -> tuple[bpy.types.Scene, bpy.types.Object]:
+    """The example's scene with a sequence as its smoke, and that smoke, ready to be rendered in a frame."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    addon.register()
+    scene = set_up_example(bpy.context.scene)
+    obj = smoke(scene)
+    volume.show(obj, Take(sequence.absolute()))
+    scene.cycles.samples, scene.cycles.use_denoising = samples, True
+    if hasattr(scene.cycles, "volume_biased"):
+        scene.cycles.volume_biased = True  # marching through the volume is ten times as fast
+    scene.frame_set(frame)
+    return scene, obj
 
 
 def rendered(scene: bpy.types.Scene, folder: Path) -> Image.Image:

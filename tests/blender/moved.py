@@ -10,14 +10,12 @@ import tempfile
 from pathlib import Path
 
 import bpy
-from looks import FRAME, RIM, rendered
+from looks import FRAME, RIM, rendered, shown_example
 from mathutils import Vector
 from pictures import beside, save
 
-import addon
-from addon import projection, volume
-from addon.take import Take
-from tests.example_shot import add, set_up_example, smoke
+from addon import projection
+from tests.example_shot import add
 
 SAMPLES = 24
 AIM = Vector((0.0, 0.0, 1.5))
@@ -28,15 +26,7 @@ WALL, ROOM = 1.6, 4.0
 
 def main() -> None:
     """Render and write it."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    addon.register()
-    scene = set_up_example(bpy.context.scene)
-    obj = smoke(scene)
-    volume.show(obj, Take(Path(sys.argv[1]).absolute()))
-    scene.cycles.samples, scene.cycles.use_denoising = SAMPLES, True
-    if hasattr(scene.cycles, "volume_biased"):
-        scene.cycles.volume_biased = True  # marching through the volume is ten times as fast
-    scene.frame_set(FRAME)
+    scene, obj = shown_example(Path(sys.argv[1]), SAMPLES, FRAME)
     obj.smokelift.plate_place = "PROJECTION"
     bpy.ops.smokelift.set_up()
     place_geometry(scene)

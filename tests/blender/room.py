@@ -20,7 +20,7 @@ import addon
 from addon import volume
 from addon.smoke import new_smoke
 from addon.take import Take
-from tests.example_shot import EXAMPLE, add, add_camera
+from tests.example_shot import EXAMPLE, add, add_camera, set_world
 
 SIZE, SAMPLES = (640, 400), 32
 FRAME = 40
@@ -68,10 +68,7 @@ def make_room(scene: bpy.types.Scene) -> None:
     sun = add(scene, "Sun", bpy.data.lights.new("Sun", "SUN"))
     sun.data.energy, sun.data.angle = 14.0, math.radians(1.0)
     sun.rotation_euler = Vector((0.6, 0.42, -0.75)).to_track_quat("-Z", "Y").to_euler()
-    world = scene.world = bpy.data.worlds.new("World")
-    if world.node_tree is None:
-        world.use_nodes = True
-    world.node_tree.nodes["Background"].inputs["Color"].default_value = (0.12, 0.14, 0.18, 1.0)
+    set_world(scene, (0.12, 0.14, 0.18))
     place = Vector((-0.6, -8.0, 2.6))
     camera = add_camera(scene, place, (Vector((0.2, 0.0, 1.25)) - place).to_track_quat("-Z", "Y").to_euler())
     camera.data.lens = 42.0
