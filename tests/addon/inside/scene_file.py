@@ -196,12 +196,13 @@ def test_points_fall_where_blender_sees_them_in_every_frame(tracked, tmp_path) -
     """Shift and sensor too, to a thousandth of a pixel."""
     tracked.camera.data.shift_x = 0.1
     camera = engines(tracked, tmp_path).camera
+    width, height = camera.size
     points = np.array(CORNERS)
     for index, frame in ((0, 11), (8, 19), (19, 30)):
         tracked.frame_set(frame)
         found, _ = project(camera.at(index), points)
         seen = [world_to_camera_view(tracked, tracked.camera, Vector(point)) for point in points]
-        np.testing.assert_allclose(found, [(p.x * 256, (1 - p.y) * 384) for p in seen], atol=2e-3)
+        np.testing.assert_allclose(found, [(p.x * width, (1 - p.y) * height) for p in seen], atol=2e-3)
 
 
 def test_a_quick_look_takes_the_camera_as_it_is(tracked) -> None:
@@ -390,8 +391,9 @@ def test_a_turned_box_turns_everything_else(shot, tmp_path) -> None:
     assert (np.array(found.domain.min) <= low + 1e-5).all()
     assert (np.array(found.domain.max) >= high - 1e-5).all()
     pixels, _ = project(found.camera, corners)
+    width, height = found.camera.size
     seen = [world_to_camera_view(shot, shot.camera, corner) for corner in box_corners(box)]
-    np.testing.assert_allclose(pixels, [(p.x * 256, (1 - p.y) * 384) for p in seen], atol=1e-3)
+    np.testing.assert_allclose(pixels, [(p.x * width, (1 - p.y) * height) for p in seen], atol=1e-3)
     direction = world.to_3x3() @ Vector(found.lights[0].direction)
     assert direction.dot(Vector((0.57, 0.46, -0.68)).normalized()) == pytest.approx(1.0)
 
