@@ -10,7 +10,8 @@ It knows nothing of the engine but its command line and its files. From what kno
   (what acts on the smoke after its clip), `shot_setup` (camera, world and light that match the clip), `compositing`
   (smoke over the clip), `projection` (the clip's background on a card), `plate` (the clean plate for these three),
   `instances` (the smoke at other times), `nodes` (the node
-  groups of these), `undistort` (the clip without its lens's distortion).
+  groups of these), `undistort` (the clip without its lens's distortion),
+  `follow` (paths of a .blend that is saved elsewhere).
 - Work beside Blender: `run` (the queue of takes), `shot_check` (the forecast of a run), `batch` (the command line).
 - Interface: `properties` (the settings); `panel` with the sub-panels `results_panel`, `advanced_panel`, `look_panel`,
   `setup_panel`, `direct_panel` and `export`, each with its buttons (`subpanel` is what they share); other buttons in
@@ -43,6 +44,7 @@ def _modules() -> tuple[ModuleType, ...]:
         drop,
         editors,
         export,
+        follow,
         instances,
         look_panel,
         operators,
@@ -57,7 +59,7 @@ def _modules() -> tuple[ModuleType, ...]:
         volume,
     )
 
-    data = (preferences, properties, volume, run)
+    data = (preferences, properties, volume, follow, run)
     buttons = (operators, box, editors, instances, undistort, drop, presets)
     panels = (panel, results_panel, advanced_panel, look_panel, setup_panel, direct_panel, export)
     return (*data, *buttons, *panels, batch)

@@ -24,11 +24,19 @@ def absolute(path: str, library: bpy.types.Library | None = None) -> Path:
     return Path(os.path.abspath(found))  # noqa: PTH100 - resolve() follows links, which Blender keeps
 
 
-def relative(path: Path) -> str:
-    """The path as Blender keeps it: relative to a saved .blend on the same drive, else absolute."""
-    if not bpy.data.filepath:
+def relative(path: Path, folder: Path | None = None) -> str:
+    """The path as Blender keeps it: relative to a saved .blend on the same drive, else absolute.
+
+    Parameters
+    ----------
+    path
+        Absolute.
+    folder
+        Of the .blend; by default of the open one.
+    """
+    if folder is None and not bpy.data.filepath:
         return str(path)
     try:
-        return bpy.path.relpath(str(path))
+        return bpy.path.relpath(str(path), start=None if folder is None else str(folder))
     except ValueError:  # on another drive
         return str(path)

@@ -34,7 +34,7 @@ def _clip_chosen(settings: "SmokeliftSettings", context: bpy.types.Context) -> N
     if settings.clip is None:
         return
     settings.first, settings.last = 1, max(1, settings.clip.frame_duration)
-    settings.folder = free_folder(settings.id_data)
+    settings.folder, settings.results = free_folder(settings.id_data), ""
 
 
 def _box_chosen(settings: "SmokeliftSettings", context: bpy.types.Context) -> None:
@@ -158,6 +158,11 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
 
     is_smoke: BoolProperty(name="Smoke", description="The object is made from a clip", options={"HIDDEN"})
     folder: StringProperty(name="Folder", description="Name of the folder for the results", options={"HIDDEN"})
+    results: StringProperty(
+        name="Results",
+        description="Folder that holds the results where none is chosen; the add-on keeps it in step with the .blend",
+        options={"HIDDEN"},
+    )
     before: StringProperty(name="Before", description="The result that was shown before", options={"HIDDEN"})
     directing: PointerProperty(name="Direct", description="What is made of the result", type=SmokeliftDirecting)
 

@@ -10,7 +10,7 @@ from bpy.props import StringProperty
 from . import smoke_takes, volume
 from .job import ENDED
 from .needs import NeedsClip, NeedsResult
-from .panel import size
+from .panel import draw_text, size
 from .smoke import active_smoke
 from .subpanel import OfClip, redraw
 from .take import Take, TakeError, takes
@@ -185,6 +185,8 @@ class _Results(OfClip):
             if other is not None:
                 text = iface_("Show {:s} Beside").format(other.title())
                 column.operator("smokelift.show_beside", text=text, icon="MOD_MIRROR").take = str(other.directory)
+        if found:
+            draw_text(layout, context, iface_("In {:s}").format(str(smoke_takes.output_folder(smoke))), "FILE_FOLDER")
         doomed = unused_takes(context)
         row = layout.row()
         row.enabled = bool(doomed)

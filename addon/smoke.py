@@ -92,7 +92,7 @@ def separate_duplicate(smoke: bpy.types.Object) -> None:
     twins = [obj for obj in bpy.data.objects if is_smoke(obj) and obj.smokelift.folder == settings.folder]
     if all(obj.session_uid >= smoke.session_uid for obj in twins):
         return
-    settings.folder = free_folder(smoke)
+    settings.folder, settings.results = free_folder(smoke), ""
     if settings.output:
         settings.output = os.path.join(settings.output, settings.folder)  # noqa: PTH118 - a Path would lose the // of Blender
     if smoke.data.users > 1:

@@ -8,7 +8,7 @@ from . import directing, preferences, shot_setup, volume
 from .blender_scene import ShotError
 from .clip_table import clip_path
 from .job import ENDED, Outcome
-from .paths import absolute
+from .paths import absolute, relative
 from .scene_file import options as engine_options
 from .scene_file import shot_tables
 from .smoke import separate_duplicate
@@ -16,10 +16,14 @@ from .take import Take, new_take, takes
 
 
 def output_folder(smoke: bpy.types.Object) -> Path:
-    """The folder of a smoke's takes: the chosen one, else in that of the preferences, beside the .blend or the clip."""
+    """The folder of a smoke's takes: the chosen one, else the one that it has, else a new one.
+
+    A new one is in that of the preferences, beside the .blend or beside the clip.
+    """
     settings = smoke.smokelift
-    if settings.output:
-        return absolute(settings.output)
+    for folder in (settings.output, settings.results):
+        if folder:
+            return absolute(folder)
     common = preferences.output_folder()
     if common is not None:
         return common / settings.folder
@@ -37,8 +41,7 @@ def write_take(smoke: bpy.types.Object) -> Take:
         If the shot is unusable, or the folder cannot be written to.
     """
     tables = shot_tables(smoke)
-    separate_duplicate(smoke)
-    take = new_take(output_folder(smoke))
+    take = _next_take(smoke)
     take.write(tables, engine_options(smoke))
     return take
 
@@ -57,10 +60,18 @@ def write_directed(smoke: bpy.types.Object) -> Take:
     if busy(bpy.context.window_manager, source):
         raise ShotError("The result on show is still being made: wait for its end, or cancel it.")
     direction, options, meshes = directing.engine_request(smoke)
-    separate_duplicate(smoke)
-    take = new_take(output_folder(smoke))
+    take = _next_take(smoke)
     take.write_directed(direction, source, options, meshes)
     return take
+
+
+def _next_take(smoke: bpy.types.Object) -> Take:
+    """The take with the next free number, in a folder that the smoke keeps from now on."""
+    separate_duplicate(smoke)
+    folder = output_folder(smoke)
+    if not smoke.smokelift.output:
+        smoke.smokelift.results = relative(folder)
+    return new_take(folder)
 
 
 def update_moved_files(smoke: bpy.types.Object, take: Take) -> None:

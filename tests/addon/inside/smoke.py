@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import shutil
+from pathlib import Path
 from types import SimpleNamespace
 
 import bpy
 import pytest
 
-from addon import results_panel, run, smoke_takes, volume
+from addon import paths, results_panel, run, smoke_takes, volume
 from addon.smoke import active_smoke, find_smoke, hide_default_cube, new_smoke, smokes
 from addon.take import Take, takes
 from tests.example_shot import EXAMPLE, add, add_box, add_camera, smoke
@@ -172,3 +174,42 @@ def test_what_is_freed_is_said_before_it_is_deleted(shot, tmp_path) -> None:
     assert takes(tmp_path / "out") == found
     assert bpy.ops.smokelift.remove_takes() == {"FINISHED"}
     assert takes(tmp_path / "out") == found[3:]
+
+
+@pytest.mark.parametrize("chosen", [False, True])
+def test_results_stay_with_a_file_that_is_saved_elsewhere(scene, clip, tmp_path, chosen) -> None:
+    """After the first save, after Save As and with a copy; the next is Take 2, and all of it can be moved."""
+    first, second, copied = (tmp_path / "project" / name / "shot.blend" for name in ("first", "second", "copied"))
+    for file in (first, second, copied):
+        file.parent.mkdir(parents=True)
+    shutil.copy(EXAMPLE / "clip.mp4", tmp_path / "project" / "clip.mp4")
+    obj = new_smoke(scene, bpy.data.movieclips.load(str(tmp_path / "project" / "clip.mp4")))
+    if chosen:
+        bpy.ops.wm.save_as_mainfile(filepath=str(first))
+        obj.smokelift.output, obj.smokelift.mask = "//results", "//mask.png"
+        (first.parent / "mask.png").touch()
+    take = smoke_takes.write_take(obj)
+    folder = take.directory.parent
+
+    def kept(there: Path = folder) -> bool:
+        found = takes(smoke_takes.output_folder(smoke(bpy.context.scene)))
+        return [take.directory for take in found] == [there / "take_0001"]
+
+    bpy.ops.wm.save_as_mainfile(filepath=str(first))
+    assert kept()
+    bpy.ops.wm.save_as_mainfile(filepath=str(second))
+    assert kept()
+    bpy.ops.wm.save_as_mainfile(filepath=str(copied), copy=True)
+    assert kept()
+    for file in (second, copied):
+        bpy.ops.wm.open_mainfile(filepath=str(file))
+        assert kept()
+        if chosen:
+            mask = smoke(bpy.context.scene).smokelift.mask
+            assert paths.absolute(mask) == first.parent / "mask.png"
+    (tmp_path / "project").rename(tmp_path / "moved")
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "moved" / "second" / "shot.blend"))
+    assert kept(tmp_path / "moved" / folder.relative_to(tmp_path / "project"))
+    (tmp_path / "moved").rename(tmp_path / "project")
+    bpy.ops.wm.open_mainfile(filepath=str(second))
+    assert smoke_takes.write_take(smoke(bpy.context.scene)).title() == "Take 2"
