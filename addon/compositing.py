@@ -28,6 +28,9 @@ FLOOR = "Smokelift Floor"
 FLOOR_WIDTHS = 2.0
 """Width of that plane over the box's: room for the shadow, and little beyond a wall behind the smoke."""
 
+_ENGINE = "smokelift_engine"
+"""Custom property of the scene: the render engine that it had before."""
+
 HOLDOUTS = "Smokelift Holdouts"
 """Name of the collection whose objects hide the smoke, and show the plate."""
 
@@ -67,7 +70,9 @@ def composite(smoke: bpy.types.Object, take: Take, index: dict[str, Any]) -> Non
         The take on show, and its `sequence.json`.
     """
     scene = scene_of(smoke)
-    scene.render.engine = "CYCLES"  # EEVEE has no shadow catcher
+    if scene.render.engine != "CYCLES":
+        scene[_ENGINE] = scene.render.engine
+        scene.render.engine = "CYCLES"  # EEVEE has no shadow catcher
     scene.render.film_transparent = True
     _catch_shadow(scene, smoke, index["scene"]["domain"])
     _hold_out(scene)
@@ -75,8 +80,35 @@ def composite(smoke: bpy.types.Object, take: Take, index: dict[str, Any]) -> Non
     node = tree.nodes.get(GROUP)
     if node is None:
         node = _insert(tree, shown)
+    elif node.mute:
+        _show(scene, node, True)
     _connect_plate(tree, node, smoke, take, index["scene"])
     _connect_clip(tree, node, smoke.smokelift.clip)
+
+
+def take_composite_away(scene: bpy.types.Scene) -> None:
+    """Render as if it were not there, and keep it as the artist has it until it is set up again."""
+    tree = scene.compositing_node_group if SINCE_5 else scene.node_tree
+    node = tree.nodes.get(GROUP) if tree is not None else None
+    if node is None or node.mute:
+        return
+    _show(scene, node, False)
+    scene.render.film_transparent = False
+    engine = scene.pop(_ENGINE, None)
+    if engine is not None and scene.render.engine == "CYCLES":
+        scene.render.engine = engine
+
+
+def _show(scene: bpy.types.Scene, node: bpy.types.Node, shown: bool) -> None:
+    """Switch the composite's parts on or off: a muted group shows the render."""
+    node.mute = not shown
+    floor = scene.objects.get(FLOOR)
+    if floor is not None:
+        floor.hide_viewport = floor.hide_render = not shown
+    for layer in scene.view_layers:
+        held = layer.layer_collection.children.get(HOLDOUTS)
+        if held is not None:
+            held.holdout = shown
 
 
 def _catch_shadow(scene: bpy.types.Scene, smoke: bpy.types.Object, domain: dict[str, Any]) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import bpy
 from mathutils import Matrix, Vector
 
-from .compositing import composite
+from .compositing import composite, take_composite_away
 from .kept import set_unless_changed
 from .plate import play_beside, show_plate
 from .projection import project, show_card
@@ -47,6 +47,8 @@ def set_up(smoke: bpy.types.Object, take: Take, index: dict[str, Any]) -> None:
         The take on show, and its `sequence.json`.
     """
     settings, scene = smoke.smokelift, scene_of(smoke)
+    if settings.set_up_plate:
+        _take_away_plates(smoke)  # first: what it gives back may be set up anew
     if settings.set_up_range:
         match_clip(smoke)
     if settings.set_up_camera:
@@ -55,8 +57,7 @@ def set_up(smoke: bpy.types.Object, take: Take, index: dict[str, Any]) -> None:
     if settings.set_up_light:
         scene.render.engine = "CYCLES"
         _scatter_as_fitted(scene, index)
-        if settings.light_mode == "ESTIMATE":
-            _estimated_suns(scene, index)
+        _estimated_suns(scene, index, index["scene"]["lights"] if settings.light_mode == "ESTIMATE" else [])
     if settings.set_up_plate:
         _set_up_plate(smoke, take, index)
     if settings.set_up_colors:
@@ -65,8 +66,19 @@ def set_up(smoke: bpy.types.Object, take: Take, index: dict[str, Any]) -> None:
         scene.view_settings.exposure, scene.view_settings.gamma = 0.0, 1.0
 
 
+def _take_away_plates(smoke: bpy.types.Object) -> None:
+    """Undo what an earlier set-up did to show the plate elsewhere than it is shown now."""
+    scene, place = scene_of(smoke), smoke.smokelift.plate_place
+    if place != "COMPOSITE":
+        take_composite_away(scene)
+    show_card(scene, place == "PROJECTION")
+    tree = scene.world.node_tree if scene.world is not None else None
+    if tree is not None and NAME in tree.nodes:
+        tree.nodes[NAME].mute = place != "WORLD"  # a muted Mix Shader shows what the world was before
+
+
 def _set_up_plate(smoke: bpy.types.Object, take: Take, index: dict[str, Any]) -> None:
-    """Show the clean plate where it was chosen to be, and no more where an earlier set-up put it in front of that."""
+    """Show the clean plate where it was chosen to be."""
     settings, scene = smoke.smokelift, scene_of(smoke)
     place = settings.plate_place
     if place == "COMPOSITE":
@@ -74,11 +86,8 @@ def _set_up_plate(smoke: bpy.types.Object, take: Take, index: dict[str, Any]) ->
     elif place == "PROJECTION":
         project(smoke, take, index)
     else:
+        scene.render.film_transparent = False
         _set_world(scene, settings.clip, take, index["scene"])
-    show_card(scene, place == "PROJECTION")
-    tree = scene.world.node_tree if scene.world is not None else None
-    if tree is not None and NAME in tree.nodes:
-        tree.nodes[NAME].mute = place == "PROJECTION"  # a muted Mix Shader shows what the world was before
 
 
 def assumed_camera(smoke: bpy.types.Object, index: dict[str, Any]) -> bpy.types.Object | None:
@@ -128,10 +137,12 @@ def _scattering(index: dict[str, Any]) -> str | None:
     return index["scene"]["medium"].get("scattering")
 
 
-def _estimated_suns(scene: bpy.types.Scene, index: dict[str, Any]) -> None:
-    """The suns that the engine estimated; they cast shadows where the smoke was fitted with them."""
-    tables = index["scene"]["lights"]
-    names = [f"{NAME} Light", *(f"{NAME} Light {number}" for number in range(2, len(tables) + 1))]
+def _estimated_suns(scene: bpy.types.Scene, index: dict[str, Any], tables: list[dict[str, Any]]) -> None:
+    """The suns that the engine estimated, and none of an earlier result besides.
+
+    They cast shadows where the smoke was fitted with them.
+    """
+    names = [f"{NAME} Light", *(f"{NAME} Light {number}" for number in range(2, len(tables) + 1))][: len(tables)]
     for name, table in zip(names, tables, strict=True):
         sun = scene.objects.get(name)
         if sun is None or sun.type != "LIGHT":
@@ -142,7 +153,8 @@ def _estimated_suns(scene: bpy.types.Scene, index: dict[str, Any]) -> None:
         sun.data.color = [part / strongest for part in table["irradiance"]]
         sun.data.use_shadow = _scattering(index) in ("multiple", "single")
         sun.rotation_euler = Vector(table["direction"]).to_track_quat("-Z", "Y").to_euler()
-    for sun in [each for each in scene.objects if each.name.startswith(f"{NAME} Light ") and each.name not in names]:
+    ours = [each for each in scene.objects if f"{each.name} ".startswith(f"{NAME} Light ")]
+    for sun in [each for each in ours if each.name not in names]:
         bpy.data.objects.remove(sun)
 
 

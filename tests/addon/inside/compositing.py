@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 
-from addon import compositing, volume
+from addon import compositing, projection, volume
 from addon.take import Take
 from conftest import made, pixels, quietly, rendered
 from smokelift.output.images import write_image
@@ -238,3 +238,83 @@ def test_without_a_camera_only_what_needs_one_is_refused(filmed) -> None:
     settings.set_up_camera = False
     assert bpy.ops.smokelift.set_up() == {"FINISHED"}
     assert isinstance(volume.shown_take(smoke(filmed)), Take)
+
+
+PLACES = ("WORLD", "COMPOSITE", "PROJECTION")
+
+
+def traces(scene: bpy.types.Scene) -> dict[str, object]:
+    """What the three places of a plate change, as it counts in a render."""
+    nodes = tree(scene).nodes if tree(scene) is not None else {}
+    world = scene.world.node_tree.nodes if scene.world is not None else {}
+    return {
+        "film": scene.render.film_transparent,
+        "engine": scene.render.engine,
+        "composited": compositing.GROUP in nodes and not nodes[compositing.GROUP].mute,
+        "world": "Smokelift" in world and not world["Smokelift"].mute,
+        "held out": any(each.holdout for each in scene.view_layers[0].layer_collection.children),
+        "objects": {
+            name
+            for name in (compositing.FLOOR, projection.CARD)
+            if name in scene.objects and not scene.objects[name].hide_render
+        },
+    }
+
+
+@pytest.fixture
+def plates(filmed) -> bpy.types.Scene:
+    """`filmed` with a camera that a plate can be projected from, few pixels, and no other part ticked."""
+    settings = smoke(filmed).smokelift
+    for name in ("set_up_range", "set_up_camera", "set_up_light", "set_up_colors"):
+        setattr(settings, name, False)
+    bpy.context.view_layer.update()
+    table = {"type": "perspective", "size": [SIZE, SIZE], "fx": 40.0, "fy": 40.0, "cx": SIZE / 2, "cy": SIZE / 2}
+    table["matrix"] = [list(row) for row in filmed.camera.matrix_world]
+    file = volume.shown_take(smoke(filmed)).directory / "sequence.json"
+    index = json.loads(file.read_text())
+    index["scene"]["camera"] = table
+    file.write_text(json.dumps(index))
+    filmed.render.resolution_x = filmed.render.resolution_y = SIZE
+    filmed.world = bpy.data.worlds.new("Own")
+    return filmed
+
+
+@pytest.mark.parametrize("after", PLACES)
+def test_a_place_of_the_plate_undoes_the_one_before(plates, tmp_path, after) -> None:
+    """All nine orders: by what is set, and by the picture."""
+    settings = smoke(plates).smokelift
+    file = str(tmp_path / "fresh.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=file)
+    found, pictures = {}, {}
+    for before in (None, *PLACES):
+        bpy.ops.wm.open_mainfile(filepath=file)
+        scene = bpy.context.scene
+        settings = smoke(scene).smokelift
+        assert scene.render.engine != "CYCLES"
+        for place in filter(None, (before, after)):
+            settings.plate_place = place
+            assert bpy.ops.smokelift.set_up() == {"FINISHED"}
+        found[before] = traces(scene)
+        scene.render.engine = "CYCLES"
+        pictures[before] = rendered(scene, tmp_path / "found.exr")
+    own = {"COMPOSITE": {compositing.FLOOR}, "PROJECTION": {projection.CARD}}
+    assert found[None]["objects"] == own.get(after, set())
+    for before in PLACES:
+        assert found[before] == found[None], before
+        assert pictures[before] == pytest.approx(pictures[None], abs=0.01), before
+
+
+def test_what_the_artist_made_of_the_composite_comes_back(plates) -> None:
+    """The floor where it was put, the grain as it was set, other stand-ins held out again."""
+    settings = smoke(plates).smokelift
+    bpy.ops.smokelift.set_up()
+    plates.objects[compositing.FLOOR].location.z = -1.0
+    tree(plates).nodes[compositing.GROUP].inputs["Grain"].default_value = 0.5
+    wanted = traces(plates)
+    for place in ("WORLD", "COMPOSITE"):
+        settings.plate_place = place
+        bpy.ops.smokelift.set_up()
+    assert traces(plates) == wanted
+    assert plates.objects[compositing.FLOOR].location.z == -1.0
+    assert tree(plates).nodes[compositing.GROUP].inputs["Grain"].default_value == 0.5
+    assert len([node for node in tree(plates).nodes if node.name.startswith(compositing.GROUP)]) == 3
