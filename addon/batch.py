@@ -25,7 +25,7 @@ POLL_SECONDS = 0.05
 
 def main(words: Sequence[str]) -> int:
     """Make a smoke of the scene; returns the exit status."""
-    from . import preferences, smoke_takes
+    from . import preferences, smoke_takes, volume
     from .blender_scene import ShotError
     from .contract import BAD_INPUT, CANCELLED, DONE
     from .job import EngineMissingError, Job, engine_command
@@ -36,6 +36,7 @@ def main(words: Sequence[str]) -> int:
     except SystemExit as leaving:
         return int(leaving.code or 0)
     try:
+        _require_means(choices)
         smoke = _smoke(choices)
         take = smoke_takes.unfinished(smoke) if choices.resume else None
         if take is not None:
@@ -49,7 +50,10 @@ def main(words: Sequence[str]) -> int:
     if job.outcome != "done":
         print(f"smokelift: {job.sentence}", file=sys.stderr, flush=True)
         return CANCELLED if job.outcome == "cancelled" else (job.status or 1)
+    is_first = volume.shown_take(smoke) is None
     smoke_takes.present(smoke, take)
+    if is_first:
+        volume.go_to_smoke(smoke)
     print(job.sentence, flush=True)
     if choices.set_up:
         bpy.ops.smokelift.set_up()
@@ -58,6 +62,26 @@ def main(words: Sequence[str]) -> int:
     if choices.render:
         _render(smoke, choices.render)
     return DONE
+
+
+def _require_means(choices: argparse.Namespace) -> None:
+    """Refuse before the run what would fail after it."""
+    from .blender_scene import ShotError
+
+    if choices.save and not bpy.data.filepath:
+        raise ShotError("The file was never saved, so --save has nowhere to write: give blender a .blend to open.")
+    scene = bpy.context.scene
+    denoises = scene.cycles.use_denoising and (choices.set_up or scene.render.engine == "CYCLES")
+    if choices.render and denoises and not _has_denoiser():
+        raise ShotError(
+            "This Blender has no denoiser, and --render needs one: switch Denoise off in the render properties."
+        )
+
+
+def _has_denoiser() -> bool:
+    """Whether Cycles was built with the denoiser that needs no graphics card."""
+    found = importlib.util.find_spec("_cycles")
+    return found is None or bool(getattr(importlib.import_module("_cycles"), "with_openimagedenoise", True))
 
 
 def _wait(job: Any) -> None:

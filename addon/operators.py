@@ -11,7 +11,7 @@ from . import run, shot_check, smoke_takes
 from .blender_scene import ShotError
 from .needs import NeedsClip
 from .properties import SEEDS
-from .smoke import activate, active_smoke, hide_default_cube, new_smoke, smokes
+from .smoke import activate, active_smoke, new_smoke, smokes
 from .take import TakeError
 
 LONGEST_OPENING = 5.0
@@ -122,8 +122,6 @@ def _make_smoke(operator: bpy.types.Operator, context: bpy.types.Context) -> set
     except (ShotError, TakeError) as error:
         operator.report({"ERROR"}, str(error))
         return {"CANCELLED"}
-    if smoke.smokelift.camera_mode == "GUESS":
-        hide_default_cube(context.scene)
     run.enqueue(context, smoke, take)
     return {"FINISHED"}
 

@@ -79,11 +79,6 @@ def _wait_for_unregistered(timer: bpy.types.Timer) -> float | None:
     return None
 
 
-def _open_log(take: str) -> None:
-    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
-        bpy.ops.smokelift.open_log(take=take)
-
-
 class SMOKELIFT_OT_work(bpy.types.Operator):
     """Poll the engine ten times a second until the queue is empty"""
 
@@ -127,6 +122,7 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
         self._queue = Queue()
         self._jobs: dict[str, Job] = {}
         self._before: dict[str, Take | None] = {}  # what was on show when a job's first frame came
+        self._seen: set[str] = set()  # takes to whose smoke the playhead went; the artist may leave it
         self._not_shown: dict[str, Job] = {}  # jobs whose newest frames the viewport does not show yet
         self._check = shot_check.ShotCheck()
         self._thumbnails = bpy.utils.previews.new()
@@ -197,6 +193,8 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
             before = self._before.setdefault(row.take, volume.shown_take(smoke))
             show_while_made(smoke, take, before, job.outcome)
             created = _datablocks() - count
+            if before is None and row.take not in self._seen and (_playing(bpy.context) or volume.go_to_smoke(smoke)):
+                self._seen.add(row.take)
         if not bpy.app.background:
             row.icon = self._thumbnail(take)
             if smoke is not None and (created or job.ended):  # where it was deleted, one undo brings it back
@@ -204,9 +202,6 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
                 bpy.ops.ed.undo_push(message="Make Smoke")
             if job.ended:
                 self.report({"ERROR" if job.outcome == "failed" else "INFO"}, job.sentence)
-            if job.outcome == "failed":
-                # later: Blender never removes a modal operator that opens a window from its first one
-                bpy.app.timers.register(functools.partial(_open_log, row.take))
 
     def _thumbnail(self, take: Take) -> int:
         """The icon of the take's thumbnail; 0 if there is none."""

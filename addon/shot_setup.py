@@ -4,19 +4,24 @@ Everything made here is found again by its name, so a second set-up changes noth
 """
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import bpy
 from mathutils import Matrix, Vector
 
+from . import volume
 from .compositing import composite, take_composite_away
-from .kept import set_unless_changed
+from .kept import set_and_remember, set_unless_changed
 from .plate import play_beside, show_plate
 from .projection import project, show_card
-from .smoke import GUESSED_CAMERA, scene_of
+from .smoke import GUESSED_CAMERA, scene_of, smokes
 from .take import Take
 
 NAME = "Smokelift"
+NEW_RANGE = (1, 250)
+"""Frames of a new file of Blender."""
+
 SENSOR_WIDTH = 36.0
 """Millimetres; Blender's default."""
 
@@ -32,8 +37,31 @@ def match_clip(smoke: bpy.types.Object) -> None:
     if clip.source == "MOVIE" and clip.fps > 0.0:
         render.fps = math.ceil(clip.fps - 1e-3)
         render.fps_base = render.fps / clip.fps
-    scene.frame_start = clip.frame_start
-    scene.frame_end = clip.frame_start + clip.frame_duration - 1
+    _set_range(scene, set_and_remember)
+
+
+def follow_range(smoke: bpy.types.Object) -> None:
+    """Give the scene the length of its clips and results, unless the artist gave it another."""
+    scene, clip = scene_of(smoke), smoke.smokelift.clip
+    of_clip = (clip.frame_start, clip.frame_start + clip.frame_duration - 1) if clip is not None else NEW_RANGE
+    if "smokelift_frame_end" in scene or (scene.frame_start, scene.frame_end) in (NEW_RANGE, of_clip):
+        _set_range(scene, set_unless_changed)
+
+
+def _set_range(scene: bpy.types.Scene, set_value: Callable[[bpy.types.ID, str, Any, str, Any], None]) -> None:
+    """Set the scene's range to that of the clips of its smokes, and of results that go on after them."""
+    firsts, lasts = [], []
+    for smoke in smokes(scene):
+        clip, data = smoke.smokelift.clip, smoke.data
+        if clip is not None:
+            firsts.append(clip.frame_start)
+            lasts.append(clip.frame_start + clip.frame_duration - 1)
+        if volume.shown_take(smoke) is not None:
+            firsts.append(data.frame_start)
+            lasts.append(data.frame_start + data.frame_duration - 1)
+    if lasts:
+        set_value(scene, "frame_end", scene, "frame_end", max(lasts))
+        set_value(scene, "frame_start", scene, "frame_start", min(firsts))
 
 
 def set_up(smoke: bpy.types.Object, take: Take, index: dict[str, Any]) -> None:

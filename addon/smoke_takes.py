@@ -11,7 +11,7 @@ from .job import ENDED, Outcome
 from .paths import absolute, relative
 from .scene_file import options as engine_options
 from .scene_file import shot_tables
-from .smoke import separate_duplicate
+from .smoke import hide_default_cube, scene_of, separate_duplicate
 from .take import Take, new_take, takes
 
 
@@ -41,6 +41,8 @@ def write_take(smoke: bpy.types.Object) -> Take:
         If the shot is unusable, or the folder cannot be written to.
     """
     tables = shot_tables(smoke)
+    if smoke.smokelift.camera_mode == "GUESS":
+        hide_default_cube(scene_of(smoke))
     take = _next_take(smoke)
     take.write(tables, engine_options(smoke))
     return take
@@ -106,6 +108,7 @@ def present(smoke: bpy.types.Object, take: Take) -> None:
     index = take.index()
     if volume.show(smoke, take) and index is not None:
         shot_setup.assumed_camera(smoke, index)
+        shot_setup.follow_range(smoke)
 
 
 def show_while_made(smoke: bpy.types.Object, take: Take, before: Take | None, outcome: Outcome) -> None:

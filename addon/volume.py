@@ -85,6 +85,18 @@ def _step(smoke: bpy.types.Object) -> tuple[int, float]:
     return _numbers(index)[0], ratio if _real_time(smoke, ratio, index) else 1.0
 
 
+def go_to_smoke(smoke: bpy.types.Object) -> bool:
+    """Go to the first frame that shows smoke unless the current one does; returns whether there is any yet."""
+    take, scene = shown_take(smoke), scene_of(smoke)
+    index = take.index() if take is not None else None
+    smoky = [int(n) for n, figures in index["frames"].items() if figures.get("mass", 1.0) > 0.0] if index else []
+    if not smoky:
+        return False
+    if number_at(smoke, scene.frame_current) not in smoky:
+        scene.frame_set(scene_frame(smoke, min(smoky)))
+    return True
+
+
 def take_before(smoke: bpy.types.Object) -> Take | None:
     """The take that a smoke showed before; None if it has no frames any more."""
     path = smoke.smokelift.before

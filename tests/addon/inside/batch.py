@@ -174,3 +174,32 @@ def test_cancelled_and_gone_on_with(running, saved, number) -> None:
         again.communicate(timeout=60)
     assert int(first.split()[1]) >= there
     assert first_frame(take) == written
+
+
+@pytest.mark.parametrize(
+    ("words", "said"), [(["--save"], "was never saved"), (["--render", "still.png"], "has no denoiser")]
+)
+def test_what_would_fail_after_the_run_is_refused_before_it(shot, monkeypatch, tmp_path, capsys, words, said) -> None:
+    """In one sentence, and nothing is written."""
+    monkeypatch.setattr(batch, "_has_denoiser", lambda: False)
+    smoke(shot).smokelift.output = str(tmp_path / "out")
+    shot.render.engine, shot.cycles.use_denoising = "CYCLES", True
+    assert batch.main(words) == 2
+    assert said in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_command_shows_its_result(saved, tmp_path) -> None:
+    """The cube of a new file is hidden, and the current frame is one with smoke."""
+    quietly(lambda: bpy.ops.wm.open_mainfile(filepath=str(saved)))
+    scene = bpy.context.scene
+    bpy.ops.mesh.primitive_cube_add()
+    bpy.context.object.name = "Cube"
+    smoke(scene).smokelift.camera_mode = "GUESS"
+    bpy.ops.wm.save_mainfile()
+    assert blender(saved, "--save").returncode == 0
+    quietly(lambda: bpy.ops.wm.open_mainfile(filepath=str(saved)))
+    scene = bpy.context.scene
+    assert scene.objects["Cube"].hide_render
+    assert 27 <= scene.frame_current <= 30
+    assert (scene.frame_start, scene.frame_end) == (1, 48)

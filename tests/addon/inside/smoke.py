@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,6 +13,7 @@ import pytest
 from addon import paths, results_panel, run, smoke_takes, volume
 from addon.smoke import active_smoke, find_smoke, hide_default_cube, new_smoke, smokes
 from addon.take import Take, takes
+from conftest import made
 from tests.example_shot import EXAMPLE, add, add_box, add_camera, smoke
 
 
@@ -125,8 +127,8 @@ def test_smoke_that_is_linked_is_finished(scene, clip, tmp_path) -> None:
 
 def with_takes(scene: bpy.types.Scene, folder, count: int) -> list[Take]:
     smoke(scene).smokelift.output = str(folder)
-    made = [smoke_takes.write_take(smoke(scene)) for _ in range(count)]
-    for take in made:
+    written = [smoke_takes.write_take(smoke(scene)) for _ in range(count)]
+    for take in written:
         take.directory.mkdir()
         (take.directory / "smoke_0001.vdb").write_bytes(b"x" * 1000)
         (take.directory / "sequence.json").write_text(
@@ -134,7 +136,7 @@ def with_takes(scene: bpy.types.Scene, folder, count: int) -> list[Take]:
             '{"extinction": 1.0, "albedo": 1.0, "anisotropy": 0.0, "color": [1, 1, 1]}, "domain": '
             '{"min": [0, 0, 0], "max": [1, 1, 1], "resolution": [8, 8, 8]}}}'
         )
-    return made
+    return written
 
 
 def test_results_are_picked_named_and_deleted(shot, tmp_path) -> None:
@@ -213,3 +215,59 @@ def test_results_stay_with_a_file_that_is_saved_elsewhere(scene, clip, tmp_path,
     (tmp_path / "moved").rename(tmp_path / "project")
     bpy.ops.wm.open_mainfile(filepath=str(second))
     assert smoke_takes.write_take(smoke(bpy.context.scene)).title() == "Take 2"
+
+
+def with_masses(folder: Path, masses: list[float]) -> Take:
+    """A take whose frames hold so much smoke."""
+    take = made(folder, frames=len(masses))
+    file = take.directory / "sequence.json"
+    index = json.loads(file.read_text())
+    index["frames"] = {str(n): {"mass": mass} for n, mass in enumerate(masses, 1)}
+    index["scene"]["clip"]["frames"] = [10, 9 + len(masses)]
+    file.write_text(json.dumps(index))
+    return take
+
+
+def test_a_new_result_is_seen(scene, clip, tmp_path) -> None:
+    """The range is the clip's and follows a longer result; the playhead goes to smoke unless it shows some."""
+    obj = new_smoke(scene, clip)
+    obj.smokelift.camera_mode = "SCENE"
+    take = with_masses(tmp_path, [0.0, 0.0, 1.0, 1.0])
+    smoke_takes.present(obj, take)
+    assert (scene.frame_start, scene.frame_end) == (1, clip.frame_duration)
+    assert volume.go_to_smoke(obj)
+    assert scene.frame_current == 13
+    scene.frame_set(14)
+    assert volume.go_to_smoke(obj)
+    assert scene.frame_current == 14
+    longer = with_masses(tmp_path / "longer", [1.0] * 80)
+    smoke_takes.present(obj, longer)
+    assert scene.frame_end == 90
+    bpy.ops.smokelift.match_clip()
+    assert (scene.frame_start, scene.frame_end) == (1, 90)
+    scene.frame_end = 60
+    smoke_takes.present(obj, take)
+    assert scene.frame_end == 60
+    empty = with_masses(tmp_path / "empty", [0.0, 0.0])
+    smoke_takes.present(obj, empty)
+    assert not volume.go_to_smoke(obj)
+
+
+def test_a_range_of_the_artist_stays(scene, clip, tmp_path) -> None:
+    """One that is neither Blender's nor the clip's."""
+    obj = new_smoke(scene, clip)
+    obj.smokelift.camera_mode = "SCENE"
+    scene.frame_start, scene.frame_end = 5, 30
+    smoke_takes.present(obj, with_masses(tmp_path, [1.0] * 80))
+    assert (scene.frame_start, scene.frame_end) == (5, 30)
+
+
+def test_a_run_hides_the_default_cube_also_without_a_window(scene, clip, tmp_path) -> None:
+    """Where the camera is guessed, and the smoke stands in the middle."""
+    cube = add(scene, "Cube", bpy.data.meshes.new("Cube"))
+    corners = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
+    cube.data.from_pydata(corners, [], [(0, 1, 3, 2), (4, 6, 7, 5)])
+    obj = new_smoke(scene, clip)
+    obj.smokelift.output = str(tmp_path)
+    smoke_takes.write_take(obj)
+    assert cube.hide_render and cube.hide_viewport
