@@ -3,6 +3,7 @@
 import bpy
 from mathutils import Vector
 
+from . import shot_check
 from .box_table import box_of
 from .smoke import active_smoke
 
@@ -39,6 +40,7 @@ class SMOKELIFT_OT_make_box(bpy.types.Operator):
         box.rotation_euler = (0.0, 0.0, 0.0)
         box.location = (low + high) / 2
         box.scale = (high - low) / 2
+        shot_check.check_again(context)
         return {"FINISHED"}
 
 

@@ -80,14 +80,12 @@ def _draw_clip(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bp
     other_rate = clip.source == "MOVIE" and abs(clip.fps - frame_rate(scene)) > 0.01
     if size != tuple(clip.size) or other_rate:
         column = layout.column(align=True)
-        draw_text(
-            column,
-            context,
-            iface_("The clip has {:d} x {:d} pixels at {:g} frames a second, the scene {:d} x {:d} at {:g}.").format(
-                *clip.size, clip.fps, *size, frame_rate(scene)
-            ),
-            "INFO",
-        )
+        if clip.source == "MOVIE":
+            text = iface_("The clip has {:d} x {:d} pixels at {:g} frames a second, the scene {:d} x {:d} at {:g}.")
+            text = text.format(*clip.size, clip.fps, *size, frame_rate(scene))
+        else:  # pictures have no frame rate of their own
+            text = iface_("The clip has {:d} x {:d} pixels, the scene {:d} x {:d}.").format(*clip.size, *size)
+        draw_text(column, context, text, "INFO")
         column.operator("smokelift.match_clip")
 
 
@@ -126,10 +124,10 @@ def _draw_cost(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bp
         draw_text(layout, context, state.check_error, "ERROR")
     elif state.check_done:
         column = layout.column(align=True)
-        text = iface_("About {:s}, {:.1f} GB of memory, up to {:s} on disk")
+        text = iface_("About {:s}, {:.1f} GiB of memory, up to {:s} on disk")
         draw_text(column, context, text.format(duration(state.seconds), state.memory, size(state.disk)), "TIME")
         if state.memory > state.memory_free:
-            text = iface_("Only {:.1f} GB are free: choose a lower quality.")
+            text = iface_("Only {:.1f} GiB are free: choose a lower quality.")
             draw_text(column, context, text.format(state.memory_free), "ERROR")
     else:
         layout.label(text="Reading the clip", icon="TIME")
@@ -161,7 +159,8 @@ def _draw_run(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy
         known = volume.provenance_note(smoke)
         if known:
             draw_text(layout, context, known, "INFO")
-        layout.operator("smokelift.vary", icon="MOD_NOISE")
+        if volume.shown_take(smoke).complete():
+            layout.operator("smokelift.vary", icon="MOD_NOISE")
         layout.operator("smokelift.set_up", icon="CAMERA_DATA")
 
 

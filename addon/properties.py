@@ -14,7 +14,7 @@ from bpy.props import (
     StringProperty,
 )
 
-from . import volume
+from . import shot_check, volume
 from .contract import FASTEST, SIDES, SLOWEST
 from .paths import PATH_OPTIONS
 from .smoke import free_folder
@@ -24,9 +24,7 @@ SEEDS = 2**31
 
 
 def _changed(_settings: "SmokeliftSettings", context: bpy.types.Context) -> None:
-    """Check the shot again, if there is a window."""
-    if not bpy.app.background and context.window is not None and bpy.ops.smokelift.check.poll():
-        bpy.ops.smokelift.check()
+    shot_check.check_again(context)
 
 
 def _clip_chosen(settings: "SmokeliftSettings", context: bpy.types.Context) -> None:

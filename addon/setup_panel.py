@@ -3,7 +3,7 @@
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from . import shot_setup, volume
+from . import shot_check, shot_setup, volume
 from .needs import NeedsClip, NeedsClipAndResult
 from .smoke import active_smoke
 from .subpanel import OfClip
@@ -21,6 +21,7 @@ class SMOKELIFT_OT_match_clip(NeedsClip, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         shot_setup.match_clip(active_smoke(context.scene))
+        shot_check.check_again(context)
         return {"FINISHED"}
 
 
@@ -49,6 +50,7 @@ class SMOKELIFT_OT_set_up(NeedsClipAndResult, bpy.types.Operator):
             return {"CANCELLED"}
         shot_setup.set_up(smoke, take, index)
         volume.show(smoke, take)  # the frame rate may have changed
+        shot_check.check_again(context)
         return {"FINISHED"}
 
 

@@ -84,6 +84,14 @@ class ShotCheck:
         self._job.start()
 
 
+def check_again(context: bpy.types.Context) -> None:
+    """Forget the last check, for the shot has changed, and begin another if there is a window."""
+    state = context.window_manager.smokelift
+    state.check_smoke, state.check_done, state.check_error, state.notes = 0, False, "", ""
+    if not bpy.app.background and context.window is not None and bpy.ops.smokelift.check.poll():
+        bpy.ops.smokelift.check()
+
+
 def check_soon(context: bpy.types.Context) -> None:
     """Check the active smoke unless it was checked. Drawing code may call this."""
     state, first = context.window_manager.smokelift, context.window_manager.windows[0]

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import json
 from types import SimpleNamespace
 from typing import Any
 
 import bpy
+import numpy as np
 import pytest
 
 from addon import advanced_panel, direct_panel, export, look_panel, panel, results_panel, setup_panel, volume
 from addon.take import Take
 from conftest import made
+from smokelift.output.images import write_image
 from tests.example_shot import smoke
 
 WIDTH = 258
@@ -63,7 +66,7 @@ def test_no_line_is_cut_off(shot) -> None:
         row.smoke_uid, row.outcome, row.sentence = smoke(shot).session_uid, outcome, "One word after the other. " * 5
         row.done, row.total, row.seconds_left, row.warnings = 1250, 2500, 80000.0, "This is a warning. " * 5
     texts = drawn(shot, panel.SMOKELIFT_PT_view, advanced_panel.SMOKELIFT_PT_view_advanced)
-    assert any("112.4 GB" in text for text in texts)
+    assert any("112.4 GiB" in text for text in texts)
     assert [text for text in texts if len(text) > LETTERS] == []
 
 
@@ -106,3 +109,48 @@ def test_words_are_blenders(scene, word) -> None:
     names += [item.name for setting in settings if setting.type == "ENUM" for item in setting.enum_items]
     names += [getattr(bpy.ops.smokelift, name).get_rna_type().name for name in dir(bpy.ops.smokelift)]
     assert not [name for name in names if word in name]
+
+
+def test_match_scene_to_clip_ends_the_error_that_asked_for_it(shot) -> None:
+    """A new box and every setting forget it too."""
+    state = bpy.context.window_manager.smokelift
+
+    def choose() -> set[str]:
+        smoke(shot).smokelift.quality = "fine"
+        return {"FINISHED"}
+
+    for press in (bpy.ops.smokelift.match_clip, bpy.ops.smokelift.make_box, choose):
+        state.check_smoke, state.check_error = smoke(shot).session_uid, "The render size has another shape."
+        assert press() == {"FINISHED"}
+        assert (state.check_smoke, state.check_error) == (0, "")
+
+
+def test_pictures_have_no_frame_rate(shot, tmp_path) -> None:
+    """A sequence is compared with the scene by its size alone."""
+    for frame in (1, 2):
+        write_image(tmp_path / f"clip_{frame:04d}.png", np.zeros((8, 8, 3), np.float32))
+    smoke(shot).smokelift.clip = bpy.data.movieclips.load(str(tmp_path / "clip_0001.png"))
+    bpy.context.window_manager.smokelift.check_smoke = smoke(shot).session_uid
+    text = " ".join(" ".join(drawn(shot, panel.SMOKELIFT_PT_view)).split())
+    assert "8 x 8 pixels, the scene" in text
+    assert "frames a second" not in text
+
+
+@pytest.mark.parametrize("complete", [True, False])
+def test_a_failed_result_has_no_other_variation(shot, tmp_path, complete) -> None:
+    """What failed or was stopped is resumed, or started again."""
+    take = made(tmp_path)
+    file = take.directory / "sequence.json"
+    file.write_text(json.dumps(json.loads(file.read_text()) | {"complete": complete}))
+    volume.show(smoke(shot), take)
+    names: list[str] = []
+    layout = Layout([])
+    object.__setattr__(layout, "operator", lambda name, **_words: names.append(name) or layout)
+    context = SimpleNamespace(
+        scene=shot,
+        region=SimpleNamespace(width=WIDTH),
+        preferences=SimpleNamespace(system=SimpleNamespace(ui_scale=1.0)),
+        window_manager=bpy.context.window_manager,
+    )
+    panel._draw_run(layout, context, smoke(shot))
+    assert ("smokelift.vary" in names) == complete
