@@ -24,6 +24,7 @@ import shutil
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +36,9 @@ OPTIONS = ("--quality", "--device", "--detail", "--seed", "--resolution", "--axi
 
 TITLES = {"continue": "Continued", "retime": "Retimed", "loop": "Loop"}
 """What a take is called that is made of another one."""
+
+CACHED_FILES = 128
+"""Files, and directories, whose content is kept in memory: two a take, for more takes than a list shows at once."""
 
 _NUMBER = re.compile(r"-?\d+(\.\d+)?(:\d+)?")
 """A number or a range of frames; never an option."""
@@ -150,11 +154,7 @@ class Take:
 
     def _request(self) -> dict[str, Any]:
         """The content of its request file; nothing if that is missing or damaged."""
-        try:
-            request = json.loads(self.request_file.read_text(encoding="utf-8"))
-        except (OSError, ValueError, RecursionError):
-            return {}
-        return request if isinstance(request, dict) else {}
+        return _json(self.request_file)
 
     def update_moved_files(self, files: Mapping[tuple[str, str], Path]) -> None:
         """Write today's paths into its scene file for files that are not where they were: the project was moved.
@@ -208,12 +208,9 @@ class Take:
         return [direction, str(source.directory), *run, *meshes]
 
     def index(self) -> dict[str, Any] | None:
-        """The content of `sequence.json`; None before the engine writes it."""
-        try:
-            index = json.loads((self.directory / INDEX_FILE).read_text(encoding="utf-8"))
-        except (OSError, ValueError, RecursionError):
-            return None
-        return index if isinstance(index, dict) else None
+        """The content of `sequence.json`, not to be changed; None before the engine writes it, or of a foreign one."""
+        index = _json(self.directory / INDEX_FILE)
+        return index if "complete" in index and isinstance(index.get("frames"), dict) else None
 
     def frames(self) -> int:
         """Number of finished frames."""
@@ -252,8 +249,7 @@ class Take:
     def size(self) -> float:
         """Size of its sequence on the disk (MB)."""
         try:
-            with os.scandir(self.directory) as files:
-                return sum(file.stat().st_size for file in files) / 1e6
+            return _size_at(self.directory, self.directory.stat().st_mtime_ns)
         except OSError:
             return 0.0
 
@@ -263,6 +259,29 @@ class Take:
         own = (self.scene_file, self.request_file, self.log_file, self.thumbnail_file, self.mesh_file)
         for file in (*own, *self._moving_files()):
             file.unlink(missing_ok=True)
+
+
+def _json(file: Path) -> dict[str, Any]:
+    """The object in a file; nothing if that is missing or damaged."""
+    try:
+        state = file.stat()
+        return _json_at(file, state.st_mtime_ns, state.st_ino, state.st_size)
+    except (OSError, ValueError, RecursionError):
+        return {}
+
+
+@lru_cache(CACHED_FILES)
+def _json_at(file: Path, *_state: int) -> dict[str, Any]:
+    """The object in a file of this state: the panel reads it with every redraw."""
+    content = json.loads(file.read_text(encoding="utf-8"))
+    return content if isinstance(content, dict) else {}
+
+
+@lru_cache(CACHED_FILES)
+def _size_at(directory: Path, _time: int) -> float:
+    """Size of the files in a directory as of its last change (MB)."""
+    with os.scandir(directory) as files:
+        return sum(file.stat().st_size for file in files) / 1e6
 
 
 def takes(folder: Path) -> list[Take]:

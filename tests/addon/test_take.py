@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import tomllib
 from pathlib import Path
 
@@ -60,6 +61,32 @@ def test_frames_and_completeness(tmp_path) -> None:
     assert (take.frames(), take.complete(), take.resumable()) == (1, True, False)
     (take.directory / "sequence.json").write_text("half a fi")
     assert (take.frames(), take.complete()) == (0, False)
+
+
+@pytest.mark.parametrize("foreign", ['{"format": 1}', '{"frames": [], "complete": true}', "[]", '{"frames": {}}'])
+def test_the_index_of_another_program_is_none(tmp_path, foreign) -> None:
+    """Its folder counts as a take without frames."""
+    take = begun(tmp_path)
+    take.directory.mkdir()
+    (take.directory / "sequence.json").write_text(foreign)
+    assert (take.index(), take.frames(), take.complete()) == (None, 0, False)
+    assert [found.frames() for found in takes(tmp_path)] == [0]
+
+
+def test_a_redraw_reads_no_file_that_has_not_changed(tmp_path, monkeypatch) -> None:
+    """Neither index, request nor sizes; a frame more is seen at once."""
+    take = begun(tmp_path)
+    with_sequence(take, 3, complete=False)
+    before = (take.frames(), take.title(), take.size())
+    with monkeypatch.context() as blocked:
+        blocked.setattr(Path, "read_text", None)
+        blocked.setattr(os, "scandir", None)
+        assert (take.frames(), take.title(), take.size()) == before
+    index = {"complete": True, "frames": {str(n): {} for n in range(1, 5)}}
+    (take.directory / "sequence.json.tmp").write_text(json.dumps(index))
+    (take.directory / "sequence.json.tmp").replace(take.directory / "sequence.json")
+    assert (take.frames(), take.complete()) == (4, True)
+    assert take.size() > before[2]
 
 
 @pytest.mark.parametrize("lost", ["scene_file", "request_file"])

@@ -188,10 +188,11 @@ class SequenceWriter:
                     self._write_arrays(path, rho, faces, fire)
             frames = {**self._index.frames, str(number): plain(figures or {})}
             checksums = {**self._index.checksums, **{path.name: checksum([path]) for path in paths}}
-            self._index = replace(self._index, frames=frames, checksums=checksums)
-            self._index.write(self.directory)
+            grown = replace(self._index, frames=frames, checksums=checksums)
+            grown.write(self.directory)
             # Last: a state without its frame could not be told from a frame that was lost.
             state.write(self.directory / RESUME)
+            self._index = grown  # only now: a run that goes on drops a frame without its state
         except OSError as error:
             raise self._failed(f"frame {number}", error) from error
 

@@ -376,6 +376,25 @@ def test_a_full_disk_is_one_sentence(tmp_path: Path, no_vdb: None, monkeypatch: 
     assert Sequence.open(tmp_path).frames == (1,)
 
 
+@pytest.mark.parametrize("kind", ["index.Index", "resume.ResumeState"])
+def test_a_full_disk_counts_the_frames_that_stay(
+    tmp_path: Path, no_vdb: None, monkeypatch: pytest.MonkeyPatch, kind: str
+) -> None:
+    def full(*arguments: Any) -> None:
+        raise OSError(28, "No space left on device")
+
+    with (
+        monkeypatch.context() as patch,
+        pytest.raises(SequenceError, match=r"finished frames stay \(1\)"),
+        SequenceWriter(tmp_path, SCENE, SETTINGS, npz=True) as writer,
+    ):
+        writer.write(1, *frame(1))
+        patch.setattr(f"smokelift.output.{kind}.write", full)
+        writer.write(2, *frame(2))
+    with SequenceWriter(tmp_path, SCENE, SETTINGS, npz=True, resume=True) as writer:
+        assert writer.finished == (1,)
+
+
 def test_frames_must_fit_and_follow(tmp_path: Path, no_vdb: None) -> None:
     rho, (x, y, z) = frame(1)
     with SequenceWriter(tmp_path, SCENE, SETTINGS, npz=True) as writer:
