@@ -13,7 +13,8 @@ It knows nothing of the engine but its command line and its files. From what kno
   groups of these), `undistort` (the clip without its lens's distortion),
   `follow` (paths of a .blend that is saved elsewhere).
 - Work beside Blender: `run` (the queue of takes), `shot_check` (the forecast of a run), `batch` (the command line).
-- Interface: `properties` (the settings); `panel` with the sub-panels `results_panel`, `advanced_panel`, `look_panel`,
+- Interface: `properties` (the settings); `panel` (`automatic` for its numbers)
+  with the sub-panels `results_panel`, `advanced_panel`, `look_panel`,
   `setup_panel`, `direct_panel` and `export`, each with its buttons (`subpanel` is what they share); other buttons in
   `operators`, `box` and `editors` (`needs` says when they can be pressed); `drop`, `presets` and `preferences`, which
   Blender calls so.

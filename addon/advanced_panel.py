@@ -2,7 +2,7 @@
 
 import bpy
 
-from .panel import draw_text
+from .automatic import draw_automatic
 from .smoke import active_smoke
 from .subpanel import OfClip
 
@@ -18,13 +18,14 @@ class _Advanced(OfClip):
         settings = smoke.smokelift
         row = layout.row()
         row.active = settings.camera_mode == "SCENE"
-        row.prop(settings, "longest_side")
+        draw_automatic(row, settings, "longest_side")
         row = layout.row(heading="Known Depth")
         row.prop(settings, "use_axis_depth", text="")
         value = row.row()
         value.active = settings.use_axis_depth
         value.prop(settings, "axis_depth", text="")
-        for name in ("fps", "transfer", "speed", "device", "use_medium"):
+        draw_automatic(layout, settings, "fps")
+        for name in ("transfer", "speed", "device", "use_medium"):
             layout.prop(settings, name)
         column = layout.column()
         column.active = settings.use_medium
@@ -32,11 +33,10 @@ class _Advanced(OfClip):
             column.prop(settings, name)
         state = context.window_manager.smokelift
         if state.check_smoke == smoke.session_uid and state.notes:
-            draw_text(layout, context, "{} x {} x {} voxels. Assumptions and choices:".format(*state.resolution))
             for note in state.notes.split("\n"):
-                draw_text(layout, context, note)
-        layout.operator("smokelift.check", icon="VIEWZOOM")
+                layout.label(text=note, translate=False)
         layout.operator("smokelift.show_page", icon="IMAGE_DATA")
+        layout.operator("smokelift.check", icon="VIEWZOOM")
 
 
 class SMOKELIFT_PT_view_advanced(_Advanced, bpy.types.Panel):

@@ -4,6 +4,7 @@ import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
 from . import run, smoke_takes
+from .automatic import draw_automatic
 from .blender_scene import ShotError
 from .needs import NeedsClipAndResult
 from .panel import draw_closed
@@ -72,7 +73,7 @@ def _draw_retime(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) 
 
 def _draw_loop(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
     _draw_ticked(layout, settings, "use_part", "part_first", "part_last")
-    layout.prop(settings, "overlap")
+    draw_automatic(layout, settings, "overlap")
 
 
 _DIRECTIONS = {"continue": _draw_continue, "retime": _draw_retime, "loop": _draw_loop}

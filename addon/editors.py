@@ -36,10 +36,10 @@ class SMOKELIFT_OT_open_log(bpy.types.Operator):
 
 
 class SMOKELIFT_OT_show_page(NeedsClip, bpy.types.Operator):
-    """Show on a page what was found in the clip: box and light, background, smoke, and what stays undetermined"""
+    """Show on a page all that was found in the clip and assumed: box and light, background, smoke, doubts"""
 
     bl_idname = "smokelift.show_page"
-    bl_label = "Inspect Clip"
+    bl_label = "Report"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

@@ -126,6 +126,7 @@ def _draw_cost(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bp
         column = layout.column(align=True)
         text = iface_("About {:s}, {:.1f} GiB of memory, up to {:s} on disk")
         draw_text(column, context, text.format(duration(state.seconds), state.memory, size(state.disk)), "TIME")
+        column.label(text=iface_("{} x {} x {} voxels").format(*state.resolution), translate=False, icon="BLANK1")
         if state.memory > state.memory_free:
             text = iface_("Only {:.1f} GiB are free: choose a lower quality.")
             draw_text(column, context, text.format(state.memory_free), "ERROR")

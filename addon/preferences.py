@@ -5,6 +5,7 @@ from pathlib import Path
 import bpy
 from bpy.props import EnumProperty, IntProperty, StringProperty
 
+from .automatic import automatic_unless, draw_automatic
 from .contract import QUALITIES
 from .paths import absolute
 
@@ -54,18 +55,20 @@ class SmokeliftPreferences(bpy.types.AddonPreferences):
     )
     threads: IntProperty(
         name="Threads",
-        description="Processor threads that make smoke; 0 uses all, fewer leave some for Blender",
+        description="Processor threads that make smoke; automatic is all, fewer leave some for Blender",
         default=0,
         min=0,
         soft_max=64,
         max=1024,
     )
+    use_threads: automatic_unless("threads", "Threads", 1)
 
     def draw(self, _context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split = True
-        for name in ("output", "quality", "threads"):
+        for name in ("output", "quality"):
             layout.prop(self, name)
+        draw_automatic(layout, self, "threads")
         layout.operator("smokelift.open_manual", icon="HELP")
 
 

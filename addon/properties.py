@@ -15,7 +15,8 @@ from bpy.props import (
 )
 
 from . import shot_check, volume
-from .contract import FASTEST, SIDES, SLOWEST
+from .automatic import automatic_unless
+from .contract import BOX_VOXELS, FASTEST, SIDES, SLOWEST
 from .paths import PATH_OPTIONS
 from .smoke import free_folder
 
@@ -143,8 +144,11 @@ class SmokeliftDirecting(bpy.types.PropertyGroup):
     )
     part_last: IntProperty(name="Last", description="Last frame of the part, in the scene", default=48, min=-1_000_000)
     overlap: IntProperty(
-        name="Overlap", description="Frames in which the end becomes the start; 0 is a third, 24 at most", min=0
+        name="Overlap",
+        description="Frames in which the end becomes the start; automatic is a third of the loop, 24 at most",
+        min=0,
     )
+    use_overlap: automatic_unless("overlap", "Overlap", 12)
 
     def speeds(self) -> tuple[float, ...]:
         """One speed, or those of a ramp."""
@@ -292,12 +296,13 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
 
     longest_side: IntProperty(
         name="Resolution",
-        description="Voxels along the box's longest side; 0 chooses by the detail that is measured in the clip",
+        description="Voxels along the box's longest side; automatic is by the detail that is measured in the clip",
         default=0,
         min=0,
         max=1024,
         update=_changed,
     )
+    use_longest_side: automatic_unless("longest_side", "Resolution", BOX_VOXELS)
     use_axis_depth: BoolProperty(
         name="Known Depth",
         description="Give the smoke's distance behind the middle of the box; otherwise it is estimated",
@@ -312,12 +317,13 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
     )
     fps: FloatProperty(
         name="Frame Rate",
-        description="Frame rate at which the clip was filmed, if it plays in slow motion; 0 is the clip's own",
+        description="Frame rate at which the clip was filmed, if it plays in slow motion; automatic is the clip's own",
         default=0.0,
         min=0.0,
         soft_max=1000.0,
         update=_changed,
     )
+    use_fps: automatic_unless("fps", "Frame Rate", 120.0)
     transfer: EnumProperty(
         name="Color Space",
         description="Color space of the clip",

@@ -3,6 +3,7 @@
 It starts by itself once the settings rest, and its result is shown in the panel.
 """
 
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import bpy
@@ -21,6 +22,35 @@ TICKS = 4
 def page_file() -> Path:
     """Where the engine shows in pictures what it found of the shot that was checked last."""
     return Path(bpy.app.tempdir) / "smokelift_inspect.png"
+
+
+WORDS = {
+    "background": "Background",
+    "scale": "Box",
+    "light": "Light",
+    "sun's direction": "Light",
+    "smoke colour": "Smoke Color",
+    "place in depth": "Depth",
+}
+"""What the engine knows of a shot and the panel shows, in the panel's words; the page of the report has the rest."""
+
+
+def found_lines(facts: Iterable[Mapping[str, str]]) -> list[str]:
+    """What was found or assumed, in a line each that fits the sidebar: what the engine says up to its first comma.
+
+    Parameters
+    ----------
+    facts
+        The engine's, each with ``what`` it is about and its ``value``.
+    """
+    shown = [(WORDS[fact["what"]], fact["value"].partition(",")[0]) for fact in facts if fact["what"] in WORDS]
+    short = (("box of ", ""), (" of the box", ""), ("colour", "color"))
+    lines = []
+    for word, value in shown:
+        for long, brief in short:
+            value = value.replace(long, brief)
+        lines.append(f"{word}: {value}")
+    return lines
 
 
 class ShotCheck:
@@ -57,7 +87,7 @@ class ShotCheck:
         details = job.details
         state.check_done = job.outcome == "done"
         state.check_error = "" if state.check_done else job.sentence
-        state.notes = "\n".join(job.notes)
+        state.notes = "\n".join(found_lines(details.get("facts", ())))
         if state.check_done:
             state.resolution = details["scene"]["domain"]["resolution"]
             state.seconds = details["seconds"]

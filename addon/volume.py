@@ -86,13 +86,16 @@ def _step(smoke: bpy.types.Object) -> tuple[int, float]:
 
 
 def go_to_smoke(smoke: bpy.types.Object) -> bool:
-    """Go to the first frame that shows smoke unless the current one does; returns whether there is any yet."""
+    """Go to the first frame that shows smoke unless the current one does, or will; returns whether there is any yet."""
     take, scene = shown_take(smoke), scene_of(smoke)
     index = take.index() if take is not None else None
     smoky = [int(n) for n, figures in index["frames"].items() if figures.get("mass", 1.0) > 0.0] if index else []
     if not smoky:
         return False
-    if number_at(smoke, scene.frame_current) not in smoky:
+    finished, used = _numbers(index), index["scene"]["clip"].get("frames")
+    last = finished[0] + used[1] - used[0] if used else finished[-1]
+    number = number_at(smoke, scene.frame_current)
+    if number not in smoky and not finished[-1] < number <= last:
         scene.frame_set(scene_frame(smoke, min(smoky)))
     return True
 

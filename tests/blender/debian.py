@@ -182,6 +182,7 @@ def test_trouble_at_the_window(root, installed) -> None:
     assert report["queue"]["volumes"] == 1
     assert report["failed"]["outcomes"] == ["failed"]
     assert "is not a video" in report["failed"]["sentence"]
+    assert not report["log_opened_by_itself"], "the log covers Blender"
     assert "is not a video" in report["log"], "the log was not opened"
     assert report["disabled"] == {"known": False, "stopped": True}
     last = Path(report["last_take"])

@@ -154,7 +154,8 @@ def _find_plates(
     if colour is None:
         raise ValueError(
             "The camera moves, so what is behind the smoke cannot be found from the clip; give a clean plate with "
-            "a picture for every frame (a video or plate_####.png), or a color, in [background]."
+            "a picture for every frame (a video or plate_####.png), or a color ([background] in a scene file, Clean "
+            "Plate in Blender)."
         )
     note = f"Background not given: one colour, {', '.join(f'{v:.2g}' for v in colour)} (linear)."
     return FoundPlates(clip, known_plate(colour, clip), Background(color=colour), (note,))

@@ -10,7 +10,17 @@ import bpy
 import numpy as np
 import pytest
 
-from addon import advanced_panel, direct_panel, export, look_panel, panel, results_panel, setup_panel, volume
+from addon import (
+    advanced_panel,
+    direct_panel,
+    export,
+    look_panel,
+    panel,
+    results_panel,
+    setup_panel,
+    shot_check,
+    volume,
+)
 from addon.take import Take
 from conftest import made
 from smokelift.output.images import write_image
@@ -58,7 +68,7 @@ def test_no_line_is_cut_off(shot) -> None:
     """The longest that there are, in a sidebar of the usual width."""
     manager = bpy.context.window_manager
     state = manager.smokelift
-    state.check_smoke, state.check_done, state.notes = smoke(shot).session_uid, True, "Assumed. " * 20
+    state.check_smoke, state.check_done, state.notes = smoke(shot).session_uid, True, "Background: a picture"
     state.resolution, state.seconds, state.disk = (144, 144, 144), 86000.0, 9999.0
     state.memory, state.memory_free = 112.4, 11.8
     for outcome in ("waiting", "running", "done", "failed"):
@@ -154,3 +164,49 @@ def test_a_failed_result_has_no_other_variation(shot, tmp_path, complete) -> Non
     )
     panel._draw_run(layout, context, smoke(shot))
     assert ("smokelift.vary" in names) == complete
+
+
+FACTS = [
+    ("background", "one colour, 0.2, 0.2, 0.2 (linear), 8% of it unknown"),
+    ("exposure", "steady"),
+    ("scale", "box of 1.29 x 1.29 x 1.71 m"),
+    ("smoke colour", "grey"),
+    ("light strength", "smoke of radiance 0.89, 0.87, 0.86"),
+    ("sun's direction", "no sun"),
+    ("place in depth", "-0.12 m behind the middle of the box, give or take 0.09 m"),
+]
+
+
+def test_what_was_found_is_five_lines_in_the_panels_words(shot) -> None:
+    """All else is in the report, whose button is below them."""
+    lines = shot_check.found_lines({"what": what, "value": value} for what, value in FACTS)
+    assert lines[0] == "Background: one color"
+    assert lines[-1] == "Depth: -0.12 m behind the middle"
+    assert len(lines) == 5
+    assert max(map(len, lines)) <= LETTERS
+    state = bpy.context.window_manager.smokelift
+    state.check_smoke, state.check_done, state.notes = smoke(shot).session_uid, True, "\n".join(lines)
+    assert set(lines) <= set(drawn(shot, advanced_panel.SMOKELIFT_PT_view_advanced))
+
+
+def test_the_resolution_is_seen_when_it_is_guessed(shot) -> None:
+    """With the cost, whatever the camera is."""
+    state = bpy.context.window_manager.smokelift
+    state.check_smoke, state.check_done, state.resolution = smoke(shot).session_uid, True, (48, 48, 64)
+    smoke(shot).smokelift.camera_mode = "GUESS"
+    state.check_smoke, state.check_done = smoke(shot).session_uid, True
+    assert any(text.startswith("48 x 48 x 64 voxels") for text in drawn(shot, panel.SMOKELIFT_PT_view))
+
+
+@pytest.mark.parametrize("name", ["longest_side", "fps", "overlap"])
+def test_what_is_automatic_is_a_word_and_a_tick(shot, name) -> None:
+    """In place of a 0 with a meaning of its own."""
+    settings = smoke(shot).smokelift.directing if name == "overlap" else smoke(shot).smokelift
+    smoke(shot).smokelift.directing.direction = "loop"
+    panels = (advanced_panel.SMOKELIFT_PT_view_advanced, direct_panel.SMOKELIFT_PT_view_direct)
+    words = drawn(shot, *panels).count("Automatic")
+    setattr(settings, f"use_{name}", True)
+    assert getattr(settings, name) > 0
+    assert drawn(shot, *panels).count("Automatic") == words - 1
+    setattr(settings, f"use_{name}", False)
+    assert getattr(settings, name) == 0

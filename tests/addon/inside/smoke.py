@@ -217,13 +217,13 @@ def test_results_stay_with_a_file_that_is_saved_elsewhere(scene, clip, tmp_path,
     assert smoke_takes.write_take(smoke(bpy.context.scene)).title() == "Take 2"
 
 
-def with_masses(folder: Path, masses: list[float]) -> Take:
-    """A take whose frames hold so much smoke."""
+def with_masses(folder: Path, masses: list[float], planned: int = 0) -> Take:
+    """A take whose frames hold so much smoke, of so many that it will have."""
     take = made(folder, frames=len(masses))
     file = take.directory / "sequence.json"
     index = json.loads(file.read_text())
     index["frames"] = {str(n): {"mass": mass} for n, mass in enumerate(masses, 1)}
-    index["scene"]["clip"]["frames"] = [10, 9 + len(masses)]
+    index["scene"]["clip"]["frames"] = [10, 9 + (planned or len(masses))]
     file.write_text(json.dumps(index))
     return take
 
@@ -240,6 +240,11 @@ def test_a_new_result_is_seen(scene, clip, tmp_path) -> None:
     scene.frame_set(14)
     assert volume.go_to_smoke(obj)
     assert scene.frame_current == 14
+    scene.frame_set(16)
+    begun = with_masses(tmp_path / "begun", [1.0, 1.0], planned=6)
+    smoke_takes.present(obj, begun)
+    assert volume.go_to_smoke(obj)
+    assert scene.frame_current == 16
     longer = with_masses(tmp_path / "longer", [1.0] * 80)
     smoke_takes.present(obj, longer)
     assert scene.frame_end == 90

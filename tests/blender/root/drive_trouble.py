@@ -127,18 +127,25 @@ def queue() -> Iterator[float]:
     report["queue"] = yield from end()
 
 
+def logs() -> list[bpy.types.Area]:
+    """Text editors that show something."""
+    areas = [area for window in bpy.context.window_manager.windows for area in window.screen.areas]
+    return [area for area in areas if area.type == "TEXT_EDITOR" and area.spaces.active.text]
+
+
 def fail() -> Iterator[float]:
-    """The clip's file is replaced by something else: a log opens."""
+    """The clip's file is replaced by something else: nothing opens over Blender, and a button opens the log."""
     clip = Path(bpy.path.abspath(volumes()[0].smokelift.clip.filepath))
     good = clip.read_bytes()
     clip.write_text("not a video " * 100)
     press("smokelift.run")
     report["failed"] = yield from end()
     yield 1.0
-    windows = bpy.context.window_manager.windows
-    logs = [a for w in windows for a in w.screen.areas if a.type == "TEXT_EDITOR" and a.spaces.active.text]
-    report["log"] = logs and logs[0].spaces.active.text.as_string()
+    report["log_opened_by_itself"] = bool(logs())
     yield from picture("failed")
+    press("smokelift.open_log", take=jobs()[-1].take)
+    yield 1.0
+    report["log"] = logs() and logs()[0].spaces.active.text.as_string()
     clip.write_bytes(good)
 
 
