@@ -1,6 +1,7 @@
 """The box that holds the smoke: the domain and the inlet in a scene file, and the engine's world in Blender's."""
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import bpy
@@ -9,6 +10,9 @@ from mathutils import Matrix, Vector
 from .blender_scene import ShotError
 from .contract import BOX_VOXELS, FEWEST_VOXELS
 from .smoke import scene_of
+
+ROUNDING = 1e-5
+"""Share of the box's longest side by which Blender's 32-bit places may be wrong: a hundred of their steps."""
 
 
 def box_of(smoke: bpy.types.Object) -> bpy.types.Object | None:
@@ -28,10 +32,7 @@ def box_corners(box: bpy.types.Object) -> list[Vector]:
 
 def domain_table(box: bpy.types.Object, rotation: Matrix, settings: bpy.types.PropertyGroup) -> dict[str, Any]:
     """The domain: the box in cubic voxels, a multiple of four along each side. It grows and keeps its floor."""
-    to_engine = rotation.inverted()
-    corners = [to_engine @ corner for corner in box_corners(box)]
-    low = Vector(min(corner[axis] for corner in corners) for axis in range(3))
-    high = Vector(max(corner[axis] for corner in corners) for axis in range(3))
+    low, high = _sides(box, rotation)
     extent = high - low
     if min(extent) <= 1e-6 * max(*extent, 1e-6):
         raise ShotError("The box is flat: give it a width, a depth and a height.")
@@ -45,6 +46,48 @@ def domain_table(box: bpy.types.Object, rotation: Matrix, settings: bpy.types.Pr
         "max": [s + length for s, length in zip(start, size, strict=True)],
         "resolution": counts,
     }
+
+
+def _sides(box: bpy.types.Object, rotation: Matrix) -> tuple[Vector, Vector]:
+    """The lowest and the highest corner of a box in the engine's world."""
+    corners = [rotation.inverted() @ corner for corner in box_corners(box)]
+    low = Vector(min(corner[axis] for corner in corners) for axis in range(3))
+    return low, Vector(max(corner[axis] for corner in corners) for axis in range(3))
+
+
+def keep_camera_outside(
+    domain: dict[str, Any], camera: dict[str, Any], box: bpy.types.Object, rotation: Matrix
+) -> dict[str, Any]:
+    """The domain, grown to the side away from a camera that would else stand in what cubes add to the box.
+
+    A camera on a side of the box counts as outside, for Blender rounds its place to 32 bits.
+
+    Raises
+    ------
+    ShotError
+        If the camera stands inside the box itself.
+    """
+    eyes = [Vector(row[3] for row in pose[:3]) for pose in camera.get("matrices") or [camera["matrix"]]]
+
+    def inside(low: Sequence[float], high: Sequence[float], eye: Vector, margin: float) -> bool:
+        return all(a + margin <= place <= b - margin for a, place, b in zip(low, eye, high, strict=True))
+
+    if camera["type"] != "perspective" or not any(inside(domain["min"], domain["max"], eye, 0.0) for eye in eyes):
+        return domain
+    low, high = _sides(box, rotation)
+    rounding = ROUNDING * max(high - low)
+    if any(inside(low, high, eye, rounding) for eye in eyes):
+        raise ShotError("The camera stands inside the smoke's box: move it out, or make the box smaller.")
+    start, end = list(domain["min"]), list(domain["max"])
+    for axis in (0, 1):  # upwards it grows from its floor
+        length = end[axis] - start[axis]
+        if all(eye[axis] >= high[axis] - rounding for eye in eyes):
+            end[axis] = high[axis] - 2 * rounding
+            start[axis] = end[axis] - length
+        elif all(eye[axis] <= low[axis] + rounding for eye in eyes):
+            start[axis] = low[axis] + 2 * rounding
+            end[axis] = start[axis] + length
+    return {**domain, "min": start, "max": end}
 
 
 def inlet_table(inlet: bpy.types.Object, rotation: Matrix, domain: dict[str, Any]) -> dict[str, Any]:

@@ -12,7 +12,7 @@ import bpy
 from mathutils import Matrix
 
 from .blender_scene import ShotError, at_frame
-from .box_table import box_corners, box_of, domain_table, in_scene, inlet_table
+from .box_table import box_corners, box_of, domain_table, in_scene, inlet_table, keep_camera_outside
 from .camera_table import camera_over_frames
 from .clip_table import clip_table, start_frame
 from .contract import IMAGE_SUFFIXES, SIDES
@@ -49,6 +49,7 @@ def shot_tables(smoke: bpy.types.Object, quick: bool = False) -> dict[str, Any]:
             rotation = box.matrix_world.to_quaternion().to_matrix()
             tables["domain"] = domain_table(box, rotation, settings)
             tables["camera"] = camera_over_frames(smoke, rotation, box_corners(box), quick)
+            tables["domain"] = keep_camera_outside(tables["domain"], tables["camera"], box, rotation)
             inlet = in_scene(scene, settings.inlet)
             if inlet is not None:
                 tables["inlet"] = [inlet_table(inlet.evaluated_get(depsgraph), rotation, tables["domain"])]

@@ -562,3 +562,25 @@ def test_a_medium_of_ones_own(shot, tmp_path) -> None:
     settings.use_medium, settings.extinction, settings.albedo, settings.anisotropy = True, 7.0, 0.5, -0.25
     medium = engines(shot, tmp_path).medium
     assert (medium.extinction, medium.albedo, medium.anisotropy) == (7.0, 0.5, -0.25)
+
+
+def with_camera_at(scene: bpy.types.Scene, y: float) -> dict:
+    """The domain for a camera so far along Y, before a box that cubes do not fill: from -1 to 1, 4.5 cubes of 4."""
+    smoke(scene).smokelift.box.scale = (1.0, 1.0, 1.777)
+    scene.camera.location.y = y
+    bpy.context.view_layer.update()
+    return shot_tables(smoke(scene))["domain"]
+
+
+def test_a_camera_beside_the_box_is_not_inside_it(shot) -> None:
+    """Nor in what rounding up to cubes adds, nor by the rounding of Blender's numbers."""
+    far = with_camera_at(shot, -7.0)
+    assert far["min"][1] < -1.0
+    for y in (-1.0, float(np.nextafter(np.float32(-1.0), np.float32(0.0))), far["min"][1] * 0.5 - 0.5):
+        near = with_camera_at(shot, y)
+        assert near["min"][1] > y
+        assert near["resolution"] == far["resolution"]
+        assert near["min"][1] == pytest.approx(-1.0, abs=1e-3)
+        assert near["max"][1] - near["min"][1] == pytest.approx(far["max"][1] - far["min"][1])
+    with pytest.raises(ShotError, match="inside the smoke's box"):
+        with_camera_at(shot, -0.9)
