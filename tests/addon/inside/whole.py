@@ -132,7 +132,7 @@ def test_light_and_background_from_the_clip(shot, tmp_path) -> None:
 
 
 def test_a_shot_of_which_only_the_clip_is_given_is_made(scene, tmp_path) -> None:
-    """A new file, whose cube would hide the smoke, and a clip: the smoke is active, and the playhead stays."""
+    """A new file, whose cube would hide the smoke, and a clip: the smoke is active, and the playhead goes to it."""
     bpy.ops.mesh.primitive_cube_add(size=2.0)
     cube = scene.objects["Cube"]
     scene.frame_set(7)
@@ -143,7 +143,7 @@ def test_a_shot_of_which_only_the_clip_is_given_is_made(scene, tmp_path) -> None
     row = make(scene, tmp_path / "out")
     assert row.outcome == "done"
     assert cube.hide_render and cube.hide_viewport
-    assert scene.frame_current == 7
+    assert scene.frame_current == FIRST
     assert bpy.context.view_layer.objects.active == smoke(scene)
     assert smoke(scene).select_get()
     assert "Camera not given" in Take(Path(row.take)).log_file.read_text()
