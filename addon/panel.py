@@ -127,6 +127,10 @@ def _draw_cost(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bp
         text = iface_("About {:s}, {:.1f} GiB of memory, up to {:s} on disk")
         draw_text(column, context, text.format(duration(state.seconds), state.memory, size(state.disk)), "TIME")
         column.label(text=iface_("{} x {} x {} voxels").format(*state.resolution), translate=False, icon="BLANK1")
+        if state.lost >= 0.0:
+            quality = smoke.smokelift.bl_rna.properties["quality"].enum_items[smoke.smokelift.quality].name
+            text = iface_("{:s} loses {:.1%} of the smoke's contrast in the clip.")
+            draw_text(column, context, text.format(iface_(quality), state.lost), "BLANK1")
         if state.memory > state.memory_free:
             text = iface_("Only {:.1f} GiB are free: choose a lower quality.")
             draw_text(column, context, text.format(state.memory_free), "ERROR")

@@ -452,6 +452,7 @@ class SmokeliftState(bpy.types.PropertyGroup):
     check_error: StringProperty()
     notes: StringProperty()
     resolution: IntVectorProperty(size=3)
+    lost: FloatProperty(default=-1.0, description="Share of the smoke's contrast in the clip; below 0 if unknown")
     seconds: FloatProperty()
     memory: FloatProperty(description="GiB")
     memory_free: FloatProperty(description="GiB")

@@ -5,6 +5,7 @@ It starts by itself once the settings rest, and its result is shown in the panel
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import Any
 
 import bpy
 
@@ -53,6 +54,12 @@ def found_lines(facts: Iterable[Mapping[str, str]]) -> list[str]:
     return lines
 
 
+def lost_share(choices: Iterable[Mapping[str, Any]]) -> float:
+    """Share of the smoke's contrast in the clip that the grid loses; below 0 where the engine did not measure it."""
+    measured = next((choice["measured"] for choice in choices if choice["what"] == "resolution"), {})
+    return float(measured.get("lost", -1.0))
+
+
 class ShotCheck:
     """The engine's check of the shot whose settings changed last; its result goes into the state of the session."""
 
@@ -90,6 +97,7 @@ class ShotCheck:
         state.notes = "\n".join(found_lines(details.get("facts", ())))
         if state.check_done:
             state.resolution = details["scene"]["domain"]["resolution"]
+            state.lost = lost_share(details.get("choices", ()))
             state.seconds = details["seconds"]
             state.memory, state.memory_free = details["memory"] / 2**30, details["memory_free"] / 2**30
             state.disk = details["disk"] / 1e6

@@ -210,3 +210,15 @@ def test_what_is_automatic_is_a_word_and_a_tick(shot, name) -> None:
     assert drawn(shot, *panels).count("Automatic") == words - 1
     setattr(settings, f"use_{name}", False)
     assert getattr(settings, name) == 0
+
+
+def test_a_quality_says_what_it_loses(shot) -> None:
+    """Beside what it costs; nothing where the engine did not measure it."""
+    measured = [{"what": "resolution", "measured": {"lost": 0.0772}}]
+    state = bpy.context.window_manager.smokelift
+    state.check_smoke, state.check_done = smoke(shot).session_uid, True
+    state.lost = shot_check.lost_share(measured)
+    words = "Draft loses 7.7% of the smoke's contrast"
+    assert words in " ".join(" ".join(drawn(shot, panel.SMOKELIFT_PT_view)).split())
+    state.lost = shot_check.lost_share([])
+    assert "loses" not in " ".join(drawn(shot, panel.SMOKELIFT_PT_view))
