@@ -26,7 +26,8 @@ import numpy as np
 from smokelift.output.archive import FLAME
 from smokelift.output.atomic import atomic_path
 from smokelift.output.index import SequenceError
-from smokelift.output.layout import INDEX, frame_path
+from smokelift.output.layout import INDEX, frame_path, proxy_path
+from smokelift.output.proxy import write_proxy
 from smokelift.output.sequence import Sequence
 from smokelift.output.usd import UsdVolume, usd_text
 from smokelift.output.vdb import vdb_module, write_vdb
@@ -193,10 +194,8 @@ def _write_frame(sequence: Sequence, number: int, out: Path, settings: ExportSet
             flame = _rounded(flame, density_step(domain, 1.0))  # radiance adds up along a ray as optical depth does
     write_vdb(paths[0], rho, velocity, domain, sequence.settings, flame)
     if settings.proxy > 1:
-        paths.append(out / proxy_name(number))
-        coarse, wide = coarser(density, domain, settings.proxy)
-        coarse = _rounded(_thinned(coarse, wide, extinction), density_step(wide, extinction))
-        write_vdb(paths[1], coarse, None, wide, sequence.settings)
+        paths.append(proxy_path(out, number))
+        write_proxy(paths[1], _thinned(density, domain, extinction), domain, settings.proxy)
     return sum(path.stat().st_size for path in paths)
 
 
@@ -215,26 +214,6 @@ def density_step(domain: Domain, extinction: float) -> float:
 def velocity_step(domain: Domain, fps: float) -> float:
     """Step of a quantised velocity in m/s (see the module)."""
     return _power_of_two(VELOCITY_STEP * domain.voxel_size * fps)
-
-
-def coarser(density: Array, domain: Domain, times: int) -> tuple[Array, Domain]:
-    """Return the means of a density over cubes of voxels, and the box of those, which may be larger.
-
-    Parameters
-    ----------
-    density : (nx, ny, nz)
-    domain
-        Its box.
-    times
-        Voxels along a side of a cube.
-    """
-    counts = tuple(-(-n // times) for n in domain.resolution)
-    padded = np.pad(density, [(0, count * times - n) for count, n in zip(counts, density.shape, strict=True)])
-    x, y, z = counts
-    coarse = padded.reshape(x, times, y, times, z, times).mean((1, 3, 5), dtype=np.float32)
-    edge = times * domain.voxel_size
-    a, b, c = (low + count * edge for low, count in zip(domain.min, counts, strict=True))
-    return coarse, Domain(domain.min, (a, b, c), (x, y, z))
 
 
 def _thinned(density: Array, domain: Domain, extinction: float) -> Array:
@@ -256,17 +235,12 @@ def _medium(sequence: Sequence) -> dict[str, float]:
     return {"extinction": medium.extinction, "albedo": medium.albedo, "anisotropy": medium.anisotropy}
 
 
-def proxy_name(number: int) -> str:
-    """Return the name of the file of a proxy's frame."""
-    return f"proxy_{number:04d}.vdb"
-
-
 def _usd_volumes(sequence: Sequence, settings: ExportSettings) -> list[UsdVolume]:
     domain, numbers = sequence.scene.domain, sequence.frames
     files = {number: frame_path(Path(), number, "vdb").name for number in numbers}
     if settings.proxy == 1:
         return [UsdVolume("Volume", "default", files, _grids(sequence, settings), domain)]
-    proxies = {number: proxy_name(number) for number in numbers}
+    proxies = {number: proxy_path(Path(), number).name for number in numbers}
     return [
         UsdVolume("Volume", "render", files, _grids(sequence, settings), domain),
         UsdVolume("Proxy", "proxy", proxies, ("density",), domain),

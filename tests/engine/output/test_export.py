@@ -15,7 +15,6 @@ from smokelift.output.export import ExportSettings, export_sequence, export_size
 from smokelift.output.index import SequenceError
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
-from smokelift.scene import Domain
 
 DOMAIN, EXTINCTION = SCENE.domain, SCENE.medium.extinction
 
@@ -93,15 +92,6 @@ def test_the_proxy_lies_where_the_smoke_is(sequence: Sequence, tmp_path: Path) -
     middle = tuple(low + 2 * edge for low in DOMAIN.min)
     assert density.transform.voxelSize() == pytest.approx((4 * edge,) * 3)  # type: ignore[attr-defined]  # no stubs
     assert density.transform.indexToWorld((0, 0, 0)) == pytest.approx(middle)  # type: ignore[attr-defined]  # no stubs
-
-
-def test_a_coarser_box_keeps_the_mass() -> None:
-    domain = Domain((0, 0, 0), (0.5, 0.7, 0.9), (5, 7, 9))
-    rho = np.random.default_rng(1).random((5, 7, 9)).astype(np.float32)
-    coarse, wide = export.coarser(rho, domain, 3)
-    assert coarse.shape == wide.shape == (2, 3, 3)
-    assert wide.max == pytest.approx((0.6, 0.9, 0.9))
-    assert coarse.sum() * 27 == pytest.approx(rho.sum(), rel=1e-5)
 
 
 @needs_vdb
