@@ -4,7 +4,9 @@ import bpy
 from bpy.props import EnumProperty
 
 from . import look, volume
+from .export import draw_work
 from .needs import NeedsResult
+from .proxy import in_viewport, modifier_of
 from .smoke import active_smoke
 from .subpanel import OfResult
 
@@ -40,7 +42,8 @@ class _Look(OfResult):
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split = True
-        data = active_smoke(context.scene).data
+        smoke = active_smoke(context.scene)
+        data = smoke.data
         sockets = look.controls(data)
         if sockets:
             layout.operator_menu_enum("smokelift.use_look", "preset", text="Presets", icon="PRESET")
@@ -51,8 +54,13 @@ class _Look(OfResult):
             column.prop(socket, "default_value", text=socket.name)
         column = layout.column()
         column.use_property_decorate = False
-        column.prop(data.display, "density", text="Viewport Density")
+        column.prop(in_viewport(smoke).display, "density", text="Viewport Density")
         column.prop(data.render, "step_size", text="Render Step")
+        modifier = modifier_of(smoke)
+        if modifier is not None:
+            column.prop(modifier, "show_viewport", text="Proxy in Viewport", icon="NONE")
+        else:
+            draw_work(column, context, smoke, "smokelift.make_proxy", "MOD_REMESH")
 
 
 class SMOKELIFT_PT_view_look(_Look, bpy.types.Panel):

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import bpy
@@ -10,11 +11,12 @@ from mathutils import Vector
 
 from .blender_scene import frame_rate
 from .box_table import engine_to_world
-from .contract import DIRECTIONS, FRAME_FILE, MADE_UP
+from .contract import DIRECTIONS, FRAME_FILE, MADE_UP, PROXY_FILE
 from .kept import set_unless_changed
 from .look import fit_look
 from .pace import paced
 from .paths import absolute, relative
+from .proxy import fit_proxy, proxy_of
 from .smoke import scene_of, smokes
 from .take import Take
 
@@ -44,9 +46,8 @@ def show(smoke: bpy.types.Object, take: Take) -> bpy.types.Object | None:
         smoke.delta_location = (0.0, 0.0, 0.0)
         set_unless_changed(smoke, "place", smoke, "matrix_basis", engine_to_world(smoke))
     _correct_position(smoke, index["scene"]["domain"])
-    _set_file(smoke.data, take, index)
-    _set_time(smoke, scene_of(smoke), index)
     fit_look(smoke.data, index["scene"])
+    _play(smoke, scene_of(smoke), take, index)
     smoke.data[PROVENANCE] = _provenance(index.get("provenance", []))
     return smoke
 
@@ -127,8 +128,7 @@ def show_beside(smoke: bpy.types.Object, take: Take) -> bpy.types.Object | None:
     domain = index["scene"]["domain"]
     width = (domain["max"][0] - domain["min"][0]) * BESIDE
     copy.location += copy.matrix_basis.to_3x3() @ Vector((width, 0.0, 0.0))
-    _set_file(copy.data, take, index)
-    _set_time(copy, scene_of(smoke), index)
+    _play(copy, scene_of(smoke), take, index)
     return copy
 
 
@@ -190,9 +190,20 @@ def _numbers(index: dict[str, Any]) -> list[int]:
     return sorted(int(number) for number in index["frames"])
 
 
-def _set_file(volume: bpy.types.Volume, take: Take, index: dict[str, Any]) -> None:
-    """Make a Volume read the take's files."""
-    path = relative(take.directory / FRAME_FILE.format(_numbers(index)[0]))
+def _play(smoke: bpy.types.Object, scene: bpy.types.Scene, take: Take, index: dict[str, Any]) -> None:
+    """Make a smoke, and its proxy if the take has one, read the take's files and play when its clip does."""
+    numbers = _numbers(index)
+    _set_file(smoke.data, take.directory / FRAME_FILE.format(numbers[0]), index)
+    fit_proxy(smoke, take, numbers)
+    proxy = proxy_of(smoke)
+    if proxy is not None:
+        _set_file(proxy, take.directory / PROXY_FILE.format(numbers[0]), index)
+    _set_time(smoke, scene, index)
+
+
+def _set_file(volume: bpy.types.Volume, file: Path, index: dict[str, Any]) -> None:
+    """Make a Volume read the files of a take."""
+    path = relative(file)
     if volume.filepath != path:
         volume.filepath = path
     volume.is_sequence = True
@@ -205,8 +216,15 @@ def _set_file(volume: bpy.types.Volume, take: Take, index: dict[str, Any]) -> No
 
 
 def _set_time(smoke: bpy.types.Object, scene: bpy.types.Scene, index: dict[str, Any]) -> None:
-    """Make a smoke play when its clip does, at the pace that is tried out."""
-    volume, settings = smoke.data, smoke.smokelift
+    """Make a smoke and its proxy play when its clip does, at the pace that is tried out."""
+    for volume in filter(None, (smoke.data, proxy_of(smoke))):
+        _set_time_of(volume, smoke, scene, index)
+
+
+def _set_time_of(
+    volume: bpy.types.Volume, smoke: bpy.types.Object, scene: bpy.types.Scene, index: dict[str, Any]
+) -> None:
+    settings = smoke.smokelift
     numbers, ratio = _numbers(index), _ratio(smoke, scene, index)
     real = _real_time(smoke, ratio, index)
     direction = index.get("settings", {}).get("direct", {}).get("job")

@@ -1,4 +1,4 @@
-"""What is handed on: the files, the assets, and the proxy in the viewport."""
+"""What the engine writes of a result: the files and assets that are handed on, and a proxy."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 import pytest
 
-from addon import export, smoke_takes, volume
+from addon import export, proxy, smoke_takes, volume
 from addon.take import Take
 from smokelift.output.export import ExportSettings, export_sequence
 from smokelift.output.sequence import Sequence
@@ -118,21 +118,14 @@ def test_the_asset_is_used_in_another_file(made, tmp_path) -> None:
     assert numbers == [3, 2, 1], "each instance plays a frame later"
 
 
-def test_a_proxy_in_the_viewport(made) -> None:
-    """It follows the smoke, renders do not see it, and a second press takes it away."""
-    with pytest.raises(RuntimeError, match=r"no proxy in .*: choose a proxy and export first"):
-        bpy.ops.smokelift.use_proxy()
-    exported(made, proxy=2)
-    assert bpy.ops.smokelift.use_proxy() == {"FINISHED"}
-    proxy = export.proxy_of(made)
-    assert (made.hide_viewport, made.hide_render) == (True, False)
-    assert (proxy.hide_viewport, proxy.hide_render) == (False, True)
-    made.location.x = 2.0
-    bpy.context.view_layer.update()
-    assert proxy.matrix_world.translation.x == pytest.approx(made.matrix_world.translation.x)
-    assert grids(proxy.data, proxy.data.frame_start + 1) == ("proxy_0002.vdb", {"density"})
-    assert bpy.ops.smokelift.use_proxy() == {"FINISHED"}
-    assert export.proxy_of(made) is None and not made.hide_viewport
+def test_a_result_gets_a_proxy(made) -> None:
+    """The viewport shows it from then on, and it can be switched off."""
+    assert proxy.modifier_of(made) is None
+    assert bpy.ops.smokelift.make_proxy() == {"FINISHED"}
+    assert proxy.in_viewport(made) != made.data
+    assert grids(proxy.proxy_of(made), made.data.frame_start + 1) == ("proxy_0002.vdb", {"density"})
+    proxy.modifier_of(made).show_viewport = False
+    assert proxy.in_viewport(made) == made.data
 
 
 def test_a_folder_with_other_files_is_left_alone(made, tmp_path) -> None:
@@ -149,4 +142,4 @@ def test_without_a_result_there_is_nothing_to_export(scene) -> None:
     """The buttons are off."""
     smoke(scene)
     assert not bpy.ops.smokelift.export.poll()
-    assert not bpy.ops.smokelift.use_proxy.poll()
+    assert not bpy.ops.smokelift.make_proxy.poll()
