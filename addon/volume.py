@@ -46,7 +46,7 @@ def show(smoke: bpy.types.Object, take: Take) -> bpy.types.Object | None:
         smoke.delta_location = (0.0, 0.0, 0.0)
         set_unless_changed(smoke, "place", smoke, "matrix_basis", engine_to_world(smoke))
     _correct_position(smoke, index["scene"]["domain"])
-    fit_look(smoke.data, index["scene"])
+    fit_look(smoke, index["scene"])
     _play(smoke, scene_of(smoke), take, index)
     smoke.data[PROVENANCE] = _provenance(index.get("provenance", []))
     return smoke
