@@ -10,7 +10,8 @@ It knows nothing of the engine but its command line and its files. From what kno
   large one), `directing` (what acts on the smoke after its clip), `shot_setup` (camera, world and light that match the
   clip), `compositing` (smoke over the clip), `projection` (the clip's background on a card), `plate` (the clean plate
   for these three), `instances` (the smoke at other times), `nodes` (the node groups of these), `undistort` (the clip
-  without its lens's distortion), `follow` (paths of a .blend that is saved elsewhere).
+  without its lens's distortion), `usd` (an export that is imported), `follow` (paths of a .blend that is saved
+  elsewhere).
 - Work beside Blender: `run` (the queue of takes), `shot_check` (the forecast of a run), `batch` (the command line).
 - Interface: `properties` (the settings); `panel` (`automatic` for its numbers)
   with the sub-panels `results_panel`, `advanced_panel`, `look_panel`,
@@ -56,10 +57,11 @@ def _modules() -> tuple[ModuleType, ...]:
         run,
         setup_panel,
         undistort,
+        usd,
         volume,
     )
 
     data = (preferences, properties, volume, follow, run)
-    buttons = (operators, box, editors, instances, undistort, drop, presets)
+    buttons = (operators, box, editors, instances, undistort, drop, presets, usd)
     panels = (panel, results_panel, advanced_panel, look_panel, setup_panel, direct_panel, export)
     return (*data, *buttons, *panels, batch)

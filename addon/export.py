@@ -44,6 +44,16 @@ class SmokeliftExport(bpy.types.PropertyGroup):
         options=PATH_OPTIONS,
         update=_changed,
     )
+    host: EnumProperty(
+        name="For",
+        description="Program that reads the files",
+        items=[
+            ("blender", "Blender", "And other programs with Z up: grids density and velocity"),
+            ("houdini", "Houdini", "Y up, grids density and vel"),
+            ("unreal", "Unreal", "Densities from 0 to 1 for 8 bits, and a pivot that stays in place"),
+        ],
+        update=_changed,
+    )
     precision: EnumProperty(
         name="Precision",
         description="Bits of each value. Smoke too thin to be seen is left out either way",
@@ -123,10 +133,12 @@ class _Session:
             return None
         self.sentence = job.sentence
         smoke = find_smoke(self.smoke)
-        if smoke is not None and done and self.operator == SMOKELIFT_OT_export.bl_idname:
-            write_asset(smoke, folder_of(smoke))
-        elif smoke is not None and done:
+        if smoke is None or not done:
+            return None
+        if self.operator == SMOKELIFT_OT_make_proxy.bl_idname:
             volume.show(smoke, volume.shown_take(smoke))
+        elif smoke.smokelift_export.host == "blender":
+            write_asset(smoke, folder_of(smoke))
         return None
 
     def _start_size(self) -> None:
@@ -159,7 +171,7 @@ def arguments(smoke: bpy.types.Object) -> list[str]:
     """The engine's arguments for the export of the take that a smoke shows."""
     settings, take = smoke.smokelift_export, volume.shown_take(smoke)
     words = ["export", str(take.directory), "--out", str(folder_of(smoke))]
-    words += ["--precision", settings.precision, "--proxy", settings.proxy]
+    words += ["--precision", settings.precision, "--proxy", settings.proxy, "--host", settings.host]
     return words if settings.use_velocity else [*words, "--no-velocity"]
 
 
@@ -207,7 +219,7 @@ class _Writes(NeedsResult):
     def execute(self, context: bpy.types.Context) -> set[str]:
         smoke = active_smoke(context.scene)
         try:
-            _session.start(smoke, self.words(smoke), self.bl_idname)
+            _session.start(smoke, self.words(smoke), type(self).bl_idname)
         except EngineMissingError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
@@ -223,7 +235,7 @@ class _Writes(NeedsResult):
 
 
 class SMOKELIFT_OT_export(_Writes, bpy.types.Operator):
-    """Write small OpenVDB files of the smoke, a USD file of them, and an asset to be used in other files"""
+    """Write small OpenVDB files of the smoke, a USD file of them, and for Blender an asset to be used in other files"""
 
     bl_idname = "smokelift.export"
     bl_label = "Export Smoke"
@@ -280,7 +292,7 @@ class _ExportPanel(OfResult):
         smoke = active_smoke(context.scene)
         settings = smoke.smokelift_export
         layout.prop(settings, "folder", placeholder=str(folder_of(smoke)))
-        for name in ("precision", "use_velocity", "proxy"):
+        for name in ("host", "precision", "use_velocity", "proxy"):
             layout.prop(settings, name)
         if _session.smoke != smoke.session_uid:
             _session.ask_size(smoke)
