@@ -44,8 +44,8 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
         "--host",
         choices=get_args(HostName),
         default="blender",
-        help="the program that reads the files (default blender): houdini has Y up and calls the velocity vel; unreal "
-        "has densities from 0 to 1 and the box's corners in every frame",
+        help="the program that reads the files: blender (default), with Z up; houdini, with Y up and the velocity as "
+        "vel; unreal, with densities from 0 to 1 and the box's corners in every frame",
     )
     parser.add_argument("--size", action="store_true", help="say the size, and write nothing")
     parser.set_defaults(run=run)
