@@ -101,3 +101,12 @@ def _input(modifier: bpy.types.Modifier, name: str) -> tuple[Any, str | None]:
     """What holds an input of a modifier as its attribute ``value``, or before 5.2 the modifier itself and the key."""
     key = modifier.node_group.interface.items_tree[name].identifier
     return (getattr(modifier.properties.inputs, key), None) if hasattr(modifier, "properties") else (modifier, key)
+
+
+def input_path(modifier: bpy.types.Modifier, name: str) -> str:
+    """The path from its object to the value of an input of a modifier's node group, for a driver."""
+    _, key = _input(modifier, name)
+    before = f'modifiers["{modifier.name}"]'
+    if key is not None:
+        return f'{before}["{key}"]'
+    return f"{before}.properties.inputs.{modifier.node_group.interface.items_tree[name].identifier}.value"
