@@ -32,7 +32,7 @@ def complete_import(folder: Path) -> None:
             obj.data.velocity_grid = next((name for name in grids if name.startswith("vel")), "velocity")
 
 
-class SMOKELIFT_USD_import(bpy.types.USDHook):
+class SMOKELIFT_USD_import(getattr(bpy.types, "USDHook", object)):
     """Completes what is imported."""
 
     bl_idname = "smokelift.usd_import"
@@ -45,11 +45,11 @@ class SMOKELIFT_USD_import(bpy.types.USDHook):
 
 
 def register() -> None:
-    """Register the hook, unless this Python lacks USD's module: without it Blender ends when a hook is called."""
-    if importlib.util.find_spec("pxr") is not None:
+    """Register the hook, unless USD or its module is missing: without that Blender ends when it calls a hook."""
+    if hasattr(bpy.types, "USDHook") and importlib.util.find_spec("pxr") is not None:
         bpy.utils.register_class(SMOKELIFT_USD_import)
 
 
 def unregister() -> None:
-    if SMOKELIFT_USD_import.is_registered:
+    if getattr(SMOKELIFT_USD_import, "is_registered", False):
         bpy.utils.unregister_class(SMOKELIFT_USD_import)
