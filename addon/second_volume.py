@@ -59,8 +59,11 @@ class SecondVolume:
 
     def remove(self, smoke: bpy.types.Object) -> None:
         """Take the modifier and its Volume away."""
-        modifier, volume = self.modifier(smoke), self.volume(smoke)
-        if modifier is not None:
-            smoke.modifiers.remove(modifier)
-        if volume is not None and volume.users == 1:
-            bpy.data.volumes.remove(volume)  # takes the object with it
+        modifier = self.modifier(smoke)
+        if modifier is None:
+            return
+        obj = get_input(modifier, self.socket)
+        set_input(modifier, self.socket, None)  # Blender 5.2 would go on counting it as used
+        smoke.modifiers.remove(modifier)
+        if obj is not None and obj.users == 0:  # else it is that of a duplicate, too
+            bpy.data.volumes.remove(obj.data)  # takes the object with it

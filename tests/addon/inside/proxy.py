@@ -122,6 +122,17 @@ def test_a_duplicate_gets_a_proxy_of_its_own(scene, obj, tmp_path) -> None:
     assert len({tuple(data.materials) for data in proxies}) == 1
 
 
+def test_a_duplicate_keeps_the_proxy_that_it_shares(scene, obj, tmp_path) -> None:
+    """Where the original shows a result without one, and the duplicate after that."""
+    twin = obj.copy()
+    twin.data = obj.data.copy()
+    scene.collection.objects.link(twin)
+    volume.show(obj, made(tmp_path, number=2))
+    assert in_viewport(twin, 3) == "proxy_0003.vdb"
+    volume.show(twin, volume.shown_take(obj))
+    assert set(bpy.data.volumes) == {obj.data, twin.data}
+
+
 def test_it_is_saved_with_the_file(scene, obj, tmp_path) -> None:
     """Although it is in no collection."""
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
