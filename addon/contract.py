@@ -19,6 +19,9 @@ FRAME_FILE = "smoke_{:04d}.vdb"
 PROXY_FILE = "proxy_{:04d}.vdb"
 """There too, and in a folder with an export: the coarse copy of a frame."""
 
+PROXY_VOXELS = 4_000_000
+"""Voxels of a box from which on a run writes coarse copies."""
+
 EXPORT_FILE = "export.json"
 """In a folder with an export: what was exported."""
 

@@ -4,9 +4,13 @@ A modifier that acts in viewports alone gives the smoke the grids of another Vol
 itself, also in a Blender without the add-on, and no viewport reads the smoke's own files.
 """
 
+import math
+from collections.abc import Mapping
+from typing import Any
+
 import bpy
 
-from .contract import PROXY_FILE
+from .contract import PROXY_FILE, PROXY_VOXELS
 from .nodes import Input, add_node, new_group
 from .second_volume import SecondVolume
 from .take import Take
@@ -34,6 +38,11 @@ def in_viewport(smoke: bpy.types.Object) -> bpy.types.Volume:
     """The Volume that viewports show of a smoke, which has the settings for that."""
     modifier, proxy = modifier_of(smoke), proxy_of(smoke)
     return proxy if proxy is not None and modifier.show_viewport else smoke.data
+
+
+def lacks_proxy(smoke: bpy.types.Object, index: Mapping[str, Any]) -> bool:
+    """Whether a smoke is large for a viewport and has no proxy, as an earlier result; ``index`` is that of its take."""
+    return modifier_of(smoke) is None and math.prod(index["scene"]["domain"]["resolution"]) >= PROXY_VOXELS
 
 
 def fit_proxy(smoke: bpy.types.Object, take: Take, numbers: list[int]) -> None:
