@@ -14,6 +14,7 @@ from smokelift.app.commands import (
     inspect,
     loop,
     preview,
+    proxy,
     reconstruct,
     render,
     retime,
@@ -31,6 +32,7 @@ MODULES = (
     retime,
     loop,
     export,
+    proxy,
     chart,
     doctor,
 )
