@@ -1,4 +1,5 @@
 #include "codes.h"
+#include "halves.h"
 #include "patches.h"
 #include "picture_blur.h"
 #include "pictures.h"
@@ -106,6 +107,66 @@ void register_places(py::module_ &module) {
             return values;
         },
         "picture"_a, "rows"_a, "columns"_a);
+}
+
+// A box of an array, of which consecutive elements along z are neighbours in memory.
+template <class T, class Data> Part<T> part_of(const py::array_t<std::remove_const_t<T>, 0> &a, Data data) {
+    require_fit(a.ndim() == 3 && a.size() > 0 && a.strides(2) == py::ssize_t(sizeof(T)));
+    Part<T> part{{data, {}}, {int(a.shape(0)), int(a.shape(1)), int(a.shape(2))}};
+    for (int axis = 0; axis < 3; ++axis)
+        part.at.stride[axis] = a.strides(axis) / Stride(sizeof(T));
+    return part;
+}
+
+template <class T> Part<const T> part_of(const py::array_t<T, 0> &a) { return part_of<const T>(a, a.data()); }
+
+Shape halved(const Shape &n) { return {(n[0] + 1) / 2, (n[1] + 1) / 2, (n[2] + 1) / 2}; }
+
+void register_halves(py::module_ &module) {
+    using namespace py::literals;
+    using Box = py::array_t<float, 0>;
+    using BoxMarks = py::array_t<bool, 0>;
+
+    module.def(
+        "means_of_two",
+        [](const Box &values) {
+            const auto fine = part_of(values);
+            return filled(halved(fine.n),
+                          [&](Out means, Workers &workers) { means_of_two(fine, means, workers); });
+        },
+        py::arg("values").noconvert());
+
+    module.def(
+        "prolong_values",
+        [](const Box &values, const BoxMarks &voxels) {
+            const auto coarse = part_of(values);
+            const auto marked = part_of(voxels);
+            require_fit(coarse.n == halved(marked.n));
+            std::vector<std::size_t> first(marked.n[0] + 1, 0);
+            for (int x = 0; x < marked.n[0]; ++x) {
+                first[x + 1] = first[x];
+                for (int y = 0; y < marked.n[1]; ++y)
+                    first[x + 1] += std::count(marked.row(x, y), marked.row(x, y) + marked.n[2], true);
+            }
+            Array prolonged(py::ssize_t(first.back()));
+            float *const result = prolonged.mutable_data();
+            released([&](Workers &workers) { prolong_values(coarse, marked, first, result, workers); });
+            return prolonged;
+        },
+        py::arg("values").noconvert(), py::arg("voxels").noconvert());
+
+    module.def(
+        "scale_alike",
+        [](const Box &values, const BoxMarks &voxels, const Box &before, const Box &after, float least,
+           Box &result) {
+            const auto fine = part_of(values), was = part_of(before), is = part_of(after);
+            const auto marked = part_of(voxels);
+            const auto scaled = part_of<float>(result, result.mutable_data());
+            require_fit(marked.n == fine.n && scaled.n == fine.n && was.n == halved(fine.n) && is.n == was.n);
+            released([&](Workers &workers) { scale_alike(fine, marked, was, is, least, scaled, workers); });
+        },
+        py::arg("values").noconvert(), py::arg("voxels").noconvert(), py::arg("before").noconvert(),
+        py::arg("after").noconvert(), "least"_a, py::arg("result").noconvert());
 }
 
 void register_codes(py::module_ &module) {
@@ -314,6 +375,7 @@ void register_patches(py::module_ &module) {
 
 void register_pictures(py::module_ &module) {
     register_places(module);
+    register_halves(module);
     register_codes(module);
     register_filters(module);
     register_turning(module);

@@ -430,6 +430,20 @@ class PictureMap:
 def read_bilinearly(picture: npt.NDArray[np.floating[Any]], rows: Array, columns: Array) -> Array:
     """A picture (rows, columns) at places (n,) in pixels; the nearest pixel's value outside."""
 
+# A grid and one half as fine. Arrays may be boxes of larger ones, but for the last axis.
+
+def means_of_two(values: Array) -> Array:
+    """Means of two along every axis; beyond the grid there is nothing."""
+
+def prolong_values(values: Array, voxels: Mask) -> Array:
+    """Values of the coarse grid, linear between the voxels' middles, at the marked voxels (n,) of the fine one."""
+
+def scale_alike(values: Array, voxels: Mask, before: Array, after: Array, least: float, result: Array) -> None:
+    """Write values x (after / before) at the marked voxels into a result.
+
+    ``before``, at least ``least``, and ``after`` are the coarse grid's, linear between its voxels' middles.
+    """
+
 def sum_lines(
     picture: npt.NDArray[np.uint8],
     table: Array,
