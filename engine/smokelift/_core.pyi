@@ -45,6 +45,9 @@ def project(faces: Faces, closed: Closed, passes: int = 2) -> tuple[list[Array],
 def divergence(faces: Faces) -> Array:
     """Net outflow of every cell."""
 
+def relative_divergence(faces: Faces) -> float:
+    """max |div u| / max |u|; 0 of no motion."""
+
 def gradient(cells: Array) -> list[Array]:
     """Central differences at cell centres along x, y and z, one-sided at the sides of the box."""
 

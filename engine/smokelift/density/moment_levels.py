@@ -71,7 +71,7 @@ class Level:
         means = self.means(density, of)
         after = change(means)
         result = np.zeros(density.shape, np.float32)
-        _core.scale_alike(density[fine], of.views.hull[fine], means[box], after[box], TINY, result[fine])
+        _core.scale_alike(density[fine], of.views.hull[fine], means[box], after[box], float(TINY), result[fine])
         return result
 
     def means(self, density: Volume, of: Level) -> Volume:
