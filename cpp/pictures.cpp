@@ -119,6 +119,27 @@ std::vector<std::size_t> count_marked(Mask voxels, Workers &workers) {
     return first;
 }
 
+void find_marked(Mask voxels, const std::vector<std::size_t> &first, std::int64_t *indices,
+                 Workers &workers) {
+    const std::size_t count = first.back();
+    workers.run(voxels.n[0], [&](int i) {
+        if (first[i] == first[i + 1])
+            return;
+        std::int64_t *at = indices + first[i];
+        for (int j = 0; j < voxels.n[1]; ++j) {
+            const unsigned char *row = voxels.row(i, j);
+            for (int k = 0; k < voxels.n[2]; ++k) {
+                if (!row[k])
+                    continue;
+                at[0] = i;
+                at[count] = j;
+                at[2 * count] = k;
+                ++at;
+            }
+        }
+    });
+}
+
 void find_places(const PictureMap &map, Mask voxels, const std::vector<std::size_t> &first,
                  const Places &places, Workers &workers) {
     workers.run(voxels.n[0], [&](int i) { places_of_plane(map, voxels, i, first[i], places); });

@@ -57,17 +57,32 @@ void require_parts(const Integers &first, py::ssize_t parts, py::ssize_t whole) 
 
 const unsigned char *bytes_of(const Marks &a) { return reinterpret_cast<const unsigned char *>(a.data()); }
 
+Mask mask_of(const Marks &voxels) {
+    require_fit(voxels.ndim() == 3);
+    return {bytes_of(voxels), {int(voxels.shape(0)), int(voxels.shape(1)), int(voxels.shape(2))}};
+}
+
 void register_places(py::module_ &module) {
     using namespace py::literals;
+
+    module.def(
+        "marked",
+        [](const Marks &voxels) {
+            const Mask mask = mask_of(voxels);
+            const auto first = released([&](Workers &workers) { return count_marked(mask, workers); });
+            py::array_t<std::int64_t> indices({py::ssize_t(3), py::ssize_t(first.back())});
+            std::int64_t *const result = indices.mutable_data();
+            released([&](Workers &workers) { find_marked(mask, first, result, workers); });
+            return indices;
+        },
+        "voxels"_a);
 
     py::class_<PictureMap>(module, "PictureMap")
         .def(py::init(&map_of), "to_pixel"_a, "centres"_a, "size"_a)
         .def(
             "places",
             [](const PictureMap &map, const Marks &voxels) {
-                require_fit(voxels.ndim() == 3);
-                const Mask mask{bytes_of(voxels),
-                                {int(voxels.shape(0)), int(voxels.shape(1)), int(voxels.shape(2))}};
+                const Mask mask = mask_of(voxels);
                 require_fit(mask.n == map.shape());
                 const auto first = released([&](Workers &workers) { return count_marked(mask, workers); });
                 const auto count = py::ssize_t(first.back());

@@ -410,6 +410,9 @@ def diffuse_adjoint(means: Array, radiance: Array, radiance_gradient: Array, alb
 
 # Pictures
 
+def marked(voxels: Mask) -> npt.NDArray[np.int64]:
+    """Indices (3, n) of the marked voxels along x, y and z: those of `numpy.nonzero`, in the same order."""
+
 class PictureMap:
     """Where the voxels of a grid lie in a picture.
 

@@ -30,3 +30,15 @@ def every_second(voxels: NDArray[np.bool_], shape: tuple[int, ...]) -> NDArray[n
     result = np.zeros(shape, np.bool_)
     result[::2, ::2, ::2] = voxels
     return result
+
+
+def with_neighbours(voxels: NDArray[np.bool_], *, corners: bool = False) -> NDArray[np.bool_]:
+    """Mark the six voxels beside each marked one as well, with corners all 26: a fast `ndimage.binary_dilation`."""
+    result = voxels.copy()
+    for axis in range(3):
+        lead = (slice(None),) * axis
+        low, high = (*lead, slice(None, -1)), (*lead, slice(1, None))
+        before = result.copy() if corners else voxels
+        result[high] |= before[low]
+        result[low] |= before[high]
+    return result

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+import smokelift._core as _core
 from smokelift.density.exemplar import Picture, reduced
 from smokelift.density.moment_levels import Level
 
@@ -118,7 +119,7 @@ class StretchedNoise:
     def _sum(self, level: Level, random: np.random.Generator) -> tuple[NDArray[np.float32], NDArray[np.float32], int]:
         """The sum (n,) of the octaves that a grid holds, the motion (3, n) in voxels so far and the octaves' number."""
         hull, size, octaves = level.views.hull, level.coarseness, 0
-        places = size * np.array(np.nonzero(hull), np.float32)
+        places = size * _core.marked(hull).astype(np.float32)
         places += ((size - 1) / 2 - self.moved[:, None]).astype(np.float32)
         noise, motion = np.zeros(places.shape[1], np.float32), np.zeros_like(places)
         if level.coarser is not None:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy import ndimage
 
 import smokelift._core as _core
-from smokelift.density.halves import any_of_two, every_second, spread_to_two
+from smokelift.density.halves import any_of_two, every_second, spread_to_two, with_neighbours
 
 ODD = (5, 4, 7)
 
@@ -43,3 +44,10 @@ def test_values_scale_as_coarse_ones_do_where_they_are_marked_alone() -> None:
     assert not result[0].any()
     _core.scale_alike(values, voxels, np.ones_like(before), np.ones_like(before) * x, 1e-30, result)
     np.testing.assert_allclose(result[2], np.where(voxels, values, 0)[2] * 0.75, rtol=1e-6)
+
+
+def test_neighbours_are_those_of_a_dilation() -> None:
+    voxels = np.random.default_rng(0).random((6, 7, 9)) > 0.95
+    np.testing.assert_array_equal(with_neighbours(voxels), ndimage.binary_dilation(voxels))
+    everywhere = ndimage.binary_dilation(voxels, np.ones((3, 3, 3)))
+    np.testing.assert_array_equal(with_neighbours(voxels, corners=True), everywhere)
