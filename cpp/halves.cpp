@@ -79,17 +79,22 @@ private:
 
 } // namespace
 
-void means_of_two(const Part<const float> &fine, const Out &coarse, Workers &workers) {
+void means_of_two(const Part<const float> &fine, const std::optional<Part<const bool>> &marked,
+                  const Out &coarse, Workers &workers) {
     const Shape &n = fine.n;
     workers.run(coarse.n[0], [&](int i) {
         std::vector<float> rows(3 * n[2]);
+        const std::vector<float> nothing(n[2]);
+        const auto row_at = [&](int x, int y) {
+            return !marked || any(marked->row(x, y), n[2]) ? fine.row(x, y) : nothing.data();
+        };
         for (int j = 0; j < coarse.n[1]; ++j) {
             float *const both = rows.data(), *const row = both + 2 * n[2];
             const int along_y = std::min(2, n[1] - 2 * j);
             for (int y = 0; y < along_y; ++y) {
-                const float *low = fine.row(2 * i, 2 * j + y);
+                const float *low = row_at(2 * i, 2 * j + y);
                 if (2 * i + 1 < n[0])
-                    mean(low, fine.row(2 * i + 1, 2 * j + y), both + y * n[2], n[2]);
+                    mean(low, row_at(2 * i + 1, 2 * j + y), both + y * n[2], n[2]);
                 else
                     half(low, both + y * n[2], n[2]);
             }

@@ -6,6 +6,7 @@
 #include "threads.h"
 #include "voxels.h"
 
+#include <optional>
 #include <vector>
 
 namespace smokelift {
@@ -18,8 +19,10 @@ template <class T> struct Part {
     T *row(int x, int y) const { return at.row(x, y); }
 };
 
-// Means of the voxels that each coarse one stands for; beyond the fine grid there is nothing.
-void means_of_two(const Part<const float> &fine, const Out &coarse, Workers &workers);
+// Means of the voxels that each coarse one stands for; beyond the fine grid there is nothing. Rows along z
+// without marked voxels are not read, and count as zero; without any marks all are read.
+void means_of_two(const Part<const float> &fine, const std::optional<Part<const bool>> &marked,
+                  const Out &coarse, Workers &workers);
 
 // The coarse values, linear between the voxels' middles, at the marked fine voxels in their order in memory;
 // `first` is where those of each plane across x begin.

@@ -144,12 +144,17 @@ void register_halves(py::module_ &module) {
 
     module.def(
         "means_of_two",
-        [](const Box &values) {
+        [](const Box &values, const std::optional<BoxMarks> &voxels) {
             const auto fine = part_of(values);
+            std::optional<Part<const bool>> marked;
+            if (voxels) {
+                marked = part_of(*voxels);
+                require_fit(marked->n == fine.n);
+            }
             return filled(halved(fine.n),
-                          [&](Out means, Workers &workers) { means_of_two(fine, means, workers); });
+                          [&](Out means, Workers &workers) { means_of_two(fine, marked, means, workers); });
         },
-        py::arg("values").noconvert());
+        py::arg("values").noconvert(), py::arg("voxels").noconvert() = py::none());
 
     module.def(
         "prolong_values",

@@ -438,8 +438,8 @@ def read_bilinearly(picture: npt.NDArray[np.floating[Any]], rows: Array, columns
 
 # A grid and one half as fine. Arrays may be boxes of larger ones, but for the last axis.
 
-def means_of_two(values: Array) -> Array:
-    """Means of two along every axis; beyond the grid there is nothing."""
+def means_of_two(values: Array, voxels: Mask | None = None) -> Array:
+    """Means of two along every axis; beyond the grid there is nothing, nor in rows without marked voxels."""
 
 def prolong_values(values: Array, voxels: Mask) -> Array:
     """Values of the coarse grid, linear between the voxels' middles, at the marked voxels (n,) of the fine one."""

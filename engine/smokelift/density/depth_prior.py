@@ -155,14 +155,13 @@ def _marked(voxels: NDArray[np.bool_], views: ViewSet, profiles: Sequence[DepthP
 
 def _spread(views: ViewSet, profiles: Sequence[DepthProfile]) -> Volume:
     """Optical depth per metre (nx, ny, nz) that has the profiles' shape and the pictures' amounts."""
-    hull = views.hull
-    spread = np.zeros(views.optics.domain.resolution, np.float32)
+    hull, spread = views.hull, np.zeros(views.optics.domain.resolution, np.float32)
     seen_at = [view.projection.places(hull) for view in views.views]
     single = [
         places.read(view.optical_depth) * profile.at(places, hull)
         for view, places, profile in zip(views.views, seen_at, profiles, strict=True)
     ]
-    spread[hull] = single[0] if len(single) == 1 else _common(views, profiles, seen_at, single)
+    spread.ravel()[views.where] = single[0] if len(single) == 1 else _common(views, profiles, seen_at, single)
     return spread
 
 

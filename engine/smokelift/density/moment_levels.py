@@ -78,7 +78,7 @@ class Level:
         """Means of a density of the next finer grid on this one."""
         fine, box = self._boxes(of)
         means = np.zeros(self.views.hull.shape, np.float32)
-        means[box] = _core.means_of_two(density[fine])
+        means[box] = _core.means_of_two(density[fine], of.views.hull[fine])
         return means
 
     @cached_property

@@ -141,7 +141,7 @@ class StretchedNoise:
 def _finer(values: NDArray[np.float32], coarser: Level, level: Level) -> NDArray[np.float32]:
     """Values at the voxels that may hold smoke on one grid, at those of the next finer one."""
     field = np.zeros(coarser.views.hull.shape, np.float32)
-    field[coarser.views.hull] = values
+    field.ravel()[coarser.views.where] = values
     return coarser.finer(field, level)
 
 

@@ -79,8 +79,8 @@ def near_smoke(velocity: Velocity, smoke: Mask, dt: float, voxel_size: float) ->
         for component, found in zip(faces_in((i, j, k), box), part.faces, strict=True):
             component[...] = found
         for values, found_values in zip((confidence, source), _known(part), strict=True):
-            if values is not None:
-                values[box] = found_values
+            if values is not None and found_values is not None:
+                np.copyto(values[box], found_values, where=found_values != 0)
         largest = max(figures.get("divergence", 0.0), part.figures.get("divergence", 0.0))
         figures = {**part.figures, **({"divergence": largest} if "divergence" in part.figures else {})}
     return Velocity(

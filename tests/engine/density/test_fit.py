@@ -137,11 +137,12 @@ def test_smoke_fades_where_none_is_expected_in_depth(plume, small) -> None:
 # profile
 
 
-def profile_of(amount, domain, axis=SmokeAxis.upright()):
+def profile_of(amount, domain, axis=None):
     """The profile at every voxel."""
     everywhere = np.ones(domain.resolution, np.bool_)
     places = project_voxels(GRID, domain).places(everywhere)
-    return DepthProfile(amount, GRID, domain, axis).at(places, everywhere).reshape(domain.resolution)
+    profile = DepthProfile(amount, GRID, domain, axis or SmokeAxis.upright())
+    return profile.at(places, everywhere).reshape(domain.resolution)
 
 
 def amount_of(width: int) -> np.ndarray:
