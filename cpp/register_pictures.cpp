@@ -1,5 +1,6 @@
 #include "codes.h"
 #include "halves.h"
+#include "lattice.h"
 #include "patches.h"
 #include "picture_blur.h"
 #include "pictures.h"
@@ -306,6 +307,20 @@ void register_filters(py::module_ &module) {
 
 void register_turning(py::module_ &module) {
     using namespace py::literals;
+
+    module.def(
+        "read_lattice",
+        [](const Array &lattice, const Array &places) {
+            const In nodes = view(lattice);
+            require_fit(places.ndim() == 2 && places.shape(0) == 3);
+            Array values(places.shape(1));
+            float *const result = values.mutable_data();
+            released([&](Workers &workers) {
+                read_lattice(nodes, places.data(), std::size_t(places.shape(1)), result, workers);
+            });
+            return values;
+        },
+        "lattice"_a, "places"_a);
 
     module.def(
         "project_turned",

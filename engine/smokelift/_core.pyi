@@ -450,6 +450,12 @@ def scale_alike(values: Array, voxels: Mask, before: Array, after: Array, least:
     ``before``, at least ``least``, and ``after`` are the coarse grid's, linear between its voxels' middles.
     """
 
+def read_lattice(lattice: Array, places: Array) -> Array:
+    """A lattice that repeats, read at finite places (3, n), linear between nodes at whole numbers.
+
+    To the bit `scipy.ndimage.map_coordinates` of order 1 and mode "grid-wrap".
+    """
+
 def sum_lines(
     picture: npt.NDArray[np.uint8],
     table: Array,

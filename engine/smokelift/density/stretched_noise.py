@@ -149,4 +149,4 @@ def _octave(places: NDArray[np.float32], spacing: float, random: np.random.Gener
     """Noise (n,) of unit variance at places (3, n), linear between nodes so many voxels apart."""
     lattice = random.standard_normal((LATTICE,) * 3).astype(np.float32) / NODES
     at = places / np.float32(spacing) + random.uniform(0, LATTICE, (3, 1)).astype(np.float32)
-    return np.asarray(ndimage.map_coordinates(lattice, at, output=np.float32, order=1, mode="grid-wrap"))
+    return _core.read_lattice(lattice, at)
