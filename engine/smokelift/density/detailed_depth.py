@@ -123,12 +123,12 @@ class DetailedDepth:
 
     def _noisy(self, smooth: Volume, level: Level, texture: ClipTexture) -> Volume:
         """The smooth answer with noise that travels with the smoke, its coarse amounts kept."""
-        hull = level.views.hull
         moved = texture.turntable.height * texture.drift * level.views.frame
         strengths = tuple(self.detail * each for each in texture.roughness)
         noise = StretchedNoise(moved, texture.width, strengths, self.seed)
         noisy = np.zeros(smooth.shape, np.float32)
-        noisy[hull] = smooth[hull] * np.exp(noise.at(level))
+        where = level.views.where
+        noisy.ravel()[where] = smooth.ravel()[where] * np.exp(noise.at(level))
         return _with_amounts(noisy, smooth, level, AMOUNTS * texture.width)
 
 
@@ -150,7 +150,8 @@ def _smooth_answer(level: Level, density: Volume) -> Volume:
     """A density in the amounts that the cameras' pictures show; those of a large grid are found on the coarsest."""
     coarser = level.coarser
     if coarser is None:
-        return fit_multiplicative(level.terms(), density, SMOOTH_ITERATIONS, SMOOTH_TOLERANCE).density
+        within = level.views.where
+        return fit_multiplicative(level.terms(), density, SMOOTH_ITERATIONS, SMOOTH_TOLERANCE, within=within).density
     return coarser.changed(density, level, lambda means: _smooth_answer(coarser, means))
 
 
@@ -222,7 +223,7 @@ class EveryView:
                     self._step(turned, smooth, exemplar, next(azimuths), (first, second), relaxation)
                 changed = np.zeros(hull.shape, np.float32)
                 np.copyto(changed[kept], table.lying(turned), where=hull[kept])
-                density = take_turns(cameras, changed, 1)
+                density = take_turns(cameras, changed, 1, within=self.level.views.where)
         return density
 
     def _step(

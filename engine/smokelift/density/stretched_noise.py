@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+import smokelift._core as _core
 from smokelift.density.exemplar import Picture, reduced
 from smokelift.density.moment_levels import Level
 
@@ -118,7 +119,7 @@ class StretchedNoise:
     def _sum(self, level: Level, random: np.random.Generator) -> tuple[NDArray[np.float32], NDArray[np.float32], int]:
         """The sum (n,) of the octaves that a grid holds, the motion (3, n) in voxels so far and the octaves' number."""
         hull, size, octaves = level.views.hull, level.coarseness, 0
-        places = size * np.array(np.nonzero(hull), np.float32)
+        places = size * _core.marked(hull).astype(np.float32)
         places += ((size - 1) / 2 - self.moved[:, None]).astype(np.float32)
         noise, motion = np.zeros(places.shape[1], np.float32), np.zeros_like(places)
         if level.coarser is not None:
@@ -140,7 +141,7 @@ class StretchedNoise:
 def _finer(values: NDArray[np.float32], coarser: Level, level: Level) -> NDArray[np.float32]:
     """Values at the voxels that may hold smoke on one grid, at those of the next finer one."""
     field = np.zeros(coarser.views.hull.shape, np.float32)
-    field[coarser.views.hull] = values
+    field.ravel()[coarser.views.where] = values
     return coarser.finer(field, level)
 
 
@@ -148,4 +149,4 @@ def _octave(places: NDArray[np.float32], spacing: float, random: np.random.Gener
     """Noise (n,) of unit variance at places (3, n), linear between nodes so many voxels apart."""
     lattice = random.standard_normal((LATTICE,) * 3).astype(np.float32) / NODES
     at = places / np.float32(spacing) + random.uniform(0, LATTICE, (3, 1)).astype(np.float32)
-    return np.asarray(ndimage.map_coordinates(lattice, at, output=np.float32, order=1, mode="grid-wrap"))
+    return _core.read_lattice(lattice, at)

@@ -2,7 +2,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
+import smokelift._core as _core
 from smokelift.density.stretched_noise import COARSEST, STRETCH, StretchedNoise, roughness
 
 WIDTH = 8.0
@@ -107,3 +109,14 @@ def test_the_coarsest_octave_is_as_wide_as_lobes() -> None:
     near, far = (np.corrcoef(noise[:-by].ravel(), noise[by:].ravel())[0, 1] for by in (2, int(3 * COARSEST * 4.0)))
     assert near > 0.85
     assert abs(far) < 0.5
+
+
+def test_a_lattice_is_read_as_scipy_does() -> None:
+    """To the bit, at nodes and a rounding beside them too, any number of turns away."""
+    random = np.random.default_rng(0)
+    lattice = random.standard_normal((5, 6, 7)).astype(np.float32)
+    places = random.uniform(-40, 40, (3, 2000)).astype(np.float32)
+    places[:, :200] = np.round(places[:, :200])
+    places[:, 100:200] -= np.float32(1e-6)
+    expected = ndimage.map_coordinates(lattice, places, output=np.float32, order=1, mode="grid-wrap")
+    np.testing.assert_array_equal(_core.read_lattice(lattice, places), expected)
