@@ -101,7 +101,7 @@ $(VENV)/extension.stamp: $(VENV)/engine.stamp
 	touch $@
 
 test-blender: dist/extension.stamp $(VENV)/tools.stamp
-	$(BIN)/python -m pytest -n 2 --dist loadfile -v -rP --durations=0 --durations-min=1 \
+	$(BIN)/python -m pytest -n 2 --dist loadscope -v -rP --durations=0 --durations-min=1 \
 		tests/blender/wheels.py tests/blender/debian.py
 
 clean:
