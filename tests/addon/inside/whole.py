@@ -387,7 +387,7 @@ def test_scenes_have_their_own_smoke(shot, tmp_path) -> None:
     make(shot, tmp_path / "one")
     other = bpy.data.scenes.new("Other")
     smoke(other).smokelift.clip = smoke(shot).smokelift.clip
-    smoke(other).smokelift.quality = "draft"
+    smoke(other).smokelift.quality, smoke(other).smokelift.longest_side = "draft", 32
     smoke(other).smokelift.first, smoke(other).smokelift.last = FIRST, FIRST + 1
     smoke(other).smokelift.output = str(tmp_path / "two")
     run.enqueue(bpy.context, smoke(other), smoke_takes.write_take(smoke(other)))
