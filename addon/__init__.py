@@ -3,15 +3,16 @@
 It knows nothing of the engine but its command line and its files. From what knows no Blender to the interface:
 
 - Without Blender: `take` (the files of a run), `job` (the engine's process), `toml` (the text of a scene file), `pace`
-  (a speed ramp), `contract` (what the add-on repeats of the engine).
+  (a speed ramp), `wording` (the engine's sentences in the panel's words), `contract` (what the add-on repeats of the
+  engine).
 - Blender's data to the engine's and back: `smoke` (the objects that hold the settings), `smoke_takes` (its takes),
   `scene_file` (Blender scene to scene file: `clip_table`, `camera_table`, `box_table` and `light_tables`, of
-  a `blender_scene`), `volume` (sequence to Volume object), `look` (its material), `directing`
-  (what acts on the smoke after its clip), `shot_setup` (camera, world and light that match the clip), `compositing`
-  (smoke over the clip), `projection` (the clip's background on a card), `plate` (the clean plate for these three),
-  `instances` (the smoke at other times), `nodes` (the node
-  groups of these), `undistort` (the clip without its lens's distortion),
-  `follow` (paths of a .blend that is saved elsewhere).
+  a `blender_scene`), `volume` (sequence to Volume object), `look` (its material), `proxy` (what viewports show of a
+  large one), `directing` (what acts on the smoke after its clip), `shot_setup` (camera, world and light that match the
+  clip), `compositing` (smoke over the clip), `projection` (the clip's background on a card), `plate` (the clean plate
+  for these three), `instances` (the smoke at other times), `nodes` (the node groups of these), `undistort` (the clip
+  without its lens's distortion), `usd` (an export that is imported), `follow` (paths of a .blend that is saved
+  elsewhere).
 - Work beside Blender: `run` (the queue of takes), `shot_check` (the forecast of a run), `batch` (the command line).
 - Interface: `properties` (the settings); `panel` (`automatic` for its numbers)
   with the sub-panels `results_panel`, `advanced_panel`, `look_panel`,
@@ -57,10 +58,11 @@ def _modules() -> tuple[ModuleType, ...]:
         run,
         setup_panel,
         undistort,
+        usd,
         volume,
     )
 
     data = (preferences, properties, volume, follow, run)
-    buttons = (operators, box, editors, instances, undistort, drop, presets)
+    buttons = (operators, box, editors, instances, undistort, drop, presets, usd)
     panels = (panel, results_panel, advanced_panel, look_panel, setup_panel, direct_panel, export)
     return (*data, *buttons, *panels, batch)

@@ -3,6 +3,7 @@
 import bpy
 
 from .automatic import draw_automatic
+from .between import AVAILABLE
 from .smoke import active_smoke
 from .subpanel import OfClip
 
@@ -25,7 +26,11 @@ class _Advanced(OfClip):
         value.active = settings.use_axis_depth
         value.prop(settings, "axis_depth", text="")
         draw_automatic(layout, settings, "fps")
-        for name in ("transfer", "speed", "device", "use_medium"):
+        for name in ("transfer", "speed"):
+            layout.prop(settings, name)
+        if AVAILABLE:
+            layout.prop(settings, "between")
+        for name in ("device", "use_medium"):
             layout.prop(settings, name)
         column = layout.column()
         column.active = settings.use_medium

@@ -16,11 +16,14 @@ MADE_UP = "made up"
 FRAME_FILE = "smoke_{:04d}.vdb"
 """In a sequence's directory, by frame number from 1."""
 
+PROXY_FILE = "proxy_{:04d}.vdb"
+"""There too, and in a folder with an export: the coarse copy of a frame."""
+
+PROXY_VOXELS = 4_000_000
+"""Voxels of a box from which on a run writes coarse copies."""
+
 EXPORT_FILE = "export.json"
 """In a folder with an export: what was exported."""
-
-PROXY_FILE = "proxy_{:04d}.vdb"
-"""In a folder with an export, by frame number: the coarser sequence."""
 
 ASSET_FILE = "smoke.blend"
 """In a folder with an export: the add-on's own file, which the engine leaves alone."""

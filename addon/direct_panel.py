@@ -5,6 +5,7 @@ from bpy.app.translations import pgettext_iface as iface_
 
 from . import run, smoke_takes
 from .automatic import draw_automatic
+from .between import AVAILABLE
 from .blender_scene import ShotError
 from .needs import NeedsClipAndResult
 from .panel import draw_closed
@@ -69,6 +70,10 @@ def _draw_retime(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) 
     column.prop(settings, "speed_middle")
     column.prop(settings, "speed_end")
     layout.prop(settings, "live")
+    if AVAILABLE:
+        row = layout.row()
+        row.active = settings.live
+        row.prop(settings.id_data.smokelift, "between")
 
 
 def _draw_loop(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:

@@ -1,6 +1,6 @@
-"""Hands a smoke on: an export of its files, a proxy of it in the viewport, and assets.
+"""Hands a smoke on: an export of its files, and assets; and makes the proxy of one that has none.
 
-An export changes nothing in the file, so it is no run of the queue: a timer of Blender polls the engine.
+That changes no result, so it is no run of the queue: a timer of Blender polls the engine.
 """
 
 import json
@@ -10,19 +10,18 @@ from typing import Any
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
-from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import BoolProperty, EnumProperty, PointerProperty, StringProperty
 
 from . import preferences, smoke_takes, volume
-from .contract import ASSET_FILE, EXPORT_FILE, FRAME_FILE, PROXY_FILE
+from .contract import ASSET_FILE, EXPORT_FILE, FRAME_FILE
 from .instances import copy_of, remove_scattered, scatter
 from .job import EngineMissingError, Job, engine_command
 from .needs import NeedsResult
 from .panel import draw_text
-from .paths import PATH_OPTIONS, absolute, relative
-from .smoke import active_smoke, find_smoke, scene_of
+from .paths import PATH_OPTIONS, absolute
+from .smoke import active_smoke, find_smoke
 from .subpanel import OfResult, redraw
-from .take import Take
+from .wording import in_panel
 
 TICK_SECONDS = 0.1
 REST_SECONDS = 0.4
@@ -30,9 +29,6 @@ REST_SECONDS = 0.4
 
 ASSET_TIMES = 8
 """Different times that the instances in the asset have at most, spread over the sequence."""
-
-SHOWN_TAKE = "smokelift_take"
-"""Custom property of a proxy: the directory of the take that was exported."""
 
 
 def _changed(settings: "SmokeliftExport", _context: bpy.types.Context) -> None:
@@ -49,6 +45,16 @@ class SmokeliftExport(bpy.types.PropertyGroup):
         options=PATH_OPTIONS,
         update=_changed,
     )
+    host: EnumProperty(
+        name="For",
+        description="Program that reads the files",
+        items=[
+            ("blender", "Blender", "And other programs with Z up: grids density and velocity"),
+            ("houdini", "Houdini", "Y up, grids density and vel"),
+            ("unreal", "Unreal", "Densities from 0 to 1 for 8 bits, and a pivot that stays in place"),
+        ],
+        update=_changed,
+    )
     precision: EnumProperty(
         name="Precision",
         description="Bits of each value. Smoke too thin to be seen is left out either way",
@@ -63,7 +69,7 @@ class SmokeliftExport(bpy.types.PropertyGroup):
     )
     proxy: EnumProperty(
         name="Proxy",
-        description="Second, coarser sequence for viewports",
+        description="Second, coarser sequence for the viewports of those who get the export",
         items=[
             ("1", "None", "No proxy"),
             ("2", "1/2", "Half the resolution, an eighth of the voxels"),
@@ -74,28 +80,34 @@ class SmokeliftExport(bpy.types.PropertyGroup):
 
 
 class _Session:
-    """The export or the estimate that the engine works on; never saved."""
+    """What the engine works on: an export, a proxy, or the estimate of an export; never saved."""
 
     def __init__(self) -> None:
         self.job: Job | None = None
         self.smoke = 0
         self.size = ""
         self.sentence = ""
-        self.exporting = False
+        self.operator = ""
+        """What writes files, while it does and after that; empty for an estimate."""
         self._asked = 0
+
+    @property
+    def working(self) -> bool:
+        """Whether files are being written."""
+        return self.job is not None and bool(self.operator)
 
     def ask_size(self, smoke: bpy.types.Object) -> None:
         """Estimate the size of an export once its settings rest. Drawing code may call this."""
-        if bpy.app.background or self.exporting:
+        if bpy.app.background or self.working:
             return
         self._asked, self.smoke, self.size = smoke.session_uid, smoke.session_uid, ""
         _again(self._start_size, REST_SECONDS)
 
-    def start(self, smoke: bpy.types.Object, *, exporting: bool) -> None:
+    def start(self, smoke: bpy.types.Object, words: list[str], operator: str = "") -> None:
         """Start the engine; EngineMissingError if there is none."""
         self.stop()
-        self.smoke, self.exporting, self.sentence = smoke.session_uid, exporting, ""
-        words = arguments(smoke) + preferences.thread_options() + ([] if exporting else ["--size"])
+        self.smoke, self.operator, self.sentence = smoke.session_uid, operator, ""
+        words = [*words, "--progress", "json", *preferences.thread_options()]
         self.job = Job(engine_command(words), Path(bpy.app.tempdir) / "smokelift_export.log")
         self.job.start()
         _again(self.poll, TICK_SECONDS)
@@ -104,7 +116,7 @@ class _Session:
         """End the engine at once."""
         if self.job is not None:
             self.job.kill()
-        self.job, self.exporting = None, False
+        self.job = None
 
     def poll(self) -> float | None:
         """Read what the engine says; a timer that ends with it."""
@@ -115,23 +127,27 @@ class _Session:
             redraw(bpy.context.window_manager)
         if not job.ended:
             return TICK_SECONDS
-        if not self.exporting:
-            done = job.outcome == "done"
-            self.size = iface_("About {:s}").format(megabytes(job.details["size"])) if done else job.sentence
-        else:
-            self.sentence = job.sentence
-            smoke = find_smoke(self.smoke)
-            if smoke is not None and job.outcome == "done":
-                write_asset(smoke, folder_of(smoke))
-        self.job, self.exporting = None, False
+        self.job = None
+        done = job.outcome == "done"
+        if not self.operator:
+            self.size = iface_("About {:s}").format(megabytes(job.details["size"])) if done else in_panel(job.sentence)
+            return None
+        self.sentence = in_panel(job.sentence)
+        smoke = find_smoke(self.smoke)
+        if smoke is None or not done:
+            return None
+        if self.operator == SMOKELIFT_OT_make_proxy.bl_idname:
+            volume.show(smoke, volume.shown_take(smoke))
+        elif smoke.smokelift_export.host == "blender":
+            write_asset(smoke, folder_of(smoke))
         return None
 
     def _start_size(self) -> None:
         smoke = find_smoke(self._asked)
-        if smoke is None or self.exporting or volume.shown_take(smoke) is None:
+        if smoke is None or self.working or volume.shown_take(smoke) is None:
             return
         try:
-            self.start(smoke, exporting=False)
+            self.start(smoke, [*arguments(smoke), "--size"])
         except EngineMissingError as error:
             self.size = str(error)
 
@@ -155,8 +171,8 @@ def folder_of(smoke: bpy.types.Object) -> Path:
 def arguments(smoke: bpy.types.Object) -> list[str]:
     """The engine's arguments for the export of the take that a smoke shows."""
     settings, take = smoke.smokelift_export, volume.shown_take(smoke)
-    words = ["export", str(take.directory), "--out", str(folder_of(smoke)), "--progress", "json"]
-    words += ["--precision", settings.precision, "--proxy", settings.proxy]
+    words = ["export", str(take.directory), "--out", str(folder_of(smoke))]
+    words += ["--precision", settings.precision, "--proxy", settings.proxy, "--host", settings.host]
     return words if settings.use_velocity else [*words, "--no-velocity"]
 
 
@@ -189,31 +205,22 @@ def _remove(obj: bpy.types.Object) -> None:
     bpy.data.volumes.remove(obj.data)  # takes the object with it
 
 
-def _read(data: bpy.types.Volume, file: Path) -> None:
-    """Have a Volume read a sequence of files that begins with another one."""
-    data.filepath = relative(file)
-
-
 def _first(folder: Path) -> int:
     """Number of the first frame of an export."""
     return int(json.loads((folder / EXPORT_FILE).read_text(encoding="utf-8"))["frames"][0])
 
 
-def proxy_of(smoke: bpy.types.Object) -> bpy.types.Object | None:
-    """The proxy of a smoke."""
-    return next((obj for obj in smoke.children if SHOWN_TAKE in obj), None)
+class _Writes(NeedsResult):
+    """An operator that has the engine write files of the result on show; without a window it waits for them."""
 
-
-class SMOKELIFT_OT_export(NeedsResult, bpy.types.Operator):
-    """Write small OpenVDB files of the smoke, a USD file of them, and an asset to be used in other files"""
-
-    bl_idname = "smokelift.export"
-    bl_label = "Export Smoke"
+    def words(self, smoke: bpy.types.Object) -> list[str]:
+        """The engine's arguments."""
+        raise NotImplementedError
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         smoke = active_smoke(context.scene)
         try:
-            _session.start(smoke, exporting=True)
+            _session.start(smoke, self.words(smoke), type(self).bl_idname)
         except EngineMissingError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
@@ -223,9 +230,29 @@ class SMOKELIFT_OT_export(NeedsResult, bpy.types.Operator):
         while _session.poll() is not None:
             time.sleep(TICK_SECONDS)
         if job.outcome != "done":
-            self.report({"ERROR"}, job.sentence)
+            self.report({"ERROR"}, in_panel(job.sentence))
             return {"CANCELLED"}
         return {"FINISHED"}
+
+
+class SMOKELIFT_OT_export(_Writes, bpy.types.Operator):
+    """Write small OpenVDB files of the smoke, a USD file of them, and for Blender an asset to be used in other files"""
+
+    bl_idname = "smokelift.export"
+    bl_label = "Export Smoke"
+
+    def words(self, smoke: bpy.types.Object) -> list[str]:
+        return arguments(smoke)
+
+
+class SMOKELIFT_OT_make_proxy(_Writes, bpy.types.Operator):
+    """Write coarse copies of the smoke's files, which viewports show in their place. Renders use the smoke itself"""
+
+    bl_idname = "smokelift.make_proxy"
+    bl_label = "Make Proxy"
+
+    def words(self, smoke: bpy.types.Object) -> list[str]:
+        return ["proxy", str(volume.shown_take(smoke).directory)]
 
 
 class SMOKELIFT_OT_cancel_export(bpy.types.Operator):
@@ -240,38 +267,20 @@ class SMOKELIFT_OT_cancel_export(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SMOKELIFT_OT_use_proxy(NeedsResult, bpy.types.Operator):
-    """Show the proxy of the export in the viewport, and the smoke itself in renders only. Press again to undo this"""
-
-    bl_idname = "smokelift.use_proxy"
-    bl_label = "Proxy in Viewport"
-    bl_options = {"REGISTER", "UNDO"}
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        smoke = active_smoke(context.scene)
-        before = proxy_of(smoke)
-        if before is not None:
-            _remove(before)
-            smoke.hide_viewport = False
-            return {"FINISHED"}
-        folder = folder_of(smoke)
-        try:
-            file = folder / PROXY_FILE.format(_first(folder))
-        except (OSError, ValueError, LookupError, TypeError):
-            file = folder / PROXY_FILE.format(1)
-        if not file.is_file():
-            self.report(
-                {"ERROR"}, rpt_("There is no proxy in {:s}: choose a proxy and export first.").format(str(folder))
-            )
-            return {"CANCELLED"}
-        proxy = bpy.data.objects.new(f"{smoke.name} Proxy", smoke.data.copy())
-        scene_of(smoke).collection.objects.link(proxy)
-        proxy.parent = smoke
-        proxy.hide_render = True
-        proxy[SHOWN_TAKE] = str(volume.shown_take(smoke).directory)
-        _read(proxy.data, file)
-        smoke.hide_viewport = True
-        return {"FINISHED"}
+def draw_work(
+    layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object, operator: str, icon: str
+) -> None:
+    """The button that has files written; their progress while that is at work, and what it said at its end."""
+    own = operator == _session.operator
+    if own and _session.working:
+        job = _session.job
+        text = iface_("{:d} of {:d}").format(job.done, job.total)
+        layout.progress(factor=job.done / job.total if job.total else 0.0, text=text, translate=False)
+        layout.operator("smokelift.cancel_export", text="Cancel", icon="CANCEL")
+    else:
+        layout.operator(operator, icon=icon)
+    if own and _session.smoke == smoke.session_uid and _session.sentence:
+        draw_text(layout, context, _session.sentence, "INFO")
 
 
 class _ExportPanel(OfResult):
@@ -284,25 +293,13 @@ class _ExportPanel(OfResult):
         smoke = active_smoke(context.scene)
         settings = smoke.smokelift_export
         layout.prop(settings, "folder", placeholder=str(folder_of(smoke)))
-        for name in ("precision", "use_velocity", "proxy"):
+        for name in ("host", "precision", "use_velocity", "proxy"):
             layout.prop(settings, name)
         if _session.smoke != smoke.session_uid:
             _session.ask_size(smoke)
         elif _session.size:
             draw_text(layout, context, _session.size, "DISK_DRIVE")
-        if _session.exporting:
-            job = _session.job
-            text = iface_("{:d} of {:d}").format(job.done, job.total)
-            layout.progress(factor=job.done / job.total if job.total else 0.0, text=text, translate=False)
-            layout.operator("smokelift.cancel_export", text="Cancel", icon="CANCEL")
-        else:
-            layout.operator("smokelift.export", icon="EXPORT")
-        if _session.smoke == smoke.session_uid and _session.sentence:
-            draw_text(layout, context, _session.sentence, "INFO")
-        proxy = proxy_of(smoke)
-        layout.operator("smokelift.use_proxy", icon="VOLUME_DATA", depress=proxy is not None)
-        if proxy is not None and Take(Path(proxy[SHOWN_TAKE])) != volume.shown_take(smoke):
-            draw_text(layout, context, "The proxy shows another result: export again.", "ERROR")
+        draw_work(layout, context, smoke, SMOKELIFT_OT_export.bl_idname, "EXPORT")
         layout.operator("smokelift.add_instance", icon="DUPLICATE")
         layout.operator("smokelift.scatter", icon="GEOMETRY_NODES")
 
@@ -325,7 +322,7 @@ _CLASSES = (
     SmokeliftExport,
     SMOKELIFT_OT_export,
     SMOKELIFT_OT_cancel_export,
-    SMOKELIFT_OT_use_proxy,
+    SMOKELIFT_OT_make_proxy,
     SMOKELIFT_PT_view_export,
     SMOKELIFT_PT_clip_export,
 )

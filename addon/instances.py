@@ -9,7 +9,7 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty, IntProperty
 
-from .nodes import Input, add_node, feed, new_group, own_group
+from .nodes import Input, add_node, feed, get_input, new_group, own_group, set_input
 from .paths import absolute, relative
 
 GROUP = "Smokelift Instances"
@@ -91,26 +91,15 @@ def scatter(obj: bpy.types.Object, width: float, count: int, step: int, repeat: 
     points.location = obj.location
     modifier = points.modifiers.new(GROUP, "NODES")
     modifier.node_group = _group()
-    set_input(points, "Times", times)
-    set_input(points, "Frames Apart", step)
+    set_input(modifier, "Times", times)
+    set_input(modifier, "Frames Apart", step)
     return points
-
-
-def set_input(points: bpy.types.Object, name: str, value: Any) -> None:
-    """Set an input of the node group of an object of `scatter`."""
-    modifier = points.modifiers[GROUP]
-    key = modifier.node_group.interface.items_tree[name].identifier
-    if hasattr(modifier, "properties"):  # since 5.2
-        getattr(modifier.properties.inputs, key).value = value
-    else:
-        modifier[key] = value
 
 
 def remove_scattered(points: bpy.types.Object) -> None:
     """Remove what `scatter` made."""
     modifier = points.modifiers[GROUP]
-    key, group = modifier.node_group.interface.items_tree["Times"].identifier, modifier.node_group
-    times = getattr(modifier.properties.inputs, key).value if hasattr(modifier, "properties") else modifier[key]
+    group, times = modifier.node_group, get_input(modifier, "Times")
     bpy.data.meshes.remove(points.data)  # takes the object with it
     for obj in list(times.objects):
         bpy.data.volumes.remove(obj.data)

@@ -134,22 +134,21 @@ _INPUTS = (
 )
 
 
-def fit_look(volume: bpy.types.Volume, scene: dict[str, Any]) -> None:
-    """Give a Volume a material of what was fitted to the clip.
+def fit_look(smoke: bpy.types.Object, scene: dict[str, Any]) -> None:
+    """Give a smoke a material of what was fitted to the clip.
 
     Parameters
     ----------
-    volume
-        Gets a material if it has none; of one that has no node of ours, nothing is changed.
+    smoke
+        Its Volume gets a material if it has none; of one that has no node of ours, nothing is changed.
     scene
         Tables of a take's scene: its medium and its domain.
     """
+    volume = smoke.data
     if not volume.materials or volume.materials[0] is None:
-        material = _new_material(volume.name)
         volume.materials.clear()
-        volume.materials.append(material)
-    material = volume.materials[0]
-    node = node_of(volume)
+        volume.materials.append(_new_material(volume.name))
+    material, node = material_of(smoke), node_of(smoke)
     if node is None:
         return
     medium, domain = scene["medium"], scene["domain"]
@@ -167,27 +166,45 @@ def fit_look(volume: bpy.types.Volume, scene: dict[str, Any]) -> None:
         set_unless_changed(material, _key(name), node.inputs[name], "default_value", value)
 
 
-def node_of(volume: bpy.types.Volume) -> bpy.types.ShaderNode | None:
-    """The node with the values of a Volume's smoke; None if its material is the artist's own."""
-    material = volume.materials[0] if volume.materials else None
+def material_of(smoke: bpy.types.Object) -> bpy.types.Material | None:
+    """The material that a smoke is rendered with: its Volume's, or one of the object's own."""
+    return smoke.material_slots[0].material if smoke.material_slots else None
+
+
+def node_of(smoke: bpy.types.Object) -> bpy.types.ShaderNode | None:
+    """The node with the values of a smoke; None if its material is the artist's own."""
+    material = material_of(smoke)
     node = material.node_tree.nodes.get(NODE) if material is not None and material.node_tree else None
     return node if node is not None and node.type == "GROUP" else None
 
 
-def controls(volume: bpy.types.Volume) -> list[bpy.types.NodeSocket]:
-    """What the tab shows of a Volume's look: inputs that no other node feeds."""
-    node = node_of(volume)
+def is_linked(smoke: bpy.types.Object) -> bool:
+    """Whether the material of a smoke belongs to another file, and cannot be changed in this one."""
+    material = material_of(smoke)
+    return material is not None and material.library is not None
+
+
+def controls(smoke: bpy.types.Object) -> list[bpy.types.NodeSocket]:
+    """What the tab shows of a smoke's look: inputs that no other node feeds."""
+    node = node_of(smoke)
     found = [node.inputs.get(name) for name in CONTROLS] if node is not None else []
     return [socket for socket in found if socket is not None and not socket.is_linked]
 
 
-def use_preset(volume: bpy.types.Volume, name: str, fitted_anisotropy: float) -> bool:
-    """Set the artist's inputs to a preset's; returns whether the material has them."""
-    node = node_of(volume)
-    if node is None:
+def use_preset(smoke: bpy.types.Object, name: str, fitted_anisotropy: float) -> bool:
+    """Set the artist's inputs to a preset's; returns whether the material has them.
+
+    A material of another file is copied to the object first.
+    """
+    if node_of(smoke) is None:
         return False
+    if is_linked(smoke):
+        own = material_of(smoke).copy()
+        smoke.material_slots[0].link = "OBJECT"
+        smoke.material_slots[0].material = own
+    node = node_of(smoke)
     socket = node.inputs["Anisotropy"]
-    set_and_remember(volume.materials[0], _key(socket.name), socket, "default_value", fitted_anisotropy)
+    set_and_remember(material_of(smoke), _key(socket.name), socket, "default_value", fitted_anisotropy)
     for key, value in PRESETS[name][2].inputs().items():
         node.inputs[key].default_value = value
     return True

@@ -4,8 +4,11 @@ import bpy
 from bpy.props import EnumProperty
 
 from . import look, volume
+from .export import draw_work
 from .needs import NeedsResult
-from .smoke import active_smoke
+from .panel import draw_text
+from .proxy import in_viewport, modifier_of
+from .smoke import is_override, smoke_with_look
 from .subpanel import OfResult
 
 
@@ -22,13 +25,17 @@ class SMOKELIFT_OT_use_look(NeedsResult, bpy.types.Operator):
         items=[(key, name, description) for key, (name, description, _) in look.PRESETS.items()],
     )
 
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return is_override(smoke_with_look(context.scene)) or super().poll(context)
+
     def execute(self, context: bpy.types.Context) -> set[str]:
-        smoke = active_smoke(context.scene)
+        smoke = smoke_with_look(context.scene)
         index = volume.shown_take(smoke).index()
         if index is None:
             self.report({"ERROR"}, "The smoke's files are missing: make it again.")
             return {"CANCELLED"}
-        if not look.use_preset(smoke.data, self.preset, index["scene"]["medium"]["anisotropy"]):
+        if not look.use_preset(smoke, self.preset, index["scene"]["medium"]["anisotropy"]):
             self.report({"ERROR"}, "The smoke's material is your own: remove it and show the result again for presets.")
             return {"CANCELLED"}
         return {"FINISHED"}
@@ -37,22 +44,52 @@ class SMOKELIFT_OT_use_look(NeedsResult, bpy.types.Operator):
 class _Look(OfResult):
     bl_label = "Look"
 
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return is_override(smoke_with_look(context.scene)) or super().poll(context)
+
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split = True
-        data = active_smoke(context.scene).data
-        sockets = look.controls(data)
+        smoke = smoke_with_look(context.scene)
+        override = is_override(smoke)
+        if override:
+            layout.label(text=smoke.name, translate=False, icon="LIBRARY_DATA_OVERRIDE")
+        sockets = look.controls(smoke)
         if sockets:
             layout.operator_menu_enum("smokelift.use_look", "preset", text="Presets", icon="PRESET")
         else:
             layout.label(text="The material is your own", icon="MATERIAL")
-        column = layout.column()
-        for socket in sockets:
-            column.prop(socket, "default_value", text=socket.name)
+        if look.is_linked(smoke):
+            draw_text(layout, context, "A preset gives this override a look of its own.", "INFO")
+        else:
+            column = layout.column()
+            for socket in sockets:
+                column.prop(socket, "default_value", text=socket.name)
         column = layout.column()
         column.use_property_decorate = False
-        column.prop(data.display, "density", text="Viewport Density")
-        column.prop(data.render, "step_size", text="Render Step")
+        modifier = modifier_of(smoke)
+        if not override:
+            column.prop(in_viewport(smoke).display, "density", text="Viewport Density")
+            _draw_render(column, context, smoke)
+        if modifier is not None:
+            column.prop(modifier, "show_viewport", text="Proxy in Viewport", icon="NONE")
+        elif not override:
+            draw_work(column, context, smoke, "smokelift.make_proxy", "MOD_REMESH")
+
+
+def _draw_render(column: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
+    """How Cycles goes through smoke: since 5.0 by null scattering, unless it is told to march as before."""
+    cycles = getattr(context.scene, "cycles", None)
+    may_choose = hasattr(cycles, "volume_biased")
+    if may_choose:
+        column.prop(cycles, "volume_biased", text="March in Cycles")
+    row = column.row()
+    row.active = not may_choose or cycles.volume_biased
+    row.prop(smoke.data.render, "step_size", text="Render Step")
+    if may_choose and not cycles.volume_biased:
+        text = "Marching has less noise in less time. Without it Cycles makes no error of steps."
+        draw_text(column, context, text, "INFO")
 
 
 class SMOKELIFT_PT_view_look(_Look, bpy.types.Panel):

@@ -10,6 +10,7 @@ from .blender_scene import frame_rate
 from .box_table import box_of
 from .clip_table import clip_path
 from .job import ENDED
+from .proxy import lacks_proxy
 from .smoke import active_smoke, find_smoke, smokes
 from .undistort import is_distorted
 
@@ -164,8 +165,13 @@ def _draw_run(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy
         known = volume.provenance_note(smoke)
         if known:
             draw_text(layout, context, known, "INFO")
-        if volume.shown_take(smoke).complete():
+        index = volume.shown_take(smoke).index()
+        if index and index["complete"]:
             layout.operator("smokelift.vary", icon="MOD_NOISE")
+            if lacks_proxy(smoke, index):
+                column = layout.column(align=True)
+                draw_text(column, context, "This smoke is large: a proxy keeps the viewport fast.", "INFO")
+                column.operator("smokelift.make_proxy", icon="MOD_REMESH")
         layout.operator("smokelift.set_up", icon="CAMERA_DATA")
 
 

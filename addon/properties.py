@@ -135,7 +135,8 @@ class SmokeliftDirecting(bpy.types.PropertyGroup):
     )
     live: BoolProperty(
         name="Preview",
-        description="Play the result on show at this speed now. Only Retime Smoke makes the frames in between",
+        description="Play the result on show at this speed now. Retime Smoke, or Frames Between in Advanced, makes the "
+        "frames in between",
         update=_speed_chosen,
     )
     use_part: BoolProperty(name="Part", description="Loop a part of the result, in which the smoke is steady")
@@ -364,6 +365,12 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
             ("FRAMES", "Frame by Frame", "One frame of the clip in each frame of the scene, as Blender plays clips"),
             ("REAL", "Real Time", "As fast as in reality"),
         ],
+        update=_speed_chosen,
+    )
+    between: BoolProperty(
+        name="Frames Between",
+        description="At another speed than the clip's, compute what lies between two frames with their velocity, while "
+        "it is shown and rendered. Blender can do so since 5.0",
         update=_speed_chosen,
     )
     device: EnumProperty(

@@ -15,6 +15,7 @@ from .job import EngineMissingError, Job, engine_command
 from .scene_file import options, shot_tables
 from .smoke import active_smoke, find_smoke
 from .take import Take, TakeError
+from .wording import in_panel
 
 TICKS = 4
 """Ticks of `run.TICK_SECONDS` without a change of settings before the engine checks the shot."""
@@ -93,7 +94,7 @@ class ShotCheck:
         job, self._job = self._job, None
         details = job.details
         state.check_done = job.outcome == "done"
-        state.check_error = "" if state.check_done else job.sentence
+        state.check_error = "" if state.check_done else in_panel(job.sentence)
         state.notes = "\n".join(found_lines(details.get("facts", ())))
         if state.check_done:
             state.resolution = details["scene"]["domain"]["resolution"]

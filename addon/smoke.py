@@ -17,7 +17,12 @@ def is_smoke(obj: bpy.types.Object | None) -> bool:
     """Whether an object is a smoke that can be made: one that is linked from another file is finished."""
     if obj is None or obj.type != "VOLUME" or obj.library is not None or obj.data.library is not None:
         return False
-    return obj.smokelift.is_smoke
+    return obj.override_library is None and obj.smokelift.is_smoke
+
+
+def is_override(obj: bpy.types.Object | None) -> bool:
+    """Whether an object is the override of a smoke that is linked from another file: only its look can be changed."""
+    return obj is not None and obj.type == "VOLUME" and obj.override_library is not None and obj.smokelift.is_smoke
 
 
 def smokes(scene: bpy.types.Scene) -> list[bpy.types.Object]:
@@ -37,6 +42,12 @@ def active_smoke(scene: bpy.types.Scene) -> bpy.types.Object | None:
             if active in (settings.box, settings.inlet, settings.assumed_camera) or active.parent == obj:
                 return obj
     return found[0] if found else None
+
+
+def smoke_with_look(scene: bpy.types.Scene) -> bpy.types.Object | None:
+    """The smoke whose look is in the tab: the active override of a linked one, else as above."""
+    active = _layer(scene).objects.active
+    return active if is_override(active) else active_smoke(scene)
 
 
 def find_smoke(uid: int) -> bpy.types.Object | None:

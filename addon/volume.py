@@ -2,19 +2,22 @@
 
 import math
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import bpy
 from bpy.app.handlers import persistent
 from mathutils import Vector
 
+from .between import drive_between, fit_between, next_of
 from .blender_scene import frame_rate
 from .box_table import engine_to_world
-from .contract import DIRECTIONS, FRAME_FILE, MADE_UP
+from .contract import DIRECTIONS, FRAME_FILE, MADE_UP, PROXY_FILE
 from .kept import set_unless_changed
 from .look import fit_look
 from .pace import paced
 from .paths import absolute, relative
+from .proxy import fit_proxy, proxy_of
 from .smoke import scene_of, smokes
 from .take import Take
 
@@ -44,9 +47,8 @@ def show(smoke: bpy.types.Object, take: Take) -> bpy.types.Object | None:
         smoke.delta_location = (0.0, 0.0, 0.0)
         set_unless_changed(smoke, "place", smoke, "matrix_basis", engine_to_world(smoke))
     _correct_position(smoke, index["scene"]["domain"])
-    _set_file(smoke.data, take, index)
-    _set_time(smoke, scene_of(smoke), index)
-    fit_look(smoke.data, index["scene"])
+    fit_look(smoke, index["scene"])
+    _play(smoke, scene_of(smoke), take, index)
     smoke.data[PROVENANCE] = _provenance(index.get("provenance", []))
     return smoke
 
@@ -127,8 +129,7 @@ def show_beside(smoke: bpy.types.Object, take: Take) -> bpy.types.Object | None:
     domain = index["scene"]["domain"]
     width = (domain["max"][0] - domain["min"][0]) * BESIDE
     copy.location += copy.matrix_basis.to_3x3() @ Vector((width, 0.0, 0.0))
-    _set_file(copy.data, take, index)
-    _set_time(copy, scene_of(smoke), index)
+    _play(copy, scene_of(smoke), take, index)
     return copy
 
 
@@ -190,9 +191,20 @@ def _numbers(index: dict[str, Any]) -> list[int]:
     return sorted(int(number) for number in index["frames"])
 
 
-def _set_file(volume: bpy.types.Volume, take: Take, index: dict[str, Any]) -> None:
-    """Make a Volume read the take's files."""
-    path = relative(take.directory / FRAME_FILE.format(_numbers(index)[0]))
+def _play(smoke: bpy.types.Object, scene: bpy.types.Scene, take: Take, index: dict[str, Any]) -> None:
+    """Make a smoke, and its proxy if the take has one, read the take's files and play when its clip does."""
+    numbers = _numbers(index)
+    _set_file(smoke.data, take.directory / FRAME_FILE.format(numbers[0]), index)
+    fit_proxy(smoke, take, numbers)
+    for volume, name in ((proxy_of(smoke), PROXY_FILE), (next_of(smoke), FRAME_FILE)):
+        if volume is not None:
+            _set_file(volume, take.directory / name.format(numbers[0]), index)
+    _set_time(smoke, scene, index)
+
+
+def _set_file(volume: bpy.types.Volume, file: Path, index: dict[str, Any]) -> None:
+    """Make a Volume read the files of a take."""
+    path = relative(file)
     if volume.filepath != path:
         volume.filepath = path
     volume.is_sequence = True
@@ -205,32 +217,36 @@ def _set_file(volume: bpy.types.Volume, take: Take, index: dict[str, Any]) -> No
 
 
 def _set_time(smoke: bpy.types.Object, scene: bpy.types.Scene, index: dict[str, Any]) -> None:
-    """Make a smoke play when its clip does, at the pace that is tried out."""
-    volume, settings = smoke.data, smoke.smokelift
-    numbers, ratio = _numbers(index), _ratio(smoke, scene, index)
+    """Make a smoke, its proxy and what it needs for frames between play when its clip does, at the pace on trial."""
+    settings, numbers, ratio = smoke.smokelift, _numbers(index), _ratio(smoke, scene, index)
     real = _real_time(smoke, ratio, index)
     direction = index.get("settings", {}).get("direct", {}).get("job")
     live = settings.directing.live and direction != "retime" and not _tracked(index)
-    clip = settings.clip
-    before = frames_before(settings, index)
-    start = (clip.frame_start if clip else 1) + (round(before * ratio) if real else before)
-    set_unless_changed(volume, "start", volume, "frame_start", start)
-    volume.frame_offset = numbers[0] - 1
-    volume.sequence_mode = "REPEAT" if direction == "loop" else "CLIP"
-    for name in ("frame_offset", "velocity_scale"):
-        volume.driver_remove(name)
     steps = ratio if real else 1.0
     pace = paced(len(numbers), settings.directing.speeds() if live else (1.0,))
-    volume.frame_duration = max(1, math.ceil(steps * pace.duration - EARLY))
-    volume.velocity_scale = (1.0 if real else ratio) * pace.speeds[0]
-    if real or live:
-        # Blender shows one file in each frame of the scene; the driven offset selects another
-        start = volume.frame_start
-        time = f"(frame-{start}+{EARLY})/{steps:.9g}"
-        place = f"min({pace.place(time)},{len(numbers) - 1})"
-        _drive(volume, "frame_offset", f"floor({place})-(frame-{start})+{numbers[0] - 1}")
-    if live and len(pace.speeds) > 1:
-        _drive(volume, "velocity_scale", f"{1.0 if real else ratio:.9g}*({pace.speed(time)})")
+    before = frames_before(settings, index)
+    first = (settings.clip.frame_start if settings.clip else 1) + (round(before * ratio) if real else before)
+    set_unless_changed(smoke.data, "start", smoke.data, "frame_start", first)
+    start = smoke.data.frame_start
+    time = f"(frame-{start}+{EARLY})/{steps:.9g}"
+    place = f"min({pace.place(time)},{len(numbers) - 1})"
+    fit_between(smoke, settings.between and (real or live))
+    for volume, ahead in ((smoke.data, 0), (proxy_of(smoke), 0), (next_of(smoke), 1)):
+        if volume is None:
+            continue
+        volume.frame_start, volume.frame_offset = start, numbers[0] - 1
+        volume.sequence_mode = "REPEAT" if direction == "loop" else "CLIP"
+        for name in ("frame_offset", "velocity_scale"):
+            volume.driver_remove(name)
+        volume.frame_duration = max(1, math.ceil(steps * pace.duration - EARLY))
+        volume.velocity_scale = (1.0 if real else ratio) * pace.speeds[0]
+        if real or live:
+            # Blender shows one file in each frame of the scene; the driven offset selects another
+            file = f"min(floor({place})+{ahead},{len(numbers) - 1})" if ahead else f"floor({place})"
+            _drive(volume, "frame_offset", f"{file}-(frame-{start})+{numbers[0] - 1}")
+        if live and len(pace.speeds) > 1:
+            _drive(volume, "velocity_scale", f"{1.0 if real else ratio:.9g}*({pace.speed(time)})")
+    drive_between(smoke, place, 1.0 / index["scene"]["clip"]["fps"])
 
 
 def _drive(volume: bpy.types.Volume, name: str, expression: str) -> None:

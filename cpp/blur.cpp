@@ -1,5 +1,7 @@
 #include "blur.h"
 
+#include "voxels.h"
+
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -28,9 +30,20 @@ int mirrored(int i, int n) {
 }
 
 SMOKELIFT_CLONES
-void add(const float *__restrict a, float factor, float *__restrict out, std::size_t n) {
-    for (std::size_t i = 0; i < n; ++i)
+void add(const float *__restrict a, float factor, float *__restrict out, const Span &span) {
+    const int end = span[1];
+    for (int i = span[0]; i < end; ++i)
         out[i] += factor * a[i];
+}
+
+// From the first to the last number of a row that is not zero.
+Span nonzero(const float *row, int n) {
+    int first = 0, end = n;
+    while (first < end && row[first] == 0)
+        ++first;
+    while (first < end && row[end - 1] == 0)
+        --end;
+    return {first, end};
 }
 
 } // namespace
@@ -39,26 +52,46 @@ void blur(In a, double width, double truncate, Out result, Workers &workers) {
     const std::vector<float> weights = gaussian(width, truncate);
     const int radius = int(weights.size()) / 2;
     const auto [nx, ny, nz] = a.n;
+    // What is zero adds nothing, and most of a box around smoke is: from the first to the last of the others.
+    std::vector<Span> filled(std::size_t(nx) * ny);
+    workers.run(nx, [&, ny = ny, nz = nz](int i) {
+        for (int j = 0; j < ny; ++j)
+            filled[std::size_t(i) * ny + j] = nonzero(a.row(i, j), nz);
+    });
     // Rows along x first, out of the array, then along y and z within a slab.
     workers.run(nx, [&, nx = nx, ny = ny, nz = nz](int i) {
         thread_local std::vector<float> slab, row;
-        const std::size_t size = a.slab_size();
-        slab.assign(size, 0);
-        for (int t = -radius; t <= radius; ++t)
-            add(a.row(mirrored(i + t, nx), 0), weights[radius + t], slab.data(), size);
+        thread_local std::vector<Span> spans;
+        slab.assign(a.slab_size(), 0);
+        spans.assign(ny, Span{0, 0});
+        for (int t = -radius; t <= radius; ++t) {
+            const int from = mirrored(i + t, nx);
+            for (int j = 0; j < ny; ++j) {
+                const Span &span = filled[std::size_t(from) * ny + j];
+                add(a.row(from, j), weights[radius + t], slab.data() + std::size_t(j) * nz, span);
+                spans[j] = joined(spans[j], span);
+            }
+        }
         row.resize(nz + 2 * radius);
         for (int j = 0; j < ny; ++j) {
             float *out = result.row(i, j), *inner = row.data() + radius;
             std::fill_n(inner, nz, 0.0f);
-            for (int t = -radius; t <= radius; ++t)
-                add(slab.data() + std::size_t(mirrored(j + t, ny)) * nz, weights[radius + t], inner, nz);
+            Span span{0, 0};
+            for (int t = -radius; t <= radius; ++t) {
+                const int from = mirrored(j + t, ny);
+                add(slab.data() + std::size_t(from) * nz, weights[radius + t], inner, spans[from]);
+                span = joined(span, spans[from]);
+            }
+            std::fill_n(out, nz, 0.0f);
+            if (span[0] == span[1])
+                continue;
             for (int t = 1; t <= radius; ++t) {
                 inner[-t] = inner[mirrored(-t, nz)];
                 inner[nz - 1 + t] = inner[mirrored(nz - 1 + t, nz)];
             }
-            std::fill_n(out, nz, 0.0f);
+            const Span reached{std::max(span[0] - radius, 0), std::min(span[1] + radius, nz)};
             for (int t = 0; t <= 2 * radius; ++t)
-                add(row.data() + t, weights[t], out, nz);
+                add(row.data() + t, weights[t], out, reached);
         }
     });
 }

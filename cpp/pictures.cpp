@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 namespace smokelift {
 namespace {
 
 constexpr std::size_t READS_PER_TASK = 1 << 16;
+constexpr int RUN = 32;               // voxels along z that are looked at together
 constexpr double LEAST_DEPTH = 1e-12; // m; a voxel in the plane of the eye is in no picture
 
 // Homogeneous pixel coordinates along a row of voxels.
@@ -43,12 +45,17 @@ SMOKELIFT_INLINE int pixel(float place, int count) {
     return static_cast<int>(std::clamp(std::nearbyint(place), 0.0f, float(count - 1)));
 }
 
+int first_marked(const unsigned char *row, int n) {
+    const void *found = std::memchr(row, 1, std::size_t(n));
+    return found ? int(static_cast<const unsigned char *>(found) - row) : n;
+}
+
 SMOKELIFT_CLONES
 void places_of_plane(const PictureMap &map, Mask voxels, int i, std::size_t at, const Places &places) {
     for (int j = 0; j < voxels.n[1]; ++j) {
-        const PixelRow line(map, i, j);
         const unsigned char *row = voxels.row(i, j);
-        for (int k = 0; k < voxels.n[2]; ++k) {
+        const PixelRow line(map, i, j);
+        for (int k = first_marked(row, voxels.n[2]); k < voxels.n[2]; ++k) {
             if (!row[k])
                 continue;
             const Place found = place_of(map, line, k);
@@ -59,16 +66,61 @@ void places_of_plane(const PictureMap &map, Mask voxels, int i, std::size_t at, 
     }
 }
 
+// How many pixels above and left of each corner of a pixel are marked.
+class MarkedPixels {
+public:
+    MarkedPixels(const PictureMap &map, const unsigned char *picture)
+        : width_(map.columns + 1), sums_(std::size_t(map.rows + 1) * width_) {
+        for (int row = 0; row < map.rows; ++row) {
+            int *const above = sums_.data() + std::size_t(row) * width_, *const sums = above + width_;
+            for (int column = 0, inside = 0; column < map.columns; ++column) {
+                inside += picture[std::size_t(row) * map.columns + column];
+                sums[column + 1] = above[column + 1] + inside;
+            }
+        }
+    }
+
+    // Whether any may be within a pixel of the box around two places.
+    bool near(const PictureMap &map, const Place &a, const Place &b) const {
+        const auto [top, bottom] = std::minmax(a.row, b.row);
+        const auto [left, right] = std::minmax(a.column, b.column);
+        const int *const first = sums_.data() + std::size_t(index_within(top - 1, 0, map.rows)) * width_;
+        const int *const last = sums_.data() + std::size_t(index_within(bottom + 3, 0, map.rows)) * width_;
+        const int low = index_within(left - 1, 0, map.columns),
+                  high = index_within(right + 3, 0, map.columns);
+        return last[high] - last[low] - first[high] + first[low] > 0;
+    }
+
+private:
+    int width_;
+    std::vector<int> sums_;
+};
+
 SMOKELIFT_CLONES
-void mark_plane(const PictureMap &map, const unsigned char *picture, int i, bool *shown) {
+void mark_run(const PictureMap &map, const unsigned char *picture, const PixelRow &line, int begin, int end,
+              bool *shown) {
+    for (int k = begin; k < end; ++k) {
+        const Place found = place_of(map, line, k);
+        const std::size_t at =
+            std::size_t(pixel(found.row, map.rows)) * map.columns + pixel(found.column, map.columns);
+        shown[k] = found.visible && picture[at];
+    }
+}
+
+void mark_plane(const PictureMap &map, const unsigned char *picture, const MarkedPixels &marked, int i,
+                bool *shown) {
     const Shape n = map.shape();
-    for (int j = 0; j < n[1]; ++j) {
+    for (int j = 0; j < n[1]; ++j, shown += n[2]) {
         const PixelRow line(map, i, j);
-        for (int k = 0; k < n[2]; ++k) {
-            const Place found = place_of(map, line, k);
-            const std::size_t at =
-                std::size_t(pixel(found.row, map.rows)) * map.columns + pixel(found.column, map.columns);
-            shown[std::size_t(j) * n[2] + k] = found.visible && picture[at];
+        for (int begin = 0; begin < n[2]; begin += RUN) {
+            const int end = std::min(begin + RUN, n[2]);
+            const double near = line.at(2, map.centres[2][begin]), far = line.at(2, map.centres[2][end - 1]);
+            // before the camera, what lies between two voxels is seen between them
+            if (near > LEAST_DEPTH && far > LEAST_DEPTH &&
+                !marked.near(map, place_of(map, line, begin), place_of(map, line, end - 1)))
+                std::fill(shown + begin, shown + end, false);
+            else
+                mark_run(map, picture, line, begin, end, shown);
         }
     }
 }
@@ -119,6 +171,27 @@ std::vector<std::size_t> count_marked(Mask voxels, Workers &workers) {
     return first;
 }
 
+void find_marked(Mask voxels, const std::vector<std::size_t> &first, std::int64_t *indices,
+                 Workers &workers) {
+    const std::size_t count = first.back();
+    workers.run(voxels.n[0], [&](int i) {
+        if (first[i] == first[i + 1])
+            return;
+        std::int64_t *at = indices + first[i];
+        for (int j = 0; j < voxels.n[1]; ++j) {
+            const unsigned char *row = voxels.row(i, j);
+            for (int k = first_marked(row, voxels.n[2]); k < voxels.n[2]; ++k) {
+                if (!row[k])
+                    continue;
+                at[0] = i;
+                at[count] = j;
+                at[2 * count] = k;
+                ++at;
+            }
+        }
+    });
+}
+
 void find_places(const PictureMap &map, Mask voxels, const std::vector<std::size_t> &first,
                  const Places &places, Workers &workers) {
     workers.run(voxels.n[0], [&](int i) { places_of_plane(map, voxels, i, first[i], places); });
@@ -126,7 +199,9 @@ void find_places(const PictureMap &map, Mask voxels, const std::vector<std::size
 
 void mark_shown(const PictureMap &map, const unsigned char *picture, bool *shown, Workers &workers) {
     const Shape n = map.shape();
-    workers.run(n[0], [&](int i) { mark_plane(map, picture, i, shown + std::size_t(i) * n[1] * n[2]); });
+    const MarkedPixels marked(map, picture);
+    workers.run(n[0],
+                [&](int i) { mark_plane(map, picture, marked, i, shown + std::size_t(i) * n[1] * n[2]); });
 }
 
 double nearest_depth(const PictureMap &map, Workers &workers) {

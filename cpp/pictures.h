@@ -5,6 +5,7 @@
 #include "threads.h"
 
 #include <array>
+#include <cstdint>
 #include <vector>
 
 namespace smokelift {
@@ -27,6 +28,9 @@ struct Places {
 
 // The first of the marked voxels in each plane across x, and how many there are at the end.
 std::vector<std::size_t> count_marked(Mask voxels, Workers &workers);
+
+// The indices (3, count) of the marked voxels along x, y and z, in their order in memory; `first` as below.
+void find_marked(Mask voxels, const std::vector<std::size_t> &first, std::int64_t *indices, Workers &workers);
 
 // The places of the marked voxels, in their order in memory; `first` is that of count_marked().
 void find_places(const PictureMap &map, Mask voxels, const std::vector<std::size_t> &first,

@@ -1,4 +1,6 @@
 #include "codes.h"
+#include "halves.h"
+#include "lattice.h"
 #include "patches.h"
 #include "picture_blur.h"
 #include "pictures.h"
@@ -56,17 +58,32 @@ void require_parts(const Integers &first, py::ssize_t parts, py::ssize_t whole) 
 
 const unsigned char *bytes_of(const Marks &a) { return reinterpret_cast<const unsigned char *>(a.data()); }
 
+Mask mask_of(const Marks &voxels) {
+    require_fit(voxels.ndim() == 3);
+    return {bytes_of(voxels), {int(voxels.shape(0)), int(voxels.shape(1)), int(voxels.shape(2))}};
+}
+
 void register_places(py::module_ &module) {
     using namespace py::literals;
+
+    module.def(
+        "marked",
+        [](const Marks &voxels) {
+            const Mask mask = mask_of(voxels);
+            const auto first = released([&](Workers &workers) { return count_marked(mask, workers); });
+            py::array_t<std::int64_t> indices({py::ssize_t(3), py::ssize_t(first.back())});
+            std::int64_t *const result = indices.mutable_data();
+            released([&](Workers &workers) { find_marked(mask, first, result, workers); });
+            return indices;
+        },
+        "voxels"_a);
 
     py::class_<PictureMap>(module, "PictureMap")
         .def(py::init(&map_of), "to_pixel"_a, "centres"_a, "size"_a)
         .def(
             "places",
             [](const PictureMap &map, const Marks &voxels) {
-                require_fit(voxels.ndim() == 3);
-                const Mask mask{bytes_of(voxels),
-                                {int(voxels.shape(0)), int(voxels.shape(1)), int(voxels.shape(2))}};
+                const Mask mask = mask_of(voxels);
                 require_fit(mask.n == map.shape());
                 const auto first = released([&](Workers &workers) { return count_marked(mask, workers); });
                 const auto count = py::ssize_t(first.back());
@@ -106,6 +123,71 @@ void register_places(py::module_ &module) {
             return values;
         },
         "picture"_a, "rows"_a, "columns"_a);
+}
+
+// A box of an array, of which consecutive elements along z are neighbours in memory.
+template <class T, class Data> Part<T> part_of(const py::array_t<std::remove_const_t<T>, 0> &a, Data data) {
+    require_fit(a.ndim() == 3 && a.size() > 0 && a.strides(2) == py::ssize_t(sizeof(T)));
+    Part<T> part{{data, {}}, {int(a.shape(0)), int(a.shape(1)), int(a.shape(2))}};
+    for (int axis = 0; axis < 3; ++axis)
+        part.at.stride[axis] = a.strides(axis) / Stride(sizeof(T));
+    return part;
+}
+
+template <class T> Part<const T> part_of(const py::array_t<T, 0> &a) { return part_of<const T>(a, a.data()); }
+
+Shape halved(const Shape &n) { return {(n[0] + 1) / 2, (n[1] + 1) / 2, (n[2] + 1) / 2}; }
+
+void register_halves(py::module_ &module) {
+    using namespace py::literals;
+    using Box = py::array_t<float, 0>;
+    using BoxMarks = py::array_t<bool, 0>;
+
+    module.def(
+        "means_of_two",
+        [](const Box &values, const std::optional<BoxMarks> &voxels) {
+            const auto fine = part_of(values);
+            std::optional<Part<const bool>> marked;
+            if (voxels) {
+                marked = part_of(*voxels);
+                require_fit(marked->n == fine.n);
+            }
+            return filled(halved(fine.n),
+                          [&](Out means, Workers &workers) { means_of_two(fine, marked, means, workers); });
+        },
+        py::arg("values").noconvert(), py::arg("voxels").noconvert() = py::none());
+
+    module.def(
+        "prolong_values",
+        [](const Box &values, const BoxMarks &voxels) {
+            const auto coarse = part_of(values);
+            const auto marked = part_of(voxels);
+            require_fit(coarse.n == halved(marked.n));
+            std::vector<std::size_t> first(marked.n[0] + 1, 0);
+            for (int x = 0; x < marked.n[0]; ++x) {
+                first[x + 1] = first[x];
+                for (int y = 0; y < marked.n[1]; ++y)
+                    first[x + 1] += std::count(marked.row(x, y), marked.row(x, y) + marked.n[2], true);
+            }
+            Array prolonged(py::ssize_t(first.back()));
+            float *const result = prolonged.mutable_data();
+            released([&](Workers &workers) { prolong_values(coarse, marked, first, result, workers); });
+            return prolonged;
+        },
+        py::arg("values").noconvert(), py::arg("voxels").noconvert());
+
+    module.def(
+        "scale_alike",
+        [](const Box &values, const BoxMarks &voxels, const Box &before, const Box &after, float least,
+           Box &result) {
+            const auto fine = part_of(values), was = part_of(before), is = part_of(after);
+            const auto marked = part_of(voxels);
+            const auto scaled = part_of<float>(result, result.mutable_data());
+            require_fit(marked.n == fine.n && scaled.n == fine.n && was.n == halved(fine.n) && is.n == was.n);
+            released([&](Workers &workers) { scale_alike(fine, marked, was, is, least, scaled, workers); });
+        },
+        py::arg("values").noconvert(), py::arg("voxels").noconvert(), py::arg("before").noconvert(),
+        py::arg("after").noconvert(), "least"_a, py::arg("result").noconvert());
 }
 
 void register_codes(py::module_ &module) {
@@ -227,6 +309,20 @@ void register_turning(py::module_ &module) {
     using namespace py::literals;
 
     module.def(
+        "read_lattice",
+        [](const Array &lattice, const Array &places) {
+            const In nodes = view(lattice);
+            require_fit(places.ndim() == 2 && places.shape(0) == 3);
+            Array values(places.shape(1));
+            float *const result = values.mutable_data();
+            released([&](Workers &workers) {
+                read_lattice(nodes, places.data(), std::size_t(places.shape(1)), result, workers);
+            });
+            return values;
+        },
+        "lattice"_a, "places"_a);
+
+    module.def(
         "project_turned",
         [](const Array &volume, double first, std::array<double, 2> steps, int columns) {
             const In voxels = view(volume);
@@ -314,6 +410,7 @@ void register_patches(py::module_ &module) {
 
 void register_pictures(py::module_ &module) {
     register_places(module);
+    register_halves(module);
     register_codes(module);
     register_filters(module);
     register_turning(module);

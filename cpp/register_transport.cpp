@@ -45,6 +45,14 @@ void register_transport(py::module_ &module) {
         "faces"_a);
 
     module.def(
+        "relative_divergence",
+        [](const Array3 &faces) {
+            const StaggeredIn u = view(faces);
+            return released([&](Workers &workers) { return relative_divergence(u, workers); });
+        },
+        "faces"_a);
+
+    module.def(
         "gradient",
         [](const Array &cells) {
             const In a = view(cells);

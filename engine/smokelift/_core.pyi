@@ -45,6 +45,9 @@ def project(faces: Faces, closed: Closed, passes: int = 2) -> tuple[list[Array],
 def divergence(faces: Faces) -> Array:
     """Net outflow of every cell."""
 
+def relative_divergence(faces: Faces) -> float:
+    """max |div u| / max |u|; 0 of no motion."""
+
 def gradient(cells: Array) -> list[Array]:
     """Central differences at cell centres along x, y and z, one-sided at the sides of the box."""
 
@@ -407,6 +410,9 @@ def diffuse_adjoint(means: Array, radiance: Array, radiance_gradient: Array, alb
 
 # Pictures
 
+def marked(voxels: Mask) -> npt.NDArray[np.int64]:
+    """Indices (3, n) of the marked voxels along x, y and z: those of `numpy.nonzero`, in the same order."""
+
 class PictureMap:
     """Where the voxels of a grid lie in a picture.
 
@@ -429,6 +435,26 @@ class PictureMap:
 
 def read_bilinearly(picture: npt.NDArray[np.floating[Any]], rows: Array, columns: Array) -> Array:
     """A picture (rows, columns) at places (n,) in pixels; the nearest pixel's value outside."""
+
+# A grid and one half as fine. Arrays may be boxes of larger ones, but for the last axis.
+
+def means_of_two(values: Array, voxels: Mask | None = None) -> Array:
+    """Means of two along every axis; beyond the grid there is nothing, nor in rows without marked voxels."""
+
+def prolong_values(values: Array, voxels: Mask) -> Array:
+    """Values of the coarse grid, linear between the voxels' middles, at the marked voxels (n,) of the fine one."""
+
+def scale_alike(values: Array, voxels: Mask, before: Array, after: Array, least: float, result: Array) -> None:
+    """Write values x (after / before) at the marked voxels into a result.
+
+    ``before``, at least ``least``, and ``after`` are the coarse grid's, linear between its voxels' middles.
+    """
+
+def read_lattice(lattice: Array, places: Array) -> Array:
+    """A lattice that repeats, read at finite places (3, n), linear between nodes at whole numbers.
+
+    To the bit `scipy.ndimage.map_coordinates` of order 1 and mode "grid-wrap".
+    """
 
 def sum_lines(
     picture: npt.NDArray[np.uint8],

@@ -13,8 +13,9 @@ from smokelift.app import cli
 from smokelift.app.commands import continue_, loop, retime
 from smokelift.direct import writing
 from smokelift.footage.images import READABLE
-from smokelift.output.export import ASSET, NOTE, proxy_name
-from smokelift.output.layout import INDEX, frame_path
+from smokelift.output.export import ASSET, NOTE
+from smokelift.output.layout import INDEX, frame_path, proxy_path
+from smokelift.output.proxy import LARGE
 from smokelift.scene import SIDES, EnvironmentLight, SceneError
 from smokelift.setup.provenance import Origin
 from smokelift.setup.settings import LIMITS, QUALITIES, Settings
@@ -26,15 +27,16 @@ def test_exit_statuses() -> None:
 
 
 def test_files_of_a_sequence() -> None:
-    """The index, and a frame."""
+    """The index, a frame, and its coarse copy."""
     assert contract.INDEX_FILE == INDEX
     assert contract.FRAME_FILE.format(12) == frame_path(Path(), 12, "vdb").name
+    assert contract.PROXY_FILE.format(12) == proxy_path(Path(), 12).name
+    assert contract.PROXY_VOXELS == LARGE
 
 
 def test_files_of_an_export() -> None:
-    """Its note, a frame of the proxy, and the file that the engine leaves to the add-on."""
+    """Its note, and the file that the engine leaves to the add-on."""
     assert (contract.EXPORT_FILE, contract.ASSET_FILE) == (NOTE, ASSET)
-    assert contract.PROXY_FILE.format(12) == proxy_name(12)
 
 
 def test_origins() -> None:

@@ -145,7 +145,7 @@ def _light(shot: Shot, given: Scene) -> tuple[Fact, ...]:
         return (
             Fact("light strength", f"smoke of radiance {colour}", "measured", "Light strength: as the views tell it."),
             _chosen(shot, "light direction", "sun's direction", str(direction.chosen), False),
-            Fact("sun's color", "that of all light", UNDETERMINED),
+            Fact("sun's colour", "that of all light", UNDETERMINED),
             Fact("ambient share", f"{direction.measured['ambient_share']:.0%}", "measured"),
         )
     if given.lights or thickness is None:
@@ -155,7 +155,7 @@ def _light(shot: Shot, given: Scene) -> tuple[Fact, ...]:
     if not shot.smoky:
         how = "Light strength: no smoke shows it."
     if shot.scene.scattering in SHADOWED:
-        how = "Light strength: as much as comes from behind the smoke, in the color that the clip asks for."
+        how = "Light strength: as much as comes from behind the smoke, in the colour that the clip asks for."
     if thickness.chosen != UNDETERMINED:
         hides, origin = f"hides {thickness.measured['hidden']:.0%} of what it covers", "measured"
         how = "Light strength: what the smoke adds for what it hides of the texture behind it."
@@ -163,7 +163,7 @@ def _light(shot: Shot, given: Scene) -> tuple[Fact, ...]:
         Fact("light strength", f"smoke of radiance {colour}", origin, how),
         _chosen(shot, "smoke thickness", "smoke thickness", hides, False),
         _chosen(shot, "light direction", "sun's direction", "no sun", False),
-        _chosen(shot, "light direction", "sun's color", "that of all light", False),
+        _chosen(shot, "light direction", "sun's colour", "that of all light", False),
         _chosen(shot, "light direction", "ambient share", "all light is from everywhere", False),
     )
 

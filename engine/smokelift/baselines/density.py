@@ -109,7 +109,7 @@ class FixedRateDescent:
             views=tuple(replace(view, counted=every) for view, every in zip(views.views, everywhere, strict=True)),
             hull=np.ones_like(views.hull),
         )
-        return FittedDensity(without_traces(density), judged.hull, fit_figures(judged, residuals, done))
+        return FittedDensity(without_traces(density, judged.where), judged.hull, fit_figures(judged, residuals, done))
 
     def _descend(
         self, renderers: Sequence[PaperRenderer], pictures: Sequence[Image], density: Volume, thin: Volume

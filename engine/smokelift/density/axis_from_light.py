@@ -182,19 +182,20 @@ class _CoarsePicture:
             mask &= DepthProfile(amount, fine, coarse, corner).share_inside() > search.inside
         self.counted = int(mask.sum())
         self._weight = mask / np.mean(np.square(noise_at(self._picture, small)), -1)
-        self._projection = project_voxels(self._camera, coarse)
-        self._hull = visual_hull(self._amount > 0.01 * self._amount.max(), self._projection)
+        projection = project_voxels(self._camera, coarse)
+        self._hull = visual_hull(self._amount > 0.01 * self._amount.max(), projection)
+        self._places = projection.places(self._hull)
         self._renderer = optics.renderer(fine, self._background, self._hull)
         self._scale = np.zeros(self._amount.shape, np.float32)
 
     def misfit(self, axis: SmokeAxis) -> float:
         """Mean square of what no amount of smoke on the rays explains, in units of the noise."""
-        profile = DepthProfile(self._amount, self._camera, self._optics.domain, axis).at(self._projection, self._hull)
-        base = self._projection.read(self._amount, self._hull) * profile / self._optics.medium.extinction
+        profile = DepthProfile(self._amount, self._camera, self._optics.domain, axis).at(self._places, self._hull)
+        base = self._places.read(self._amount) * profile / self._optics.medium.extinction
         density = np.zeros(self._optics.domain.resolution, np.float32)
         least = np.inf
         for _ in range(self._rounds):
-            density[self._hull] = base * np.exp(self._projection.read(self._scale, self._hull))
+            density[self._hull] = base * np.exp(self._places.read(self._scale))
             left = self._picture - self._renderer.image(density)
             least = min(least, float(np.sum(self._weight[..., None] * left**2) / (3 * self.counted)))
             self._scale = np.clip(self._scale + self._step(left), -4, 3)

@@ -12,6 +12,7 @@ from scipy import ndimage
 
 from smokelift.density.exemplar import SIZE, Exemplar, Picture
 from smokelift.density.observation import ObservedClip, View
+from smokelift.density.stretched_noise import roughness
 from smokelift.density.turntable import Turntable
 from smokelift.scene import Camera, Domain
 
@@ -39,12 +40,15 @@ class ClipTexture:
         Standard deviation of the smoke across the axis, in voxels.
     drift
         Mean motion of the pictures along the axis, in voxels a frame.
+    roughness
+        Of the octaves of `StretchedNoise`.
     """
 
     turntable: Turntable
     exemplars: tuple[Exemplar, ...]
     width: float
     drift: float
+    roughness: tuple[float, ...]
 
     @staticmethod
     def of(clip: ObservedClip) -> ClipTexture | None:
@@ -69,12 +73,14 @@ class ClipTexture:
         while SIZE * scales[0] < ACROSS * width:
             scales.insert(0, 2 * scales[0])
         exemplars = tuple(Exemplar.of(pictures, scale) for scale in scales)
-        return ClipTexture(shown[0].turntable, exemplars, width, abs(float(motion[1])))
+        drift = abs(float(motion[1]))
+        return ClipTexture(shown[0].turntable, exemplars, width, drift, roughness(pictures, width))
 
     def halved(self, domain: Domain) -> ClipTexture:
         """The texture on a domain with voxels twice as wide, without the scale that these do not hold."""
         exemplars = tuple(replace(each, scale=each.scale // 2) for each in self.exemplars if each.scale > 1)
-        return ClipTexture(replace(self.turntable, domain=domain), exemplars, self.width / 2, self.drift / 2)
+        turntable = replace(self.turntable, domain=domain)
+        return ClipTexture(turntable, exemplars, self.width / 2, self.drift / 2, self.roughness)
 
 
 class _Shown(NamedTuple):

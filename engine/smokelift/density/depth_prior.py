@@ -15,12 +15,11 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from smokelift.density.axis import SmokeAxis
 from smokelift.density.clip_axis import AXIS_FRAMES
-from smokelift.density.halves import LARGE, any_of_two, every_second, spread_to_two
-from smokelift.density.hull import centres_of
+from smokelift.density.halves import LARGE, any_of_two, every_second, spread_to_two, with_neighbours
+from smokelift.density.hull import Places, centres_of
 from smokelift.density.objective import Term
 from smokelift.density.observation import ObservedClip, View, ViewSet
 from smokelift.density.profile import EXPECTED, DepthProfile
@@ -136,10 +135,10 @@ def _expected(views: ViewSet, profiles: Sequence[DepthProfile]) -> NDArray[np.bo
         # where every second voxel and its neighbours expect none, those between them expect none either
         sampled = every_second(any_of_two(hull), hull.shape)
         coarse = _marked(sampled, views, profiles)[::2, ::2, ::2]
-        hull = spread_to_two(np.asarray(ndimage.binary_dilation(coarse, np.ones((3, 3, 3)))), hull.shape) & hull
+        hull = spread_to_two(with_neighbours(coarse, corners=True), hull.shape) & hull
     near = _marked(hull, views, profiles)[box]
     expected = np.zeros(hull.shape, np.bool_)
-    expected[box] = ndimage.binary_dilation(near) & views.hull[box]
+    expected[box] = with_neighbours(near) & views.hull[box]
     return expected
 
 
@@ -147,8 +146,8 @@ def _marked(voxels: NDArray[np.bool_], views: ViewSet, profiles: Sequence[DepthP
     """Those of some voxels (nx, ny, nz) where any profile expects smoke."""
     found = np.zeros(np.count_nonzero(voxels), np.bool_)
     for view, profile in zip(views.views, profiles, strict=True):
-        visible = view.projection.places(voxels).visible
-        found |= visible & (profile.shape(view.projection, voxels) > EXPECTED)
+        places = view.projection.places(voxels)
+        found |= places.visible & (profile.shape(places, voxels) > EXPECTED)
     expected = np.zeros(voxels.shape, np.bool_)
     expected[voxels] = found
     return expected
@@ -156,31 +155,34 @@ def _marked(voxels: NDArray[np.bool_], views: ViewSet, profiles: Sequence[DepthP
 
 def _spread(views: ViewSet, profiles: Sequence[DepthProfile]) -> Volume:
     """Optical depth per metre (nx, ny, nz) that has the profiles' shape and the pictures' amounts."""
-    hull = views.hull
-    spread = np.zeros(views.optics.domain.resolution, np.float32)
+    hull, spread = views.hull, np.zeros(views.optics.domain.resolution, np.float32)
+    seen_at = [view.projection.places(hull) for view in views.views]
     single = [
-        view.projection.read(view.optical_depth, hull) * profile.at(view.projection, hull)
-        for view, profile in zip(views.views, profiles, strict=True)
+        places.read(view.optical_depth) * profile.at(places, hull)
+        for view, places, profile in zip(views.views, seen_at, profiles, strict=True)
     ]
-    spread[hull] = single[0] if len(single) == 1 else _common(views, profiles, single)
+    spread.ravel()[views.where] = single[0] if len(single) == 1 else _common(views, profiles, seen_at, single)
     return spread
 
 
 def _common(
-    views: ViewSet, profiles: Sequence[DepthProfile], single: Sequence[NDArray[np.float64]]
+    views: ViewSet,
+    profiles: Sequence[DepthProfile],
+    seen_at: Sequence[Places],
+    single: Sequence[NDArray[np.float64]],
 ) -> NDArray[np.float64]:
     """What several profiles have in common (n,), layer by layer as much as the view that shows most."""
     hull = views.hull
-    seen = [view.projection.visible[hull] for view in views.views]
+    seen = [places.visible for places in seen_at]
     count = np.sum(seen, axis=0)
     # a round blob's two profiles make it up, and more of them must not make it smaller
     power = np.minimum(1, 2 / count)
     # what only one shows it would fill with all that the others contradict
     least = np.where(count > 1, LEAST_SHAPE, 0)
     values = np.ones(count.shape)
-    for view, profile, visible in zip(views.views, profiles, seen, strict=True):
-        shape = np.maximum(profile.shape(view.projection, hull), least)
-        values *= np.where(visible, shape**power, 1)
+    for places, profile in zip(seen_at, profiles, strict=True):
+        shape = np.maximum(profile.shape(places, hull), least)
+        values *= np.where(places.visible, shape**power, 1)
     layer = np.nonzero(hull)[2]
     wanted = np.max([np.bincount(layer, np.where(*pair, 0)) for pair in zip(seen, single, strict=True)], axis=0)
     there = np.bincount(layer, values)

@@ -83,7 +83,9 @@ def descend(
     expected : (nx, ny, nz), optional
         What bounds the scale of an empty voxel, so that smoke fades where a prior expects none.
     """
-    where = np.flatnonzero(hull if expected is None else hull & ((density > 0) | (expected > 0)))
+    where = np.flatnonzero(hull)
+    if expected is not None:
+        where = where[(density.ravel()[where] > 0) | (expected.ravel()[where] > 0)]
     began = density.ravel()[where]
     current = np.minimum(began, np.float32(bound))
     floor = np.full(current.shape, FLOOR * current.mean() if current.size else 0, np.float32)

@@ -2,10 +2,11 @@
 
 The smooth answer of `RoundDepth` is the mean of all smokes that show one picture. From the side it is a spindle without
 detail. A plausible smoke shows from every side what the clip shows from the front: not one of its pictures, but the
-distribution of their patches (`exemplar`). Noise breaks the spindle's symmetry. Then, from coarse to fine, pictures of
-the smoke from many azimuths are moved towards that distribution, and the smoke is scaled along their rays to follow.
-The rows of every picture keep the amounts of the smooth answer, and after each round the cameras' pictures have their
-turn. What is carried on from the frame before has met the clip's statistics already and needs one round.
+distribution of their patches (`exemplar`). Noise breaks the spindle's symmetry (`stretched_noise`). Then, from coarse
+to fine, pictures of the smoke from many azimuths are moved towards that distribution, and the smoke is scaled along
+their rays to follow. The rows of every picture keep the amounts of the smooth answer, and after each round the cameras'
+pictures have their turn. What is carried on from the frame before has met the clip's statistics already and needs one
+round.
 """
 
 from __future__ import annotations
@@ -15,7 +16,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
 import smokelift._core as _core
@@ -26,6 +26,7 @@ from smokelift.density.moment_levels import Level
 from smokelift.density.multiplicative import fit_multiplicative, take_turns
 from smokelift.density.objective import Term
 from smokelift.density.observation import ObservedClip, ViewSet
+from smokelift.density.stretched_noise import StretchedNoise
 from smokelift.density.temporal_prior import BLUR_REACH, TINY
 from smokelift.density.turntable import Turntable
 from smokelift.render import Volume
@@ -37,19 +38,6 @@ SMOOTH_ITERATIONS = 4
 
 SMOOTH_TOLERANCE = 0.02
 """Share of the objective that one of them has to gain for another to follow, as in the fit."""
-
-NOISE = 1.5
-"""Standard deviation of the logarithm of the noise that breaks the smooth answer's symmetry: stronger than the smoke's
-own detail, for the pictures from all sides level most of it (docs/experiments/every-view.md)."""
-
-LATTICE = 32
-"""Nodes along each side of the noise's lattice, which repeats."""
-
-COARSEST_NOISE = 2.0
-"""Distance between nodes of the coarsest noise, in standard deviations of the smoke's width: a lobe is as large."""
-
-FINEST_NOISE = 3.5
-"""Voxels between nodes of the finest noise, at least: finer noise stays as grains (docs/experiments/every-view.md)."""
 
 AMOUNTS = 0.5
 """Standard deviation of the blur that noise does not change, in standard deviations of the smoke's width: noise makes
@@ -135,11 +123,12 @@ class DetailedDepth:
 
     def _noisy(self, smooth: Volume, level: Level, texture: ClipTexture) -> Volume:
         """The smooth answer with noise that travels with the smoke, its coarse amounts kept."""
-        hull = level.views.hull
         moved = texture.turntable.height * texture.drift * level.views.frame
-        octaves = _Octaves(moved, texture.width, self.seed)
+        strengths = tuple(self.detail * each for each in texture.roughness)
+        noise = StretchedNoise(moved, texture.width, strengths, self.seed)
         noisy = np.zeros(smooth.shape, np.float32)
-        noisy[hull] = smooth[hull] * np.exp(np.float32(NOISE * self.detail) * octaves.noise(level))
+        where = level.views.where
+        noisy.ravel()[where] = smooth.ravel()[where] * np.exp(noise.at(level))
         return _with_amounts(noisy, smooth, level, AMOUNTS * texture.width)
 
 
@@ -161,7 +150,8 @@ def _smooth_answer(level: Level, density: Volume) -> Volume:
     """A density in the amounts that the cameras' pictures show; those of a large grid are found on the coarsest."""
     coarser = level.coarser
     if coarser is None:
-        return fit_multiplicative(level.terms(), density, SMOOTH_ITERATIONS, SMOOTH_TOLERANCE).density
+        within = level.views.where
+        return fit_multiplicative(level.terms(), density, SMOOTH_ITERATIONS, SMOOTH_TOLERANCE, within=within).density
     return coarser.changed(density, level, lambda means: _smooth_answer(coarser, means))
 
 
@@ -233,7 +223,7 @@ class EveryView:
                     self._step(turned, smooth, exemplar, next(azimuths), (first, second), relaxation)
                 changed = np.zeros(hull.shape, np.float32)
                 np.copyto(changed[kept], table.lying(turned), where=hull[kept])
-                density = take_turns(cameras, changed, 1)
+                density = take_turns(cameras, changed, 1, within=self.level.views.where)
         return density
 
     def _step(
@@ -293,49 +283,3 @@ def _unseen(degrees: float, cameras: Sequence[float], near: float = NEAR) -> boo
 def _apart(a: float, b: float) -> float:
     """Degrees between two directions; what is seen from the back is what is seen from the front."""
     return abs((a - b + 90) % 180 - 90)
-
-
-@dataclass(frozen=True, eq=False)
-class _Octaves:
-    """Noise in octaves from about the smoke's width to single voxels.
-
-    Attributes
-    ----------
-    moved : (3,)
-        How far it has moved, in voxels of the finest grid.
-    width
-        Of the smoke, in voxels.
-    seed
-        Of the noise.
-    """
-
-    moved: NDArray[np.float64]
-    width: float
-    seed: int
-
-    def noise(self, level: Level) -> NDArray[np.float32]:
-        """Noise (n,) of unit variance at the voxels that may hold smoke."""
-        total, octaves, _ = self._sum(level, np.random.default_rng(self.seed))
-        return np.asarray(total / np.float32(np.sqrt(octaves)))
-
-    def _sum(self, level: Level, random: np.random.Generator) -> tuple[NDArray[np.float32], int, float]:
-        """The sum (n,) of the octaves that a grid holds, their number and the next spacing of nodes (voxels)."""
-        total = np.zeros(np.count_nonzero(level.views.hull), np.float32)
-        octaves, spacing = 0, COARSEST_NOISE * self.width
-        if level.coarser is not None:
-            coarse, octaves, spacing = self._sum(level.coarser, random)
-            field = np.zeros(level.coarser.views.hull.shape, np.float32)
-            field[level.coarser.views.hull] = coarse
-            total = level.coarser.finer(field, level)
-        size = level.coarseness
-        if octaves and spacing < FINEST_NOISE * size:
-            return total, octaves, spacing
-        voxels = np.nonzero(level.views.hull)
-        places = [size * voxels[axis] + (size - 1) / 2 - self.moved[axis] for axis in range(3)]
-        while octaves == 0 or spacing >= FINEST_NOISE * size:
-            lattice = random.standard_normal((LATTICE,) * 3).astype(np.float32)
-            at = [place / spacing + shift for place, shift in zip(places, random.uniform(0, LATTICE, 3), strict=True)]
-            values = ndimage.map_coordinates(lattice, at, output=np.float32, order=1, mode="grid-wrap")
-            total += values / values.std()
-            spacing, octaves = spacing / 2, octaves + 1
-        return total, octaves, spacing

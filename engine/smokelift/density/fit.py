@@ -126,8 +126,8 @@ class GradientFit:
     def fit(self, views: ViewSet, depth: DepthEstimate, initial: Volume | None) -> FittedDensity:
         """Find a density; see `DensityFit`."""
         views, settings = depth.views, self.settings
-        hull = views.hull
-        if not hull.any():
+        hull, where = views.hull, views.where
+        if not where.size:
             return empty_density(views)
         cameras = camera_terms(views, depth.inside)
         start = inside(hull, depth.density if initial is None else initial)
@@ -137,7 +137,8 @@ class GradientFit:
             fresh = initial is None
             start = depth.detail.added(start, cameras, fresh=fresh)
             iterations *= 1 + fresh  # detail that is all new is far from the pictures
-        scaled = fit_multiplicative(cameras, start, iterations, settings.tolerance, recorded=True)
+        scaled = fit_multiplicative(cameras, start, iterations, settings.tolerance, within=where, recorded=True)
+        expected, started = (float(values.ravel()[where].max()) for values in (depth.density, start))
         final = descend(
             cameras,
             scaled.density,
@@ -145,13 +146,13 @@ class GradientFit:
             settings.descent_iterations,
             settings.tolerance,
             settings.patience,
-            bound=float(max(settings.bound * depth.density.max(), start.max())),
+            bound=max(settings.bound * expected, started),
             recorded=scaled.recorded,
             expected=depth.density if depth.smooth is None else depth.smooth,
         )
         figures = fit_figures(views, final.residuals, scaled.iterations + final.iterations)
         steady = scaled.density if depth.detail is not None else None
-        return FittedDensity(without_traces(final.density), hull, figures, depth.smooth, steady)
+        return FittedDensity(without_traces(final.density, where), hull, figures, depth.smooth, steady)
 
 
 def reconstruct_density(
@@ -236,9 +237,13 @@ def empty_density(views: ViewSet) -> FittedDensity:
     return FittedDensity(np.zeros(views.hull.shape, np.float32), views.hull, fit_figures(views, residuals, 0))
 
 
-def without_traces(density: Volume) -> Volume:
-    """The density without what no picture can show; see `TRACE`."""
-    return inside(density >= TRACE, density)
+def without_traces(density: Volume, within: NDArray[np.intp]) -> Volume:
+    """The density at some voxels (n,) of the flat array, without what no picture can show; see `TRACE`."""
+    values = density.ravel()[within]
+    shown = values >= TRACE
+    result = np.zeros(density.shape, np.float32)
+    result.ravel()[within[shown]] = values[shown]
+    return result
 
 
 def fit_figures(views: ViewSet, residuals: Sequence[Image], iterations: int) -> dict[str, float]:
@@ -257,7 +262,7 @@ def fit_figures(views: ViewSet, residuals: Sequence[Image], iterations: int) -> 
         **decibels,
         **({"relative_error": math.sqrt(losses[0] / change)} if change > 0 else {}),
         "iterations": float(iterations),
-        "hull_share": float(views.hull.mean()),
+        "hull_share": np.count_nonzero(views.hull) / views.hull.size,
     }
 
 

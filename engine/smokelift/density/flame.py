@@ -59,9 +59,10 @@ def flame_emission(light: NDArray[np.float32], camera: Camera, density: Volume, 
     if not hull.any():
         return flame
     profile = DepthProfile(light, camera, optics.domain, _middle(density, camera, optics.domain))
-    flame[hull] = projection.read(light, hull) * profile.at(projection, hull)
+    places = projection.places(hull)
+    flame[hull] = places.read(light) * profile.at(places, hull)
     burning = flame > 0
-    burning[hull] &= profile.shape(projection, hull) > FAINTEST
+    burning[hull] &= profile.shape(places, hull) > FAINTEST
     pixels = ndimage.binary_dilation(light > 0, iterations=2)
     matrix = emission_matrix(density, camera, optics, pixels, burning)
     flame = np.where(burning, flame, np.float32(0))

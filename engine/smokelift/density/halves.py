@@ -5,8 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.render import Volume
-
 LARGE = 1_000_000
 """Voxels that may hold smoke, above which a grid has a coarser one (docs/experiments/clip-pixels.md)."""
 
@@ -21,34 +19,6 @@ def any_of_two(voxels: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return voxels
 
 
-def means_of_two(values: Volume) -> Volume:
-    """Means of two along every axis; beyond the grid there is nothing."""
-    for axis in range(3):
-        lead = (slice(None),) * axis
-        second = values[(*lead, slice(1, None, 2))]
-        values = values[(*lead, slice(0, None, 2))] * np.float32(0.5)
-        values[(*lead, slice(0, second.shape[axis]))] += np.float32(0.5) * second
-    return values
-
-
-def prolonged(values: Volume) -> Volume:
-    """Twice as many values along every axis, linear between their middles."""
-    for axis in (2, 1, 0):
-        near = np.moveaxis(values, axis, 0)
-        shape = list(values.shape)
-        shape[axis] *= 2
-        result = np.empty(shape, np.float32)
-        finer = np.moveaxis(result, axis, 0)
-        finer[0::2] = finer[1::2] = np.float32(0.75) * near
-        quarter = np.float32(0.25) * near
-        finer[2::2] += quarter[:-1]
-        finer[1:-1:2] += quarter[1:]
-        finer[0] += quarter[0]
-        finer[-1] += quarter[-1]
-        values = result
-    return values
-
-
 def spread_to_two(voxels: NDArray[np.bool_], shape: tuple[int, ...]) -> NDArray[np.bool_]:
     """Mark all voxels of a grid (shape) that those of one half as fine are made of."""
     x, y, z = (slice(0, count) for count in shape)
@@ -59,4 +29,16 @@ def every_second(voxels: NDArray[np.bool_], shape: tuple[int, ...]) -> NDArray[n
     """Mark the first voxel of a grid (shape) of each that one half as fine marks."""
     result = np.zeros(shape, np.bool_)
     result[::2, ::2, ::2] = voxels
+    return result
+
+
+def with_neighbours(voxels: NDArray[np.bool_], *, corners: bool = False) -> NDArray[np.bool_]:
+    """Mark the six voxels beside each marked one as well, with corners all 26: a fast `ndimage.binary_dilation`."""
+    result = voxels.copy()
+    for axis in range(3):
+        lead = (slice(None),) * axis
+        low, high = (*lead, slice(None, -1)), (*lead, slice(1, None))
+        before = result.copy() if corners else voxels
+        result[high] |= before[low]
+        result[low] |= before[high]
     return result

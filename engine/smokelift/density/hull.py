@@ -76,7 +76,7 @@ def voxel_centres(domain: Domain) -> NDArray[np.float64]:
 
 def centres_of(voxels: NDArray[np.bool_], domain: Domain) -> NDArray[np.float64]:
     """World positions (n, 3) of the centres of the marked voxels."""
-    places = [axis[index] for axis, index in zip(_axes(domain), np.nonzero(voxels), strict=True)]
+    places = [axis[index] for axis, index in zip(_axes(domain), _core.marked(voxels), strict=True)]
     return np.stack(places, -1)
 
 

@@ -15,7 +15,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.density.halves import LARGE, any_of_two, means_of_two, prolonged
+import smokelift._core as _core
+from smokelift.density.halves import LARGE, any_of_two
 from smokelift.density.objective import Term, camera_terms
 from smokelift.density.observation import Observation, View, ViewSet
 from smokelift.density.temporal_prior import TINY
@@ -62,34 +63,36 @@ class Level:
     def finer(self, values: Volume, of: Level) -> NDArray[np.float32]:
         """Values of this grid at the voxels (n,) that may hold smoke on the next finer one, linear between middles."""
         fine, box = self._boxes(of)
-        finer: NDArray[np.float32] = prolonged(values[box])[_inner(fine)][of.views.hull[fine]]
-        return finer
+        return _core.prolong_values(values[box], of.views.hull[fine])
 
     def changed(self, density: Volume, of: Level, change: Callable[[Volume], Volume]) -> Volume:
         """A density of the next finer grid, changed as its means on this grid are by `change`."""
         fine, box = self._boxes(of)
         means = self.means(density, of)
         after = change(means)
-        hull = of.views.hull[fine]
-        factor = prolonged(after[box])[_inner(fine)][hull]
-        factor /= np.maximum(prolonged(means[box])[_inner(fine)][hull], TINY)
         result = np.zeros(density.shape, np.float32)
-        result[fine][hull] = density[fine][hull] * factor
+        _core.scale_alike(density[fine], of.views.hull[fine], means[box], after[box], float(TINY), result[fine])
         return result
 
     def means(self, density: Volume, of: Level) -> Volume:
         """Means of a density of the next finer grid on this one."""
         fine, box = self._boxes(of)
         means = np.zeros(self.views.hull.shape, np.float32)
-        means[box] = means_of_two(density[fine])
+        means[box] = _core.means_of_two(density[fine], of.views.hull[fine])
         return means
+
+    @cached_property
+    def _box(self) -> tuple[slice, slice, slice]:
+        """The box around the smoke."""
+        return box_around(self.views.hull, 0)
 
     def _boxes(self, of: Level) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
         """The box around the smoke on the finer grid and on this one."""
-        box = box_around(self.views.hull, 0)
         shape = of.views.hull.shape
-        fine = tuple(slice(2 * span.start, min(2 * span.stop, count)) for span, count in zip(box, shape, strict=True))
-        return fine, box
+        fine = tuple(
+            slice(2 * span.start, min(2 * span.stop, count)) for span, count in zip(self._box, shape, strict=True)
+        )
+        return fine, self._box
 
 
 def _halved(domain: Domain) -> Domain:
@@ -110,8 +113,3 @@ def _shrunk(view: View, domain: Domain) -> Observation:
 
     pixels = math.prod(view.camera.size) / (columns * rows)
     return Observation(view.camera.resized(columns, rows), cut(view.image), view.plate.through(cut, pixels))
-
-
-def _inner(box: tuple[slice, ...]) -> tuple[slice, ...]:
-    """The same box counted from its own corner: along an odd number of voxels the finer grid ends before the last."""
-    return tuple(slice(0, span.stop - span.start) for span in box)

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from smokelift.density.hull import Places, inside
+from smokelift.density.hull import Places
 from smokelift.density.objective import Fit, Term, noise_floor, objective
 from smokelift.render import Image, Volume
 
@@ -43,7 +43,13 @@ PROBE = 1.05
 
 
 def fit_multiplicative(
-    terms: Sequence[Term], density: Volume, iterations: int, tolerance: float, *, recorded: bool = False
+    terms: Sequence[Term],
+    density: Volume,
+    iterations: int,
+    tolerance: float,
+    *,
+    within: NDArray[np.intp] | None = None,
+    recorded: bool = False,
 ) -> Fit:
     """Scale the smoke of every ray until the pictures match; returns the best density seen.
 
@@ -57,10 +63,12 @@ def fit_multiplicative(
         At most so many, in each of which every term has a turn.
     tolerance
         Stop when an iteration lowers the objective by less than this share.
+    within : (n,), optional
+        Voxels of the flat array outside which the density is known to be zero.
     recorded
         Keep the renderers' records of the last iteration's pictures, for a descent that goes on from there.
     """
-    smoke, enough = _Smoke(density), noise_floor(terms)
+    smoke, enough = _Smoke(density, within), noise_floor(terms)
     places = smoke.places(terms)
     current = best = smoke.values()
     least, done, last = np.inf, 0, False
@@ -83,7 +91,9 @@ def fit_multiplicative(
     return Fit(smoke.volume_of(best), least, left, done, kept)
 
 
-def take_turns(terms: Sequence[Term], density: Volume, rounds: int) -> Volume:
+def take_turns(
+    terms: Sequence[Term], density: Volume, rounds: int, *, within: NDArray[np.intp] | None = None
+) -> Volume:
     """Scale the smoke of every ray towards each picture in turn, whatever the others lose by it.
 
     Parameters
@@ -94,8 +104,10 @@ def take_turns(terms: Sequence[Term], density: Volume, rounds: int) -> Volume:
         Start; voxels at zero stay there.
     rounds
         Turns of each.
+    within : (n,), optional
+        As of `fit_multiplicative`.
     """
-    smoke = _Smoke(density)
+    smoke = _Smoke(density, within)
     places, values = smoke.places(terms), smoke.values()
     for _ in range(rounds):
         for term, place in zip(terms, places, strict=True):
@@ -109,14 +121,15 @@ class _Smoke:
     Their values (n,) are what is computed with; one volume is filled with them again and again for the renderers.
     """
 
-    def __init__(self, density: Volume) -> None:
-        self._filled = density != 0
-        self._where = np.flatnonzero(self._filled)
-        self._volume = inside(self._filled, density)
+    def __init__(self, density: Volume, within: NDArray[np.intp] | None) -> None:
+        values = density.ravel()
+        self._where = np.flatnonzero(values) if within is None else within[values[within] != 0]
+        self._values: Values = values[self._where]
+        self._volume = np.zeros(density.shape, np.float32)
 
     def values(self) -> Values:
-        """Those of the density that the volume holds now."""
-        return self._volume.ravel()[self._where]
+        """Those of the density."""
+        return self._values
 
     def volume_of(self, values: Values) -> Volume:
         """The volume (nx, ny, nz) with these values, until the next call."""
@@ -125,7 +138,9 @@ class _Smoke:
 
     def places(self, terms: Sequence[Term]) -> list[Places]:
         """Where the voxels lie in each term's picture."""
-        return [term.view.projection.places(self._filled) for term in terms]
+        filled = np.zeros(self._volume.shape, np.bool_)
+        filled.ravel()[self._where] = True
+        return [term.view.projection.places(filled) for term in terms]
 
 
 def _scaled(smoke: _Smoke, values: Values, places: Places, term: Term, image: Image) -> Values:

@@ -186,6 +186,11 @@ class ViewSet:
     frame: int = 0
 
     @cached_property
+    def where(self) -> NDArray[np.intp]:
+        """The hull's voxels (n,) in an array of all. To read an array at them leaves the memory between untouched."""
+        return np.flatnonzero(self.hull)
+
+    @cached_property
     def renderers(self) -> tuple[Renderer, ...]:
         """Of the views, for densities in the hull."""
         return tuple(self.optics.renderer(view.camera, view.plate.image, self.hull) for view in self.views)

@@ -21,7 +21,7 @@ from scipy import ndimage
 from scipy.special import gamma, gammainc
 
 from smokelift.density.axis import SmokeAxis
-from smokelift.density.hull import Projection, centres_of
+from smokelift.density.hull import Places, centres_of
 from smokelift.density.screen import upright_rows, view_frame
 from smokelift.scene import Camera, Domain
 from smokelift.scene.projection import ray_through_pixels
@@ -133,16 +133,16 @@ class DepthProfile:
         self._heights, self._spread = lateral_spread(amount, camera, domain)
         self._balls = ball_spread(amount, camera, domain)
 
-    def at(self, projection: Projection, voxels: NDArray[np.bool_]) -> NDArray[np.float64]:
-        """What is spread (1/m), of unit integral along the depth, at the marked voxels (n,)."""
-        profile, width = self._shape_and_width(projection, voxels)
+    def at(self, places: Places, voxels: NDArray[np.bool_]) -> NDArray[np.float64]:
+        """What is spread (1/m), of unit integral along the depth, at the marked voxels (n,), seen at `places`."""
+        profile, width = self._shape_and_width(places, voxels)
         steep = np.log(1 / EXPECTED)
         area = gamma(1 + 1 / FLATNESS) * gammainc(1 / FLATNESS, steep) - EXPECTED * steep ** (1 / FLATNESS)
         return np.asarray(np.maximum(profile - EXPECTED, 0) / (2 * area * width))
 
-    def shape(self, projection: Projection, voxels: NDArray[np.bool_]) -> NDArray[np.float64]:
+    def shape(self, places: Places, voxels: NDArray[np.bool_]) -> NDArray[np.float64]:
         """The profile g at the marked voxels (n,), 1 in the middle."""
-        return self._shape_and_width(projection, voxels)[0]
+        return self._shape_and_width(places, voxels)[0]
 
     def share_inside(self) -> NDArray[np.float32]:
         """Share (rows, columns) of the profile that each pixel's ray meets inside the domain."""
@@ -165,11 +165,11 @@ class DepthProfile:
         return np.where(missed, 0, (high - low) / 2).astype(np.float32)
 
     def _shape_and_width(
-        self, projection: Projection, voxels: NDArray[np.bool_]
+        self, places: Places, voxels: NDArray[np.bool_]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         offset = centres_of(voxels, self._domain) - self._centre
         height, lateral = offset @ self._height, offset @ self._lateral
-        width = self._width(height, lateral, projection.read(self._balls, voxels))
+        width = self._width(height, lateral, places.read(self._balls))
         distance = np.abs(offset @ self._depth - self._axis.at(height, lateral))
         return np.exp(-((distance / width) ** FLATNESS)), width
 

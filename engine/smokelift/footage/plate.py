@@ -184,7 +184,7 @@ def changing_plate(plates: Clip, clip: Clip, sample_count: int = 32) -> Changing
     if last >= len(plates):
         raise ValueError(
             f"{plates.path}: has {len(plates)} of the frames 0 to {last} that are needed; give a clean plate with a "
-            "picture for every frame of the clip, or a color, in [background]."
+            "picture for every frame of the clip, or a colour, in [background]."
         )
     silent = ChangingPlate(plates, clip.first, clip.size, lasting_noise(0.0))
     return replace(silent, noise=noise_before(silent, clip, sample_count))

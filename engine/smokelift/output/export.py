@@ -7,6 +7,8 @@ What is left out or rounded does not show in a picture of 8 bits:
   h metres they change the optical depth by extinction * h * sqrt(n / 12) steps (root mean square), which is kept below
   `SHADE`. Powers of two leave the last bits of a 16 bit float zero, which compresses well.
 - Quantised velocities move smoke by at most half of `VELOCITY_STEP` voxels a frame.
+
+Names, axes and the range of values are those of the program that reads the files (`smokelift.output.host`).
 """
 
 from __future__ import annotations
@@ -16,8 +18,8 @@ import math
 import re
 import shutil
 import tempfile
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -25,12 +27,14 @@ import numpy as np
 
 from smokelift.output.archive import FLAME
 from smokelift.output.atomic import atomic_path
+from smokelift.output.host import HOSTS, HostName
 from smokelift.output.index import SequenceError
-from smokelift.output.layout import INDEX, frame_path
+from smokelift.output.layout import INDEX, frame_path, proxy_path
+from smokelift.output.proxy import write_proxy
 from smokelift.output.sequence import Sequence
 from smokelift.output.usd import UsdVolume, usd_text
 from smokelift.output.vdb import vdb_module, write_vdb
-from smokelift.scene import Domain
+from smokelift.scene import Domain, Medium
 from smokelift.transport import Array
 
 NOTE = "export.json"
@@ -70,6 +74,8 @@ class ExportSettings:
         Whether to export the velocity, which motion blur needs.
     proxy
         How many times coarser a second sequence for viewports is, of the density alone; 1 for none.
+    host
+        The program that reads the files: ``"blender"``, ``"houdini"`` or ``"unreal"``.
 
     Raises
     ------
@@ -80,6 +86,7 @@ class ExportSettings:
     precision: Precision = "half"
     velocity: bool = True
     proxy: int = 1
+    host: HostName = "blender"
 
     def __post_init__(self) -> None:
         """Check the proxy."""
@@ -90,7 +97,8 @@ class ExportSettings:
 def export_sequence(sequence: Sequence, out: str | Path, settings: ExportSettings) -> Iterator[tuple[int, int]]:
     """Export a sequence to a folder: `smoke_0001.vdb`, ..., `smoke.usda`, `export.json`, and `proxy_0001.vdb`, ...
 
-    An earlier export in the folder is replaced. The sequence stays as it is.
+    There is no USD file for a program whose axes are left-handed. An earlier export in the folder is replaced. The
+    sequence stays as it is.
 
     Parameters
     ----------
@@ -117,11 +125,13 @@ def export_sequence(sequence: Sequence, out: str | Path, settings: ExportSetting
     try:
         out.mkdir(parents=True, exist_ok=True)
         _clear(out)
-        note = {**_note(sequence, settings), "complete": False}
+        peak = _peak(sequence, sequence.frames, settings)
+        note = {**_note(sequence, settings, peak), "complete": False}
         _write_text(out / NOTE, json.dumps(note, indent=1) + "\n")  # first: it says whose files these are
         for number in sequence.frames:
-            yield number, _write_frame(sequence, number, out, settings)
-        _write_text(out / USD, usd_text(_usd_volumes(sequence, settings), sequence.fps, _medium(sequence)))
+            yield number, _write_frame(sequence, number, out, settings, peak)
+        if not HOSTS[settings.host].left_handed:  # USD has no such axes
+            _write_text(out / USD, _usd(sequence, settings, peak))
         _write_text(out / NOTE, json.dumps({**note, "complete": True}, indent=1) + "\n")
     except OSError as error:
         raise SequenceError(f"{out}: cannot be written: {error}") from error
@@ -156,8 +166,10 @@ def export_size(sequence: Sequence, settings: ExportSettings) -> int:
         As `export_sequence`.
     """
     places = np.unique(np.linspace(0, len(sequence.frames) - 1, SAMPLES).round().astype(int))
+    numbers = [sequence.frames[place] for place in places]
+    peak = _peak(sequence, numbers, settings)
     with tempfile.TemporaryDirectory() as folder:
-        sizes = [_write_frame(sequence, sequence.frames[place], Path(folder), settings) for place in places]
+        sizes = [_write_frame(sequence, number, Path(folder), settings, peak) for number in numbers]
     return round(float(np.interp(np.arange(len(sequence.frames)), places, sizes).sum()))
 
 
@@ -175,35 +187,52 @@ def require_space(out: Path, size: int) -> None:
         raise SequenceError(f"{out}: the export takes {size / 1e6:.0f} MB, and {free / 1e6:.0f} MB are free.")
 
 
-def _write_frame(sequence: Sequence, number: int, out: Path, settings: ExportSettings) -> int:
+def _peak(sequence: Sequence, numbers: Iterable[int], settings: ExportSettings) -> float:
+    """What densities are divided by: the largest of these frames for a program that keeps 8 bits of them, else 1."""
+    if not HOSTS[settings.host].eight_bits:
+        return 1.0
+    return max(float(sequence.density(number).max()) for number in numbers) or 1.0
+
+
+def _write_frame(sequence: Sequence, number: int, out: Path, settings: ExportSettings, peak: float) -> int:
     """Write the files of a frame; returns their bytes."""
-    domain, extinction = sequence.scene.domain, sequence.scene.medium.extinction
-    density = sequence.density(number)
+    domain, extinction, host = sequence.scene.domain, sequence.scene.medium.extinction, HOSTS[settings.host]
+    thinned = _thinned(sequence.density(number), domain, extinction)
     velocity = sequence.velocity_at_centres(number) if settings.velocity else None
     paths = [frame_path(out, number, "vdb")]
-    rho = _thinned(density, domain, extinction)
+    rho = thinned
     if settings.precision == "quantised":
         rho = _rounded(rho, density_step(domain, extinction))
         velocity = None if velocity is None else _rounded(velocity, velocity_step(domain, sequence.fps))
+    if host.eight_bits:
+        rho = _rounded(thinned / np.float32(peak), 1 / 255)
     flame = None
     if FLAME in _grids(sequence, settings):
         found = sequence.flame(number)
         flame = np.zeros_like(rho) if found is None else found
         if settings.precision == "quantised":
             flame = _rounded(flame, density_step(domain, 1.0))  # radiance adds up along a ray as optical depth does
-    write_vdb(paths[0], rho, velocity, domain, sequence.settings, flame)
+    write_vdb(
+        paths[0],
+        host.turned(rho),
+        None if velocity is None else host.turned(velocity),
+        host.box(domain),
+        sequence.settings,
+        None if flame is None else host.turned(flame),
+        velocity_name=host.velocity,
+        facts=host.facts(sequence.fps, _medium(sequence, peak)),
+        whole_box=host.whole_box,
+    )
     if settings.proxy > 1:
-        paths.append(out / proxy_name(number))
-        coarse, wide = coarser(density, domain, settings.proxy)
-        coarse = _rounded(_thinned(coarse, wide, extinction), density_step(wide, extinction))
-        write_vdb(paths[1], coarse, None, wide, sequence.settings)
+        paths.append(proxy_path(out, number))
+        write_proxy(paths[1], host.turned(thinned / np.float32(peak)), host.box(domain), settings.proxy)
     return sum(path.stat().st_size for path in paths)
 
 
 def _grids(sequence: Sequence, settings: ExportSettings) -> tuple[str, ...]:
     """Names of the grids in the files of all frames."""
     burns = sequence.scene.medium.flame_color is not None
-    return ("density", *["velocity"] * settings.velocity, *[FLAME] * burns)
+    return ("density", *[HOSTS[settings.host].velocity] * settings.velocity, *[FLAME] * burns)
 
 
 def density_step(domain: Domain, extinction: float) -> float:
@@ -215,26 +244,6 @@ def density_step(domain: Domain, extinction: float) -> float:
 def velocity_step(domain: Domain, fps: float) -> float:
     """Step of a quantised velocity in m/s (see the module)."""
     return _power_of_two(VELOCITY_STEP * domain.voxel_size * fps)
-
-
-def coarser(density: Array, domain: Domain, times: int) -> tuple[Array, Domain]:
-    """Return the means of a density over cubes of voxels, and the box of those, which may be larger.
-
-    Parameters
-    ----------
-    density : (nx, ny, nz)
-    domain
-        Its box.
-    times
-        Voxels along a side of a cube.
-    """
-    counts = tuple(-(-n // times) for n in domain.resolution)
-    padded = np.pad(density, [(0, count * times - n) for count, n in zip(counts, density.shape, strict=True)])
-    x, y, z = counts
-    coarse = padded.reshape(x, times, y, times, z, times).mean((1, 3, 5), dtype=np.float32)
-    edge = times * domain.voxel_size
-    a, b, c = (low + count * edge for low, count in zip(domain.min, counts, strict=True))
-    return coarse, Domain(domain.min, (a, b, c), (x, y, z))
 
 
 def _thinned(density: Array, domain: Domain, extinction: float) -> Array:
@@ -251,37 +260,35 @@ def _power_of_two(value: float) -> float:
     return 2.0 ** math.floor(math.log2(value))
 
 
-def _medium(sequence: Sequence) -> dict[str, float]:
+def _medium(sequence: Sequence, peak: float) -> Medium:
+    """Optical properties of smoke of density 1, as the files have it."""
     medium = sequence.scene.medium
-    return {"extinction": medium.extinction, "albedo": medium.albedo, "anisotropy": medium.anisotropy}
+    return replace(medium, extinction=medium.extinction * peak)
 
 
-def proxy_name(number: int) -> str:
-    """Return the name of the file of a proxy's frame."""
-    return f"proxy_{number:04d}.vdb"
-
-
-def _usd_volumes(sequence: Sequence, settings: ExportSettings) -> list[UsdVolume]:
-    domain, numbers = sequence.scene.domain, sequence.frames
+def _usd(sequence: Sequence, settings: ExportSettings, peak: float) -> str:
+    host, numbers, grids = HOSTS[settings.host], sequence.frames, _grids(sequence, settings)
+    domain = host.box(sequence.scene.domain)
+    purpose = "default" if settings.proxy == 1 else "render"
     files = {number: frame_path(Path(), number, "vdb").name for number in numbers}
-    if settings.proxy == 1:
-        return [UsdVolume("Volume", "default", files, _grids(sequence, settings), domain)]
-    proxies = {number: proxy_name(number) for number in numbers}
-    return [
-        UsdVolume("Volume", "render", files, _grids(sequence, settings), domain),
-        UsdVolume("Proxy", "proxy", proxies, ("density",), domain),
-    ]
+    volumes = [UsdVolume("Volume", purpose, files, grids, domain)]
+    if settings.proxy > 1:
+        proxies = {number: proxy_path(Path(), number).name for number in numbers}
+        volumes.append(UsdVolume("Proxy", "proxy", proxies, ("density",), domain))
+    medium = _medium(sequence, peak)
+    return usd_text(volumes, sequence.fps, medium, host.velocity, host.up_axis)
 
 
-def _note(sequence: Sequence, settings: ExportSettings) -> dict[str, Any]:
-    domain = sequence.scene.domain
+def _note(sequence: Sequence, settings: ExportSettings, peak: float) -> dict[str, Any]:
+    domain = HOSTS[settings.host].box(sequence.scene.domain)
     return {
+        "host": settings.host,
         "precision": settings.precision,
         "grids": list(_grids(sequence, settings)),
         "proxy": settings.proxy,
         "frames": [sequence.frames[0], sequence.frames[-1]],
         "fps": sequence.fps,
-        "medium": _medium(sequence),
+        "medium": {key: value for key, value in vars(_medium(sequence, peak)).items() if value is not None},
         "domain": {"min": list(domain.min), "max": list(domain.max), "resolution": list(domain.resolution)},
         "provenance": [dict(part) for part in sequence.provenance],
     }

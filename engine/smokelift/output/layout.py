@@ -17,12 +17,17 @@ PREVIEW = "preview.mp4"
 PICTURES = (CONTACT_SHEET, ORBIT, STRIP, PREVIEW)
 """What shows a sequence at a glance; nothing is computed from it."""
 
-_FRAME = re.compile(r"smoke_\d{4,}\.(vdb|npz)")
+_FRAME = re.compile(r"smoke_\d{4,}\.(vdb|npz)|proxy_\d{4,}\.vdb")
 
 
 def frame_path(directory: Path, number: int, kind: str) -> Path:
     """Return the file of a frame; the kind is ``"vdb"`` or ``"npz"``."""
     return directory / f"smoke_{number:04d}.{kind}"
+
+
+def proxy_path(directory: Path, number: int) -> Path:
+    """Return the file of a frame's coarse copy."""
+    return directory / f"proxy_{number:04d}.vdb"
 
 
 def is_foreign(name: str) -> bool:

@@ -1,6 +1,7 @@
 """A USD file, as text, of a sequence of OpenVDB files beside it: every renderer and program that knows USD opens it.
 
-Source: the schemas UsdVol Volume and OpenVDBAsset, and the purposes ``render`` and ``proxy`` of UsdGeom Imageable.
+Source: the schemas UsdVol Volume and OpenVDBAsset, the purposes ``render`` and ``proxy`` of UsdGeom Imageable, and for
+the material, which USD has no shader of its own for, the nodes of MaterialX 1.39 (`pbrlib`).
 """
 
 from __future__ import annotations
@@ -8,7 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from smokelift.scene import Domain
+from smokelift.scene import Domain, Medium
+
+MATERIAL = "/Smoke/Material"
 
 
 @dataclass(frozen=True)
@@ -24,7 +27,7 @@ class UsdVolume:
     files
         Name of the OpenVDB file of every frame, by its number.
     grids
-        Names of the grids in the files: ``"density"``, and ``"velocity"`` and ``"flame"`` if there are such.
+        Names of the grids in the files: ``"density"``, and that of the velocity and ``"flame"`` if there are such.
     domain
         The box of the smoke.
     """
@@ -36,7 +39,9 @@ class UsdVolume:
     domain: Domain
 
 
-def usd_text(volumes: Sequence[UsdVolume], fps: float, medium: Mapping[str, float]) -> str:
+def usd_text(
+    volumes: Sequence[UsdVolume], fps: float, medium: Medium, velocity: str = "velocity", up_axis: str = "Z"
+) -> str:
     """Return the text of a ``.usda`` file.
 
     Parameters
@@ -46,16 +51,21 @@ def usd_text(volumes: Sequence[UsdVolume], fps: float, medium: Mapping[str, floa
     fps
         Frames a second.
     medium
-        Optical properties of smoke of density 1, kept as custom data: USD has no shader of its own for volumes.
+        Optical properties of smoke of density 1: the material, and custom data.
+    velocity
+        Name of the grid that holds vectors.
+    up_axis
+        ``"Z"`` or ``"Y"``.
     """
     numbers = sorted(volumes[0].files)
-    properties = "".join(f"            double {name} = {value:.9g}\n" for name, value in medium.items())
-    prims = "\n".join(_prim(volume) for volume in volumes)
+    known = {"extinction": medium.extinction, "albedo": medium.albedo, "anisotropy": medium.anisotropy}
+    properties = "".join(f"            double {name} = {value:.9g}\n" for name, value in known.items())
+    prims = "\n".join(_prim(volume, velocity) for volume in volumes)
     return f"""#usda 1.0
 (
     defaultPrim = "Smoke"
     metersPerUnit = 1
-    upAxis = "Z"
+    upAxis = "{up_axis}"
     startTimeCode = {numbers[0]}
     endTimeCode = {numbers[-1]}
     timeCodesPerSecond = {fps:.9g}
@@ -70,26 +80,29 @@ def Xform "Smoke" (
     }}
 )
 {{
-{prims}}}
+{prims}
+{_material(medium)}}}
 """
 
 
-def _prim(volume: UsdVolume) -> str:
+def _prim(volume: UsdVolume, velocity: str) -> str:
     path = f"/Smoke/{volume.name}"
-    low, high = (", ".join(f"{value:.9g}" for value in corner) for corner in (volume.domain.min, volume.domain.max))
+    low, high = (_numbers(corner) for corner in (volume.domain.min, volume.domain.max))
     fields = "".join(f"        rel field:{grid} = <{path}/{grid}>\n" for grid in volume.grids)
-    assets = "\n".join(_asset(grid, volume.files) for grid in volume.grids)
-    return f"""    def Volume "{volume.name}"
+    assets = "\n".join(_asset(grid, volume.files, vector=grid == velocity) for grid in volume.grids)
+    return f"""    def Volume "{volume.name}" (
+        prepend apiSchemas = ["MaterialBindingAPI"]
+    )
     {{
         uniform token purpose = "{volume.purpose}"
         float3[] extent = [({low}), ({high})]
+        rel material:binding = <{MATERIAL}>
 {fields}
 {assets}    }}
 """
 
 
-def _asset(grid: str, files: Mapping[int, str]) -> str:
-    vector = grid == "velocity"
+def _asset(grid: str, files: Mapping[int, str], *, vector: bool) -> str:
     kind, role = ("half3", '            token vectorDataRoleHint = "Vector"\n') if vector else ("half", "")
     samples = "".join(f"                {number}: @./{files[number]}@,\n" for number in sorted(files))
     return f"""        def OpenVDBAsset "{grid}"
@@ -101,3 +114,53 @@ def _asset(grid: str, files: Mapping[int, str]) -> str:
 {samples}            }}
         }}
 """
+
+
+def _material(medium: Medium) -> str:
+    """The material: absorption and scattering, 1/m, are those of density 1 times the field ``density``."""
+    scattering = [medium.extinction * albedo for albedo in medium.albedos]
+    absorption = [medium.extinction - share for share in scattering]
+    coefficients = "\n".join(
+        f"""        def Shader "{name}"
+        {{
+            uniform token info:id = "ND_multiply_vector3FA"
+            float3 inputs:in1 = ({_numbers(values)})
+            float inputs:in2.connect = <{MATERIAL}/Density.outputs:out>
+            float3 outputs:out
+        }}
+"""
+        for name, values in (("Absorption", absorption), ("Scattering", scattering))
+    )
+    return f"""    def Material "Material"
+    {{
+        token outputs:mtlx:volume.connect = <{MATERIAL}/Volume.outputs:out>
+
+        def Shader "Density"
+        {{
+            uniform token info:id = "ND_geompropvalue_float"
+            string inputs:geomprop = "density"
+            float outputs:out
+        }}
+
+{coefficients}
+        def Shader "Phase"
+        {{
+            uniform token info:id = "ND_anisotropic_vdf"
+            float3 inputs:absorption.connect = <{MATERIAL}/Absorption.outputs:out>
+            float3 inputs:scattering.connect = <{MATERIAL}/Scattering.outputs:out>
+            float inputs:anisotropy = {medium.anisotropy:.9g}
+            token outputs:out
+        }}
+
+        def Shader "Volume"
+        {{
+            uniform token info:id = "ND_volume"
+            token inputs:vdf.connect = <{MATERIAL}/Phase.outputs:out>
+            token outputs:out
+        }}
+    }}
+"""
+
+
+def _numbers(values: Sequence[float]) -> str:
+    return ", ".join(f"{value:.9g}" for value in values)

@@ -97,6 +97,10 @@ def write_vdb(
     domain: Domain,
     metadata: Mapping[str, Any] | None = None,
     flame: npt.ArrayLike | None = None,
+    *,
+    velocity_name: str = "velocity",
+    facts: Mapping[str, str | float] | None = None,
+    whole_box: bool = False,
 ) -> None:
     """Write one frame; the file appears whole or not at all.
 
@@ -117,6 +121,12 @@ def write_vdb(
         Settings to keep with the density grid, as JSON can hold them.
     flame
         Emission, radiance per metre, shape (nx, ny, nz), not negative; None for a file without that grid.
+    velocity_name
+        Name of the grid of the velocity.
+    facts
+        Metadata that every grid gets.
+    whole_box
+        Whether two opposite corners of the box are active although there is no smoke.
 
     Raises
     ------
@@ -134,8 +144,8 @@ def write_vdb(
     rho_box, corner = rho[box], tuple(side.start for side in box)
     grids = {"density": _fog(vdb, rho_box, corner)}
     if near is not None:
-        grids["velocity"] = vdb.Vec3SGrid()
-        grids["velocity"].copyFromArray(_near(rho_box, near), ijk=corner)
+        grids[velocity_name] = vdb.Vec3SGrid()
+        grids[velocity_name].copyFromArray(_near(rho_box, near), ijk=corner)
     if flame is not None:
         emission = checked_volume(flame, domain.shape, FLAME)
         box = _around(emission > 0.0, 0)
@@ -149,6 +159,10 @@ def write_vdb(
         # The binding's default tolerance does not fit vector grids, so it is spelt out.
         grid.prune(tolerance=grid.zeroValue)
         grid.transform = vdb.createLinearTransform([[h, 0, 0, 0], [0, h, 0, 0], [0, 0, h, 0], [x, y, z, 1]])
+        for fact, value in (facts or {}).items():
+            grid[fact] = value
+        for corner in ((0, 0, 0), tuple(n - 1 for n in domain.shape)) if whole_box else ():
+            grid.getAccessor().setActiveState(corner, True)
     if metadata is not None:
         grids["density"][SETTINGS] = json.dumps(dict(metadata), sort_keys=True)
     with atomic_path(path) as aside:

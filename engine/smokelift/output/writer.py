@@ -1,4 +1,4 @@
-"""Writes a sequence: one OpenVDB file a frame and one `sequence.json`.
+"""Writes a sequence: one OpenVDB file a frame, of a large one a coarse copy beside it, and one `sequence.json`.
 
 A frame counts once `sequence.json` lists it, which is written after the frame's files. Every file appears whole or not
 at all. So a killed run leaves a directory that opens, and the same run can go on from it.
@@ -24,8 +24,9 @@ from smokelift.output.atomic import DISK_FULL, atomic_path
 from smokelift.output.checksum import checksum
 from smokelift.output.images import write_image
 from smokelift.output.index import DirectoryBusyError, Index, Origins, SequenceError, difference, plain, without_folders
-from smokelift.output.layout import BACKGROUND, INDEX, LOCK, RESUME, frame_path, is_foreign
+from smokelift.output.layout import BACKGROUND, INDEX, LOCK, RESUME, frame_path, is_foreign, proxy_path
 from smokelift.output.lock import Lock
+from smokelift.output.proxy import LARGE, write_proxy
 from smokelift.output.resume import ResumeState
 from smokelift.output.vdb import VdbUnavailable, checked_volume, vdb_module, write_vdb
 from smokelift.scene import Background, CompleteScene, scene_to_dict
@@ -186,6 +187,8 @@ class SequenceWriter:
                         shutil.copyfile(ready[kind], aside)
                 else:
                     self._write_arrays(path, rho, faces, fire)
+            if "vdb" in self._kinds and rho.size >= LARGE:
+                write_proxy(proxy_path(self.directory, number), rho, self._domain, flame=fire)
             frames = {**self._index.frames, str(number): plain(figures or {})}
             checksums = {**self._index.checksums, **{path.name: checksum([path]) for path in paths}}
             grown = replace(self._index, frames=frames, checksums=checksums)

@@ -18,7 +18,7 @@ import numpy as np
 
 from smokelift.density import FittedDensity, ViewSet
 from smokelift.density.flame import flame_emission
-from smokelift.density.hull import inside, project_voxels
+from smokelift.density.hull import project_voxels
 from smokelift.pipeline.clip_fit import clip_psnr
 from smokelift.pipeline.method import Method
 from smokelift.render import Volume
@@ -120,13 +120,13 @@ def _frame(index: int, before: Past | None, shot: Shot, method: Method) -> Frame
         # what a moving camera does not see no picture corrects, so that its mass has to be kept
         moved = before.density if before.steady is None else before.steady
         carried = carry(moved, predicted, dt, domain.voxel_size, conserve=shot.moves)
-        carried = inside(carried > 0, carried)
     fitted, taken_over = _density(index, before, carried, shot, method)
     flame = _flame(index, fitted.density, shot)
     fit = _fit_figures(index, fitted, shot)
     fit_done = time.perf_counter()
-    velocity = estimated = Velocity.zero(domain.resolution, domain.voxel_size, shot.scene.closed)
-    if before is not None:
+    if before is None:
+        velocity = estimated = Velocity.zero(domain.resolution, domain.voxel_size, shot.scene.closed)
+    else:
         estimated = method.velocity_estimator.estimate(
             *_measured(before, fitted),
             dt,

@@ -44,7 +44,7 @@ class Sight:
         rays = _core.Rays(plan.rays.lines, plan.rays.length, plan.rays.planes)
         if not plan.everywhere:
             x, y, z = plan.shape
-            mask = np.zeros((x + 2, y + 2, z + 2, 1), np.float32)
+            mask = _core.zeros((x + 2, y + 2, z + 2, 1))
             mask[1:-1, 1:-1, 1:-1, 0] = plan.marked
             rays.clip(support, mask)
         return Sight(support, rays)

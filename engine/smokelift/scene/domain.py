@@ -171,13 +171,16 @@ def checked_sides(value: Any) -> tuple[Side, ...]:
 
 def box_around(voxels: NDArray[np.bool_], margin: int) -> tuple[slice, slice, slice]:
     """The smallest box that holds the marked voxels and so many more on each side; an empty one without any."""
-    spans = []
-    for axis, count in enumerate(voxels.shape):
-        marked = np.flatnonzero(voxels.any(tuple(other for other in range(3) if other != axis)))
-        spans.append(
-            slice(max(int(marked[0]) - margin, 0), min(int(marked[-1]) + 1 + margin, count))
-            if marked.size
-            else slice(0, 0)
-        )
-    x, y, z = spans
+    along_x = voxels.any((1, 2))
+    # rows of memory are read one after the other, and only where there is something
+    across = voxels[_span(along_x, 0)].any(0)
+    x, y, z = (_span(marked, margin) for marked in (along_x, across.any(1), across.any(0)))
     return x, y, z
+
+
+def _span(marked: NDArray[np.bool_], margin: int) -> slice:
+    """From the first to the last mark of a row, and so many more at both ends; empty without any."""
+    places = np.flatnonzero(marked)
+    if not places.size:
+        return slice(0, 0)
+    return slice(max(int(places[0]) - margin, 0), min(int(places[-1]) + 1 + margin, marked.size))

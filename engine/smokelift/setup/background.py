@@ -55,7 +55,7 @@ FEW = 4
 
 FROM_ONE = (
     "One frame alone does not show what moves: the colour around it counts as background, and all that has another as "
-    "smoke. If that is wrong, hide what is no smoke by a mask in [clip], or give a clean plate, or a color, in "
+    "smoke. If that is wrong, hide what is no smoke by a mask in [clip], or give a clean plate, or a colour, in "
     "[background]."
 )
 """What is to be said of a background of one colour that a single frame shows."""
@@ -154,7 +154,7 @@ def _find_plates(
     if colour is None:
         raise ValueError(
             "The camera moves, so what is behind the smoke cannot be found from the clip; give a clean plate with "
-            "a picture for every frame (a video or plate_####.png), or a color ([background] in a scene file, Clean "
+            "a picture for every frame (a video or plate_####.png), or a colour ([background] in a scene file, Clean "
             "Plate in Blender)."
         )
     note = f"Background not given: one colour, {', '.join(f'{v:.2g}' for v in colour)} (linear)."
@@ -201,7 +201,7 @@ def smoke_in_plate(samples: SmokeSamples) -> tuple[str, ...]:
         return ()
     return (
         f"The background may hold most of the smoke: {share:.0%} of where smoke is or may be is never free of it, so "
-        "what stays there all the time is missing from the result. Give a clean plate, or a color, in [background].",
+        "what stays there all the time is missing from the result. Give a clean plate, or a colour, in [background].",
     )
 
 
@@ -296,7 +296,7 @@ def _found(plate: Plate, clip: Clip) -> str:
             return f"{found}."
         return (
             f"{found}, but for {other:.1%} of the picture that has other colours and never changes, as a nozzle, a "
-            "floor or a logo does. If that is smoke, give the color in [background]."
+            "floor or a logo does. If that is smoke, give the colour in [background]."
         )
     return _how(unknown)
 
@@ -305,7 +305,7 @@ def _from_few(frames: int) -> str:
     """What is to be said of a background of more than one colour that so few frames show, two at least."""
     return (
         f"Only {frames} frames show what is behind the smoke: what is the same in all that there are counts as "
-        "background, smoke too. Give a clean plate, or a color, in [background]."
+        "background, smoke too. Give a clean plate, or a colour, in [background]."
     )
 
 

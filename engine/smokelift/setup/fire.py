@@ -49,7 +49,7 @@ def fire_choice(fire: Fire, given: Vector | None) -> Choice[str]:
     red, green, blue = given or fire.color
     reason = (
         f"Fire: {fire.share:.1%} of the smoke's pixels shine by themselves. The grid flame holds their light, of the "
-        f"color {red:g}, {green:g}, {blue:g}{' that is given' if given else ''}; the smoke beside it is continued over "
-        "it."
+        f"colour {red:g}, {green:g}, {blue:g}{' that is given' if given else ''}; the smoke beside it is continued "
+        "over it."
     )
     return Choice("fire", f"{fire.share:.3f}", reason, {"share": fire.share, "red": red, "green": green, "blue": blue})

@@ -8,7 +8,7 @@ from smokelift.footage.plate import Plates
 from smokelift.setup.smoke import SAMPLES, SmokeSamples
 
 _WHERE = "([background] in a scene file, Clean Plate in Blender)"
-_GIVE = f"give a clean plate, or a color {_WHERE}"
+_GIVE = f"give a clean plate, or a colour {_WHERE}"
 
 
 def nothing_seen(

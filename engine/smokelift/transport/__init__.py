@@ -16,6 +16,7 @@ from smokelift.transport.grid import (
     part_of,
     require_positive,
     require_same_shape,
+    sides_in_order,
 )
 from smokelift.transport.projection import divergence, outflow, project, without_divergence
 
@@ -39,5 +40,6 @@ __all__ = [
     "project",
     "require_positive",
     "require_same_shape",
+    "sides_in_order",
     "without_divergence",
 ]

@@ -17,6 +17,7 @@ from smokelift.transport.grid import (
     Velocity,
     at_centres,
     faces_in,
+    finite,
     require_same_shape,
 )
 
@@ -94,7 +95,7 @@ def advect(
             raise ValueError("mass can be kept of a density, not of a velocity.")
         x, y, z = _core.advect_faces(field.faces, displacement.faces, corrected)
         return Velocity((x, y, z), field.voxel_size, field.closed)
-    if not np.isfinite(field).all():
+    if not finite(field):
         raise ValueError("the field holds values that are not finite.")
     if not conserve:
         return _moved(field, displacement, corrected)

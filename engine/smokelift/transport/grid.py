@@ -7,7 +7,7 @@ Harlow and Welch 1965), where its divergence and the pressure projection are exa
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import InitVar, dataclass, field, replace
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -127,6 +127,8 @@ class Velocity(StaggeredGrid):
     residual
         Of an estimate, on its own grid: what it and those before it leave unexplained. The next estimate finds
         sources by it.
+    known_finite
+        Whether the faces are known to be finite; they are not read then, which takes long on a large grid.
 
     Raises
     ------
@@ -139,10 +141,11 @@ class Velocity(StaggeredGrid):
     confidence: Array | None = field(default=None, kw_only=True)
     source: Array | None = field(default=None, kw_only=True)
     residual: ResidualMeans | None = field(default=None, kw_only=True)
+    known_finite: InitVar[bool] = field(default=False, kw_only=True)
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, known_finite: bool) -> None:
         super().__post_init__()
-        if not all(map(_finite, self.faces)):
+        if not known_finite and not all(map(finite, self.faces)):
             raise ValueError("the velocity holds values that are not finite.")
 
     def displacement(self, dt: float) -> StaggeredGrid:
@@ -156,12 +159,12 @@ class Velocity(StaggeredGrid):
         require_positive("dt", dt)
         with np.errstate(over="ignore", invalid="ignore"):
             x, y, z = (component * np.float32(dt / self.voxel_size) for component in self.faces)
-        if not all((np.abs(component) <= LARGEST).all() for component in (x, y, z)):
+        if not all(component.min() >= -LARGEST and component.max() <= LARGEST for component in (x, y, z)):
             raise ValueError(f"the velocity moves smoke by more than {LARGEST:g} voxels in {dt:g} s.")
         return StaggeredGrid((x, y, z), 1.0, self.closed)
 
 
-def _finite(values: Array) -> bool:
+def finite(values: Array) -> bool:
     """Whether all values are finite. Their sum says so at once, unless it is too large itself."""
     with np.errstate(over="ignore", invalid="ignore"):
         return bool(np.isfinite(values.sum())) or bool(np.isfinite(values).all())
@@ -204,6 +207,7 @@ def part_of(velocity: Velocity, box: VoxelBox) -> Velocity:
         figures=velocity.figures,
         confidence=confidence,
         source=source,
+        known_finite=True,
     )
 
 

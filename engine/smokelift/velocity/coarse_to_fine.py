@@ -11,7 +11,15 @@ import numpy.typing as npt
 
 import smokelift._core as _core
 from smokelift.scene import Side
-from smokelift.transport import Array, Faces, ResidualMeans, StaggeredGrid, Velocity, advect_cells
+from smokelift.transport import (
+    Array,
+    Faces,
+    ResidualMeans,
+    StaggeredGrid,
+    Velocity,
+    advect_cells,
+    sides_in_order,
+)
 from smokelift.velocity.estimator import (
     Density,
     Estimate,
@@ -53,11 +61,12 @@ class CoarseToFine:
         settings = self.settings
         # a prediction may be on the coarser grid already, where its shape is checked
         first, second = checked(before, after, dt, voxel_size, inflow, None if settings.coarsening else prediction)
-        rest = Velocity.zero(first.shape, voxel_size, closed)
+        closed = sides_in_order(closed)
         peaks = sorted(float(density.max()) for density in (first, second))
         if peaks[0] <= settings.smoke_threshold * peaks[1]:
             # Between smoke and none there is no motion to be seen: what is new has come in.
             source = np.maximum(second - first, 0) / np.float32(dt)
+            rest = Velocity.zero(first.shape, voxel_size, closed)
             return replace(rest, confidence=np.zeros_like(second), source=source)
         if settings.coarsening:
             coarser = CoarseToFine(replace(settings, coarsening=settings.coarsening - 1))
@@ -74,10 +83,12 @@ class CoarseToFine:
         weight = motion_weight(first.shape, inflow)
         pair = prepare(first, second, settings)
         finest = Level(pair.before, pair.after, weight, past=None if prediction is None else prediction.residual)
-        predicted = None if prediction is None else Prediction(replace(prediction, closed=rest.closed), dt)
+        predicted = None if prediction is None else Prediction(replace(prediction, closed=closed), dt)
         sources = settings.sources if inflow is None else None
-        estimate = _Estimation(finest, predicted, sources, pair, rest.closed, settings).result()
-        return rest if estimate is None else estimate.velocity(dt, voxel_size)
+        estimate = _Estimation(finest, predicted, sources, pair, closed, settings).result()
+        if estimate is None:
+            return Velocity.zero(first.shape, voxel_size, closed)
+        return estimate.velocity(dt, voxel_size)
 
     def predict(self, velocity: Velocity, dt: float) -> Velocity:
         """The velocity of the next frame if no force acts, carried along on its grid."""

@@ -104,10 +104,8 @@ def refined_in(coarse: Velocity, shape: tuple[int, int, int], box: VoxelBox) -> 
     part = _refined_in(coarse, shape, box)
     figures = dict(coarse.figures)
     if figures:
-        largest = max(float(np.abs(component).max()) for component in part.faces)
-        left = float(np.abs(_core.divergence(part.faces)).max())
-        figures["divergence"] = left / largest if largest > 0 else 0.0
-    return replace(part, figures=figures)
+        figures["divergence"] = _core.relative_divergence(part.faces)
+    return replace(part, figures=figures, known_finite=True)
 
 
 def _refined_in(coarse: Velocity, shape: tuple[int, int, int], box: VoxelBox) -> Velocity:
@@ -124,7 +122,14 @@ def _refined_in(coarse: Velocity, shape: tuple[int, int, int], box: VoxelBox) ->
         None if values is None else values.repeat(2, 0).repeat(2, 1).repeat(2, 2)[tuple(map(slice, counts))]
         for values in (part.confidence, part.source)
     )
-    fine = Velocity(prolonged(part, counts), part.voxel_size / 2, part.closed, confidence=confidence, source=source)
+    fine = Velocity(
+        prolonged(part, counts),
+        part.voxel_size / 2,
+        part.closed,
+        confidence=confidence,
+        source=source,
+        known_finite=True,
+    )
     i, j, k = (
         slice(inner.start - 2 * outer.start, inner.stop - 2 * outer.start)
         for inner, outer in zip(box, (x, y, z), strict=True)
@@ -200,10 +205,11 @@ def _density(name: str, values: Density) -> Array:
     values = numbers(values, name)
     if values.ndim != 3 or 0 in values.shape:
         raise ValueError(f"{name} must be a three-dimensional array, not one of shape {values.shape}.")
-    if not np.isfinite(values).all():
+    least, most = values.min(), values.max()  # NaN if any is
+    if not np.isfinite((least, most)).all():
         raise ValueError(f"{name} holds densities that are not finite.")
-    if values.min() < 0:
+    if least < 0:
         raise ValueError(f"{name} holds negative densities.")
-    if values.max() > LARGEST_DENSITY:
-        raise ValueError(f"{name} holds densities up to {values.max():g}; scale them to {LARGEST_DENSITY:g} at most.")
+    if most > LARGEST_DENSITY:
+        raise ValueError(f"{name} holds densities up to {most:g}; scale them to {LARGEST_DENSITY:g} at most.")
     return np.ascontiguousarray(values)

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 
 from smokelift.scene.domain import box_around
-from smokelift.transport import Array, Velocity, VoxelBox, advect, faces_in
+from smokelift.transport import Array, Velocity, VoxelBox, advect, face_shapes, faces_in
 from smokelift.velocity.estimator import Mask, refined_in
 
 LARGE = 4_000_000
@@ -45,7 +44,8 @@ def carry(density: Array, velocity: Velocity, dt: float, voxel_size: float, *, c
     for box, source in _boxes(density > 0, reach, whole=conserve):
         moved = advect(density[source], refined_in(velocity, (x, y, z), source), dt, conserve=conserve)
         inner = tuple(slice(a.start - b.start, a.stop - b.start) for a, b in zip(box, source, strict=True))
-        result[box] = moved[inner]
+        # memory is given where something is written: where the smoke is, not all over its box
+        np.copyto(result[box], moved[inner], where=moved[inner] > 0)
     return result
 
 
@@ -71,19 +71,28 @@ def near_smoke(velocity: Velocity, smoke: Mask, dt: float, voxel_size: float) ->
     x, y, z = smoke.shape
     if velocity.shape == smoke.shape:
         return velocity
-    near = Velocity.zero(smoke.shape, voxel_size, velocity.closed)
+    i, j, k = (np.zeros(shape, np.float32) for shape in face_shapes(smoke.shape))
     confidence, source = (None if values is None else np.zeros(smoke.shape, np.float32) for values in _known(velocity))
     figures: dict[str, float] = {}
     for box, _ in _boxes(smoke, _reach(velocity, dt / voxel_size)):
         part = refined_in(velocity, (x, y, z), box)
-        for component, found in zip(faces_in(near.faces, box), part.faces, strict=True):
+        for component, found in zip(faces_in((i, j, k), box), part.faces, strict=True):
             component[...] = found
         for values, found_values in zip((confidence, source), _known(part), strict=True):
-            if values is not None:
-                values[box] = found_values
+            if values is not None and found_values is not None:
+                np.copyto(values[box], found_values, where=found_values != 0)
         largest = max(figures.get("divergence", 0.0), part.figures.get("divergence", 0.0))
         figures = {**part.figures, **({"divergence": largest} if "divergence" in part.figures else {})}
-    return replace(near, figures=figures, confidence=confidence, source=source, residual=velocity.residual)
+    return Velocity(
+        (i, j, k),
+        voxel_size,
+        velocity.closed,
+        figures=figures,
+        confidence=confidence,
+        source=source,
+        residual=velocity.residual,
+        known_finite=True,
+    )
 
 
 def _known(velocity: Velocity) -> tuple[Array | None, Array | None]:

@@ -246,7 +246,8 @@ PLACES = ("WORLD", "COMPOSITE", "PROJECTION")
 def traces(scene: bpy.types.Scene) -> dict[str, object]:
     """What the three places of a plate change, as it counts in a render."""
     nodes = tree(scene).nodes if tree(scene) is not None else {}
-    world = scene.world.node_tree.nodes if scene.world is not None else {}
+    of_world = scene.world.node_tree if scene.world is not None else None
+    world = of_world.nodes if of_world is not None else {}  # before 5.0 a new world has none
     return {
         "film": scene.render.film_transparent,
         "engine": scene.render.engine,

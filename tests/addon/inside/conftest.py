@@ -18,6 +18,9 @@ from smokelift.output.vdb import write_vdb
 from smokelift.scene import Domain, Medium, Scene, scene_to_dict
 from tests.example_shot import EXAMPLE, set_up_example
 
+# An installed Blender finds the modules that it comes with; USD's importer calls hooks in one of them.
+sys.path += [str(folder) for folder in Path(bpy.utils.resource_path("LOCAL"), "python", "lib").glob("*/site-packages")]
+
 FRAMES = 6
 """Of a take that `made` makes."""
 

@@ -1,4 +1,4 @@
-"""What is handed on: the files, the assets, and the proxy in the viewport."""
+"""What the engine writes of a result: the files and assets that are handed on, and a proxy."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 import pytest
 
-from addon import export, smoke_takes, volume
+from addon import export, look, proxy, smoke_takes, volume
 from addon.take import Take
 from smokelift.output.export import ExportSettings, export_sequence
 from smokelift.output.sequence import Sequence
@@ -76,17 +76,50 @@ def test_an_export_beside_the_results(made) -> None:
     frames = {f"smoke_{number:04d}.vdb" for number in range(1, FRAMES + 1)}
     assert names == {*frames, "export.json", "smoke.usda", "smoke.blend"}
     assert json.loads((folder / "export.json").read_text())["grids"] == ["density"]
+    assert (folder / "smoke.blend").stat().st_size > 10_000
     assert [obj.type for obj in bpy.data.objects].count("VOLUME") == 1, "what was made for the asset is left"
     assert len(bpy.data.node_groups) == before
 
 
-def test_blender_reads_the_usd_file(made) -> None:
-    """As a sequence of Volumes without velocity."""
-    exported(made, velocity=False)
+@pytest.mark.parametrize(("host", "velocity"), [("blender", "velocity"), ("houdini", "vel")])
+def test_blender_reads_the_usd_file(made, host, velocity) -> None:
+    """As a sequence of Volumes that look like the smoke and whose velocity is in metres a second."""
+    exported(made, host=host)
     bpy.ops.wm.usd_import(filepath=str(export.folder_of(made) / "smoke.usda"))
-    (data,) = [data for data in bpy.data.volumes if data != made.data]
+    (obj,) = [obj for obj in bpy.data.objects if obj.type == "VOLUME" and obj != made]
+    data = obj.data
     assert (data.is_sequence, data.frame_start, data.frame_duration) == (True, 1, FRAMES)
-    assert grids(data, 2) == ("smoke_0002.vdb", {"density"})
+    assert grids(data, 2) == ("smoke_0002.vdb", {"density", velocity})
+    assert (data.velocity_unit, data.velocity_grid) == ("SECOND", velocity)
+    assert look.node_of(obj).inputs["Extinction"].default_value == pytest.approx(3.0)
+    assert look.material_of(obj) != look.material_of(made)
+
+
+def test_the_usd_file_is_sound(made) -> None:
+    """By USD's own module: names, fields, purposes, and a material whose nodes MaterialX knows."""
+    from pxr import Sdf, Usd, UsdGeom, UsdShade, UsdVol
+
+    exported(made, proxy=2)
+    stage = Usd.Stage.Open(str(export.folder_of(made) / "smoke.usda"))
+    assert (UsdGeom.GetStageUpAxis(stage), stage.GetTimeCodesPerSecond()) == ("Z", 24.0)
+    for prim in stage.Traverse():
+        assert Sdf.Path.IsValidIdentifier(prim.GetName()), prim
+        for attribute in prim.GetProperties():
+            assert Sdf.Path.IsValidNamespacedIdentifier(attribute.GetName()), attribute
+    volumes = [UsdVol.Volume(stage.GetPrimAtPath(f"/Smoke/{name}")) for name in ("Volume", "Proxy")]
+    assert [sorted(each.GetFieldPaths()) for each in volumes] == [["density", "velocity"], ["density"]]
+    assert [UsdGeom.Imageable(each).ComputePurpose() for each in volumes] == ["render", "proxy"]
+    for each in volumes:
+        for path in each.GetFieldPaths().values():
+            asset = UsdVol.OpenVDBAsset(stage.GetPrimAtPath(path)).GetFilePathAttr().Get(2)
+            assert Path(asset.resolvedPath).is_file()
+        material, _ = UsdShade.MaterialBindingAPI(each).ComputeBoundMaterial()
+        assert material.ComputeVolumeSource("mtlx")[0].GetIdAttr().Get() == "ND_volume"
+    known = "".join(path.read_text() for path in Path(bpy.utils.resource_path("LOCAL")).rglob("*_defs.mtlx"))
+    shaders = [UsdShade.Shader(prim) for prim in stage.Traverse() if prim.IsA(UsdShade.Shader)]
+    assert len(shaders) == 5
+    for shader in shaders:
+        assert f'nodedef name="{shader.GetIdAttr().Get()}"' in known
 
 
 def test_the_asset_is_used_in_another_file(made, tmp_path) -> None:
@@ -118,21 +151,22 @@ def test_the_asset_is_used_in_another_file(made, tmp_path) -> None:
     assert numbers == [3, 2, 1], "each instance plays a frame later"
 
 
-def test_a_proxy_in_the_viewport(made) -> None:
-    """It follows the smoke, renders do not see it, and a second press takes it away."""
-    with pytest.raises(RuntimeError, match=r"no proxy in .*: choose a proxy and export first"):
-        bpy.ops.smokelift.use_proxy()
-    exported(made, proxy=2)
-    assert bpy.ops.smokelift.use_proxy() == {"FINISHED"}
-    proxy = export.proxy_of(made)
-    assert (made.hide_viewport, made.hide_render) == (True, False)
-    assert (proxy.hide_viewport, proxy.hide_render) == (False, True)
-    made.location.x = 2.0
-    bpy.context.view_layer.update()
-    assert proxy.matrix_world.translation.x == pytest.approx(made.matrix_world.translation.x)
-    assert grids(proxy.data, proxy.data.frame_start + 1) == ("proxy_0002.vdb", {"density"})
-    assert bpy.ops.smokelift.use_proxy() == {"FINISHED"}
-    assert export.proxy_of(made) is None and not made.hide_viewport
+def test_a_result_gets_a_proxy(made) -> None:
+    """The viewport shows it from then on, and it can be switched off."""
+    assert proxy.modifier_of(made) is None
+    assert bpy.ops.smokelift.make_proxy() == {"FINISHED"}
+    assert proxy.in_viewport(made) != made.data
+    assert grids(proxy.proxy_of(made), made.data.frame_start + 1) == ("proxy_0002.vdb", {"density"})
+    proxy.modifier_of(made).show_viewport = False
+    assert proxy.in_viewport(made) == made.data
+
+
+def test_an_export_for_another_program_has_no_asset(made) -> None:
+    """Blender would not find its grids."""
+    made.smokelift_export.host = "unreal"
+    assert bpy.ops.smokelift.export() == {"FINISHED"}
+    names = {path.name for path in export.folder_of(made).iterdir()}
+    assert names == {*(f"smoke_{number:04d}.vdb" for number in range(1, FRAMES + 1)), "export.json"}
 
 
 def test_a_folder_with_other_files_is_left_alone(made, tmp_path) -> None:
@@ -149,4 +183,4 @@ def test_without_a_result_there_is_nothing_to_export(scene) -> None:
     """The buttons are off."""
     smoke(scene)
     assert not bpy.ops.smokelift.export.poll()
-    assert not bpy.ops.smokelift.use_proxy.poll()
+    assert not bpy.ops.smokelift.make_proxy.poll()

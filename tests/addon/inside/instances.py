@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from addon import instances, volume
+from addon.nodes import set_input
 from conftest import FRAMES, made, rendered
 from smokelift.scene import Medium
 from tests.example_shot import add, add_camera, smoke
@@ -76,11 +77,11 @@ def test_points_without_the_attribute_have_random_times(shown) -> None:
     points.data = mesh
     frame = shown.data.frame_start
     assert set(files(points, frame)) == {"smoke_0001.vdb"}
-    instances.set_input(points, "Random Offset", 5 * FRAMES)
+    set_input(points.modifiers[instances.GROUP], "Random Offset", 5 * FRAMES)
     points.update_tag()
     drawn = files(points, frame)
     assert set(drawn) == {f"smoke_{number:04d}.vdb" for number in range(1, FRAMES + 1)}
-    instances.set_input(points, "Seed", 1)
+    set_input(points.modifiers[instances.GROUP], "Seed", 1)
     points.update_tag()
     assert files(points, frame) != drawn
 

@@ -6,10 +6,12 @@ import bpy
 import numpy as np
 import pytest
 
-from addon import look, volume
+from addon import look, look_panel, volume
+from addon.smoke import is_override, smokes
 from conftest import made, rendered
 from smokelift.output.vdb import vdb_module
 from smokelift.scene import Medium
+from tests.addon.inside.panel import drawn
 from tests.example_shot import add, add_camera, smoke
 
 MEDIUM = Medium(4.0, 0.8, 0.3)
@@ -35,7 +37,7 @@ def lit(scene) -> bpy.types.Scene:
 
 def node(scene: bpy.types.Scene) -> bpy.types.ShaderNode:
     """The one with the values of the scene's smoke."""
-    return look.node_of(smoke(scene).data)
+    return look.node_of(smoke(scene))
 
 
 def test_presets_look_different(lit, tmp_path) -> None:
@@ -91,7 +93,7 @@ def test_a_preset_needs_our_material(lit, tmp_path) -> None:
     obj.data.materials[0] = bpy.data.materials.new("Own")
     with pytest.raises(RuntimeError, match="material is your own"):
         bpy.ops.smokelift.use_look(preset="SOOT")
-    assert look.controls(obj.data) == []
+    assert look.controls(obj) == []
 
 
 @pytest.mark.parametrize(
@@ -170,5 +172,31 @@ def test_all_smokes_share_one_group(lit, tmp_path) -> None:
     other = add(lit, "Other", bpy.data.volumes.new("Other"))
     other.smokelift.is_smoke = True
     volume.show(other, made(tmp_path, number=2))
-    assert look.node_of(obj.data).node_tree == look.node_of(other.data).node_tree
+    assert look.node_of(obj).node_tree == look.node_of(other).node_tree
     assert obj.data.materials[0] != other.data.materials[0]
+
+
+def test_an_override_of_a_linked_smoke_gets_a_look_of_its_own(lit, tmp_path) -> None:
+    """It stays in this file, and the smoke that is linked keeps its look."""
+    volume.show(smoke(lit), made(tmp_path, medium=MEDIUM))
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "library.blend"))
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_, wanted):
+        wanted.objects = ["Smoke"]
+    (linked,) = wanted.objects
+    scene = bpy.context.scene
+    scene.collection.objects.link(linked)
+    override = linked.override_create(remap_local_usages=True)
+    assert smokes(scene) == [] and not bpy.ops.smokelift.use_look.poll(), "it is not active"
+    bpy.context.view_layer.objects.active = override
+    texts = drawn(scene, look_panel.SMOKELIFT_PT_view_look)
+    assert "Density" not in texts and "Viewport Density" not in texts
+    assert bpy.ops.smokelift.use_look(preset="SOOT") == {"FINISHED"}
+    assert "Density" in drawn(scene, look_panel.SMOKELIFT_PT_view_look)
+    look.node_of(override).inputs["Density"].default_value = 3.0
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
+    override = next(obj for obj in bpy.context.scene.objects if is_override(obj))
+    assert look.node_of(override).inputs["Density"].default_value == 3.0
+    assert look.node_of(override).inputs["Color"].default_value[0] == pytest.approx(0.05)
+    assert look.node_of(override.override_library.reference).inputs["Density"].default_value == 1.0

@@ -111,6 +111,19 @@ def test_the_look_is_in_the_tab(shot, tmp_path) -> None:
     assert {"Presets    ", "Viewport Density", "Render Step"} <= set(texts)
 
 
+def test_large_smoke_without_a_proxy_is_offered_one(shot, tmp_path) -> None:
+    """An earlier result: a run writes it by itself."""
+    take = made(tmp_path)
+    volume.show(smoke(shot), take)
+    bpy.context.window_manager.smokelift.check_smoke = smoke(shot).session_uid  # no check is under way
+    offer = "This smoke is large"
+    assert not [text for text in drawn(shot, panel.SMOKELIFT_PT_view) if text.startswith(offer)]
+    index = json.loads((take.directory / "sequence.json").read_text())
+    index["scene"]["domain"]["resolution"] = [160, 160, 240]
+    (take.directory / "sequence.json").write_text(json.dumps(index))
+    assert [text for text in drawn(shot, panel.SMOKELIFT_PT_view) if text.startswith(offer)]
+
+
 @pytest.mark.parametrize("word", ["Captured At", "Pixels", "Processor", "Graphics Card", "Anew"])
 def test_words_are_blenders(scene, word) -> None:
     """Frame rate, color space, CPU, GPU."""

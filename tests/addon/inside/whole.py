@@ -289,7 +289,7 @@ def test_a_clip_without_smoke_is_not_done(scene, tmp_path) -> None:
     (row,) = bpy.context.window_manager.smokelift.jobs
     assert row.outcome == "failed"
     assert "No smoke found" in row.sentence
-    assert "Clean Plate in Blender" in row.sentence
+    assert "Check the background that is given (Clean Plate)" in row.sentence
 
 
 def test_the_check_says_what_a_run_takes_and_assumes(shot, tmp_path) -> None:

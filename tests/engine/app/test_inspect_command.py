@@ -70,7 +70,7 @@ def test_a_page_shows_what_is_known(plume, tmp_path, capsys, kind) -> None:
     for what in ("exposure", "camera", "scale", "extinction", "albedo", "light strength", "smoke thickness"):
         assert known[what]["origin"] == "undetermined"
     assert known["light strength"]["how"] != known["smoke thickness"]["how"]
-    for what in ("sun's direction", "sun's color", "ambient share"):
+    for what in ("sun's direction", "sun's colour", "ambient share"):
         assert known[what]["origin"] == "undetermined"
         assert "Give [[lights]]" in known[what]["how"]
     if kind == ".html":

@@ -121,7 +121,7 @@ def test_lobes_are_as_strong_on_every_grid(plume, tmp_path, monkeypatch) -> None
     """Also where their amounts are kept on a grid half as fine."""
     scene = plume.write(tmp_path, rising(3))
     coarse = lobes(scene, 36)
-    assert coarse > 0.4
+    assert coarse > 0.15
     assert lobes(scene, 72) == pytest.approx(coarse, rel=0.25)
     monkeypatch.setattr(moment_levels, "LARGE", 10_000)
     assert lobes(scene, 72) == pytest.approx(coarse, rel=0.25)

@@ -137,11 +137,12 @@ def test_smoke_fades_where_none_is_expected_in_depth(plume, small) -> None:
 # profile
 
 
-def profile_of(amount, domain):
+def profile_of(amount, domain, axis=None):
     """The profile at every voxel."""
     everywhere = np.ones(domain.resolution, np.bool_)
-    profile = DepthProfile(amount, GRID, domain, SmokeAxis.upright())
-    return profile.at(project_voxels(GRID, domain), everywhere).reshape(domain.resolution)
+    places = project_voxels(GRID, domain).places(everywhere)
+    profile = DepthProfile(amount, GRID, domain, axis or SmokeAxis.upright())
+    return profile.at(places, everywhere).reshape(domain.resolution)
 
 
 def amount_of(width: int) -> np.ndarray:
@@ -183,9 +184,7 @@ def test_the_profile_follows_the_axis(plume) -> None:
     domain = plume.scene.domain
     h = domain.voxel_size
     axis = SmokeAxis(np.array([-8 * h, 8 * h]), np.array([-3 * h, 3 * h]), np.zeros(2))
-    everywhere = np.ones(domain.resolution, np.bool_)
-    profile = DepthProfile(amount_of(6), GRID, domain, axis).at(project_voxels(GRID, domain), everywhere)
-    profile = profile.reshape(domain.resolution)
+    profile = profile_of(amount_of(6), domain, axis)
     y = (np.arange(24) - 11.5) * h
     middle = (profile * y[None, :, None]).sum(1)[12] / profile.sum(1)[12]
     np.testing.assert_allclose(middle[[8, 16, 24]], axis.at((np.array([8, 16, 24]) - 15.5) * h), atol=0.1 * h)
@@ -199,9 +198,7 @@ def test_columns_behind_one_another_make_it_deeper(plume) -> None:
     depths = []
     for apart in (0.0, 8 * h):
         axis = SmokeAxis(np.zeros(1), np.zeros(1), np.full(1, apart))
-        everywhere = np.ones(domain.resolution, np.bool_)
-        profile = DepthProfile(amount_of(6), GRID, domain, axis).at(project_voxels(GRID, domain), everywhere)
-        profile = profile.reshape(domain.resolution)[12, :, 16]
+        profile = profile_of(amount_of(6), domain, axis)[12, :, 16]
         depths.append(np.sqrt((profile * y**2).sum() / profile.sum()))
     assert depths[1] > 1.8 * depths[0]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +16,6 @@ from smokelift.output.export import ExportSettings, export_sequence, export_size
 from smokelift.output.index import SequenceError
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
-from smokelift.scene import Domain
 
 DOMAIN, EXTINCTION = SCENE.domain, SCENE.medium.extinction
 
@@ -95,15 +95,6 @@ def test_the_proxy_lies_where_the_smoke_is(sequence: Sequence, tmp_path: Path) -
     assert density.transform.indexToWorld((0, 0, 0)) == pytest.approx(middle)  # type: ignore[attr-defined]  # no stubs
 
 
-def test_a_coarser_box_keeps_the_mass() -> None:
-    domain = Domain((0, 0, 0), (0.5, 0.7, 0.9), (5, 7, 9))
-    rho = np.random.default_rng(1).random((5, 7, 9)).astype(np.float32)
-    coarse, wide = export.coarser(rho, domain, 3)
-    assert coarse.shape == wide.shape == (2, 3, 3)
-    assert wide.max == pytest.approx((0.6, 0.9, 0.9))
-    assert coarse.sum() * 27 == pytest.approx(rho.sum(), rel=1e-5)
-
-
 @needs_vdb
 def test_an_export_takes_the_place_of_an_earlier_one(sequence: Sequence, tmp_path: Path) -> None:
     exported(sequence, tmp_path / "out", proxy=2)
@@ -158,3 +149,66 @@ def test_fire_is_exported(tmp_path: Path, precision: str) -> None:
     assert set(grids(tmp_path / "out" / "smoke_0002.vdb")) == {"density", "velocity", "flame"}
     assert 'OpenVDBAsset "flame"' in (tmp_path / "out" / "smoke.usda").read_text()
     assert json.loads((tmp_path / "out" / "export.json").read_text())["grids"] == ["density", "velocity", "flame"]
+
+
+def placed(path: Path, name: str, axis: int) -> tuple[float, float]:
+    """Where along an axis of the world the active voxels of a grid begin and end, between their outer faces."""
+    grid: Any = grids(path)[name]
+    low, high = grid.evalActiveVoxelBoundingBox()
+    half = DOMAIN.voxel_size / 2
+    return grid.transform.indexToWorld(low)[axis] - half, grid.transform.indexToWorld(high)[axis] + half
+
+
+@needs_vdb
+def test_files_for_blender(sequence: Sequence, tmp_path: Path) -> None:
+    """The frame rate and the units are in every grid."""
+    exported(sequence, tmp_path / "out")
+    found: dict[str, Any] = grids(tmp_path / "out" / "smoke_0001.vdb")
+    assert set(found) == {"density", "velocity"}
+    for grid in found.values():
+        assert (grid["fps"], grid["length_unit"], grid["velocity_unit"]) == (24.0, "m", "m/s")
+        assert grid["extinction"] == pytest.approx(EXTINCTION)
+
+
+@needs_vdb
+def test_files_for_houdini(sequence: Sequence, tmp_path: Path) -> None:
+    """Y is up, and the velocity is called vel and turned with the smoke."""
+    exported(sequence, tmp_path / "out", host="houdini", proxy=2)
+    path = tmp_path / "out" / "smoke_0002.vdb"
+    assert set(grids(path)) == {"density", "vel"}
+    before = [placed(sequence.directory / "smoke_0002.vdb", "density", axis) for axis in range(3)]
+    x, y, z = (placed(path, "density", axis) for axis in range(3))
+    assert x == pytest.approx(before[0]) and z == pytest.approx((-before[1][1], -before[1][0]))
+    assert y == pytest.approx((DOMAIN.min[2], DOMAIN.min[2] + 6 * DOMAIN.voxel_size)), "thin air above is left out"
+    grid: Any = grids(path)["vel"]
+    vel = np.zeros((8, 12, 8, 3), np.float32)
+    grid.copyToArray(vel)
+    u = sequence.velocity_at_centres(2)
+    np.testing.assert_allclose(vel[2, 1, 4], u[2, 3, 1][[0, 2, 1]] * [1, 1, -1], atol=2e-3)
+    text = (tmp_path / "out" / "smoke.usda").read_text()
+    assert 'upAxis = "Y"' in text and "rel field:vel =" in text
+    (proxy,) = grids(tmp_path / "out" / "proxy_0002.vdb").values()
+    assert proxy.transform.indexToWorld((0, 0, 0)) == pytest.approx((-0.75, 0.25, -0.75))  # type: ignore[attr-defined]  # no stubs
+
+
+@needs_vdb
+def test_files_for_unreal(sequence: Sequence, tmp_path: Path) -> None:
+    """Densities are 256 steps up to 1, their extinction is what they were divided by, and the pivot stays in place."""
+    exported(sequence, tmp_path / "out", host="unreal")
+    assert not (tmp_path / "out" / "smoke.usda").exists()
+    peak = max(float(sequence.density(number).max()) for number in sequence.frames)
+    medium = json.loads((tmp_path / "out" / "export.json").read_text())["medium"]
+    assert medium["extinction"] == pytest.approx(EXTINCTION * peak)
+    for number in sequence.frames:
+        path = tmp_path / "out" / f"smoke_{number:04d}.vdb"
+        rho, u = (grid[:, ::-1] for grid in vdb.read_vdb(path, DOMAIN.shape))  # its axes are left-handed
+        assert np.abs(rho * 255 - np.round(rho * 255)).max() < 0.1, "to the precision of 16 bits"
+        assert rho.max() <= 1.0
+        np.testing.assert_allclose(rho[:, :, :6] * peak, sequence.density(number)[:, :, :6], atol=peak / 400)
+        wanted = sequence.velocity_at_centres(number)[:, :, :6] * [1, -1, 1]
+        np.testing.assert_allclose(u[:, :, :6], wanted, atol=2e-3)
+        for axis in range(3):
+            for name in ("density", "velocity"):
+                assert placed(path, name, axis) == pytest.approx((DOMAIN.min[axis], DOMAIN.max[axis]))
+        density: Any = grids(path)["density"]
+        assert density["extinction"] == pytest.approx(EXTINCTION * peak)

@@ -30,7 +30,7 @@ def test_how_many_frames_were_looked_at_is_said(wall) -> None:
     clip, plate = wall
     said, advice = nothing_seen(clip, plate, sample_smoke(clip, plate), given=False, cuts=())
     assert "No smoke found in the 4 frames that were looked at" in said
-    assert "give a clean plate, or a color" in advice
+    assert "give a clean plate, or a colour" in advice
 
 
 def test_nothing_is_said_of_smoke(wall) -> None:

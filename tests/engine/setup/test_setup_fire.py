@@ -22,7 +22,7 @@ def test_fire_is_said_and_does_not_light_the_smoke(plume, draft, tmp_path) -> No
     assert not any(choice.what == "fire" for choice in without.choices)
     (said,) = [choice.reason for choice in with_fire.choices if choice.what == "fire"]
     assert re.match(r"Fire: \d+\.\d% of the smoke's pixels shine by themselves", said)
-    assert "of the color 1, 0.4" in said
+    assert "of the colour 1, 0.4" in said
     assert without.fire is None and without.scene.medium.flame_color is None
     assert with_fire.observe_fire(2).image.max() > 0.5 and without.observe_fire(2) is None
     red, green, blue = with_fire.scene.medium.flame_color
@@ -38,4 +38,4 @@ def test_a_color_of_fire_that_is_given_is_taken(plume, draft, tmp_path) -> None:
         shot = prepare_shot(clip.changed(burning), scene, draft)
     assert shot.scene.medium.flame_color == (1.0, 0.5, 0.2)
     (said,) = [choice.reason for choice in shot.choices if choice.what == "fire"]
-    assert "of the color 1, 0.5, 0.2 that is given" in said
+    assert "of the colour 1, 0.5, 0.2 that is given" in said

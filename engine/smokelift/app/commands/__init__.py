@@ -13,6 +13,7 @@ from smokelift.app.commands import (
     inspect,
     loop,
     preview,
+    proxy,
     reconstruct,
     render,
     retime,
@@ -30,6 +31,7 @@ MODULES = (
     retime,
     loop,
     export,
+    proxy,
     doctor,
 )
 

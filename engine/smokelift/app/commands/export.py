@@ -17,6 +17,7 @@ from smokelift.output.export import (
     require_export,
     require_space,
 )
+from smokelift.output.host import HostName
 from smokelift.output.sequence import Sequence
 
 
@@ -39,6 +40,13 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
         metavar="N",
         help="write a second sequence for viewports, with voxels N times as large (default 1: none)",
     )
+    parser.add_argument(
+        "--host",
+        choices=get_args(HostName),
+        default="blender",
+        help="the program that reads the files: blender (default), with Z up; houdini, with Y up and the velocity as "
+        "vel; unreal, with densities from 0 to 1 and the box's corners in every frame",
+    )
     parser.add_argument("--size", action="store_true", help="say the size, and write nothing")
     parser.set_defaults(run=run)
 
@@ -46,7 +54,7 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, say: Reporter) -> None:
     """Say the size, and export unless that is all that was asked for."""
     began = time.monotonic()
-    settings = ExportSettings(options.precision, not options.no_velocity, options.proxy)
+    settings = ExportSettings(options.precision, not options.no_velocity, options.proxy, options.host)
     sequence = Sequence.open(options.directory)
     require_export(sequence, options.out)
     size = export_size(sequence, settings)

@@ -1,0 +1,152 @@
+"""Noise that breaks the smooth answer's symmetry: as strong as the clip's own detail on every scale, and stretched.
+
+Each octave has the strength that the clip's pictures show on its scale, so turbulent smoke gets lobes, and laminar
+smoke stays as it is. Each is looked up where random motion of the coarser scales has taken it from: a flow draws smoke
+out into sheets and threads, where plain noise has round grains (Perlin, "An image synthesizer", 1985).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+import smokelift._core as _core
+from smokelift.density.exemplar import Picture, reduced
+from smokelift.density.moment_levels import Level
+
+COARSEST = 2.0
+"""Distance between nodes of the coarsest octave, in standard deviations of the smoke's width: a lobe is as large."""
+
+FINEST = 3.5
+"""Voxels between nodes of the finest octave, at least: finer ones flicker (docs/experiments/stretched-noise.md)."""
+
+STRETCH = 0.2
+"""Standard deviation of the motion of each scale, over the distance between its nodes: more draws the smoke out into
+straws (docs/experiments/stretched-noise.md)."""
+
+LATTICE = 32
+"""Nodes along each side of a lattice, which repeats."""
+
+NODES = np.float32((2 / 3) ** 1.5)
+"""Standard deviation of what is interpolated linearly between nodes of unit variance in three dimensions."""
+
+BODY = 0.1
+"""Share of a picture's largest optical depth, blurred, from which its detail is measured: outlines are none."""
+
+NEIGHBOURS = (4, 2, 1, 1 / 2, 1 / 4, 1 / 8)
+"""Blurs of the octaves that are found in a band, over its own: what others add is less than a hundredth."""
+
+FINE_ENOUGH = 1.5
+"""Standard deviation (pixels) of the blurs that measure detail, at least: larger pictures are reduced first."""
+
+
+def roughness(pictures: Sequence[Picture], width: float) -> tuple[float, ...]:
+    """Measure how much the density of some smoke fluctuates on the scale of every octave.
+
+    A picture's energy in a band, the difference of blurs of s / sqrt(6) and half of that for nodes s apart, is divided
+    by that of smoke with a Gaussian profile whose octaves of noise all have unit strength.
+
+    Parameters
+    ----------
+    pictures
+        Optical depth, a pixel a voxel.
+    width
+        Standard deviation of the smoke across its axis, in voxels.
+
+    Returns
+    -------
+    tuple
+        Standard deviation of the logarithm of the density by octave, the coarsest first.
+    """
+    octaves = max(1, 1 + int(np.log2(COARSEST * width / FINEST)))
+    blurs = [COARSEST * width / 2**octave / np.sqrt(6) for octave in range(octaves)]
+    return tuple(float(np.sqrt(np.log1p(_energy(pictures, blur) / _unit_energy(blur, width)))) for blur in blurs)
+
+
+def _energy(pictures: Sequence[Picture], blur: float) -> float:
+    """Mean square of the detail between a blur (deviation, pixels) and half of it, over the blurred smoke's."""
+    scale = 1
+    while blur / (2 * scale) >= FINE_ENOUGH:
+        scale *= 2
+    square = amount = 0.0
+    for picture in pictures:
+        small = reduced(picture, scale)
+        fine, coarse = (ndimage.gaussian_filter(small, each / scale) for each in (blur / 2, blur))
+        body = coarse > BODY * coarse.max()
+        square += float(np.sum((fine - coarse)[body] ** 2 / coarse[body], dtype=np.float64))
+        amount += float(np.sum(coarse[body], dtype=np.float64))
+    return square / amount
+
+
+def _unit_energy(blur: float, width: float) -> float:
+    """The same of octaves of unit strength; each is blurred white noise, of which a ray averages independent parts."""
+    own = np.array([each * blur for each in NEIGHBOURS])
+    square = own**2
+    bands = 1 / (square + blur**2 / 4) - 2 / (square + blur**2 * 5 / 8) + 1 / (square + blur**2)
+    return float(np.sum(square * bands * own / np.hypot(own, width)))
+
+
+@dataclass(frozen=True, eq=False)
+class StretchedNoise:
+    """Noise in octaves that each are stretched by the coarser ones' motion.
+
+    Attributes
+    ----------
+    moved : (3,)
+        How far it has moved, in voxels of the finest grid.
+    width
+        Standard deviation of the smoke across its axis, in voxels of that grid.
+    strengths
+        Standard deviation by octave, the coarsest first.
+    seed
+        Of the noise.
+    """
+
+    moved: NDArray[np.float64]
+    width: float
+    strengths: tuple[float, ...]
+    seed: int
+
+    def at(self, level: Level) -> NDArray[np.float32]:
+        """Noise (n,) at the voxels that may hold smoke."""
+        noise, *_ = self._sum(level, np.random.default_rng(self.seed))
+        return noise
+
+    def _sum(self, level: Level, random: np.random.Generator) -> tuple[NDArray[np.float32], NDArray[np.float32], int]:
+        """The sum (n,) of the octaves that a grid holds, the motion (3, n) in voxels so far and the octaves' number."""
+        hull, size, octaves = level.views.hull, level.coarseness, 0
+        places = size * _core.marked(hull).astype(np.float32)
+        places += ((size - 1) / 2 - self.moved[:, None]).astype(np.float32)
+        noise, motion = np.zeros(places.shape[1], np.float32), np.zeros_like(places)
+        if level.coarser is not None:
+            coarse_noise, coarse_motion, octaves = self._sum(level.coarser, random)
+            noise, *motions = (_finer(values, level.coarser, level) for values in (coarse_noise, *coarse_motion))
+            motion = np.stack(motions)
+        while octaves < len(self.strengths):
+            spacing = COARSEST * self.width / 2**octaves
+            if octaves and spacing < FINEST * size:
+                break
+            if octaves:  # drawn out by the motion of nodes twice as far apart
+                reach = np.float32(2 * STRETCH * spacing)
+                motion = motion + reach * np.stack([_octave(places + motion, 2 * spacing, random) for _ in range(3)])
+            noise = noise + np.float32(self.strengths[octaves]) * _octave(places + motion, spacing, random)
+            octaves += 1
+        return noise, motion, octaves
+
+
+def _finer(values: NDArray[np.float32], coarser: Level, level: Level) -> NDArray[np.float32]:
+    """Values at the voxels that may hold smoke on one grid, at those of the next finer one."""
+    field = np.zeros(coarser.views.hull.shape, np.float32)
+    field.ravel()[coarser.views.where] = values
+    return coarser.finer(field, level)
+
+
+def _octave(places: NDArray[np.float32], spacing: float, random: np.random.Generator) -> NDArray[np.float32]:
+    """Noise (n,) of unit variance at places (3, n), linear between nodes so many voxels apart."""
+    lattice = random.standard_normal((LATTICE,) * 3).astype(np.float32) / NODES
+    at = places / np.float32(spacing) + random.uniform(0, LATTICE, (3, 1)).astype(np.float32)
+    return _core.read_lattice(lattice, at)

@@ -1,0 +1,93 @@
+"""Coarse copies of a sequence's frames, which a viewport reads in the place of files that are too large for it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from smokelift.output.index import SequenceError
+from smokelift.output.layout import proxy_path
+from smokelift.output.sequence import Sequence
+from smokelift.output.vdb import vdb_module, write_vdb
+from smokelift.scene import Domain
+from smokelift.transport import Array
+
+TIMES = 4
+"""How many times as large the voxels of a proxy are."""
+
+LARGE = 4_000_000
+"""Voxels of a box from which on a run writes proxies. Blender reads a frame of 41 million, a quarter of them smoke, in
+1.2 s (`tests/blender/heavy.py`, two cores), so of so many it reads 8 a second."""
+
+
+def write_proxy(path: Path, density: Array, domain: Domain, times: int = TIMES, flame: Array | None = None) -> None:
+    """Write the coarse copy of a frame: its density, and its emission where it has one.
+
+    Parameters
+    ----------
+    path
+        The ``.vdb`` file.
+    density, flame : (nx, ny, nz)
+        As `write_vdb` takes them.
+    domain
+        Their box.
+    times
+        How many times as large the voxels are.
+
+    Raises
+    ------
+    VdbUnavailable
+        If there is no OpenVDB module.
+    OSError
+        If the file cannot be written.
+    """
+    rho, wide = coarser(density, domain, times)
+    write_vdb(path, rho, None, wide, flame=None if flame is None else coarser(flame, domain, times)[0])
+
+
+def write_proxies(sequence: Sequence) -> Iterator[int]:
+    """Write the coarse copies of all frames of a sequence into its directory.
+
+    Yields
+    ------
+    The number of every frame whose copy is written.
+
+    Raises
+    ------
+    SequenceError
+        If there are no frames, or a file cannot be read or written.
+    VdbUnavailable
+        If there is no OpenVDB module.
+    """
+    vdb_module()
+    if not sequence.frames:
+        raise SequenceError(f"{sequence.directory}: has no finished frame to make a proxy of yet.")
+    for number in sequence.frames:
+        path = proxy_path(sequence.directory, number)
+        try:
+            write_proxy(path, sequence.density(number), sequence.scene.domain, flame=sequence.flame(number))
+        except OSError as error:
+            raise SequenceError(f"{path}: cannot be written: {error}") from error
+        yield number
+
+
+def coarser(values: Array, domain: Domain, times: int) -> tuple[Array, Domain]:
+    """Return the means of a volume over cubes of voxels, and the box of those, which may be larger.
+
+    Parameters
+    ----------
+    values : (nx, ny, nz)
+    domain
+        Its box.
+    times
+        Voxels along a side of a cube.
+    """
+    counts = tuple(-(-n // times) for n in domain.resolution)
+    padded = np.pad(values, [(0, count * times - n) for count, n in zip(counts, values.shape, strict=True)])
+    x, y, z = counts
+    coarse = padded.reshape(x, times, y, times, z, times).mean((1, 3, 5), dtype=np.float32)
+    edge = times * domain.voxel_size
+    a, b, c = (low + count * edge for low, count in zip(domain.min, counts, strict=True))
+    return coarse, Domain(domain.min, (a, b, c), (x, y, z))

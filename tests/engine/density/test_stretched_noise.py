@@ -1,0 +1,122 @@
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy import ndimage
+
+import smokelift._core as _core
+from smokelift.density.stretched_noise import COARSEST, STRETCH, StretchedNoise, roughness
+
+WIDTH = 8.0
+NONE = (0.0, 0.0, 0.0)
+
+
+def level(shape) -> SimpleNamespace:
+    """A grid that may hold smoke everywhere."""
+    return SimpleNamespace(views=SimpleNamespace(hull=np.ones(shape, np.bool_)), coarseness=1, coarser=None)
+
+
+def body(shape) -> np.ndarray:
+    """Smooth smoke along the last axis, of a Gaussian profile as wide as `WIDTH`."""
+    x, y = ((np.arange(count) - (count - 1) / 2) / WIDTH for count in shape[:2])
+    return np.exp(-(x[:, None, None] ** 2 + y[:, None] ** 2) / 2) * np.ones(shape)
+
+
+def picture(strengths, seed) -> np.ndarray:
+    """Optical depth of that smoke with noise."""
+    shape = (48, 48, 64)
+    noise = StretchedNoise(np.zeros(3), WIDTH, strengths, seed).at(level(shape)).reshape(shape)
+    return (body(shape) * np.exp(noise)).sum(1).astype(np.float32)
+
+
+@pytest.mark.parametrize("strength", [0.5, 1.0])
+def test_roughness_is_the_strength_of_noise(strength) -> None:
+    """Up to what one smoke of few lobes says."""
+    found = roughness([picture((strength,) * 3, seed) for seed in range(6)], WIDTH)
+    assert found == pytest.approx((strength,) * 3, rel=0.3)
+
+
+@pytest.mark.parametrize("octave", [1, 2])
+def test_roughness_is_found_on_its_scale(octave) -> None:
+    with_it, without = (
+        roughness([picture(tuple(0.8 * (each == number) for each in range(3)), 0)], WIDTH) for number in (octave, -1)
+    )
+    gains = np.array(with_it) / np.array(without)
+    assert gains[octave] > 1.8
+    assert gains[0] < 1.3
+
+
+def test_laminar_smoke_is_smooth() -> None:
+    """But for the curve of its outline, which only the coarse octaves see."""
+    coarse, middle, fine = roughness([picture(NONE, 0)], WIDTH)
+    assert fine < 0.1
+    assert middle < 0.25
+    assert coarse < 0.6
+
+
+def test_roughness_does_not_depend_on_the_amount() -> None:
+    shown = picture((0.5, 0.5, 0.5), 0)
+    np.testing.assert_allclose(roughness([100 * shown], WIDTH), roughness([shown], WIDTH), rtol=1e-5)
+
+
+def test_noise_has_its_strengths() -> None:
+    """In sum, and nothing where they are zero."""
+    noise = StretchedNoise(np.zeros(3), 4.0, (0.3, 0.4), 0).at(level((64, 64, 64)))
+    assert noise.std() == pytest.approx(0.5, rel=0.1)
+    assert noise.mean() == pytest.approx(0, abs=0.05)
+    assert not StretchedNoise(np.zeros(3), WIDTH, NONE, 0).at(level((8, 8, 8))).any()
+
+
+def test_noise_moves_with_the_smoke() -> None:
+    shape = (12, 12, 24)
+    before, after = (
+        StretchedNoise(np.array([0.0, 0.0, by]), WIDTH, (0.5, 0.5, 0.5), 3).at(level(shape)).reshape(shape)
+        for by in (0.0, 4.0)
+    )
+    np.testing.assert_allclose(after[..., 4:], before[..., :-4], atol=1e-4)
+
+
+def test_a_seed_is_a_smoke() -> None:
+    first, again, other = (
+        StretchedNoise(np.zeros(3), WIDTH, (0.5, 0.5), seed).at(level((16, 16, 16))) for seed in (0, 0, 1)
+    )
+    np.testing.assert_array_equal(first, again)
+    assert np.corrcoef(first, other)[0, 1] < 0.5
+
+
+def test_fine_octaves_are_drawn_out() -> None:
+    """Stretched noise varies much more along one direction than along another, voxel by voxel; plain noise less."""
+    shape = (48, 48, 48)
+    noise = StretchedNoise(np.zeros(3), WIDTH, (0.0, 0.0, 1.0), 0)
+
+    def drawn_out(values) -> float:
+        slopes = np.stack(np.gradient(values.reshape(shape)))
+        tensor = np.einsum("i...,j...->...ij", slopes, slopes).reshape(6, 8, 6, 8, 6, 8, 3, 3).mean((1, 3, 5))
+        least, _, most = np.moveaxis(np.linalg.eigvalsh(tensor), -1, 0)
+        return float(np.median(most / least))
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("smokelift.density.stretched_noise.STRETCH", 0.0)
+        plain = drawn_out(noise.at(level(shape)))
+    assert STRETCH > 0
+    assert drawn_out(noise.at(level(shape))) > 1.5 * plain
+
+
+def test_the_coarsest_octave_is_as_wide_as_lobes() -> None:
+    """Neighbours closer than its nodes agree, and voxels further apart do not."""
+    shape = (64, 16, 16)
+    noise = StretchedNoise(np.zeros(3), 4.0, (1.0,), 0).at(level(shape)).reshape(shape)
+    near, far = (np.corrcoef(noise[:-by].ravel(), noise[by:].ravel())[0, 1] for by in (2, int(3 * COARSEST * 4.0)))
+    assert near > 0.85
+    assert abs(far) < 0.5
+
+
+def test_a_lattice_is_read_as_scipy_does() -> None:
+    """To the bit, at nodes and a rounding beside them too, any number of turns away."""
+    random = np.random.default_rng(0)
+    lattice = random.standard_normal((5, 6, 7)).astype(np.float32)
+    places = random.uniform(-40, 40, (3, 2000)).astype(np.float32)
+    places[:, :200] = np.round(places[:, :200])
+    places[:, 100:200] -= np.float32(1e-6)
+    expected = ndimage.map_coordinates(lattice, places, output=np.float32, order=1, mode="grid-wrap")
+    np.testing.assert_array_equal(_core.read_lattice(lattice, places), expected)
