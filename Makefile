@@ -22,6 +22,8 @@ QUIET_PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
 # Of each kind: some four minutes for what runs with every change.
 CASES ?= 20
+# Files or folders that `make pytest` runs in place of all tests.
+TESTS ?=
 HAS_VDB = $(shell $(BIN)/python -c 'import importlib.util as u; print("yes" if u.find_spec("bpy") else "")')
 
 # What a step that failed left behind is not taken for its result.
@@ -37,7 +39,7 @@ demo: $(VENV)/engine.stamp
 test: lint pytest
 
 pytest: $(VENV)/tools.stamp
-	$(BIN)/python -m pytest -n 2 --dist worksteal
+	$(BIN)/python -m pytest -n 2 --dist worksteal $(TESTS)
 
 sanitize: $(VENV)/tools.stamp
 	$(BIN)/python tools/sanitize.py
@@ -99,7 +101,7 @@ $(VENV)/extension.stamp: $(VENV)/engine.stamp
 	touch $@
 
 test-blender: dist/extension.stamp $(VENV)/tools.stamp
-	$(BIN)/python -m pytest -n 2 --dist loadfile -v -rP --durations=0 --durations-min=1 \
+	$(BIN)/python -m pytest -n 2 --dist loadscope -v -rP --durations=0 --durations-min=1 \
 		tests/blender/wheels.py tests/blender/debian.py
 
 clean:

@@ -15,13 +15,14 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from benchmarks.background.clips import exposed, filmed
+from benchmarks.accuracy.scenes import camera_of
+from benchmarks.background.clips import Smoke, exposed, filmed
 from smokelift.density import reconstruct_density
 from smokelift.footage.clip import Clip
 from smokelift.footage.plate import known_plate
 from smokelift.footage.working_picture import working_picture
 from smokelift.render import scene_optics
-from smokelift.scene import Camera, CompleteScene, DirectionalLight, Scene, completed
+from smokelift.scene import CompleteScene, DirectionalLight, Scene, completed
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import ShotView
 from smokelift.setup.view_gain import balanced
@@ -44,7 +45,7 @@ def main() -> None:
         scene = completed(Scene.load(folder / "scene.toml"))
         scene = replace(scene, domain=replace(scene.domain, resolution=RESOLUTION))
         if options.unlit:
-            scene = _unlit(scene, float(_radiance(folder, "front").max()))
+            scene = _unlit(scene, float(Smoke.load(folder, "front").radiance.max()))
         for name, gain in GAINS.items():
             front, side = (
                 _view(folder, view, scene, np.array(g)) for view, g in (("front", (1, 1, 1)), ("side", gain))
@@ -58,17 +59,6 @@ def main() -> None:
             )
 
 
-def _radiance(folder: Path, view: str) -> npt.NDArray[np.float32]:
-    with np.load(folder / f"{view}.npz") as file:
-        return np.asarray(file["image"], np.float32)
-
-
-def _camera(folder: Path, view: str) -> Camera:
-    camera = Scene.load(folder / f"{view}.toml").camera
-    assert camera is not None
-    return camera
-
-
 def _unlit(scene: CompleteScene, brightest: float) -> CompleteScene:
     irradiance = (1.1 * brightest * 4 * np.pi / scene.medium.albedo,) * 3
     return replace(scene, lights=(DirectionalLight((0.0, 0.0, -1.0), irradiance),), scattering="unshadowed")
@@ -76,9 +66,9 @@ def _unlit(scene: CompleteScene, brightest: float) -> CompleteScene:
 
 def _view(folder: Path, view: str, scene: CompleteScene, gain: npt.NDArray[np.float64]) -> ShotView:
     """A camera of a scene with its clip, multiplied by a gain, before black."""
-    pictures = (_radiance(folder, view)[..., None] * gain).astype(np.float32)
+    pictures = (Smoke.load(folder, view).radiance[..., None] * gain).astype(np.float32)
     clip: Clip = filmed(np.clip(exposed(pictures, np.ones(len(pictures))), 0, 1), view)
-    camera = _camera(folder, view)
+    camera = camera_of(folder / f"{view}.toml")
     return ShotView(clip, camera, known_plate(np.zeros(3), clip), working_picture(camera, scene.domain))
 
 
@@ -90,8 +80,8 @@ def _third(folder: Path, scene: CompleteScene, front: ShotView, side: ShotView) 
     assert other is not None
     lit = replace(scene, camera=seen.camera)
     fitted = reconstruct_density(seen.image, lit, plate=seen.plate, views=(other,))
-    working = working_picture(_camera(folder, UNSEEN), scene.domain)
-    truth = working.cut(np.repeat(_radiance(folder, UNSEEN)[frame][..., None], 3, -1))
+    working = working_picture(camera_of(folder / f"{UNSEEN}.toml"), scene.domain)
+    truth = working.cut(np.repeat(Smoke.load(folder, UNSEEN).radiance[frame][..., None], 3, -1))
     shown = scene_optics(scene).renderer(working.camera, np.zeros(3, np.float32)).image(fitted.density)
     wrong = (shown - truth)[np.maximum(shown, truth).max(-1) > 0.01]
     return float(-10 * np.log10(np.mean(np.square(wrong))))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +12,7 @@ import numpy.typing as npt
 from smokelift import Camera, Clip, Scene
 from smokelift.density.screen import view_frame
 from smokelift.evaluation.truth import Truth
-from smokelift.footage.images import area_average
+from smokelift.footage.images import Picture, area_average
 from smokelift.render import Image
 from smokelift.scene.projection import project, ray_through_pixels
 
@@ -40,23 +40,38 @@ class BakedViews:
         By the keys of `VIEWS`.
     pictures
         Linear grey radiance before black, float16 [frame, row, column].
+    transmittances
+        The share of the background's light that gets through, as large.
     """
 
     cameras: dict[str, Camera]
     pictures: dict[str, npt.NDArray[np.float16]]
+    transmittances: dict[str, npt.NDArray[np.float16]]
 
     @staticmethod
     def load(folder: Path) -> BakedViews:
         """Read all cameras and their pictures."""
-        pictures = {}
+        pictures, transmittances = {}, {}
         for view, name in VIEWS.items():
             with np.load(folder / f"{name}.npz") as file:
-                pictures[view] = file["image"]
-        return BakedViews({view: camera_of(folder / f"{name}.toml") for view, name in VIEWS.items()}, pictures)
+                pictures[view], transmittances[view] = file["image"], file["transmittance"]
+        cameras = {view: camera_of(folder / f"{name}.toml") for view, name in VIEWS.items()}
+        return BakedViews(cameras, pictures, transmittances)
 
     def seen(self, view: str, frame: int) -> Image:
         """Return the picture of a camera in a frame, linear (rows, columns, 3)."""
         return np.repeat(self.pictures[view][frame][..., None].astype(np.float32), 3, axis=-1)
+
+    def averaged(self, size: tuple[int, int], frames: Sequence[int]) -> tuple[dict[str, Picture], dict[str, Picture]]:
+        """Return radiance and transmittance of every camera, (frames, rows, columns), at another size."""
+        radiance, transmittance = (
+            {
+                view: np.stack([area_average(each[frame].astype(np.float32), *size) for frame in frames])
+                for view, each in pictures.items()
+            }
+            for pictures in (self.pictures, self.transmittances)
+        )
+        return radiance, transmittance
 
 
 @dataclass(frozen=True, eq=False)

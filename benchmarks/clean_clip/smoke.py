@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.accuracy.scenes import VIEWS, camera_of
+from benchmarks.accuracy.scenes import BakedViews
 from benchmarks.background.clips import Smoke
 from smokelift import Camera, Domain, Scene
 from smokelift.evaluation.truth import Truth
-from smokelift.footage.images import Picture, area_average
+from smokelift.footage.images import Picture
 from smokelift.render import scene_renderer
 from smokelift.scene import completed
 from smokelift.transport import Array
@@ -69,18 +69,13 @@ class Baked:
         scene = Scene.load(folder / "scene.toml")
         if scene.domain is None:
             raise ValueError(f"{folder}: the scene has no [domain].")
-        radiance, transmittance = {}, {}
-        for view, name in VIEWS.items():
-            with np.load(folder / f"{name}.npz") as file:
-                radiance[view], transmittance[view] = (
-                    np.stack([area_average(file[which][n].astype(np.float32), *SIZE) for n in SCORED])
-                    for which in ("image", "transmittance")
-                )
+        views = BakedViews.load(folder)
+        radiance, transmittance = views.averaged(SIZE, SCORED)
         return Baked(
             name=folder.name,
             scene=replace(scene, clip=None, background=None, domain=Domain(scene.domain.min, scene.domain.max, GRID)),
             front=Smoke.load(folder),
-            cameras={view: camera_of(folder / f"{name}.toml").resized(*SIZE) for view, name in VIEWS.items()},
+            cameras={view: camera.resized(*SIZE) for view, camera in views.cameras.items()},
             radiance=radiance,
             transmittance=transmittance,
             densities=Truth.load(folder / "truth.npz").densities.astype(np.float32),

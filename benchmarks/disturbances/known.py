@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from benchmarks.accuracy.scenes import VIEWS, camera_of
+from benchmarks.accuracy.scenes import BakedViews
 from smokelift import Camera, Medium, Scene
 from smokelift.evaluation.resampling import resampled
 from smokelift.evaluation.truth import Truth
-from smokelift.footage.images import Picture, area_average
+from smokelift.footage.images import Picture
 from smokelift.render import Renderer
 from smokelift.scene import DirectionalLight, Domain
 from smokelift.transport import Array
@@ -70,14 +70,9 @@ class Known:
         truth, described = Truth.load(folder / "truth.npz"), Scene.load(folder / "scene.toml")
         if described.domain is None:
             raise ValueError(f"{folder}: the scene has no [domain].")
-        cameras = {view: camera_of(folder / f"{name}.toml").resized(*SIZE) for view, name in VIEWS.items()}
-        radiance, transmittance = {}, {}
-        for view, name in VIEWS.items():
-            with np.load(folder / f"{name}.npz") as file:
-                radiance[view], transmittance[view] = (
-                    np.stack([area_average(picture.astype(np.float32), *SIZE) for picture in file[which][:moments]])
-                    for which in ("image", "transmittance")
-                )
+        views = BakedViews.load(folder)
+        cameras = {view: camera.resized(*SIZE) for view, camera in views.cameras.items()}
+        radiance, transmittance = views.averaged(SIZE, range(min(moments, truth.frames)))
         before = [max(moment - 1, 0) for moment in range(moments)]
         return Known(
             name=folder.name,

@@ -62,7 +62,7 @@ def index(shot: TinyShot, folder: Path, random: Damage) -> tuple[str, ...]:
 
 
 def twin(shot: TinyShot, folder: Path, random: Damage) -> tuple[str, ...]:
-    """A damaged NumPy twin in a sequence without checksums, as early versions wrote it."""
+    """A damaged NumPy twin in a sequence without checksums, which would tell."""
     shutil.copytree(shot.finished, folder)
     path = folder / "out" / "sequence.json"
     path.write_text(json.dumps({**json.loads(path.read_text()), "checksums": {}}))

@@ -1,13 +1,14 @@
 """Picture a baked scene with Mitsuba 3: its clip, and linear pictures from four sides that no reconstruction may see.
 
     python -m benchmarks.truth.picture plume-1/truth.npz OUT [--light point] [--background wall] [--check 20]
-        [--scattering multiple] [--linear] [--frames 24] [--smoke 18 0.9 6 front]
+        [--scattering multiple] [--linear] [--frames 24] [--smoke 18 0.9 6 front] [--scene SCENE.toml]
 
 Nothing of Smokelift takes part. The pictures are single scattering, integrated at half-voxel steps over Mitsuba's own
 sensor, emitters and trilinear grid, so they carry no noise; `--check` compares frames with `volpath`. Scattering is
 isotropic, so that one source function serves all cameras. With multiple scattering `volpath` makes the pictures itself,
 at half the size and with some noise. `--smoke` names the first frame, the albedo, the optical depth of the thickest
 column seen from the front, and whence a sun shines, 35 degrees above; the sun is as strong as the clip can show.
+`--scene` has the camera, the medium and the light that are otherwise drawn by the scene's name, and its own wall.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +24,6 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from benchmarks.example.render import YAWS, blocks, crop, srgb_decode, srgb_encode, turned, wall, write_png, write_video
 from benchmarks.mitsuba_scene import (
     ENDLESS,
     emitter,
@@ -35,15 +36,27 @@ from benchmarks.mitsuba_scene import (
     surroundings,
     volume,
 )
+from benchmarks.truth.clip import (
+    CHECK_BLOCK,
+    YAWS,
+    blocks,
+    crop,
+    srgb_decode,
+    srgb_encode,
+    turned,
+    wall,
+    write_png,
+    write_video,
+)
 
 PIXELS = 4  # a voxel
 FOV = 30.0
 DISTANCE = 7.0  # of the camera from the axis (m)
 DIRECTIONS = (8, 16)  # of light from the surroundings: Gauss points in z, equal ones in azimuth
-CHECK_BLOCK = 16  # pixels; volpath's noise is averaged over such blocks
 CHECK_PASSES, CHECK_SAMPLES = 4, 4096  # a block
 ANY = -1  # number of bounces
 SAMPLES = 512  # with multiple scattering
+EXAMPLES_WALL = 3  # seed of the wall that --scene has
 IRRADIANCE = 8.0  # of a light, at the middle of the box
 LIGHT_DISTANCE = 2.5  # of a point light from there (m)
 SUNS = {"front": (0.0, 0.819152, -0.573576), "back": (0.0, -0.819152, -0.573576)}  # directions of travel
@@ -161,6 +174,7 @@ def main() -> None:
     parser.add_argument("--linear", action="store_true", help="the clip as linear EXR pictures instead of a video")
     parser.add_argument("--frames", type=int, help="how many, from the first")
     parser.add_argument("--smoke", nargs=4, metavar=("FIRST", "ALBEDO", "DEPTH", "LIGHT"), help="instead of drawn ones")
+    parser.add_argument("--scene", type=Path, help="scene file with a camera by its position, a medium and one light")
     parser.add_argument("--check", type=int, nargs="*", default=[], help="frames to compare with volpath")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
@@ -199,6 +213,10 @@ def main() -> None:
         "fov_y_degrees": FOV,
         "size": [pixels * nx, pixels * nz],
     }
+    if options.scene:
+        given = tomllib.loads(options.scene.read_text())
+        camera, scene["medium"], (light,) = given["camera"], given["medium"], given["lights"]
+        scene["light"] = light
     views = {view: turned(camera, yaw) for view, yaw in YAWS.items()}
     renderer = Renderer(scene, [camera | {"matrix": matrix.tolist()} for matrix, _ in views.values()], multiple)
     for frame in options.check:
@@ -209,7 +227,11 @@ def main() -> None:
         print(f"frame {frame}: against volpath {difference:.2%} RMS, {marched.sum() / traced.sum() - 1:+.2%} in all")
 
     walled = options.background == "wall"
-    behind = wall(*camera["size"], len(name)) if walled else np.zeros((*camera["size"][::-1], 3))
+    behind = (
+        wall(*camera["size"], EXAMPLES_WALL if options.scene else len(name))
+        if walled
+        else np.zeros((*camera["size"][::-1], 3))
+    )
     plate = srgb_encode(behind)
     stored: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {view: [] for view in views}
     for density in densities:

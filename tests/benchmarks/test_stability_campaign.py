@@ -1,4 +1,7 @@
-"""A short campaign of damaged files and failing systems, and that the campaign itself sees what it must."""
+"""A case of every class of damaged files and failing systems, and that the campaign itself sees what it must.
+
+`make stability` runs twenty of every class, from the same numbers on.
+"""
 
 from __future__ import annotations
 
@@ -51,9 +54,9 @@ def open_folder() -> Iterator[Path]:
 
 @pytest.mark.parametrize("name", DAMAGED)
 def test_damaged_files_end_in_one_line(shot, tmp_path, name) -> None:
-    statuses, failed = failures(shot, name, 3, tmp_path)
+    statuses, failed = failures(shot, name, 1, tmp_path)
     assert failed == []
-    assert sum(statuses.values()) == 3
+    assert sum(statuses.values()) == 1
 
 
 @pytest.mark.parametrize(("name", "number"), [(name, n) for name, numbers in FOUND.items() for n in numbers])
@@ -66,10 +69,9 @@ def test_a_run_goes_on_when_the_system_is_well_again(shot, open_folder, name) ->
     """To the bits of a run in one go; nothing that was said to be done is lost."""
     if reason := lacking(name, open_folder):
         pytest.skip(reason)
-    cases = 5 if name == "killed" else 1
-    statuses, failed = failures(shot, name, cases, open_folder)
+    statuses, failed = failures(shot, name, 1, open_folder)
     assert failed == []
-    assert sum(statuses.values()) == cases
+    assert sum(statuses.values()) == 1
     assert name != "killed" or statuses[-signal.SIGKILL]
 
 

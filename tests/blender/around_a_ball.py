@@ -14,7 +14,7 @@ import bpy
 from PIL import Image
 
 import addon
-from tests.example_shot import EXAMPLE, set_up_example, smoke
+from tests.example_shot import FULL_SIZE, set_up_example, smoke
 
 FIRST, LAST, ADDED = 21, 28, 28
 SHOWN = (LAST, 36, 44, LAST + ADDED)
@@ -28,7 +28,7 @@ def main(picture: Path) -> None:
     bpy.ops.wm.read_factory_settings(use_empty=True)
     addon.register()
     with tempfile.TemporaryDirectory() as folder:
-        shutil.copytree(EXAMPLE, folder, dirs_exist_ok=True)
+        shutil.copytree(FULL_SIZE, folder, dirs_exist_ok=True)
         scene = set_up_example(bpy.context.scene, Path(folder))
         obj = smoke(scene)
         settings = obj.smokelift

@@ -94,7 +94,7 @@ def test_command_makes_smoke_that_renders_like_the_clip(root, installed) -> None
     frames = LAST - FIRST + 1
     assert f"frame {frames} of {frames}" in said
     found = np.asarray(Image.open(picture).convert("RGB"), np.float32) / 255
-    with Clip.open(ROOT / "examples" / "plume" / "clip.mp4") as clip:
+    with Clip.open(ROOT / "tests" / "plume" / "clip.mp4") as clip:
         height, width = found.shape[:2]
         wanted, plate = (linear_to_srgb(area_average(clip.frame(number), width, height)) for number in (LAST - 1, 0))
     smoke = np.abs(wanted - plate).max(-1) > 0.05
@@ -123,7 +123,7 @@ def test_relit_from_elsewhere(root, installed) -> None:
     left, right, elsewhere = (load(folder / f"{name}.png") for name in ("from_left", "from_right", "elsewhere"))
     columns = np.arange(left.shape[1])
     middle_left, middle_right = ((picture.sum(0) * columns).sum() / picture.sum() for picture in (left, right))
-    assert middle_left < middle_right - 1  # pixels; the plume is 40 wide
+    assert middle_left < middle_right - 0.5  # pixels; the plume is 20 wide
     assert elsewhere.max() > 60
 
 

@@ -19,7 +19,7 @@ from room import painted, panel
 
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import area_average, linear_to_srgb
-from tests.example_shot import EXAMPLE, add, set_world
+from tests.example_shot import FULL_SIZE, add, set_world
 
 FRAME = 36
 SIZE, SAMPLES = (640, 960), 32  # three quarters of it are rendered
@@ -35,7 +35,7 @@ def main() -> None:
     """Render and write it: the clip, the front, two turned cameras, and another sun."""
     scene, obj = shown_example(Path(sys.argv[1]), SAMPLES, FRAME)
     scene.render.resolution_x, scene.render.resolution_y = SIZE
-    with tempfile.TemporaryDirectory() as folder, Clip.open(EXAMPLE / "clip.mp4") as clip:
+    with tempfile.TemporaryDirectory() as folder, Clip.open(FULL_SIZE / "clip.mp4") as clip:
         bpy.ops.smokelift.set_up()
         front = rendered(scene, Path(folder))
         filmed = 255 * linear_to_srgb(area_average(clip.frame(FRAME - 1), *front.size)) + 0.5

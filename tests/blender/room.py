@@ -20,7 +20,7 @@ import addon
 from addon import volume
 from addon.smoke import new_smoke
 from addon.take import Take
-from tests.example_shot import EXAMPLE, add, add_camera, set_world
+from tests.example_shot import FULL_SIZE, add, add_camera, set_world
 
 SIZE, SAMPLES = (640, 400), 32
 FRAME = 40
@@ -45,7 +45,7 @@ def main() -> None:
         scene.cycles.volume_biased = True  # marching through the volume is ten times as fast
     scene.view_settings.view_transform = "Standard"
     make_room(scene)
-    clips = bpy.data.movieclips.load(str(EXAMPLE / "clip.mp4")), None
+    clips = bpy.data.movieclips.load(str(FULL_SIZE / "clip.mp4")), None
     for clip, x, folder, preset, shown in zip(clips, (-1.3, 0.5), sys.argv[1:], ("SMOKE", "DUST"), SHOWN, strict=True):
         obj = new_smoke(scene, clip)
         volume.show(obj, Take(Path(folder).absolute()))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib.util
 import json
 import os
-import re
 import shutil
 import subprocess
 import sys
@@ -19,7 +18,7 @@ from smokelift.output.sequence import Sequence
 
 FOLDER = Path(__file__).resolve().parents[2] / "integrations" / "flamenco"
 MODEL = Path(__file__).with_name("flamenco_model.js")
-EXAMPLE = FOLDER.parents[1] / "examples" / "plume" / "scene.toml"
+EXAMPLE = FOLDER.parents[1] / "tests" / "plume" / "scene.toml"
 ENVIRONMENT = {
     **os.environ,
     "PYTHONPATH": os.pathsep.join([str(Path(smokelift.__file__).parents[1]), os.environ.get("PYTHONPATH", "")]),
@@ -85,7 +84,7 @@ def test_the_commands_run(tmp_path) -> None:
     for path in EXAMPLE.parent.glob("*.[mp]*"):
         shutil.copy(path, tmp_path)
     scene = tmp_path / "scene.toml"
-    scene.write_text(re.sub(r"resolution = .*", "resolution = [16, 16, 24]", EXAMPLE.read_text()))
+    scene.write_text(EXAMPLE.read_text().replace("[domain]\n", "[domain]\nresolution = [16, 16, 24]\n"))
     out = tmp_path / "smoke"
     job = compiled(
         input=str(scene),

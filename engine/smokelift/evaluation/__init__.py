@@ -1,1 +1,1 @@
-"""How near a result is to the truth: metrics, scores and charts."""
+"""How near a result is to the truth: metrics and scores."""

@@ -75,11 +75,11 @@ class Index:
     settings
         All settings that decide the result.
     choices, provenance, sources
-        As in `Origins`; empty for early versions.
+        As in `Origins`.
     frames
         The figures of every finished frame, by its number as text.
     checksums
-        Of the frames' files, by name (`smokelift.output.checksum`); empty for early versions.
+        Of the frames' files, by name (`smokelift.output.checksum`).
     complete
         Whether the run came to its end.
     versions
@@ -128,8 +128,6 @@ class Index:
             raise SequenceError(f"{path}: cannot be read: {error}") from error
         if not isinstance(data, dict) or data.get("format") != FORMAT:
             raise SequenceError(f"{path}: is not a sequence of format {FORMAT}, which this version reads")
-        for key, nothing in (("choices", []), ("provenance", []), ("sources", {}), ("checksums", {})):
-            data.setdefault(key, nothing)  # early versions wrote none
         kinds = {
             "scene": dict,
             "settings": dict,

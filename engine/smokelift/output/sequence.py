@@ -46,7 +46,7 @@ class Sequence:
         each (see `smokelift.setup`).
     provenance
         What of the result is measured, estimated, assumed and made up: ``what``, ``origin``, ``how`` and ``settings``
-        of each part (see `smokelift.setup`). Empty for sequences of early versions.
+        of each part (see `smokelift.setup`).
     """
 
     directory: Path

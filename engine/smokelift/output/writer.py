@@ -223,9 +223,9 @@ class SequenceWriter:
                 )
             if part == "scene" and there.sources:  # their checksums tell files apart, wherever a project was moved to
                 before, now = without_folders(before), without_folders(now)
-            # early versions kept no sources; a patch of Python changes no result
+            # a patch of Python changes no result
             changed = difference(part, before, now | {"python": before.get("python")} if part == "versions" else now)
-            if changed and before:
+            if changed:
                 raise SequenceError(
                     f"{self.directory}: was begun differently and cannot be resumed: {changed}; choose another "
                     "directory"

@@ -1,4 +1,4 @@
-"""How the smoke looks: presets, fire, and materials of earlier versions."""
+"""How the smoke looks: presets and fire."""
 
 from __future__ import annotations
 

@@ -23,8 +23,6 @@ def render(name: str) -> None:
     bpy.ops.render.render(write_still=True)
 
 
-scene.render.resolution_percentage = 100
-render("as_filmed.png")
 sun.data.energy, sun.data.color = 22.0, (1.0, 0.72, 0.45)
 (scene.world,) = [world for world in bpy.data.worlds if world.use_fake_user]  # black, from before Set Up Shot
 shine(1.0, 0.2, -0.2)

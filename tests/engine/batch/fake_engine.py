@@ -52,7 +52,8 @@ def main(words):
             sys.exit(2)
         time.sleep(task["seconds"])
         there[str(number)] = {"psnr": 30.0, "seconds_density": task["seconds"], "seconds_velocity": 0.0}
-        written = {"format": 1, "scene": {}, "settings": {}, "frames": there, "versions": {}}
+        written = {"format": 1, "scene": {}, "settings": {}, "choices": [], "provenance": [], "frames": there}
+        written |= {"sources": {}, "checksums": {}, "versions": {}}
         aside = out / ".aside.tmp"
         aside.write_text(json.dumps({**written, "complete": number == task["frames"]}))
         with COMMITTING, (out.parent / f"{out.name}.ledger").open("a") as ledger:

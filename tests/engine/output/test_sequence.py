@@ -123,15 +123,6 @@ def test_a_file_that_was_changed_is_refused_before_it_is_read(tmp_path: Path, ki
     assert opened.density(1).any()
 
 
-def test_a_sequence_without_checksums_opens(tmp_path: Path, no_vdb: None) -> None:
-    """Early versions wrote none."""
-    write(tmp_path, [1])
-    index = json.loads((tmp_path / "sequence.json").read_text())
-    del index["checksums"], index["sources"]
-    (tmp_path / "sequence.json").write_text(json.dumps(index))
-    np.testing.assert_array_equal(Sequence.open(tmp_path).density(1), frame(1)[0])
-
-
 def test_the_file_of_a_frame_is_not_read_again_for_a_fire_that_no_clip_shows(tmp_path: Path, no_vdb: None) -> None:
     """Whether the clip shows fire is said by the scene."""
     write(tmp_path, [1])

@@ -94,10 +94,27 @@ def run(plume, draft, tmp_path_factory) -> tuple[list[Frame], Path]:
     return frames_written(plume.scene, draft, out), out
 
 
-def test_density_is_carried_from_the_third_frame_on(plume, draft) -> None:
+@pytest.fixture(scope="module")
+def by_themselves(plume, draft) -> list[Frame]:
+    """The frames of a run that carries nothing along."""
+    return frames_of(plume.scene, replace(draft, transport=0.0))
+
+
+@pytest.fixture(scope="module")
+def all_carried(plume, draft) -> list[Frame]:
+    """The frames of a run that carries everything along."""
+    return frames_of(plume.scene, replace(draft, transport=1.0))
+
+
+@pytest.fixture(scope="module")
+def along_the_path(tracked, draft) -> list[Frame]:
+    """The frames from a camera that moves."""
+    return frames_of(tracked, draft)
+
+
+def test_density_is_carried_from_the_third_frame_on(by_themselves, all_carried) -> None:
     """The carried density is a part of the first guess, so its share matters once there is a velocity."""
-    frames = {share: frames_of(plume.scene, replace(draft, transport=share)) for share in (0.0, 1.0)}
-    for alone, carried in zip(frames[0.0], frames[1.0], strict=True):
+    for alone, carried in zip(by_themselves, all_carried, strict=True):
         same = np.array_equal(alone.density, carried.density)
         assert same == (alone.number <= 2)
 
@@ -110,7 +127,7 @@ def test_the_smoke_stands_where_the_settings_say(plume, draft) -> None:
     places = []
     for given in (0.0, shift):
         settings = replace(draft, axis_depth=given, transport=0.0)
-        first = frames_of(plume.scene, settings)[0].density
+        first = frames_of(plume.scene.with_frames(0, 1), settings)[0].density
         places.append(float((first * offset).sum() / first.sum()))
     assert places[1] - places[0] == pytest.approx(shift, rel=0.2)
 
@@ -127,7 +144,7 @@ def test_the_axis_is_estimated_from_the_clip(plume, draft, tmp_path) -> None:
 
 def test_the_example_stands_upright() -> None:
     """Its inlet is 0.1 m behind the middle and 0.14 m above the floor, where its picture could as well be far back."""
-    scene = Scene.load(Path(__file__).parents[3] / "examples" / "plume" / "scene.toml")
+    scene = Scene.load(Path(__file__).parents[2] / "plume" / "scene.toml")
     assert scene.clip is not None
     with Clip.open(scene.clip) as clip:
         axis = axis_of(prepare_shot(clip, scene, Settings.preset()))
@@ -221,7 +238,7 @@ def test_walls_and_inlets_of_the_scene_are_kept(plume, draft, tmp_path) -> None:
             inflows.append(inflow)
             return super().estimate(*arguments, inflow=inflow, **options)
 
-    scene = replace(plume.scene, closed=("z-",), inlets=(Inlet((0, 0, 0.3), 0.2),))
+    scene = replace(plume.scene.with_frames(0, 2), closed=("z-",), inlets=(Inlet((0, 0, 0.3), 0.2),))
     with Clip.open(scene.clip) as clip:
         shot = prepare_shot(clip, scene, draft)
         method = replace(compose(shot.settings), velocity_estimator=Watched(shot.settings.velocity))
@@ -288,7 +305,8 @@ def test_what_a_mask_hides_is_no_smoke(run, plume, draft, tmp_path) -> None:
         assert frame.density[beside].max() <= 1e-3 * frame.density.max()
         assert frame.density.sum() == pytest.approx(wanted.density.sum(), rel=0.02)
         assert frame.figures["psnr"] == pytest.approx(wanted.figures["psnr"], abs=0.5)
-    assert all(frame.density[beside].max() > 0.1 * frame.density.max() for frame in frames_of(scene, draft))
+    shown = frames_of(scene.with_frames(0, 1), draft)
+    assert all(frame.density[beside].max() > 0.1 * frame.density.max() for frame in shown)
 
 
 @pytest.mark.parametrize("count", [1, 3])
@@ -371,21 +389,20 @@ def test_further_views_put_the_smoke_in_its_place(plume, two_views, draft, tmp_p
     """From the front alone the blob stands in the middle of the box; with the side where it stood, in every frame."""
     voxel = two_views.domain.voxel_size
     truth = [centroid(np.roll(density, 5, axis=1), two_views) for density in plume.densities]
-    alone = frames_of(replace(two_views, views=()), draft)
+    alone = frames_of(replace(two_views, views=()).with_frames(0, 1), draft)
     both = frames_written(two_views, draft, tmp_path / "out")
     for frames, near in ((alone, False), (both, True)):
-        off = [np.linalg.norm(centroid(f.density, two_views) - t) / voxel for f, t in zip(frames, truth, strict=True)]
+        off = [np.linalg.norm(centroid(f.density, two_views) - truth[f.number - 1]) / voxel for f in frames]
         assert max(off) < 0.7 if near else min(off) > 3
     sequence = Sequence.open(tmp_path / "out")
     assert sequence.scene == completed(two_views)
     for number in sequence.frames:
         assert min(sequence.figures(number)["psnr"], sequence.figures(number)["psnr_view_1"]) > 35
     cut_off(two_views, draft, tmp_path / "again", 3)
+    with pytest.raises(SequenceError, match="was begun differently"):
+        frames_written(replace(two_views, views=()), draft, tmp_path / "again", resume=True)
     rest = frames_written(two_views, draft, tmp_path / "again", resume=True)
     np.testing.assert_array_equal(rest[-1].density, both[-1].density)
-    with pytest.raises(SequenceError, match="was begun differently"):
-        cut_off(two_views, draft, tmp_path / "cut", 3)
-        frames_written(replace(two_views, views=()), draft, tmp_path / "cut", resume=True)
 
 
 def test_with_nothing_carried_along_a_frame_is_that_of_its_pictures(two_views, draft) -> None:
@@ -400,10 +417,9 @@ def test_with_nothing_carried_along_a_frame_is_that_of_its_pictures(two_views, d
     np.testing.assert_array_equal(frames[2].density, alone.density)
 
 
-def test_detail_that_is_made_up_shows_no_motion(plume, draft) -> None:
+def test_detail_that_is_made_up_shows_no_motion(plume, draft, by_themselves) -> None:
     """The first velocity is that between the densities without it, to the bit."""
     settings = replace(draft, transport=0.0)
-    frames = frames_of(plume.scene, settings)
     with Clip.open(plume.scene.clip) as clip:
         shot = prepare_shot(clip, plume.scene, settings)
     estimator, domain = compose(shot.settings).velocity_estimator, shot.optics.domain
@@ -420,16 +436,15 @@ def test_detail_that_is_made_up_shows_no_motion(plume, draft) -> None:
             prediction=None,
         )
 
-    first, second = frames[:2]
+    first, second = by_themselves[:2]
     assert first.smooth is not None and second.smooth is not None
     np.testing.assert_array_equal(second.estimated.centres(), velocity(first.smooth, second.smooth).centres())
     assert not np.array_equal(second.estimated.centres(), velocity(first.density, second.density).centres())
 
 
-def test_smoke_from_a_moving_camera_stands_where_it_stood(plume, tracked, draft, tmp_path) -> None:
+def test_smoke_from_a_moving_camera_stands_where_it_stood(plume, tracked, draft, along_the_path) -> None:
     """The pictures are met, the smoke is in its place to half a voxel; a still camera's would drift off."""
-    still = replace(tracked, camera=tracked.camera.at(0))
-    found = {name: frames_of(scene, draft) for name, scene in (("path", tracked), ("still", still))}
+    found = {"path": along_the_path, "still": frames_of(replace(tracked, camera=tracked.camera.at(0)), draft)}
     off = {
         name: [
             np.linalg.norm(centroid(frame.density, tracked) - centroid(truth, tracked)) / tracked.domain.voxel_size
@@ -444,10 +459,9 @@ def test_smoke_from_a_moving_camera_stands_where_it_stood(plume, tracked, draft,
             assert psnr(render(frame.density, tracked, tracked.camera.at(index)), clip.frame(index)) >= 40
 
 
-def test_a_moving_camera_resumes_on_its_own_path_only(tracked, draft, tmp_path) -> None:
+def test_a_moving_camera_resumes_on_its_own_path_only(tracked, draft, along_the_path, tmp_path) -> None:
     """The path is kept with the sequence: the rest is the same to the bit, and another path is refused."""
     out = tmp_path / "out"
-    whole = frames_of(tracked, draft)
     cut_off(tracked, draft, out, 3)
     poses = tracked.camera.matrices
     other = replace(tracked.camera, matrices=(*poses[:-1], poses[0]))
@@ -456,7 +470,7 @@ def test_a_moving_camera_resumes_on_its_own_path_only(tracked, draft, tmp_path) 
     frames_written(tracked, draft, out, resume=True)
     sequence = Sequence.open(out)
     assert sequence.scene == completed(tracked)
-    for frame in whole:
+    for frame in along_the_path:
         np.testing.assert_array_equal(sequence.density(frame.number), frame.density)
 
 
@@ -653,24 +667,22 @@ def test_a_frame_that_is_let_go_takes_no_memory(plume, draft, tmp_path) -> None:
     assert alive == [0, 0, 0]
 
 
-def test_without_transport_every_picture_stands_alone(plume, draft) -> None:
+def test_without_transport_every_picture_stands_alone(by_themselves) -> None:
     """With a share of 0 nothing is carried into a start."""
-    frames = frames_of(plume.scene, replace(draft, transport=0.0))
-    assert all(frame.figures["transport"] == {} for frame in frames)
+    assert all(frame.figures["transport"] == {} for frame in by_themselves)
 
 
-def test_the_threads_of_products_change_nothing(plume, draft) -> None:
+def test_the_threads_of_products_change_nothing(run, plume, draft) -> None:
     """Another program's settings of the linear algebra are no part of a run: it can be resumed anywhere."""
     with threadpool_limits(limits=1):
         one = frames_of(plume.scene, draft)
-    for alone, as_ever in zip(one, frames_of(plume.scene, draft), strict=True):
+    for alone, as_ever in zip(one, run[0], strict=True):
         np.testing.assert_array_equal(alone.density, as_ever.density)
 
 
-def test_transport_keeps_the_mass_of_every_height(plume, draft) -> None:
+def test_transport_keeps_the_mass_of_every_height(by_themselves, all_carried) -> None:
     """What is taken over moves smoke along the rays: per height it stays within an eighth of what the picture says."""
-    alone, carried = (frames_of(plume.scene, replace(draft, transport=share)) for share in (0.0, 1.0))
-    for one, other in zip(alone, carried, strict=True):
+    for one, other in zip(by_themselves, all_carried, strict=True):
         expected, found = one.density.sum((0, 1)), other.density.sum((0, 1))
         assert np.abs(found - expected).sum() < 0.125 * expected.sum()
 

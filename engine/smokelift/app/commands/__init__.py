@@ -5,7 +5,6 @@ A module's `add_parser` adds the command with its options to the parser; the opt
 
 from smokelift.app.commands import (
     batch,
-    chart,
     check,
     continue_,
     doctor,
@@ -33,7 +32,6 @@ MODULES = (
     loop,
     export,
     proxy,
-    chart,
     doctor,
 )
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from smokelift.evaluation.label_placement import place_labels
+from benchmarks.accuracy.label_placement import place_labels
 
 BOUNDS = np.array([0.0, 0.0, 600.0, 400.0])
 NOTHING = np.zeros((0, 4))

@@ -1,30 +1,16 @@
-"""Render baked smoke with Mitsuba 3: the example's clip, its clean plate, reference images from four sides.
+"""What a pictured clip needs besides Mitsuba: a painted wall, cameras around the smoke, and its files."""
 
-    python -m benchmarks.example.render TRUTH.npz SCENE.toml [--views DIR] [--check 12 30 46]
-
-The pictures are single scattering, integrated at half-voxel steps instead of sampled, so they carry no noise; what
-arrives of the light is kept at the voxels' centres. The camera's rays, the light and the trilinear density are
-Mitsuba's own. `--check` compares with `volpath`.
-"""
-
-import argparse
 import math
-import tomllib
 from pathlib import Path
 from typing import Any
 
 import av
-import drjit as dr
-import mitsuba as mi
 import numpy as np
 from av.video.reformatter import Interpolation
 from scipy import ndimage
 
-from benchmarks.mitsuba_scene import emitter, integral, march, path_traced, pixel_rays, sensor, smoke, volume
-
 YAWS = {"front": 0, "nov20": 20, "nov45": 45, "side": 90}  # degrees about the vertical, towards +x
 CHECK_BLOCK = 16  # pixels; volpath's noise is averaged over such blocks
-CHECK_PASSES, CHECK_SAMPLES = 16, 8192  # a block
 # FFmpeg's conversion of colours is a code value too dark unless it is asked to round.
 EXACT = int(
     Interpolation.BICUBIC | Interpolation.ACCURATE_RND | Interpolation.FULL_CHR_H_INT | Interpolation.FULL_CHR_H_INP
@@ -153,83 +139,6 @@ def crop(density: np.ndarray, low: np.ndarray, voxel: float) -> tuple[np.ndarray
     return part, low + first * voxel, low + last * voxel
 
 
-class Renderer:
-    """Renders densities in the light and medium of a scene file.
-
-    Parameters
-    ----------
-    scene : dict
-        The parsed scene file; its lights are directional.
-    """
-
-    def __init__(self, scene: dict[str, Any]) -> None:
-        self.camera, self.medium, self.lights = scene["camera"], scene["medium"], scene["lights"]
-        self.low, self.high = (np.array(scene["domain"][key], float) for key in ("min", "max"))
-        self.mitsuba = mi.load_dict({"type": "scene", **self.scene(np.zeros((2, 2, 2), np.float32), np.eye(4))})
-
-    def scene(self, density: np.ndarray, matrix: np.ndarray, block: int = 1) -> dict[str, Any]:
-        """Describe Mitsuba's own scene."""
-        phase = {"type": "hg", "g": self.medium["anisotropy"]}
-        return {
-            "integrator": {"type": "volpath", "max_depth": 2, "hide_emitters": True},
-            "camera": sensor(self.camera | {"matrix": matrix}, block),
-            "domain": smoke(density, self.low, self.high, self.medium, phase),
-            **{f"light{number}": emitter(light) for number, light in enumerate(self.lights)},
-        }
-
-    def images(self, density: np.ndarray, matrices: list[np.ndarray]) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Render a density from several cameras.
-
-        Parameters
-        ----------
-        density : numpy.ndarray
-            [x, y, z] over the whole domain.
-        matrices : list of numpy.ndarray
-            Camera to world.
-
-        Returns
-        -------
-        list of tuple
-            Radiance [row, column, rgb] of the smoke alone, and transmittance [row, column], a camera.
-        """
-        width, height = self.camera["size"]
-        if not density.any():
-            clear = np.zeros((height, width, 3), np.float32), np.ones((height, width), np.float32)
-            return [clear] * len(matrices)
-        voxel = float((self.high - self.low)[0] / density.shape[0])
-        part, low, high = crop(density, self.low, voxel)
-        box = mi.BoundingBox3f(mi.ScalarPoint3f(low), mi.ScalarPoint3f(high))
-        texture = mi.load_dict(volume(part, low, high))
-        step, extinction, g = voxel / 2, self.medium["extinction"], self.medium["anisotropy"]
-
-        axes = [a + (np.arange(n) + 0.5) * voxel for a, n in zip(low, part.shape, strict=True)]
-        nodes = mi.Point3f(*(p.ravel() for p in np.meshgrid(*axes, indexing="ij")))
-        views = [
-            (pixel_rays(self.camera | {"matrix": matrix}), np.zeros((height, width, 3)), None) for matrix in matrices
-        ]
-        for source in self.mitsuba.emitters():
-            sample, irradiance = source.sample_direction(dr.zeros(mi.Interaction3f), mi.Point2f(0.5))
-            to_light = mi.Vector3f(sample.d)
-            depth = integral(texture, box, nodes, to_light, voxel).numpy()
-            shade = mi.load_dict(volume(depth.reshape(part.shape), low, high))
-
-            def arriving(where: Any, shade: Any = shade) -> Any:
-                return dr.exp(-extinction * shade.eval_1(where))
-
-            colour = irradiance.numpy().ravel() * self.medium["albedo"]
-            for number, (ray, radiance, _) in enumerate(views):
-                scattered, transmittance = march(texture, arriving, box, ray, step, extinction)
-                cosine = dr.dot(ray.d, to_light)
-                phase = (1 - g * g) / (4 * math.pi * (1 + g * g - 2 * g * cosine) ** 1.5)
-                picture = (scattered * phase).numpy().reshape(height, width, 1) * colour
-                views[number] = ray, radiance + picture, transmittance.numpy().reshape(height, width)
-        return [(radiance.astype(np.float32), transmittance) for _, radiance, transmittance in views]
-
-    def path_traced(self, density: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-        """Render with Mitsuba's `volpath` at single scattering; pixels are blocks of the camera's."""
-        return np.mean(path_traced(self.scene(density, matrix, CHECK_BLOCK), CHECK_PASSES, CHECK_SAMPLES), axis=0)
-
-
 def blocks(image: np.ndarray) -> np.ndarray:
     """Average over blocks of pixels."""
     height, width = image.shape[:2]
@@ -263,57 +172,3 @@ def write_video(path: Path, pictures: list[np.ndarray], fps: float, crf: int) ->
             )
             container.mux(stream.encode(frame))
         container.mux(stream.encode())
-
-
-def main() -> None:
-    """Render a clip and its plate beside the scene file, and whatever else is asked for."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("truth", type=Path, help="baked by benchmarks.truth.bake")
-    parser.add_argument("scene", type=Path)
-    parser.add_argument("--views", type=Path, help="folder for linear reference images from four sides")
-    parser.add_argument("--check", type=int, nargs="*", default=[], help="frames to compare with volpath")
-    parser.add_argument("--wall-seed", type=int, default=3)
-    parser.add_argument("--crf", type=int, default=12, help="the clip's quality; less is better")
-    options = parser.parse_args()
-
-    scene = tomllib.loads(options.scene.read_text())
-    densities = np.load(options.truth)["density"]
-    renderer = Renderer(scene)
-    views = {name: turned(scene["camera"], yaw) for name, yaw in YAWS.items()}
-    if options.views is None:
-        views = {"front": views["front"]}
-    matrices = [matrix for matrix, _ in views.values()]
-    front = matrices[0]
-
-    for frame in options.check:
-        traced = renderer.path_traced(np.float32(densities[frame]), front)
-        marched = blocks(renderer.images(np.float32(densities[frame]), [front])[0][0])
-        difference = np.sqrt(np.mean((marched - traced) ** 2) / np.mean(traced**2))
-        total = marched.sum() / traced.sum() - 1
-        print(f"frame {frame}: against volpath {difference:.2%} RMS over blocks, {total:+.2%} in all")
-
-    plate = srgb_encode(wall(*scene["camera"]["size"], options.wall_seed))
-    folder = options.scene.parent
-    write_png(folder / scene["background"]["image"], plate)
-    pictures, stored = [], {name: [] for name in views}
-    for frame, density in enumerate(densities):
-        rendered = renderer.images(np.float32(density), matrices)
-        radiance, transmittance = rendered[0]
-        seen = radiance + transmittance[..., None] * srgb_decode(plate)
-        pictures.append(srgb_encode(seen))
-        for name, (image, _) in zip(views, rendered, strict=True):
-            stored[name].append(image.mean(axis=-1).astype(np.float16))
-        print(f"frame {frame}: smoke up to {radiance.max():.3f}, picture up to {seen.max():.3f}", flush=True)
-    write_video(folder / scene["clip"]["path"], pictures, scene["clip"]["fps"], options.crf)
-
-    if options.views is not None:
-        options.views.mkdir(parents=True, exist_ok=True)
-        for name, images in stored.items():
-            np.savez_compressed(options.views / f"{name}.npz", image=np.stack(images))
-            (options.views / f"{name}.toml").write_text(views[name][1])
-        linear = srgb_decode(plate).astype(np.float16)
-        np.savez_compressed(options.views / "background_plate.npz", plate=linear)
-
-
-if __name__ == "__main__":
-    main()

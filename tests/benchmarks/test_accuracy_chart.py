@@ -1,17 +1,15 @@
-"""``smokelift chart``: what is read from the CSV, which runs are on the front, and what cannot be drawn."""
+"""Speed against accuracy: what is read from the CSV, which runs are on the front, and what cannot be drawn."""
 
 from __future__ import annotations
 
-import sys
 from itertools import combinations
 from pathlib import Path
 
 import pytest
 
+from benchmarks.accuracy.chart import chart, pareto_front
+from benchmarks.accuracy.measured_runs import DEFAULT, Run, Runs, read_runs
 from smokelift import Settings
-from smokelift.app.cli import main
-from smokelift.evaluation.measured_runs import DEFAULT, Run, Runs, read_runs
-from smokelift.evaluation.speed_accuracy_chart import chart, pareto_front
 
 HEADER = "scene,run,method,frames,seconds,psnr_new,density_error,velocity_error,machine,date\n"
 ROWS = (
@@ -29,14 +27,6 @@ def write(folder: Path, text: str = HEADER + ROWS) -> Path:
     path = folder / "runs.csv"
     path.write_text(text)
     return path
-
-
-def refused(capsys, path: Path, out: Path) -> str:
-    capsys.readouterr()
-    assert main(["chart", str(path), "--out", str(out)]) == 2
-    lines = capsys.readouterr().err.strip().splitlines()
-    assert len(lines) == 1, lines
-    return lines[0]
 
 
 def test_runs_are_means_over_the_scenes(tmp_path) -> None:
@@ -118,31 +108,19 @@ def test_the_pareto_front() -> None:
     assert pareto_front([]) == []
 
 
-def test_a_chart_is_drawn(tmp_path, capsys) -> None:
-    pytest.importorskip("matplotlib")
-    assert main(["chart", str(write(tmp_path)), "--out", str(tmp_path / "chart.png")]) == 0
-    assert (tmp_path / "chart.png").read_bytes().startswith(b"\x89PNG")
-    assert "chart.png written" in "".join(capsys.readouterr().out.splitlines())
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (HEADER, "no runs"),
+        ((HEADER + ROWS).replace("0.5,20", "soon,20"), "must be a number"),
+        ((HEADER + ROWS).replace("a,paper", "c,paper").replace("b,paper", "d,paper"), "share"),
+    ],
+)
+def test_what_cannot_be_read(tmp_path, text, said) -> None:
+    with pytest.raises(ValueError, match=said):
+        read_runs(write(tmp_path, text))
 
 
-def test_what_cannot_be_read(tmp_path, capsys) -> None:
-    out = tmp_path / "chart.png"
-    assert "no such file" in refused(capsys, tmp_path / "gone.csv", out)
-    (tmp_path / "clip.mp4").write_bytes(b"\xff\xfe")
-    assert "clip.mp4: is not a text file in UTF-8" in refused(capsys, tmp_path / "clip.mp4", out)
-    assert "'psnr_new'" in refused(capsys, write(tmp_path, HEADER.replace("psnr_new", "psnr")), out)
-    assert "no runs" in refused(capsys, write(tmp_path, HEADER), out)
-    assert "must be a number" in refused(capsys, write(tmp_path, (HEADER + ROWS).replace("0.5,20", "soon,20")), out)
-    assert "share" in refused(
-        capsys, write(tmp_path, (HEADER + ROWS).replace("a,paper", "c,paper").replace("b,paper", "d,paper")), out
-    )
-    untimed = HEADER + "a,billboard,baseline,24,,20,,,box,2026-01-01\n"
-    assert "nothing to draw" in refused(capsys, write(tmp_path, untimed), out)
-    assert ".png" in refused(capsys, write(tmp_path), tmp_path / "chart.pdf")
-    assert "does not exist" in refused(capsys, write(tmp_path), tmp_path / "no" / "chart.png")
-    assert not out.exists()
-
-
-def test_without_matplotlib(tmp_path, capsys, monkeypatch) -> None:
-    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
-    assert "pip install matplotlib" in refused(capsys, write(tmp_path), tmp_path / "chart.png")
+def test_runs_without_a_time_are_no_chart(tmp_path) -> None:
+    with pytest.raises(ValueError, match="nothing to draw"):
+        chart(read_runs(write(tmp_path, HEADER + "a,billboard,baseline,24,,20,,,box,2026-01-01\n")))

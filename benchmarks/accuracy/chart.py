@@ -1,8 +1,12 @@
-"""Speed against accuracy: time, errors and realism, from the figures of `python -m benchmarks.accuracy`."""
+"""Speed against accuracy: time, errors and realism, from the figures of `python -m benchmarks.accuracy`.
+
+python -m benchmarks.accuracy.chart OUT/accuracy.csv docs/accuracy_chart.png
+"""
 
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -10,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from smokelift.evaluation.label_placement import place_labels
-from smokelift.evaluation.measured_runs import ERRORS, Run, Runs
-from smokelift.output.atomic import atomic_path
+from benchmarks.accuracy.label_placement import place_labels
+from benchmarks.accuracy.measured_runs import ERRORS, Run, Runs, read_runs
+from benchmarks.charts import require_matplotlib
 
 SECONDS = "seconds"
 
@@ -42,21 +46,6 @@ def pareto_front(points: Sequence[tuple[float, float]]) -> list[int]:
     return front
 
 
-def draw(runs: Runs, path: Path) -> None:
-    """Write the chart as a PNG.
-
-    Raises
-    ------
-    ValueError
-        If matplotlib is not installed, the suffix is another, or no run has both a time and an error.
-    """
-    if path.suffix.lower() != ".png":
-        raise ValueError(f"{path}: the chart is written as .png.")
-    figure = chart(runs)
-    with atomic_path(path) as aside:
-        figure.savefig(aside, format="png")
-
-
 def chart(runs: Runs) -> Any:
     """Return the chart as a matplotlib figure: log axes, the Pareto fronts, the default, and the curve of the detail.
 
@@ -68,10 +57,9 @@ def chart(runs: Runs) -> Any:
     shown = [panel for panel in PANELS if any(_at(run, panel) is not None for run in runs.runs)]
     if not any(across == SECONDS for across, _ in shown):
         raise ValueError("No run has both a time and an error; there is nothing to draw.")
-    try:
-        from matplotlib.figure import Figure
-    except ImportError:
-        raise ValueError("smokelift chart needs matplotlib: pip install matplotlib.") from None
+    require_matplotlib()
+    from matplotlib.figure import Figure
+
     columns = min(len(shown), 2)
     rows = -(-len(shown) // columns)
     figure = Figure(figsize=(6.5 * columns, 5.2 * rows), dpi=DPI, layout="constrained")
@@ -186,3 +174,7 @@ def _readable(axis: Any, values: list[float], room: float) -> None:
     axis.set_ticks(ticks, [f"{tick:g}" for tick in ticks])
     axis.set_ticks([], minor=True)
     (axis.axes.set_xlim if axis.axis_name == "x" else axis.axes.set_ylim)(low, high)
+
+
+if __name__ == "__main__":
+    chart(read_runs(Path(sys.argv[1]))).savefig(sys.argv[2], format="png")

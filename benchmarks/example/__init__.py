@@ -1,1 +1,0 @@
-"""The example clip: baked by Mantaflow, pictured by Mitsuba. README.md says how."""
