@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 
@@ -12,15 +12,15 @@ from scipy import ndimage
 
 from smokelift.direct.constraint import FaceMasks, Mask, faces_of
 from smokelift.direct.moment import Moment
-from smokelift.transport import Array, advect
+from smokelift.transport import Array, ResidualMeans, advect
 from smokelift.velocity.sources import SourceDetection
 
 MOTION = 0.5
 """Share of its change that may be motion in a voxel of an inlet, at most."""
 
 PROMINENT = 0.25
-"""Share of the strongest inlet's smoke that another lets in at least: inlets of one scene are of one kind, and what a
-wrong velocity leaves is scattered."""
+"""Share of the strongest inlet's smoke that lasts in an inlet at least, where the weaker half of the moments counts:
+inlets of one scene are of one kind, and what a wrong velocity leaves is scattered and moves on."""
 
 FAINT = 0.01
 """Share of the largest density below which a voxel is not in the smoke."""
@@ -77,24 +77,29 @@ def find_inflow(moments: Sequence[Moment], dt: float, marked: Mask | None = None
 
 def _detect_inlets(moments: Sequence[Moment], dt: float) -> Mask:
     """The voxels of inlets by the mean over all moments, for inlets stand still and errors do not."""
-    detection, means = SourceDetection(), None
-    smoke: Mask = np.zeros(moments[0].density.shape, bool)
+    means, smoke = _unexplained(moments, dt)
+    middle = len(moments) // 2
+    halves = [_unexplained(part, dt)[0].mean for part in (moments[: middle + 1], moments[middle:]) if len(part) > 1]
+    return _strongest_inlets(SourceDetection().weight(means, smoke) < MOTION, means.mean, np.minimum.reduce(halves))
+
+
+def _unexplained(moments: Sequence[Moment], dt: float) -> tuple[ResidualMeans, Mask]:
+    """Means over moments, two at least, of the change that velocities do not explain; and where the last smoke is."""
+    means, smoke = None, np.zeros(moments[0].density.shape, bool)
     for number, (before, after) in enumerate(pairwise(moments), 1):
         carried = advect(before.density, after.velocity, dt)
         densest = np.maximum(after.density, carried)
-        detection = replace(detection, news=1 / number)
-        means = detection.means(after.density - carried, densest, 1.0, means)
+        means = SourceDetection(news=1 / number).means(after.density - carried, densest, 1.0, means)
         smoke = densest > FAINT * densest.max()
-    if means is None:
-        return smoke
-    return _strongest_inlets(detection.weight(means, smoke) < MOTION, means.mean)
+    assert means is not None
+    return means, smoke
 
 
-def _strongest_inlets(entering: Mask, strength: Array) -> Mask:
-    """The connected components of voxels (nx, ny, nz) in which most smoke enters."""
+def _strongest_inlets(entering: Mask, strength: Array, lasting: Array) -> Mask:
+    """The connected components of voxels (nx, ny, nz) in which most smoke enters all the time."""
     labels, count = ndimage.label(entering)
     if count == 0:
         return entering
-    sums = ndimage.sum_labels(strength, labels, np.arange(1, count + 1))
-    kept: Mask = np.isin(labels, 1 + np.flatnonzero(sums >= PROMINENT * sums.max()))
+    sums, lasting_sums = (ndimage.sum_labels(each, labels, np.arange(1, count + 1)) for each in (strength, lasting))
+    kept: Mask = np.isin(labels, 1 + np.flatnonzero(lasting_sums >= PROMINENT * sums.max()))
     return kept

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -48,6 +50,16 @@ def test_the_inlet_of_a_plume_is_found():
 
 def test_smoke_that_only_moves_has_no_inlet():
     assert not find_inflow(course(free(), at_rest(blob()), 8), DT).voxels.any()
+
+
+def test_what_enters_at_changing_places_is_no_inlet():
+    """A wrong velocity leaves it, and moves on."""
+    rest = at_rest(blob())
+    grown = [rest.density]
+    for place in (-0.5,) * 4 + (0.5,) * 4:
+        news = Ball((place, 0.0, 1.0), 0.3).voxels(DOMAIN)
+        grown.append(grown[-1] + np.float32(0.2) * news)
+    assert not find_inflow([replace(rest, density=density) for density in grown], DT).voxels.any()
 
 
 def test_an_inlet_replays_its_moments_without_a_jump():
