@@ -1,6 +1,7 @@
-"""Make the picture of the front page, docs/blender_render.png: ``python tests/blender/front_page.py demo/sequence``.
+"""Make the picture of the front page, docs/blender_render.png: ``python tests/blender/front_page.py SEQUENCE``.
 
-It takes a Python with bpy, and the example's sequence from `make demo`.
+It takes a Python with bpy, and a sequence of the example:
+``smokelift reconstruct examples/plume/scene.toml --quality fine --frames 25:36 --out SEQUENCE``.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ from PIL import Image
 import addon
 from addon import compositing, look, volume
 from addon.take import Take
-from tests.example_shot import set_up_example, smoke
+from tests.example_shot import FULL_SIZE, set_up_example, smoke
 
 FRAME = 30
 PERCENT, SAMPLES = 75, 24
@@ -49,7 +49,7 @@ def shown_example(sequence: Path, samples: int, frame: int) -> tuple[bpy.types.S
     """The example's scene with a sequence as its smoke, and that smoke, ready to be rendered in a frame."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     addon.register()
-    scene = set_up_example(bpy.context.scene)
+    scene = set_up_example(bpy.context.scene, FULL_SIZE)
     obj = smoke(scene)
     volume.show(obj, Take(sequence.absolute()))
     scene.cycles.samples, scene.cycles.use_denoising = samples, True
