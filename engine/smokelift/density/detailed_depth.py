@@ -58,9 +58,9 @@ NEAR = 10.0
 GOLDEN = (np.sqrt(5) - 1) / 2
 """Multiples of it, less their whole parts, are spread evenly however many there are."""
 
-FRESH, CARRIED = 0.6, 0.4
+FRESH, CARRIED = 0.6, 0.35
 """Shares of a step towards a picture that are made, for smoke that nothing is carried for and for what is carried: more
-of the second flickers (docs/experiments/every-view.md)."""
+of the second flickers (docs/experiments/stretched-noise.md)."""
 
 STEP_RANGE = (0.3, 3.0)
 """Largest change of a ray's smoke in one step."""
@@ -187,9 +187,7 @@ class EveryView:
 
     def added(self, density: Volume, cameras: Sequence[Term], *, fresh: bool) -> Volume:
         """Scale a density towards the clip's texture and the cameras' pictures in turn; see `Detail`."""
-        # what is carried has the finest detail already, and renewing it would flicker
-        exemplars = self.texture.exemplars if fresh else self.texture.exemplars[:-1]
-        return self._rounds(density, cameras, exemplars, self.azimuths(), fresh)
+        return self._rounds(density, cameras, self.texture.exemplars, self.azimuths(), fresh)
 
     def _rounds(
         self,
