@@ -77,22 +77,28 @@ def find_inflow(moments: Sequence[Moment], dt: float, marked: Mask | None = None
 
 def _detect_inlets(moments: Sequence[Moment], dt: float) -> Mask:
     """The voxels of inlets by the mean over all moments, for inlets stand still and errors do not."""
-    means, smoke = _unexplained(moments, dt)
+    changes = [_unexplained(before, after, dt) for before, after in pairwise(moments)]
+    means = _means(changes)
     middle = len(moments) // 2
-    halves = [_unexplained(part, dt)[0].mean for part in (moments[: middle + 1], moments[middle:]) if len(part) > 1]
-    return _strongest_inlets(SourceDetection().weight(means, smoke) < MOTION, means.mean, np.minimum.reduce(halves))
+    halves = [_means(part).mean for part in (changes[:middle], changes[middle:]) if part]
+    densest = changes[-1][1]
+    entering = SourceDetection().weight(means, densest > FAINT * densest.max()) < MOTION
+    return _strongest_inlets(entering, means.mean, np.minimum.reduce(halves))
 
 
-def _unexplained(moments: Sequence[Moment], dt: float) -> tuple[ResidualMeans, Mask]:
-    """Means over moments, two at least, of the change that velocities do not explain; and where the last smoke is."""
-    means, smoke = None, np.zeros(moments[0].density.shape, bool)
-    for number, (before, after) in enumerate(pairwise(moments), 1):
-        carried = advect(before.density, after.velocity, dt)
-        densest = np.maximum(after.density, carried)
-        means = SourceDetection(news=1 / number).means(after.density - carried, densest, 1.0, means)
-        smoke = densest > FAINT * densest.max()
+def _unexplained(before: Moment, after: Moment, dt: float) -> tuple[Array, Array]:
+    """The change that a velocity does not explain, and the larger density of what it explains and what there is."""
+    carried = advect(before.density, after.velocity, dt)
+    return after.density - carried, np.maximum(after.density, carried)
+
+
+def _means(changes: Sequence[tuple[Array, Array]]) -> ResidualMeans:
+    """Means over changes, one at least, that velocities do not explain."""
+    means = None
+    for number, (residual, densest) in enumerate(changes, 1):
+        means = SourceDetection(news=1 / number).means(residual, densest, 1.0, means)
     assert means is not None
-    return means, smoke
+    return means
 
 
 def _strongest_inlets(entering: Mask, strength: Array, lasting: Array) -> Mask:
