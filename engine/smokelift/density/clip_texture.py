@@ -25,6 +25,9 @@ SMOOTHING = 1.5
 ACROSS = 6.0
 """Standard deviations of a row's smoke that make its whole width."""
 
+VOXEL = 12**-0.5
+"""Standard deviation (voxels) of smoke that fills one voxel: none is narrower, a thread of single pixels either."""
+
 
 @dataclass(frozen=True, eq=False)
 class ClipTexture:
@@ -68,7 +71,7 @@ class ClipTexture:
             motion = motion[::-1]
         shown = [each for number in frames for each in _on_screens(seen[number], domain, axis)]
         pictures = [each.picture for each in shown]
-        width = float(np.mean([_width(picture) for picture in pictures]))
+        width = max(VOXEL, float(np.mean([_width(picture) for picture in pictures])))
         scales = [1]
         while SIZE * scales[0] < ACROSS * width:
             scales.insert(0, 2 * scales[0])

@@ -35,10 +35,10 @@ NODES = np.float32((2 / 3) ** 1.5)
 """Standard deviation of what is interpolated linearly between nodes of unit variance in three dimensions."""
 
 BODY = 0.1
-"""Share of a picture's largest optical depth, blurred, from which its detail is measured: outlines are none."""
+"""Share of a picture's largest optical depth, blurred, from which detail is measured: faint outlines do not count."""
 
 NEIGHBOURS = (4, 2, 1, 1 / 2, 1 / 4, 1 / 8)
-"""Blurs of the octaves that are found in a band, over its own: what others add is less than a hundredth."""
+"""Blurs of the octaves whose energy is found in a band, over the band's own: others add less than a hundredth."""
 
 FINE_ENOUGH = 1.5
 """Standard deviation (pixels) of the blurs that measure detail, at least: larger pictures are reduced first."""
@@ -83,7 +83,7 @@ def _energy(pictures: Sequence[Picture], blur: float) -> float:
 
 
 def _unit_energy(blur: float, width: float) -> float:
-    """The same of octaves of unit strength; each is blurred white noise, of which a ray averages independent parts."""
+    """`_energy` of octaves of unit strength: each is blurred white noise, of which a ray averages independent parts."""
     own = np.array([each * blur for each in NEIGHBOURS])
     square = own**2
     bands = 1 / (square + blur**2 / 4) - 2 / (square + blur**2 * 5 / 8) + 1 / (square + blur**2)

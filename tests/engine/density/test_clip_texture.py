@@ -84,3 +84,13 @@ def test_one_photograph_is_enough() -> None:
 def test_a_clip_without_smoke_has_no_texture() -> None:
     """None, and nothing fails."""
     assert ClipTexture.of(Shadows((np.zeros((36, 36), np.float32),))) is None
+
+
+def test_a_thread_of_single_pixels_has_a_texture() -> None:
+    """It is as wide as a voxel."""
+    thread = np.zeros((36, 36), np.float32)
+    thread[:, 18] = 1
+    texture = ClipTexture.of(Shadows((thread,)))
+    assert texture is not None
+    assert texture.width > 0
+    assert np.isfinite(texture.roughness).all()
