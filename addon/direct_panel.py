@@ -55,6 +55,7 @@ def _draw_continue(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup
     layout.prop(settings, "frames")
     layout.prop(settings, "fade")
     _draw_ticked(layout, settings, "use_start", "start")
+    layout.prop(settings, "room")
     draw_closed(layout, settings)
     layout.prop(settings, "effectors")
     row = layout.row()

@@ -65,6 +65,7 @@ def _continued(smoke: bpy.types.Object, numbers: list[int]) -> tuple[str, list[s
     if settings.fade > settings.frames:
         raise ShotError(f"The smoke fades in {settings.fade} frames, more than are added ({settings.frames}).")
     options = ["--frames", str(settings.frames), "--fade", str(settings.fade)]
+    options += ["--room", _number_text(settings.room)]
     last, start = numbers[-1], volume.scene_frame(smoke, numbers[-1])
     if settings.use_start:
         start = settings.start

@@ -84,6 +84,16 @@ class SmokeliftDirecting(bpy.types.PropertyGroup):
         name="Start", description="Last frame that stays as it is, counted in the scene", default=1, min=-1_000_000
     )
     closed: _closed("Sides of the result's box, along its own axes, that are walls for the frames that are added")
+    room: FloatProperty(
+        name="Room",
+        description="How many times as large as the result's box the smoke may become. Its box grows where smoke goes; "
+        "smoke that would need more dissolves before the box ends. 1 keeps the box",
+        default=8.0,
+        min=1.0,
+        soft_max=64.0,
+        max=4096.0,
+        precision=1,
+    )
     effectors: PointerProperty(
         name="Effectors",
         description=(

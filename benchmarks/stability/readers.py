@@ -146,7 +146,7 @@ READERS: Mapping[str, Reader] = {
     "state": Reader(
         "resume.npz",
         lambda path: ResumeState(1, _volume(), _faces(), {"smooth": _volume()}).write(path),
-        lambda path: ResumeState.read(path, SHAPE),
+        lambda path: ResumeState.read(path, lambda _: SHAPE),
         OSError,
     ),
     "twin": Reader("smoke_0001.npz", _write_twin, _read_twin, OSError),

@@ -71,6 +71,9 @@ BYTES_A_VOXEL_OF_SOLVER = 145
 TIMED = (64, 64, 64)
 """Voxels of the grid whose solve is timed."""
 
+BYTES_A_SIMULATED_VOXEL = 230
+"""Bytes at the peak for each voxel of a box in which smoke is simulated, and of the moments it starts from."""
+
 LEAST_VOXELS = 8
 """Voxels along the shortest side of a grid that is suggested."""
 
@@ -130,6 +133,11 @@ def memory_needed(resolution: Resolution, work: Workload) -> int:
     if work.settings.method == "paper" or work.settings.velocity.coarsening == 0:
         a_voxel += BYTES_A_VOXEL_OF_SOLVER
     return round(BASE_BYTES + BYTES_A_PIXEL * work.pixels + (a_voxel + work.largest * a_smoky_voxel) * voxels)
+
+
+def affordable_room(resolution: Resolution) -> float:
+    """Return how many times as large as a clip's box one may be whose simulation fits into the memory that is free."""
+    return (memory_free() - BASE_BYTES) / (BYTES_A_SIMULATED_VOXEL * math.prod(resolution))
 
 
 def memory_free() -> int:

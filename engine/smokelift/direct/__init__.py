@@ -1,6 +1,6 @@
 """Smoke after its clip: continued, retimed, looped, and made to react to wind, turbulence, fans and obstacles."""
 
-from smokelift.direct.continuation import Continuation, continue_sequence
+from smokelift.direct.continuation import DISSOLVED, ROOM, Continuation, continue_sequence
 from smokelift.direct.looping import loop_length, loop_sequence, usual_overlap
 from smokelift.direct.mesh import Mesh
 from smokelift.direct.moment import Moment, complete_velocity, read_moment
@@ -13,6 +13,8 @@ from smokelift.direct.turbulence import Turbulence
 from smokelift.direct.writing import open_source
 
 __all__ = [
+    "DISSOLVED",
+    "ROOM",
     "Ball",
     "Box",
     "Continuation",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
@@ -11,8 +12,17 @@ from typing import Any
 import numpy as np
 
 from smokelift.direct.constraint import faces_of
+from smokelift.direct.growth import (
+    Growth,
+    cut_sides,
+    dissolved,
+    emerged,
+    in_larger_box,
+    kept_outside,
+    moves,
+)
 from smokelift.direct.moment import Moment, read_moment
-from smokelift.direct.obstacles import Ball, Box, Obstacle, Obstacles, outside_message
+from smokelift.direct.obstacles import Ball, Box, Obstacle, Obstacles, require_place
 from smokelift.direct.simulation import fit_simulation
 from smokelift.direct.surroundings import Fan, Surroundings
 from smokelift.direct.turbulence import Turbulence
@@ -20,7 +30,8 @@ from smokelift.direct.writing import SHORTEST, Written, directed_writer, simulat
 from smokelift.output.resume import ResumeState
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
-from smokelift.scene import Domain, Side
+from smokelift.scene import SIDES, CompleteScene, Domain, Side
+from smokelift.scene import Box as Space
 from smokelift.scene.checks import Vector
 from smokelift.transport import Velocity
 
@@ -31,8 +42,15 @@ steady, and the replay of so much is not noticed."""
 UNFADED = ("unfaded", "unfaded_flame")
 """Names of the density and the emission before the fading in the resume state: the simulation goes on from those."""
 
+DISSOLVED = "dissolved"
+"""Figure of a simulated frame: the share of its smoke that has dissolved before sides that cannot move."""
+
 SMALLEST_EDDY = 3
 """Voxels across an eddy, at least: fewer do not show that it turns."""
+
+
+ROOM = 8.0
+"""Usual room for the smoke, in the clip's boxes: what a minute of wind of the smoke's own speed fills."""
 
 
 @dataclass(frozen=True)
@@ -52,9 +70,12 @@ class Continuation:
     turbulences
         Eddies that all air gains after `start`.
     fans, obstacles
-        What stands in the box after `start`.
+        What stands there after `start`, in the clip's box or where it can grow to.
     closed
         Sides that are walls after `start`, besides those of the scene.
+    room
+        How many times as many voxels as the clip's the box may have that grows with the smoke, 1 at least. Before a
+        side that cannot move any more the smoke dissolves.
     """
 
     frames: int
@@ -65,6 +86,7 @@ class Continuation:
     fans: tuple[Fan, ...] = ()
     obstacles: tuple[Obstacle, ...] = ()
     closed: tuple[Side, ...] = ()
+    room: float = ROOM
 
 
 def continue_sequence(
@@ -100,8 +122,14 @@ def continue_sequence(
             f"{sequence.directory}: cannot go on from frame {start}; choose one from "
             f"{sequence.frames[SHORTEST - 1]} to {sequence.frames[-1]}."
         )
-    surroundings = _surroundings(continuation, sequence.scene.domain)
-    surroundings.solid(1, 1 / sequence.fps)  # refuses what fills the box before anything is written
+    growth = _growth(continuation, sequence.scene)
+    box = _start_box(continuation, growth)
+    for obstacle in continuation.obstacles:
+        require_place("obstacle", obstacle, box, growth.reach())
+    for fan in continuation.fans:
+        require_place("fan", fan.place, box, box)
+    # refuses what fills the box before anything is written
+    _surroundings(continuation, box, growth.clip).solid(1, 1 / sequence.fps)
     last = start + continuation.frames
     settings = {
         "frames": continuation.frames,
@@ -112,6 +140,7 @@ def continue_sequence(
         "fans": [vars(fan.place) | {"velocity": fan.velocity} for fan in continuation.fans],
         "obstacles": [_as_settings(obstacle) for obstacle in continuation.obstacles],
         "closed": continuation.closed,
+        "room": continuation.room,
     }
     how = (
         f"Frames {start + 1} to {last} are a simulation that starts from frame {start}, with the buoyancy, the "
@@ -122,7 +151,7 @@ def continue_sequence(
         if writer.state is None and writer.finished:
             return
         yield from _copied(sequence, kept, writer)
-        yield from _simulated(sequence, kept, continuation, surroundings, writer)
+        yield from _simulated(sequence, kept, continuation, growth, writer)
 
 
 def _copied(sequence: Sequence, numbers: tuple[int, ...], writer: SequenceWriter) -> Iterator[Written]:
@@ -132,45 +161,56 @@ def _copied(sequence: Sequence, numbers: tuple[int, ...], writer: SequenceWriter
 
 
 def _simulated(
-    sequence: Sequence,
-    kept: tuple[int, ...],
-    continuation: Continuation,
-    surroundings: Surroundings,
-    writer: SequenceWriter,
+    sequence: Sequence, kept: tuple[int, ...], continuation: Continuation, growth: Growth, writer: SequenceWriter
 ) -> Iterator[Written]:
-    start, dt = kept[-1], 1 / sequence.fps
+    start, dt, clip = kept[-1], 1 / sequence.fps, growth.clip
     # the first frame has no velocity of its own
     moments = [read_moment(sequence, number) for number in kept[1:][-FITTED_MOMENTS:]]
-    simulation = fit_simulation(moments, dt, sequence.scene.inflow(), surroundings)
-    closed = (*sequence.scene.closed, *continuation.closed)
+    simulation = fit_simulation(moments, dt, sequence.scene.inflow(), _surroundings(continuation, clip, clip))
     moment, state = moments[-1], writer.state
-    moment = replace(moment, velocity=replace(moment.velocity, closed=closed))
+    del moments  # they are large
+    moment = replace(moment, velocity=replace(moment.velocity, closed=growth.closed))
+    cut = cut_sides(moment)
+    box, larger = clip, _start_box(continuation, growth)
     if state is not None and state.number > start:
-        moment = _resumed(state, sequence.scene.domain, closed)
+        box = writer.box(state.number)
+        moment = _resumed(state, box, growth.closed)
+        larger = growth.after(box, moment, dt)
+        simulation = simulation.in_larger_box(moves(clip, box), _surroundings(continuation, box, clip))
     for step in range(1, continuation.frames + 1):
         number = start + step
         if number in writer.finished:
             continue
         began = time.perf_counter()
-        moment = simulation.next(moment, step)
+        if larger != box:
+            ends, before = moves(box, larger), simulation.surroundings
+            simulation = simulation.in_larger_box(ends, _surroundings(continuation, larger, clip))
+            moment = in_larger_box(moment, ends, before, simulation.surroundings, (step - 1) * dt)
+            box = larger
+        moment = emerged(simulation.next(moment, step), clip.slices_in(box), cut, step, dt)
+        mass = float(moment.density.sum(dtype=np.float64))
+        moment = dissolved(moment, growth.stopped(box), dt)
+        gone = 1 - float(moment.density.sum(dtype=np.float64)) / mass if mass > 0 else 0.0
         left = np.float32(_share_left(step, continuation))
         faded = replace(
             moment, density=moment.density * left, flame=None if moment.flame is None else moment.flame * left
         )
-        solid = surroundings.solid(step, dt)
+        solid = simulation.surroundings.solid(step, dt)
         obstacles = None if solid is None else solid.voxels
-        figures = simulated_figures(faded, began, "simulated", vars(simulation.physics), obstacles)
+        further = {**vars(simulation.physics), DISSOLVED: gone}
+        figures = simulated_figures(faded, began, "simulated", further, obstacles)
         volumes = [values for values in (moment.density, moment.flame) if values is not None]
         faces, unfaded = moment.velocity.faces, dict(zip(UNFADED, volumes, strict=False))
         state = ResumeState(number, faded.density, faces, unfaded)
-        writer.write(number, faded.density, faces, figures, flame=faded.flame, state=state)
+        writer.write(number, faded.density, faces, figures, flame=faded.flame, box=box, state=state)
         yield number, figures
+        larger = growth.after(box, moment, dt)
 
 
-def _resumed(state: ResumeState, domain: Domain, closed: tuple[Side, ...]) -> Moment:
+def _resumed(state: ResumeState, box: Domain, closed: tuple[Side, ...]) -> Moment:
     """The last simulated moment of a run that goes on."""
     volumes = [np.asarray(state.extra[name], np.float32) for name in UNFADED if name in state.extra]
-    return Moment(volumes[0], Velocity(state.velocity, domain.voxel_size, closed), *volumes[1:])
+    return Moment(volumes[0], Velocity(state.velocity, box.voxel_size, closed), *volumes[1:])
 
 
 def _share_left(step: int, continuation: Continuation) -> float:
@@ -178,13 +218,23 @@ def _share_left(step: int, continuation: Continuation) -> float:
     return min(1.0, (continuation.frames - step) / continuation.fade) if continuation.fade else 1.0
 
 
-def _surroundings(continuation: Continuation, domain: Domain) -> Surroundings:
-    blown = []
+def _growth(continuation: Continuation, scene: CompleteScene) -> Growth:
+    closed = tuple(side for side in SIDES if side in (*scene.closed, *continuation.closed))
+    voxels = int(continuation.room * math.prod(scene.domain.resolution))
+    return Growth(scene.domain, closed, voxels, kept_outside(scene))
+
+
+def _start_box(continuation: Continuation, growth: Growth) -> Domain:
+    """The box in which the simulation begins: the clip's, and the fans."""
+    box = growth.clip
     for fan in continuation.fans:
-        voxels = fan.place.voxels(domain)
-        if not voxels.any():
-            raise ValueError(outside_message("fan", domain))
-        blown.append((faces_of(voxels), fan.velocity))
+        box = growth.around(box, Space(*fan.place.bounds()))
+    return box
+
+
+def _surroundings(continuation: Continuation, domain: Domain, clip: Domain) -> Surroundings:
+    """What is placed in a box that the clip's has grown to."""
+    blown = tuple((faces_of(fan.place.voxels(domain)), fan.velocity) for fan in continuation.fans)
     for turbulence in continuation.turbulences:
         if turbulence.size < SMALLEST_EDDY * domain.voxel_size:
             raise ValueError(
@@ -192,7 +242,7 @@ def _surroundings(continuation: Continuation, domain: Domain) -> Surroundings:
                 f"{SMALLEST_EDDY * domain.voxel_size:.3g} m at least."
             )
     obstacles = Obstacles(domain, continuation.obstacles) if continuation.obstacles else None
-    return Surroundings(continuation.wind, continuation.turbulences, tuple(blown), obstacles)
+    return Surroundings(continuation.wind, continuation.turbulences, blown, obstacles, domain.first_in(clip))
 
 
 def _as_settings(obstacle: Obstacle) -> dict[str, Any]:

@@ -12,7 +12,8 @@ from scipy import ndimage
 
 from smokelift.direct.constraint import FaceMasks, Mask, faces_of
 from smokelift.direct.moment import Moment
-from smokelift.transport import Array, ResidualMeans, advect
+from smokelift.scene.domain import box_around
+from smokelift.transport import Array, ResidualMeans, advect, faces_in
 from smokelift.velocity.sources import SourceDetection
 
 MOTION = 0.5
@@ -38,23 +39,55 @@ class Inflow:
     Attributes
     ----------
     voxels : (nx, ny, nz) bool
-        Those of all inlets.
+        Those of all inlets, in a box around them.
     moments
-        Of the clip, in their order.
+        Of the clip, in their order, in that box.
+    first
+        The simulation's voxel at which that box begins.
     """
 
     voxels: Mask
     moments: Sequence[Moment]
+    first: tuple[int, ...] = (0, 0, 0)
 
     def at(self, step: int) -> Moment:
         """The moment that is replayed so many steps after the last one."""
         last = len(self.moments) - 1
         return self.moments[abs(last - step % (2 * last))] if last else self.moments[0]
 
+    @property
+    def box(self) -> tuple[slice, ...]:
+        """The box around the inlets in the simulation's voxels."""
+        return tuple(slice(first, first + n) for first, n in zip(self.first, self.voxels.shape, strict=True))
+
     @cached_property
     def faces(self) -> FaceMasks:
-        """The faces of the inlets' voxels."""
+        """The faces of the inlets' voxels, in their box."""
         return faces_of(self.voxels)
+
+    def density_into(self, density: Array, step: int, solid: Mask | None) -> None:
+        """Set the density (nx, ny, nz) in the inlets to what enters, outside of what is solid."""
+        inlets = self.voxels if solid is None else self.voxels & ~solid[self.box]
+        density[self.box][inlets] = self.at(step).density[inlets]
+
+    def velocity_into(self, faces: Sequence[Array], step: int) -> None:
+        """Set the velocity on the faces of the inlets to that of what enters."""
+        x, y, z = faces
+        for here, inlets, entering in zip(
+            faces_in((x, y, z), self.box), self.faces, self.at(step).velocity.faces, strict=True
+        ):
+            here[inlets] = entering[inlets]
+
+    def cropped(self) -> Inflow:
+        """The same, in the smallest box."""
+        box = box_around(self.voxels, 0)
+        if not self.voxels.any():
+            box = (slice(0, 1),) * 3  # a moment has a voxel at least
+        moments = [
+            Moment(m.density[box].copy(), m.velocity.with_faces(u.copy() for u in faces_in(m.velocity.faces, box)))
+            for m in self.moments
+        ]
+        return Inflow(self.voxels[box], moments, tuple(a + side.start for a, side in zip(self.first, box, strict=True)))
 
 
 def find_inflow(moments: Sequence[Moment], dt: float, marked: Mask | None = None) -> Inflow:

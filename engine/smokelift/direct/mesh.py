@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from smokelift.direct.constraint import Mask
 from smokelift.scene import Domain
-from smokelift.scene.checks import LARGEST
+from smokelift.scene.checks import LARGEST, Vector
 
 Values = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
@@ -89,6 +89,12 @@ class Mesh:
         if not (np.abs(triangles) <= LARGEST).all():
             raise ValueError(f"{path}: has corners that are no numbers up to {LARGEST:g} m; export the mesh again.")
         return Mesh(triangles)
+
+    def bounds(self) -> tuple[Vector, Vector]:
+        """The corners in metres of the box around it."""
+        corners = self.triangles.reshape(-1, 3)
+        (a, b, c), (d, e, f) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+        return (a, b, c), (d, e, f)
 
     def voxels(self, domain: Domain) -> Mask:
         """The voxels whose centres it encloses, shape (nx, ny, nz).

@@ -14,6 +14,7 @@ from scipy import ndimage
 from smokelift.direct.constraint import Mask
 from smokelift.direct.mesh import ORDERS, Crossings, Mesh, enclosed
 from smokelift.scene import Domain
+from smokelift.scene.checks import Vector
 from smokelift.transport import Array, Faces
 
 
@@ -69,6 +70,12 @@ class MovingMesh:
     def at(self, step: int) -> Mesh:
         """The mesh so many frames after the one that the smoke starts from."""
         return self.places[min(step, len(self.places) - 1)]
+
+    def bounds(self) -> tuple[Vector, Vector]:
+        """The corners in metres of the box around all its places."""
+        lows, highs = zip(*(place.bounds() for place in self.places), strict=True)
+        (a, b, c), (d, e, f) = np.min(lows, axis=0).tolist(), np.max(highs, axis=0).tolist()
+        return (a, b, c), (d, e, f)
 
     def ever_in(self, domain: Domain) -> bool:
         """Whether it ever reaches into a box, as far as its own bounds tell."""

@@ -11,6 +11,7 @@ import numpy as np
 from smokelift.direct.constraint import Mask, faces_between, faces_of, project_with_given_faces
 from smokelift.direct.mesh import Mesh
 from smokelift.direct.moving_mesh import MovingMesh
+from smokelift.scene import Box as Space
 from smokelift.scene import Domain
 from smokelift.scene.checks import Vector
 from smokelift.transport import Faces, Velocity, divergence, face_shapes, outflow
@@ -37,6 +38,11 @@ class Ball:
         inside: Mask = x**2 + y**2 + z**2 <= self.radius**2
         return inside
 
+    def bounds(self) -> tuple[Vector, Vector]:
+        """The corners in metres of the box around it."""
+        (x, y, z), r = self.centre, self.radius
+        return (x - r, y - r, z - r), (x + r, y + r, z + r)
+
 
 @dataclass(frozen=True)
 class Box:
@@ -57,6 +63,10 @@ class Box:
         x, y, z = ((a >= 0) & (b <= 0) for a, b in zip(above, below, strict=True))
         inside: Mask = x & y & z
         return inside
+
+    def bounds(self) -> tuple[Vector, Vector]:
+        """Its corners in metres."""
+        return self.low, self.high
 
 
 Obstacle = Ball | Box | Mesh | MovingMesh
@@ -108,21 +118,11 @@ class Obstacles:
     domain
         The box.
     things
-        In it, or on their way there.
-
-    Raises
-    ------
-    ValueError
-        If one holds no voxel of the box, or is a mesh that is open.
+        In it, or outside.
     """
 
     domain: Domain
     things: tuple[Obstacle, ...]
-
-    def __post_init__(self) -> None:
-        for thing in self.things:
-            if not (thing.ever_in(self.domain) if isinstance(thing, MovingMesh) else thing.voxels(self.domain).any()):
-                raise ValueError(outside_message("obstacle", self.domain))
 
     def at(self, step: int, dt: float) -> Solid | None:
         """What is solid after so many steps, which last `dt` seconds each; None if nothing is.
@@ -130,7 +130,7 @@ class Obstacles:
         Raises
         ------
         ValueError
-            If it fills the box, or a mesh that moves is open.
+            If it fills the box, or a mesh is open.
         """
         if not self.things:
             return None
@@ -159,6 +159,31 @@ def _with(solid: Solid, voxels: Mask, velocity: Faces) -> Solid:
     return Solid(solid.voxels | voxels, (x, y, z))
 
 
-def outside_message(what: str, domain: Domain) -> str:
-    """The sentence that refuses a thing outside the box."""
-    return f"the {what} holds no voxel of the box from {domain.min} to {domain.max} m; move it in, or make it larger."
+def require_place(what: str, thing: Obstacle, domain: Domain, reach: Space) -> None:
+    """Refuse a thing that no smoke can meet.
+
+    Parameters
+    ----------
+    what
+        Its name.
+    thing
+        The thing.
+    domain
+        The box at the start.
+    reach
+        How far it can grow.
+
+    Raises
+    ------
+    ValueError
+        If the thing holds no voxel of the box and does not stand where the box can grow to, or is a mesh that is open.
+    """
+    low, high = thing.bounds()
+    meets = all(a < d and b > c for a, b, c, d in zip(low, high, reach.min, reach.max, strict=True))
+    within = all(c <= a and b <= d for a, b, c, d in zip(low, high, domain.min, domain.max, strict=True))
+    here = thing.ever_in(domain) if isinstance(thing, MovingMesh) else bool(thing.voxels(domain).any())
+    if not here and (within or not meets):
+        raise ValueError(
+            f"the {what} holds no voxel of the box from {domain.min} to {domain.max} m, nor of what the box can grow "
+            "to; move it in, make it larger, or give the box more --room."
+        )

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -60,22 +60,33 @@ class Simulation:
 
     def next(self, moment: Moment, step: int) -> Moment:
         """Return the moment one step later; step 1 starts from the clip's last moment."""
-        entering, solid = self.inflow.at(step), self.surroundings.solid(step, self.dt)
+        solid = self.surroundings.solid(step, self.dt)
         moved = self._self_advected(moment.velocity, step)
-        driven = moved.with_faces(self._with_forces(moved, moment, entering, step))
+        driven = moved.with_faces(self._with_forces(moved, moment, step))
         velocity = project(driven) if solid is None else solid.projected(driven)
         obstacle = None if solid is None else solid.voxels
         density = self._advected(moment.density, velocity, obstacle)
         density *= np.float32(math.exp(-self.physics.dissipation * self.dt))
-        inlets = self.inflow.voxels if obstacle is None else self.inflow.voxels & ~obstacle
+        self.inflow.density_into(density, step, obstacle)
         flame = None
         if self.fire is not None and moment.flame is not None:
             flame = self.fire.after(self._advected(moment.flame, velocity, obstacle), obstacle)
-        return Moment(
-            np.where(inlets, entering.density, density),
-            Velocity(velocity.faces, velocity.voxel_size, velocity.closed),
-            flame,
-        )
+        return Moment(density, Velocity(velocity.faces, velocity.voxel_size, velocity.closed), flame)
+
+    def in_larger_box(self, ends: tuple[tuple[int, int], ...], surroundings: Surroundings) -> Simulation:
+        """The same in a larger box.
+
+        Parameters
+        ----------
+        ends
+            Voxels by which the low side and the high side move outwards, along x, y and z.
+        surroundings
+            What is placed there.
+        """
+        first = tuple(start + low for start, (low, _) in zip(self.inflow.first, ends, strict=True))
+        inflow = replace(self.inflow, first=first)
+        fire = None if self.fire is None else replace(self.fire, feed=np.pad(self.fire.feed, ends))
+        return replace(self, inflow=inflow, surroundings=surroundings, fire=fire)
 
     def _advected(self, values: Array, velocity: Velocity, solid: Mask | None) -> Array:
         return _without_traces(advect(values, velocity, self.dt, conserve=True), solid)
@@ -89,17 +100,17 @@ class Simulation:
         inside = on_faces(np.stack([from_inside] * 3, axis=-1))
         return moved.with_faces(u * share for u, share in zip(moved.faces, inside, strict=True))
 
-    def _with_forces(self, moved: Velocity, moment: Moment, entering: Moment, step: int) -> list[Array]:
+    def _with_forces(self, moved: Velocity, moment: Moment, step: int) -> list[Array]:
         """The velocity on faces after forces, inlets and fans, before the projection."""
         rising = lift(moment.density, moved).faces
         faces = []
-        for axis, ambient in enumerate(self.surroundings.air(moved, step * self.dt)):
+        for axis in range(3):
             driven = moved.faces[axis] + np.float32(self.dt * self.physics.buoyancy) * rising[axis]
             for fan_faces, fan_velocity in self.surroundings.blown:
-                driven = np.where(fan_faces[axis], np.float32(fan_velocity[axis]), driven)
-            driven = np.where(self.inflow.faces[axis], entering.velocity.faces[axis], driven)
-            faces.append(driven + ambient)
-        return faces
+                driven[fan_faces[axis]] = fan_velocity[axis]
+            faces.append(driven)
+        self.inflow.velocity_into(faces, step)
+        return [u + a for u, a in zip(faces, self.surroundings.air(moved, step * self.dt), strict=True)]
 
 
 def fit_simulation(
@@ -120,7 +131,7 @@ def fit_simulation(
     """
     inflow = find_inflow(moments, dt, marked)
     physics = fit_physics(moments, dt, inflow.voxels)
-    return Simulation(physics, inflow, surroundings or Surroundings(), dt, fit_fire(moments, dt))
+    return Simulation(physics, inflow.cropped(), surroundings or Surroundings(), dt, fit_fire(moments, dt))
 
 
 def _without_traces(density: Array, solid: Mask | None) -> Array:

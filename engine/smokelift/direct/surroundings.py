@@ -47,19 +47,22 @@ class Surroundings:
         The faces of every fan's voxels, with its velocity in m/s.
     obstacles
         Through which nothing passes; None without any.
+    first
+        Voxel at which the box begins, counted from the clip's box: turbulence stays where it is when the box grows.
     """
 
     wind: Vector = (0.0, 0.0, 0.0)
     turbulences: tuple[Turbulence, ...] = ()
     blown: tuple[tuple[FaceMasks, Vector], ...] = ()
     obstacles: Obstacles | None = None
+    first: tuple[int, ...] = (0, 0, 0)
 
     def air(self, like: Velocity, time: float) -> list[Array]:
         """The velocity in m/s that wind and turbulence have given to all air after a time in seconds, on faces."""
         share = np.float32(1 - math.exp(-time / RISE))
         faces = [np.full_like(component, speed) for component, speed in zip(like.faces, self.wind, strict=True)]
         for turbulence in self.turbulences:
-            eddies = turbulence.velocity(like, time)
+            eddies = turbulence.velocity(like, time, self.first)
             faces = [component + eddy for component, eddy in zip(faces, eddies, strict=True)]
         return [share * component for component in faces]
 

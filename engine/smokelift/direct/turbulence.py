@@ -51,13 +51,13 @@ class Turbulence:
     size: float
     seed: int = 0
 
-    def velocity(self, like: Velocity, time: float) -> list[Array]:
-        """The velocity in m/s on the faces of a grid, at a time in seconds."""
+    def velocity(self, like: Velocity, time: float, first: tuple[int, ...] = (0, 0, 0)) -> list[Array]:
+        """The velocity in m/s on the faces of a grid that begins at a voxel, at a time in seconds."""
         modes = self._modes
         turned = self.speed * np.sqrt(2 / MODES) * np.exp(1j * (modes.phase + modes.rate * time))
         faces = []
         for axis, component in enumerate(like.faces):
-            places = (np.arange(n) + (0.0 if d == axis else 0.5) for d, n in enumerate(component.shape))
+            places = (first[d] + np.arange(n) + (0.0 if d == axis else 0.5) for d, n in enumerate(component.shape))
             x, y, z = (
                 np.exp(1j * np.outer(along, like.voxel_size * place))
                 for along, place in zip(modes.number.T, places, strict=True)

@@ -19,7 +19,7 @@ from smokelift.output.layout import INDEX
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
 from smokelift.scene import Camera
-from smokelift.transport import Velocity, divergence
+from smokelift.transport import Velocity, divergence, faces_in
 
 SHORTEST = 4
 """Frames that a sequence needs to be continued, retimed or looped."""
@@ -93,9 +93,12 @@ def write_copy(
 ) -> Written:
     """Write the frame `source` of a sequence unchanged as the frame `number` of another, with further figures."""
     figures = {**sequence.figures(source), "origin": "clip", **further}
-    faces = sequence.velocity(source).faces
-    density, flame = sequence.density(source), sequence.flame(source)
-    writer.write(number, density, faces, figures, ready=sequence.files(source), flame=flame)
+    box = sequence.box(source)
+    part = box.slices_in(sequence.scene.domain)
+    density, flame = sequence.density(source)[part], sequence.flame(source)
+    faces = faces_in(sequence.velocity(source).faces, part)
+    flame = None if flame is None else flame[part]
+    writer.write(number, density, faces, figures, ready=sequence.files(source), flame=flame, box=box)
     return number, {**figures, "seconds_density": 0.0, "seconds_velocity": 0.0}
 
 

@@ -18,10 +18,18 @@ import numpy as np
 from smokelift.checks import shown
 from smokelift.output.atomic import atomic_path
 from smokelift.output.layout import INDEX
+from smokelift.scene import Domain
 from smokelift.scene.files import read_text
 
 FORMAT = 1
 """Version of the file's structure; any other is refused."""
+
+BOX = "box"
+"""Key in the figures of a frame whose files have a box of their own, with the keys of a scene's domain: smoke that
+is simulated outgrows the clip's."""
+
+SAME_SIZE = 1e-3
+"""By which part the sizes of voxels may differ that count as the same: places have so many digits at least."""
 
 FILES = ("path", "image")
 """Keys of a scene that hold paths."""
@@ -100,6 +108,25 @@ class Index:
     def numbers(self) -> tuple[int, ...]:
         """The finished frames' numbers, in order."""
         return tuple(sorted(map(int, self.frames)))
+
+    def box(self, number: int, otherwise: Domain) -> Domain:
+        """The box of a frame's files, where it is not the scene's.
+
+        Raises
+        ------
+        SequenceError
+            If its voxels are not those of the scene's.
+        """
+        given = self.frames[str(number)].get(BOX)
+        if given is None:
+            return otherwise
+        try:
+            box = Domain(**given)
+        except (TypeError, ValueError) as error:
+            raise SequenceError(f"{INDEX} is damaged: the box of frame {number}: {error}") from error
+        if abs(box.voxel_size / otherwise.voxel_size - 1) > SAME_SIZE:
+            raise SequenceError(f"{INDEX} is damaged: the box of frame {number} has voxels of another size")
+        return box
 
     def write(self, directory: Path) -> None:
         """Write the file; OSError if that fails."""

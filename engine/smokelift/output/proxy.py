@@ -22,7 +22,14 @@ LARGE = 4_000_000
 1.2 s (`tests/blender/heavy.py`, two cores), so of so many it reads 8 a second."""
 
 
-def write_proxy(path: Path, density: Array, domain: Domain, times: int = TIMES, flame: Array | None = None) -> None:
+def write_proxy(
+    path: Path,
+    density: Array,
+    domain: Domain,
+    times: int = TIMES,
+    flame: Array | None = None,
+    lattice: Domain | None = None,
+) -> None:
     """Write the coarse copy of a frame: its density, and its emission where it has one.
 
     Parameters
@@ -35,6 +42,8 @@ def write_proxy(path: Path, density: Array, domain: Domain, times: int = TIMES, 
         Their box.
     times
         How many times as large the voxels are.
+    lattice
+        As `write_vdb` takes it; a multiple of `times` voxels before the box, if it is not the box itself.
 
     Raises
     ------
@@ -44,7 +53,8 @@ def write_proxy(path: Path, density: Array, domain: Domain, times: int = TIMES, 
         If the file cannot be written.
     """
     rho, wide = coarser(density, domain, times)
-    write_vdb(path, rho, None, wide, flame=None if flame is None else coarser(flame, domain, times)[0])
+    fire = None if flame is None else coarser(flame, domain, times)[0]
+    write_vdb(path, rho, None, wide, flame=fire, lattice=None if lattice is None else _wide(lattice, times))
 
 
 def write_proxies(sequence: Sequence) -> Iterator[int]:
@@ -88,6 +98,12 @@ def coarser(values: Array, domain: Domain, times: int) -> tuple[Array, Domain]:
     padded = np.pad(values, [(0, count * times - n) for count, n in zip(counts, values.shape, strict=True)])
     x, y, z = counts
     coarse = padded.reshape(x, times, y, times, z, times).mean((1, 3, 5), dtype=np.float32)
+    return coarse, _wide(domain, times)
+
+
+def _wide(domain: Domain, times: int) -> Domain:
+    """The box of the cubes of a domain's voxels, which may be larger."""
+    x, y, z = (-(-n // times) for n in domain.resolution)
     edge = times * domain.voxel_size
-    a, b, c = (low + count * edge for low, count in zip(domain.min, counts, strict=True))
-    return coarse, Domain(domain.min, (a, b, c), (x, y, z))
+    a, b, c = (low + count * edge for low, count in zip(domain.min, (x, y, z), strict=True))
+    return Domain(domain.min, (a, b, c), (x, y, z))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -44,8 +44,15 @@ class ResumeState:
         write_arrays(path, arrays, compressed=False)
 
     @staticmethod
-    def read(path: Path, shape: tuple[int, int, int]) -> ResumeState | None:
-        """Read the state on a grid of so many voxels, or return None if no frame was finished.
+    def read(path: Path, shape_of: Callable[[int], tuple[int, int, int]]) -> ResumeState | None:
+        """Read the state, or return None if no frame was finished.
+
+        Parameters
+        ----------
+        path
+            The file.
+        shape_of
+            Gives the voxels of a frame, by its number.
 
         Raises
         ------
@@ -54,6 +61,7 @@ class ResumeState:
         """
         if not path.is_file():
             return None
+        shape = shape_of(int(read_arrays(path, {"number": ()})["number"]))
         expected: dict[str, Shape | None] = {"number": (), "density": shape, **dict.fromkeys(VELOCITY)}
         arrays = read_arrays(path, expected, others={_EXTRA: shape})
         number, density = arrays.pop("number"), arrays.pop("density")

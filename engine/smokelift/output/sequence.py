@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ from smokelift.output.layout import INDEX, frame_path
 from smokelift.output.vdb import read_flame, read_vdb
 from smokelift.output.viewer import Viewer
 from smokelift.render import Image
-from smokelift.scene import Camera, CompleteScene, completed, scene_from_dict
+from smokelift.scene import Camera, CompleteScene, Domain, completed, scene_from_dict
 from smokelift.scene.checks import file_path
 from smokelift.transport import Array, Velocity, face_shapes, on_faces
 
@@ -34,7 +34,7 @@ class Sequence:
     directory
         Where it lies.
     scene, settings
-        What it was made from.
+        What it was made from. Its domain holds the boxes of all frames.
     versions
         Of the software that made it.
     frames
@@ -57,6 +57,7 @@ class Sequence:
     complete: bool
     choices: tuple[Mapping[str, Any], ...]
     provenance: tuple[Mapping[str, Any], ...]
+    _boxes: Mapping[int, Domain]
     _figures: Mapping[str, Mapping[str, Any]]
     _checksums: Mapping[str, str]
 
@@ -75,17 +76,19 @@ class Sequence:
         index = Index.read(directory)
         try:
             scene = completed(scene_from_dict(index.scene, str(directory / INDEX), directory))
+            boxes = {number: index.box(number, scene.domain) for number in index.numbers}
         except ValueError as error:
             raise SequenceError(str(error)) from error
         return cls(
             directory,
-            scene,
+            replace(scene, domain=_around(scene.domain, boxes.values())),
             index.settings,
             index.versions,
             index.numbers,
             index.complete,
             tuple(index.choices),
             tuple(index.provenance),
+            boxes,
             index.frames,
             index.checksums,
         )
@@ -95,6 +98,17 @@ class Sequence:
         """Frames a second: those of the clip, or `USUAL_FPS` where the scene does not say them."""
         clip = self.scene.clip
         return (clip.fps if clip is not None else None) or USUAL_FPS
+
+    def box(self, number: int) -> Domain:
+        """Return the box of a frame's files. Beyond it, in the scene's domain, there is nothing.
+
+        Raises
+        ------
+        SequenceError
+            If there is no such frame.
+        """
+        self._check(number)
+        return self._boxes[int(number)]
 
     def density(self, number: int) -> Array:
         """Return the density of a frame, shape (nx, ny, nz): the NumPy twin's if there is one.
@@ -223,7 +237,8 @@ class Sequence:
         """The arrays of these names from a NumPy twin, or else from OpenVDB; emission where it is there."""
         self._check(number)
         twin, grids = (frame_path(self.directory, number, kind) for kind in ("npz", "vdb"))
-        shape = self.scene.domain.shape
+        whole, box = self.scene.domain, self._boxes[int(number)]
+        shape = box.shape
         path = twin if twin.is_file() else grids
         if not path.is_file():
             raise SequenceError(f"{path}: is missing")
@@ -232,11 +247,30 @@ class Sequence:
             if path is twin:
                 shapes = {"density": shape, **dict(zip(VELOCITY, face_shapes(shape), strict=True))}
                 others = {FLAME: shape} if FLAME in names else None
-                return read_arrays(path, {name: shapes[name] for name in names if name != FLAME}, others=others)
+                arrays = read_arrays(path, {name: shapes[name] for name in names if name != FLAME}, others=others)
+                return {name: _placed(values, box, whole) for name, values in arrays.items()}
             if FLAME in names:
-                flame = read_flame(path, shape)
+                flame = read_flame(path, whole)
                 return {} if flame is None else {FLAME: flame}
-            density, velocity = read_vdb(path, shape)
+            density, velocity = read_vdb(path, whole)
         except OSError as error:
             raise SequenceError(str(error)) from error
         return {"density": density, "velocity": velocity}
+
+
+def _around(domain: Domain, boxes: Iterable[Domain]) -> Domain:
+    """The domain, grown until it holds all boxes."""
+    below, above = [0, 0, 0], [0, 0, 0]
+    for box in boxes:
+        for axis, part in enumerate(box.slices_in(domain)):
+            below[axis] = max(below[axis], -part.start)
+            above[axis] = max(above[axis], part.stop - domain.resolution[axis])
+    return domain.grown(tuple(below), tuple(above)) if any(below + above) else domain
+
+
+def _placed(values: Array, box: Domain, whole: Domain) -> Array:
+    """The values of a box's voxels, or of its faces, in the whole domain; zero beyond."""
+    if box.shape == whole.shape:
+        return values
+    ends = [(part.start, count - part.stop) for part, count in zip(box.slices_in(whole), whole.resolution, strict=True)]
+    return np.pad(values, ends)

@@ -101,6 +101,7 @@ def write_vdb(
     velocity_name: str = "velocity",
     facts: Mapping[str, str | float] | None = None,
     whole_box: bool = False,
+    lattice: Domain | None = None,
 ) -> None:
     """Write one frame; the file appears whole or not at all.
 
@@ -127,6 +128,9 @@ def write_vdb(
         Metadata that every grid gets.
     whole_box
         Whether two opposite corners of the box are active although there is no smoke.
+    lattice
+        Whose first voxel has the index (0, 0, 0), with voxels in line with those of `domain`; by default `domain`. All
+        frames of a sequence share one, because a host mixes grids with one transform only.
 
     Raises
     ------
@@ -141,7 +145,9 @@ def write_vdb(
     rho = checked_volume(density, domain.shape, "density")
     box = _around(rho > 0.0, VELOCITY_MARGIN)
     near = None if velocity is None else _part(velocity, box, domain)
-    rho_box, corner = rho[box], tuple(side.start for side in box)
+    lattice = lattice or domain
+    first = domain.first_in(lattice)
+    rho_box, corner = rho[box], _index(box, first)
     grids = {"density": _fog(vdb, rho_box, corner)}
     if near is not None:
         grids[velocity_name] = vdb.Vec3SGrid()
@@ -149,9 +155,9 @@ def write_vdb(
     if flame is not None:
         emission = checked_volume(flame, domain.shape, FLAME)
         box = _around(emission > 0.0, 0)
-        grids[FLAME] = _fog(vdb, emission[box], tuple(side.start for side in box))
-    h = domain.voxel_size
-    x, y, z = (low + 0.5 * h for low in domain.min)
+        grids[FLAME] = _fog(vdb, emission[box], _index(box, first))
+    h = lattice.voxel_size
+    x, y, z = (low + 0.5 * h for low in lattice.min)
     for name, grid in grids.items():
         grid.name = name
         grid.creator = "Smokelift"
@@ -161,7 +167,8 @@ def write_vdb(
         grid.transform = vdb.createLinearTransform([[h, 0, 0, 0], [0, h, 0, 0], [0, 0, h, 0], [x, y, z, 1]])
         for fact, value in (facts or {}).items():
             grid[fact] = value
-        for corner in ((0, 0, 0), tuple(n - 1 for n in domain.shape)) if whole_box else ():
+        last = tuple(i + n - 1 for i, n in zip(first, domain.shape, strict=True))
+        for corner in (first, last) if whole_box else ():
             grid.getAccessor().setActiveState(corner, True)
     if metadata is not None:
         grids["density"][SETTINGS] = json.dumps(dict(metadata), sort_keys=True)
@@ -222,6 +229,11 @@ def _near(rho: Array, velocity: Array) -> Array:
     return np.clip(stored, -_LIMIT, _LIMIT, out=stored)
 
 
+def _index(box: tuple[slice, ...], first: tuple[int, ...]) -> tuple[int, ...]:
+    """The index of a box's first voxel in a file, where the domain's first has the index `first`."""
+    return tuple(side.start + start for side, start in zip(box, first, strict=True))
+
+
 def _around(marked: npt.NDArray[np.bool_], margin: int) -> tuple[slice, ...]:
     """The box around the marked voxels; all of the grid without any, as OpenVDB takes no empty array."""
     return box_around(marked, margin) if marked.any() else tuple(slice(0, n) for n in marked.shape)
@@ -236,15 +248,15 @@ def _ensure_written(path: Path) -> None:
         file.truncate(size)
 
 
-def read_vdb(path: str | Path, shape: tuple[int, int, int]) -> tuple[Array, Array]:
+def read_vdb(path: str | Path, domain: Domain) -> tuple[Array, Array]:
     """Read the density and the velocity that :func:`write_vdb` wrote.
 
     Parameters
     ----------
     path
         The ``.vdb`` file.
-    shape
-        Voxels along x, y, z of the domain.
+    domain
+        The box that is read, with voxels in line with those of the file.
 
     Returns
     -------
@@ -261,17 +273,25 @@ def read_vdb(path: str | Path, shape: tuple[int, int, int]) -> tuple[Array, Arra
     vdb = vdb_module()
     if not Path(path).is_file():
         raise FileNotFoundError(f"{path}: no such file")
-    density = np.zeros(shape, np.float32)
-    velocity = np.zeros((*shape, 3), np.float32)
+    density = np.zeros(domain.shape, np.float32)
+    velocity = np.zeros((*domain.shape, 3), np.float32)
     try:
         for name, array in (("density", density), ("velocity", velocity)):
-            vdb.read(str(path), gridname=name).copyToArray(array)
+            _copy(vdb.read(str(path), gridname=name), array, domain)
     except (RuntimeError, LookupError, TypeError) as error:
         raise OSError(f"{path}: is damaged or lacks density or velocity: {error}") from error
     return density, velocity
 
 
-def read_flame(path: str | Path, shape: tuple[int, int, int]) -> Array | None:
+def _copy(grid: Any, array: Array, domain: Domain) -> None:
+    """Copy the values of a grid in a box to an array of its voxels."""
+    origin = grid.transform.indexToWorld((0, 0, 0))
+    h = domain.voxel_size
+    corner = tuple(round((low + 0.5 * h - at) / h) for low, at in zip(domain.min, origin, strict=True))
+    grid.copyToArray(array, ijk=corner)
+
+
+def read_flame(path: str | Path, domain: Domain) -> Array | None:
     """Read the emission that :func:`write_vdb` wrote, radiance per metre, shape (nx, ny, nz); None if it wrote none.
 
     Raises
@@ -282,11 +302,11 @@ def read_flame(path: str | Path, shape: tuple[int, int, int]) -> Array | None:
     vdb = vdb_module()
     if not Path(path).is_file():
         raise FileNotFoundError(f"{path}: no such file")
-    flame = np.zeros(shape, np.float32)
+    flame = np.zeros(domain.shape, np.float32)
     try:
         if not any(grid.name == FLAME for grid in vdb.readAllGridMetadata(str(path))):
             return None
-        vdb.read(str(path), gridname=FLAME).copyToArray(flame)
+        _copy(vdb.read(str(path), gridname=FLAME), flame, domain)
     except (OSError, RuntimeError, LookupError, TypeError) as error:
         raise OSError(f"{path}: is damaged: {error}") from error
     return flame

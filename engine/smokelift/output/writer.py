@@ -7,6 +7,7 @@ at all. So a killed run leaves a directory that opens, and the same run can go o
 from __future__ import annotations
 
 import json
+import math
 import os
 import shutil
 from collections.abc import Mapping
@@ -23,13 +24,22 @@ from smokelift.output.archive import FLAME, VELOCITY, write_arrays
 from smokelift.output.atomic import DISK_FULL, atomic_path
 from smokelift.output.checksum import checksum
 from smokelift.output.images import write_image
-from smokelift.output.index import DirectoryBusyError, Index, Origins, SequenceError, difference, plain, without_folders
+from smokelift.output.index import (
+    BOX,
+    DirectoryBusyError,
+    Index,
+    Origins,
+    SequenceError,
+    difference,
+    plain,
+    without_folders,
+)
 from smokelift.output.layout import BACKGROUND, INDEX, LOCK, RESUME, frame_path, is_foreign, proxy_path
 from smokelift.output.lock import Lock
 from smokelift.output.proxy import LARGE, write_proxy
 from smokelift.output.resume import ResumeState
 from smokelift.output.vdb import VdbUnavailable, checked_volume, vdb_module, write_vdb
-from smokelift.scene import Background, CompleteScene, scene_to_dict
+from smokelift.scene import Background, CompleteScene, Domain, scene_to_dict
 from smokelift.transport import Array, Faces, Velocity, face_shapes
 
 
@@ -98,6 +108,10 @@ class SequenceWriter:
         """Numbers of the frames that need not be computed again, in order."""
         return self._index.numbers
 
+    def box(self, number: int) -> Domain:
+        """The box of a finished frame."""
+        return self._index.box(number, self._domain)
+
     def __enter__(self) -> SequenceWriter:
         self._kinds = written_kinds(self._npz)
         try:
@@ -141,6 +155,7 @@ class SequenceWriter:
         figures: Mapping[str, Any] | None = None,
         *,
         flame: npt.ArrayLike | None = None,
+        box: Domain | None = None,
         ready: Mapping[str, Path] | None = None,
         state: ResumeState | None = None,
     ) -> None:
@@ -158,6 +173,8 @@ class SequenceWriter:
             Numbers and text about the frame by name. Numbers that are not finite become null.
         flame : (nx, ny, nz), optional
             Emission of fire, radiance per metre, not negative; None where there can be none.
+        box
+            Of the frame, with voxels in line with the scene's domain; by default that. It is kept in the figures.
         ready
             Files that hold this frame already, by their kind ``"vdb"`` or ``"npz"``: they are copied.
         state
@@ -175,8 +192,10 @@ class SequenceWriter:
             raise ValueError(f"frame {number} cannot follow frame {self.finished[-1]}: a sequence has no gaps")
         if number < 0:
             raise ValueError(f"a frame's number must not be negative, as {number} is")
-        rho, faces = _checked(density, velocity_faces, self._domain.shape)
-        fire = None if flame is None else checked_volume(flame, self._domain.shape, FLAME)
+        box = box or self._domain
+        rho, faces = _checked(density, velocity_faces, box.shape)
+        fire = None if flame is None else checked_volume(flame, box.shape, FLAME)
+        own_box = {} if box == self._domain else {BOX: {"min": box.min, "max": box.max, "resolution": box.resolution}}
         self.state = None  # a run has gone on by now, and the arrays are large
         state = state or ResumeState(number, rho, faces)
         try:
@@ -186,10 +205,10 @@ class SequenceWriter:
                     with atomic_path(path) as aside:
                         shutil.copyfile(ready[kind], aside)
                 else:
-                    self._write_arrays(path, rho, faces, fire)
-            if "vdb" in self._kinds and rho.size >= LARGE:
-                write_proxy(proxy_path(self.directory, number), rho, self._domain, flame=fire)
-            frames = {**self._index.frames, str(number): plain(figures or {})}
+                    self._write_arrays(path, rho, faces, fire, box)
+            if "vdb" in self._kinds and math.prod(self._domain.shape) >= LARGE:  # of all frames or of none
+                write_proxy(proxy_path(self.directory, number), rho, box, flame=fire, lattice=self._domain)
+            frames = {**self._index.frames, str(number): plain({**(figures or {}), **own_box})}
             checksums = {**self._index.checksums, **{path.name: checksum([path]) for path in paths}}
             grown = replace(self._index, frames=frames, checksums=checksums)
             grown.write(self.directory)
@@ -199,13 +218,13 @@ class SequenceWriter:
         except OSError as error:
             raise self._failed(f"frame {number}", error) from error
 
-    def _write_arrays(self, path: Path, density: Array, faces: Faces, flame: Array | None) -> None:
+    def _write_arrays(self, path: Path, density: Array, faces: Faces, flame: Array | None, box: Domain) -> None:
         if path.suffix == ".npz":
             fire = {} if flame is None else {FLAME: flame}
             write_arrays(path, {"density": density, **dict(zip(VELOCITY, faces, strict=True)), **fire})
         else:
             velocity = Velocity(faces, self._domain.voxel_size)
-            write_vdb(path, density, velocity, self._domain, self._index.settings, flame)
+            write_vdb(path, density, velocity, box, self._index.settings, flame, lattice=self._domain)
 
     def _take_over(self) -> None:
         """Judge what is in the directory, and read what can be gone on from."""
@@ -233,7 +252,7 @@ class SequenceWriter:
         self._clear("*")
         frames = there.frames
         if not there.complete:
-            self.state = self._last_state()
+            self.state = self._last_state(there)
             last = self.state.number if self.state is not None else -1
             frames = {number: figures for number, figures in frames.items() if int(number) <= last}
         kept = {frame_path(self.directory, int(number), kind).name for number in frames for kind in ("vdb", "npz")}
@@ -246,9 +265,12 @@ class SequenceWriter:
         for leftover in self.directory.glob(f".{name}.*.tmp"):
             leftover.unlink(missing_ok=True)
 
-    def _last_state(self) -> ResumeState | None:
+    def _last_state(self, there: Index) -> ResumeState | None:
+        def shape_of(number: int) -> tuple[int, int, int]:
+            return there.box(number, self._domain).shape if str(number) in there.frames else self._domain.shape
+
         try:
-            return ResumeState.read(self.directory / RESUME, self._domain.shape)
+            return ResumeState.read(self.directory / RESUME, shape_of)
         except OSError as error:
             raise SequenceError(f"{error}; this run cannot be resumed, choose another directory") from error
 

@@ -121,6 +121,25 @@ class Domain(Box):
         (x, y, z), (a, b, c) = self.centre, (n * voxel_size / 2 for n in resolution)
         return Domain((x - a, y - b, z - c), (x + a, y + b, z + c), resolution)
 
+    def grown(self, below: tuple[int, ...], above: tuple[int, ...]) -> Domain:
+        """Return the domain with so many voxels more on its low sides and on its high sides, along x, y and z."""
+        h = self.voxel_size
+        a, b, c = (low - n * h for low, n in zip(self.min, below, strict=True))
+        d, e, f = (high + n * h for high, n in zip(self.max, above, strict=True))
+        x, y, z = (n + i + j for n, i, j in zip(self.resolution, below, above, strict=True))
+        return Domain((a, b, c), (d, e, f), (x, y, z))
+
+    def first_in(self, other: Box) -> tuple[int, int, int]:
+        """Return the voxel, counted from the low corner of another box, at which the domain begins."""
+        x, y, z = (round((low - start) / self.voxel_size) for low, start in zip(self.min, other.min, strict=True))
+        return x, y, z
+
+    def slices_in(self, other: Box) -> tuple[slice, slice, slice]:
+        """Return the part of a larger box's voxels that are the domain's."""
+        starts = self.first_in(other)
+        x, y, z = (slice(first, first + n) for first, n in zip(starts, self.resolution, strict=True))
+        return x, y, z
+
     def offsets(self, point: Vector) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Return the metres from a point to the voxels' centres along x, y and z, ready to be broadcast."""
         places = zip(self.min, point, self.resolution, strict=True)

@@ -119,6 +119,6 @@ def test_smoke_goes_around_a_mesh(tmp_path):
         assert figures["divergence"] < 3e-3
     made = Sequence.open(out)
     assert made.complete
-    density, inside = made.density(14), mesh.voxels(DOMAIN)
+    density, inside = made.density(14), mesh.voxels(made.scene.domain)
     assert not density[inside].any()
     assert density[~inside].any()

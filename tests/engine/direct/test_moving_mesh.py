@@ -7,7 +7,7 @@ import pytest
 
 from smokelift.direct import Continuation, Mesh, MovingMesh, continue_sequence, open_source
 from smokelift.direct.constraint import faces_between
-from smokelift.direct.obstacles import Obstacles
+from smokelift.direct.obstacles import Obstacles, require_place
 from smokelift.direct.physics import Physics
 from smokelift.direct.surroundings import Surroundings
 from smokelift.output.index import SequenceError
@@ -101,7 +101,7 @@ def test_numbered_files_are_one_obstacle(tmp_path):
     assert len(list(continue_sequence(source, out, Continuation(3, obstacles=(read,)), npz=True, resume=True))) == 1
     made = Sequence.open(out)
     for step in (1, 2, 3):
-        assert not made.density(10 + step)[moving.at(step).voxels(DOMAIN)].any()
+        assert not made.density(10 + step)[moving.at(step).voxels(made.scene.domain)].any()
     (tmp_path / "crate_0010.stl").unlink()
     with pytest.raises(ValueError, match=r"crate_0010\.stl: is no file"):
         MovingMesh.read(pattern)
@@ -113,5 +113,6 @@ def test_numbered_files_are_one_obstacle(tmp_path):
 def test_a_mesh_that_never_reaches_the_box_is_refused():
     far = cube((5.0, -0.3, 1.2), (5.5, 0.3, 1.7))
     with pytest.raises(ValueError, match="holds no voxel"):
-        Obstacles(DOMAIN, (along_x(far, 0.1, 5),))
+        require_place("obstacle", along_x(far, 0.1, 5), DOMAIN, DOMAIN)
+    require_place("obstacle", along_x(far, 0.1, 5), DOMAIN, DOMAIN.grown((0, 0, 0), (40, 0, 0)))
     assert Obstacles(DOMAIN, (along_x(far, -24.0, 5),)).at(1, DT) is None

@@ -279,7 +279,7 @@ def test_vdb_files_hold_the_same(run, plume) -> None:
         pytest.skip(str(missing))
     frames, out = run
     for frame in frames:
-        density, _ = read_vdb(out / f"smoke_{frame.number:04d}.vdb", plume.scene.domain.resolution)
+        density, _ = read_vdb(out / f"smoke_{frame.number:04d}.vdb", plume.scene.domain)
         np.testing.assert_allclose(density, frame.density, rtol=1e-3, atol=1e-6)
 
 

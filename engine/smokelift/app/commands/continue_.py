@@ -3,15 +3,38 @@
 from __future__ import annotations
 
 import argparse
+import math
 import time
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from smokelift.app.cost import affordable_room
 from smokelift.app.options import add_directed_options, finite, named_path, require_new
 from smokelift.app.progress import Reporter, say_frames
 from smokelift.checks import counted
-from smokelift.direct import Ball, Box, Continuation, Fan, Mesh, MovingMesh, Turbulence, continue_sequence, open_source
+from smokelift.direct import (
+    DISSOLVED,
+    ROOM,
+    Ball,
+    Box,
+    Continuation,
+    Fan,
+    Mesh,
+    MovingMesh,
+    Turbulence,
+    continue_sequence,
+    open_source,
+)
+from smokelift.direct.writing import Written
+from smokelift.output.index import Index
+from smokelift.output.layout import INDEX
+from smokelift.output.sequence import Sequence
 from smokelift.scene import SIDES
+
+NOTICED = 1e-3
+"""Share of the smoke that has to dissolve in a frame before its box's end to be worth a sentence."""
 
 
 def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
@@ -68,6 +91,14 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
         metavar="SIDE",
         help=f"sides of the box that become walls, of {', '.join(SIDES)}; those of the clip stay walls",
     )
+    parser.add_argument(
+        "--room",
+        type=finite,
+        default=ROOM,
+        metavar="TIMES",
+        help="the box grows with the smoke to at most so many times the size of the clip's; 1 keeps it "
+        "(default: %(default)g)",
+    )
     parser.set_defaults(run=run)
 
 
@@ -90,8 +121,10 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     continuation = _continuation(options)
     sequence = open_source(options.directory)
     require_new(options)
+    continuation = replace(continuation, room=_room(options, sequence, say))
     start = sequence.frames[-1] if continuation.start is None else continuation.start
     written = continue_sequence(sequence, options.out, continuation, npz=options.npz, resume=options.resume)
+    written = _with_note(written, continuation.room, say)
     total = start - sequence.frames[0] + 1 + continuation.frames
     say_frames(say, written, sequence.frames[0], total)
     seconds = time.monotonic() - began
@@ -101,12 +134,42 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     )
 
 
+def _room(options: argparse.Namespace, sequence: Sequence, say: Reporter) -> float:
+    """The room that is asked for, as far as memory allows; a run that goes on keeps its own."""
+    room: float = options.room
+    if options.resume and (options.out / INDEX).is_file():
+        return min(room, float(Index.read(options.out).settings.get("direct", {}).get("room", room)))
+    affordable = affordable_room(sequence.scene.domain.resolution)
+    if room > max(affordable, 1.0):
+        room = max(1.0, math.floor(10 * affordable) / 10)
+        say.note(
+            f"Memory limits the smoke's room: its box grows to {room:g} times the clip's at most, not to "
+            f"{options.room:g} times; close other programs, or continue a result with fewer voxels."
+        )
+    return room
+
+
+def _with_note(written: Iterable[Written], room: float, say: Reporter) -> Iterator[Written]:
+    """The frames, with one sentence when smoke first dissolves because its box cannot grow."""
+    said = False
+    for number, figures in written:
+        yield number, figures
+        if not said and figures.get(DISSOLVED, 0.0) > NOTICED:
+            said = True
+            say.note(
+                f"From frame {number} on the smoke dissolves before it reaches the end of its box, which cannot grow "
+                f"any more: it has {room:g} times the size of the clip's (--room), or a camera or a lamp is in the way."
+            )
+
+
 def _continuation(options: argparse.Namespace) -> Continuation:
     """What the options say."""
     if options.frames < 1:
         raise ValueError(f"--frames {options.frames}: there has to be 1 at least.")
     if not 0 <= options.fade <= options.frames:
         raise ValueError(f"--fade {options.fade}: expected 0 to {options.frames}, as many frames as are added.")
+    if options.room < 1:
+        raise ValueError(f"--room {options.room:g}: expected 1 or more, in boxes of the clip.")
     balls = [_ball("--ball", values) for values in options.ball]
     boxes = [Box(*zip(*(sorted(ends) for ends in zip(v[:3], v[3:], strict=True)), strict=True)) for v in options.box]
     return Continuation(
@@ -118,6 +181,7 @@ def _continuation(options: argparse.Namespace) -> Continuation:
         fans=tuple(Fan(_ball("--fan", values[:4]), tuple(values[4:])) for values in options.fan),
         obstacles=(*balls, *boxes, *map(_mesh, options.mesh)),
         closed=tuple(side for side in SIDES if side in options.closed),
+        room=options.room,
     )
 
 

@@ -1,0 +1,226 @@
+"""The box of a simulation: it grows with the smoke, up to a largest size, before whose sides the smoke dissolves.
+
+All boxes have the voxels of the clip's. A side moves outwards by whole blocks before smoke arrives at it, so that
+nothing is cut. A side that is a wall stays, and so does one beyond which the box would have too many voxels or hold a
+camera or a lamp.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from smokelift.direct.moment import Moment
+from smokelift.direct.surroundings import Surroundings
+from smokelift.scene import SIDES, Box, CompleteScene, Domain, EnvironmentLight, PointLight, Side
+from smokelift.scene.checks import Vector
+from smokelift.scene.domain import LONGEST, box_around
+from smokelift.transport import Array, Velocity, advect, at_centres
+
+BLOCK = 8
+"""Voxels by which a side moves: few steps change the box, and counts with small factors transform fast."""
+
+MARGIN = 4
+"""Voxels of clear air between smoke and an open side. Pressure is zero there, which bends the flow nearby."""
+
+SEEN = np.float32(1e-3)
+"""Share of the largest density above which smoke counts as there."""
+
+FADE = 0.25
+"""Share of the box's length over which smoke dissolves before a side that cannot move."""
+
+FADE_POWER = 2.0
+"""Power of the distance to such a side that is left of the smoke: its value and its slope end at zero."""
+
+EMERGING = 1.0
+"""Seconds after the clip in which smoke becomes dense that comes out of a side that had cut it. The clip shows none
+beyond, and smoke that came out at once would have a flat top."""
+
+
+Moves = tuple[tuple[int, int], tuple[int, int], tuple[int, int]]
+"""Voxels by which the low and the high side move outwards, along x, y and z."""
+
+
+@dataclass(frozen=True)
+class Growth:
+    """How far a box may grow.
+
+    Attributes
+    ----------
+    clip
+        The box of the clip.
+    closed
+        Sides that are walls.
+    voxels
+        Of the largest box.
+    outside
+        Points in metres that stay outside: cameras and lamps.
+    """
+
+    clip: Domain
+    closed: tuple[Side, ...]
+    voxels: int
+    outside: tuple[Vector, ...] = ()
+
+    def after(self, box: Domain, moment: Moment, dt: float) -> Domain:
+        """The box for the step that follows a moment, whose smoke may be near a side of its own."""
+        smoke = box_around(moment.density > SEEN * moment.density.max(), 0)
+        grown = box
+        for side, axis, is_high in _open(self.closed):
+            if smoke[axis].stop == 0:
+                break
+            fastest = float(np.abs(moment.velocity.faces[axis]).max()) * dt / box.voxel_size
+            clear = box.resolution[axis] - smoke[axis].stop if is_high else smoke[axis].start
+            blocks = math.ceil((MARGIN + fastest - clear) / BLOCK)
+            if blocks > 0 and self._fits(larger := _moved(grown, side, blocks)):
+                grown = larger
+        return grown
+
+    def around(self, box: Domain, thing: Box) -> Domain:
+        """The box, grown until it holds another; as it is where that would be too large."""
+        larger = box
+        for side, axis, is_high in _open(self.closed):
+            beyond = thing.max[axis] - box.max[axis] if is_high else box.min[axis] - thing.min[axis]
+            blocks = math.ceil(beyond / (BLOCK * box.voxel_size))
+            if blocks > 0:
+                larger = _moved(larger, side, blocks)
+        return larger if self._fits(larger) else box
+
+    def stopped(self, box: Domain) -> tuple[Side, ...]:
+        """The open sides that cannot move."""
+        return tuple(side for side, _, _ in _open(self.closed) if not self._fits(_moved(box, side, 1)))
+
+    def reach(self) -> Box:
+        """The box that holds every box there can be."""
+        times = self.voxels / math.prod(self.clip.resolution) - 1
+        low, high = list(self.clip.min), list(self.clip.max)
+        for _, axis, is_high in _open(self.closed):
+            way = times * (self.clip.max[axis] - self.clip.min[axis])
+            if is_high:
+                high[axis] += way
+            else:
+                low[axis] -= way
+        return Box((low[0], low[1], low[2]), (high[0], high[1], high[2]))
+
+    def _fits(self, box: Domain) -> bool:
+        small = math.prod(box.resolution) <= self.voxels and max(box.resolution) <= LONGEST
+        return small and not any(box.contains(point) for point in self.outside)
+
+
+def kept_outside(scene: CompleteScene) -> tuple[Vector, ...]:
+    """The places in metres of a scene's cameras and lamps: a renderer needs them outside the box."""
+    cameras = [scene.camera, *(view.camera for view in scene.views)]
+    eyes = [camera for camera in cameras if camera.type == "perspective"]
+    matrices = [matrix for camera in eyes for matrix in camera.matrices or (camera.matrix,)]
+    lights = [light for light in scene.lights if not isinstance(light, EnvironmentLight)]
+    lamps = [sample.position for light in lights for sample in light.samples() if isinstance(sample, PointLight)]
+    return (*((x[3], y[3], z[3]) for x, y, z, *_ in matrices), *lamps)
+
+
+def moves(box: Domain, larger: Domain) -> Moves:
+    """How many voxels the low side and the high side of a box move outwards to those of a larger one, of each axis."""
+    parts = box.slices_in(larger)
+    x, y, z = ((part.start, count - part.stop) for part, count in zip(parts, larger.resolution, strict=True))
+    return x, y, z
+
+
+def in_larger_box(moment: Moment, ends: Moves, before: Surroundings, after: Surroundings, time: float) -> Moment:
+    """A moment in a larger box.
+
+    Parameters
+    ----------
+    moment
+        The moment.
+    ends
+        See `moves`.
+    before, after
+        What is placed in its box, and in the larger one. The velocity of the air goes on as theirs, and what the smoke
+        has beside that as it is at the side.
+    time
+        Of the moment, in seconds.
+    """
+    velocity = moment.velocity
+    air = before.air(velocity, time)
+    x, y, z = (np.pad(u - a, ends, mode="edge") for u, a in zip(velocity.faces, air, strict=True))
+    flow = Velocity((x, y, z), velocity.voxel_size, velocity.closed)
+    faces = (u + a for u, a in zip(flow.faces, after.air(flow, time), strict=True))
+    flame = None if moment.flame is None else np.pad(moment.flame, ends)
+    return Moment(np.pad(moment.density, ends), flow.with_faces(faces), flame)
+
+
+def dissolved(moment: Moment, stopped: tuple[Side, ...], dt: float) -> Moment:
+    """A moment whose smoke has lost what it loses in a step on its way to sides that cannot move.
+
+    What is left of it goes with the distance to the side to the power `FADE_POWER`. So it is gone at the side however
+    fast it gets there, and what does not move towards it stays.
+    """
+    left = np.ones((), np.float32)
+    for side, axis, is_high in _open(()):
+        if side not in stopped:
+            continue
+        count = moment.density.shape[axis]
+        inside = (np.arange(count, dtype=np.float32) + 0.5).reshape([-1 if d == axis else 1 for d in range(3)])
+        distance = count - inside if is_high else inside
+        voxels = np.float32((1 if is_high else -1) * dt / moment.velocity.voxel_size)
+        moved = voxels * at_centres(moment.velocity.faces)[axis]
+        before, now = (np.minimum(d, FADE * count) for d in (distance + np.maximum(moved, 0), distance))
+        left = left * (now / before) ** np.float32(FADE_POWER)
+    return _thinned(moment, left)
+
+
+def emerged(moment: Moment, clip: tuple[slice, ...], cut: tuple[Side, ...], step: int, dt: float) -> Moment:
+    """A moment whose smoke is thin where it has just come out of sides of the clip's box that had cut it.
+
+    Parameters
+    ----------
+    moment
+        The moment.
+    clip
+        The clip's box in its voxels.
+    cut
+        Sides of the clip's box.
+    step, dt
+        Steps since the clip, and seconds of each.
+    """
+    missing = 1 - min(1.0, step * dt / EMERGING) ** 2
+    if not cut or missing == 0:
+        return moment
+    inside = np.zeros(moment.density.shape, np.float32)
+    inside[clip] = 1
+    from_inside = advect(inside, moment.velocity, dt, scheme="semi-lagrangian")
+    left = np.ones_like(inside)
+    for side, axis, is_high in _open(()):
+        if side in cut:
+            beyond = [slice(None)] * 3
+            beyond[axis] = slice(clip[axis].stop, None) if is_high else slice(None, clip[axis].start)
+            left[tuple(beyond)] = 1 - np.float32(missing) * from_inside[tuple(beyond)]
+    return _thinned(moment, left)
+
+
+def cut_sides(moment: Moment) -> tuple[Side, ...]:
+    """The sides of a moment's box at which there is smoke."""
+    seen = moment.density > SEEN * moment.density.max()
+    return tuple(side for side, axis, is_high in _open(moment.velocity.closed) if seen.take(-is_high, axis).any())
+
+
+def _thinned(moment: Moment, left: Array) -> Moment:
+    flame = None if moment.flame is None else moment.flame * left
+    return replace(moment, density=moment.density * left, flame=flame)
+
+
+def _open(closed: tuple[Side, ...]) -> Iterator[tuple[Side, int, bool]]:
+    """The sides that are no walls, each with its axis and whether it is a high one."""
+    for number, side in enumerate(SIDES):
+        if side not in closed:
+            yield side, number // 2, number % 2 == 1
+
+
+def _moved(box: Domain, side: Side, blocks: int) -> Domain:
+    """A box one side of which has moved outwards by blocks, a high one less where that makes the count whole blocks."""
+    axis, is_high = SIDES.index(side) // 2, SIDES.index(side) % 2
+    ends = [[0, 0, 0], [0, 0, 0]]
+    ends[is_high][axis] = blocks * BLOCK + (-box.resolution[axis] % BLOCK if is_high else 0)
+    return box.grown(tuple(ends[0]), tuple(ends[1]))

@@ -1,0 +1,163 @@
+"""The box that grows with the smoke: nothing is cut, nothing jumps, and its end has no edge."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from smokelift.direct import DISSOLVED, Ball, Continuation, Fan, Moment, Turbulence, continue_sequence, open_source
+from smokelift.direct.growth import (
+    BLOCK,
+    MARGIN,
+    Growth,
+    cut_sides,
+    dissolved,
+    emerged,
+    in_larger_box,
+    kept_outside,
+    moves,
+)
+from smokelift.direct.surroundings import Surroundings
+from smokelift.output.sequence import Sequence
+from smokelift.scene import PointLight
+from smokelift.transport import Velocity, advect
+from tests.engine.direct.rising import DOMAIN, DT, SCENE, at_rest, blob, write_plume
+
+ROOMY = Growth(DOMAIN, ("z-",), 20 * DOMAIN.resolution[0] * DOMAIN.resolution[1] * DOMAIN.resolution[2])
+
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory):
+    directory = tmp_path_factory.mktemp("source") / "smoke"
+    write_plume(directory)
+    return open_source(directory)
+
+
+def run(source, out, continuation, **options):
+    list(continue_sequence(source, out, continuation, npz=True, **options))
+    return Sequence.open(out)
+
+
+def blowing(speed: float, density: np.ndarray) -> Moment:
+    """Smoke that goes along x with all air."""
+    still = at_rest(density)
+    x, y, z = still.velocity.faces
+    return replace(still, velocity=still.velocity.with_faces((x + np.float32(speed), y, z)))
+
+
+def test_a_side_moves_before_smoke_arrives_there():
+    def grown(moment: Moment) -> tuple[tuple[int, int], ...]:
+        return moves(DOMAIN, ROOMY.after(DOMAIN, moment, DT))
+
+    small = blob((0.0, 0.0, 1.5), 0.1)
+    assert grown(at_rest(0 * small)) == grown(at_rest(small)) == ((0, 0),) * 3
+    near = np.zeros_like(small)
+    near[-MARGIN - 1, 8, 12] = 1.0
+    assert grown(at_rest(near)) == ((0, 0),) * 3
+    assert grown(at_rest(np.roll(near, 1, axis=0)))[0] == (0, BLOCK)
+    # fast smoke is expected
+    assert grown(blowing(2.5 * DOMAIN.voxel_size / DT, near))[0] == (0, BLOCK)
+    # the floor is a wall
+    assert grown(at_rest(blob((0.0, 0.0, 0.0), 0.1)))[2] == (0, 0)
+
+
+def test_a_box_stays_below_its_largest_size_and_before_cameras_and_lamps():
+    tight = replace(ROOMY, voxels=2 * 16 * 16 * 24)
+    assert tight.stopped(DOMAIN) == ()
+    box = tight.after(DOMAIN, at_rest(np.ones(DOMAIN.shape, np.float32)), DT)
+    assert np.prod(box.resolution) <= tight.voxels
+    assert set(tight.stopped(box)) == {"x-", "x+", "y-", "y+", "z+"}
+    lamp = PointLight((1.2, 0.0, 1.0), (1.0, 1.0, 1.0))
+    outside = kept_outside(replace(SCENE, lights=(*SCENE.lights, lamp)))
+    assert outside == (SCENE.camera.position, lamp.position)
+    assert replace(ROOMY, outside=outside).stopped(DOMAIN) == ("x+",)
+
+
+def test_a_larger_box_changes_nothing_where_the_smaller_was():
+    """Wind and turbulence go on beyond, so a growing box makes no difference to the air."""
+    clip, larger = DOMAIN, DOMAIN.grown((8, 0, 16), (0, 8, 8))
+    before, after = (
+        Surroundings((0.3, 0.0, 0.0), (Turbulence(0.5, 0.6),), first=box.first_in(clip)) for box in (clip, larger)
+    )
+    still = at_rest(blob())
+    moment = replace(still, velocity=still.velocity.with_faces(before.air(still.velocity, 0.5)), flame=still.density)
+    found = in_larger_box(moment, moves(clip, larger), before, after, 0.5)
+    part = clip.slices_in(larger)
+    np.testing.assert_array_equal(found.density[part], moment.density)
+    np.testing.assert_array_equal(found.flame[part], moment.density)
+    assert found.density.sum() == moment.density.sum()
+    for here, there in zip(found.velocity.faces, after.air(found.velocity, 0.5), strict=True):
+        np.testing.assert_allclose(here, there, atol=2e-5)
+
+
+def test_smoke_dissolves_softly_before_a_side_that_cannot_move():
+    """What goes there fades with the distance, at any speed, and is gone at the side; what stays is not touched."""
+    for speed in (0.5, 3.0):
+        moment = blowing(speed, np.ones(DOMAIN.shape, np.float32))
+        for _ in range(round(3 / (speed * DT))):  # smoke that comes in all the time
+            carried = advect(np.pad(moment.density, ((0, 0),) * 3), moment.velocity, DT)
+            carried[:2] = 1
+            moment = dissolved(replace(moment, density=carried), ("x+",), DT)
+        profile = moment.density[:, 8, 12]
+        assert (profile[:11] > 0.9).all()
+        assert profile[-1] < 0.1
+        assert np.abs(np.diff(profile)).max() < 0.5
+    still = at_rest(blob((0.8, 0.0, 1.0)))
+    assert dissolved(still, ("x+",), DT).density == pytest.approx(still.density)
+
+
+def test_smoke_that_the_clip_cut_comes_out_thinly_at_first():
+    larger = DOMAIN.grown((0, 0, 0), (0, 0, 8))
+    cut = np.ones(DOMAIN.shape, np.float32)
+    assert cut_sides(at_rest(cut)) == ("x-", "x+", "y-", "y+", "z+")
+    velocity = Velocity.zero(larger.shape, larger.voxel_size, ("z-",))
+    x, y, z = velocity.faces
+    z[:, :, 1:] = larger.voxel_size / DT
+    moment = Moment(np.pad(cut, moves(DOMAIN, larger)), velocity.with_faces((x, y, z)))
+    tops = []
+    for step in range(1, 30):
+        density = advect(moment.density, moment.velocity, DT)
+        density[:, :, 0] = 1
+        moment = emerged(replace(moment, density=density), DOMAIN.slices_in(larger), ("z+",), step, DT)
+        tops.append(moment.density[8, 8, 24:])
+    assert tops[0].max() < 0.01
+    assert np.abs(np.diff(tops[11])).max() < 0.2
+    assert tops[-1].min() > 0.5
+
+
+def test_smoke_in_wind_leaves_the_clips_box_uncut(source, tmp_path):
+    """The frames have boxes of their own, and open as one sequence; no smoke is lost, at a stop and a resumption too."""
+    continuation = Continuation(16, wind=(4.0, 0.0, 0.0), room=12)
+    made = run(source, tmp_path / "out", continuation)
+    assert made.scene.domain == made.box(26)
+    assert made.box(10) == source.scene.domain
+    assert made.density(10).shape == made.density(26).shape == made.scene.domain.shape
+    assert [part.stop for part in source.scene.domain.slices_in(made.scene.domain)][0] < made.scene.domain.shape[0]
+    beyond = made.density(26)[source.scene.domain.slices_in(made.scene.domain)[0].stop :]
+    assert beyond.sum() > 0.1 * made.density(26).sum()
+    seen = made.density(26) > 1e-2 * made.density(26).max()
+    assert not any(seen.take(side, axis).any() for axis in (0, 1) for side in (0, -1))
+    assert made.figures(26)[DISSOLVED] == 0
+    for number, _ in continue_sequence(source, tmp_path / "stopped", continuation, npz=True):
+        if number == 21:
+            break
+    stopped = run(source, tmp_path / "stopped", continuation, resume=True)
+    np.testing.assert_array_equal(stopped.density(26), made.density(26))
+    again = run(open_source(tmp_path / "out"), tmp_path / "again", Continuation(1))
+    np.testing.assert_array_equal(again.density(10)[again.box(10).slices_in(again.scene.domain)], source.density(10))
+    assert again.density(26).sum() == pytest.approx(made.density(26).sum())
+
+
+def test_without_room_the_smoke_dissolves(source, tmp_path):
+    made = run(source, tmp_path / "out", Continuation(16, wind=(4.0, 0.0, 0.0), room=1))
+    assert made.scene.domain == source.scene.domain
+    assert made.figures(26)[DISSOLVED] > 0
+    density = made.density(26).max(axis=(1, 2))
+    assert density[-1] < 0.1 * density.max()
+
+
+def test_a_fan_may_stand_beside_the_clips_box(source, tmp_path):
+    made = run(source, tmp_path / "out", Continuation(2, fans=(Fan(Ball((-1.6, 0, 1), 0.3), (2.0, 0, 0)),)))
+    assert made.scene.domain.min[0] <= -1.9
