@@ -19,7 +19,7 @@ import numpy.typing as npt
 from benchmarks.accuracy.scenes import KnownScene, baked_scene
 from benchmarks.direct.clips import density_error, picture_psnr, reconstructed_moment, true_moment
 from benchmarks.tables import markdown
-from smokelift.direct import Moment, fit_simulation
+from smokelift.direct import Moment, fit_simulation, spun_up
 from smokelift.direct.continuation import FITTED_MOMENTS
 from smokelift.output.images import eight_bit
 from smokelift.output.sheet import write_sheet
@@ -38,7 +38,9 @@ def ways(moments: list[Moment], frames: int, dt: float) -> Iterator[tuple[str, l
         density = advect(carried[-1].density, last.velocity, dt, conserve=True)
         carried.append(Moment(density, last.velocity))
     yield "carried", carried[1:]
-    simulation, simulated = fit_simulation(moments[-FITTED_MOMENTS:], dt), [last]
+    fitted = moments[-FITTED_MOMENTS:]
+    simulation = fit_simulation(fitted, dt)
+    simulated = [spun_up(simulation, fitted)]
     for step in range(1, frames + 1):
         simulated.append(simulation.next(simulated[-1], step))
     yield "simulated", simulated[1:]

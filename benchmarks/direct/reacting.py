@@ -16,7 +16,7 @@ from benchmarks.accuracy.scenes import baked_scene
 from benchmarks.direct.clips import true_moment
 from benchmarks.direct.continuation import tile
 from benchmarks.truth.scenes import BOX_MIN, BOX_SIZE
-from smokelift.direct import Ball, Mesh, MovingMesh, Turbulence, fit_simulation
+from smokelift.direct import Ball, Mesh, MovingMesh, Turbulence, fit_simulation, spun_up
 from smokelift.direct.constraint import Mask
 from smokelift.direct.obstacles import Obstacles
 from smokelift.direct.surroundings import Surroundings
@@ -65,7 +65,8 @@ def main() -> None:
     shown = [max(1, options.frames * part // 6) for part in (1, 3, 6)]
     columns = {}
     for name, around in cases.items():
-        simulation, moment, kept = fit_simulation(moments, truth.dt, surroundings=around), moments[-1], []
+        simulation = fit_simulation(moments, truth.dt, surroundings=around)
+        moment, kept = spun_up(simulation, moments), []
         for step in range(1, options.frames + 1):
             moment = simulation.next(moment, step)
             if step in shown:

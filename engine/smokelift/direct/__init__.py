@@ -1,13 +1,14 @@
 """Smoke after its clip: continued, retimed, looped, and made to react to wind, turbulence, fans and obstacles."""
 
 from smokelift.direct.continuation import DISSOLVED, ROOM, Continuation, continue_sequence
+from smokelift.direct.fitting import fit_simulation, spun_up
 from smokelift.direct.looping import loop_length, loop_sequence, usual_overlap
 from smokelift.direct.mesh import Mesh
 from smokelift.direct.moment import Moment, complete_velocity, read_moment
 from smokelift.direct.moving_mesh import MovingMesh
 from smokelift.direct.obstacles import Ball, Box
 from smokelift.direct.retiming import playback, retime_sequence
-from smokelift.direct.simulation import Simulation, fit_simulation
+from smokelift.direct.simulation import Simulation
 from smokelift.direct.surroundings import Fan
 from smokelift.direct.turbulence import Turbulence
 from smokelift.direct.writing import open_source
@@ -33,5 +34,6 @@ __all__ = [
     "playback",
     "read_moment",
     "retime_sequence",
+    "spun_up",
     "usual_overlap",
 ]

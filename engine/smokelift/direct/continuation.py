@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from smokelift.direct.constraint import faces_of
+from smokelift.direct.fitting import fit_simulation, spun_up
 from smokelift.direct.growth import (
     Growth,
     cut_sides,
@@ -23,7 +24,6 @@ from smokelift.direct.growth import (
 )
 from smokelift.direct.moment import Moment, read_moment
 from smokelift.direct.obstacles import Ball, Box, Obstacle, Obstacles, require_place
-from smokelift.direct.simulation import fit_simulation
 from smokelift.direct.surroundings import Fan, Surroundings
 from smokelift.direct.turbulence import Turbulence
 from smokelift.direct.writing import SHORTEST, Written, directed_writer, simulated_figures, write_copy
@@ -167,7 +167,7 @@ def _simulated(
     # the first frame has no velocity of its own
     moments = [read_moment(sequence, number) for number in kept[1:][-FITTED_MOMENTS:]]
     simulation = fit_simulation(moments, dt, sequence.scene.inflow(), _surroundings(continuation, clip, clip))
-    moment, state = moments[-1], writer.state
+    moment, state = spun_up(simulation, moments), writer.state
     del moments  # they are large
     moment = replace(moment, velocity=replace(moment.velocity, closed=growth.closed))
     cut = cut_sides(moment)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -54,6 +54,10 @@ class Inflow:
         """The moment that is replayed so many steps after the last one."""
         last = len(self.moments) - 1
         return self.moments[abs(last - step % (2 * last))] if last else self.moments[0]
+
+    def forwards(self) -> Inflow:
+        """The same from the first moment on, so that step n replays moment n."""
+        return replace(self, moments=self.moments[::-1])
 
     @property
     def box(self) -> tuple[slice, ...]:

@@ -17,16 +17,16 @@ Advection keeps the mass. There is no viscosity, and MacCormack's correction kee
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from smokelift.direct.constraint import Mask
-from smokelift.direct.fire import Fire, fit_fire
-from smokelift.direct.inflow import Inflow, find_inflow
+from smokelift.direct.fire import Fire
+from smokelift.direct.inflow import Inflow
 from smokelift.direct.moment import Moment
-from smokelift.direct.physics import Physics, fit_physics, lift
+from smokelift.direct.obstacles import Solid
+from smokelift.direct.physics import Physics, lift
 from smokelift.direct.surroundings import Surroundings
 from smokelift.transport import Array, Velocity, advect, on_faces, project
 
@@ -61,9 +61,7 @@ class Simulation:
     def next(self, moment: Moment, step: int) -> Moment:
         """Return the moment one step later; step 1 starts from the clip's last moment."""
         solid = self.surroundings.solid(step, self.dt)
-        moved = self._self_advected(moment.velocity, step)
-        driven = moved.with_faces(self._with_forces(moved, moment, step))
-        velocity = project(driven) if solid is None else solid.projected(driven)
+        velocity = self._driven(moment, step, solid)
         obstacle = None if solid is None else solid.voxels
         density = self._advected(moment.density, velocity, obstacle)
         density *= np.float32(math.exp(-self.physics.dissipation * self.dt))
@@ -71,7 +69,11 @@ class Simulation:
         flame = None
         if self.fire is not None and moment.flame is not None:
             flame = self.fire.after(self._advected(moment.flame, velocity, obstacle), obstacle)
-        return Moment(density, Velocity(velocity.faces, velocity.voxel_size, velocity.closed), flame)
+        return Moment(density, velocity, flame)
+
+    def velocity(self, moment: Moment, step: int) -> Velocity:
+        """The velocity of the moment one step later."""
+        return self._driven(moment, step, self.surroundings.solid(step, self.dt))
 
     def in_larger_box(self, ends: tuple[tuple[int, int], ...], surroundings: Surroundings) -> Simulation:
         """The same in a larger box.
@@ -87,6 +89,12 @@ class Simulation:
         inflow = replace(self.inflow, first=first)
         fire = None if self.fire is None else replace(self.fire, feed=np.pad(self.fire.feed, ends))
         return replace(self, inflow=inflow, surroundings=surroundings, fire=fire)
+
+    def _driven(self, moment: Moment, step: int, solid: Solid | None) -> Velocity:
+        moved = self._self_advected(moment.velocity, step)
+        driven = moved.with_faces(self._with_forces(moved, moment, step))
+        velocity = project(driven) if solid is None else solid.projected(driven)
+        return Velocity(velocity.faces, velocity.voxel_size, velocity.closed)
 
     def _advected(self, values: Array, velocity: Velocity, solid: Mask | None) -> Array:
         return _without_traces(advect(values, velocity, self.dt, conserve=True), solid)
@@ -111,27 +119,6 @@ class Simulation:
             faces.append(driven)
         self.inflow.velocity_into(faces, step)
         return [u + a for u, a in zip(faces, self.surroundings.air(moved, step * self.dt), strict=True)]
-
-
-def fit_simulation(
-    moments: Sequence[Moment], dt: float, marked: Mask | None = None, surroundings: Surroundings | None = None
-) -> Simulation:
-    """Fit forces, inlets and fire to the moments of a clip, for a simulation that goes on from them.
-
-    Parameters
-    ----------
-    moments
-        Consecutive ones, two at least.
-    dt
-        Time between them in seconds.
-    marked : (nx, ny, nz) bool, optional
-        Where smoke enters, if that is known.
-    surroundings
-        What is placed around the smoke.
-    """
-    inflow = find_inflow(moments, dt, marked)
-    physics = fit_physics(moments, dt, inflow.voxels)
-    return Simulation(physics, inflow.cropped(), surroundings or Surroundings(), dt, fit_fire(moments, dt))
 
 
 def _without_traces(density: Array, solid: Mask | None) -> Array:
