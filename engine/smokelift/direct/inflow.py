@@ -120,7 +120,8 @@ def _detect_inlets(moments: Sequence[Moment], dt: float) -> Mask:
     halves = [_means(part).mean for part in (changes[:middle], changes[middle:]) if part]
     densest = changes[-1][1]
     entering = SourceDetection().weight(means, densest > FAINT * densest.max()) < MOTION
-    return _strongest_inlets(entering, means.mean, np.minimum.reduce(halves))
+    given = np.mean([_given_away(moment) for moment in moments], axis=0)
+    return _strongest_inlets(entering, means.mean, np.minimum.reduce(halves), given)
 
 
 def _unexplained(before: Moment, after: Moment, dt: float) -> tuple[Array, Array]:
@@ -138,11 +139,28 @@ def _means(changes: Sequence[tuple[Array, Array]]) -> ResidualMeans:
     return means
 
 
-def _strongest_inlets(entering: Mask, strength: Array, lasting: Array) -> Mask:
-    """The connected components of voxels (nx, ny, nz) in which most smoke enters all the time."""
+def _given_away(moment: Moment) -> Array:
+    """Smoke that flows from each voxel into others of the box, less what flows from there into it, times m/s."""
+    given = np.zeros_like(moment.density)
+    for axis, component in enumerate(moment.velocity.faces):
+        density, flow = np.moveaxis(moment.density, axis, 0), np.moveaxis(component, axis, 0)[1:-1]
+        through = 0.5 * flow * (density[1:] + density[:-1])
+        along = np.moveaxis(given, axis, 0)
+        along[:-1] += through
+        along[1:] -= through
+    return given
+
+
+def _strongest_inlets(entering: Mask, strength: Array, lasting: Array, given: Array) -> Mask:
+    """The connected components of voxels (nx, ny, nz) in which most smoke enters all the time, and goes into the box.
+
+    Where smoke gathers before it leaves the box, more appears than velocities explain as well; it flows in from there.
+    """
     labels, count = ndimage.label(entering)
     if count == 0:
         return entering
-    sums, lasting_sums = (ndimage.sum_labels(each, labels, np.arange(1, count + 1)) for each in (strength, lasting))
-    kept: Mask = np.isin(labels, 1 + np.flatnonzero(lasting_sums >= PROMINENT * sums.max()))
+    numbers = np.arange(1, count + 1)
+    sums, lasting_sums, given_sums = (ndimage.sum_labels(each, labels, numbers) for each in (strength, lasting, given))
+    sums = np.where(given_sums > 0, sums, 0)
+    kept: Mask = np.isin(labels, numbers[(sums > 0) & (lasting_sums >= PROMINENT * sums.max())])
     return kept

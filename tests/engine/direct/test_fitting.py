@@ -98,6 +98,17 @@ def test_what_enters_at_changing_places_is_no_inlet():
     assert not find_inflow([replace(rest, density=density) for density in grown], DT).voxels.any()
 
 
+def test_where_smoke_gathers_before_it_leaves_is_no_inlet():
+    """Too little of what rises to an open side goes out in a reconstruction, so that there is more than comes."""
+    rising = [np.zeros_like(component) for component in at_rest(blob()).velocity.faces]
+    rising[2][:] = 0.2
+    top = blob((0.0, 0.0, 2.9))
+    moments = [Moment(np.float32(1 + 0.2 * number) * top, Velocity(rising, DOMAIN.voxel_size)) for number in range(8)]
+    assert not find_inflow(moments, DT).voxels.any()
+    sinking = [replace(m, velocity=m.velocity.with_faces(-u for u in m.velocity.faces)) for m in moments]
+    assert find_inflow(sinking, DT).voxels.any()
+
+
 def test_an_inlet_replays_its_moments_without_a_jump():
     moments = plume()[:4]
     inflow = Inflow(np.ones(DOMAIN.shape, bool), moments)
