@@ -9,7 +9,7 @@ the moment before to this one:
 where a is the ambient velocity: wind and turbulence, which all air has in addition to the flow. Outside the box there
 is nothing else.
 
-Buoyancy b and dissipation d are those of the clip (`smokelift.direct.physics`), as are what enters
+Buoyancy b and dissipation d are those of the clip (`smokelift.direct.fitting`), as are what enters
 (`smokelift.direct.inflow`) and how fire burns (`smokelift.direct.fire`), which lifts nothing beside what b has of it.
 Advection keeps the mass. There is no viscosity, and MacCormack's correction keeps the eddies that the clip has.
 """
