@@ -1,7 +1,7 @@
 """Smoke after its clip: continued, retimed, looped, and made to react to wind, turbulence, fans and obstacles."""
 
 from smokelift.direct.continuation import DISSOLVED, ROOM, Continuation, continue_sequence
-from smokelift.direct.looping import loop_length, loop_sequence, usual_overlap
+from smokelift.direct.looping import loop_length, loop_sequence, steady_part, usual_overlap
 from smokelift.direct.mesh import Mesh
 from smokelift.direct.moment import Moment, complete_velocity, read_moment
 from smokelift.direct.moving_mesh import MovingMesh
@@ -33,5 +33,6 @@ __all__ = [
     "playback",
     "read_moment",
     "retime_sequence",
+    "steady_part",
     "usual_overlap",
 ]

@@ -158,7 +158,7 @@ def _with_note(written: Iterable[Written], room: float, say: Reporter) -> Iterat
             said = True
             say.note(
                 f"From frame {number} on the smoke dissolves before it reaches the end of its box, which cannot grow "
-                f"any more: it has {room:g} times the size of the clip's (--room), or a camera or a lamp is in the way."
+                f"any more: give it more --room than {room:g}, or move a camera or a lamp that is in its way."
             )
 
 
