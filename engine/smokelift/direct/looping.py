@@ -47,21 +47,21 @@ def steady_part(sequence: Sequence, overlap: int | None = None) -> tuple[int, in
     overlap
         Frames that the start and the end share; None for `usual_overlap`.
     """
+    whole = len(sequence.frames)
+    shortest = max(SHORTEST, math.ceil(whole / 2), 2 * (overlap or 0))
+    if shortest >= whole:
+        return sequence.frames[0], sequence.frames[-1]
     profiles = [_profile(sequence.density(number)) for number in sequence.frames]
-    whole = len(profiles)
-    best: tuple[float, int, int] | None = None
-    for count in range(whole, min(whole, max(SHORTEST, math.ceil(whole / 2), 2 * (overlap or 0))) - 1, -1):
+    parts: list[tuple[float, int, int]] = []
+    for count in range(whole, shortest - 1, -1):
         shared = usual_overlap(count) if overlap is None else overlap
-        middle, length = shared // 2, count - shared
-        changes = [
-            (_change(profiles[i + middle], profiles[min(i + middle + length, whole - 1)]), i, i + count - 1)
-            for i in range(whole - count + 1)
-        ]
-        best = min([*changes, *([best] if best else [])])
-        if best[0] <= STEADY:
+        for first in range(whole - count + 1):
+            middle = first + shared // 2
+            parts.append((_change(profiles[middle], profiles[middle + count - shared]), first, first + count - 1))
+        if min(parts)[0] <= STEADY:
             break
-    assert best is not None
-    return sequence.frames[best[1]], sequence.frames[best[2]]
+    _, first, last = min(parts)
+    return sequence.frames[first], sequence.frames[last]
 
 
 def usual_overlap(count: int) -> int:
