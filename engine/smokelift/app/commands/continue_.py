@@ -96,8 +96,7 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
         type=finite,
         default=ROOM,
         metavar="TIMES",
-        help="the box grows with the smoke to at most so many times the size of the clip's; 1 keeps it "
-        "(default: %(default)g)",
+        help="the box grows with the smoke to at most so many times the size of the clip's; 1 keeps it",
     )
     parser.set_defaults(run=run)
 
