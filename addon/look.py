@@ -40,6 +40,7 @@ class Look:
     color: tuple[float, float, float] = (1.0, 1.0, 1.0)
     edge_contrast: float = 1.0
     absorption_color: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    evaporation: float = 0.0
     anisotropy: float | None = None
 
     def inputs(self) -> dict[str, Any]:
@@ -50,20 +51,21 @@ class Look:
             "Color": (*self.color, 1.0),
             "Edge Contrast": self.edge_contrast,
             "Absorption Color": (*self.absorption_color, 1.0),
+            "Evaporation": self.evaporation,
         }
         return values if self.anisotropy is None else values | {"Anisotropy": self.anisotropy}
 
 
 # Steam and mist are droplets of water, which absorb no light. One droplet scatters it forward (anisotropy about 0.85);
 # many make it lose its direction, and a render that follows it to the first one only would show them black: with 0.25
-# the lamp behind the camera gives half as much light as with 0, and the lamp before it twice as much. Dry air takes
-# thin steam away, so its edges are sharp.
+# the lamp behind the camera gives half as much light as with 0, and the lamp before it twice as much. Steam is dense
+# where it comes out, and dry air takes it away as it rises, from its edges inwards.
 PRESETS = {
     "SMOKE": ("Smoke", "As in the clip", Look()),
     "STEAM": (
         "Steam",
-        "White and thin, gone at its edges, bright against the light",
-        Look(density=0.6, brightness=100.0, edge_contrast=1.5, anisotropy=0.25),
+        "White where it comes out, dries up as it rises, bright against the light",
+        Look(density=1.2, brightness=100.0, edge_contrast=1.3, evaporation=3.0, anisotropy=0.25),
     ),
     "SOOT": ("Soot", "Black and thick", Look(density=2.5, color=(0.05, 0.045, 0.04))),
     "DUST": (
@@ -97,6 +99,15 @@ _INPUTS = (
     Input(
         "Absorption Color", "NodeSocketColor", "Color of the light that gets through the smoke", (0.0, 0.0, 0.0, 1.0)
     ),
+    Input(
+        "Evaporation",
+        "NodeSocketFloat",
+        "Smoke that is gone at the top of the clip's box, in Edge Densities: the higher it is the more of it, from its "
+        "edges inwards",
+        0.0,
+        0.0,
+        1e3,
+    ),
     Input("Anisotropy", "NodeSocketFloat", "Forward scattering above 0, backward below; fitted", 0.0, -1.0, 1.0),
     Input("Extinction", "NodeSocketFloat", "Per metre of smoke of density 1; fitted to the clip", 1.0, 0.0, 1e9),
     Input("Albedo", "NodeSocketColor", "Scattered share of the extinction; fitted", (0.9, 0.9, 0.9, 1.0)),
@@ -108,6 +119,8 @@ _INPUTS = (
         1e-9,
         1e9,
     ),
+    Input("Floor", "NodeSocketFloat", "Height in the smoke where evaporation begins; fitted", 0.0, -1e6, 1e6),
+    Input("Height", "NodeSocketFloat", "From there to where all of it counts; fitted", 1.0, 1e-6, 1e6),
     Input(
         "Flame Strength",
         "NodeSocketFloat",
@@ -159,11 +172,14 @@ def fit_look(smoke: bpy.types.Object, scene: dict[str, Any]) -> None:
         "Anisotropy": medium["anisotropy"],
         # smoke that could fill the box and would still let 1/e of the light through
         "Edge Density": 1.0 / (medium["extinction"] * width),
+        "Floor": domain["min"][2],
+        "Height": domain["max"][2] - domain["min"][2],
     }
     if "flame_color" in medium:
         fitted["Flame Color"] = (*medium["flame_color"], 1.0)
     for name, value in fitted.items():
-        set_unless_changed(material, _key(name), node.inputs[name], "default_value", value)
+        if name in node.inputs:  # a file's own node group may be older
+            set_unless_changed(material, _key(name), node.inputs[name], "default_value", value)
 
 
 def material_of(smoke: bpy.types.Object) -> bpy.types.Material | None:
@@ -206,7 +222,8 @@ def use_preset(smoke: bpy.types.Object, name: str, fitted_anisotropy: float) -> 
     socket = node.inputs["Anisotropy"]
     set_and_remember(material_of(smoke), _key(socket.name), socket, "default_value", fitted_anisotropy)
     for key, value in PRESETS[name][2].inputs().items():
-        node.inputs[key].default_value = value
+        if key in node.inputs:
+            node.inputs[key].default_value = value
     return True
 
 
@@ -254,6 +271,11 @@ class _Formulas:
         """The values of a grid of the Volume; 0 where it has none of that name."""
         return add_node(self._tree, "ShaderNodeAttribute", 0, row, attribute_name=name).outputs["Fac"]
 
+    def height(self, column: int, row: int) -> bpy.types.NodeSocket:
+        """The height in the smoke's own space."""
+        place = add_node(self._tree, "ShaderNodeTexCoord", column, row).outputs["Object"]
+        return add_node(self._tree, "ShaderNodeSeparateXYZ", column, row + 1, place).outputs["Z"]
+
     def math(self, operation: str, column: int, row: int, a: Any, b: Any) -> bpy.types.NodeSocket:
         """A number of two numbers."""
         return add_node(self._tree, "ShaderNodeMath", column, row, a, b, operation=operation).outputs[0]
@@ -294,14 +316,23 @@ def _build(tree: bpy.types.NodeTree) -> None:
 
 
 def _extinction(formulas: _Formulas, source: Any) -> bpy.types.NodeSocket:
-    """The extinction times density x min(density / edge density, 1) ^ (edge contrast - 1)."""
-    density = formulas.grid("density", 0)
+    """The extinction times density x min(density / edge density, 1) ^ (edge contrast - 1), of what is not dried up."""
+    density = _remaining(formulas, source)
     ratio = formulas.math("DIVIDE", 1, 0, density, source["Edge Density"])
     thin = formulas.math("MAXIMUM", 2, 0, formulas.math("MINIMUM", 1, 1, ratio, 1.0), LEAST_RATIO)
     exponent = formulas.math("SUBTRACT", 2, 1, source["Edge Contrast"], 1.0)
     shape = formulas.math("POWER", 3, 0, thin, exponent)
     amount = formulas.math("MULTIPLY", 3, 1, source["Extinction"], source["Density"])
     return formulas.math("MULTIPLY", 5, 0, formulas.math("MULTIPLY", 4, 0, density, shape), amount)
+
+
+def _remaining(formulas: _Formulas, source: Any) -> bpy.types.NodeSocket:
+    """The density less evaporation x edge density x (z - floor) / height: high smoke is old, thin smoke goes first."""
+    above = formulas.math("SUBTRACT", -2, 2, formulas.height(-3, 2), source["Floor"])
+    age = formulas.math("MAXIMUM", -1, 2, formulas.math("DIVIDE", -1, 3, above, source["Height"]), 0.0)
+    most = formulas.math("MULTIPLY", -2, 3, source["Evaporation"], source["Edge Density"])
+    left = formulas.math("SUBTRACT", 0, 1, formulas.grid("density", 0), formulas.math("MULTIPLY", 0, 2, age, most))
+    return formulas.math("MAXIMUM", 1, 2, left, 0.0)
 
 
 def _albedo(formulas: _Formulas, source: Any) -> bpy.types.NodeSocket:

@@ -2,7 +2,7 @@
 
 from smokelift.direct.continuation import DISSOLVED, ROOM, Continuation, continue_sequence
 from smokelift.direct.fitting import fit_simulation, spun_up
-from smokelift.direct.looping import loop_length, loop_sequence, usual_overlap
+from smokelift.direct.looping import loop_length, loop_sequence, steady_part, usual_overlap
 from smokelift.direct.mesh import Mesh
 from smokelift.direct.moment import Moment, complete_velocity, read_moment
 from smokelift.direct.moving_mesh import MovingMesh
@@ -35,5 +35,6 @@ __all__ = [
     "read_moment",
     "retime_sequence",
     "spun_up",
+    "steady_part",
     "usual_overlap",
 ]

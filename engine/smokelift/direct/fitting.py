@@ -21,7 +21,6 @@ from itertools import pairwise
 import numpy as np
 from scipy import optimize
 
-from smokelift.density.halves import any_of_two
 from smokelift.direct.constraint import Mask
 from smokelift.direct.fire import fit_fire
 from smokelift.direct.inflow import Inflow, find_inflow
@@ -97,7 +96,7 @@ def _buoyancy(moments: Sequence[Moment], dt: float, inlets: Mask, dissipation: f
     if len(moments) < MIN_MOMENTS or not all(moment.density.any() for moment in moments):
         return 0.0
     while max(moments[0].density.shape) > COARSE:
-        moments, inlets = [_halved(moment) for moment in moments], any_of_two(inlets)
+        moments, inlets = [_halved(moment) for moment in moments], _any_of_two(inlets)
     half = len(moments) // 2
     still = Simulation(Physics(0.0, dissipation), Inflow(inlets, moments).cropped(), Surroundings(), dt)
     goal = _height(moments[-1].density)
@@ -153,3 +152,10 @@ def _pairs(values: Array, axis: int) -> Array:
     """Means of pairs along an axis of even length."""
     count = values.shape[axis]
     return 0.5 * (values.take(range(0, count, 2), axis) + values.take(range(1, count, 2), axis))
+
+
+def _any_of_two(mask: Mask) -> Mask:
+    """Whether any of two voxels of a mask (nx, ny, nz) along every axis is marked."""
+    for axis in range(3):
+        mask = np.logical_or.reduceat(mask, range(0, mask.shape[axis], 2), axis)
+    return mask

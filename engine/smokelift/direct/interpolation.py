@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TypeVar
 
 import numpy as np
@@ -10,12 +11,15 @@ from smokelift.direct.moment import Moment
 from smokelift.transport import Array, Velocity, advect, project
 
 Carried = TypeVar("Carried", Array, Velocity)
+Mix = Callable[[Array, Array, float], Array]
 
 RESOLVED = 1e-6
 """Nearer than this to 0 or 1 the result is one of the two moments itself."""
 
 
-def interpolate(before: Moment, after: Moment, motion: Velocity, dt: float, share: float) -> Moment:
+def interpolate(
+    before: Moment, after: Moment, motion: Velocity, dt: float, share: float, mix: Mix | None = None
+) -> Moment:
     """The smoke at a share of the time from one moment to another.
 
     The first moment is advected forwards by its part of the time, the second backwards by the rest, and the two are
@@ -32,6 +36,8 @@ def interpolate(before: Moment, after: Moment, motion: Velocity, dt: float, shar
         Seconds from the one to the other.
     share
         0 for the first, 1 for the second.
+    mix
+        Mixes what of density and of emission is carried from both, by the share; linearly if it is None.
     """
     if share < RESOLVED:
         return before
@@ -41,7 +47,7 @@ def interpolate(before: Moment, after: Moment, motion: Velocity, dt: float, shar
 
     def blended(first: Array, second: Array) -> Array:
         forwards = advect(first, midway, share * dt, conserve=True)
-        return _blend(forwards, advect_back(second, midway, (1 - share) * dt), share)
+        return (mix or _blend)(forwards, advect_back(second, midway, (1 - share) * dt), share)
 
     density = blended(before.density, after.density)
     flame = None if before.flame is None or after.flame is None else blended(before.flame, after.flame)

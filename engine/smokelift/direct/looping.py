@@ -2,21 +2,66 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
+
+import numpy as np
 
 from smokelift.direct.interpolation import interpolate
 from smokelift.direct.moment import Moment, read_moment
 from smokelift.direct.writing import SHORTEST, Written, directed_writer, simulated_figures, write_copy
 from smokelift.output.sequence import Sequence
-from smokelift.transport import Velocity
+from smokelift.scene import SIDES, Side
+from smokelift.transport import Array, Velocity
 from smokelift.velocity import estimate_velocity
 
 LONGEST_OVERLAP = 24
 """Frames that the start and the end of a loop share, at most, unless said otherwise. In a second the way from the one
 to the other is slow beside the smoke's own motion."""
+
+
+TINY = 1e-20
+"""Keeps quotients of no smoke finite."""
+
+BORDER, BORDER_FACTOR = 0.2, 16.0
+"""Share of the box's length before an open side where smoke of one end alone goes sooner, and how many times the usual
+density is at the side: smoke of that density is gone there after a tenth of the overlap."""
+
+STEADY = 0.15
+"""Share of the smoke that may be elsewhere, in profiles along the axes, after a loop that counts as steady."""
+
+
+def steady_part(sequence: Sequence, overlap: int | None = None) -> tuple[int, int]:
+    """Return the first and the last frame of the longest part in which the smoke is steady.
+
+    Where it is in none, of the parts that are half as long as the sequence or longer, the one in which it is most so.
+
+    Parameters
+    ----------
+    sequence
+        See `smokelift.direct.writing.open_source`.
+    overlap
+        Frames that the start and the end share; None for `usual_overlap`.
+    """
+    whole = len(sequence.frames)
+    shortest = max(SHORTEST, math.ceil(whole / 2), 2 * (overlap or 0))
+    if shortest >= whole:
+        return sequence.frames[0], sequence.frames[-1]
+    profiles = [_profile(sequence.density(number)) for number in sequence.frames]
+    parts: list[tuple[float, int, int]] = []
+    for count in range(whole, shortest - 1, -1):
+        shared = usual_overlap(count) if overlap is None else overlap
+        for first in range(whole - count + 1):
+            middle = first + shared // 2
+            parts.append((_change(profiles[middle], profiles[middle + count - shared]), first, first + count - 1))
+        if min(parts)[0] <= STEADY:
+            break
+    _, first, last = min(parts)
+    return sequence.frames[first], sequence.frames[last]
 
 
 def usual_overlap(count: int) -> int:
@@ -50,8 +95,9 @@ def loop_sequence(
     """Write a part of a sequence so that its last frame leads to its first.
 
     The part overlaps with its own start. In the overlap the motion from the last density to the first is estimated, the
-    last frames are advected along it and the first ones back, and the two are blended. So shapes move to where they
-    have to be, and do not fade out in one place and in at another.
+    last frames are advected along it and the first ones back, and the two are mixed. So shapes move to where they
+    have to be, and do not fade out in one place and in at another. Smoke that only one of them has comes and goes by
+    its edges.
 
     Parameters
     ----------
@@ -113,6 +159,70 @@ def seam(end: Moment, start: Moment, share: float, duration: float) -> Moment:
     else:
         velocity = end.velocity
         way = estimate_velocity(end.density, start.density, duration, velocity.voxel_size, closed=velocity.closed)
-    moment = interpolate(end, start, way, duration, share)
+    mix = partial(mix_by_edges, closed=end.velocity.closed)
+    moment = interpolate(end, start, way, duration, share, mix)
     faces = [u + w for u, w in zip(moment.velocity.faces, way.faces, strict=True)]
     return replace(moment, velocity=Velocity((faces[0], faces[1], faces[2]), way.voxel_size, way.closed))
+
+
+def mix_by_edges(end: Array, start: Array, share: float, closed: tuple[Side, ...] = ()) -> Array:
+    """Mix two densities so that neither shows through the other.
+
+    Where both are alike it is a linear mix. Where one alone has smoke, the thin of it goes first and comes last, as air
+    dissolves smoke, and no shape becomes a ghost of itself. Each has the weight
+
+        w = (1 - s) a^2 / ((1 - s) a^2 + s (b^2 + (c d)^2)),    d = |a - b| / (a + b),
+
+    of density a beside b of the other, with the usual density c, more near open sides of the box: what rises out of it
+    is gone before it shows where the box ends. The mass changes linearly.
+
+    Parameters
+    ----------
+    end, start : (nx, ny, nz)
+        Not negative.
+    share
+        0 for the first, 1 for the second.
+    closed
+        Sides of the box that are walls.
+    """
+    of_end, of_start = (float(values.sum(dtype=np.float64)) for values in (end, start))
+    if of_end + of_start == 0:
+        return np.zeros_like(end)
+    usual = (float(np.vdot(end, end)) + float(np.vdot(start, start))) / (of_end + of_start)
+    difference = np.abs(end - start) / np.maximum(end + start, np.float32(TINY))
+    lone = np.square(np.float32(usual) * difference * _sooner(end.shape, closed))
+
+    def weighted(a: Array, b: Array, s: float) -> Array:
+        own, other = np.float32(1 - s) * np.square(a), np.float32(s) * (np.square(b) + lone)
+        weight: Array = own / np.maximum(own + other, np.float32(TINY))
+        return a * weight
+
+    mixed = weighted(end, start, share) + weighted(start, end, 1 - share)
+    mass = (1 - share) * of_end + share * of_start
+    return mixed * np.float32(mass / max(float(mixed.sum(dtype=np.float64)), TINY))
+
+
+def _sooner(shape: tuple[int, ...], closed: tuple[Side, ...]) -> Array:
+    """How many times as dense smoke counts as the usual, 1 away from the open sides."""
+    factor = np.ones((), np.float32)
+    for number, side in enumerate(SIDES):
+        if side in closed:
+            continue
+        axis, count = number // 2, shape[number // 2]
+        places = np.arange(count, dtype=np.float32)
+        distance = (places[::-1] if number % 2 else places) / np.float32(BORDER * count)
+        rise = 1 + np.float32(BORDER_FACTOR - 1) * np.square(np.maximum(1 - distance, 0))
+        factor = np.maximum(factor, rise.reshape([-1 if d == axis else 1 for d in range(3)]))
+    return factor
+
+
+def _profile(density: Array) -> Array:
+    """The sums of a density over the layers across each axis, one after the other."""
+    sums = [density.sum(axis=tuple(d for d in range(3) if d != axis)) for axis in range(3)]
+    return np.concatenate(sums)
+
+
+def _change(before: Array, after: Array) -> float:
+    """The share of two profiles that differs, from 0 to 1."""
+    both = float(before.sum() + after.sum())
+    return float(np.abs(before - after).sum()) / both if both > 0 else 0.0

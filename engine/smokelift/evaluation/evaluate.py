@@ -85,14 +85,16 @@ def evaluate(
             "from."
         )
     figures: Figures = {"directory": str(sequence.directory), "frames": len(sequence.frames), "notes": []}
-    truth = None
+    truth, whole = None, sequence
     if truth_path is not None:
+        # the truth is known in the clip's box, which smoke that goes on may have left
+        sequence = sequence.within(sequence.box(sequence.frames[0]))
         truth = _load_truth(sequence, truth_path)
         figures["truth"] = {"path": str(truth_path), **_against_truth(sequence, truth)}
     with ExitStack() as stack:
-        views = open_views(sequence, view_paths, stack, figures["notes"])
+        views = open_views(whole, view_paths, stack, figures["notes"])
         if view_paths or truth is None:
-            figures["views"] = [_against_view(sequence, view) for view in views]
+            figures["views"] = [_against_view(whole, view) for view in views]
     figures["orbit"] = _around(sequence, truth)
     return Evaluation(figures, sequence, truth)
 

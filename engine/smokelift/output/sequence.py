@@ -110,6 +110,10 @@ class Sequence:
         self._check(number)
         return self._boxes[int(number)]
 
+    def within(self, box: Domain) -> Sequence:
+        """Return the sequence as it is in a box, with voxels in line with its own; what is outside is left out."""
+        return replace(self, scene=replace(self.scene, domain=box))
+
     def density(self, number: int) -> Array:
         """Return the density of a frame, shape (nx, ny, nz): the NumPy twin's if there is one.
 
@@ -269,8 +273,15 @@ def _around(domain: Domain, boxes: Iterable[Domain]) -> Domain:
 
 
 def _placed(values: Array, box: Domain, whole: Domain) -> Array:
-    """The values of a box's voxels, or of its faces, in the whole domain; zero beyond."""
-    if box.shape == whole.shape:
+    """The values of a box's voxels, or of its faces, in another domain; zero where the box has none."""
+    if box == whole:
         return values
-    ends = [(part.start, count - part.stop) for part, count in zip(box.slices_in(whole), whole.resolution, strict=True)]
-    return np.pad(values, ends)
+    further = [count - n for count, n in zip(values.shape, box.shape, strict=True)]  # 1 along the axis of faces
+    placed: Array = np.zeros([n + more for n, more in zip(whole.shape, further, strict=True)], np.float32)
+    inner, outer = [], []
+    for start, count, room in zip(box.first_in(whole), values.shape, placed.shape, strict=True):
+        low, high = max(start, 0), min(start + count, room)
+        inner.append(slice(low - start, high - start))
+        outer.append(slice(low, high))
+    placed[tuple(outer)] = values[tuple(inner)]
+    return placed

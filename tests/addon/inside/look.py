@@ -113,6 +113,23 @@ def test_edges_and_density(lit, tmp_path, name, value, least, most) -> None:
         assert rendered(lit, tmp_path / "thick.exr").sum() == pytest.approx(before, rel=0.1)
 
 
+def test_smoke_evaporates_on_its_way_up(lit, tmp_path) -> None:
+    """The smoke is between a half and a bit more of its height; what is dense stays longer."""
+    lit.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0.0
+    volume.show(smoke(lit), made(tmp_path, medium=Medium(4.0, 0.8)))
+    inputs = node(lit).inputs
+    assert (inputs["Floor"].default_value, inputs["Height"].default_value) == (0.0, 3.0)
+    seen = []
+    for evaporation, density in ((0.0, 0.125), (20.0, 0.125), (80.0, 0.125), (80.0, 0.01)):
+        inputs["Evaporation"].default_value, inputs["Edge Density"].default_value = evaporation, density
+        seen.append(float(rendered(lit, tmp_path / "seen.exr").sum()))
+    assert seen[0] > seen[1] > 0.0
+    assert seen[2] == 0.0
+    assert seen[3] > 0.8 * seen[0]
+    inputs["Edge Density"].default_value, inputs["Floor"].default_value = 0.125, 2.0
+    assert rendered(lit, tmp_path / "below.exr").sum() == pytest.approx(seen[0], rel=0.1)
+
+
 def test_brightness_goes_from_black_to_white(lit, tmp_path) -> None:
     """And never beyond."""
     lit.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0.0
@@ -150,6 +167,7 @@ def test_fire_is_as_bright_as_the_grid_says_in_the_color_of_the_clip(lit, tmp_pa
     """Radiance per metre: 4 of it along 0.25 m are 1, in smoke that hides nothing."""
     lit.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0.0
     bpy.data.objects["Sun"].hide_render = True
+    lit.cycles.samples = 512
     take = made(tmp_path, medium=Medium(1e-4, 0.8, flame_color=(1.0, 0.4, 0.1)))
     file = take.directory / "smoke_0003.vdb"
     grids, metadata = vdb_module().readAll(str(file))

@@ -8,6 +8,7 @@ import bpy
 import pytest
 
 import addon
+from smokelift.direct import ROOM
 from smokelift.footage.images import Transfer
 from smokelift.render.device import DeviceName
 from smokelift.scene import Medium
@@ -69,6 +70,12 @@ def test_what_is_made_up_is_the_engines_by_default(scene) -> None:
         for limit in (setting.hard_min, setting.hard_max):
             Settings(**{name: limit})
     assert properties["detail"].subtype == "FACTOR"
+
+
+def test_room_is_the_engines_by_default(scene) -> None:
+    """As large as the box of simulated smoke may become."""
+    room = smoke(scene).smokelift.directing.bl_rna.properties["room"]
+    assert (room.default, room.hard_min) == (ROOM, 1.0)
 
 
 def test_default_medium_is_the_engines(scene) -> None:

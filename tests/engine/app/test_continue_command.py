@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import shutil
+
 import numpy as np
 from command_line import command, events, names, refused
+
+from smokelift.app import cost
 
 
 def test_continue_adds_frames(finished, tmp_path, capsys) -> None:
@@ -18,12 +22,30 @@ def test_continue_adds_frames(finished, tmp_path, capsys) -> None:
     assert command("render", out, "--frame", said[-1]["frames"], "--out", tmp_path / "last.png") == 0
 
 
+def test_one_sentence_says_that_the_box_cannot_grow(finished, tmp_path, capsys, monkeypatch) -> None:
+    """For want of room or of memory; a run that goes on keeps the room that it has."""
+
+    def said(*words: object) -> list[str]:
+        start = ("continue", finished, "--out", tmp_path / "out", "--npz", "--frames", 8, "--wind", 6, 0, 0)
+        assert command(*start, *words, "--progress", "json") == 0
+        return [event["text"] for event in events(capsys.readouterr().out) if event["event"] == "note"]
+
+    (sentence,) = said("--room", 1)
+    assert "dissolves" in sentence and "more --room than 1" in sentence
+    shutil.rmtree(tmp_path / "out")
+    monkeypatch.setattr(cost, "memory_free", lambda: 0)
+    assert "grows to 1 times" in said()[0]
+    monkeypatch.undo()
+    assert said("--resume") == []
+
+
 def test_mistakes_end_in_one_sentence(finished, tmp_path, capsys) -> None:
     start = ("continue", finished, "--out", tmp_path / "out", "--npz")
     assert "--frames 0" in refused(capsys, *start, "--frames", 0)
     assert "--fade 4" in refused(capsys, *start, "--frames", 3, "--fade", 4)
     assert "radius" in refused(capsys, *start, "--frames", 3, "--ball", 0, 0, 1, -1)
     assert "no voxel" in refused(capsys, *start, "--frames", 3, "--box", 50, 50, 50, 60, 60, 60)
+    assert "--room 0.5" in refused(capsys, *start, "--frames", 3, "--room", 0.5)
     assert "--turbulence 1 0 0" in refused(capsys, *start, "--frames", 3, "--turbulence", 1, 0, 0)
     assert "--turbulence 1 1 0.5" in refused(capsys, *start, "--frames", 3, "--turbulence", 1, 1, 0.5)
     assert "too small for voxels" in refused(capsys, *start, "--frames", 3, "--turbulence", 1, 0.001, 0)
@@ -36,7 +58,7 @@ def test_mistakes_end_in_one_sentence(finished, tmp_path, capsys) -> None:
 def test_a_mesh_is_an_obstacle(finished, tmp_path, capsys) -> None:
     start = ("continue", finished, "--out", tmp_path / "out", "--npz", "--frames", 1)
     assert "mesh.stl: is no file" in refused(capsys, *start, "--mesh", tmp_path / "mesh.stl")
-    corners = np.array([(9, 9, 9), (8, 9, 9), (9, 8, 9), (9, 9, 8)], np.float32)
+    corners = np.array([(99, 9, 9), (98, 9, 9), (99, 8, 9), (99, 9, 8)], np.float32)
     with (tmp_path / "mesh.stl").open("wb") as file:
         file.write(bytes(80) + (4).to_bytes(4, "little"))
         for number in range(4):

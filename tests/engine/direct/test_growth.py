@@ -128,13 +128,12 @@ def test_smoke_that_the_clip_cut_comes_out_thinly_at_first():
 
 
 def test_smoke_in_wind_leaves_the_clips_box_uncut(source, tmp_path):
-    """The frames have boxes of their own, and open as one sequence; no smoke is lost, at a stop and a resumption too."""
+    """The frames have boxes of their own and open as one sequence; a stopped run goes on to the same."""
     continuation = Continuation(16, wind=(4.0, 0.0, 0.0), room=12)
     made = run(source, tmp_path / "out", continuation)
     assert made.scene.domain == made.box(26)
     assert made.box(10) == source.scene.domain
     assert made.density(10).shape == made.density(26).shape == made.scene.domain.shape
-    assert [part.stop for part in source.scene.domain.slices_in(made.scene.domain)][0] < made.scene.domain.shape[0]
     beyond = made.density(26)[source.scene.domain.slices_in(made.scene.domain)[0].stop :]
     assert beyond.sum() > 0.1 * made.density(26).sum()
     seen = made.density(26) > 1e-2 * made.density(26).max()

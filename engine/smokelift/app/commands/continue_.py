@@ -96,8 +96,7 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
         type=finite,
         default=ROOM,
         metavar="TIMES",
-        help="the box grows with the smoke to at most so many times the size of the clip's; 1 keeps it "
-        "(default: %(default)g)",
+        help="the box grows with the smoke to at most so many times the size of the clip's; 1 keeps it",
     )
     parser.set_defaults(run=run)
 
@@ -158,7 +157,7 @@ def _with_note(written: Iterable[Written], room: float, say: Reporter) -> Iterat
             said = True
             say.note(
                 f"From frame {number} on the smoke dissolves before it reaches the end of its box, which cannot grow "
-                f"any more: it has {room:g} times the size of the clip's (--room), or a camera or a lamp is in the way."
+                f"any more: give it more --room than {room:g}, or move a camera or a lamp that is in its way."
             )
 
 

@@ -9,7 +9,7 @@ from typing import Any
 from smokelift.app.options import add_directed_options, frame_range, require_new
 from smokelift.app.progress import Reporter, say_frames
 from smokelift.checks import counted
-from smokelift.direct import loop_length, loop_sequence, open_source, usual_overlap
+from smokelift.direct import loop_length, loop_sequence, open_source, steady_part, usual_overlap
 
 
 def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
@@ -20,7 +20,7 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
         "--frames",
         type=frame_range,
         metavar="A:B",
-        help="first and last frame of the part, counted from 1 (default: all)",
+        help="first and last frame of the part, counted from 1 (default: where the smoke is steady)",
     )
     parser.add_argument(
         "--overlap",
@@ -35,7 +35,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     """Loop the sequence, and say every frame."""
     began = time.monotonic()
     sequence = open_source(options.directory)
-    first, last = options.frames or (sequence.frames[0], sequence.frames[-1])
+    first, last = options.frames or steady_part(sequence, options.overlap)
     overlap = usual_overlap(last - first + 1) if options.overlap is None else options.overlap
     total = loop_length(sequence, first, last, overlap)
     require_new(options)
@@ -43,6 +43,6 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     say_frames(say, written, 1, total)
     seconds = time.monotonic() - began
     say.finish(
-        f"{counted(total, 'frame')} in {options.out}, which repeat ({seconds:.0f} s).",
+        f"{counted(total, 'frame')} in {options.out}, which repeat frames {first} to {last} ({seconds:.0f} s).",
         {"directory": str(options.out), "frames": total, "seconds": round(seconds, 1)},
     )

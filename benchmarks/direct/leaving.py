@@ -1,0 +1,164 @@
+"""A reconstruction continued in wind, by a fan and around a ball, in the clip's box and in one that grows; and looped.
+
+    python -m benchmarks.direct.leaving SMOKE OUT [--frames 48] [--start 40] [--picture FILE.png]
+
+It says how much smoke leaves by a face of the box, and how much dissolves before a side that cannot move, as shares of
+what there is at the start. The picture has eight frames of each in the box that grows, from the front and from 45
+degrees.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from scipy import ndimage
+
+from benchmarks.tables import markdown
+from smokelift.direct import (
+    DISSOLVED,
+    ROOM,
+    Ball,
+    Continuation,
+    Fan,
+    continue_sequence,
+    loop_sequence,
+    open_source,
+    steady_part,
+    usual_overlap,
+)
+from smokelift.output.images import eight_bit
+from smokelift.output.sequence import Sequence
+from smokelift.output.sheet import write_sheet
+from smokelift.scene import Domain
+from smokelift.transport import Array, at_centres, faces_in
+
+HEADER = ["case", "room", "left by a face", "dissolved", "box at the end", "seconds a frame: first, last six"]
+AMBIENT = 0.35
+"""Share of the light in the picture that comes from everywhere; the rest comes from above."""
+
+COLUMNS = 8
+
+
+def cases(domain: Domain) -> dict[str, Continuation]:
+    """Return what acts on the smoke, in places and speeds that go with the box."""
+    (x, y, z), (a, b, c) = domain.min, domain.max
+    width, height = a - x, c - z
+    middle, left = (x + a) / 2, x + 0.1 * width
+    depth = (y + b) / 2
+    fan = Fan(Ball((left, depth, z + 0.2 * height), 0.125 * width), (1.25 * width, 0.0, 0.0))
+    return {
+        "wind": Continuation(1, wind=(0.4 * width, 0.0, 0.0)),
+        "fan": Continuation(1, fans=(fan,)),
+        "ball": Continuation(1, obstacles=(Ball((middle, depth, z + 0.63 * height), 0.175 * width),)),
+    }
+
+
+def left_by_a_face(sequence: Sequence, start: int) -> float:
+    """Return the mass that the velocity takes through the sides of the box after a frame, over that of the frame."""
+    left, dt = 0.0, 1 / sequence.fps
+    for number in sequence.frames:
+        if number > start:
+            box = sequence.box(number)
+            part = box.slices_in(sequence.scene.domain)
+            before = sequence.density(number - 1)[part]
+            faces = faces_in(sequence.velocity(number).faces, part)
+            left += float((before * (1 - share_inside(faces, dt / box.voxel_size))).sum(dtype=np.float64))
+    return left / float(sequence.density(start).sum(dtype=np.float64))
+
+
+def share_inside(faces: tuple[Array, Array, Array], scale: float) -> Array:
+    """Return the part of every voxel that is still in the box after it has gone `scale` times the velocity."""
+    share = np.ones((), np.float32)
+    for axis, along in enumerate(at_centres(faces)):
+        count = along.shape[axis]
+        low = scale * along + np.arange(count, dtype=np.float32).reshape([-1 if d == axis else 1 for d in range(3)])
+        share = share * np.clip(np.minimum(low + 1, count - low), 0, 1)
+    return share
+
+
+def seen(sequence: Sequence, number: int, around: Domain, degrees: float) -> npt.NDArray[np.uint8]:
+    """Return smoke lit from above, from the front or turned, z up."""
+    medium, inner = sequence.scene.medium, sequence.scene.domain
+    ends = [
+        (part.start, count - part.stop) for part, count in zip(inner.slices_in(around), around.resolution, strict=True)
+    ]
+    density = np.pad(sequence.density(number), ends)
+    if degrees:
+        density = ndimage.rotate(density, degrees, axes=(0, 1), reshape=False, order=1)
+    optical = density * np.float32(medium.extinction * around.voxel_size)
+    lit = AMBIENT + (1 - AMBIENT) * np.exp(-np.cumsum(optical[:, :, ::-1], axis=2)[:, :, ::-1])
+    picture = (np.exp(-np.cumsum(optical, axis=1)) * optical * lit).sum(axis=1).T[::-1]
+    return eight_bit(np.repeat(np.ascontiguousarray(picture)[..., None].astype(np.float32), 3, axis=-1))
+
+
+def rows_of(sequence: Sequence, numbers: list[int], around: Domain) -> list[list[npt.NDArray[np.uint8]]]:
+    """Return frames from the front, and from 45 degrees."""
+    return [[seen(sequence, number, around, degrees) for number in numbers] for degrees in (0.0, 45.0)]
+
+
+def main() -> None:
+    """Print the table and draw the picture."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("smoke", type=Path)
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--frames", type=int, default=48)
+    parser.add_argument("--start", type=int, default=40)
+    parser.add_argument("--picture", type=Path)
+    options = parser.parse_args()
+    source = open_source(options.smoke)
+    table, made = [], {}
+    for name, case in cases(source.scene.domain).items():
+        for room in (1.0, ROOM):
+            out = options.out / f"{name}_{room:g}"
+            continuation = Continuation(
+                options.frames, options.start, wind=case.wind, fans=case.fans, obstacles=case.obstacles, room=room
+            )
+            figures = [figures for number, figures in continue_sequence(source, out, continuation)][-options.frames :]
+            made[name] = sequence = Sequence.open(out)
+            seconds = [each["seconds_velocity"] for each in figures]
+            last = sequence.frames[-1]
+            mass = sequence.figures(options.start)["mass"]
+            dissolved = sum(each[DISSOLVED] * each["mass"] for each in figures) / mass
+            grown = np.prod(sequence.box(last).resolution) / np.prod(source.scene.domain.resolution)
+            table.append(
+                [
+                    name,
+                    f"{room:g}",
+                    f"{left_by_a_face(sequence, options.start):.3f}",
+                    f"{dissolved:.3f}",
+                    f"{grown:.1f}",
+                    f"{np.mean(seconds[:6]):.2f}, {np.mean(seconds[-6:]):.2f}",
+                ]
+            )
+    print(markdown(HEADER, table), flush=True)
+    if options.picture:
+        first, last = steady_part(source)
+        overlap = usual_overlap(last - first + 1)
+        list(loop_sequence(source, options.out / "loop", first, last, overlap))
+        loop = Sequence.open(options.out / "loop")
+        wide = _around([sequence.scene.domain for sequence in made.values()])
+        steps = np.round(np.linspace(0, options.frames, COLUMNS)).astype(int).tolist()
+        rows, labels = [], []
+        for name, sequence in made.items():
+            rows += rows_of(sequence, [options.start + step for step in steps], wide)
+            labels += [f"{name}, front", f"{name}, 45 degrees"]
+        numbers = [loop.frames[-1], *np.round(np.linspace(1, overlap + 1, COLUMNS - 1)).astype(int).tolist()]
+        rows += rows_of(loop, numbers, wide)
+        labels += ["loop's last frame and its seam, front", "loop, 45 degrees"]
+        write_sheet(options.picture, rows, [f"+{step}" for step in steps], labels)
+
+
+def _around(boxes: list[Domain]) -> Domain:
+    """The smallest box around boxes of one lattice."""
+    first = boxes[0]
+    parts = [box.slices_in(first) for box in boxes]
+    below = tuple(max(-part[axis].start for part in parts) for axis in range(3))
+    above = tuple(max(part[axis].stop for part in parts) - first.resolution[axis] for axis in range(3))
+    return first.grown(below, above)
+
+
+if __name__ == "__main__":
+    main()
