@@ -17,6 +17,9 @@ from .undistort import is_distorted
 POINTS_A_LETTER = 6.5
 """Mean width of a letter in Blender's interface font at scale 1; Blender does not wrap labels."""
 
+CELLS = 0.27, 0.2, 0.22, 0.19
+"""Shares of a line of the table of qualities: button, time, memory, disk; the rest is what is lost."""
+
 
 class _Main:
     bl_label = "Smokelift"
@@ -41,13 +44,12 @@ class _Main:
             return
         _draw_clip(layout, context, smoke)
         _draw_shot(layout, context, smoke)
+        _draw_qualities(layout, context, smoke)
         column = layout.column()
-        column.prop(settings, "quality")
         column.prop(settings, "detail")
         row = column.row()
         row.active = settings.detail > 0.0
         row.prop(settings, "seed")
-        _draw_cost(column, context, smoke)
         layout.prop(settings, "output", placeholder=str(smoke_takes.output_folder(smoke)))
         _draw_run(layout, context, smoke)
 
@@ -114,29 +116,55 @@ def draw_closed(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -
     column.row(align=True).prop(settings, "closed")
 
 
-def _draw_cost(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-    """The estimated cost; the first drawing of the tab starts the estimate."""
-    state = context.window_manager.smokelift
-    if state.check_smoke != smoke.session_uid:
+def _draw_qualities(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
+    """A button for each quality with what it takes and loses; the first drawing of the tab starts the estimate.
+
+    While a change is estimated, the figures of before stay, greyed.
+    """
+    state, settings = context.window_manager.smokelift, smoke.smokelift
+    checked = state.check_smoke == smoke.session_uid
+    done = checked and state.check_done
+    costs = state.costs if state.costs_smoke == smoke.session_uid and not (checked and state.check_error) else {}
+    column = layout.column(align=True)
+    column.use_property_split = False
+    column.label(text=settings.bl_rna.properties["quality"].name)
+    if len(costs):
+        for cell, word in zip(_cells(column), ("", "Time", "Memory", "Disk", "Lost"), strict=True):
+            cell.label(text=word)
+    for item in settings.bl_rna.properties["quality"].enum_items:
+        button, *cells = _cells(column)
+        button.prop_enum(settings, "quality", item.identifier)
+        cost = costs.get(item.identifier)
+        if cost is not None:
+            lost = "" if cost.lost < 0.0 else f"{cost.lost:.1%}"
+            words = (duration(cost.seconds, brief=True), f"{cost.memory:.1f} GiB", size(cost.disk), lost)
+            for cell, word in zip(cells, words, strict=True):
+                cell.active = done
+                cell.alert = cost.memory > state.memory_free
+                cell.label(text=word, translate=False)
+    if not checked:
         layout.operator("smokelift.check", icon="VIEWZOOM")
         shot_check.check_soon(context)
-        return
-    if state.check_error:
+    elif state.check_error:
         draw_text(layout, context, state.check_error, "ERROR")
-    elif state.check_done:
-        column = layout.column(align=True)
-        text = iface_("About {:s}, {:.1f} GiB of memory, up to {:s} on disk")
-        draw_text(column, context, text.format(duration(state.seconds), state.memory, size(state.disk)), "TIME")
-        column.label(text=iface_("{} x {} x {} voxels").format(*state.resolution), translate=False, icon="BLANK1")
-        if state.lost >= 0.0:
-            quality = smoke.smokelift.bl_rna.properties["quality"].enum_items[smoke.smokelift.quality].name
-            text = iface_("{:s} loses {:.1%} of the smoke's contrast in the clip.")
-            draw_text(column, context, text.format(iface_(quality), state.lost), "BLANK1")
-        if state.memory > state.memory_free:
-            text = iface_("Only {:.1f} GiB are free: choose a lower quality.")
-            draw_text(column, context, text.format(state.memory_free), "ERROR")
-    else:
+    elif not done:
         layout.label(text="Reading the clip", icon="TIME")
+    elif (own := costs.get(settings.quality)) is not None:
+        text = iface_("{} x {} x {} voxels").format(*own.resolution)
+        layout.label(text=text, translate=False, icon="MESH_GRID")
+        if own.memory > state.memory_free:
+            text = iface_("Only {:.1f} GiB are free: choose a lower quality.")
+            draw_text(layout, context, text.format(state.memory_free), "ERROR")
+
+
+def _cells(column: bpy.types.UILayout) -> list[bpy.types.UILayout]:
+    """The cells of a line of the table of qualities."""
+    cells, left = [], 1.0
+    for share in CELLS:
+        column = column.split(factor=share / left, align=True)
+        cells.append(column.row(align=True))
+        left -= share
+    return [*cells, column.row(align=True)]
 
 
 def _draw_run(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
@@ -207,11 +235,13 @@ def _progress(row: bpy.types.PropertyGroup) -> str:
     return text if row.seconds_left < 0.0 else iface_("{:s}, {:s} left").format(text, duration(row.seconds_left))
 
 
-def duration(seconds: float) -> str:
-    """A time in words, to the second below a minute and to the minute above."""
+def duration(seconds: float, brief: bool = False) -> str:
+    """A time in words, to the second below a minute and to the minute above; or briefly, to a tenth of an hour."""
     if seconds < 60.0:
         return f"{max(1, round(seconds))} s"
     minutes = round(seconds / 60.0)
+    if brief and minutes >= 60:
+        return f"{minutes / 60:.1f} h"
     return f"{minutes} min" if minutes < 60 else f"{minutes // 60} h {minutes % 60:02d} min"
 
 

@@ -55,10 +55,25 @@ def found_lines(facts: Iterable[Mapping[str, str]]) -> list[str]:
     return lines
 
 
-def lost_share(choices: Iterable[Mapping[str, Any]]) -> float:
-    """Share of the smoke's contrast in the clip that the grid loses; below 0 where the engine did not measure it."""
-    measured = next((choice["measured"] for choice in choices if choice["what"] == "resolution"), {})
-    return float(measured.get("lost", -1.0))
+def keep_costs(state: bpy.types.PropertyGroup, smoke_uid: int, quality: str, details: Mapping[str, Any]) -> None:
+    """Keep what each quality takes and loses; where the resolution is given, of the chosen one, and what it takes.
+
+    Parameters
+    ----------
+    state
+        Of this session.
+    smoke_uid, quality
+        The smoke that was checked, and the quality that it has.
+    details
+        What the engine says at the end of a check.
+    """
+    given = {quality: {**details, "resolution": details["scene"]["domain"]["resolution"], "lost": -1.0}}
+    state.costs.clear()
+    for name, cost in (details["qualities"] or given).items():
+        row = state.costs.add()
+        row.name, row.resolution, row.lost = name, cost["resolution"], cost["lost"]
+        row.seconds, row.memory, row.disk = cost["seconds"], cost["memory"] / 2**30, cost["disk"] / 1e6
+    state.costs_smoke, state.memory_free = smoke_uid, details["memory_free"] / 2**30
 
 
 class ShotCheck:
@@ -66,6 +81,7 @@ class ShotCheck:
 
     def __init__(self) -> None:
         self._job: Job | None = None
+        self._quality = ""
 
     @property
     def running(self) -> bool:
@@ -97,11 +113,7 @@ class ShotCheck:
         state.check_error = "" if state.check_done else in_panel(job.sentence)
         state.notes = "\n".join(found_lines(details.get("facts", ())))
         if state.check_done:
-            state.resolution = details["scene"]["domain"]["resolution"]
-            state.lost = lost_share(details.get("choices", ()))
-            state.seconds = details["seconds"]
-            state.memory, state.memory_free = details["memory"] / 2**30, details["memory_free"] / 2**30
-            state.disk = details["disk"] / 1e6
+            keep_costs(state, state.check_smoke, self._quality, details)
         return True
 
     def _start(self, state: bpy.types.PropertyGroup) -> None:
@@ -111,6 +123,7 @@ class ShotCheck:
         if smoke is None:
             return
         folder = Path(bpy.app.tempdir)
+        self._quality = smoke.smokelift.quality
         try:
             take = Take(folder / "smokelift_check")
             take.write(shot_tables(smoke, quick=True), options(smoke))

@@ -21,6 +21,7 @@ from addon import (
     shot_check,
     volume,
 )
+from addon.contract import QUALITIES
 from addon.take import Take
 from conftest import made
 from smokelift.output.images import write_image
@@ -69,8 +70,8 @@ def test_no_line_is_cut_off(shot) -> None:
     manager = bpy.context.window_manager
     state = manager.smokelift
     state.check_smoke, state.check_done, state.notes = smoke(shot).session_uid, True, "Background: a picture"
-    state.resolution, state.seconds, state.disk = (144, 144, 144), 86000.0, 9999.0
-    state.memory, state.memory_free = 112.4, 11.8
+    know_costs(shot, seconds=86000.0, memory=112.4, disk=99900.0, lost=0.123)
+    state.memory_free = 11.8
     for outcome in ("waiting", "running", "done", "failed"):
         row = manager.smokelift.jobs.add()
         row.smoke_uid, row.outcome, row.sentence = smoke(shot).session_uid, outcome, "One word after the other. " * 5
@@ -99,6 +100,18 @@ def test_no_line_of_a_result_is_cut_off(shot, tmp_path, monkeypatch) -> None:
     assert "Delete Earlier Results: 888.9 GB" in texts
     assert "Loop Smoke    " in texts
     assert [text for text in texts if len(text) > LETTERS] == []
+
+
+def know_costs(scene: bpy.types.Scene, **figures: float) -> None:
+    """All qualities were estimated, each with these figures."""
+    state = bpy.context.window_manager.smokelift
+    usual = {"resolution": (48, 48, 64), "seconds": 12.0, "memory": 0.4, "disk": 30.0, "lost": 0.0772}
+    for quality in QUALITIES:
+        row = state.costs.add()
+        row.name = quality
+        for name, value in {**usual, **figures}.items():
+            setattr(row, name, value)
+    state.costs_smoke = smoke(scene).session_uid
 
 
 def test_the_look_is_in_the_tab(shot, tmp_path) -> None:
@@ -205,8 +218,8 @@ def test_what_was_found_is_five_lines_in_the_panels_words(shot) -> None:
 def test_the_resolution_is_seen_when_it_is_guessed(shot) -> None:
     """With the cost, whatever the camera is."""
     state = bpy.context.window_manager.smokelift
-    state.check_smoke, state.check_done, state.resolution = smoke(shot).session_uid, True, (48, 48, 64)
     smoke(shot).smokelift.camera_mode = "GUESS"
+    know_costs(shot)
     state.check_smoke, state.check_done = smoke(shot).session_uid, True
     assert any(text.startswith("48 x 48 x 64 voxels") for text in drawn(shot, panel.SMOKELIFT_PT_view))
 
@@ -225,13 +238,38 @@ def test_what_is_automatic_is_a_word_and_a_tick(shot, name) -> None:
     assert getattr(settings, name) == 0
 
 
-def test_a_quality_says_what_it_loses(shot) -> None:
-    """Beside what it costs; nothing where the engine did not measure it."""
-    measured = [{"what": "resolution", "measured": {"lost": 0.0772}}]
+def test_every_quality_says_what_it_takes_and_loses(shot) -> None:
+    """Also while another setting is estimated; nothing of another smoke, nor of a shot that is refused."""
     state = bpy.context.window_manager.smokelift
+    each = {"resolution": [48, 48, 64], "seconds": 12, "memory": 2**28, "memory_free": 2**33, "disk": 3e7}
+    each |= {"lost": 0.0772}
+    details = {**each, "qualities": dict.fromkeys(QUALITIES, each), "scene": {"domain": each}}
+    shot_check.keep_costs(state, smoke(shot).session_uid, "draft", details)
+    cells = ("12 s", "0.2 GiB", "30 MB", "7.7%")
+
+    def shown() -> list[int]:
+        texts = drawn(shot, panel.SMOKELIFT_PT_view)
+        return [texts.count(cell) for cell in cells]
+
     state.check_smoke, state.check_done = smoke(shot).session_uid, True
-    state.lost = shot_check.lost_share(measured)
-    words = "Draft loses 7.7% of the smoke's contrast"
-    assert words in " ".join(" ".join(drawn(shot, panel.SMOKELIFT_PT_view)).split())
-    state.lost = shot_check.lost_share([])
-    assert "loses" not in " ".join(drawn(shot, panel.SMOKELIFT_PT_view))
+    assert shown() == [4, 4, 4, 4]
+    smoke(shot).smokelift.albedo = 0.5
+    assert not state.check_done
+    state.check_smoke = smoke(shot).session_uid
+    assert shown() == [4, 4, 4, 4]
+    state.check_smoke, state.check_error = smoke(shot).session_uid, "The box is flat."
+    assert shown() == [0, 0, 0, 0]
+    state.check_error, state.costs_smoke = "", state.costs_smoke + 1
+    assert shown() == [0, 0, 0, 0]
+
+
+def test_a_given_resolution_says_what_it_takes(shot) -> None:
+    """Of the chosen quality alone, since the others would have the same voxels; what is lost was not measured."""
+    state = bpy.context.window_manager.smokelift
+    each = {"resolution": [48, 48, 64], "seconds": 12, "memory": 2**28, "memory_free": 2**33, "disk": 3e7}
+    details = {**each, "qualities": {}, "scene": {"domain": each}}
+    shot_check.keep_costs(state, smoke(shot).session_uid, "draft", details)
+    state.check_smoke, state.check_done = smoke(shot).session_uid, True
+    texts = drawn(shot, panel.SMOKELIFT_PT_view)
+    assert texts.count("12 s") == 1
+    assert not [text for text in texts if "%" in text]

@@ -70,7 +70,8 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         notes = [*shot.notes, *boundaries(shot.scene, settings), *choices, *made_up(shot)]
         for note in notes:
             say.note(note)
-        cost = estimate_cost(domain.resolution, Workload.of(shot, settings))
+        work = Workload.of(shot, settings)
+        cost = estimate_cost(domain.resolution, work)
         known = facts(shot, scene, cost)
         files = list(options.page)
         if options.page:
@@ -91,9 +92,16 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
             "choices": [choice.as_dict() for choice in shot.choices],
             "facts": [fact.as_dict() for fact in known],
             "files": [str(path) for path in files],
+            "qualities": _qualities(shot, work),
             **asdict(cost),
         },
     )
+
+
+def _qualities(shot: Shot, work: Workload) -> dict[str, dict[str, Any]]:
+    """What each quality takes of this clip, and what it loses of it; empty where the resolution was not measured."""
+    grids = shot.qualities.items()
+    return {quality: {**asdict(grid), **asdict(estimate_cost(grid.resolution, work))} for quality, grid in grids}
 
 
 def _write_scene(path: Path, shot: Shot, given: Scene, known: Sequence[Fact]) -> tuple[Path, ...]:
