@@ -17,7 +17,7 @@ from .undistort import is_distorted
 POINTS_A_LETTER = 6.5
 """Mean width of a letter in Blender's interface font at scale 1; Blender does not wrap labels."""
 
-CELLS = 0.27, 0.2, 0.22, 0.19
+CELLS = 0.245, 0.215, 0.18, 0.18
 """Shares of a line of the table of qualities: button, time, memory, disk; the rest is what is lost."""
 
 
@@ -86,6 +86,8 @@ def _draw_clip(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bp
         if clip.source == "MOVIE":
             text = iface_("The clip has {:d} x {:d} pixels at {:g} frames a second, the scene {:d} x {:d} at {:g}.")
             text = text.format(*clip.size, clip.fps, *size, frame_rate(scene))
+            if size == tuple(clip.size):
+                text = iface_("The clip has {:g} frames a second, the scene {:g}.").format(clip.fps, frame_rate(scene))
         else:  # pictures have no frame rate of their own
             text = iface_("The clip has {:d} x {:d} pixels, the scene {:d} x {:d}.").format(*clip.size, *size)
         draw_text(column, context, text, "INFO")
@@ -127,17 +129,20 @@ def _draw_qualities(layout: bpy.types.UILayout, context: bpy.types.Context, smok
     costs = state.costs if state.costs_smoke == smoke.session_uid and not (checked and state.check_error) else {}
     column = layout.column(align=True)
     column.use_property_split = False
-    column.label(text=settings.bl_rna.properties["quality"].name)
-    if len(costs):
-        for cell, word in zip(_cells(column), ("", "Time", "Memory", "Disk", "Lost"), strict=True):
-            cell.label(text=word)
+    title = settings.bl_rna.properties["quality"].name
+    for cell, word in zip(_cells(column), (title, "Time", "RAM", "Disk", "Lost"), strict=True):
+        cell.label(text=word)
     for item in settings.bl_rna.properties["quality"].enum_items:
         button, *cells = _cells(column)
         button.prop_enum(settings, "quality", item.identifier)
         cost = costs.get(item.identifier)
         if cost is not None:
-            lost = "" if cost.lost < 0.0 else f"{cost.lost:.1%}"
-            words = (duration(cost.seconds, brief=True), f"{cost.memory:.1f} GiB", size(cost.disk), lost)
+            words = (
+                _brief_time(cost.seconds),
+                _brief(cost.memory, "G"),
+                _brief_disk(cost.disk),
+                _brief_share(cost.lost),
+            )
             for cell, word in zip(cells, words, strict=True):
                 cell.active = done
                 cell.alert = cost.memory > state.memory_free
@@ -148,7 +153,8 @@ def _draw_qualities(layout: bpy.types.UILayout, context: bpy.types.Context, smok
     elif state.check_error:
         draw_text(layout, context, state.check_error, "ERROR")
     elif not done:
-        layout.label(text="Reading the clip", icon="TIME")
+        text = iface_("Reading the clip: {:s}").format(duration(state.check_seconds))
+        layout.label(text=text if state.check_seconds else iface_("Reading the clip"), translate=False, icon="TIME")
     elif (own := costs.get(settings.quality)) is not None:
         text = iface_("{} x {} x {} voxels").format(*own.resolution)
         layout.label(text=text, translate=False, icon="MESH_GRID")
@@ -165,6 +171,26 @@ def _cells(column: bpy.types.UILayout) -> list[bpy.types.UILayout]:
         cells.append(column.row(align=True))
         left -= share
     return [*cells, column.row(align=True)]
+
+
+def _brief_time(seconds: float) -> str:
+    return duration(seconds) if seconds < 3570.0 else _brief(seconds / 3600.0, "h")
+
+
+def _brief_disk(megabytes: float) -> str:
+    return f"{megabytes:.0f} M" if megabytes < 99.5 else _brief(megabytes / 1000.0, "G")
+
+
+def _brief_share(share: float) -> str:
+    """In percent; nothing below 0, where it is unknown."""
+    if share < 0.0:
+        return ""
+    return f"{share:.1%}" if share < 0.00995 else f"{share:.0%}"
+
+
+def _brief(value: float, unit: str) -> str:
+    """To two digits at least: a cell of the table holds six letters."""
+    return f"{value:.1f} {unit}" if value < 9.95 else f"{value:.0f} {unit}"
 
 
 def _draw_run(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
@@ -213,7 +239,7 @@ def _draw_job(
     if row.outcome == "waiting":
         box.label(text="Waits for the run before it", icon="SORTTIME")
     elif row.outcome == "running":
-        box.progress(factor=row.done / row.total if row.total else 0.0, text=_progress(row))
+        draw_progress(box, row)
     else:
         draw_text(box, context, row.sentence, "ERROR" if row.outcome == "failed" else "INFO")
     if row.icon:
@@ -226,6 +252,11 @@ def _draw_job(
         box.operator("smokelift.cancel", text="Cancel", icon="CANCEL").take = row.take
 
 
+def draw_progress(layout: bpy.types.UILayout, row: bpy.types.PropertyGroup) -> None:
+    """How far a run has come."""
+    layout.progress(factor=row.done / row.total if row.total else 0.0, text=_progress(row))
+
+
 def _progress(row: bpy.types.PropertyGroup) -> str:
     if row.cancel:
         return "Stopping"
@@ -235,13 +266,11 @@ def _progress(row: bpy.types.PropertyGroup) -> str:
     return text if row.seconds_left < 0.0 else iface_("{:s}, {:s} left").format(text, duration(row.seconds_left))
 
 
-def duration(seconds: float, brief: bool = False) -> str:
-    """A time in words, to the second below a minute and to the minute above; or briefly, to a tenth of an hour."""
+def duration(seconds: float) -> str:
+    """A time in words, to the second below a minute and to the minute above."""
     if seconds < 60.0:
         return f"{max(1, round(seconds))} s"
     minutes = round(seconds / 60.0)
-    if brief and minutes >= 60:
-        return f"{minutes / 60:.1f} h"
     return f"{minutes} min" if minutes < 60 else f"{minutes // 60} h {minutes % 60:02d} min"
 
 

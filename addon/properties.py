@@ -260,8 +260,8 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
     )
     quality: EnumProperty(
         name="Quality",
-        description="More detail takes more time, memory and disk space. Lost is the share of the smoke's contrast in "
-        "the clip that is finer than the voxels",
+        description="More detail takes more time, memory (RAM, in GiB) and disk space. Lost is the share of the "
+        "smoke's contrast in the clip that is finer than the voxels",
         items=[
             ("draft", "Draft", "A quick look"),
             ("balanced", "Balanced", "Good for most shots"),
@@ -472,6 +472,7 @@ class SmokeliftState(bpy.types.PropertyGroup):
     check_ticks: IntProperty()
     check_done: BoolProperty()
     check_error: StringProperty()
+    check_seconds: IntProperty(description="Since the engine began to read the clip")
     notes: StringProperty()
     costs: CollectionProperty(type=SmokeliftCost)
     costs_smoke: IntProperty(description="Whose the costs are")

@@ -3,6 +3,7 @@
 It starts by itself once the settings rest, and its result is shown in the panel.
 """
 
+import time
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -82,6 +83,7 @@ class ShotCheck:
     def __init__(self) -> None:
         self._job: Job | None = None
         self._quality = ""
+        self._began = 0.0
 
     @property
     def running(self) -> bool:
@@ -106,7 +108,8 @@ class ShotCheck:
             return False
         self._job.poll()
         if not self._job.ended:
-            return False
+            before, state.check_seconds = state.check_seconds, int(time.monotonic() - self._began)
+            return state.check_seconds != before
         job, self._job = self._job, None
         details = job.details
         state.check_done = job.outcome == "done"
@@ -119,7 +122,7 @@ class ShotCheck:
     def _start(self, state: bpy.types.PropertyGroup) -> None:
         self.kill()
         smoke = find_smoke(state.check_smoke)
-        state.check_done, state.check_error = False, ""
+        state.check_done, state.check_error, state.check_seconds = False, "", 0
         if smoke is None:
             return
         folder = Path(bpy.app.tempdir)
@@ -133,6 +136,7 @@ class ShotCheck:
         except (ShotError, TakeError, EngineMissingError) as error:
             state.check_error = str(error)
             return
+        self._began = time.monotonic()
         self._job.start()
 
 

@@ -77,7 +77,7 @@ def test_no_line_is_cut_off(shot) -> None:
         row.smoke_uid, row.outcome, row.sentence = smoke(shot).session_uid, outcome, "One word after the other. " * 5
         row.done, row.total, row.seconds_left, row.warnings = 1250, 2500, 80000.0, "This is a warning. " * 5
     texts = drawn(shot, panel.SMOKELIFT_PT_view, advanced_panel.SMOKELIFT_PT_view_advanced)
-    assert any("112.4 GiB" in text for text in texts)
+    assert {"24 h", "112 G", "100 G", "12%"} <= set(texts)
     assert [text for text in texts if len(text) > LETTERS] == []
 
 
@@ -120,8 +120,8 @@ def test_the_look_is_in_the_tab(shot, tmp_path) -> None:
     volume.show(smoke(shot), made(tmp_path))
     assert look_panel.SMOKELIFT_PT_view_look.poll(SimpleNamespace(scene=shot))
     texts = drawn(shot, look_panel.SMOKELIFT_PT_view_look)
-    assert {"Density", "Brightness", "Color", "Edge Contrast", "Absorption Color", "Anisotropy"} <= set(texts)
-    assert {"Presets    ", "Viewport Density", "Render Step"} <= set(texts)
+    assert {"Density", "Brightness", "Color", "Edge Contrast", "Absorption", "Anisotropy"} <= set(texts)
+    assert {"Presets    ", "View Density", "Render Step"} <= set(texts)
 
 
 def test_large_smoke_without_a_proxy_is_offered_one(shot, tmp_path) -> None:
@@ -170,6 +170,28 @@ def test_pictures_have_no_frame_rate(shot, tmp_path) -> None:
     text = " ".join(" ".join(drawn(shot, panel.SMOKELIFT_PT_view)).split())
     assert "8 x 8 pixels, the scene" in text
     assert "frames a second" not in text
+
+
+def test_only_what_differs_from_the_clip_is_said(shot) -> None:
+    """The rate alone, if the sizes are the same."""
+    bpy.ops.smokelift.match_clip()
+    shot.render.fps, shot.render.fps_base = 50, 1.0
+    bpy.context.window_manager.smokelift.check_smoke = smoke(shot).session_uid  # no check is under way
+    text = " ".join(" ".join(drawn(shot, panel.SMOKELIFT_PT_view)).split())
+    assert f"The clip has {smoke(shot).smokelift.clip.fps:g} frames a second, the scene 50." in text
+
+
+def test_waiting_is_seen(shot, tmp_path) -> None:
+    """How long the clip has been read; and in Direct how far the run has come, whose bar is out of sight above it."""
+    state = bpy.context.window_manager.smokelift
+    state.check_smoke, state.check_seconds = smoke(shot).session_uid, 12
+    assert "Reading the clip: 12 s    " in drawn(shot, panel.SMOKELIFT_PT_view)
+    volume.show(smoke(shot), made(tmp_path))
+    row = state.jobs.add()
+    row.smoke_uid, row.outcome, row.done, row.total = smoke(shot).session_uid, "running", 3, 8
+    assert "3 of 8" in drawn(shot, direct_panel.SMOKELIFT_PT_view_direct)
+    row.outcome = "done"
+    assert "3 of 8" not in drawn(shot, direct_panel.SMOKELIFT_PT_view_direct)
 
 
 @pytest.mark.parametrize("complete", [True, False])
@@ -245,7 +267,7 @@ def test_every_quality_says_what_it_takes_and_loses(shot) -> None:
     each |= {"lost": 0.0772}
     details = {**each, "qualities": dict.fromkeys(QUALITIES, each), "scene": {"domain": each}}
     shot_check.keep_costs(state, smoke(shot).session_uid, "draft", details)
-    cells = ("12 s", "0.2 GiB", "30 MB", "7.7%")
+    cells = ("12 s", "0.2 G", "30 M", "8%")
 
     def shown() -> list[int]:
         texts = drawn(shot, panel.SMOKELIFT_PT_view)

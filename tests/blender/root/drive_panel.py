@@ -60,11 +60,13 @@ def story() -> Iterator[float]:
 
     # the scene made to look like the clip, and Cycles in the viewport
     area.type = "VIEW_3D"
+    area.spaces.active.region_3d.view_perspective = "PERSP"
     yield 1.0
     yield from find(window, area, region(area, "UI"), "bpy.ops.smokelift.set_up()")
     click()
-    look_away()
     yield 1.0
+    look_away()
+    report["looks_through"] = area.spaces.active.region_3d.view_perspective
     area.spaces.active.shading.type = "RENDERED"
     yield 8.0
     yield from picture("rendered")
