@@ -124,7 +124,7 @@ def _draw_qualities(layout: bpy.types.UILayout, context: bpy.types.Context, smok
     While a change is estimated, the figures of before stay, greyed.
     """
     state, settings = context.window_manager.smokelift, smoke.smokelift
-    checked = state.check_smoke == smoke.session_uid
+    checked = shot_check.is_checked(state, smoke)
     done = checked and state.check_done
     costs = state.costs if state.costs_smoke == smoke.session_uid and not (checked and state.check_error) else {}
     column = layout.column(align=True)

@@ -469,6 +469,7 @@ class SmokeliftState(bpy.types.PropertyGroup):
 
     jobs: CollectionProperty(type=SmokeliftJob)
     check_smoke: IntProperty()
+    check_place: StringProperty(description="Corners of the box that was checked; empty without one")
     check_ticks: IntProperty()
     check_done: BoolProperty()
     check_error: StringProperty()

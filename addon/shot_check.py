@@ -12,6 +12,7 @@ import bpy
 
 from . import preferences
 from .blender_scene import ShotError
+from .box_table import box_corners, box_of
 from .job import EngineMissingError, Job, engine_command
 from .scene_file import options, shot_tables
 from .smoke import active_smoke, find_smoke
@@ -56,23 +57,23 @@ def found_lines(facts: Iterable[Mapping[str, str]]) -> list[str]:
     return lines
 
 
-def keep_costs(state: bpy.types.PropertyGroup, smoke_uid: int, quality: str, details: Mapping[str, Any]) -> None:
-    """Keep what each quality takes and loses; where the resolution is given, of the chosen one, and what it takes.
+def keep_costs(state: bpy.types.PropertyGroup, smoke_uid: int, details: Mapping[str, Any]) -> None:
+    """Keep what each quality takes and loses.
 
     Parameters
     ----------
     state
         Of this session.
-    smoke_uid, quality
-        The smoke that was checked, and the quality that it has.
+    smoke_uid
+        The smoke that was checked.
     details
         What the engine says at the end of a check.
     """
-    given = {quality: {**details, "resolution": details["scene"]["domain"]["resolution"], "lost": -1.0}}
     state.costs.clear()
-    for name, cost in (details["qualities"] or given).items():
+    for name, cost in details["qualities"].items():
         row = state.costs.add()
-        row.name, row.resolution, row.lost = name, cost["resolution"], cost["lost"]
+        row.name, row.resolution = name, cost["resolution"]
+        row.lost = -1.0 if cost["lost"] is None else cost["lost"]
         row.seconds, row.memory, row.disk = cost["seconds"], cost["memory"] / 2**30, cost["disk"] / 1e6
     state.costs_smoke, state.memory_free = smoke_uid, details["memory_free"] / 2**30
 
@@ -82,7 +83,6 @@ class ShotCheck:
 
     def __init__(self) -> None:
         self._job: Job | None = None
-        self._quality = ""
         self._began = 0.0
 
     @property
@@ -116,7 +116,7 @@ class ShotCheck:
         state.check_error = "" if state.check_done else in_panel(job.sentence)
         state.notes = "\n".join(found_lines(details.get("facts", ())))
         if state.check_done:
-            keep_costs(state, state.check_smoke, self._quality, details)
+            keep_costs(state, state.check_smoke, details)
         return True
 
     def _start(self, state: bpy.types.PropertyGroup) -> None:
@@ -126,7 +126,6 @@ class ShotCheck:
         if smoke is None:
             return
         folder = Path(bpy.app.tempdir)
-        self._quality = smoke.smokelift.quality
         try:
             take = Take(folder / "smokelift_check")
             take.write(shot_tables(smoke, quick=True), options(smoke))
@@ -138,6 +137,17 @@ class ShotCheck:
             return
         self._began = time.monotonic()
         self._job.start()
+
+
+def place(smoke: bpy.types.Object) -> str:
+    """Where the corners of a smoke's box are; empty without one."""
+    box = box_of(smoke) if smoke.smokelift.camera_mode == "SCENE" else None
+    return "" if box is None else " ".join(f"{number:.5g}" for corner in box_corners(box) for number in corner)
+
+
+def is_checked(state: bpy.types.PropertyGroup, smoke: bpy.types.Object) -> bool:
+    """Whether the last check is of this smoke, whose box has not been moved since: Blender tells of that by drawing."""
+    return state.check_smoke == smoke.session_uid and state.check_place in ("", place(smoke))
 
 
 def check_again(context: bpy.types.Context) -> None:
@@ -152,7 +162,7 @@ def check_soon(context: bpy.types.Context) -> None:
     """Check the active smoke unless it was checked. Drawing code may call this."""
     state, first = context.window_manager.smokelift, context.window_manager.windows[0]
     smoke = active_smoke(context.scene)
-    known = smoke is None or smoke.session_uid == state.check_smoke
+    known = smoke is None or is_checked(state, smoke)
     if not known and context.window == first and not bpy.app.timers.is_registered(_check):
         bpy.app.timers.register(_check)  # drawing code may not change data
 

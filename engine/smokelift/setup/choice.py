@@ -62,8 +62,8 @@ class Grid:
     resolution
         Voxels along x, y, z.
     lost
-        Share of the smoke's contrast in the clip that is finer than it shows.
+        Share of the smoke's contrast in the clip that is finer than it shows; None where that was not measured.
     """
 
     resolution: tuple[int, int, int]
-    lost: float
+    lost: float | None

@@ -265,8 +265,7 @@ def test_every_quality_says_what_it_takes_and_loses(shot) -> None:
     state = bpy.context.window_manager.smokelift
     each = {"resolution": [48, 48, 64], "seconds": 12, "memory": 2**28, "memory_free": 2**33, "disk": 3e7}
     each |= {"lost": 0.0772}
-    details = {**each, "qualities": dict.fromkeys(QUALITIES, each), "scene": {"domain": each}}
-    shot_check.keep_costs(state, smoke(shot).session_uid, "draft", details)
+    shot_check.keep_costs(state, smoke(shot).session_uid, {**each, "qualities": dict.fromkeys(QUALITIES, each)})
     cells = ("12 s", "0.2 G", "30 M", "8%")
 
     def shown() -> list[int]:
@@ -286,12 +285,26 @@ def test_every_quality_says_what_it_takes_and_loses(shot) -> None:
 
 
 def test_a_given_resolution_says_what_it_takes(shot) -> None:
-    """Of the chosen quality alone, since the others would have the same voxels; what is lost was not measured."""
+    """What is lost was not measured."""
     state = bpy.context.window_manager.smokelift
-    each = {"resolution": [48, 48, 64], "seconds": 12, "memory": 2**28, "memory_free": 2**33, "disk": 3e7}
-    details = {**each, "qualities": {}, "scene": {"domain": each}}
-    shot_check.keep_costs(state, smoke(shot).session_uid, "draft", details)
+    each = {"resolution": [48, 48, 64], "seconds": 12, "memory": 2**28, "memory_free": 2**33, "disk": 3e7, "lost": None}
+    shot_check.keep_costs(state, smoke(shot).session_uid, {**each, "qualities": dict.fromkeys(QUALITIES, each)})
     state.check_smoke, state.check_done = smoke(shot).session_uid, True
     texts = drawn(shot, panel.SMOKELIFT_PT_view)
-    assert texts.count("12 s") == 1
+    assert texts.count("12 s") == 4
     assert not [text for text in texts if "%" in text]
+
+
+def test_a_box_that_is_moved_is_estimated_anew(shot) -> None:
+    """Blender draws the tab then, and drawing asks for an estimate."""
+    state = bpy.context.window_manager.smokelift
+    state.check_smoke, state.check_place = smoke(shot).session_uid, shot_check.place(smoke(shot))
+    assert shot_check.is_checked(state, smoke(shot))
+    smoke(shot).smokelift.box.scale.x *= 1.1
+    bpy.context.view_layer.update()
+    assert not shot_check.is_checked(state, smoke(shot))
+    smoke(shot).smokelift.camera_mode = "GUESS"
+    state.check_smoke, state.check_place = smoke(shot).session_uid, shot_check.place(smoke(shot))
+    smoke(shot).smokelift.box.scale.x *= 1.1
+    bpy.context.view_layer.update()
+    assert shot_check.is_checked(state, smoke(shot))

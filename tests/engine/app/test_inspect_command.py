@@ -53,7 +53,7 @@ def test_choices_are_said_and_kept(shot, finished, capsys) -> None:
 
 
 def test_every_quality_is_forecast(plume, tmp_path, capsys) -> None:
-    """In one run, as a run at each quality has it; nothing where the resolution is given."""
+    """In one run, as a run at each quality has it; where the resolution is given, all have that."""
     path = tmp_path / "scene.toml"
     replace(plume.scene, camera=None, domain=None).save(path)
 
@@ -70,7 +70,10 @@ def test_every_quality_is_forecast(plume, tmp_path, capsys) -> None:
         own = forecast("--quality", quality)
         assert said["resolution"] == own["scene"]["domain"]["resolution"]
         assert said["memory"] == pytest.approx(own["memory"], rel=0.01)
-    assert forecast("--resolution", "12,12,16")["qualities"] == {}
+    given = forecast("--resolution", "12,12,16")["qualities"]
+    assert [(name, said["resolution"], said["lost"]) for name, said in given.items()] == [
+        (name, [12, 12, 16], None) for name in QUALITIES
+    ]
 
 
 def test_an_inlet_outside_the_box(plume, tmp_path, capsys) -> None:

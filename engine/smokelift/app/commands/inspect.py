@@ -20,8 +20,10 @@ from smokelift.footage.clip import Clip
 from smokelift.output.images import write_image
 from smokelift.render import device
 from smokelift.scene import Background, Scene, scene_to_dict
+from smokelift.setup.choice import Grid
 from smokelift.setup.prepare import boundaries, prepare_shot
 from smokelift.setup.provenance import made_up
+from smokelift.setup.settings import QUALITIES
 from smokelift.setup.shot import Shot
 
 
@@ -99,9 +101,10 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
 
 
 def _qualities(shot: Shot, work: Workload) -> dict[str, dict[str, Any]]:
-    """What each quality takes of this clip, and what it loses of it; empty where the resolution was not measured."""
-    grids = shot.qualities.items()
-    return {quality: {**asdict(grid), **asdict(estimate_cost(grid.resolution, work))} for quality, grid in grids}
+    """What each quality takes of this clip, and what it loses of it; the same where the resolution is given."""
+    grids = shot.qualities or dict.fromkeys(QUALITIES, Grid(shot.scene.domain.resolution, None))
+    costs = {quality: asdict(estimate_cost(grid.resolution, work)) for quality, grid in grids.items()}
+    return {quality: {**asdict(grids[quality]), **cost} for quality, cost in costs.items()}
 
 
 def _write_scene(path: Path, shot: Shot, given: Scene, known: Sequence[Fact]) -> tuple[Path, ...]:
