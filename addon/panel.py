@@ -185,7 +185,7 @@ def _brief_share(share: float) -> str:
     """In percent; nothing below 0, where it is unknown."""
     if share < 0.0:
         return ""
-    return f"{share:.1%}" if share < 0.00995 else f"{share:.0%}"
+    return f"{share:.1%}" if 0.0005 <= share < 0.00995 else f"{share:.0%}"
 
 
 def _brief(value: float, unit: str) -> str:
