@@ -14,7 +14,7 @@ from .smoke import active_smoke
 from .subpanel import OfResult
 from .take import TakeError
 
-EFFECTORS = "Smoke Effectors"
+EFFECTORS = "Effectors"
 """Name of a collection that the tab makes."""
 
 
