@@ -7,11 +7,15 @@ from . import run, smoke_takes
 from .automatic import draw_automatic
 from .between import AVAILABLE
 from .blender_scene import ShotError
-from .needs import NeedsClipAndResult
-from .panel import draw_closed
+from .directing import MESHES
+from .needs import NeedsClipAndResult, NeedsResult
+from .panel import draw_closed, draw_progress
 from .smoke import active_smoke
 from .subpanel import OfResult
 from .take import TakeError
+
+EFFECTORS = "Effectors"
+"""Name of a collection that the tab makes."""
 
 
 class SMOKELIFT_OT_direct(NeedsClipAndResult, bpy.types.Operator):
@@ -32,6 +36,39 @@ class SMOKELIFT_OT_direct(NeedsClipAndResult, bpy.types.Operator):
         return {"FINISHED"}
 
 
+class SMOKELIFT_OT_add_effectors(NeedsResult, bpy.types.Operator):
+    """Let the selected objects act on the smoke: put them into the collection of effectors, which is made if need be"""
+
+    bl_idname = "smokelift.add_effectors"
+    bl_label = "Add Selected to Effectors"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not super().poll(context):
+            return False
+        if not _may_act(context):
+            cls.poll_message_set("Select a mesh, a Wind or Turbulence force field, or an Empty")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        settings = active_smoke(context.scene).smokelift.directing
+        if settings.effectors is None:
+            settings.effectors = bpy.data.collections.new(EFFECTORS)
+            context.scene.collection.children.link(settings.effectors)
+        for obj in _may_act(context):
+            if obj.name not in settings.effectors.objects:
+                settings.effectors.objects.link(obj)
+        return {"FINISHED"}
+
+
+def _may_act(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """The selected objects that may act on the active smoke."""
+    box = active_smoke(context.scene).smokelift.box
+    return [obj for obj in context.selected_objects if obj != box and obj.type in {*MESHES, "EMPTY"}]
+
+
 class _Direct(OfResult):
     bl_label = "Direct"
 
@@ -39,7 +76,8 @@ class _Direct(OfResult):
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
-        settings = active_smoke(context.scene).smokelift.directing
+        smoke = active_smoke(context.scene)
+        settings = smoke.smokelift.directing
         row = layout.row()
         row.use_property_split = False
         row.prop(settings, "direction", expand=True)
@@ -49,6 +87,9 @@ class _Direct(OfResult):
         row.scale_y = 1.5
         text = iface_("{:s} Smoke").format(iface_(label))
         row.operator("smokelift.direct", text=text, translate=False, icon="PLAY")
+        for job in context.window_manager.smokelift.jobs:
+            if job.outcome == "running" and job.smoke_uid == smoke.session_uid:
+                draw_progress(layout, job)
 
 
 def _draw_continue(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
@@ -58,6 +99,7 @@ def _draw_continue(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup
     layout.prop(settings, "room")
     draw_closed(layout, settings)
     layout.prop(settings, "effectors")
+    layout.operator("smokelift.add_effectors", icon="ADD")
     row = layout.row()
     row.active = settings.effectors is not None
     row.prop(settings, "fan_speed")
@@ -109,6 +151,6 @@ class SMOKELIFT_PT_clip_direct(_Direct, bpy.types.Panel):
     bl_parent_id = "SMOKELIFT_PT_clip"
 
 
-_CLASSES = (SMOKELIFT_OT_direct, SMOKELIFT_PT_view_direct, SMOKELIFT_PT_clip_direct)
+_CLASSES = (SMOKELIFT_OT_direct, SMOKELIFT_OT_add_effectors, SMOKELIFT_PT_view_direct, SMOKELIFT_PT_clip_direct)
 
 register, unregister = bpy.utils.register_classes_factory(_CLASSES)

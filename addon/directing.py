@@ -181,6 +181,8 @@ def _triangles(obj: bpy.types.Object, matrix: Matrix) -> npt.NDArray[np.float64]
     whole = np.array(matrix)
     moved = places.reshape(-1, 3) @ whole[:3, :3].T + whole[:3, 3]
     triangles = moved[corners].reshape(-1, 3, 3)
+    if len(triangles) and np.linalg.matrix_rank(moved - moved.mean(0), tol=1e-6 * np.ptp(moved)) < 3:
+        raise ShotError(f"{obj.name} is flat and encloses nothing: give it a thickness (Solidify).")
     # six times the signed volume that a closed surface encloses
     inward = np.einsum("ni,ni", triangles[:, 0], np.cross(triangles[:, 1], triangles[:, 2])) < 0
     return triangles[:, ::-1] if inward else triangles

@@ -1,5 +1,6 @@
 """What is read in other editors of Blender: the log of a run, and the page of what was found in the clip."""
 
+import functools
 from pathlib import Path
 
 import bpy
@@ -10,6 +11,9 @@ from . import shot_check
 from .needs import NeedsClip
 from .smoke import active_smoke
 from .take import Take
+
+DRAWN_SECONDS = 0.3
+"""After which a new window has been drawn."""
 
 LOG_TEXT = "Smokelift Log"
 
@@ -57,7 +61,19 @@ class SMOKELIFT_OT_show_page(NeedsClip, bpy.types.Operator):
         page.reload()
         if not bpy.app.background:
             _editor(context, "IMAGE_EDITOR").image = page
+            bpy.app.timers.register(functools.partial(_fit, page.name), first_interval=DRAWN_SECONDS)
         return {"FINISHED"}
+
+
+def _fit(name: str) -> None:
+    """Show the whole of a picture in the editor that has it; a timer, as a window has no size before it is drawn."""
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            image = area.spaces.active.image if area.type == "IMAGE_EDITOR" else None
+            if image is not None and image.name == name:
+                region = next(region for region in area.regions if region.type == "WINDOW")
+                with bpy.context.temp_override(window=window, area=area, region=region):
+                    bpy.ops.image.view_all(fit_view=True)
 
 
 def _editor(context: bpy.types.Context, kind: str) -> bpy.types.Space:

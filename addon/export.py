@@ -40,7 +40,7 @@ class SmokeliftExport(bpy.types.PropertyGroup):
 
     folder: StringProperty(
         name="Folder",
-        description="Folder for the export; by default a folder named export beside the results",
+        description="Folder for the export; by default export_ and the program's name, beside the results",
         subtype="DIR_PATH",
         options=PATH_OPTIONS,
         update=_changed,
@@ -165,7 +165,7 @@ _session = _Session()
 def folder_of(smoke: bpy.types.Object) -> Path:
     """The folder for the export of a smoke."""
     chosen = smoke.smokelift_export.folder
-    return absolute(chosen) if chosen else smoke_takes.output_folder(smoke) / "export"
+    return absolute(chosen) if chosen else smoke_takes.output_folder(smoke) / f"export_{smoke.smokelift_export.host}"
 
 
 def arguments(smoke: bpy.types.Object) -> list[str]:

@@ -11,6 +11,9 @@ from .proxy import in_viewport, modifier_of
 from .smoke import is_override, smoke_with_look
 from .subpanel import OfResult
 
+SHORT = {"Absorption Color": "Absorption"}
+"""Names of inputs that the sidebar would cut off."""
+
 
 class SMOKELIFT_OT_use_look(NeedsResult, bpy.types.Operator):
     """Set density, brightness, colors and edges of the smoke. What was fitted to the clip stays"""
@@ -65,15 +68,15 @@ class _Look(OfResult):
         else:
             column = layout.column()
             for socket in sockets:
-                column.prop(socket, "default_value", text=socket.name)
+                column.prop(socket, "default_value", text=SHORT.get(socket.name, socket.name))
         column = layout.column()
         column.use_property_decorate = False
         modifier = modifier_of(smoke)
         if not override:
-            column.prop(in_viewport(smoke).display, "density", text="Viewport Density")
+            column.prop(in_viewport(smoke).display, "density", text="View Density")
             _draw_render(column, context, smoke)
         if modifier is not None:
-            column.prop(modifier, "show_viewport", text="Proxy in Viewport", icon="NONE")
+            column.prop(modifier, "show_viewport", text="Proxy in View", icon="NONE")
         elif not override:
             draw_work(column, context, smoke, "smokelift.make_proxy", "MOD_REMESH")
 

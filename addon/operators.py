@@ -179,7 +179,8 @@ class SMOKELIFT_OT_check(NeedsClip, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         state = context.window_manager.smokelift
-        state.check_smoke = active_smoke(context.scene).session_uid
+        smoke = active_smoke(context.scene)
+        state.check_smoke, state.check_place = smoke.session_uid, shot_check.place(smoke)
         state.check_ticks = shot_check.TICKS
         run.work(context)
         return {"FINISHED"}

@@ -17,6 +17,9 @@ from .undistort import is_distorted
 POINTS_A_LETTER = 6.5
 """Mean width of a letter in Blender's interface font at scale 1; Blender does not wrap labels."""
 
+CELLS = 0.245, 0.215, 0.18, 0.18
+"""Shares of a line of the table of qualities: button, time, memory, disk; the rest is what is lost."""
+
 
 class _Main:
     bl_label = "Smokelift"
@@ -41,13 +44,12 @@ class _Main:
             return
         _draw_clip(layout, context, smoke)
         _draw_shot(layout, context, smoke)
+        _draw_qualities(layout, context, smoke)
         column = layout.column()
-        column.prop(settings, "quality")
         column.prop(settings, "detail")
         row = column.row()
         row.active = settings.detail > 0.0
         row.prop(settings, "seed")
-        _draw_cost(column, context, smoke)
         layout.prop(settings, "output", placeholder=str(smoke_takes.output_folder(smoke)))
         _draw_run(layout, context, smoke)
 
@@ -84,6 +86,8 @@ def _draw_clip(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bp
         if clip.source == "MOVIE":
             text = iface_("The clip has {:d} x {:d} pixels at {:g} frames a second, the scene {:d} x {:d} at {:g}.")
             text = text.format(*clip.size, clip.fps, *size, frame_rate(scene))
+            if size == tuple(clip.size):
+                text = iface_("The clip has {:g} frames a second, the scene {:g}.").format(clip.fps, frame_rate(scene))
         else:  # pictures have no frame rate of their own
             text = iface_("The clip has {:d} x {:d} pixels, the scene {:d} x {:d}.").format(*clip.size, *size)
         draw_text(column, context, text, "INFO")
@@ -114,29 +118,79 @@ def draw_closed(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -
     column.row(align=True).prop(settings, "closed")
 
 
-def _draw_cost(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-    """The estimated cost; the first drawing of the tab starts the estimate."""
-    state = context.window_manager.smokelift
-    if state.check_smoke != smoke.session_uid:
+def _draw_qualities(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
+    """A button for each quality with what it takes and loses; the first drawing of the tab starts the estimate.
+
+    While a change is estimated, the figures of before stay, greyed.
+    """
+    state, settings = context.window_manager.smokelift, smoke.smokelift
+    checked = shot_check.is_checked(state, smoke)
+    done = checked and state.check_done
+    costs = state.costs if state.costs_smoke == smoke.session_uid and not (checked and state.check_error) else {}
+    column = layout.column(align=True)
+    column.use_property_split = False
+    title = settings.bl_rna.properties["quality"].name
+    for cell, word in zip(_cells(column), (title, "Time", "RAM", "Disk", "Lost"), strict=True):
+        cell.label(text=word)
+    for item in settings.bl_rna.properties["quality"].enum_items:
+        button, *cells = _cells(column)
+        button.prop_enum(settings, "quality", item.identifier)
+        cost = costs.get(item.identifier)
+        if cost is not None:
+            words = (
+                _brief_time(cost.seconds),
+                _brief(cost.memory, "G"),
+                _brief_disk(cost.disk),
+                _brief_share(cost.lost),
+            )
+            for cell, word in zip(cells, words, strict=True):
+                cell.active = done
+                cell.alert = cost.memory > state.memory_free
+                cell.label(text=word, translate=False)
+    if not checked:
         layout.operator("smokelift.check", icon="VIEWZOOM")
         shot_check.check_soon(context)
-        return
-    if state.check_error:
+    elif state.check_error:
         draw_text(layout, context, state.check_error, "ERROR")
-    elif state.check_done:
-        column = layout.column(align=True)
-        text = iface_("About {:s}, {:.1f} GiB of memory, up to {:s} on disk")
-        draw_text(column, context, text.format(duration(state.seconds), state.memory, size(state.disk)), "TIME")
-        column.label(text=iface_("{} x {} x {} voxels").format(*state.resolution), translate=False, icon="BLANK1")
-        if state.lost >= 0.0:
-            quality = smoke.smokelift.bl_rna.properties["quality"].enum_items[smoke.smokelift.quality].name
-            text = iface_("{:s} loses {:.1%} of the smoke's contrast in the clip.")
-            draw_text(column, context, text.format(iface_(quality), state.lost), "BLANK1")
-        if state.memory > state.memory_free:
+    elif not done:
+        text = iface_("Reading the clip: {:s}").format(duration(state.check_seconds))
+        layout.label(text=text if state.check_seconds else iface_("Reading the clip"), translate=False, icon="TIME")
+    elif (own := costs.get(settings.quality)) is not None:
+        text = iface_("{} x {} x {} voxels").format(*own.resolution)
+        layout.label(text=text, translate=False, icon="MESH_GRID")
+        if own.memory > state.memory_free:
             text = iface_("Only {:.1f} GiB are free: choose a lower quality.")
-            draw_text(column, context, text.format(state.memory_free), "ERROR")
-    else:
-        layout.label(text="Reading the clip", icon="TIME")
+            draw_text(layout, context, text.format(state.memory_free), "ERROR")
+
+
+def _cells(column: bpy.types.UILayout) -> list[bpy.types.UILayout]:
+    """The cells of a line of the table of qualities."""
+    cells, left = [], 1.0
+    for share in CELLS:
+        column = column.split(factor=share / left, align=True)
+        cells.append(column.row(align=True))
+        left -= share
+    return [*cells, column.row(align=True)]
+
+
+def _brief_time(seconds: float) -> str:
+    return duration(seconds) if seconds < 3570.0 else _brief(seconds / 3600.0, "h")
+
+
+def _brief_disk(megabytes: float) -> str:
+    return f"{megabytes:.0f} M" if megabytes < 99.5 else _brief(megabytes / 1000.0, "G")
+
+
+def _brief_share(share: float) -> str:
+    """In percent; nothing below 0, where it is unknown."""
+    if share < 0.0:
+        return ""
+    return f"{share:.1%}" if 0.0005 <= share < 0.00995 else f"{share:.0%}"
+
+
+def _brief(value: float, unit: str) -> str:
+    """To two digits at least: a cell of the table holds six letters."""
+    return f"{value:.1f} {unit}" if value < 9.95 else f"{value:.0f} {unit}"
 
 
 def _draw_run(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
@@ -185,7 +239,7 @@ def _draw_job(
     if row.outcome == "waiting":
         box.label(text="Waits for the run before it", icon="SORTTIME")
     elif row.outcome == "running":
-        box.progress(factor=row.done / row.total if row.total else 0.0, text=_progress(row))
+        draw_progress(box, row)
     else:
         draw_text(box, context, row.sentence, "ERROR" if row.outcome == "failed" else "INFO")
     if row.icon:
@@ -196,6 +250,11 @@ def _draw_job(
         box.operator("smokelift.open_log", icon="TEXT").take = row.take
     else:
         box.operator("smokelift.cancel", text="Cancel", icon="CANCEL").take = row.take
+
+
+def draw_progress(layout: bpy.types.UILayout, row: bpy.types.PropertyGroup) -> None:
+    """How far a run has come."""
+    layout.progress(factor=row.done / row.total if row.total else 0.0, text=_progress(row))
 
 
 def _progress(row: bpy.types.PropertyGroup) -> str:

@@ -266,10 +266,12 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
             ("ESTIMATE", "From the Clip", "Estimate even light from the smoke's brightness"),
             ("SCENE", "Scene Lights", "The scene's suns and point lights, and its world's panorama"),
         ],
+        update=_changed,
     )
     quality: EnumProperty(
         name="Quality",
-        description="More detail takes more time, memory and disk space",
+        description="More detail takes more time, memory (RAM, in GiB) and disk space. Lost is the share of the "
+        "smoke's contrast in the clip that is finer than the voxels",
         items=[
             ("draft", "Draft", "A quick look"),
             ("balanced", "Balanced", "Good for most shots"),
@@ -345,7 +347,7 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
         ],
         update=_changed,
     )
-    use_medium: BoolProperty(name="Smoke Material", description="Set the smoke's optical properties")
+    use_medium: BoolProperty(name="Smoke Material", description="Set the smoke's optical properties", update=_changed)
     extinction: FloatProperty(
         name="Extinction",
         description="Extinction coefficient per metre of smoke of density 1",
@@ -353,6 +355,7 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
         min=0.001,
         max=1e9,
         soft_max=50.0,
+        update=_changed,
     )
     albedo: FloatProperty(
         name="Albedo",
@@ -360,6 +363,7 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
         default=0.9,
         min=0.0,
         max=1.0,
+        update=_changed,
     )
     anisotropy: FloatProperty(
         name="Anisotropy",
@@ -367,6 +371,7 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
         default=0.0,
         min=-0.95,
         max=0.95,
+        update=_changed,
     )
     speed: EnumProperty(
         name="Speed",
@@ -459,24 +464,33 @@ class SmokeliftJob(bpy.types.PropertyGroup):
     cancel: BoolProperty()
 
 
+class SmokeliftCost(bpy.types.PropertyGroup):
+    """What a run takes at the quality that it is named after."""
+
+    resolution: IntVectorProperty(size=3)
+    seconds: FloatProperty()
+    memory: FloatProperty(description="GiB")
+    disk: FloatProperty(description="MB")
+    lost: FloatProperty(description="Share of the smoke's contrast in the clip; below 0 if unknown")
+
+
 class SmokeliftState(bpy.types.PropertyGroup):
     """This session's runs, and the estimate of the next one; never saved."""
 
     jobs: CollectionProperty(type=SmokeliftJob)
     check_smoke: IntProperty()
+    check_place: StringProperty(description="Corners of the box that was checked; empty without one")
     check_ticks: IntProperty()
     check_done: BoolProperty()
     check_error: StringProperty()
+    check_seconds: IntProperty(description="Since the engine began to read the clip")
     notes: StringProperty()
-    resolution: IntVectorProperty(size=3)
-    lost: FloatProperty(default=-1.0, description="Share of the smoke's contrast in the clip; below 0 if unknown")
-    seconds: FloatProperty()
-    memory: FloatProperty(description="GiB")
+    costs: CollectionProperty(type=SmokeliftCost)
+    costs_smoke: IntProperty(description="Whose the costs are")
     memory_free: FloatProperty(description="GiB")
-    disk: FloatProperty(description="MB")
 
 
-_CLASSES = (SmokeliftDirecting, SmokeliftSettings, SmokeliftJob, SmokeliftState)
+_CLASSES = (SmokeliftDirecting, SmokeliftSettings, SmokeliftJob, SmokeliftCost, SmokeliftState)
 
 
 def register() -> None:

@@ -49,8 +49,11 @@ class SMOKELIFT_OT_set_up(NeedsClipAndResult, bpy.types.Operator):
             self.report({"ERROR"}, "The scene has no camera: choose the one that the smoke was made for.")
             return {"CANCELLED"}
         shot_setup.set_up(smoke, take, index)
+        if settings.set_up_camera and context.area is not None and context.area.type == "VIEW_3D":
+            context.space_data.region_3d.view_perspective = "CAMERA"
         volume.show(smoke, take)  # the frame rate may have changed
         shot_check.check_again(context)
+        self.report({"INFO"}, "The shot is set up: press F12 for a render that matches the clip.")
         return {"FINISHED"}
 
 

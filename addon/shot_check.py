@@ -3,6 +3,7 @@
 It starts by itself once the settings rest, and its result is shown in the panel.
 """
 
+import time
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import bpy
 
 from . import preferences
 from .blender_scene import ShotError
+from .box_table import box_corners, box_of
 from .job import EngineMissingError, Job, engine_command
 from .scene_file import options, shot_tables
 from .smoke import active_smoke, find_smoke
@@ -55,10 +57,25 @@ def found_lines(facts: Iterable[Mapping[str, str]]) -> list[str]:
     return lines
 
 
-def lost_share(choices: Iterable[Mapping[str, Any]]) -> float:
-    """Share of the smoke's contrast in the clip that the grid loses; below 0 where the engine did not measure it."""
-    measured = next((choice["measured"] for choice in choices if choice["what"] == "resolution"), {})
-    return float(measured.get("lost", -1.0))
+def keep_costs(state: bpy.types.PropertyGroup, smoke_uid: int, details: Mapping[str, Any]) -> None:
+    """Keep what each quality takes and loses.
+
+    Parameters
+    ----------
+    state
+        Of this session.
+    smoke_uid
+        The smoke that was checked.
+    details
+        What the engine says at the end of a check.
+    """
+    state.costs.clear()
+    for name, cost in details["qualities"].items():
+        row = state.costs.add()
+        row.name, row.resolution = name, cost["resolution"]
+        row.lost = -1.0 if cost["lost"] is None else cost["lost"]
+        row.seconds, row.memory, row.disk = cost["seconds"], cost["memory"] / 2**30, cost["disk"] / 1e6
+    state.costs_smoke, state.memory_free = smoke_uid, details["memory_free"] / 2**30
 
 
 class ShotCheck:
@@ -66,6 +83,7 @@ class ShotCheck:
 
     def __init__(self) -> None:
         self._job: Job | None = None
+        self._began = 0.0
 
     @property
     def running(self) -> bool:
@@ -90,24 +108,21 @@ class ShotCheck:
             return False
         self._job.poll()
         if not self._job.ended:
-            return False
+            before, state.check_seconds = state.check_seconds, int(time.monotonic() - self._began)
+            return state.check_seconds != before
         job, self._job = self._job, None
         details = job.details
         state.check_done = job.outcome == "done"
         state.check_error = "" if state.check_done else in_panel(job.sentence)
         state.notes = "\n".join(found_lines(details.get("facts", ())))
         if state.check_done:
-            state.resolution = details["scene"]["domain"]["resolution"]
-            state.lost = lost_share(details.get("choices", ()))
-            state.seconds = details["seconds"]
-            state.memory, state.memory_free = details["memory"] / 2**30, details["memory_free"] / 2**30
-            state.disk = details["disk"] / 1e6
+            keep_costs(state, state.check_smoke, details)
         return True
 
     def _start(self, state: bpy.types.PropertyGroup) -> None:
         self.kill()
         smoke = find_smoke(state.check_smoke)
-        state.check_done, state.check_error = False, ""
+        state.check_done, state.check_error, state.check_seconds = False, "", 0
         if smoke is None:
             return
         folder = Path(bpy.app.tempdir)
@@ -120,7 +135,19 @@ class ShotCheck:
         except (ShotError, TakeError, EngineMissingError) as error:
             state.check_error = str(error)
             return
+        self._began = time.monotonic()
         self._job.start()
+
+
+def place(smoke: bpy.types.Object) -> str:
+    """Where the corners of a smoke's box are; empty without one."""
+    box = box_of(smoke) if smoke.smokelift.camera_mode == "SCENE" else None
+    return "" if box is None else " ".join(f"{number:.5g}" for corner in box_corners(box) for number in corner)
+
+
+def is_checked(state: bpy.types.PropertyGroup, smoke: bpy.types.Object) -> bool:
+    """Whether the last check is of this smoke, whose box has not been moved since: Blender tells of that by drawing."""
+    return state.check_smoke == smoke.session_uid and state.check_place in ("", place(smoke))
 
 
 def check_again(context: bpy.types.Context) -> None:
@@ -135,7 +162,7 @@ def check_soon(context: bpy.types.Context) -> None:
     """Check the active smoke unless it was checked. Drawing code may call this."""
     state, first = context.window_manager.smokelift, context.window_manager.windows[0]
     smoke = active_smoke(context.scene)
-    known = smoke is None or smoke.session_uid == state.check_smoke
+    known = smoke is None or is_checked(state, smoke)
     if not known and context.window == first and not bpy.app.timers.is_registered(_check):
         bpy.app.timers.register(_check)  # drawing code may not change data
 

@@ -151,10 +151,10 @@ def _provenance(parts: list[dict[str, Any]]) -> str:
         return " ".join(directed)
     made_up = next((part["settings"] for part in parts if part["origin"] == MADE_UP), None)
     if made_up is None:
-        what = "Nothing is made up: the depth is smooth."
+        what = "Nothing is made up: its depth is smooth."
     else:
-        what = f"Depth detail {made_up['detail']:.2g} is made up: variation {made_up['seed']}."
-    return " ".join(["The camera's view is measured.", what, *directed])
+        what = f"What it does not see is made up: Depth Detail {made_up['detail']:.2g}, Variation {made_up['seed']}."
+    return " ".join(["What the camera sees is measured.", what, *directed])
 
 
 @persistent

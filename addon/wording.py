@@ -35,6 +35,18 @@ _PHRASES: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] = (
     # the engine counts frames from 0, and the panel from 1
     (r"between frames (\d+) and (\d+), as at a cut", lambda found: f"between frames {_next(found)}, as at a cut"),
     (r"--frames (\d+):(\d+) or (\d+):(\d+)", lambda found: "Frames {} to {} or {} to {}".format(*_after(found))),
+    (
+        r"^(\d+ frames?) in .+? \((\d+ s)\), ([\d.]+) dB inside the smoke at the clip's pixels \(median\)\.$",
+        r"\1 made in \2. They match the clip to \3 dB; more is closer.",
+    ),
+    (r"^(\d+ frames?) in .+?(, \d+ of them simulated|, which repeat)? \((\d+ s)\)\.$", r"\1 made in \3\2."),
+    (r"^A proxy of (\d+ frames?) in .+\.$", r"The proxy of \1 is made."),
+    (r"^\S.*[/\\]take_\d+: has the frames", "The result has the frames"),
+    (
+        r"install it \(pip install .+? zip (smokelift_gpu)\)(, or use .*cpu)?",
+        r"install the extension \1, or choose Device CPU",
+    ),
+    (r"^The axis depth (\S+ m) is outside", r"Known Depth: \1 is outside"),
     (r"go on with --resume, or choose another directory", "press Resume, or choose another Output"),
     (r"(?<!\S)--([a-z]+)(?:-([a-z]+))?", lambda found: " ".join(found.groups("")).title().strip()),
     (r"(?<!\S)\[\[?([a-z]+)\]?\](?!\w)", lambda found: NAMES.get(found[1], found[0])),

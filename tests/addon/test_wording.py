@@ -56,6 +56,21 @@ def test_no_word_of_a_scene_file_or_of_an_option_is_left(topic) -> None:
         ),
         ("Smoke colour: undetermined, grey is taken.", "Smoke color: undetermined, grey is taken."),
         (
+            "12 frames in /a b/take_0001 (28 s), 26.4 dB inside the smoke at the clip's pixels (median).",
+            "12 frames made in 28 s. They match the clip to 26.4 dB; more is closer.",
+        ),
+        ("18 frames in C:\\take_0002, 6 of them simulated (9 s).", "18 frames made in 9 s, 6 of them simulated."),
+        ("1 frame in take_0003, which repeat (9 s).", "1 frame made in 9 s, which repeat."),
+        ("24 frames in /tmp/take_0004 (9 s).", "24 frames made in 9 s."),
+        ("A proxy of 12 frames in /tmp/take_0003.", "The proxy of 12 frames is made."),
+        ("/tmp/take_0003: has the frames 1 to 12; choose", "The result has the frames 1 to 12; choose"),
+        (
+            "As Taichi is not installed: install it (pip install 'smokelift[gpu]'; in Blender the extension's zip "
+            "smokelift_gpu), or use --device cpu.",
+            "As Taichi is not installed: install the extension smokelift_gpu, or choose Device CPU.",
+        ),
+        ("The axis depth 30 m is outside the box", "Known Depth: 30 m is outside the box"),
+        (
             "finished frames stay (2), and --resume goes on from them",
             "finished frames stay (2), and Resume goes on from them",
         ),

@@ -159,6 +159,7 @@ def test_window(root, installed) -> None:
     assert max(report["clip_editor"]["longest_gaps"]) < LONGEST_GAP
     assert report["volumes"] == 1, "the second run did not replace the first"
     assert report["moved_with_the_clip"] == 5
+    assert report["looks_through"] == "CAMERA", "the view is not that of the camera that was set up"
     assert report["variation"] == 1, "the second run is no other variation"
     assert change(load(pictures / "view_3d_done.png"), load(pictures / "rendered.png"), middle) > 10
 

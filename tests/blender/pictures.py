@@ -13,15 +13,23 @@ DOCS = ROOT / "docs"
 SIDEBAR = (1042, 78, 1300, 900)
 """Where the tab is in a picture of the screen: left, top, right, bottom."""
 
-STAGES = ("idle", "running", "done")
+SUB_PANEL = (1042, 78, 1300, 440)
+"""And a sub-panel by itself."""
+
+SUB_PANELS = ("results", "advanced", "look", "set_up", "direct", "export")
+STAGES = ("qualities", "view_3d_running", "view_3d_done")
 GAP = 8
 COLOURS = 256
 
 
 def main() -> None:
     """Write them."""
-    panels = [Image.open(SEEN / f"view_3d_{stage}.png").convert("RGB").crop(SIDEBAR) for stage in STAGES]
+    panels = [Image.open(SEEN / f"{stage}.png").convert("RGB").crop(SIDEBAR) for stage in STAGES]
     save("blender_panel.png", beside(panels))
+    alone = [
+        Image.open(file).convert("RGB").crop(SUB_PANEL) for file in (SEEN / f"sub_panel_{n}.png" for n in SUB_PANELS)
+    ]
+    save("blender_subpanels.png", beside(alone))
     window = Image.open(SEEN / "view_3d_done.png").convert("RGB")
     save("blender_window.png", window.resize((1200, 750), Image.Resampling.LANCZOS))
 

@@ -1,4 +1,4 @@
-"""What was chosen for a clip, and the figure that decided it."""
+"""What was chosen for a clip, and the figure that decided it; and what other qualities would choose."""
 
 from __future__ import annotations
 
@@ -51,3 +51,19 @@ class Choice(Generic[Chosen]):
             "tolerance": self.tolerance,
             "by_hand": self.by_hand,
         }
+
+
+@dataclass(frozen=True)
+class Grid:
+    """The grid that a quality takes of a clip.
+
+    Attributes
+    ----------
+    resolution
+        Voxels along x, y, z.
+    lost
+        Share of the smoke's contrast in the clip that is finer than it shows; None where that was not measured.
+    """
+
+    resolution: tuple[int, int, int]
+    lost: float | None

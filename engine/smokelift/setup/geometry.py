@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -17,9 +18,9 @@ from smokelift.footage.turning import Turns
 from smokelift.footage.working_picture import CameraError, working_picture
 from smokelift.scene import Box, Camera, Domain, Scene, as_matrix
 from smokelift.scene.projection import voxel_width
-from smokelift.setup.choice import Choice
+from smokelift.setup.choice import Choice, Grid
 from smokelift.setup.detail import Detail, smoke_detail
-from smokelift.setup.settings import LIMITS, Settings
+from smokelift.setup.settings import LIMITS, LOST_DETAIL, QUALITIES, Quality, Settings
 from smokelift.setup.smoke import SmokeSamples
 
 Shape = tuple[int, int, int]
@@ -58,12 +59,15 @@ class Geometry:
         Why it has that resolution; None for the finest grid of a quality that nothing was measured for.
     notes
         What was assumed, a sentence each.
+    qualities
+        The grid that each quality would take of this clip; empty where nothing was measured.
     """
 
     camera: Camera
     domain: Domain
     resolution: Choice[Shape] | None
     notes: tuple[str, ...] = ()
+    qualities: Mapping[Quality, Grid] = field(default_factory=dict)
 
     @property
     def choices(self) -> tuple[Choice[Shape], ...]:
@@ -85,8 +89,8 @@ def find_geometry(
     given = None if scene.camera is None else fitting(scene.camera, clip)
     if given is not None and scene.domain is not None:
         camera = _turning(given, turns)
-        box, division = _divided(scene.domain, clip, camera, settings, plates, samples)
-        return Geometry(camera, box, division, _grown(scene.domain, box))
+        box, division, qualities = _divided(scene.domain, clip, camera, settings, plates, samples)
+        return Geometry(camera, box, division, _grown(scene.domain, box), qualities)
     if scene.domain is not None:
         raise ValueError("The scene gives a [domain] but no [camera]; give the camera that filmed it.")
     if scene.inlets:
@@ -98,43 +102,53 @@ def find_geometry(
         )
     focal = _focal(clip) if turns is None else turns.lens.focal[0]
     camera = given or _level(clip, focal)
-    grids = _around(camera, samples, settings)
+    base, size, metres = _around(camera, samples)
     camera = _turning(camera, turns)
+
+    def grids(quality: Quality) -> tuple[Domain, ...]:
+        # multiples of four, so that pyramids halve them evenly
+        return _grids(base, size, LIMITS[quality].voxels(max(size) / metres), 4)
+
+    choice: Choice[Shape] | None = None
+    by_quality: Mapping[Quality, Grid] = {}
     if isinstance(settings.resolution, tuple):
-        domain, choice = grids[-1], _resolution_by_hand(grids[-1])
+        domain = _filled(base, size, settings.resolution)
+        choice = _resolution_by_hand(domain)
     elif settings.selection.measure:
-        domain, choice = _resolved(clip, camera, grids, plates, samples.smoky, settings)
+        domain, choice, by_quality = _resolved(clip, camera, grids, plates, samples.smoky, settings)
     else:
-        domain, choice = grids[-1], None
-    size = " x ".join(f"{high - low:.2f}" for low, high in zip(domain.min, domain.max, strict=True))
+        domain = grids(settings.quality)[-1]
+    metric = " x ".join(f"{high - low:.2f}" for low, high in zip(domain.min, domain.max, strict=True))
     missing = "Box not given:" if given is not None else f"Camera not given: {_assumed_lens(clip, focal)},"
     where = "around the smoke" if samples.smoky else "over all of the picture"
     notes = (
         f"{missing} the picture taken to be {PICTURE_HEIGHT:g} m high where the smoke is.",
-        f"Domain {where}: {size} m, {' x '.join(map(str, domain.resolution))} voxels.",
+        f"Domain {where}: {metric} m, {' x '.join(map(str, domain.resolution))} voxels.",
     )
-    return Geometry(camera, domain, choice, notes)
+    return Geometry(camera, domain, choice, notes, by_quality)
 
 
 def _divided(
     box: Box, clip: Clip, camera: Camera, settings: Settings, plates: Plates, samples: SmokeSamples
-) -> tuple[Domain, Choice[Shape]]:
-    """A box that is given, with as many voxels as are asked for, and why."""
+) -> tuple[Domain, Choice[Shape], Mapping[Quality, Grid]]:
+    """A box that is given, with as many voxels as are asked for, and why; and the grid of each quality."""
     floor, size = np.array([*box.centre[:2], box.min[2]]), np.subtract(box.max, box.min)
     if isinstance(settings.resolution, tuple):
         if isinstance(box, Domain):
             domain = replace(box, resolution=settings.resolution)
         else:
             domain = _filled(floor, size, settings.resolution)
-        return domain, _resolution_by_hand(domain)
+        return domain, _resolution_by_hand(domain), {}
     if isinstance(box, Domain) and settings.resolution is None:
-        return box, _resolution_by_hand(box)
+        return box, _resolution_by_hand(box), {}
     still = camera.at(next(iter(samples.smoky), 0))
-    if isinstance(box, Domain):
-        grids = _same_shape(box, LIMITS[settings.quality].voxels(_pixels(still, box)))
-    else:
+
+    def grids(quality: Quality) -> tuple[Domain, ...]:
+        if isinstance(box, Domain):
+            return _same_shape(box, LIMITS[quality].voxels(_pixels(still, box)))
         (coarsest,) = _grids(floor, size, COARSEST, 1)
-        grids = _grids(floor, size, LIMITS[settings.quality].voxels(_pixels(still, coarsest)), 1)
+        return _grids(floor, size, LIMITS[quality].voxels(_pixels(still, coarsest)), 1)
+
     return _resolved(clip, camera, grids, plates, samples.smoky, settings)
 
 
@@ -220,10 +234,12 @@ def _ways(camera: Camera, x: Array, y: Array) -> Array:
     return np.asarray(np.stack(pixels, -1) @ turn.T)
 
 
-def _around(camera: Camera, samples: SmokeSamples, settings: Settings) -> tuple[Domain, ...]:
+def _around(camera: Camera, samples: SmokeSamples) -> tuple[Array, Array, float]:
     """The box around the smoke before a camera, upright where the picture of a level one is `PICTURE_HEIGHT` high.
 
-    The box comes with every number of voxels that may be chosen, the fewest first.
+    Returns
+    -------
+    The middle of its floor (3,) and its size (3,) in metres, and the metres that a pixel of the picture shows there.
     """
     metres = PICTURE_HEIGHT / camera.size[1]
     distance = camera.fy * metres
@@ -239,11 +255,7 @@ def _around(camera: Camera, samples: SmokeSamples, settings: Settings) -> tuple[
     across *= 1 + across / (2 * distance)
     base = eye + distance * along + (aside.min() + aside.max()) / 2 * lateral
     base[2] = eye[2] + height.min()
-    size = np.array([across, across, up])
-    if isinstance(settings.resolution, tuple):
-        return (_filled(base, size, settings.resolution),)
-    # multiples of four, so that pyramids halve them evenly
-    return _grids(base, size, LIMITS[settings.quality].voxels(max(across, up) / metres), 4)
+    return base, np.array([across, across, up]), metres
 
 
 def _filled(floor: Array, size: Array, resolution: Shape) -> Domain:
@@ -311,25 +323,41 @@ def _same_shape(domain: Domain, most: int) -> tuple[Domain, ...]:
 
 
 def _resolved(
-    clip: Clip, camera: Camera, grids: tuple[Domain, ...], plates: Plates, smoky: tuple[int, ...], settings: Settings
-) -> tuple[Domain, Choice[Shape]]:
-    """The coarsest grid of some that loses no more of what the finest shows than tolerated, and why."""
+    clip: Clip,
+    camera: Camera,
+    grids: Callable[[Quality], tuple[Domain, ...]],
+    plates: Plates,
+    smoky: tuple[int, ...],
+    settings: Settings,
+) -> tuple[Domain, Choice[Shape], Mapping[Quality, Grid]]:
+    """Of a quality's grids the coarsest that loses no more of what the finest shows than tolerated, and why.
+
+    The clip's detail is measured once, and says what each quality would take.
+    """
+    own = grids(settings.quality)
     if not smoky:
-        said = " x ".join(map(str, grids[0].resolution))
-        return grids[0], Choice(
-            "resolution", grids[0].resolution, f"Resolution: {said} voxels, since no smoke is seen."
-        )
-    tolerance, finest = settings.selection.lost_detail, max(grids[-1].resolution)
-    detail = _detail(clip, camera, grids[-1], plates, smoky)
-    domain = next((grid for grid in grids if detail.lost(max(grid.resolution), finest) <= tolerance), grids[-1])
-    longest = max(domain.resolution)
+        said = " x ".join(map(str, own[0].resolution))
+        reason = f"Resolution: {said} voxels, since no smoke is seen."
+        return own[0], Choice("resolution", own[0].resolution, reason), {}
+    detail = _detail(clip, camera, own[-1], plates, smoky)
+
+    def coarsest(allowed: tuple[Domain, ...], tolerance: float) -> Domain:
+        finest = max(allowed[-1].resolution)
+        return next((grid for grid in allowed if detail.lost(max(grid.resolution), finest) <= tolerance), allowed[-1])
+
+    tolerance = settings.selection.lost_detail
+    domain = coarsest(own, tolerance)
+    longest, finest = max(domain.resolution), max(own[-1].resolution)
     lost = detail.lost(longest)
     reason = (
         f"Resolution: {' x '.join(map(str, domain.resolution))} voxels for {detail.pixels:.0f} pixels along the "
         f"longest side: {settings.quality} loses {lost:.1%} of the smoke's contrast in the clip."
     )
     measured = {"lost": lost, "lost_beside_finest": detail.lost(longest, finest), "pixels": detail.pixels}
-    return domain, Choice("resolution", domain.resolution, reason, measured, tolerance)
+    others = {quality: coarsest(grids(quality), LOST_DETAIL[quality]) for quality in QUALITIES}
+    taken = {**others, settings.quality: domain}
+    by_quality = {name: Grid(grid.resolution, detail.lost(max(grid.resolution))) for name, grid in taken.items()}
+    return domain, Choice("resolution", domain.resolution, reason, measured, tolerance), by_quality
 
 
 def _detail(clip: Clip, camera: Camera, box: Domain, plates: Plates, smoky: tuple[int, ...]) -> Detail:

@@ -97,6 +97,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
         ),
         doubts=look.doubts,
         choices=(*geometry.choices, *smoke.choices, *tried, *light.choices(complete), *gains),
+        qualities=geometry.qualities,
         exposure=samples.exposure,
         smoky=samples.smoky,
         place=None,

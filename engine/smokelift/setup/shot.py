@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -12,8 +13,8 @@ from smokelift.footage.plate import Plates
 from smokelift.footage.working_picture import CameraError, WorkingPicture, working_picture
 from smokelift.render import Image, Optics
 from smokelift.scene import Camera, CompleteScene, Domain, Inlet
-from smokelift.setup.choice import Choice
-from smokelift.setup.settings import Settings
+from smokelift.setup.choice import Choice, Grid
+from smokelift.setup.settings import Quality, Settings
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +87,8 @@ class Shot:
         Those of the notes that say why the result may be nothing, or wrong.
     choices
         What was chosen by measurement or by hand, with the figures that decided it.
+    qualities
+        The grid that each quality would take of this clip; empty where the resolution was not measured.
     exposure
         Largest relative change of exposure, which is evened out; 0 where it is steady.
     smoky
@@ -105,6 +108,7 @@ class Shot:
     notes: tuple[str, ...]
     doubts: tuple[str, ...]
     choices: tuple[Choice[Any], ...]
+    qualities: Mapping[Quality, Grid]
     exposure: float
     smoky: tuple[int, ...]
     place: AxisEstimate | None

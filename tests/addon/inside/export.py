@@ -163,7 +163,9 @@ def test_a_result_gets_a_proxy(made) -> None:
 
 def test_an_export_for_another_program_has_no_asset(made) -> None:
     """Blender would not find its grids."""
+    for_blender = export.folder_of(made)
     made.smokelift_export.host = "unreal"
+    assert export.folder_of(made) != for_blender
     assert bpy.ops.smokelift.export() == {"FINISHED"}
     names = {path.name for path in export.folder_of(made).iterdir()}
     assert names == {*(f"smoke_{number:04d}.vdb" for number in range(1, FRAMES + 1)), "export.json"}

@@ -208,7 +208,7 @@ def test_an_override_of_a_linked_smoke_gets_a_look_of_its_own(lit, tmp_path) -> 
     assert smokes(scene) == [] and not bpy.ops.smokelift.use_look.poll(), "it is not active"
     bpy.context.view_layer.objects.active = override
     texts = drawn(scene, look_panel.SMOKELIFT_PT_view_look)
-    assert "Density" not in texts and "Viewport Density" not in texts
+    assert "Density" not in texts and "View Density" not in texts
     assert bpy.ops.smokelift.use_look(preset="SOOT") == {"FINISHED"}
     assert "Density" in drawn(scene, look_panel.SMOKELIFT_PT_view_look)
     look.node_of(override).inputs["Density"].default_value = 3.0

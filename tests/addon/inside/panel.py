@@ -21,6 +21,7 @@ from addon import (
     shot_check,
     volume,
 )
+from addon.contract import QUALITIES
 from addon.take import Take
 from conftest import made
 from smokelift.output.images import write_image
@@ -69,14 +70,14 @@ def test_no_line_is_cut_off(shot) -> None:
     manager = bpy.context.window_manager
     state = manager.smokelift
     state.check_smoke, state.check_done, state.notes = smoke(shot).session_uid, True, "Background: a picture"
-    state.resolution, state.seconds, state.disk = (144, 144, 144), 86000.0, 9999.0
-    state.memory, state.memory_free = 112.4, 11.8
+    know_costs(shot, seconds=86000.0, memory=112.4, disk=99900.0, lost=0.123)
+    state.memory_free = 11.8
     for outcome in ("waiting", "running", "done", "failed"):
         row = manager.smokelift.jobs.add()
         row.smoke_uid, row.outcome, row.sentence = smoke(shot).session_uid, outcome, "One word after the other. " * 5
         row.done, row.total, row.seconds_left, row.warnings = 1250, 2500, 80000.0, "This is a warning. " * 5
     texts = drawn(shot, panel.SMOKELIFT_PT_view, advanced_panel.SMOKELIFT_PT_view_advanced)
-    assert any("112.4 GiB" in text for text in texts)
+    assert {"24 h", "112 G", "100 G", "12%"} <= set(texts)
     assert [text for text in texts if len(text) > LETTERS] == []
 
 
@@ -101,14 +102,26 @@ def test_no_line_of_a_result_is_cut_off(shot, tmp_path, monkeypatch) -> None:
     assert [text for text in texts if len(text) > LETTERS] == []
 
 
+def know_costs(scene: bpy.types.Scene, **figures: float) -> None:
+    """All qualities were estimated, each with these figures."""
+    state = bpy.context.window_manager.smokelift
+    usual = {"resolution": (48, 48, 64), "seconds": 12.0, "memory": 0.4, "disk": 30.0, "lost": 0.0772}
+    for quality in QUALITIES:
+        row = state.costs.add()
+        row.name = quality
+        for name, value in {**usual, **figures}.items():
+            setattr(row, name, value)
+    state.costs_smoke = smoke(scene).session_uid
+
+
 def test_the_look_is_in_the_tab(shot, tmp_path) -> None:
     """Once there is smoke; every input by its name, and how it is shown."""
     assert not look_panel.SMOKELIFT_PT_view_look.poll(SimpleNamespace(scene=shot))
     volume.show(smoke(shot), made(tmp_path))
     assert look_panel.SMOKELIFT_PT_view_look.poll(SimpleNamespace(scene=shot))
     texts = drawn(shot, look_panel.SMOKELIFT_PT_view_look)
-    assert {"Density", "Brightness", "Color", "Edge Contrast", "Absorption Color", "Anisotropy"} <= set(texts)
-    assert {"Presets    ", "Viewport Density", "Render Step"} <= set(texts)
+    assert {"Density", "Brightness", "Color", "Edge Contrast", "Absorption", "Anisotropy"} <= set(texts)
+    assert {"Presets    ", "View Density", "Render Step"} <= set(texts)
 
 
 def test_large_smoke_without_a_proxy_is_offered_one(shot, tmp_path) -> None:
@@ -159,6 +172,28 @@ def test_pictures_have_no_frame_rate(shot, tmp_path) -> None:
     assert "frames a second" not in text
 
 
+def test_only_what_differs_from_the_clip_is_said(shot) -> None:
+    """The rate alone, if the sizes are the same."""
+    bpy.ops.smokelift.match_clip()
+    shot.render.fps, shot.render.fps_base = 50, 1.0
+    bpy.context.window_manager.smokelift.check_smoke = smoke(shot).session_uid  # no check is under way
+    text = " ".join(" ".join(drawn(shot, panel.SMOKELIFT_PT_view)).split())
+    assert f"The clip has {smoke(shot).smokelift.clip.fps:g} frames a second, the scene 50." in text
+
+
+def test_waiting_is_seen(shot, tmp_path) -> None:
+    """How long the clip has been read; and in Direct how far the run has come, whose bar is out of sight above it."""
+    state = bpy.context.window_manager.smokelift
+    state.check_smoke, state.check_seconds = smoke(shot).session_uid, 12
+    assert "Reading the clip: 12 s    " in drawn(shot, panel.SMOKELIFT_PT_view)
+    volume.show(smoke(shot), made(tmp_path))
+    row = state.jobs.add()
+    row.smoke_uid, row.outcome, row.done, row.total = smoke(shot).session_uid, "running", 3, 8
+    assert "3 of 8" in drawn(shot, direct_panel.SMOKELIFT_PT_view_direct)
+    row.outcome = "done"
+    assert "3 of 8" not in drawn(shot, direct_panel.SMOKELIFT_PT_view_direct)
+
+
 @pytest.mark.parametrize("complete", [True, False])
 def test_a_failed_result_has_no_other_variation(shot, tmp_path, complete) -> None:
     """What failed or was stopped is resumed, or started again."""
@@ -205,8 +240,8 @@ def test_what_was_found_is_five_lines_in_the_panels_words(shot) -> None:
 def test_the_resolution_is_seen_when_it_is_guessed(shot) -> None:
     """With the cost, whatever the camera is."""
     state = bpy.context.window_manager.smokelift
-    state.check_smoke, state.check_done, state.resolution = smoke(shot).session_uid, True, (48, 48, 64)
     smoke(shot).smokelift.camera_mode = "GUESS"
+    know_costs(shot)
     state.check_smoke, state.check_done = smoke(shot).session_uid, True
     assert any(text.startswith("48 x 48 x 64 voxels") for text in drawn(shot, panel.SMOKELIFT_PT_view))
 
@@ -225,13 +260,51 @@ def test_what_is_automatic_is_a_word_and_a_tick(shot, name) -> None:
     assert getattr(settings, name) == 0
 
 
-def test_a_quality_says_what_it_loses(shot) -> None:
-    """Beside what it costs; nothing where the engine did not measure it."""
-    measured = [{"what": "resolution", "measured": {"lost": 0.0772}}]
+def test_every_quality_says_what_it_takes_and_loses(shot) -> None:
+    """Also while another setting is estimated; nothing of another smoke, nor of a shot that is refused."""
     state = bpy.context.window_manager.smokelift
+    each = {"resolution": [48, 48, 64], "seconds": 12, "memory": 2**28, "memory_free": 2**33, "disk": 3e7}
+    each |= {"lost": 0.0772}
+    shot_check.keep_costs(state, smoke(shot).session_uid, {**each, "qualities": dict.fromkeys(QUALITIES, each)})
+    cells = ("12 s", "0.2 G", "30 M", "8%")
+
+    def shown() -> list[int]:
+        texts = drawn(shot, panel.SMOKELIFT_PT_view)
+        return [texts.count(cell) for cell in cells]
+
     state.check_smoke, state.check_done = smoke(shot).session_uid, True
-    state.lost = shot_check.lost_share(measured)
-    words = "Draft loses 7.7% of the smoke's contrast"
-    assert words in " ".join(" ".join(drawn(shot, panel.SMOKELIFT_PT_view)).split())
-    state.lost = shot_check.lost_share([])
-    assert "loses" not in " ".join(drawn(shot, panel.SMOKELIFT_PT_view))
+    assert shown() == [4, 4, 4, 4]
+    smoke(shot).smokelift.albedo = 0.5
+    assert not state.check_done
+    state.check_smoke = smoke(shot).session_uid
+    assert shown() == [4, 4, 4, 4]
+    state.check_smoke, state.check_error = smoke(shot).session_uid, "The box is flat."
+    assert shown() == [0, 0, 0, 0]
+    state.check_error, state.costs_smoke = "", state.costs_smoke + 1
+    assert shown() == [0, 0, 0, 0]
+
+
+def test_a_given_resolution_says_what_it_takes(shot) -> None:
+    """What is lost was not measured."""
+    state = bpy.context.window_manager.smokelift
+    each = {"resolution": [48, 48, 64], "seconds": 12, "memory": 2**28, "memory_free": 2**33, "disk": 3e7, "lost": None}
+    shot_check.keep_costs(state, smoke(shot).session_uid, {**each, "qualities": dict.fromkeys(QUALITIES, each)})
+    state.check_smoke, state.check_done = smoke(shot).session_uid, True
+    texts = drawn(shot, panel.SMOKELIFT_PT_view)
+    assert texts.count("12 s") == 4
+    assert not [text for text in texts if "%" in text]
+
+
+def test_a_box_that_is_moved_is_estimated_anew(shot) -> None:
+    """Blender draws the tab then, and drawing asks for an estimate."""
+    state = bpy.context.window_manager.smokelift
+    state.check_smoke, state.check_place = smoke(shot).session_uid, shot_check.place(smoke(shot))
+    assert shot_check.is_checked(state, smoke(shot))
+    smoke(shot).smokelift.box.scale.x *= 1.1
+    bpy.context.view_layer.update()
+    assert not shot_check.is_checked(state, smoke(shot))
+    smoke(shot).smokelift.camera_mode = "GUESS"
+    state.check_smoke, state.check_place = smoke(shot).session_uid, shot_check.place(smoke(shot))
+    smoke(shot).smokelift.box.scale.x *= 1.1
+    bpy.context.view_layer.update()
+    assert shot_check.is_checked(state, smoke(shot))

@@ -272,11 +272,11 @@ def test_the_material_is_the_mediums(shot, tmp_path) -> None:
                 {"what": "velocity", "origin": "estimated", "how": "", "settings": {}},
                 {"what": "detail", "origin": "made up", "how": "", "settings": {"detail": 0.5, "seed": 3}},
             ],
-            "The camera's view is measured. Depth detail 0.5 is made up: variation 3.",
+            "What the camera sees is measured. What it does not see is made up: Depth Detail 0.5, Variation 3.",
         ),
         (
             [{"what": "velocity", "origin": "estimated", "how": "", "settings": {}}],
-            "The camera's view is measured. Nothing is made up: the depth is smooth.",
+            "What the camera sees is measured. Nothing is made up: its depth is smooth.",
         ),
         ([], ""),
     ],

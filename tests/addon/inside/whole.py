@@ -13,6 +13,7 @@ import pytest
 
 import smokelift
 from addon import look, run, shot_check, smoke_takes, volume
+from addon.contract import QUALITIES
 from addon.light_tables import point_intensity, sun_irradiance
 from addon.scene_file import shot_tables
 from addon.smoke import activate, smokes
@@ -297,10 +298,13 @@ def test_the_check_says_what_a_run_takes_and_assumes(shot, tmp_path) -> None:
     bpy.ops.smokelift.check()
     state = bpy.context.window_manager.smokelift
     assert state.check_done
-    assert tuple(state.resolution) == (44, 44, 64)
-    assert state.seconds > 1
-    assert 0.1 < state.memory < state.memory_free
-    assert 1 < state.disk < 100
+    assert [cost.name for cost in state.costs] == list(QUALITIES)
+    draft, *_, final = state.costs
+    assert tuple(draft.resolution) == (44, 44, 64)
+    assert 1 < draft.seconds < final.seconds
+    assert 0.1 < draft.memory < min(final.memory, state.memory_free)
+    assert 1 < draft.disk < 100
+    assert final.lost < draft.lost < 0.2
     assert "Background: " in state.notes
     assert len(state.notes.split("\n")) <= 5
     assert bpy.ops.smokelift.show_page() == {"FINISHED"}

@@ -29,6 +29,7 @@ from artist import (
 
 TICK_SECONDS = 0.02
 DRAWINGS = 5
+SUB_PANELS = ("results", "advanced", "look", "set_up", "direct", "export")
 
 
 def story() -> Iterator[float]:
@@ -40,6 +41,7 @@ def story() -> Iterator[float]:
     space.show_region_ui = True
     yield 1.0
     report["viewport"] = place(window, region(area, "WINDOW"))
+    yield from qualities(window, area)
     report["view_3d"] = yield from make_smoke(window, area, "view_3d", "bpy.ops.smokelift.run()")
 
     # another variation, in the same tab beside the clip; nothing is drawn there that takes long in software
@@ -60,15 +62,52 @@ def story() -> Iterator[float]:
 
     # the scene made to look like the clip, and Cycles in the viewport
     area.type = "VIEW_3D"
+    area.spaces.active.region_3d.view_perspective = "PERSP"
     yield 1.0
     yield from find(window, area, region(area, "UI"), "bpy.ops.smokelift.set_up()")
     click()
-    look_away()
     yield 1.0
+    look_away()
+    report["looks_through"] = area.spaces.active.region_3d.view_perspective
     area.spaces.active.shading.type = "RENDERED"
     yield 8.0
     yield from picture("rendered")
+    area.spaces.active.shading.type = "SOLID"
+    yield from sub_panels(window, area)
     report["volumes"] = sum(obj.type == "VOLUME" for obj in window.scene.objects)
+
+
+def qualities(window: bpy.types.Window, area: bpy.types.Area) -> Iterator[float]:
+    """Take a picture of the tab with what each quality takes and loses, where the resolution is automatic."""
+    settings, state = volume(window).smokelift, bpy.context.window_manager.smokelift
+    chosen, settings.longest_side = settings.longest_side, 0
+    region(area, "UI").active_panel_category = "Smokelift"
+    area.tag_redraw()
+    yield from until(lambda: state.check_done)
+    yield 1.0
+    yield from picture("qualities")
+    settings.longest_side = chosen
+    region(area, "UI").active_panel_category = "View"
+    yield 1.0
+
+
+def sub_panels(window: bpy.types.Window, area: bpy.types.Area) -> Iterator[float]:
+    """Take a picture of each sub-panel by itself, open, below the tab's own closed panel."""
+    left, top, _, _ = place(window, region(area, "UI"))
+    shell(f"xdotool mousemove {left + 60} {top + 14}").wait()
+    yield 0.5
+    click()
+    yield 1.0
+    for name in SUB_PANELS:
+        of_smoke = getattr(bpy.types, f"SMOKELIFT_PT_view_{name}")
+        alone = type(
+            f"SMOKELIFT_PT_alone_{name}", of_smoke.__bases__, {"bl_space_type": "VIEW_3D", "bl_options": set()}
+        )
+        bpy.utils.register_class(alone)
+        look_away()
+        yield 1.5
+        yield from picture(f"sub_panel_{name}")
+        bpy.utils.unregister_class(alone)
 
 
 def volume(window: bpy.types.Window) -> bpy.types.Object:

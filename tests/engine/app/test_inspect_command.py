@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from smokelift.footage.images import read_image
 from smokelift.output.images import write_image
 from smokelift.output.sequence import Sequence
 from smokelift.scene import Background, DirectionalLight, Inlet, Medium, Scene
+from smokelift.setup.settings import QUALITIES
 from smokelift.setup.surroundings import light_around
 from tests.engine.setup.shots import filmed_around, flickering
 
@@ -48,6 +50,30 @@ def test_choices_are_said_and_kept(shot, finished, capsys) -> None:
     assert scattering["measured"]["error_unshadowed"] > scattering["tolerance"]
     assert command("inspect", shot, *QUICK) == 0
     assert scattering["reason"] in "".join(capsys.readouterr().out.splitlines())
+
+
+def test_every_quality_is_forecast(plume, tmp_path, capsys) -> None:
+    """In one run, as a run at each quality has it; where the resolution is given, all have that."""
+    path = tmp_path / "scene.toml"
+    replace(plume.scene, camera=None, domain=None).save(path)
+
+    def forecast(*words: str) -> dict[str, Any]:
+        assert command("inspect", path, "--progress", "json", "--device", "cpu", *words) == 0
+        *_, done = events(capsys.readouterr().out)
+        return done
+
+    done = forecast("--quality", "draft")
+    assert list(done["qualities"]) == list(QUALITIES)
+    for quality, said in done["qualities"].items():
+        assert said["memory"] <= done["qualities"]["final"]["memory"]
+        assert said["lost"] >= done["qualities"]["final"]["lost"]
+        own = forecast("--quality", quality)
+        assert said["resolution"] == own["scene"]["domain"]["resolution"]
+        assert said["memory"] == pytest.approx(own["memory"], rel=0.01)
+    given = forecast("--resolution", "12,12,16")["qualities"]
+    assert [(name, said["resolution"], said["lost"]) for name, said in given.items()] == [
+        (name, [12, 12, 16], None) for name in QUALITIES
+    ]
 
 
 def test_an_inlet_outside_the_box(plume, tmp_path, capsys) -> None:

@@ -20,8 +20,10 @@ from smokelift.footage.clip import Clip
 from smokelift.output.images import write_image
 from smokelift.render import device
 from smokelift.scene import Background, Scene, scene_to_dict
+from smokelift.setup.choice import Grid
 from smokelift.setup.prepare import boundaries, prepare_shot
 from smokelift.setup.provenance import made_up
+from smokelift.setup.settings import QUALITIES
 from smokelift.setup.shot import Shot
 
 
@@ -70,7 +72,8 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         notes = [*shot.notes, *boundaries(shot.scene, settings), *choices, *made_up(shot)]
         for note in notes:
             say.note(note)
-        cost = estimate_cost(domain.resolution, Workload.of(shot, settings))
+        work = Workload.of(shot, settings)
+        cost = estimate_cost(domain.resolution, work)
         known = facts(shot, scene, cost)
         files = list(options.page)
         if options.page:
@@ -91,9 +94,17 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
             "choices": [choice.as_dict() for choice in shot.choices],
             "facts": [fact.as_dict() for fact in known],
             "files": [str(path) for path in files],
+            "qualities": _qualities(shot, work),
             **asdict(cost),
         },
     )
+
+
+def _qualities(shot: Shot, work: Workload) -> dict[str, dict[str, Any]]:
+    """What each quality takes of this clip, and what it loses of it; the same where the resolution is given."""
+    grids = shot.qualities or dict.fromkeys(QUALITIES, Grid(shot.scene.domain.resolution, None))
+    costs = {quality: asdict(estimate_cost(grid.resolution, work)) for quality, grid in grids.items()}
+    return {quality: {**asdict(grids[quality]), **cost} for quality, cost in costs.items()}
 
 
 def _write_scene(path: Path, shot: Shot, given: Scene, known: Sequence[Fact]) -> tuple[Path, ...]:
