@@ -25,6 +25,7 @@ MODULE = re.compile(r"python -m (benchmarks[\w.]*)")
 ARROWS = re.compile(r"^ {4}(\w+(?: --> \w+)+)$", re.MULTILINE)
 IMPORT = re.compile(r"^\s*(?:from|import) smokelift\.([a-z]\w*)", re.MULTILINE)
 FUNCTION = re.compile(r"\b([\w/]+\.py):(\w+)")
+FILE = re.compile(r"\b(\w+(?:/\w+)+\.(?:py|cpp|h))\b")
 COMMIT = re.compile(r"\b(?=[0-9a-f]*\d)(?=[0-9a-f]*[a-f])[0-9a-f]{7,8}\b")
 SEVERAL_NUMBERS = re.compile(r"\d\s*%? / [-+(.]?\d")
 
@@ -95,6 +96,13 @@ def test_the_architecture_names_what_there_is() -> None:
         if not re.search(rf"^(def |class )?{function}\b", (ENGINE / path).read_text(), re.MULTILINE)
     ]
     assert missing == []
+
+
+@pytest.mark.parametrize("page", [*sorted(ROOT.glob("*.md")), *MEASURED], ids=name)
+def test_files_of_the_code_that_a_page_names_exist(page: Path) -> None:
+    """They are named as within the engine, or as within the checkout; NAME stands for any."""
+    named = {file for file in FILE.findall(page.read_text()) if "NAME" not in file}
+    assert [file for file in sorted(named) if not ((ENGINE / file).exists() or (ROOT / file).exists())] == []
 
 
 def test_imports_follow_the_arrows_of_the_architecture() -> None:
