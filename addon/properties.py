@@ -261,7 +261,7 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
         name="Quality",
         description="More detail takes more time, memory and disk space",
         items=[
-            ("draft", "Draft", "A quick look"),
+            ("draft", "Draft", "A quick preview"),
             ("balanced", "Balanced", "Good for most shots"),
             ("fine", "Fine", "More of the clip's detail, several times slower"),
             ("final", "Final", "All of the clip's detail, a voxel a pixel: much memory, seconds to minutes a frame"),

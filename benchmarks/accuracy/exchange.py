@@ -1,4 +1,4 @@
-"""Calibrations of which a part is told: single estimates of an uncalibrated clip in the place of what is known."""
+"""Calibrations of which a part is given: single estimates of an uncalibrated clip in the place of what is known."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ Matrix = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Told:
-    """Which parts of a calibration are told; the others are as they were found.
+class Given:
+    """Which parts of a calibration are given; the others are as they were found.
 
     Attributes
     ----------
@@ -34,31 +34,31 @@ class Told:
     box: bool
 
 
-def partly(told: CompleteScene, found: CompleteScene, parts: Told) -> tuple[Camera, Domain]:
-    """The camera and the box of a scene of which some parts are told.
+def partly(given: CompleteScene, found: CompleteScene, parts: Given) -> tuple[Camera, Domain]:
+    """The camera and the box of a scene of which some parts are given.
 
-    A pixel of the picture is as large at the middle of the box, in voxels, as in the scene that is told.
+    A pixel of the picture is as large at the middle of the box, in voxels, as in the scene that is given.
 
     Parameters
     ----------
-    told, found
+    given, found
         The same clip with a calibration, and without.
     """
     camera = found.camera
     if parts.focal:
-        camera = replace(camera, fx=told.camera.fx, fy=told.camera.fy)
+        camera = replace(camera, fx=given.camera.fx, fy=given.camera.fy)
     if parts.tilt:
-        camera = _turned(camera, _facing(np.array(told.camera.matrix)[:3, :3]))
-    longer = camera.fx / told.camera.fx
+        camera = _turned(camera, _facing(np.array(given.camera.matrix)[:3, :3]))
+    longer = camera.fx / given.camera.fx
     if parts.box:
-        # in the told camera's coordinates; a longer lens stands farther away
-        middle = np.linalg.inv(np.array(told.camera.matrix)) @ np.append(told.domain.centre, 1)
+        # in the given camera's coordinates; a longer lens stands farther away
+        middle = np.linalg.inv(np.array(given.camera.matrix)) @ np.append(given.domain.centre, 1)
         centre = (np.array(camera.matrix) @ (middle * (1, 1, longer, 1)))[:3]
-        size = np.array(told.domain.max) - np.array(told.domain.min)
-        return camera, _box(centre, size, told.domain.resolution)
+        size = np.array(given.domain.max) - np.array(given.domain.min)
+        return camera, _box(centre, size, given.domain.resolution)
     away = camera.fx / found.camera.fx
     low, high, depth = _shown(found, camera, away)
-    voxel = _voxel_pixels(told) * _distance(camera, (low + high) / 2) / camera.fx
+    voxel = _voxel_pixels(given) * _distance(camera, (low + high) / 2) / camera.fx
     size = np.array([high[0] - low[0], depth, high[2] - low[2]])
     counts = 4 * np.ceil(size / voxel / 4 - 1e-6)
     # what is higher has its lower end where it was

@@ -55,7 +55,7 @@ class Seen:
     Attributes
     ----------
     camera
-        In the world that is told.
+        In the world that is given.
     pictures
         Linear radiance before black, by the number of the frame.
     """
@@ -72,7 +72,7 @@ class Seen:
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """Densities that are looked at: by the number of the frame, in the box of a scene."""
+    """Densities that are pictured: by the number of the frame, in the box of a scene."""
 
     scene: CompleteScene
     densities: Mapping[int, Volume]
@@ -122,20 +122,20 @@ class Laid:
     ends: tuple[float, ...]
 
 
-def starts(told: CompleteScene, other: CompleteScene) -> tuple[Matrix, ...]:
-    """Ways (4, 4) to lay the world that is told on another one of the same clip: what a search starts from.
+def starts(given: CompleteScene, other: CompleteScene) -> tuple[Matrix, ...]:
+    """Ways (4, 4) to lay the world that is given on another one of the same clip: what a search starts from.
 
     What is up stays up, or the input's cameras look alike; each turned by `TURNS` about the vertical. What the input's
-    camera sees in the middle of the box that is told lies where it is in the other one, and is as large.
+    camera sees in the middle of the box that is given lies where it is in the other one, and is as large.
     """
-    turns = [np.array(scene.camera.matrix)[:3, :3] for scene in (told, other)]
-    middle = np.array(told.domain.centre)
-    pixel = project(told.camera, middle)[0]
+    turns = [np.array(scene.camera.matrix)[:3, :3] for scene in (given, other)]
+    middle = np.array(given.domain.centre)
+    pixel = project(given.camera, middle)[0]
     origin, ray = _ray(other.camera, pixel)
     # the upright screen through the middle of the other box, across the way that its camera looks
     across = -turns[1][:2, 2]
     place = origin + ray * (across @ (np.array(other.domain.centre) - origin)[:2]) / (across @ ray[:2])
-    apart = [float(project(scene.camera, at)[1]) / scene.camera.fx for scene, at in ((told, middle), (other, place))]
+    apart = [float(project(scene.camera, at)[1]) / scene.camera.fx for scene, at in ((given, middle), (other, place))]
     ours, theirs = (np.arctan2(turn[1, 2], turn[0, 2]) for turn in turns)
     ways = []
     for alike in (Rotation.from_euler("z", theirs - ours).as_matrix(), turns[1] @ turns[0].T):
@@ -156,14 +156,14 @@ def _ray(camera: Camera, pixel: Matrix) -> tuple[Matrix, Matrix]:
 
 
 def moved(camera: Camera, start: Matrix, centre: Matrix, by: Matrix) -> Camera:
-    """A camera of the world that is told, in the result's world.
+    """A camera of the world that is given, in the result's world.
 
     Parameters
     ----------
     camera
-        In the world that is told.
+        In the world that is given.
     start : (4, 4)
-        From the world that is told to that of the result: turn, shift and one scale.
+        From the world that is given to that of the result: turn, shift and one scale.
     centre : (3,)
         Of the result's box.
     by : (6,)

@@ -1,13 +1,13 @@
-"""Reconstruct real clips of which nothing is known, and say how much of what could be told that costs.
+"""Reconstruct real clips of which nothing is known, and say how much of what could be given that costs.
 
     python -m benchmarks.accuracy.uncalibrated --capture CAPTURE --wall WALL/scene.toml
 
 CAPTURE holds a scene.toml with camera, box and background, and camera00.toml of a camera that only scores. The clip is
-reconstructed with all of that, with nothing, and with every choice between of what of the camera and the box is told;
+reconstructed with all of that, with nothing, and with every choice between of what of the camera and the box is given;
 each result is then laid where camera 00 sees it best (`laying`). WALL is a clip of smoke before something with a
 pattern.
 
-What is not told is estimated from the whole clip. Frames are then reconstructed one by one, as the first of a clip.
+What is not given is estimated from the whole clip. Frames are then reconstructed one by one, as the first of a clip.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
-from benchmarks.accuracy.exchange import Told, partly
+from benchmarks.accuracy.exchange import Given, partly
 from benchmarks.accuracy.laying import Result, Score, Seen, best_laid, scores, starts
 from benchmarks.accuracy.runs import run_settings
 from benchmarks.accuracy.scenes import REAL_SIZE, camera_of
@@ -41,7 +41,7 @@ FRAMES = (30, 50, 70, 90)
 """Frames of a capture that are scored."""
 
 WALL_STEP = 6
-"""Every such frame of the clip before a wall is looked at."""
+"""Every such frame of the clip before a wall is reconstructed."""
 
 COVERED = 0.02
 """Share of the light behind that smoke takes away where the box of the smoke in a picture begins."""
@@ -53,7 +53,7 @@ AWAY = (-21, -14, -7, 7, 14, 21)
 """Pixels down and to the right by which a background is moved to tell what correlates by chance."""
 
 STRONGER = 2.0
-"""Ratio of lights that meet the clip about equally: how much it costs that the light is unknown."""
+"""Ratio of lights that fit the clip about equally: how much it costs that the light is unknown."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,41 +178,41 @@ def _range(values: Sequence[float]) -> str:
 
 
 def _beside(folder: Path, numbers: Sequence[int]) -> None:
-    """Print what camera 00 sees of all that is told, of nothing, and of what is between."""
+    """Print what camera 00 sees of all that is given, of nothing, and of what is between."""
     side, known = Scene.load(folder / "camera00.toml"), Scene.load(folder / "scene.toml")
     assert side.clip is not None
     with Clip.open(side.clip) as clip:
         pictures = {number: area_average(clip.frame(number), *REAL_SIZE) for number in numbers}
     seen = Seen(camera_of(folder / "camera00.toml").resized(*REAL_SIZE), pictures)
-    told, figures = found(known, run_settings(RUN), numbers)
-    _say("all told", figures)
+    given, figures = found(known, run_settings(RUN), numbers)
+    _say("all given", figures)
     alone, figures = found(Scene(clip=known.clip), run_settings(RUN), numbers)
-    _say("nothing told", figures)
-    _say_laid("all told", told, told.scene, seen)
+    _say("nothing given", figures)
+    _say_laid("all given", given, given.scene, seen)
     only = found(Scene(clip=known.clip, camera=known.camera), run_settings(RUN), numbers)[0]
-    _say_laid("the camera told, without a box", only, told.scene, seen)
-    _say_laid("nothing told", alone, told.scene, seen)
-    # the densities alone are looked at, and how light is scattered was the same on both sides
+    _say_laid("the camera given, without a box", only, given.scene, seen)
+    _say_laid("nothing given", alone, given.scene, seen)
+    # the densities alone are compared, and how light is scattered was the same on both sides
     plain = replace(run_settings(RUN), selection=SelectionSettings(measure=False))
     for focal, tilt, box in product((True, False), repeat=3):
-        parts = Told(focal, tilt, box)
-        camera, domain = partly(told.scene, alone.scene, parts)
+        parts = Given(focal, tilt, box)
+        camera, domain = partly(given.scene, alone.scene, parts)
         scene = Scene(clip=known.clip, camera=camera, domain=domain)
         result = found(scene, plain, numbers)[0]
-        _say_laid(str(parts), result, told.scene, seen)
+        _say_laid(str(parts), result, given.scene, seen)
         if focal == tilt == box:
             lit = tuple(light.scaled(STRONGER) for light in result.scene.lights)
             stronger = replace(scene, lights=lit, scattering=result.scene.scattering)
             result = found(stronger, plain, numbers)[0]
-            _say_laid(f"{parts}, light times {STRONGER:g}", result, told.scene, seen)
+            _say_laid(f"{parts}, light times {STRONGER:g}", result, given.scene, seen)
 
 
-def _say_laid(name: str, result: Result, told: CompleteScene, seen: Seen) -> None:
-    """Print what camera 00 sees of a result, as it lies where that is told, and laid best."""
-    ways = starts(told, result.scene)
+def _say_laid(name: str, result: Result, given: CompleteScene, seen: Seen) -> None:
+    """Print what camera 00 sees of a result, as it lies where that is given, and laid best."""
+    ways = starts(given, result.scene)
     laid = best_laid(result, ways, seen)
     best = scores(result, laid.camera, seen)
-    if result.scene is told:
+    if result.scene is given:
         _say_score(f"camera 00, {name}, as it lies", scores(result, seen.camera, seen))
     ends = " ".join(f"{end:.2f}" for end in laid.ends)
     _say_score(f"camera 00, {name}, laid best", best, f"; ends of the coarse searches {ends}")

@@ -111,7 +111,7 @@ class Case:
     clean : (frames, rows, columns, 3)
         The true pictures, linear.
     given
-        Whether the background is told.
+        Whether the background is given.
     lens
         Of a camera that may turn.
     """

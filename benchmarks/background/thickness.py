@@ -30,7 +30,7 @@ def main() -> None:
     parser.add_argument("scenes", nargs="+", type=Path)
     parser.add_argument("--every", type=int, default=1, help="take every so many frames")
     options = parser.parse_args()
-    print("| scene | smoke | behind | told | taken | without |")
+    print("| scene | smoke | behind | found | taken | without |")
     print("| --- " * 6 + "|")
     for folder in options.scenes:
         baked = Smoke.load(folder)
@@ -49,11 +49,12 @@ def _row(smoke: Smoke, plate: Picture, given: bool) -> str:
     clip = filmed(exposed(smoke.before(plate), np.ones(len(smoke.radiance))), "baked")
     plates = known_plate(plate, clip) if given else find_plates(clip, None, None).plates
     samples, medium = sample_smoke(clip, plates), Medium(albedo=1.0)
-    told = smoke_thickness(samples.textures).source
+    measured = smoke_thickness(samples.textures).source
     taken, without = (
-        float(np.mean(ambient_sun(samples, medium, source).irradiance)) / (4 * np.pi) / true for source in (told, None)
+        float(np.mean(ambient_sun(samples, medium, source).irradiance)) / (4 * np.pi) / true
+        for source in (measured, None)
     )
-    said = "undetermined" if told is None else f"{told.mean() / true:.2f}"
+    said = "undetermined" if measured is None else f"{measured.mean() / true:.2f}"
     return f"{said} | {taken:.2f} | {without:.2f}"
 
 

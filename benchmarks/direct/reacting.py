@@ -1,4 +1,4 @@
-"""A true plume set free, in wind, stirred, around a ball and pushed by one, as a picture.
+"""A true plume set free, in wind, stirred, around a ball at rest and one that moves, as a picture.
 
 python -m benchmarks.direct.reacting SCENES/plume-2 FILE.png [--frames 48]
 """

@@ -57,7 +57,7 @@ def wrong_start(known: Known, factor: float, method: MethodName) -> Figures:
     """The fit of one frame, started from the true density times a factor."""
     take = plain(known.at([FIRST]))
     clip = filmed(take.pictures, "clip")
-    shot = prepare_shot(clip, take.told, _settings(method))
+    shot = prepare_shot(clip, take.given, _settings(method))
     composed: Method = compose(shot.settings)
     views = ViewSet.of(shot.observe(0), shot.optics, 0)
     depth = composed.depth_prior.of_clip(shot).estimate(views)

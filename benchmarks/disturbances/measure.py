@@ -36,7 +36,7 @@ def whole_run(take: Take, method: MethodName) -> Figures:
     relative, and ``mass_ratio``, which are absent in another box than the scene's. All are means over the frames that
     count.
     """
-    key = (take.known.name, take.pictures.tobytes(), take.told, take.gain, take.behind, take.scored, method)
+    key = (take.known.name, take.pictures.tobytes(), take.given, take.gain, take.behind, take.scored, method)
     if key not in _done:
         _done[key] = _measured(take, method)
     return _done[key]
@@ -46,7 +46,7 @@ def _measured(take: Take, method: MethodName) -> Figures:
     settings = replace(Settings.preset(method=method), detail=0.0)
     clip = filmed(take.pictures, "clip")
     try:
-        shot = prepare_shot(clip, take.told, settings)
+        shot = prepare_shot(clip, take.given, settings)
         frames = list(Reconstruction(shot, compose(shot.settings)))
     except ValueError as error:
         return {"refused": str(error)}

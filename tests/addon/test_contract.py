@@ -48,7 +48,7 @@ def test_resolutions() -> None:
     """Limits of the qualities can be reached in the box's proportions; the least that is accepted."""
     limits = [each for limit in LIMITS.values() for each in (limit.least, limit.most)]
     assert all(limit % (contract.BOX_VOXELS // 4) == 0 for limit in limits)
-    fewest = contract.FEWEST_VOXELS
+    fewest = contract.MIN_VOXELS
     Settings.preset("draft", "default", (fewest,) * 3)
     with pytest.raises(ValueError, match="resolution"):
         Settings.preset("draft", "default", (fewest, fewest, fewest - 1))

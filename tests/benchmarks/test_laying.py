@@ -46,25 +46,25 @@ def test_a_camera_is_moved_about_the_middle():
 
 @pytest.mark.parametrize("size, up", [(1.0, 0.0), (2.0, 0.0), (2.0, 17.0)])
 def test_searches_start_from_worlds_that_look_alike_to_the_inputs_camera(size: float, up: float):
-    told, other = scene(1.0), scene(size, up)
-    upright, *_, turned = starts(told, other)
-    assert len(starts(told, other)) == 10
+    given, other = scene(1.0), scene(size, up)
+    upright, *_, turned = starts(given, other)
+    assert len(starts(given, other)) == 10
     for way in (upright, turned):
         # as large, and at the same pixel
         np.testing.assert_allclose(np.linalg.det(way[:3, :3]), size**3)
-        np.testing.assert_allclose(project(other.camera, way[:3, 3])[0], project(told.camera, np.zeros(3))[0])
+        np.testing.assert_allclose(project(other.camera, way[:3, 3])[0], project(given.camera, np.zeros(3))[0])
     np.testing.assert_allclose(upright[:3, 2], (0, 0, size), atol=1e-9)
-    alike = moved(told.camera, starts(told, other)[5], np.zeros(3), np.zeros(6))
+    alike = moved(given.camera, starts(given, other)[5], np.zeros(3), np.zeros(6))
     np.testing.assert_allclose(np.array(alike.matrix), np.array(other.camera.matrix), atol=1e-9)
 
 
 def test_a_result_that_is_turned_far_is_turned_back(lopsided: np.ndarray):
-    told = scene(1.0)
-    result = Result(told, {3: lopsided})
+    given = scene(1.0)
+    result = Result(given, {3: lopsided})
     truly = moved(SIDE, np.eye(4), np.zeros(3), np.array([0.0, 0.05, 0.8, 0, 0, 0.01]))
     seen = Seen(SIDE, {3: 0.5 * pictures(result, truly, Seen(SIDE, {3: np.zeros(1)}))[0]})
     before = scores(result, SIDE, seen)
-    laid = best_laid(result, starts(told, told), seen)
+    laid = best_laid(result, starts(given, given), seen)
     after = scores(result, laid.camera, seen)
     assert after.gained[0] > before.gained[0] + 12
     assert after.gained[0] > after.plain[0] + 3  # another exposure is evened out by the gain
@@ -83,9 +83,9 @@ def test_half_as_many_voxels_show_about_the_same(lopsided: np.ndarray):
 
 
 def test_a_search_goes_on_until_it_has_converged(lopsided: np.ndarray):
-    told = scene(1.0)
-    result = Result(told, {0: lopsided})
+    given = scene(1.0)
+    result = Result(given, {0: lopsided})
     truly = moved(SIDE, np.eye(4), np.zeros(3), np.array([0.05, 0.05, 0.2, 0, 0.02, 0.01]))
     seen = Seen(SIDE, {0: pictures(result, truly, Seen(SIDE, {0: np.zeros(1)}))[0]})
-    laid = best_laid(result, starts(told, told)[:1], seen)
+    laid = best_laid(result, starts(given, given)[:1], seen)
     assert scores(result, laid.camera, seen).gained[0] > 42

@@ -21,7 +21,7 @@ from smokelift.density.halves import LARGE
 Resolution = tuple[int, int, int]
 
 START_SECONDS = 3.5
-"""Seconds to start, to estimate what is not given and to look at the clip's texture."""
+"""Seconds to start, to estimate what is not given and to measure the clip's texture."""
 
 VOXELS_A_FRAME = 1.2e7
 """Voxels whose solve takes as long as what every frame takes, however small its grid: decoding and files."""
@@ -71,7 +71,7 @@ BYTES_A_VOXEL_OF_SOLVER = 145
 TIMED = (64, 64, 64)
 """Voxels of the grid whose solve is timed."""
 
-LEAST_VOXELS = 8
+MIN_VOXELS = 8
 """Voxels along the shortest side of a grid that is suggested."""
 
 
@@ -169,14 +169,14 @@ def _same_proportions(resolution: Resolution) -> Iterator[Resolution]:
     common = math.gcd(*resolution)
     x, y, z = (n // common for n in resolution)
     candidates = ((x * times, y * times, z * times) for times in range(common - 1, 0, -1))
-    return (each for each in candidates if min(each) >= LEAST_VOXELS)
+    return (each for each in candidates if min(each) >= MIN_VOXELS)
 
 
 def _about_the_same(resolution: Resolution) -> Iterator[Resolution]:
     """Smaller resolutions of the same proportions but for multiples of four, the largest first."""
     for longest in range(max(resolution) - 4, 0, -4):
         x, y, z = (4 * math.ceil(n * longest / max(resolution) / 4) for n in resolution)
-        if min(x, y, z) >= LEAST_VOXELS:
+        if min(x, y, z) >= MIN_VOXELS:
             yield x, y, z
 
 

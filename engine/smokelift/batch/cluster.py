@@ -65,7 +65,7 @@ def run_on_cluster(
     address
         Of the scheduler, as ``tcp://host:8786``.
     say
-        Is told when the scheduler goes away.
+        Is called when the scheduler goes away.
     returns, pause
         Seconds in which a scheduler that went away has to return, and from try to try.
 

@@ -27,7 +27,7 @@ from smokelift.density.screen import view_frame
 from smokelift.render import Volume
 from smokelift.scene.domain import box_around
 
-LEAST_SHAPE = 0.05
+MIN_SHAPE = 0.05
 """With several views no profile is below this share of its peak inside the hull, since another view may see smoke there
 (docs/experiments/density-profile.md)."""
 
@@ -78,7 +78,7 @@ class DepthPrior(Protocol):
     """What is assumed of the smoke's depth."""
 
     def of_clip(self, clip: ObservedClip) -> DepthPrior:
-        """The prior for a clip, after a look at any of its frames; itself if it needs none."""
+        """The prior for a clip, after any of its frames were seen; itself if it needs none."""
 
     def estimate(self, views: ViewSet) -> DepthEstimate:
         """What it says of one moment."""
@@ -178,7 +178,7 @@ def _common(
     # a round blob's two profiles make it up, and more of them must not make it smaller
     power = np.minimum(1, 2 / count)
     # what only one shows it would fill with all that the others contradict
-    least = np.where(count > 1, LEAST_SHAPE, 0)
+    least = np.where(count > 1, MIN_SHAPE, 0)
     values = np.ones(count.shape)
     for places, profile in zip(seen_at, profiles, strict=True):
         shape = np.maximum(profile.shape(places, hull), least)

@@ -155,7 +155,7 @@ class _Problem:
         self.volume.ravel()[self.where] = density
 
     def residuals(self, density: Values) -> tuple[Image, ...]:
-        """What the pictures of a density differ by from those that are to be met."""
+        """What the pictures of a density differ by from those that are to be fitted."""
         self.show(density)
         return tuple(term.renderer.image(self.volume, keep_record=True) - term.view.image for term in self.terms)
 

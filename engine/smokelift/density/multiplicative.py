@@ -99,7 +99,7 @@ def take_turns(
     Parameters
     ----------
     terms
-        The pictures, in the order of their turns. The last is met best.
+        The pictures, in the order of their turns. The last is fitted best.
     density : (nx, ny, nz)
         Start; voxels at zero stay there.
     rounds

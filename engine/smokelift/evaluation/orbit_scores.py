@@ -30,7 +30,7 @@ STEADY = (45, 75, 105, 135)
 """Azimuths at which three consecutive frames are compared."""
 
 MOMENTS, SETTLED = 6, 4
-"""Frames that are looked at, spread over the clip, and the first ones, which have hardly any before them to start from
+"""Frames that are scored, spread over the clip, and the first ones, which have hardly any before them to start from
 and are left out."""
 
 OUTLINE, MARGIN = 0.08, 2

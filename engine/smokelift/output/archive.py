@@ -27,7 +27,7 @@ VELOCITY = ("velocity_x", "velocity_y", "velocity_z")
 FLAME = "flame"
 """Name of the emission of fire, which is there only where a clip shows fire."""
 
-MOST_VALUES = 2**32
+MAX_VALUES = 2**32
 """Values of an array whose shape is not known before, at most."""
 
 
@@ -120,7 +120,7 @@ def _array(
         raise ValueError(f"{info.filename} holds {kind}")
     count = math.prod(shape)
     unexpected = exactly not in (None, shape) or (at_most is not None and not _within(shape, at_most))
-    if unexpected or count > MOST_VALUES or count * kind.itemsize > info.file_size:
+    if unexpected or count > MAX_VALUES or count * kind.itemsize > info.file_size:
         raise ValueError(f"{info.filename} cannot have the shape {shape}")
     with archive.open(info) as file:
         values: npt.NDArray[Any] = np.lib.format.read_array(file)  # type: ignore[no-untyped-call]  # NumPy's

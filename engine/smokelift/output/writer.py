@@ -193,7 +193,7 @@ class SequenceWriter:
             checksums = {**self._index.checksums, **{path.name: checksum([path]) for path in paths}}
             grown = replace(self._index, frames=frames, checksums=checksums)
             grown.write(self.directory)
-            # Last: a state without its frame could not be told from a frame that was lost.
+            # Last: a state without its frame would pass for a frame that was lost.
             state.write(self.directory / RESUME)
             self._index = grown  # only now: a run that goes on drops a frame without its state
         except OSError as error:
@@ -214,10 +214,10 @@ class SequenceWriter:
             self._clear(INDEX)  # nothing else is written before it
             return
         # another clip or quality, say, makes another scene, and another scene other settings of a part
-        for told in ("sources", "own settings", "scene", "settings", "versions"):
-            part = told.removeprefix("own ")
+        for name in ("sources", "own settings", "scene", "settings", "versions"):
+            part = name.removeprefix("own ")
             before, now = (getattr(index, part) for index in (there, self._index))
-            if told != part:
+            if name != part:
                 before, now = (
                     {key: value for key, value in each.items() if not isinstance(value, dict)} for each in (before, now)
                 )

@@ -28,7 +28,7 @@ def shares_of_a_run(shot: Shot) -> list[float]:
 
 
 def test_shares_are_those_of_the_run(plume, shot) -> None:
-    """Of a grid that is looked at as it is."""
+    """Of a grid that is measured as it is."""
     found, shares = Workload.of(shot, SMOOTH), shares_of_a_run(shot)
     assert found.largest == pytest.approx(max(shares), rel=0.02)
     assert found.mean == pytest.approx(sum(shares) / len(shares), rel=0.1)
