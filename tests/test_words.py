@@ -1,5 +1,6 @@
 """The words: names, docstrings, messages and pages say what `CONTRIBUTING.md` says, and not what it says not."""
 
+import ast
 import re
 from pathlib import Path
 
@@ -105,6 +106,28 @@ def test_the_table_is_what_is_enforced() -> None:
         r"^\| ([^|]+) \| ([^|]+) \|$", (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8"), re.MULTILINE
     )
     assert {avoided for say, avoided in rows if say != "say" and "---" not in say} == set(BANNED)
+
+
+FRAGMENT = re.compile(r"(?:Of|That of|Those|By|In|From|As|With|On|At|The same) ")
+"""How docstrings begin that leave their noun to the name beside them."""
+
+
+def docstrings(source: str) -> list[str]:
+    """Every string of a module that stands by itself."""
+    bodies = [body for node in ast.walk(ast.parse(source)) if isinstance(body := getattr(node, "body", None), list)]
+    values = [each.value for body in bodies for each in body if isinstance(each, ast.Expr)]
+    return [each.value for each in values if isinstance(each, ast.Constant) and isinstance(each.value, str)]
+
+
+def test_docstrings_have_their_noun() -> None:
+    modules = [
+        path for path in FILES if path.suffix == ".py" and name(path).startswith(("benchmarks", "engine", "tools"))
+    ]
+    found = {
+        name(path): [each for each in docstrings(path.read_text(encoding="utf-8")) if FRAGMENT.match(each)]
+        for path in modules
+    }
+    assert {path: each for path, each in found.items() if each} == {}
 
 
 @pytest.mark.parametrize("sentence", ["It is told.", "first_look(clip)", "LEAST_SHARE = 0.3", "looked\n    at"])

@@ -24,7 +24,7 @@ SPEAKERS = {"fail", "note", "report", "error", "unexpected", "warn"}
 """Functions that say their first argument to the user; classes of exceptions do so as well."""
 
 MIN_WORDS = 4
-"""Of a message: less is a part of one."""
+"""Fewest words of a message: less is a part of one."""
 
 TOPICS = {
     "Command line": ("engine/smokelift/app", "engine/smokelift_command"),

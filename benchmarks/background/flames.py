@@ -106,7 +106,7 @@ class Fire:
 
     @staticmethod
     def of(truth: Truth, scene: CompleteScene, beneath: bool) -> Fire:
-        """That of a scene."""
+        """Return the fire of a scene."""
         left = next(itertools.islice(reactants(truth), FRAME, None))
         density = truth.densities[FRAME].astype(np.float32) * (1 - left * beneath)
         emission = np.sqrt(left)

@@ -22,7 +22,7 @@ from benchmarks.clean_clip.smoke import Baked
 from benchmarks.tables import markdown
 
 Results = dict[str, Figures]
-"""By "code / scene / row"."""
+"""Figures by "code / scene / row"."""
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

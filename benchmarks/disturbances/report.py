@@ -33,7 +33,7 @@ COLOURS = {"default": "tab:blue", "paper": "tab:orange"}
 NAMES = {"default": "Smokelift", "paper": "the paper's method"}
 COLUMNS = 4
 HIGHEST = 4.0
-"""Of errors on a chart, at most."""
+"""Largest error that a chart shows."""
 
 
 class Results:

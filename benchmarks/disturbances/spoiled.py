@@ -81,7 +81,7 @@ def flicker(known: Known, share: float) -> Take:
 
 
 def flicker_before_grey(known: Known, share: float) -> Take:
-    """The same before a grey background, which shows the exposure."""
+    """A take that flickers before a grey background, which shows the exposure."""
     return before_grey(usual(known), GREY, _flickering(share))
 
 

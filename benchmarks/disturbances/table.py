@@ -116,4 +116,4 @@ DISTURBANCES: dict[str, Disturbance] = {
         "Density scaled", "factor", calls.scaled_density, (1e-6, 1e-3, 0.1, 1, 10, 1e3, 1e6), 1, logarithmic=True
     ),
 }  # fmt: skip
-"""By the names that the command takes, those first whose strengths people meet."""
+"""Disturbances by the names that the command takes, those first whose strengths people meet."""

@@ -27,7 +27,7 @@ EVENTS = ("open", "os.mkdir", "os.rename", "os.remove")
 """What a run does with its output folder, as Python's audit calls it."""
 
 MAX_EVENTS = 52
-"""Of them in a run of the tiny shot that writes OpenVDB too; a run that writes less may be over before its failure."""
+"""Events in a run of the tiny shot that writes OpenVDB too; a run that writes less may be over before its failure."""
 
 ORDINARY_USER = 54321
 """A number that no user has, so that all of its processes are ours."""
@@ -178,7 +178,7 @@ ENVIRONMENTS: Mapping[str, Environment] = {
     "cancelled": terminated,
     "killed": killed,
 }
-"""Of each class what fails."""
+"""What fails, by the class."""
 
 
 def lacking(name: str, folder: Path) -> str:

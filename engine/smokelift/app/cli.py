@@ -34,7 +34,7 @@ _TRANSIENT = {
 """Errors of a storage that pass: it is full, or its server is away."""
 
 MAX_THREADS = 1024
-"""As a guard against a number that no processor has."""
+"""Largest number of threads: no processor has more."""
 
 _HINT = " Finished frames stay, --resume goes on from them."
 

@@ -63,7 +63,7 @@ SMALL = 2**23
 so that they take their memory whether smoke is there or not."""
 
 BYTES_A_VOXEL_OF_SMALL = 80, 100
-"""The same as `BYTES_A_VOXEL` for such a grid."""
+"""Bytes a voxel of such a grid, as `BYTES_A_VOXEL`."""
 
 BYTES_A_VOXEL_OF_SOLVER = 145
 """Bytes for each voxel of the box that a velocity adds whose estimate has the grid of the density."""

@@ -11,7 +11,7 @@ UNEXPLAINED = 0.7
 """Root mean square of what a fit leaves, as a share of what the smoke changes: at 0.7 half of the change's energy."""
 
 DOUBTFUL = 0.3
-"""The same from which not all of the change may be smoke: good results leave less, those in which labels, leaves, a
+"""Share left from which not all of the change may be smoke: good results leave less, those in which labels, leaves, a
 head or the light are taken for smoke more (docs/clips.md)."""
 
 

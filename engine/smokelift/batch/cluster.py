@@ -26,7 +26,7 @@ CONNECT_SECONDS = 30
 """Time for the scheduler to answer."""
 
 PAUSE_SECONDS = 5.0
-"""From one try to reach a scheduler that went away to the next."""
+"""Seconds between two tries to reach a scheduler that went away."""
 
 RETURN_SECONDS = 1800.0
 """Time for a scheduler that went away to return."""

@@ -28,7 +28,7 @@ from smokelift.render import Volume
 from smokelift.scene.domain import box_around
 
 MIN_SHAPE = 0.05
-"""With several views no profile is below this share of its peak inside the hull, since another view may see smoke there
+"""Smallest share of its peak that a profile has inside the hull of several views: another one may see smoke there
 (docs/experiments/density-profile.md)."""
 
 
@@ -143,7 +143,7 @@ def _expected(views: ViewSet, profiles: Sequence[DepthProfile]) -> NDArray[np.bo
 
 
 def _marked(voxels: NDArray[np.bool_], views: ViewSet, profiles: Sequence[DepthProfile]) -> NDArray[np.bool_]:
-    """Those of some voxels (nx, ny, nz) where any profile expects smoke."""
+    """Mark those of some voxels (nx, ny, nz) where any profile expects smoke."""
     found = np.zeros(np.count_nonzero(voxels), np.bool_)
     for view, profile in zip(views.views, profiles, strict=True):
         places = view.projection.places(voxels)

@@ -178,7 +178,7 @@ class EveryView:
 
     @cached_property
     def coarser(self) -> EveryView | None:
-        """The same on a grid half as fine, of the scales that it holds; None where the smoke has few voxels."""
+        """Return the detail on a grid half as fine, of the scales that it holds; None where smoke has few voxels."""
         coarser, texture = self.level.coarser, self.texture
         if coarser is None or len(texture.exemplars) == 1:
             return None

@@ -22,7 +22,7 @@ from smokelift.render.emission import emission_matrix
 from smokelift.scene import Camera, Domain
 
 ITERATIONS = 30
-"""Of the scaling, at most."""
+"""Largest number of iterations of the scaling."""
 
 EXACT = 0.01
 """Difference from the picture, as a share of its sum, at which the scaling stops."""

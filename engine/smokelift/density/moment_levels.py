@@ -47,7 +47,7 @@ class Level:
 
     @cached_property
     def coarser(self) -> Level | None:
-        """The same on a grid half as fine; None where the smoke has few voxels."""
+        """Return the level of a grid half as fine; None where the smoke has few voxels."""
         views = self.views
         if np.count_nonzero(views.hull) <= LARGE:
             return None

@@ -128,7 +128,7 @@ class _Smoke:
         self._volume = np.zeros(density.shape, np.float32)
 
     def values(self) -> Values:
-        """Those of the density."""
+        """Values of the density."""
         return self._values
 
     def volume_of(self, values: Values) -> Volume:

@@ -192,7 +192,7 @@ class ViewSet:
 
     @cached_property
     def renderers(self) -> tuple[Renderer, ...]:
-        """Of the views, for densities in the hull."""
+        """Renderers of the views, for densities in the hull."""
         return tuple(self.optics.renderer(view.camera, view.plate.image, self.hull) for view in self.views)
 
     @staticmethod

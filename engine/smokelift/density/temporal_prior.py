@@ -93,7 +93,7 @@ class NothingCarried:
 
 @dataclass(frozen=True)
 class BlendCarried:
-    """As much of the carried density as proves right; see the module.
+    """A prior that takes over as much of the carried density as proves right; see the module.
 
     Attributes
     ----------

@@ -46,7 +46,7 @@ class BesideClip:
 
     @property
     def psnr(self) -> float | None:
-        """Of linear radiance inside the smoke (dB, peak 1); None without smoke."""
+        """PSNR of linear radiance inside the smoke (dB, peak 1); None without smoke."""
         left = np.square((self.seen - self.shown)[self.inside], dtype=np.float64)
         return float(-10 * np.log10(max(left.mean(), 1e-12))) if left.size else None
 

@@ -134,7 +134,7 @@ def _compiled(light: ParallelSweep | PointSweep) -> _core.ParallelLight | _core.
 
 
 def _with_y_and_z_swapped(plan: RenderPlan, lights: Sequence[ParallelSweep]) -> RenderPlan:
-    """The same plan for arrays of voxels [x, z, y]; only its domain stays as it is."""
+    """Return the plan for arrays of voxels [x, z, y]; only its domain stays as it is."""
     x, y, z = plan.corner
     rays = plan.rays
     lines, planes = rays.lines.copy(), rays.planes.copy()

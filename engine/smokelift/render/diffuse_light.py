@@ -25,7 +25,7 @@ SMALLEST, LARGEST = 2, 4
 too dark (docs/experiments/multiple-scattering.md)."""
 
 FIELDS = 4
-"""Of what is linear across a block: the mean, and the slopes along x, y and z."""
+"""Fields of what is linear across a block: the mean, and the slopes along x, y and z."""
 
 
 class DiffuseLight:

@@ -22,11 +22,11 @@ DIRECTIONS = 32
 """Random directions, orthogonal to each other, on which patches are projected; always the same ones."""
 
 QUANTILES = 512
-"""At which distributions on a direction are compared."""
+"""Quantiles at which distributions on a direction are compared."""
 
 PATCHES = 20_000
-"""Of a picture and scale about so many count, evenly chosen: forty a quantile say enough, and large grids have ten
-times as many."""
+"""Patches of a picture and scale that count, about, evenly chosen: forty a quantile say enough, and large grids
+have ten times as many."""
 
 SMOKE = 0.05
 """Share of a picture's largest value: a patch without a brighter pixel shows no smoke."""
