@@ -26,6 +26,7 @@ ARROWS = re.compile(r"^ {4}(\w+(?: --> \w+)+)$", re.MULTILINE)
 IMPORT = re.compile(r"^\s*(?:from|import) smokelift\.([a-z]\w*)", re.MULTILINE)
 FUNCTION = re.compile(r"\b([\w/]+\.py):(\w+)")
 FILE = re.compile(r"\b(\w+(?:/\w+)+\.(?:py|cpp|h))\b")
+CONSTANT = re.compile(r"`([A-Z][A-Z_]+)`")
 COMMIT = re.compile(r"\b(?=[0-9a-f]*\d)(?=[0-9a-f]*[a-f])[0-9a-f]{7,8}\b")
 SEVERAL_NUMBERS = re.compile(r"\d\s*%? / [-+(.]?\d")
 
@@ -142,9 +143,10 @@ def test_an_experiment_fits_on_a_page(page: Path) -> None:
     assert len(page.read_text().splitlines()) <= PAGE
 
 
-def test_pages_in_work_exist() -> None:
-    assert {page.stem for page in EXPERIMENTS} >= IN_WORK
-    assert {page.stem for page in DOCS.glob("*.md")} >= GUIDES
+def test_constants_that_records_chose_exist() -> None:
+    code = "".join(path.read_text() for path in ENGINE.rglob("*.py"))
+    named = {(page.stem, constant) for page in RECORDS for constant in CONSTANT.findall(page.read_text())}
+    assert {(page, constant) for page, constant in named if not re.search(rf"\b{constant}\b", code)} == set()
 
 
 @pytest.mark.parametrize("page", MEASURED, ids=name)

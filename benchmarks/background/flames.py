@@ -8,7 +8,7 @@ and shines as its square root. It burns in the baked smoke, or beneath it: with 
 left.
 One frame before black, at eight bits, with the camera and the box given. Pictures are integrated at half-voxel steps,
 without the renderer that is measured: smoke of one source radiance, and the fire's light behind it.
-With FOLDER nothing is reconstructed: the clips of that fire are written for `tests.blender.beside_the_clip`.
+With FOLDER nothing is reconstructed: the clips of that fire are written for `benchmarks.blender.beside_the_clip`.
 """
 
 from __future__ import annotations

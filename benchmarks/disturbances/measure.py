@@ -9,7 +9,7 @@ import numpy as np
 from benchmarks.background.clips import filmed
 from benchmarks.disturbances.known import FRONT, GRID, Known, Take
 from smokelift import Reconstruction, Settings, prepare_shot
-from smokelift.evaluation.frame_means import SMOKE, eight_bit_values
+from smokelift.evaluation.frame_means import SMOKE_SHARE, eight_bit_values
 from smokelift.evaluation.metrics import psnr, velocity_error, volume_error
 from smokelift.evaluation.resampling import resampled
 from smokelift.evaluation.series import finite_mean
@@ -100,7 +100,7 @@ def flow_error(known: Known, moment: int, velocity: Array) -> float | None:
         At the centres of the small grid's voxels (m/s).
     """
     density, true = known.density(moment), known.velocities[moment]
-    counted = (density > SMOKE * density.max()) & ~known.inlets[moment]
+    counted = (density > SMOKE_SHARE * density.max()) & ~known.inlets[moment]
     if not counted.any() or not np.isfinite(true).all():
         return None
     return velocity_error(velocity, true, counted)[0]

@@ -16,7 +16,7 @@ import psutil
 import scipy.fft
 
 from smokelift.app.workload import Workload
-from smokelift.density.halves import LARGE
+from smokelift.density.halves import MIN_COARSENED_VOXELS
 
 Resolution = tuple[int, int, int]
 
@@ -116,7 +116,7 @@ def voxel_solves(resolution: Resolution, work: Workload) -> float:
         return work.frames * PAPER_SOLVES * voxels
     on_own_grid, beyond = SOLVES_A_SMOKY_VOXEL
     smoky = work.mean * voxels
-    fitted = on_own_grid * min(smoky, LARGE) + beyond * max(smoky - LARGE, 0)
+    fitted = on_own_grid * min(smoky, MIN_COARSENED_VOXELS) + beyond * max(smoky - MIN_COARSENED_VOXELS, 0)
     a_frame = (VOXELS_A_FRAME + SOLVES_A_VOXEL * voxels + fitted) * (1 + SHARE_A_VIEW * (work.views - 1))
     if work.settings.detail == 0:
         return work.frames * WITHOUT_DETAIL * a_frame

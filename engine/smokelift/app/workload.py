@@ -12,7 +12,7 @@ from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
 from smokelift.setup.smoke import SAMPLES
 
-LONGEST = 96
+MAX_SIDE_VOXELS = 96
 """Voxels along the longest side of the grid on which the smoke is found, at most: it takes a rim of one of them
 with it, which makes shares up to two fifths too large (docs/experiments/memory-and-time.md)."""
 
@@ -74,6 +74,6 @@ def _shares(shot: Shot, settings: Settings) -> list[float]:
 
 def _coarse(domain: Domain) -> Domain:
     """The box, or a little less of it, with voxels that do not depend on those of a large grid, nor do its shares."""
-    times = max(1.0, max(domain.resolution) / LONGEST)
+    times = max(1.0, max(domain.resolution) / MAX_SIDE_VOXELS)
     x, y, z = (max(1, math.floor(n / times + 1e-6)) for n in domain.resolution)
     return domain.about_centre((x, y, z), domain.voxel_size * times)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from smokelift.density.axis import SmokeAxis
 from smokelift.density.clip_axis import AXIS_FRAMES
-from smokelift.density.halves import LARGE, any_of_two, every_second, spread_to_two, with_neighbours
+from smokelift.density.halves import MIN_COARSENED_VOXELS, any_of_two, every_second, spread_to_two, with_neighbours
 from smokelift.density.hull import Places, centres_of
 from smokelift.density.objective import Term
 from smokelift.density.observation import ObservedClip, View, ViewSet
@@ -131,7 +131,7 @@ def _expected(views: ViewSet, profiles: Sequence[DepthProfile]) -> NDArray[np.bo
     """
     hull = views.hull
     box = box_around(hull, 1)
-    if np.count_nonzero(hull) > LARGE:
+    if np.count_nonzero(hull) > MIN_COARSENED_VOXELS:
         # where every second voxel and its neighbours expect none, those between them expect none either
         sampled = every_second(any_of_two(hull), hull.shape)
         coarse = _marked(sampled, views, profiles)[::2, ::2, ::2]

@@ -26,7 +26,7 @@ from smokelift.output.images import write_image
 from smokelift.output.index import DirectoryBusyError, Index, Origins, SequenceError, difference, plain, without_folders
 from smokelift.output.layout import BACKGROUND, INDEX, LOCK, RESUME, frame_path, is_foreign, proxy_path
 from smokelift.output.lock import Lock
-from smokelift.output.proxy import LARGE, write_proxy
+from smokelift.output.proxy import MIN_PROXY_VOXELS, write_proxy
 from smokelift.output.resume import ResumeState
 from smokelift.output.vdb import VdbUnavailable, checked_volume, vdb_module, write_vdb
 from smokelift.scene import Background, CompleteScene, scene_to_dict
@@ -187,7 +187,7 @@ class SequenceWriter:
                         shutil.copyfile(ready[kind], aside)
                 else:
                     self._write_arrays(path, rho, faces, fire)
-            if "vdb" in self._kinds and rho.size >= LARGE:
+            if "vdb" in self._kinds and rho.size >= MIN_PROXY_VOXELS:
                 write_proxy(proxy_path(self.directory, number), rho, self._domain, flame=fire)
             frames = {**self._index.frames, str(number): plain(figures or {})}
             checksums = {**self._index.checksums, **{path.name: checksum([path]) for path in paths}}

@@ -123,7 +123,7 @@ def test_lobes_are_as_strong_on_every_grid(plume, tmp_path, monkeypatch) -> None
     coarse = lobes(scene, 36)
     assert coarse > 0.15
     assert lobes(scene, 72) == pytest.approx(coarse, rel=0.25)
-    monkeypatch.setattr(moment_levels, "LARGE", 10_000)
+    monkeypatch.setattr(moment_levels, "MIN_COARSENED_VOXELS", 10_000)
     assert lobes(scene, 72) == pytest.approx(coarse, rel=0.25)
 
 

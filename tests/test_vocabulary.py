@@ -65,7 +65,7 @@ EXCEPTIONS = {
     "docs/blender.md": "rewritten with the add-on",
     "docs/directing.md": "rewritten with the add-on",
     "docs/shooting.md": "rewritten with the add-on",
-    "tests/test_words.py": "the list itself",
+    "tests/test_vocabulary.py": "the list itself",
     "CONTRIBUTING.md": "the table itself",
     **{f"docs/experiments/{page}.md": "shortened when its subject is measured anew" for page in IN_WORK},
 }
