@@ -8,7 +8,7 @@ import bpy
 from mathutils import Matrix, Vector
 
 from .blender_scene import ShotError
-from .contract import BOX_VOXELS, FEWEST_VOXELS
+from .contract import BOX_VOXELS, MIN_VOXELS
 from .smoke import scene_of
 
 ROUNDING = 1e-5
@@ -37,7 +37,7 @@ def domain_table(box: bpy.types.Object, rotation: Matrix, settings: bpy.types.Pr
     if min(extent) <= 1e-6 * max(*extent, 1e-6):
         raise ShotError("The box is flat: give it a width, a depth and a height.")
     voxel = max(extent) / (settings.longest_side or BOX_VOXELS)
-    counts = [max(FEWEST_VOXELS, 4 * math.ceil(length / voxel / 4 - 1e-4)) for length in extent]
+    counts = [max(MIN_VOXELS, 4 * math.ceil(length / voxel / 4 - 1e-4)) for length in extent]
     size = [count * voxel for count in counts]
     middle = (low + high) / 2
     start = [middle[0] - size[0] / 2, middle[1] - size[1] / 2, low[2]]

@@ -35,7 +35,7 @@ BOX_VOXELS = 64
 """Voxels along the box's longest side that give it its proportions where the engine chooses how many it really has:
 it takes multiples of a quarter of them, which all of its own limits are."""
 
-FEWEST_VOXELS = 8
+MIN_VOXELS = 8
 """Voxels along any side, at least."""
 
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".exr", ".hdr")

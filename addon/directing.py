@@ -202,5 +202,5 @@ def _stl(parts: list[npt.NDArray[np.float64]]) -> bytes:
 def _number_text(value: float) -> str:
     """A number as the engine's command line reads it, which takes ``-1e-05`` for an option."""
     if not math.isfinite(value):
-        raise ShotError("A place or a speed is not finite: look at the scale of the smoke and of its effectors.")
+        raise ShotError("A place or a speed is not finite: check the scale of the smoke and of its effectors.")
     return f"{value:.6f}"

@@ -24,7 +24,7 @@ MARK = "smokelift_look"
 BLACKBODY_KELVIN = 1000.0
 """Temperature that a grid's value of 1 stands for; that of Blender's Principled Volume."""
 
-LEAST_RATIO = 1e-3
+MIN_RATIO = 1e-3
 """Density over the edge's, below which edges do not change any more; keeps the power of it finite."""
 
 
@@ -319,7 +319,7 @@ def _extinction(formulas: _Formulas, source: Any) -> bpy.types.NodeSocket:
     """The extinction times density x min(density / edge density, 1) ^ (edge contrast - 1), of what is not dried up."""
     density = _remaining(formulas, source)
     ratio = formulas.math("DIVIDE", 1, 0, density, source["Edge Density"])
-    thin = formulas.math("MAXIMUM", 2, 0, formulas.math("MINIMUM", 1, 1, ratio, 1.0), LEAST_RATIO)
+    thin = formulas.math("MAXIMUM", 2, 0, formulas.math("MINIMUM", 1, 1, ratio, 1.0), MIN_RATIO)
     exponent = formulas.math("SUBTRACT", 2, 1, source["Edge Contrast"], 1.0)
     shape = formulas.math("POWER", 3, 0, thin, exponent)
     amount = formulas.math("MULTIPLY", 3, 1, source["Extinction"], source["Density"])

@@ -82,7 +82,7 @@ class _Look(OfResult):
 
 
 def _draw_render(column: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy.types.Object) -> None:
-    """How Cycles goes through smoke: since 5.0 by null scattering, unless it is told to march as before."""
+    """How Cycles goes through smoke: since 5.0 by null scattering, unless it is set to march as before."""
     cycles = getattr(context.scene, "cycles", None)
     may_choose = hasattr(cycles, "volume_biased")
     if may_choose:

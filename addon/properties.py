@@ -273,7 +273,7 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
         description="More detail takes more time, memory (RAM, in GiB) and disk space. Lost is the share of the "
         "smoke's contrast in the clip that is finer than the voxels",
         items=[
-            ("draft", "Draft", "A quick look"),
+            ("draft", "Draft", "A quick preview"),
             ("balanced", "Balanced", "Good for most shots"),
             ("fine", "Fine", "More of the clip's detail, several times slower"),
             ("final", "Final", "All of the clip's detail, a voxel a pixel: much memory, seconds to minutes a frame"),

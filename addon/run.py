@@ -16,7 +16,7 @@ from .take import Take, TakeError
 from .wording import in_panel
 
 TICK_SECONDS = 0.1
-"""From one look at the engine to the next."""
+"""Between two checks of the engine."""
 
 
 def enqueue(context: bpy.types.Context, smoke: bpy.types.Object, take: Take) -> None:

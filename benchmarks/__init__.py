@@ -5,7 +5,8 @@
 - ``pipeline``: seconds a frame and memory of whole runs
 - ``accuracy``: reconstructions beside known volumes and other views
 - ``stability``: damaged files, hostile values and failing systems against the command line
-- ``truth``, ``example``: make the scenes that are known, and the example clip
+- ``blender``: pictures for the manual, and results beside their clips in Cycles
+- ``truth``: makes the scenes that are known, and the example clip
 
 ``python -m benchmarks renderer|velocity|pipeline`` runs the first three; the other commands are
 modules of their own, such as ``python -m benchmarks.accuracy``. All run in the folder of the checkout.

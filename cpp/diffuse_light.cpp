@@ -14,7 +14,7 @@ using Fields = std::vector<float>;
 
 constexpr float SPREAD = BlockTransport::SPREAD;
 constexpr float TOLERANCE = 5e-4f; // of the mean radiance, relative
-constexpr int MOST_ITERATIONS = 100;
+constexpr int MAX_ITERATIONS = 100;
 
 // visit(lattice_row, row) for the first blocks of all rows, with and without a border.
 template <class Visit> void over_rows(const Lattice &lattice, const Visit &visit) {
@@ -136,7 +136,7 @@ Fields DiffuseLight::all_orders(Fields residual, Workers &workers) const {
     Fields phi(size, 0.0f), search = residual, moved(size), scattered(size);
     double square = product(residual, residual);
     const double enough = TOLERANCE * TOLERANCE * square;
-    for (int iteration = 0; iteration < MOST_ITERATIONS && square > enough; ++iteration) {
+    for (int iteration = 0; iteration < MAX_ITERATIONS && square > enough; ++iteration) {
         multiply(scattering_, search, scattered);
         smoke_.mean_radiance(scattered.data(), moved.data(), workers);
         for (std::size_t i = 0; i < size; ++i)

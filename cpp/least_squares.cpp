@@ -43,7 +43,7 @@ void add_scaled(const float *__restrict a, float factor, float *__restrict out, 
 
 // Enough blocks of slabs for some threads, each of so many that the slabs computed twice at its ends hardly
 // count.
-constexpr int BLOCKS = 8, LEAST_SLABS = 4, MOST_SLABS = 16;
+constexpr int BLOCKS = 8, MIN_SLABS = 4, MAX_SLABS = 16;
 
 } // namespace
 
@@ -140,7 +140,7 @@ double LeastSquares::finish(Window &window, const StaggeredIn &u, const Staggere
 double LeastSquares::sweep(const StaggeredIn &u, In offset, const StaggeredOut &result,
                            Workers &workers) const {
     const int nx = box_.cells[0], slabs = nx + 1;
-    const int size = std::clamp(nx / BLOCKS, LEAST_SLABS, MOST_SLABS), blocks = (slabs + size - 1) / size;
+    const int size = std::clamp(nx / BLOCKS, MIN_SLABS, MAX_SLABS), blocks = (slabs + size - 1) / size;
     return workers.sum(blocks, [&](int block) {
         const int first = block * size, last = std::min(first + size, slabs);
         Window window(box_);

@@ -12,7 +12,7 @@ namespace smokelift {
 // slopes, three along x, y, z from -1 to 1 across the box.
 using MomentumSource = std::vector<std::array<float, 3>>;
 
-// trust * prediction + P(density * source), with P the pressure projection; the prediction is not looked at
+// trust * prediction + P(density * source), with P the pressure projection; the prediction is not read
 // where trust is zero.
 void add_momentum(In density, const MomentumSource &source, float trust, const StaggeredIn &prediction,
                   const StaggeredOut &result, Workers &workers);

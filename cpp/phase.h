@@ -10,7 +10,7 @@ namespace smokelift {
 
 constexpr float PI = 3.14159265f;
 // Least square of a distance to the eye, and least 1 + g^2 - 2 g cosine: nothing is divided by 0.
-constexpr float LEAST_SQUARE = 1e-30f, LEAST_BASE = 1e-6f;
+constexpr float MIN_SQUARE = 1e-30f, MIN_BASE = 1e-6f;
 
 // A value that changes linearly along the row: value(c) = at_0 + c step, in each of the three axes.
 struct RowOfVectors {
@@ -51,8 +51,8 @@ SMOKELIFT_INLINE void phase_row(const Phase &phase, const ParallelLight &light, 
         const float x = eye.at_0[0] + at * eye.step[0], y = eye.at_0[1] + at * eye.step[1],
                     z = eye.at_0[2] + at * eye.step[2];
         const float cosine =
-            (l[0] * x + l[1] * y + l[2] * z) / std::sqrt(std::max(x * x + y * y + z * z, LEAST_SQUARE));
-        const float base = std::max(1 + g * g - 2 * g * cosine, LEAST_BASE);
+            (l[0] * x + l[1] * y + l[2] * z) / std::sqrt(std::max(x * x + y * y + z * z, MIN_SQUARE));
+        const float base = std::max(1 + g * g - 2 * g * cosine, MIN_BASE);
         out[c] = norm / (base * std::sqrt(base));
     }
 }
@@ -74,8 +74,8 @@ SMOKELIFT_INLINE void phase_row(const Phase &phase, const PointLight &light, int
         const float u = from[0] + at * along[0], v = from[1] + at * along[1], w = from[2] + at * along[2];
         const float square = u * u + v * v + w * w;
         const float cosine =
-            (u * x + v * y + w * z) / std::sqrt(std::max(x * x + y * y + z * z, LEAST_SQUARE) * square);
-        const float base = std::max(1 + g * g - 2 * g * cosine, LEAST_BASE);
+            (u * x + v * y + w * z) / std::sqrt(std::max(x * x + y * y + z * z, MIN_SQUARE) * square);
+        const float base = std::max(1 + g * g - 2 * g * cosine, MIN_BASE);
         out[c] = norm / (base * std::sqrt(base) * square);
     }
 }

@@ -9,8 +9,8 @@ namespace smokelift {
 namespace {
 
 constexpr std::size_t READS_PER_TASK = 1 << 16;
-constexpr int RUN = 32;               // voxels along z that are looked at together
-constexpr double LEAST_DEPTH = 1e-12; // m; a voxel in the plane of the eye is in no picture
+constexpr int RUN = 32;             // voxels along z that are projected together
+constexpr double MIN_DEPTH = 1e-12; // m; a voxel in the plane of the eye is in no picture
 
 // Homogeneous pixel coordinates along a row of voxels.
 struct PixelRow {
@@ -34,7 +34,7 @@ struct Place {
 
 SMOKELIFT_INLINE Place place_of(const PictureMap &map, const PixelRow &line, int k) {
     const double z = map.centres[2][k], depth = line.at(2, z);
-    const double safe = std::abs(depth) < LEAST_DEPTH ? LEAST_DEPTH : depth;
+    const double safe = std::abs(depth) < MIN_DEPTH ? MIN_DEPTH : depth;
     const double column = line.at(0, z) / safe - 0.5, row = line.at(1, z) / safe - 0.5;
     const bool inside =
         (column > -0.5) & (column < map.columns - 0.5) & (row > -0.5) & (row < map.rows - 0.5);
@@ -116,7 +116,7 @@ void mark_plane(const PictureMap &map, const unsigned char *picture, const Marke
             const int end = std::min(begin + RUN, n[2]);
             const double near = line.at(2, map.centres[2][begin]), far = line.at(2, map.centres[2][end - 1]);
             // before the camera, what lies between two voxels is seen between them
-            if (near > LEAST_DEPTH && far > LEAST_DEPTH &&
+            if (near > MIN_DEPTH && far > MIN_DEPTH &&
                 !marked.near(map, place_of(map, line, begin), place_of(map, line, end - 1)))
                 std::fill(shown + begin, shown + end, false);
             else

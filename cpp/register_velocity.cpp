@@ -148,8 +148,8 @@ void register_motion(py::module_ &module) {
         "solution"_a, "u"_a, "largest"_a, "closed"_a);
 }
 
-// The problem with what it looks at. The right-hand side is made when it is first asked for; from then on
-// nothing else is needed of offset and centre.
+// The problem with the arrays that it refers to. The right-hand side is made when it is first asked for; from
+// then on nothing else is needed of offset and centre.
 class Problem {
 public:
     Problem(const Array3 &direction, const Array &offset, const Array &weight, const Array &irrotational,

@@ -14,7 +14,7 @@
 namespace smokelift {
 namespace {
 
-constexpr int SPINS = 2000; // looks for the next loop before a thread goes to sleep
+constexpr int SPINS = 2000; // checks for the next loop before a thread goes to sleep
 
 std::atomic<int> threads_set{0};
 

@@ -13,7 +13,7 @@ EXAMPLE = Path(__file__).parent / "plume"
 """The example at two fifths of its size: what Blender and the engine do with it is the same, in half the time."""
 
 FULL_SIZE = Path(__file__).parents[1] / "examples" / "plume"
-"""The example itself, for pictures that are looked at."""
+"""The example itself, for pictures that are shown."""
 
 
 def set_up_example(scene: bpy.types.Scene, folder: Path = EXAMPLE) -> bpy.types.Scene:

@@ -1,6 +1,7 @@
 """The documents: every path that they or the code name exists, and pages keep their form."""
 
 import re
+import subprocess
 from itertools import pairwise
 from pathlib import Path
 
@@ -24,6 +25,42 @@ MODULE = re.compile(r"python -m (benchmarks[\w.]*)")
 ARROWS = re.compile(r"^ {4}(\w+(?: --> \w+)+)$", re.MULTILINE)
 IMPORT = re.compile(r"^\s*(?:from|import) smokelift\.([a-z]\w*)", re.MULTILINE)
 FUNCTION = re.compile(r"\b([\w/]+\.py):(\w+)")
+FILE = re.compile(r"\b(\w+(?:/\w+)+\.(?:py|cpp|h))\b")
+CONSTANT = re.compile(r"`([A-Z][A-Z_]+)`")
+COMMIT = re.compile(r"\b(?=[0-9a-f]*\d)(?=[0-9a-f]*[a-f])[0-9a-f]{7,8}\b")
+SEVERAL_NUMBERS = re.compile(r"\d\s*%? / [-+(.]?\d")
+
+PAGE = 65
+"""Lines of a decision record, at most: it is read on one page."""
+
+IN_WORK = {
+    "axis-uncertainty",
+    "background",
+    "bright-background",
+    "continuation",
+    "density-axis",
+    "density-axis-light",
+    "environment-directions",
+    "every-view",
+    "flicker",
+    "guided-simulation",
+    "light-direction",
+    "moved-background",
+    "scattering-selection",
+    "smoke-colour",
+    "smoke-thickness",
+    "stretched-noise",
+    "surroundings",
+    "unknown-background",
+    "unseen-seed",
+}
+"""Experiments whose subject is measured anew, and which are shortened with it: background, light and depth."""
+
+GUIDES = {"blender", "directing", "shooting", "tour", "troubleshooting"}
+"""Pages for artists, which are rewritten with the add-on."""
+
+RECORDS = [page for page in EXPERIMENTS if page.stem not in IN_WORK]
+MEASURED = [*RECORDS, *(page for page in sorted(DOCS.glob("*.md")) if page.stem not in GUIDES)]
 
 
 def name(path: Path) -> str:
@@ -62,6 +99,13 @@ def test_the_architecture_names_what_there_is() -> None:
     assert missing == []
 
 
+@pytest.mark.parametrize("page", [*sorted(ROOT.glob("*.md")), *MEASURED], ids=name)
+def test_files_of_the_code_that_a_page_names_exist(page: Path) -> None:
+    """They are named as within the engine, or as within the checkout; NAME stands for any."""
+    named = {file for file in FILE.findall(page.read_text()) if "NAME" not in file}
+    assert [file for file in sorted(named) if not ((ENGINE / file).exists() or (ROOT / file).exists())] == []
+
+
 def test_imports_follow_the_arrows_of_the_architecture() -> None:
     below: dict[str, set[str]] = {}
     for chain in ARROWS.findall((ROOT / "ARCHITECTURE.md").read_text()):
@@ -92,6 +136,37 @@ def test_pictures_of_the_docs_are_shown() -> None:
 def test_an_experiment_has_its_four_parts(page: Path) -> None:
     parts = [line for line in page.read_text().splitlines() if line.startswith("## ")]
     assert parts == ["## Question", "## Setting", "## Table", "## Answer"]
+
+
+@pytest.mark.parametrize("page", RECORDS, ids=name)
+def test_an_experiment_fits_on_a_page(page: Path) -> None:
+    assert len(page.read_text().splitlines()) <= PAGE
+
+
+def test_constants_that_records_chose_exist() -> None:
+    code = "".join(path.read_text() for path in ENGINE.rglob("*.py"))
+    named = {(page.stem, constant) for page in RECORDS for constant in CONSTANT.findall(page.read_text())}
+    assert {(page, constant) for page, constant in named if not re.search(rf"\b{constant}\b", code)} == set()
+
+
+@pytest.mark.parametrize("page", MEASURED, ids=name)
+def test_a_cell_of_a_table_has_one_number(page: Path) -> None:
+    rows = [line for line in page.read_text().splitlines() if line.startswith("|")]
+    assert [cell for row in rows for cell in row.split("|") if SEVERAL_NUMBERS.search(cell)] == []
+
+
+def test_commits_that_pages_name_exist() -> None:
+    named = {commit for page in PAGES if page.stem not in IN_WORK for commit in COMMIT.findall(page.read_text())}
+    ended = subprocess.run(["git", "rev-list", "HEAD"], cwd=ROOT, capture_output=True, text=True, check=False)
+    if ended.returncode or len(ended.stdout.split()) < 100:
+        pytest.skip("this is no clone with the whole history")
+    known = {commit[:length] for commit in ended.stdout.split() for length in (7, 8)}
+    assert named - known == set()
+
+
+@pytest.mark.parametrize("page", sorted(DOCS.glob("*.md")), ids=name)
+def test_a_page_that_describes_has_no_history(page: Path) -> None:
+    assert not re.search(rf"\b(?:[Uu]ntil|[Bb]efore|[Ss]ince) {COMMIT.pattern}", page.read_text())
 
 
 @pytest.mark.parametrize("page", sorted(DOCS.glob("*.md")), ids=name)

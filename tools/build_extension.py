@@ -38,7 +38,7 @@ MANUAL = ROOT / "build" / "manual"
 """The manual as web pages, which the preferences' button opens."""
 
 LEVEL = 5
-"""Of compression: takes six tenths of the time of 6, which is usual, for 1 % more bytes."""
+"""Level of compression: it takes six tenths of the time of 6, which is usual, for 1 % more bytes."""
 
 GPU = {"name": "Smokelift GPU", "tagline": "Lets Smokelift render on the graphics card"}
 """What the manifest of `smokelift_gpu` says otherwise."""

@@ -30,7 +30,7 @@ PYTHONS = ("3.11", "3.13")
 VERSION = re.findall(
     r'^__version__ = "(.+)"$', (ROOT / "engine/smokelift/__init__.py").read_text(encoding="utf-8"), re.M
 )[0]
-"""Of everything that is shipped; it stands nowhere else."""
+"""Version of everything that is shipped; it stands nowhere else."""
 
 GLIBC = "2.28"
 """Oldest C library that Blender's own builds run with."""
@@ -81,7 +81,7 @@ def main() -> int:
 
 
 def versions(own: str, blender: bool) -> list[str]:
-    """Of Python, that wheels are built for: this one, or Blender's.
+    """Versions of Python that wheels are built for: this one, or Blender's.
 
     This one is the first of Blender's if it is one: what the tests had compiled then serves the others too.
     """

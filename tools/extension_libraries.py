@@ -131,7 +131,7 @@ def library_faults(libraries: Path, imported: Iterable[Path], platform: Platform
 
     Returns
     -------
-    Requirements that are not met, and numpy if it is there, which would displace Blender's own.
+    Requirements that nothing fulfils, and numpy if it is there, which would displace Blender's own.
     """
     have = {"numpy": Version(BLENDER_NUMPY[python])}
     for found in distributions(path=[str(folder) for folder in imported]):

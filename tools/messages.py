@@ -23,8 +23,8 @@ _FIELD = re.compile(r"\{:[^{}]*\}")
 SPEAKERS = {"fail", "note", "report", "error", "unexpected", "warn"}
 """Functions that say their first argument to the user; classes of exceptions do so as well."""
 
-FEWEST_WORDS = 4
-"""Of a message: less is a part of one."""
+MIN_WORDS = 4
+"""Fewest words of a message: less is a part of one."""
 
 TOPICS = {
     "Command line": ("engine/smokelift/app", "engine/smokelift_command"),
@@ -50,7 +50,7 @@ def messages(path: Path) -> list[str]:
     for said, text in _strings(tree, False, skipped):
         text = " ".join(text.split())
         sentence = text.endswith(".") and (text[:1].isupper() or text.startswith(GAP))
-        if (said or sentence) and len(text.replace(GAP, " ").split()) >= FEWEST_WORDS:
+        if (said or sentence) and len(text.replace(GAP, " ").split()) >= MIN_WORDS:
             found[text] = None
     return list(found)
 

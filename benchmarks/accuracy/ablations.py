@@ -30,7 +30,7 @@ class EvenDepth:
     """A depth prior: smoke is spread evenly along each ray through the domain."""
 
     def of_clip(self, clip: ObservedClip) -> EvenDepth:
-        """Return itself: it needs no look at the clip."""
+        """Return itself: it reads nothing of the clip."""
         return self
 
     def estimate(self, views: ViewSet) -> DepthEstimate:

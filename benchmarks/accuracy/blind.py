@@ -49,7 +49,7 @@ def trial(
     rows = []
     for run in order:
         if (densities := known_densities(known, run, folder / run)) is None:
-            raise ValueError(f"{run}: has no densities to look at from elsewhere.")
+            raise ValueError(f"{run}: has no densities to show from elsewhere.")
         rows.append(orbit_tiles(Orbit(densities.scene), densities.of_frame(frame)))
     return rows, order
 

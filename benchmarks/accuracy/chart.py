@@ -1,4 +1,4 @@
-"""Speed against accuracy: time, errors and realism, from the figures of `python -m benchmarks.accuracy`.
+"""Speed against accuracy: time, errors and patches, from the figures of `python -m benchmarks.accuracy`.
 
 python -m benchmarks.accuracy.chart OUT/accuracy.csv docs/accuracy_chart.png
 """

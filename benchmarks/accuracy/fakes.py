@@ -17,7 +17,7 @@ from scipy import ndimage
 from benchmarks import tables
 from benchmarks.accuracy.scenes import baked_scene
 from benchmarks.accuracy.score import known_densities
-from smokelift.evaluation.frame_means import SMOKE, Figures
+from smokelift.evaluation.frame_means import SMOKE_SHARE, Figures
 from smokelift.evaluation.orbit_scores import Densities, orbit_scores
 from smokelift.evaluation.series import finite_mean
 from smokelift.evaluation.truth import Truth
@@ -115,7 +115,7 @@ def _lathe(density: Volume) -> Volume:
 
 def _drawn_out(density: Volume) -> Volume:
     """Every ray's smoke is spread evenly over the depth that its layer has."""
-    deep = np.any(density > SMOKE * density.max(), axis=0)
+    deep = np.any(density > SMOKE_SHARE * density.max(), axis=0)
     evenly = density.sum(1, keepdims=True) / np.maximum(deep.sum(0), 1)
     return np.asarray(np.where(deep[None], evenly, 0), np.float32)
 

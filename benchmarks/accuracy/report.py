@@ -55,7 +55,7 @@ def error_columns(views: list[str]) -> list[Column]:
         ("velocity, cosine", ["velocity_error", "velocity_cosine"], ".2f"),
         ("around", ["velocity_error_around", "velocity_cosine_around"], ".2f"),
         ("div (true)", ["divergence", "divergence_truth"], ".0e"),
-        ("warp (true)", ["warp_error", "warp_error_truth"], ".2f"),
+        ("warp error (true)", ["warp_error", "warp_error_truth"], ".2f"),
         *_COST,
     ]
 

@@ -44,7 +44,7 @@ BLACK = np.zeros(3, np.float32)
 
 VIEW_FIGURES = ("psnr", "ssim")
 ORBIT_FIGURES = ("patches", "patches_worst", "patches_own", "texture", "texture_own", "edges", "halo", "flicker")
-"""Of the orbit beside the truth's, or beside the front where that is not known."""
+"""Figures of the orbit beside the truth's, or beside the front where that is not known."""
 
 VOLUME_FIGURES = (
     "density_error", "height_mass_error", "mass_ratio", "velocity_error", "velocity_cosine", "velocity_error_around",

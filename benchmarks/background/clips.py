@@ -58,7 +58,7 @@ class Smoke:
         return Smoke(0.1 * self.radiance, self.transmittance)
 
     def standing(self) -> Smoke:
-        """The same with a column from the floor to the top that wavers and never goes away.
+        """Return the smoke with a column from the floor to the top that wavers and never goes away.
 
         It is as bright as the smoke's brightest and lets a tenth to a half of the light through.
         """
@@ -73,7 +73,7 @@ class Smoke:
         return Smoke(self.radiance * column + bright * (1 - column), self.transmittance * column)
 
     def misty(self) -> Smoke:
-        """The same with mist over two thirds of the picture that hardly moves and never goes away.
+        """Return the smoke with mist over two thirds of the picture that hardly moves and never goes away.
 
         It is a third as bright as the smoke's brightest, lets a half of the light through at least, and drifts by the
         picture's width in 600 frames.
@@ -111,7 +111,7 @@ class Case:
     clean : (frames, rows, columns, 3)
         The true pictures, linear.
     given
-        Whether the background is told.
+        Whether the background is given.
     lens
         Of a camera that may turn.
     """
@@ -184,7 +184,7 @@ def compressed(encoded: Picture, crf: int) -> Picture:
 
 
 def noisy(encoded: Picture, share: float) -> Picture:
-    """With white noise of a share of the range."""
+    """Return a clip with white noise of a share of the range."""
     noise = np.random.default_rng(0).standard_normal(encoded.shape, np.float32)
     return encoded + np.float32(share) * noise
 

@@ -6,9 +6,9 @@ A scene is a folder that `benchmarks.truth.bake` and `benchmarks.truth.picture` 
 of a reactant: it enters with the smoke, goes where the true velocity carries it, is burnt up after `BURNING` seconds,
 and shines as its square root. It burns in the baked smoke, or beneath it: with less smoke the more of the reactant is
 left.
-One frame before black, at eight bits, with the camera and the box told. Pictures are integrated at half-voxel steps,
+One frame before black, at eight bits, with the camera and the box given. Pictures are integrated at half-voxel steps,
 without the renderer that is measured: smoke of one source radiance, and the fire's light behind it.
-With FOLDER nothing is reconstructed: the clips of that fire are written for `tests.blender.beside_the_clip`.
+With FOLDER nothing is reconstructed: the clips of that fire are written for `benchmarks.blender.beside_the_clip`.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ RESOLUTION, THIRD = (32, 32, 48), 16
 
 @dataclass(frozen=True)
 class Case:
-    """What is filmed, and what is told.
+    """What is filmed, and what is given.
 
     Attributes
     ----------
@@ -67,8 +67,8 @@ class Case:
         Whether it burns beneath the smoke.
     coloured
         Whether it has two colours.
-    told
-        Whether the smoke's depth is told.
+    given
+        Whether the smoke's depth is given.
     smoke
         Whether fire is taken for smoke, as it is without being looked for.
     """
@@ -76,7 +76,7 @@ class Case:
     level: float = 0.9
     beneath: bool = False
     coloured: bool = False
-    told: bool = False
+    given: bool = False
     smoke: bool = False
 
 
@@ -89,7 +89,7 @@ CASES = {
         "fire": Case(),
         "clipped": Case(2.5),
         "two colours": Case(coloured=True),
-        "depth told": Case(told=True),
+        "depth given": Case(given=True),
     }.items()
 }
 
@@ -106,7 +106,7 @@ class Fire:
 
     @staticmethod
     def of(truth: Truth, scene: CompleteScene, beneath: bool) -> Fire:
-        """That of a scene."""
+        """Return the fire of a scene."""
         left = next(itertools.islice(reactants(truth), FRAME, None))
         density = truth.densities[FRAME].astype(np.float32) * (1 - left * beneath)
         emission = np.sqrt(left)
@@ -149,7 +149,7 @@ def _measured(fire: Fire, case: Case, scene: CompleteScene) -> Iterator[str]:
     clip = filmed(np.clip(exposed(picture[None], np.ones(1)), 0, 1), "fire")
     density = coarsen(fire.density)
     places = scene.domain.min[1] + (np.arange(RESOLUTION[1]) + 0.5) * 2 / RESOLUTION[1]
-    depth = float(np.average(places, weights=density.sum((0, 2)))) if case.told else None
+    depth = float(np.average(places, weights=density.sum((0, 2)))) if case.given else None
     with mock.patch("smokelift.setup.fire.fire_share", lambda *_: 0.0) if case.smoke else mock.MagicMock():
         shot, frame = _reconstructed(clip, scene, depth)
     sides = [orbit(scene.camera, scene.domain, 90).resized(32, 48)]
@@ -172,7 +172,7 @@ def _measured(fire: Fire, case: Case, scene: CompleteScene) -> Iterator[str]:
 
 
 def _write_clip(folder: Path, fire: Fire, scene: CompleteScene) -> None:
-    """Two pictures of the moment with what is told of them, and where they show smoke and fire."""
+    """Two pictures of the moment with what is given of them, and where they show smoke and fire."""
     folder.mkdir(parents=True, exist_ok=True)
     picture, added = fire.picture(Case())
     for number in (1, 2):

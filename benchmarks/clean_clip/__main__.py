@@ -2,7 +2,7 @@
 
     python -m benchmarks.clean_clip OUT SCENES/plume-3 SCENES/jet-3 [--code before=CHECKOUT now=.] [--only wall]
 
-A scene is a folder that `benchmarks.truth.picture` filled; camera, box, medium and light are told, nothing else unless
+A scene is a folder that `benchmarks.truth.picture` filled; camera, box, medium and light are given, nothing else unless
 the row says so. What OUT/figures.json holds already stays as it is.
 """
 
@@ -22,7 +22,7 @@ from benchmarks.clean_clip.smoke import Baked
 from benchmarks.tables import markdown
 
 Results = dict[str, Figures]
-"""By "code / scene / row"."""
+"""Figures by "code / scene / row"."""
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

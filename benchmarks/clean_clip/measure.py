@@ -34,7 +34,7 @@ Figures = dict[str, float | str]
 
 
 def write(film: Film, folder: Path) -> Path:
-    """Write the clip without loss, the plate if it is told, and the scene file, which is returned."""
+    """Write the clip without loss, the plate if it is given, and the scene file, which is returned."""
     folder.mkdir(parents=True, exist_ok=True)
     if film.hlg:
         clip = wide(folder / "clip.mkv", hlg_signal(to_bt2020(film.pictures)), 10, BT2020, **HLG)
@@ -49,7 +49,7 @@ def write(film: Film, folder: Path) -> Path:
     scene = replace(film.smoke.scene, clip=ClipSource(clip), background=background, medium=medium, camera=camera)
     path = folder / "scene.toml"
     scene.save(path)
-    # what is not told needs no key, which earlier states of the code may not know
+    # what is not given needs no key, which earlier states of the code may not know
     path.write_text(re.sub(r"color = \[\s*1\.0,\s*1\.0,\s*1\.0,?\s*\]\n", "", path.read_text()))
     return path
 

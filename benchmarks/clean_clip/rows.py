@@ -34,7 +34,7 @@ Spoil = Callable[[Picture], Picture]
 
 @dataclass(frozen=True, eq=False)
 class Film:
-    """A clip with what is told of it.
+    """A clip with what is given of it.
 
     Attributes
     ----------
@@ -43,13 +43,13 @@ class Film:
     pictures : (frames, rows, columns, 3)
         As they are filmed: linear in HLG, else sRGB values.
     plate : (rows, columns, 3), optional
-        The background, linear, if it is told.
+        The background, linear, if it is given.
     behind
         Linear grey behind the smoke in the views that are compared.
     colour
         Of the smoke.
     medium
-        Whether medium and colour are told.
+        Whether medium and colour are given.
     hlg
         Whether the file has ten bits of hybrid log-gamma in place of eight of sRGB.
     """
@@ -131,9 +131,9 @@ class Clips:
                 "sky, dark, given": lambda: self._film(clouds, clouds, of=dark, behind=BRIGHT),
                 "sky, dark": lambda: self._film(clouds, of=dark, behind=BRIGHT),
             },
-            "black, medium not told": {
-                "black, medium not told": lambda: self._film(black, medium=False),
-                "black, medium not told, coloured": lambda: self._film(black, medium=False, colour=ORANGE),
+            "black, medium unknown": {
+                "black, medium unknown": lambda: self._film(black, medium=False),
+                "black, medium unknown, coloured": lambda: self._film(black, medium=False, colour=ORANGE),
             },
         }
         return {name: Row(clean, film) for clean, each in films.items() for name, film in each.items()}

@@ -1,4 +1,4 @@
-"""A true plume set free, in wind, stirred, around a ball and pushed by one, as a picture.
+"""A true plume set free, in wind, stirred, around a ball at rest and one that moves, as a picture.
 
 python -m benchmarks.direct.reacting SCENES/plume-2 FILE.png [--frames 48]
 """
@@ -28,7 +28,7 @@ LEARNT = range(8, 20)
 """Frames that the simulation learns from."""
 
 HEIGHT, RADIUS = 1.55, 0.3
-"""Of the ball, in metres; it stands above the middle of the smoke."""
+"""Height and radius of the ball, in metres; it stands above the middle of the smoke."""
 
 WAY = 1.6
 """Metres that the moving ball goes, with its middle in the smoke's."""

@@ -55,7 +55,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def _rank(key: tuple[str, float, str, MethodName]) -> bool:
     """What is measured first: the strengths that people meet, and what they are compared with."""
     disturbance = DISTURBANCES[key[0]]
-    return key[1] not in (disturbance.undisturbed, *disturbance.met)
+    return key[1] not in (disturbance.undisturbed, *disturbance.common)
 
 
 if __name__ == "__main__":

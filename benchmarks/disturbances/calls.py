@@ -13,7 +13,7 @@ from benchmarks.disturbances.spoiled import FIRST, plain
 from smokelift import Settings
 from smokelift.baselines.velocity import PaperVelocity
 from smokelift.density import ViewSet
-from smokelift.evaluation.frame_means import SMOKE, eight_bit_values
+from smokelift.evaluation.frame_means import SMOKE_SHARE, eight_bit_values
 from smokelift.evaluation.metrics import psnr, velocity_error
 from smokelift.evaluation.resampling import resampled
 from smokelift.evaluation.series import finite_mean
@@ -27,13 +27,13 @@ from smokelift.transport import Velocity, advect, project
 def motion(known: Known, voxels: float, method: MethodName) -> Figures:
     """A density and the same one carried by its true flow, scaled to a mean way of so many voxels."""
     density = known.density(FIRST)
-    smoke = density > SMOKE * density.max()
+    smoke = density > SMOKE_SHARE * density.max()
     flow = _on_faces(known)
     way = np.linalg.norm(flow.centres()[smoke], axis=-1).mean() / (known.fps * flow.voxel_size)
     flow = flow.with_faces(np.float32(voxels / way) * component for component in flow.faces)
     after = advect(density, flow, 1 / known.fps)
     found = compose(_settings(method)).velocity_estimator.estimate(density, after, 1 / known.fps, flow.voxel_size)
-    counted = after > SMOKE * after.max()
+    counted = after > SMOKE_SHARE * after.max()
     return {"velocity_error": velocity_error(found.centres(), flow.centres(), counted)[0]}
 
 
@@ -49,7 +49,7 @@ def scaled_density(known: Known, factor: float, method: MethodName) -> Figures:
         smoothness, kinetic = (weight / factor**2 for weight in (estimator.smoothness, estimator.kinetic))
         estimator = replace(estimator, smoothness=smoothness, kinetic=kinetic)
     found = estimator.estimate(before, after, 1 / known.fps, known.domain.voxel_size)
-    counted = (after > SMOKE * after.max()) & ~known.inlets[FIRST + 1]
+    counted = (after > SMOKE_SHARE * after.max()) & ~known.inlets[FIRST + 1]
     return {"velocity_error": velocity_error(found.centres(), known.velocities[FIRST + 1], counted)[0]}
 
 
@@ -57,7 +57,7 @@ def wrong_start(known: Known, factor: float, method: MethodName) -> Figures:
     """The fit of one frame, started from the true density times a factor."""
     take = plain(known.at([FIRST]))
     clip = filmed(take.pictures, "clip")
-    shot = prepare_shot(clip, take.told, _settings(method))
+    shot = prepare_shot(clip, take.given, _settings(method))
     composed: Method = compose(shot.settings)
     views = ViewSet.of(shot.observe(0), shot.optics, 0)
     depth = composed.depth_prior.of_clip(shot).estimate(views)

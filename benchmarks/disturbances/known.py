@@ -149,7 +149,7 @@ class Take:
     ----------
     known
         The moment that each frame shows, with all that is known of it.
-    told
+    given
         The description that the method gets; its camera's pictures are the clip's.
     pictures : (frames, rows, columns, 3)
         The clip in sRGB, 0 to 1.
@@ -162,7 +162,7 @@ class Take:
     """
 
     known: Known
-    told: Scene
+    given: Scene
     pictures: Picture
     gain: float = 1.0
     behind: float = 0.0

@@ -9,7 +9,7 @@ import numpy as np
 from benchmarks.background.clips import filmed
 from benchmarks.disturbances.known import FRONT, GRID, Known, Take
 from smokelift import Reconstruction, Settings, prepare_shot
-from smokelift.evaluation.frame_means import SMOKE, eight_bit_values
+from smokelift.evaluation.frame_means import SMOKE_SHARE, eight_bit_values
 from smokelift.evaluation.metrics import psnr, velocity_error, volume_error
 from smokelift.evaluation.resampling import resampled
 from smokelift.evaluation.series import finite_mean
@@ -36,7 +36,7 @@ def whole_run(take: Take, method: MethodName) -> Figures:
     relative, and ``mass_ratio``, which are absent in another box than the scene's. All are means over the frames that
     count.
     """
-    key = (take.known.name, take.pictures.tobytes(), take.told, take.gain, take.behind, take.scored, method)
+    key = (take.known.name, take.pictures.tobytes(), take.given, take.gain, take.behind, take.scored, method)
     if key not in _done:
         _done[key] = _measured(take, method)
     return _done[key]
@@ -46,7 +46,7 @@ def _measured(take: Take, method: MethodName) -> Figures:
     settings = replace(Settings.preset(method=method), detail=0.0)
     clip = filmed(take.pictures, "clip")
     try:
-        shot = prepare_shot(clip, take.told, settings)
+        shot = prepare_shot(clip, take.given, settings)
         frames = list(Reconstruction(shot, compose(shot.settings)))
     except ValueError as error:
         return {"refused": str(error)}
@@ -100,7 +100,7 @@ def flow_error(known: Known, moment: int, velocity: Array) -> float | None:
         At the centres of the small grid's voxels (m/s).
     """
     density, true = known.density(moment), known.velocities[moment]
-    counted = (density > SMOKE * density.max()) & ~known.inlets[moment]
+    counted = (density > SMOKE_SHARE * density.max()) & ~known.inlets[moment]
     if not counted.any() or not np.isfinite(true).all():
         return None
     return velocity_error(velocity, true, counted)[0]

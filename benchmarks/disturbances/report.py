@@ -33,7 +33,7 @@ COLOURS = {"default": "tab:blue", "paper": "tab:orange"}
 NAMES = {"default": "Smokelift", "paper": "the paper's method"}
 COLUMNS = 4
 HIGHEST = 4.0
-"""Of errors on a chart, at most."""
+"""Largest error that a chart shows."""
 
 
 class Results:
@@ -188,7 +188,7 @@ def _panel(plot: Any, results: Results, name: str, lines: dict[str, Floats], fig
     if disturbance.logarithmic or disturbance.labels:
         names = disturbance.labels or [f"{strength:g}" for strength in disturbance.strengths]
         plot.set_xticks(at, names, rotation=40 if disturbance.labels else 0)
-    for strength in disturbance.met:
+    for strength in disturbance.common:
         plot.axvline(strength, color="0.85", linewidth=5, zorder=0)
     if figure == "psnr_new":
         plot.axhline(-LOSS, color="tab:red", linewidth=0.7, linestyle=":")
@@ -228,22 +228,24 @@ def table(results: Results) -> str:
             continue
         measured = [x for x, each in zip(disturbance.strengths, ours.T, strict=True) if not np.isnan(each).all()]
         lost = ", ".join(f"{strength:.2g}" for strength in _lost(results, name)) or "nowhere"
-        line = [f"{disturbance.title}, {disturbance.unit}", f"{min(measured):.3g} to {max(measured):.3g}", lost]
-        line.append(", ".join(f"{strength:.2g}" for strength in disturbance.met))
-        for method in METHODS:
-            met = [results.changes(name, strength, method) for strength in disturbance.met]
-            line.append("; ".join(_mean_and_worst(each) for each in met if not math.isnan(mean(each))))
-        lines.append(line)
+        known = [f"{disturbance.title}, {disturbance.unit}", f"{min(measured):.3g} to {max(measured):.3g}", lost]
+        for strength in disturbance.common or (None,):
+            line = [*known, "" if strength is None else f"{strength:.2g}"]
+            for method in METHODS:
+                line += ["", ""] if strength is None else _mean_and_worst(results.changes(name, strength, method))
+            lines.append(line)
     head = [
         "disturbance",
         "measured",
         "1 dB lost from",
         "people meet",
-        "there: mean, worst",
-        "the paper's method there",
+        "there: mean (dB)",
+        "worst (dB)",
+        "the paper's method: mean (dB)",
+        "worst (dB)",
     ]
     return tables.markdown(head, lines)
 
 
-def _mean_and_worst(changes: Floats) -> str:
-    return f"{mean(changes):+.1f}, {np.nanmin(changes):+.1f} ({np.count_nonzero(~np.isnan(changes))})"
+def _mean_and_worst(changes: Floats) -> list[str]:
+    return ["", ""] if math.isnan(mean(changes)) else [f"{mean(changes):+.1f}", f"{np.nanmin(changes):+.1f}"]

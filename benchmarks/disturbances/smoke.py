@@ -42,7 +42,7 @@ def anisotropy(known: Known, mean_cosine: float) -> Take:
 
 
 def albedo(known: Known, share: float) -> Take:
-    """Smoke that scatters a share of the light that it stops, before a grey background, which is told."""
+    """Smoke that scatters a share of the light that it stops, before a grey background, which is given."""
     part = usual(known)
     part = replace(part, scene=replace(part.scene, medium=replace(part.medium, albedo=share))).pictured()
     return replace(before_grey(part, GREY), behind=GREY)

@@ -46,16 +46,16 @@ def plain(known: Known) -> Take:
 
 
 def before(known: Known, plate: Picture, gains: npt.ArrayLike = 1.0) -> Take:
-    """A take before a linear plate (rows, columns, 3), which is told; each frame with a gain of its own, or one."""
+    """A take before a linear plate (rows, columns, 3), which is given; each frame with a gain of its own, or one."""
     seen = known.radiance[FRONT][..., None] + known.transmittance[FRONT][..., None] * plate
     linear = seen * np.asarray(gains, np.float32).reshape(-1, 1, 1, 1)
     return Take(known, known.scene, np.clip(linear_to_srgb(linear), 0, 1))
 
 
 def before_grey(known: Known, radiance: float, gains: npt.ArrayLike = 1.0) -> Take:
-    """A take before a linear grey that is told."""
+    """A take before a linear grey that is given."""
     take = before(known, backdrop(SIZE[::-1], radiance), gains)
-    return replace(take, told=replace(take.told, background=Background(color=(radiance,) * 3)))
+    return replace(take, given=replace(take.given, background=Background(color=(radiance,) * 3)))
 
 
 def usual(known: Known) -> Known:
@@ -81,7 +81,7 @@ def flicker(known: Known, share: float) -> Take:
 
 
 def flicker_before_grey(known: Known, share: float) -> Take:
-    """The same before a grey background, which shows the exposure."""
+    """A take that flickers before a grey background, which shows the exposure."""
     return before_grey(usual(known), GREY, _flickering(share))
 
 
@@ -94,11 +94,11 @@ def blur(known: Known, voxels: float) -> Take:
 
 
 def saturation(known: Known, share: float) -> Take:
-    """An exposure at which a share of the smoke's pixels is white; the light is told as strong as it seems."""
+    """An exposure at which a share of the smoke's pixels is white; the light is given as strong as it seems."""
     part = usual(known)
     seen = part.radiance[FRONT]
     gain = 1 / float(np.quantile(seen[seen > SMOKE * seen.max()], 1 - share)) if share else 1.0
-    return replace(before(part, backdrop(SIZE[::-1], 0), gain), told=_lit(part, gain), gain=gain)
+    return replace(before(part, backdrop(SIZE[::-1], 0), gain), given=_lit(part, gain), gain=gain)
 
 
 def crushing(known: Known, level: float) -> Take:
@@ -108,7 +108,7 @@ def crushing(known: Known, level: float) -> Take:
 
 
 def bright_background(known: Known, share: float) -> Take:
-    """A grey background with a share of the radiance of the smoke's brightest pixels; its colour is told."""
+    """A grey background with a share of the radiance of the smoke's brightest pixels; its colour is given."""
     part = usual(known)
     seen = part.radiance[FRONT]
     grey = share * float(np.quantile(seen[seen > SMOKE * seen.max()], 0.95))
@@ -122,7 +122,7 @@ def grid(known: Known, number: float) -> Take:
     half = np.array(shape) * coarser * known.domain.voxel_size / 2
     middle = np.array(known.domain.centre)
     box = Domain(tuple(middle - half), tuple(middle + half), shape)
-    return replace(take, told=replace(take.told, domain=box))
+    return replace(take, given=replace(take.given, domain=box))
 
 
 def missing(known: Known, share: float) -> Take:
@@ -157,7 +157,7 @@ def wrong_light(known: Known, degrees: float) -> Take:
     x, y, z = known.light.direction
     turn = np.radians(degrees)
     turned = (x * np.cos(turn) - y * np.sin(turn), x * np.sin(turn) + y * np.cos(turn), z)
-    return replace(take, told=replace(take.told, lights=(replace(known.light, direction=turned),)))
+    return replace(take, given=replace(take.given, lights=(replace(known.light, direction=turned),)))
 
 
 def wrong_extinction(known: Known, factor: float) -> Take:
@@ -177,7 +177,7 @@ def wrong_anisotropy(known: Known, anisotropy: float) -> Take:
 
 def _told_medium(known: Known, medium: Medium) -> Take:
     take = plain(usual(known))
-    return replace(take, told=replace(take.told, medium=medium))
+    return replace(take, given=replace(take.given, medium=medium))
 
 
 def _lit(known: Known, gain: float) -> Scene:

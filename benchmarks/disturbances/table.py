@@ -28,7 +28,7 @@ class Disturbance:
         From weak to strong, or along a scale with the undisturbed value inside.
     undisturbed
         One of them, which disturbs nothing.
-    met
+    common
         Those that people meet.
     logarithmic
         Whether a chart has them on a logarithmic scale.
@@ -41,7 +41,7 @@ class Disturbance:
     measure: Measure
     strengths: tuple[float, ...]
     undisturbed: float
-    met: tuple[float, ...] = ()
+    common: tuple[float, ...] = ()
     logarithmic: bool = False
     labels: tuple[str, ...] = ()
 
@@ -56,28 +56,28 @@ def _disturbed(
     unit: str,
     strengths: tuple[float, ...],
     undisturbed: float = 0.0,
-    met: tuple[float, ...] = (),
+    common: tuple[float, ...] = (),
     logarithmic: bool = False,
     labels: tuple[str, ...] = (),
 ) -> Disturbance:
     """Return a disturbance of whole runs."""
-    return Disturbance(title, unit, partial(_run, make), strengths, undisturbed, met, logarithmic, labels)
+    return Disturbance(title, unit, partial(_run, make), strengths, undisturbed, common, logarithmic, labels)
 
 
 DISTURBANCES: dict[str, Disturbance] = {
-    "noise": _disturbed(spoiled.noise, "Noise", "share of the 8-bit range", (0, 0.02, 0.05, 0.1, 0.2), met=(0.05,)),
+    "noise": _disturbed(spoiled.noise, "Noise", "share of the 8-bit range", (0, 0.02, 0.05, 0.1, 0.2), common=(0.05,)),
     "crf": _disturbed(spoiled.compression, "H.264", "crf (none at -5)", (-5, 0, 20, 28, 35, 43, 50), -5, (35,)),
-    "light": _disturbed(spoiled.wrong_light, "Light told wrong", "degrees", (0, 15, 30, 60, 90, 180), met=(30,)),
+    "light": _disturbed(spoiled.wrong_light, "Wrong light", "degrees", (0, 15, 30, 60, 90, 180), common=(30,)),
     "extinction": _disturbed(
-        spoiled.wrong_extinction, "Extinction told wrong", "factor", (0.1, 0.5, 1, 2, 10), 1, (0.5, 2), True
+        spoiled.wrong_extinction, "Wrong extinction", "factor", (0.1, 0.5, 1, 2, 10), 1, (0.5, 2), True
     ),
     "flicker": _disturbed(
-        spoiled.flicker, "Exposure flickers, black behind", "share", (0, 0.05, 0.1, 0.2, 0.4), met=(0.1,)
+        spoiled.flicker, "Exposure flickers, black behind", "share", (0, 0.05, 0.1, 0.2, 0.4), common=(0.1,)
     ),
     "flicker-grey": _disturbed(
-        spoiled.flicker_before_grey, "Exposure flickers, grey behind", "share", (0, 0.05, 0.1, 0.2, 0.4), met=(0.1,)
+        spoiled.flicker_before_grey, "Exposure flickers, grey behind", "share", (0, 0.05, 0.1, 0.2, 0.4), common=(0.1,)
     ),
-    "missing": _disturbed(spoiled.missing, "Frames missing", "share", (0, 1 / 6, 1 / 4, 1 / 3, 1 / 2), met=(1 / 3,)),
+    "missing": _disturbed(spoiled.missing, "Frames missing", "share", (0, 1 / 6, 1 / 4, 1 / 3, 1 / 2), common=(1 / 3,)),
     "doubled": _disturbed(spoiled.doubled, "Frames doubled", "share", (0, 1 / 6, 1 / 3, 1 / 2, 1)),
     "cut": _disturbed(spoiled.cut, "A cut", "frames jumped", (0, 2, 5, 10, 14)),
     "blur": _disturbed(spoiled.blur, "Blur", "voxels", (0, 0.5, 1, 2, 4)),
@@ -101,9 +101,9 @@ DISTURBANCES: dict[str, Disturbance] = {
         spoiled.grid, "Boxes and grids", "", tuple(float(k) for k in range(len(spoiled.GRIDS))),
         float(list(spoiled.GRIDS).index("36 high")), labels=tuple(spoiled.GRIDS),
     ),
-    "wrong-albedo": _disturbed(spoiled.wrong_albedo, "Albedo told wrong", "factor", (0.25, 0.5, 1, 1.25), 1),
+    "wrong-albedo": _disturbed(spoiled.wrong_albedo, "Wrong albedo", "factor", (0.25, 0.5, 1, 1.25), 1),
     "wrong-anisotropy": _disturbed(
-        spoiled.wrong_anisotropy, "Anisotropy told wrong", "mean cosine", (-0.9, -0.5, 0, 0.5, 0.9)
+        spoiled.wrong_anisotropy, "Wrong anisotropy", "mean cosine", (-0.9, -0.5, 0, 0.5, 0.9)
     ),
     "start": Disturbance(
         "Start of a fit wrong", "factor to the true density", calls.wrong_start, (0.01, 0.1, 0.5, 1, 2, 10, 100), 1,
@@ -116,4 +116,4 @@ DISTURBANCES: dict[str, Disturbance] = {
         "Density scaled", "factor", calls.scaled_density, (1e-6, 1e-3, 0.1, 1, 10, 1e3, 1e6), 1, logarithmic=True
     ),
 }  # fmt: skip
-"""By the names that the command takes, those first whose strengths people meet."""
+"""Disturbances by the names that the command takes, those first whose strengths people meet."""

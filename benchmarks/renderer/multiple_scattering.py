@@ -24,7 +24,7 @@ DIRECTIONS = {
     "side": (-0.819152, 0.0, -0.573576),
     "back": (0.0, -0.819152, -0.573576),
 }
-"""Of travel, as the reference has them."""
+"""Directions of travel, as the reference has them."""
 
 DISTANCE, FOV = 7.0, 30.0
 IRRADIANCE = 2 * math.pi

@@ -29,7 +29,7 @@ from smokelift.render.device import DeviceName, start
 WARM_UPS = 2
 """Iterations before the timed ones."""
 
-FEWEST, MOST = 5, 25
+MIN_RUNS, MAX_RUNS = 5, 25
 """Numbers of timed iterations; between them, they end after `ENOUGH_SECONDS`."""
 
 ENOUGH_SECONDS = 2.0
@@ -123,7 +123,7 @@ def prepare_function(peer: str) -> Callable[[BenchScene], Iteration]:
 
 def _clocked(iteration: Iteration, density: Any) -> tuple[list[float], Any]:
     seconds: list[float] = []
-    while len(seconds) < FEWEST or (len(seconds) < MOST and sum(seconds) < ENOUGH_SECONDS):
+    while len(seconds) < MIN_RUNS or (len(seconds) < MAX_RUNS and sum(seconds) < ENOUGH_SECONDS):
         began = time.perf_counter()
         outcome = iteration.run(density)
         seconds.append(time.perf_counter() - began)

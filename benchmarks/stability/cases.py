@@ -98,7 +98,7 @@ DAMAGED: Mapping[str, tuple[Prepare, str]] = {
     "scene file": (scene, "new"),
     "sequence.json": (index, "new"),
 }
-"""Of each class of damaged files how a case is made, and how the names begin that its command may write."""
+"""How a case of each class of damaged files is made, and how the names begin that its command may write."""
 
 
 def damaged(prepare: Prepare, out: str, shot: TinyShot, place: Path, random: Damage) -> tuple[Ended, str]:

@@ -26,8 +26,8 @@ from smokelift import _core
 EVENTS = ("open", "os.mkdir", "os.rename", "os.remove")
 """What a run does with its output folder, as Python's audit calls it."""
 
-MOST_EVENTS = 52
-"""Of them in a run of the tiny shot that writes OpenVDB too; a run that writes less may be over before its failure."""
+MAX_EVENTS = 52
+"""Events in a run of the tiny shot that writes OpenVDB too; a run that writes less may be over before its failure."""
 
 ORDINARY_USER = 54321
 """A number that no user has, so that all of its processes are ours."""
@@ -85,7 +85,7 @@ def small_files(out: Path, random: np.random.Generator) -> Iterator[Failure]:
 def read_only(out: Path, random: np.random.Generator) -> Iterator[Failure]:
     """The folder takes nothing more, from the beginning or from some moment on."""
     out.mkdir()
-    number = int(random.integers(MOST_EVENTS))
+    number = int(random.integers(MAX_EVENTS))
 
     def begin() -> None:
         _become_ordinary()
@@ -101,7 +101,7 @@ def read_only(out: Path, random: np.random.Generator) -> Iterator[Failure]:
 @contextmanager
 def moved_away(out: Path, random: np.random.Generator) -> Iterator[Failure]:
     """Somebody gives the folder another name at some moment."""
-    number, elsewhere = int(random.integers(2, MOST_EVENTS)), out.with_name("elsewhere")
+    number, elsewhere = int(random.integers(2, MAX_EVENTS)), out.with_name("elsewhere")
 
     def mend() -> None:
         if elsewhere.exists() and not out.exists():
@@ -153,14 +153,14 @@ def no_network(out: Path, random: np.random.Generator) -> Iterator[Failure]:
 @contextmanager
 def terminated(out: Path, random: np.random.Generator) -> Iterator[Failure]:
     """The process is asked to end, by Ctrl-C or SIGTERM."""
-    number, by = int(random.integers(1, MOST_EVENTS)), random.choice([signal.SIGINT, signal.SIGTERM])
+    number, by = int(random.integers(1, MAX_EVENTS)), random.choice([signal.SIGINT, signal.SIGTERM])
     yield Failure(lambda: _at_event(number, out, lambda: os.kill(os.getpid(), by)), ends=(0, 130))
 
 
 @contextmanager
 def killed(out: Path, random: np.random.Generator) -> Iterator[Failure]:
     """The process is killed between two of the things that it does with the folder."""
-    number = int(random.integers(1, MOST_EVENTS))
+    number = int(random.integers(1, MAX_EVENTS))
     begin = partial(_at_event, number, out, lambda: os.kill(os.getpid(), signal.SIGKILL))
     yield Failure(begin, ends=(0, -signal.SIGKILL))
 
@@ -178,7 +178,7 @@ ENVIRONMENTS: Mapping[str, Environment] = {
     "cancelled": terminated,
     "killed": killed,
 }
-"""Of each class what fails."""
+"""What fails, by the class."""
 
 
 def lacking(name: str, folder: Path) -> str:

@@ -163,4 +163,4 @@ READERS: Mapping[str, Reader] = {
         ImageError,
     ),
 }
-"""By a word for what is read."""
+"""Readers by a word for what they read."""

@@ -99,9 +99,9 @@ def _events(ended: Ended) -> list[dict[str, Any]]:
 
 def _lost(ended: Ended, out: Path, wanted: Path) -> str:
     """What is wrong with the frames that a run said to have finished, and with those that its folder lists."""
-    told = {event["frame"] for event in _events(ended) if event["event"] == "frame"}
+    reported = {event["frame"] for event in _events(ended) if event["event"] == "frame"}
     if not (out / INDEX).exists():
-        return "lost" if told else ""
+        return "lost" if reported else ""
     try:
         there = Sequence.open(out)
         listed = [number for number in there.frames if _same(there, Sequence.open(wanted), number)]
@@ -109,7 +109,7 @@ def _lost(ended: Ended, out: Path, wanted: Path) -> str:
         return f"damaged: {error}"
     if len(listed) < len(there.frames):
         return "other frames are listed than were computed"
-    return "lost" if told - set(listed) else ""
+    return "lost" if reported - set(listed) else ""
 
 
 def _differs(out: Path, wanted: Path) -> str:

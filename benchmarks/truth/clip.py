@@ -85,11 +85,11 @@ def wall(width: int, height: int, seed: int) -> np.ndarray:
 
     u, v = (x - 114) / 31, y - 336  # the bowl; v = 0 is its rim
     picture *= (1 - 0.75 * np.exp(-(((x - 122) / 36) ** 2) - ((y - 369) / 5) ** 2))[..., None]
-    feet = (abs(abs(u) - 0.45 - 0.006 * v) < 0.045) & (v > 15) & (v < 34)
+    legs = (abs(abs(u) - 0.45 - 0.006 * v) < 0.045) & (v > 15) & (v < 34)
     body = (v > 0) & (u**2 + (v / 27) ** 2 < 1)
     gleam = 0.35 + 2.2 * np.exp(-(((u + 0.45) / 0.28) ** 2)) + 0.5 * np.exp(-(((u - 0.75) / 0.15) ** 2))
     iron = np.where(body, gleam, 0.5) * np.exp(0.06 * noise(0.8, 0.8))
-    picture = np.where((body | feet)[..., None], paint((0.034, 0.031, 0.030), iron), picture)
+    picture = np.where((body | legs)[..., None], paint((0.034, 0.031, 0.030), iron), picture)
     rim, mouth = u**2 + (v / 5.5) ** 2, (u / 0.92) ** 2 + (v / 4.0) ** 2
     picture = np.where((rim < 1)[..., None], paint((0.085, 0.078, 0.074), 1 - 0.6 * u), picture)
     picture = np.where((mouth < 1)[..., None], paint((0.012, 0.011, 0.010), np.ones_like(u)), picture)

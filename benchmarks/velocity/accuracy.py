@@ -51,7 +51,7 @@ class Score:
         Mean and largest speed, relative to the truth's.
     inlet
         Relative L2 error in the cells where smoke enters.
-    warp
+    warp_error
         Error of the density that the estimate carries, relative to that of the density that the true velocity
         carries. Below one the estimate fits changes that are not motion.
     solves
@@ -63,7 +63,7 @@ class Score:
     mean: float
     largest: float
     inlet: float
-    warp: float
+    warp_error: float
     solves: float
 
 

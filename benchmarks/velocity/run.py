@@ -35,7 +35,7 @@ Say = Callable[[str], None]
 LIBRARIES = ("numpy", "scipy")
 
 ENOUGH_SECONDS = 2.0
-MOST = 5
+MAX_RUNS = 5
 """Work is timed again until it took this long in all, or ran this often."""
 
 BUILT_IN = "built-in"
@@ -217,7 +217,7 @@ class _Clock:
         seconds: list[float] = []
         solves: list[float] = []
         before = self._unit()
-        while len(seconds) < MOST and sum(seconds) < ENOUGH_SECONDS:
+        while len(seconds) < MAX_RUNS and sum(seconds) < ENOUGH_SECONDS:
             began = time.perf_counter()
             made = work()
             seconds.append(time.perf_counter() - began)

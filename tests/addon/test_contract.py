@@ -15,7 +15,7 @@ from smokelift.direct import writing
 from smokelift.footage.images import READABLE
 from smokelift.output.export import ASSET, NOTE
 from smokelift.output.layout import INDEX, frame_path, proxy_path
-from smokelift.output.proxy import LARGE
+from smokelift.output.proxy import MIN_PROXY_VOXELS
 from smokelift.scene import SIDES, EnvironmentLight, SceneError
 from smokelift.setup.provenance import Origin
 from smokelift.setup.settings import LIMITS, QUALITIES, Settings
@@ -31,7 +31,7 @@ def test_files_of_a_sequence() -> None:
     assert contract.INDEX_FILE == INDEX
     assert contract.FRAME_FILE.format(12) == frame_path(Path(), 12, "vdb").name
     assert contract.PROXY_FILE.format(12) == proxy_path(Path(), 12).name
-    assert contract.PROXY_VOXELS == LARGE
+    assert contract.PROXY_VOXELS == MIN_PROXY_VOXELS
 
 
 def test_files_of_an_export() -> None:
@@ -48,7 +48,7 @@ def test_resolutions() -> None:
     """Limits of the qualities can be reached in the box's proportions; the least that is accepted."""
     limits = [each for limit in LIMITS.values() for each in (limit.least, limit.most)]
     assert all(limit % (contract.BOX_VOXELS // 4) == 0 for limit in limits)
-    fewest = contract.FEWEST_VOXELS
+    fewest = contract.MIN_VOXELS
     Settings.preset("draft", "default", (fewest,) * 3)
     with pytest.raises(ValueError, match="resolution"):
         Settings.preset("draft", "default", (fewest, fewest, fewest - 1))

@@ -73,7 +73,7 @@ def test_a_clip_is_written_without_loss_and_tells_what_it_says(ball, tmp_path) -
 
 
 def test_nothing_is_told_where_the_row_says_so(ball, tmp_path) -> None:
-    scene = Scene.load(write(Clips(ball).rows()["black, medium not told, coloured"].film(), tmp_path))
+    scene = Scene.load(write(Clips(ball).rows()["black, medium unknown, coloured"].film(), tmp_path))
     assert scene.background is None
     assert scene.medium is None
 

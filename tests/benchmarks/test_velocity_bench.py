@@ -37,7 +37,7 @@ FEW = run.Plan(pairs=1, steps={}, reference=1, iterations=(1,), primal_dual_iter
 def quick(monkeypatch):
     """Little is measured, and once."""
     monkeypatch.setattr(run, "USUAL", PLAN)
-    monkeypatch.setattr(run, "MOST", 1)
+    monkeypatch.setattr(run, "MAX_RUNS", 1)
 
 
 @pytest.fixture
@@ -133,7 +133,7 @@ def test_every_figure_in_json_and_in_the_table(quick, tmp_path, capsys):
 
 def test_more_iterations_are_nearer_to_the_truth(monkeypatch):
     monkeypatch.setattr(run, "USUAL", replace(FEW, pairs=2, iterations=(1, 20)))
-    monkeypatch.setattr(run, "MOST", 1)
+    monkeypatch.setattr(run, "MAX_RUNS", 1)
     (row,) = run.run([(32, 32, 48)], [], lambda _: None, lambda _: None)["sizes"]
     errors = [estimate["error"] for estimate in row["estimates"]]
     assert errors[1] < 0.9 * errors[0]

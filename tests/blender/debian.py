@@ -201,7 +201,7 @@ def test_a_video_is_dragged_into_the_view(root, installed) -> None:
 
 
 def story(root: Path, user: Path, script: str, pictures: Path, shot: tuple[Path, int, int, int]) -> Any:
-    """Have an artist's story told at a window, on a shot as make_shot.py makes it; returns its report."""
+    """Play an artist's story at a window, on a shot as make_shot.py makes it; returns its report."""
     shutil.rmtree(pictures, ignore_errors=True)
     pictures.mkdir()
     said = inside(root, user, SCRIPTS / "window.sh", script, pictures, *shot)

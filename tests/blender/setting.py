@@ -15,7 +15,7 @@ from extension_products import NAMED
 
 DIST = ROOT / "dist"
 WORK = ROOT / "build" / "test-blender"
-"""Everything that the tests leave; pictures and figures are meant to be looked at."""
+"""Everything that the tests leave; pictures and figures are for the eye."""
 
 LONGEST = 1200
 """Seconds that a command may take: a Blender that hangs is a fault, not a reason to wait."""

@@ -37,7 +37,7 @@ def test_render_agrees_with_mitsuba(name, view):
 
 
 def test_real_plume_before_black(tmp_path):
-    """A calibrated real clip: the input view is met, and OpenVDB files hold what the arrays say."""
+    """A calibrated real clip: the input view is fitted, and OpenVDB files hold what the arrays say."""
     scene = smokelift.Scene.load(DATA / "scalar_real" / "scene.toml")
     settings = smokelift.Settings.preset("draft")
     try:
@@ -57,7 +57,7 @@ def test_real_plume_before_black(tmp_path):
 
 
 def test_real_smoke_before_a_textured_wall():
-    """A clip and nothing else: the smoke's part of the picture is met."""
+    """A clip and nothing else: the smoke's part of the picture is fitted."""
     scene = smokelift.Scene.load(DATA / "fluidnexus" / "scene.toml")
     settings = smokelift.Settings.preset("balanced")
     with smokelift.Clip.open(scene.clip) as clip:

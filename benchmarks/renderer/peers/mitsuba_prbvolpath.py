@@ -33,7 +33,7 @@ class _Middles:
 
 
 class _ThroughMiddles(mi.ad.integrators.prbvolpath.PRBVolpathIntegrator):
-    """The same rays as everybody's: averaged over the pixels' areas, voxels would have quite other gradients."""
+    """An integrator of everybody's rays: averaged over the pixels' areas, voxels would have quite other gradients."""
 
     def sample_rays(self, scene: Any, sensor: Any, sampler: Any) -> Any:
         return super().sample_rays(scene, sensor, _Middles(sampler))

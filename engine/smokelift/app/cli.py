@@ -33,8 +33,8 @@ _TRANSIENT = {
 }
 """Errors of a storage that pass: it is full, or its server is away."""
 
-MOST_THREADS = 1024
-"""As a guard against a number that no processor has."""
+MAX_THREADS = 1024
+"""Largest number of threads: no processor has more."""
 
 _HINT = " Finished frames stay, --resume goes on from them."
 
@@ -161,8 +161,8 @@ def _threads(text: str) -> int:
         count = int(text)
     except ValueError:
         count = -1
-    if not 0 <= count <= MOST_THREADS:
-        raise argparse.ArgumentTypeError(f"{text!r}: expected a whole number from 0 to {MOST_THREADS}")
+    if not 0 <= count <= MAX_THREADS:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected a whole number from 0 to {MAX_THREADS}")
     return count
 
 

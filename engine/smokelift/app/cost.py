@@ -17,12 +17,12 @@ import psutil
 import scipy.fft
 
 from smokelift.app.workload import Workload
-from smokelift.density.halves import LARGE
+from smokelift.density.halves import MIN_COARSENED_VOXELS
 
 Resolution = tuple[int, int, int]
 
 START_SECONDS = 3.5
-"""Seconds to start, to estimate what is not given and to look at the clip's texture."""
+"""Seconds to start, to estimate what is not given and to measure the clip's texture."""
 
 VOXELS_A_FRAME = 1.2e7
 """Voxels whose solve takes as long as what every frame takes, however small its grid: decoding and files."""
@@ -64,7 +64,7 @@ SMALL = 2**23
 so that they take their memory whether smoke is there or not."""
 
 BYTES_A_VOXEL_OF_SMALL = 80, 100
-"""The same as `BYTES_A_VOXEL` for such a grid."""
+"""Bytes a voxel of such a grid, as `BYTES_A_VOXEL`."""
 
 BYTES_A_VOXEL_OF_SOLVER = 145
 """Bytes for each voxel of the box that a velocity adds whose estimate has the grid of the density."""
@@ -76,7 +76,7 @@ BYTES_A_SIMULATED_VOXEL = 170
 """Bytes of memory at the peak for each voxel of a box in which smoke is simulated: 161 in one of 2.4 million with a
 ball, less without an obstacle."""
 
-LEAST_VOXELS = 8
+MIN_VOXELS = 8
 """Voxels along the shortest side of a grid that is suggested."""
 
 
@@ -121,7 +121,7 @@ def voxel_solves(resolution: Resolution, work: Workload) -> float:
         return work.frames * PAPER_SOLVES * voxels
     on_own_grid, beyond = SOLVES_A_SMOKY_VOXEL
     smoky = work.mean * voxels
-    fitted = on_own_grid * min(smoky, LARGE) + beyond * max(smoky - LARGE, 0)
+    fitted = on_own_grid * min(smoky, MIN_COARSENED_VOXELS) + beyond * max(smoky - MIN_COARSENED_VOXELS, 0)
     a_frame = (VOXELS_A_FRAME + SOLVES_A_VOXEL * voxels + fitted) * (1 + SHARE_A_VIEW * (work.views - 1))
     if work.settings.detail == 0:
         return work.frames * WITHOUT_DETAIL * a_frame
@@ -179,14 +179,14 @@ def _same_proportions(resolution: Resolution) -> Iterator[Resolution]:
     common = math.gcd(*resolution)
     x, y, z = (n // common for n in resolution)
     candidates = ((x * times, y * times, z * times) for times in range(common - 1, 0, -1))
-    return (each for each in candidates if min(each) >= LEAST_VOXELS)
+    return (each for each in candidates if min(each) >= MIN_VOXELS)
 
 
 def _about_the_same(resolution: Resolution) -> Iterator[Resolution]:
     """Smaller resolutions of the same proportions but for multiples of four, the largest first."""
     for longest in range(max(resolution) - 4, 0, -4):
         x, y, z = (4 * math.ceil(n * longest / max(resolution) / 4) for n in resolution)
-        if min(x, y, z) >= LEAST_VOXELS:
+        if min(x, y, z) >= MIN_VOXELS:
             yield x, y, z
 
 

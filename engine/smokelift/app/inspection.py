@@ -26,7 +26,7 @@ BOX, LIGHT, SMOKE, HIDDEN, PATH = (90, 200, 255), (255, 220, 60), (255, 150, 40)
 """Colours of the box, of light, of smoke, of what is unknown and of the camera's path, sRGB."""
 
 MASK = (255, 60, 60)
-"""That of the mask's outline."""
+"""Colour of the mask's outline."""
 
 ARROW = 0.35
 """Length of the arrow of a light over the diagonal of the box."""
@@ -35,7 +35,7 @@ HEAD = 16.0
 """Length of its head in pixels."""
 
 BINS = 96
-"""Of the histogram."""
+"""Bins of the histogram."""
 
 
 def inspection_page(shot: Shot, given: Scene, known: Sequence[Fact], notes: Iterable[str]) -> Page:

@@ -66,7 +66,7 @@ class Fact:
     how: str = ""
 
     def as_dict(self) -> dict[str, str]:
-        """The same as JSON holds it."""
+        """Return the fact as JSON holds it."""
         return asdict(self)
 
 

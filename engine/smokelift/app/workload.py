@@ -12,12 +12,12 @@ from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
 from smokelift.setup.smoke import SAMPLES
 
-LONGEST = 96
-"""Voxels along the longest side of the grid on which the smoke is looked at, at most: it takes a rim of one of them
+MAX_SIDE_VOXELS = 96
+"""Voxels along the longest side of the grid on which the smoke is found, at most: it takes a rim of one of them
 with it, which makes shares up to two fifths too large (docs/experiments/memory-and-time.md)."""
 
 LOOKED_AT = 4
-"""Frames with smoke that are looked at, from the one with the most on."""
+"""Frames with smoke that are measured, from the one with the most on."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Workload:
 
     @staticmethod
     def of(shot: Shot, settings: Settings) -> Workload:
-        """Look at a shot that was prepared with settings: at the smoke of some frames, on a coarse grid."""
+        """Measure the smoke of some frames of a shot that was prepared with settings, on a coarse grid."""
         shares = _shares(shot, settings)
         smoky = len(shot.smoky) / len(shot.spread(SAMPLES))
         return Workload(
@@ -74,6 +74,6 @@ def _shares(shot: Shot, settings: Settings) -> list[float]:
 
 def _coarse(domain: Domain) -> Domain:
     """The box, or a little less of it, with voxels that do not depend on those of a large grid, nor do its shares."""
-    times = max(1.0, max(domain.resolution) / LONGEST)
+    times = max(1.0, max(domain.resolution) / MAX_SIDE_VOXELS)
     x, y, z = (max(1, math.floor(n / times + 1e-6)) for n in domain.resolution)
     return domain.about_centre((x, y, z), domain.voxel_size * times)

@@ -42,7 +42,7 @@ class OrthogonalCopy:
     """The paper's depth prior: thin fog to start from, and the only picture imposed again as if from 90 degrees."""
 
     def of_clip(self, clip: ObservedClip) -> OrthogonalCopy:
-        """Itself: it does not look at the clip."""
+        """Itself: it does not read the clip."""
         return self
 
     def estimate(self, views: ViewSet) -> DepthEstimate:

@@ -99,7 +99,7 @@ def shade_point(
     channels: ti.template(),
     add: ti.i32,
 ):
-    """The same of a point light, for the voxels seen through one face."""
+    """Sweep the light of a point light, for the voxels seen through one face."""
     size = ti.Vector([inscatter.shape[0], inscatter.shape[1], inscatter.shape[2]])
     for index in ti.grouped(ti.ndrange(inscatter.shape[0], inscatter.shape[1], inscatter.shape[2])):
         if faces_voxel(axis, travel, position, index):

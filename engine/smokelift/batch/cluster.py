@@ -26,7 +26,7 @@ CONNECT_SECONDS = 30
 """Time for the scheduler to answer."""
 
 PAUSE_SECONDS = 5.0
-"""From one try to reach a scheduler that went away to the next."""
+"""Seconds between two tries to reach a scheduler that went away."""
 
 RETURN_SECONDS = 1800.0
 """Time for a scheduler that went away to return."""
@@ -65,7 +65,7 @@ def run_on_cluster(
     address
         Of the scheduler, as ``tcp://host:8786``.
     say
-        Is told when the scheduler goes away.
+        Is called when the scheduler goes away.
     returns, pause
         Seconds in which a scheduler that went away has to return, and from try to try.
 

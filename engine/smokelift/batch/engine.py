@@ -24,7 +24,7 @@ DONE, BAD_INPUT, NO_DEVICE, CANCELLED = 0, 2, 3, 130
 """Its exit statuses."""
 
 POLL_SECONDS = 0.25
-"""From one look at a running engine to the next, at most."""
+"""Between two checks of a running engine, at most."""
 
 GRACE_SECONDS = 20.0
 """Time for a cancelled engine to end; it kills itself before that."""

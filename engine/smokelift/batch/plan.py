@@ -41,7 +41,7 @@ class Remaining:
 
 
 def remaining_work(states: Iterable[ShotState]) -> tuple[Remaining, ...]:
-    """Return what is left of each shot that is not finished and whose clip was looked at, longest first."""
+    """Return what is left of each shot that is not finished and whose clip was inspected, longest first."""
     states = list(states)
     ratios = [
         statistics.fmean(frames.seconds) * record.forecast.frames / record.forecast.seconds

@@ -54,7 +54,7 @@ class Record:
     machine
         Where it ran last.
     forecast
-        None before the clip was looked at.
+        None before the clip was inspected.
     """
 
     of: dict[str, Any]

@@ -72,7 +72,7 @@ class Shot:
 
     @property
     def directory(self) -> Path:
-        """Of its sequence."""
+        """Folder of its sequence."""
         return self.folder / self.name
 
     @property

@@ -1,4 +1,4 @@
-"""The work on one shot, wherever it is done: look at its clip, and reconstruct it to its end.
+"""The work on one shot, wherever it is done: inspect its clip, and reconstruct it to its end.
 
 It may be called for the same shot by several processes on several machines: one does the work, the others wait for it.
 What decides is on the storage that they share: the lock, the record and the sequence.
@@ -84,7 +84,7 @@ def finish_shot(
     stop
         Ends the work once it is set; finished frames stay.
     say
-        Is told what is waited for.
+        Is called with what is waited for.
     patience
         How long to wait for failures that pass.
     engine

@@ -21,7 +21,7 @@ AXIS_FRAMES = 16
 """Frames of a clip from which the axis is estimated."""
 
 LIGHT_FRAMES = 4
-"""Those of them whose light is looked at as well: each costs 200 pictures on a coarse grid."""
+"""Frames of these whose light is fitted as well: each costs 200 pictures on a coarse grid."""
 
 LONGEST = 512
 """Voxels along the longest side at most: finer grids show the place no better."""

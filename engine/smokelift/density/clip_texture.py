@@ -55,9 +55,9 @@ class ClipTexture:
 
     @staticmethod
     def of(clip: ObservedClip) -> ClipTexture | None:
-        """Look at frames of a clip; None if none shows smoke."""
+        """Measure the texture of frames of a clip; None if none shows smoke."""
         frames, domain = clip.spread(FRAMES), clip.optics.domain
-        # each frame is looked at once, the ones that follow for the motion alone
+        # each frame is read once, the ones that follow for the motion alone
         needed = sorted({number + ahead for number in frames for ahead in (0, 1) if number + ahead < clip.length})
         seen = {number: _seen(clip, number) for number in needed}
         upright = {number: _on_screens(views, domain) for number, views in seen.items()}

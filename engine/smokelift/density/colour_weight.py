@@ -25,7 +25,7 @@ MODEL_ERROR = 0.15
 whose colours tell nothing loses mass; with more, those that tell are listened to less
 (docs/experiments/disturbed-clips.md)."""
 
-LEAST_NOISE = 1e-12
+MIN_VARIANCE = 1e-12
 """Radiance squared: n^2 at least, for division."""
 
 
@@ -62,7 +62,7 @@ class ColourWeight:
             return None
         variances, axes = np.linalg.eigh(plate.errors.astype(np.float64))
         model = MODEL_ERROR * np.abs(image - plate.image).mean(-1)
-        without = np.maximum(np.square(noise_at(image, plate)).mean(-1) + model**2, LEAST_NOISE)
+        without = np.maximum(np.square(noise_at(image, plate)).mean(-1) + model**2, MIN_VARIANCE)
         passed = np.exp(-2 * optical_depth) * unknown / without
         shares = 1 / (1 + passed[..., None] * np.maximum(variances, 0))
         return ColourWeight(axes.astype(np.float32), shares.astype(np.float32))

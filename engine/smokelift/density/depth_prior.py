@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from smokelift.density.axis import SmokeAxis
 from smokelift.density.clip_axis import AXIS_FRAMES
-from smokelift.density.halves import LARGE, any_of_two, every_second, spread_to_two, with_neighbours
+from smokelift.density.halves import MIN_COARSENED_VOXELS, any_of_two, every_second, spread_to_two, with_neighbours
 from smokelift.density.hull import Places, centres_of
 from smokelift.density.objective import Term
 from smokelift.density.observation import ObservedClip, View, ViewSet
@@ -27,8 +27,8 @@ from smokelift.density.screen import view_frame
 from smokelift.render import Volume
 from smokelift.scene.domain import box_around
 
-LEAST_SHAPE = 0.05
-"""With several views no profile is below this share of its peak inside the hull, since another view may see smoke there
+MIN_SHAPE = 0.05
+"""Smallest share of its peak that a profile has inside the hull of several views: another one may see smoke there
 (docs/experiments/density-profile.md)."""
 
 
@@ -78,7 +78,7 @@ class DepthPrior(Protocol):
     """What is assumed of the smoke's depth."""
 
     def of_clip(self, clip: ObservedClip) -> DepthPrior:
-        """The prior for a clip, after a look at any of its frames; itself if it needs none."""
+        """The prior for a clip, after any of its frames were seen; itself if it needs none."""
 
     def estimate(self, views: ViewSet) -> DepthEstimate:
         """What it says of one moment."""
@@ -131,7 +131,7 @@ def _expected(views: ViewSet, profiles: Sequence[DepthProfile]) -> NDArray[np.bo
     """
     hull = views.hull
     box = box_around(hull, 1)
-    if np.count_nonzero(hull) > LARGE:
+    if np.count_nonzero(hull) > MIN_COARSENED_VOXELS:
         # where every second voxel and its neighbours expect none, those between them expect none either
         sampled = every_second(any_of_two(hull), hull.shape)
         coarse = _marked(sampled, views, profiles)[::2, ::2, ::2]
@@ -143,7 +143,7 @@ def _expected(views: ViewSet, profiles: Sequence[DepthProfile]) -> NDArray[np.bo
 
 
 def _marked(voxels: NDArray[np.bool_], views: ViewSet, profiles: Sequence[DepthProfile]) -> NDArray[np.bool_]:
-    """Those of some voxels (nx, ny, nz) where any profile expects smoke."""
+    """Mark those of some voxels (nx, ny, nz) where any profile expects smoke."""
     found = np.zeros(np.count_nonzero(voxels), np.bool_)
     for view, profile in zip(views.views, profiles, strict=True):
         places = view.projection.places(voxels)
@@ -178,7 +178,7 @@ def _common(
     # a round blob's two profiles make it up, and more of them must not make it smaller
     power = np.minimum(1, 2 / count)
     # what only one shows it would fill with all that the others contradict
-    least = np.where(count > 1, LEAST_SHAPE, 0)
+    least = np.where(count > 1, MIN_SHAPE, 0)
     values = np.ones(count.shape)
     for places, profile in zip(seen_at, profiles, strict=True):
         shape = np.maximum(profile.shape(places, hull), least)

@@ -34,11 +34,11 @@ less: it may fill, but more slowly than others (docs/experiments/density-descent
 SUFFICIENT = 1e-4
 """Armijo's constant: share of the linear prediction that a step has to gain."""
 
-LARGEST = np.float32(0.25)
+MAX_CHANGE = np.float32(0.25)
 """Largest change of a voxel in one step, as a share of what it holds and the floor. Without it density spikes grow
 where few rays pass, at floor and ceiling (docs/experiments/density-descent.md)."""
 
-LONGEST = 1e30
+MAX_FIRST_STEP = 1e30
 """First step, at most: a start of next to nothing asks for more than 32 bits hold."""
 
 SHORTEN = 0.3
@@ -113,8 +113,8 @@ def descend(
         slope = _dot(gradient, direction)
         if not slope > 0:
             break
-        length = 1.0 if curvature.known else min(0.1 * loss / slope, LONGEST)
-        reach = LARGEST * (current + floor)
+        length = 1.0 if curvature.known else min(0.1 * loss / slope, MAX_FIRST_STEP)
+        reach = MAX_CHANGE * (current + floor)
         lowest, highest = np.maximum(current - reach, 0), np.minimum(current + reach, np.float32(bound))
         step = _step(problem, current, loss, gradient, direction, length, (lowest, highest))
         if step is None:
@@ -155,7 +155,7 @@ class _Problem:
         self.volume.ravel()[self.where] = density
 
     def residuals(self, density: Values) -> tuple[Image, ...]:
-        """What the pictures of a density differ by from those that are to be met."""
+        """What the pictures of a density differ by from those that are to be fitted."""
         self.show(density)
         return tuple(term.renderer.image(self.volume, keep_record=True) - term.view.image for term in self.terms)
 

@@ -5,7 +5,7 @@ detail. A plausible smoke shows from every side what the clip shows from the fro
 distribution of their patches (`exemplar`). Noise breaks the spindle's symmetry (`stretched_noise`). Then, from coarse
 to fine, pictures of the smoke from many azimuths are moved towards that distribution, and the smoke is scaled along
 their rays to follow. The rows of every picture keep the amounts of the smooth answer, and after each round the cameras'
-pictures have their turn. What is carried on from the frame before has met the clip's statistics already and needs one
+pictures have their turn. What is carried on from the frame before has the clip's statistics already and needs one
 round.
 """
 
@@ -101,7 +101,7 @@ class DetailedDepth:
     texture: ClipTexture | None = None
 
     def of_clip(self, clip: ObservedClip) -> DetailedDepth:
-        """Look at a clip's texture, unless there is no detail to make."""
+        """Measure a clip's texture, unless there is no detail to make."""
         texture = ClipTexture.of(clip) if self.detail > 0 else None
         return replace(self, smooth=self.smooth.of_clip(clip), texture=texture)
 
@@ -178,7 +178,7 @@ class EveryView:
 
     @cached_property
     def coarser(self) -> EveryView | None:
-        """The same on a grid half as fine, of the scales that it holds; None where the smoke has few voxels."""
+        """Return the detail on a grid half as fine, of the scales that it holds; None where smoke has few voxels."""
         coarser, texture = self.level.coarser, self.texture
         if coarser is None or len(texture.exemplars) == 1:
             return None

@@ -37,19 +37,19 @@ BASES = 8
 KNOTS = 512
 """Quantiles that stand for a distribution."""
 
-SAMPLES = 8192
+MAX_PATCHES = 8192
 """Patches at most that the quantiles of a scale are taken from."""
 
 PASSES = 2
 """Times that a picture's patches are moved, each along another basis."""
 
-FAINT = 0.01
+MIN_DEPTH_SHARE = 0.01
 """Share of a picture's largest optical depth below which a patch, or a row, shows no smoke."""
 
 DENSE = 0.05
 """Share of a picture's largest optical depth from which the spread of v is measured."""
 
-LARGEST = 12.0
+MAX_LOG_DEPTH = 12.0
 """Bound of v: far beyond what any picture shows, within what an exponential holds."""
 
 
@@ -94,7 +94,7 @@ class Exemplar:
         ]
         random = np.random.default_rng(0)
         every = np.concatenate(samples, 1)
-        every = every[:, random.permutation(every.shape[1])[:SAMPLES]]
+        every = every[:, random.permutation(every.shape[1])[:MAX_PATCHES]]
         size = len(every)
         directions = np.stack([np.linalg.qr(random.standard_normal((size, size)))[0] for _ in range(BASES)])
         directions = directions.astype(np.float32)
@@ -116,17 +116,17 @@ class Exemplar:
             moves = basis @ patches
             _core.to_quantiles(moves, self.quantiles[number % BASES])
             mean = _core.fold(basis.T[:-1] @ moves, at, SIZE, padded)
-            v = np.clip(v + mean[reach:-reach, reach:-reach], 0, LARGEST)
+            v = np.clip(v + mean[reach:-reach, reach:-reach], 0, MAX_LOG_DEPTH)
         return np.asarray(self.unit * np.expm1(v), np.float32)
 
 
 def _patches(v: Picture, height: float) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
     """Patches (n, count) about pixels near smoke, with their height; and their places (2, count) in v, padded."""
     linear, reach = np.expm1(v), SIZE // 2
-    least = FAINT * linear.max()
+    least = MIN_DEPTH_SHARE * linear.max()
     at = np.array(np.nonzero(ndimage.maximum_filter(linear, SIZE) > least), np.int32)
     amounts = linear.sum(0)
-    there = np.flatnonzero(amounts > FAINT * amounts.max())
+    there = np.flatnonzero(amounts > MIN_DEPTH_SHARE * amounts.max())
     place = height * (at[1] - there[0]) / max(there[-1] - there[0], 1)
     pixels = _core.unfold(np.pad(v, reach), at + reach, SIZE)
     return np.concatenate([pixels, place[None].astype(np.float32)]), at + reach

@@ -31,7 +31,7 @@ from smokelift.scene import CompleteScene, Domain, Scene, completed
 LARGEST_START = 1e12
 """Initial density, at most: squares of larger ones are not finite in 32 bits."""
 
-TRACE = 1e-9
+MIN_DENSITY = 1e-9
 """Density below which a voxel is empty: no picture can show it. Libraries may switch numbers below float32's normal
 range to 0 for a whole process, so a run that is resumed would otherwise differ in its last bits."""
 
@@ -238,9 +238,9 @@ def empty_density(views: ViewSet) -> FittedDensity:
 
 
 def without_traces(density: Volume, within: NDArray[np.intp]) -> Volume:
-    """The density at some voxels (n,) of the flat array, without what no picture can show; see `TRACE`."""
+    """The density at some voxels (n,) of the flat array, without what no picture can show; see `MIN_DENSITY`."""
     values = density.ravel()[within]
-    shown = values >= TRACE
+    shown = values >= MIN_DENSITY
     result = np.zeros(density.shape, np.float32)
     result.ravel()[within[shown]] = values[shown]
     return result

@@ -22,12 +22,12 @@ from smokelift.render.emission import emission_matrix
 from smokelift.scene import Camera, Domain
 
 ITERATIONS = 30
-"""Of the scaling, at most."""
+"""Largest number of iterations of the scaling."""
 
 EXACT = 0.01
 """Difference from the picture, as a share of its sum, at which the scaling stops."""
 
-FAINTEST = 1e-3
+MIN_PROFILE_SHARE = 1e-3
 """Share of a profile's peak below which nothing burns."""
 
 SMOOTHING = 2.0
@@ -62,7 +62,7 @@ def flame_emission(light: NDArray[np.float32], camera: Camera, density: Volume, 
     places = projection.places(hull)
     flame[hull] = places.read(light) * profile.at(places, hull)
     burning = flame > 0
-    burning[hull] &= profile.shape(places, hull) > FAINTEST
+    burning[hull] &= profile.shape(places, hull) > MIN_PROFILE_SHARE
     pixels = ndimage.binary_dilation(light > 0, iterations=2)
     matrix = emission_matrix(density, camera, optics, pixels, burning)
     flame = np.where(burning, flame, np.float32(0))
@@ -98,7 +98,7 @@ def _middle(density: Volume, camera: Camera, domain: Domain) -> SmokeAxis:
         ndimage.gaussian_filter1d(np.bincount(level - lowest, weights), SMOOTHING)
         for weights in (amount, amount * (offset @ along))
     )
-    known = total > FAINTEST * total.max()
+    known = total > MIN_PROFILE_SHARE * total.max()
     depths = moment[known] / total[known]
     heights = (np.flatnonzero(known) + lowest) * h
     return SmokeAxis(heights, depths, np.zeros_like(depths))

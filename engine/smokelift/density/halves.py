@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-LARGE = 1_000_000
+MIN_COARSENED_VOXELS = 1_000_000
 """Voxels that may hold smoke, above which a grid has a coarser one (docs/experiments/clip-pixels.md)."""
 
 

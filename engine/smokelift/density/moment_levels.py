@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import smokelift._core as _core
-from smokelift.density.halves import LARGE, any_of_two
+from smokelift.density.halves import MIN_COARSENED_VOXELS, any_of_two
 from smokelift.density.objective import Term, camera_terms
 from smokelift.density.observation import Observation, View, ViewSet
 from smokelift.density.temporal_prior import TINY
@@ -47,9 +47,9 @@ class Level:
 
     @cached_property
     def coarser(self) -> Level | None:
-        """The same on a grid half as fine; None where the smoke has few voxels."""
+        """Return the level of a grid half as fine; None where the smoke has few voxels."""
         views = self.views
-        if np.count_nonzero(views.hull) <= LARGE:
+        if np.count_nonzero(views.hull) <= MIN_COARSENED_VOXELS:
             return None
         optics = replace(views.optics, domain=_halved(views.optics.domain))
         seen = tuple(View.of(_shrunk(view, optics.domain), optics) for view in views.views)

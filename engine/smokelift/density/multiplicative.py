@@ -99,7 +99,7 @@ def take_turns(
     Parameters
     ----------
     terms
-        The pictures, in the order of their turns. The last is met best.
+        The pictures, in the order of their turns. The last is fitted best.
     density : (nx, ny, nz)
         Start; voxels at zero stay there.
     rounds
@@ -128,7 +128,7 @@ class _Smoke:
         self._volume = np.zeros(density.shape, np.float32)
 
     def values(self) -> Values:
-        """Those of the density."""
+        """Values of the density."""
         return self._values
 
     def volume_of(self, values: Values) -> Volume:

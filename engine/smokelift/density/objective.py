@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from smokelift.density.observation import View, ViewSet
 from smokelift.render import Image, Renderer, Volume
 
-LEAST_SHARE = 0.3
+MIN_SHARE = 0.3
 """Lower bound of the share of a ray's smoke that is taken to lie inside the domain. With less, smoke that the prior
 puts outside is missing in the picture; with more, density spikes grow at floor and ceiling
 (docs/experiments/density-profile.md)."""
@@ -79,7 +79,7 @@ def camera_terms(views: ViewSet, inside: Sequence[NDArray[np.float32]]) -> list[
         Of each, the share of every ray's smoke that lies inside the domain.
     """
     return [
-        Term(view, renderer, view.counted * np.maximum(share, LEAST_SHARE) ** 2)
+        Term(view, renderer, view.counted * np.maximum(share, MIN_SHARE) ** 2)
         for view, renderer, share in zip(views.views, views.renderers, inside, strict=True)
     ]
 

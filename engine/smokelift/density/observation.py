@@ -23,7 +23,7 @@ from smokelift.scene import SHADOWED, Camera, Domain, Inlet
 from smokelift.scene.checks import LARGEST
 
 THINNEST_CLEAR = 0.05
-"""Transmittance at least: optical depth above 3 cannot be told from a brightness."""
+"""Transmittance at least: a brightness does not show an optical depth above 3."""
 
 PATCH = 3
 """Pixels along a shaded side of smoke at least (docs/experiments/bright-background.md)."""
@@ -90,7 +90,7 @@ class ObservedClip(Protocol):
 
     @property
     def place(self) -> AxisEstimate | None:
-        """Where in depth the smoke was found to stand (`density.clip_axis`); None where it was not looked for."""
+        """Where in depth the smoke was found to stand (`density.clip_axis`); None where it was not estimated."""
 
     @property
     def length(self) -> int:
@@ -117,7 +117,7 @@ class View:
     mask : (rows, columns) bool
         Pixels that may show smoke.
     optical_depth : (rows, columns)
-        Of smoke without shadows that explains the picture, or as much as can be told where only smoke in its own shadow
+        Of smoke without shadows that explains the picture, or as much as shows where only smoke in its own shadow
         does; 0 outside the mask.
     projection
         Where the voxels lie in the picture.
@@ -138,7 +138,7 @@ class View:
 
     @staticmethod
     def of(observation: Observation, optics: Optics) -> View:
-        """Look at an observation against the grid of `optics.domain`."""
+        """Set an observation against the grid of `optics.domain`."""
         camera, image, plate = observation.camera, observation.image, observation.plate
         if plate is BLACK:
             plate = eight_bit_plate(np.zeros(3, np.float32), camera.size)
@@ -177,7 +177,7 @@ class ViewSet:
     optics
         How light travels through the domain.
     frame
-        Number of the moment in its clip, from 0; a depth prior that looked at the clip knows the others.
+        Number of the moment in its clip, from 0; a depth prior that has seen the clip knows the others.
     """
 
     views: tuple[View, ...]
@@ -192,12 +192,12 @@ class ViewSet:
 
     @cached_property
     def renderers(self) -> tuple[Renderer, ...]:
-        """Of the views, for densities in the hull."""
+        """Renderers of the views, for densities in the hull."""
         return tuple(self.optics.renderer(view.camera, view.plate.image, self.hull) for view in self.views)
 
     @staticmethod
     def of(observations: Sequence[Observation], optics: Optics, frame: int = 0) -> ViewSet:
-        """Look at observations of one moment against the grid.
+        """Set observations of one moment against the grid.
 
         Raises
         ------
@@ -220,7 +220,7 @@ def apparent_optical_depth(
     J is the source radiance of smoke in the middle of the domain, B the plate. Over the three channels, or their
     combinations as much as they count, T is the least squares solution. None explains a pixel which the smoke makes
     darker although J is brighter than B. Only smoke in its own shadow does so, and such a pixel counts as thick as can
-    be told: a fit that starts from less thins it out until nothing is left (docs/experiments/bright-background.md).
+    be shown: a fit that starts from less thins it out until nothing is left (docs/experiments/bright-background.md).
     """
     source = np.zeros(3)
     if optics.scattering != "absorption":

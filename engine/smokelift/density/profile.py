@@ -41,7 +41,7 @@ SILHOUETTE = 0.05
 THINNEST = 0.7
 """Half the thickness of a silhouette's thinnest parts, in pixels (docs/experiments/density-profile.md)."""
 
-APART = 0.5
+DISTANCE_SHARE = 0.5
 """Share of the distance between columns behind one another that lasts on the way up: they draw together
 (docs/experiments/density-columns.md)."""
 
@@ -181,6 +181,6 @@ class DepthProfile:
             across = self._axis.width_at(height, lateral)
         else:
             across = np.interp(height, self._heights, self._spread)
-        spread = np.sqrt(across * balls + (APART * self._axis.spread_at(height, lateral)) ** 2)
+        spread = np.sqrt(across * balls + (DISTANCE_SHARE * self._axis.spread_at(height, lateral)) ** 2)
         scale = np.sqrt(gamma(1 / FLATNESS) / gamma(3 / FLATNESS))
         return np.asarray(np.maximum(spread, self._domain.voxel_size) * scale)

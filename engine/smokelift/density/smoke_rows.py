@@ -37,7 +37,7 @@ class SmokeRows:
 
     @property
     def heights(self) -> NDArray[np.float64]:
-        """In metres above the domain's centre, ascending, along `view_frame`'s height, (n,)."""
+        """Heights in metres above the domain's centre, ascending, along `view_frame`'s height, (n,)."""
         return self.rows[0].heights
 
     @cached_property

@@ -35,7 +35,7 @@ from smokelift.scene.domain import box_around
 TINY = np.finfo(np.float32).tiny
 """Smallest normal number, for divisions and logarithms."""
 
-FAINT = 1e-3
+MIN_DEPTH_SHARE = 1e-3
 """Optical depth, as a fraction of the largest, below which its logarithm means nothing."""
 
 GUIDED_BLUR = 5.0
@@ -93,7 +93,7 @@ class NothingCarried:
 
 @dataclass(frozen=True)
 class BlendCarried:
-    """As much of the carried density as proves right; see the module.
+    """A prior that takes over as much of the carried density as proves right; see the module.
 
     Attributes
     ----------
@@ -195,7 +195,7 @@ def _with_optical_depth(
 
     They are mixed in logarithms. Where none is wanted nothing is known, because smoke may have come in.
     """
-    faint = FAINT * want.max()
+    faint = MIN_DEPTH_SHARE * want.max()
     step = share * np.log((want + faint) / (have + faint)) * want / (want + faint)
     # one pixel's blur keeps neighbouring rays from fighting over the voxels that they share
     step = ndimage.gaussian_filter(step.astype(np.float32), 0.7)

@@ -31,7 +31,7 @@ class Evaluation:
     figures
         Nested plain values, as JSON holds them; None where there is nothing to say.
     sequence
-        What was looked at.
+        What was evaluated.
     truth
         Of its box, if it is known.
     """

@@ -18,10 +18,10 @@ from smokelift.transport import Array
 
 Figures = dict[str, Any]
 
-SMOKE = 0.01
+SMOKE_SHARE = 0.01
 """Share of a frame's largest true density above which a voxel counts as smoke."""
 
-AROUND = 2
+SURROUNDING_VOXELS = 2
 """Voxels around the smoke in which a velocity still matters: advection and motion blur reach there."""
 
 
@@ -88,7 +88,7 @@ class VolumeMeans:
             "height_mass_error": metrics.height_mass_error(found, true),
             "mass_ratio": float(found.sum(dtype=float) / max(true.sum(dtype=float), 1e-30)),
         }
-        smoke = true > SMOKE * true.max()
+        smoke = true > SMOKE_SHARE * true.max()
         before, self._before = self._before, (frame, found)
         if velocity is not None and before is not None and before[0] == frame - 1 and smoke.any():
             figures |= self._motion(frame, before[1], found, resampled(velocity, truth.shape), smoke)
@@ -102,7 +102,7 @@ class VolumeMeans:
         truth = self._truth
         true_velocity = truth.velocity(frame - 1).centres()
         free = ~(truth.inflow(frame - 1) | truth.inflow(frame))
-        inside, around = smoke & free, ndimage.binary_dilation(smoke, iterations=AROUND) & free
+        inside, around = smoke & free, ndimage.binary_dilation(smoke, iterations=SURROUNDING_VOXELS) & free
         if not ndimage.binary_erosion(inside, np.ones((2, 2, 2))).any():
             return {}  # too little smoke for a divergence
         error, cosine = metrics.velocity_error(velocity, true_velocity, inside)

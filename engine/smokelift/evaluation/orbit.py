@@ -13,7 +13,7 @@ from smokelift.scene import Camera, CompleteScene, FiniteLight, PointLight
 from smokelift.transport import Array
 
 GAMMA = 2.2
-"""Of the grey values: differences count as they are seen."""
+"""Exponent of the grey values: differences count as they are seen."""
 
 
 class Orbit:

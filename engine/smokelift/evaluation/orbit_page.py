@@ -17,7 +17,7 @@ from smokelift.output.sheet import GAP, Tile, write_sheet
 from smokelift.render import Volume
 
 DEGREES = tuple(range(0, 180, 18))
-"""Of the columns."""
+"""Azimuths of the columns."""
 
 TITLES = tuple(f"{degrees}\N{DEGREE SIGN}" for degrees in DEGREES)
 
@@ -25,7 +25,7 @@ TILE_ROWS, CURVE_ROWS = 240, 180
 """Pixels."""
 
 COLOURS = ((240, 170, 60), (90, 170, 250), (120, 220, 120), (240, 110, 180), (180, 140, 250))
-"""Of the curves, in order."""
+"""Colours of the curves, in order."""
 
 GREY = (120, 120, 120)
 

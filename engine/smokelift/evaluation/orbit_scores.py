@@ -26,11 +26,11 @@ ON = 5
 """Azimuths, of 15 degrees each, from one picture of the truth to the one that it is compared with for its own distance:
 pictures that far from each other share next to no detail."""
 
-STEADY = (45, 75, 105, 135)
+FLICKER_AZIMUTHS = (45, 75, 105, 135)
 """Azimuths at which three consecutive frames are compared."""
 
-MOMENTS, SETTLED = 6, 4
-"""Frames that are looked at, spread over the clip, and the first ones, which have hardly any before them to start from
+MOMENTS, FIRST_FRAMES = 6, 4
+"""Frames that are scored, spread over the clip, and the first ones, which have hardly any before them to start from
 and are left out."""
 
 OUTLINE, MARGIN = 0.08, 2
@@ -113,7 +113,7 @@ def _add(
 
 
 def _moments(count: int) -> list[int]:
-    first = SETTLED if count > 2 * SETTLED else 0
+    first = FIRST_FRAMES if count > 2 * FIRST_FRAMES else 0
     spread = np.linspace(first, count - 1, min(MOMENTS, count - first))
     return sorted({round(float(moment)) for moment in spread})
 
@@ -128,11 +128,11 @@ def _relative_flicker(
     for middle in np.unique(np.clip(moments, 1, count - 2)).tolist():
         around = range(middle - 1, middle + 2)
         densities = [density(frame) for frame in around]
-        found.append(_flicker(orbit, densities, STEADY))
+        found.append(_flicker(orbit, densities, FLICKER_AZIMUTHS))
         if truth is None:
             reference.append(_flicker(orbit, densities, (0,)))
         else:
-            reference.append(_flicker(orbit, [truth(frame) for frame in around], STEADY))
+            reference.append(_flicker(orbit, [truth(frame) for frame in around], FLICKER_AZIMUTHS))
     a, b = finite_mean(found), finite_mean(reference)
     return None if a is None or b is None else _ratio(a, b)
 

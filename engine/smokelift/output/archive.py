@@ -18,7 +18,7 @@ Shape = tuple[int, ...]
 NUMBERS = "biuf"
 """NumPy's kinds of real numbers."""
 
-LARGEST = 1e12
+MAX_MAGNITUDE = 1e12
 """Magnitude that no density, velocity or residual reaches; sums of squares of larger ones are not finite in 32 bits."""
 
 VELOCITY = ("velocity_x", "velocity_y", "velocity_z")
@@ -27,7 +27,7 @@ VELOCITY = ("velocity_x", "velocity_y", "velocity_z")
 FLAME = "flame"
 """Name of the emission of fire, which is there only where a clip shows fire."""
 
-MOST_VALUES = 2**32
+MAX_VALUES = 2**32
 """Values of an array whose shape is not known before, at most."""
 
 
@@ -120,12 +120,14 @@ def _array(
         raise ValueError(f"{info.filename} holds {kind}")
     count = math.prod(shape)
     unexpected = exactly not in (None, shape) or (at_most is not None and not _within(shape, at_most))
-    if unexpected or count > MOST_VALUES or count * kind.itemsize > info.file_size:
+    if unexpected or count > MAX_VALUES or count * kind.itemsize > info.file_size:
         raise ValueError(f"{info.filename} cannot have the shape {shape}")
     with archive.open(info) as file:
         values: npt.NDArray[Any] = np.lib.format.read_array(file)  # type: ignore[no-untyped-call]  # NumPy's
-    if kind.kind == "f" and values.size and not float(np.abs(values).max()) <= LARGEST:  # 16 bits cannot hold the bound
-        raise ValueError(f"{info.filename} holds values that are not finite, or beyond {LARGEST:g}")
+    if (
+        kind.kind == "f" and values.size and not float(np.abs(values).max()) <= MAX_MAGNITUDE
+    ):  # 16 bits cannot hold the bound
+        raise ValueError(f"{info.filename} holds values that are not finite, or beyond {MAX_MAGNITUDE:g}")
     return values
 
 

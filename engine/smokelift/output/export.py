@@ -54,7 +54,7 @@ SHADE = 1 / 510
 VELOCITY_STEP = 1 / 16
 """Step of a quantised velocity in voxels a frame."""
 
-SAMPLES = 5
+SAMPLED_FRAMES = 5
 """Frames that are written to estimate the size of all."""
 
 Precision = Literal["half", "quantised"]
@@ -165,7 +165,7 @@ def export_size(sequence: Sequence, settings: ExportSettings) -> int:
     SequenceError, VdbUnavailable
         As `export_sequence`.
     """
-    places = np.unique(np.linspace(0, len(sequence.frames) - 1, SAMPLES).round().astype(int))
+    places = np.unique(np.linspace(0, len(sequence.frames) - 1, SAMPLED_FRAMES).round().astype(int))
     numbers = [sequence.frames[place] for place in places]
     peak = _peak(sequence, numbers, settings)
     with tempfile.TemporaryDirectory() as folder:

@@ -14,10 +14,10 @@ from smokelift.scene.projection import project
 VISIBLE = 0.01
 """Optical depth from which smoke is seen: it changes what is behind it by as much, which is a step or two of 8 bits."""
 
-MARGIN = 0.05
+MARGIN_SHARE = 0.05
 """Margin on each side, as a fraction of the smoke's longer side in the picture."""
 
-NARROWEST = 0.5
+MIN_ASPECT = 0.5
 """Width over height of the part at least, and the reverse, where the picture has room for it."""
 
 TURN_STEP = 15
@@ -80,8 +80,8 @@ def frame_smoke(sequence: Sequence) -> Framing:
         return Framing(box, 0, 0, width, height)
     points = np.concatenate(seen)
     low, high = points.min(0), points.max(0)
-    low, high = low - MARGIN * (high - low).max(), high + MARGIN * (high - low).max()
-    least = NARROWEST * (high - low)[::-1]
+    low, high = low - MARGIN_SHARE * (high - low).max(), high + MARGIN_SHARE * (high - low).max()
+    least = MIN_ASPECT * (high - low)[::-1]
     lacking = np.maximum(least - (high - low), 0) / 2
     left, top = np.clip(np.floor(low - lacking), 0, [width - 1, height - 1]).astype(int)
     right, bottom = np.clip(np.ceil(high + lacking), [left + 1, top + 1], [width, height]).astype(int)

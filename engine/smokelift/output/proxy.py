@@ -17,9 +17,9 @@ from smokelift.transport import Array
 TIMES = 4
 """How many times as large the voxels of a proxy are."""
 
-LARGE = 4_000_000
+MIN_PROXY_VOXELS = 4_000_000
 """Voxels of a box from which on a run writes proxies. Blender reads a frame of 41 million, a quarter of them smoke, in
-1.2 s (`tests/blender/heavy.py`, two cores), so of so many it reads 8 a second."""
+1.2 s (`benchmarks/blender/heavy.py`, two cores), so of so many it reads 8 a second."""
 
 
 def write_proxy(

@@ -36,7 +36,7 @@ from smokelift.output.index import (
 )
 from smokelift.output.layout import BACKGROUND, INDEX, LOCK, RESUME, frame_path, is_foreign, proxy_path
 from smokelift.output.lock import Lock
-from smokelift.output.proxy import LARGE, write_proxy
+from smokelift.output.proxy import MIN_PROXY_VOXELS, write_proxy
 from smokelift.output.resume import ResumeState
 from smokelift.output.vdb import VdbUnavailable, checked_volume, vdb_module, write_vdb
 from smokelift.scene import Background, CompleteScene, Domain, scene_to_dict
@@ -206,13 +206,13 @@ class SequenceWriter:
                         shutil.copyfile(ready[kind], aside)
                 else:
                     self._write_arrays(path, rho, faces, fire, box)
-            if "vdb" in self._kinds and math.prod(self._domain.shape) >= LARGE:  # of all frames or of none
+            if "vdb" in self._kinds and math.prod(self._domain.shape) >= MIN_PROXY_VOXELS:  # of all frames or of none
                 write_proxy(proxy_path(self.directory, number), rho, box, flame=fire, lattice=self._domain)
             frames = {**self._index.frames, str(number): plain({**(figures or {}), **own_box})}
             checksums = {**self._index.checksums, **{path.name: checksum([path]) for path in paths}}
             grown = replace(self._index, frames=frames, checksums=checksums)
             grown.write(self.directory)
-            # Last: a state without its frame could not be told from a frame that was lost.
+            # Last: a state without its frame would pass for a frame that was lost.
             state.write(self.directory / RESUME)
             self._index = grown  # only now: a run that goes on drops a frame without its state
         except OSError as error:
@@ -233,10 +233,10 @@ class SequenceWriter:
             self._clear(INDEX)  # nothing else is written before it
             return
         # another clip or quality, say, makes another scene, and another scene other settings of a part
-        for told in ("sources", "own settings", "scene", "settings", "versions"):
-            part = told.removeprefix("own ")
+        for name in ("sources", "own settings", "scene", "settings", "versions"):
+            part = name.removeprefix("own ")
             before, now = (getattr(index, part) for index in (there, self._index))
-            if told != part:
+            if name != part:
                 before, now = (
                     {key: value for key, value in each.items() if not isinstance(value, dict)} for each in (before, now)
                 )

@@ -18,7 +18,7 @@ from smokelift.footage.working_picture import WorkingPicture
 from smokelift.render import Image, Optics, Volume
 from smokelift.setup.shot import Shot, ShotView
 
-OUTLINE = 320
+OUTLINE_PIXELS = 320
 """Pixels along the longer side of the picture, at most, in which the smoke is found: its outline needs no more
 (docs/experiments/clip-pixels.md)."""
 
@@ -46,7 +46,7 @@ class BesideClip:
 
     @property
     def psnr(self) -> float | None:
-        """Of linear radiance inside the smoke (dB, peak 1); None without smoke."""
+        """PSNR of linear radiance inside the smoke (dB, peak 1); None without smoke."""
         left = np.square((self.seen - self.shown)[self.inside], dtype=np.float64)
         return float(-10 * np.log10(max(left.mean(), 1e-12))) if left.size else None
 
@@ -92,7 +92,7 @@ def beside_clip(
     renderer = optics.renderer(camera.resized(columns, rows), behind, density > 0)
     shown = renderer.image(density)
     seen = view.clip.area_average(frame, columns, rows, cut)
-    shrink = max(1.0, max(working.width, working.height) / OUTLINE)
+    shrink = max(1.0, max(working.width, working.height) / OUTLINE_PIXELS)
     small = working.resized(*(max(1, round(side / shrink)) for side in (working.width, working.height)))
     smoke = matte(small.of(view.clip, frame), plate.through(small.cut, small.pixels)).mask
     inside = smoke[np.ix_(down * smoke.shape[0] // working.height, across * smoke.shape[1] // working.width)]

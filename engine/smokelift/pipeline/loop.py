@@ -88,7 +88,7 @@ class Past:
 
 
 def frames_after(start: Frame | None, shot: Shot, method: Method) -> Iterator[Frame]:
-    """Yield a shot's frames after one, or all; the first is held back until the second gives it a velocity."""
+    """Yield a shot's frames after one, or all; the first waits until the second gives it a velocity."""
     count = len(shot.clip)
     with products_on_one_thread():
         method = replace(method, depth_prior=method.depth_prior.of_clip(shot))

@@ -9,7 +9,7 @@
 `render` and `render_gradient` go all the way from a density and a scene (``image``).
 """
 
-from smokelift.render.cpu_backend import Sight
+from smokelift.render.cpu_backend import RaySupport
 from smokelift.render.device import DeviceError, start
 from smokelift.render.image import render, render_gradient
 from smokelift.render.optics import Optics, scene_optics, scene_renderer
@@ -19,8 +19,8 @@ __all__ = [
     "DeviceError",
     "Image",
     "Optics",
+    "RaySupport",
     "Renderer",
-    "Sight",
     "Volume",
     "render",
     "render_gradient",

@@ -23,5 +23,5 @@ def products_on_one_thread() -> AbstractContextManager[Any]:
 
 @lru_cache(maxsize=1)
 def _libraries() -> ThreadpoolController:
-    """Those that are loaded; to find them takes as long as a picture."""
+    """Return the libraries that are loaded; to find them takes as long as a picture."""
     return ThreadpoolController()

@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 LATERAL = ((1, 2), (0, 2), (0, 1))
 """The two other axes of each axis."""
 
-LEAST_SLOPE = 1e-9
+MIN_SLOPE = 1e-9
 """Voxels a plane. Rays of less slope stay in one column of voxels, and dividing by this instead loses nothing."""
 
 
@@ -111,7 +111,7 @@ def _plane_range(
     (rows, columns) each; 0 and -1 where the ray misses the grid.
     """
     low, high = -0.999 - offset, lateral - 0.001 - offset
-    steep = np.where(np.abs(slope) < LEAST_SLOPE, LEAST_SLOPE, slope)
+    steep = np.where(np.abs(slope) < MIN_SLOPE, MIN_SLOPE, slope)
     one, other = low / steep, high / steep
     # a ray along the planes' axis is beside the grid in all of them or in none
     along, beside = slope == 0, (low > 0) | (high < 0)

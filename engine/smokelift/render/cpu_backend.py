@@ -21,7 +21,7 @@ Floats = NDArray[np.float32]
 
 
 @dataclass(frozen=True, eq=False)
-class Sight:
+class RaySupport:
     """Where a camera's rays meet the voxels that may hold smoke.
 
     It takes as long to find as a picture, so that renderers of the same camera, domain, support and lights share it.
@@ -38,7 +38,7 @@ class Sight:
     rays: _core.Rays
 
     @staticmethod
-    def of(plan: RenderPlan) -> Sight:
+    def of(plan: RenderPlan) -> RaySupport:
         """Find it for a plan."""
         support = _core.Support(plan.marked)
         rays = _core.Rays(plan.rays.lines, plan.rays.length, plan.rays.planes)
@@ -47,16 +47,16 @@ class Sight:
             mask = _core.zeros((x + 2, y + 2, z + 2, 1))
             mask[1:-1, 1:-1, 1:-1, 0] = plan.marked
             rays.clip(support, mask)
-        return Sight(support, rays)
+        return RaySupport(support, rays)
 
 
 class CpuBackend:
     """Picture and derivative of one `RenderPlan` in channels; `Renderer` makes colours of them.
 
-    `sight` is that of another backend, or found anew.
+    `ray_support` is that of another backend, or found anew.
     """
 
-    def __init__(self, plan: RenderPlan, sight: Sight | None = None) -> None:
+    def __init__(self, plan: RenderPlan, ray_support: RaySupport | None = None) -> None:
         self._axes = (0, 1, 2)
         lights = plan.lighting.lights
         parallel = [light for light in lights if isinstance(light, ParallelSweep)]
@@ -67,8 +67,8 @@ class CpuBackend:
         self._plan = plan
         channels = plan.lighting.channels
         x, y, z = plan.shape
-        self.sight = sight or Sight.of(plan)
-        self._support, self._rays = self.sight.support, self.sight.rays
+        self.ray_support = ray_support or RaySupport.of(plan)
+        self._support, self._rays = self.ray_support.support, self.ray_support.rays
         # what no sweep touches is never given memory
         self._medium = _core.zeros((x + 2, y + 2, z + 2, channels + 1))
         self._gradient: Floats | None = None
@@ -134,7 +134,7 @@ def _compiled(light: ParallelSweep | PointSweep) -> _core.ParallelLight | _core.
 
 
 def _with_y_and_z_swapped(plan: RenderPlan, lights: Sequence[ParallelSweep]) -> RenderPlan:
-    """The same plan for arrays of voxels [x, z, y]; only its domain stays as it is."""
+    """Return the plan for arrays of voxels [x, z, y]; only its domain stays as it is."""
     x, y, z = plan.corner
     rays = plan.rays
     lines, planes = rays.lines.copy(), rays.planes.copy()

@@ -1,7 +1,7 @@
 """Which device renders: the processor with compiled code, or a GPU with Taichi.
 
 Taichi may be missing. It is only imported where a GPU driver is installed, and, unless a GPU is asked for, where a GPU
-is: that alone takes longer than all that is looked at before a run.
+is: that alone takes longer than all that is estimated before a run.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.render.cpu_backend import CpuBackend, Sight
+from smokelift.render.cpu_backend import CpuBackend, RaySupport
 from smokelift.render.plan import RenderPlan
 
 DeviceName = Literal["auto", "cpu", "gpu"]
@@ -49,7 +49,7 @@ class Backend(Protocol):
     """Picture and derivative of one `RenderPlan`, in channels; `Renderer` makes colours of them."""
 
     @property
-    def sight(self) -> Sight | None:
+    def ray_support(self) -> RaySupport | None:
         """What another backend of the same rays and voxels can take over."""
 
     def image(self, density: NDArray[np.float32], keep_record: bool) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
@@ -73,7 +73,7 @@ def available_gpu() -> str | None:
 
 
 def has_taichi() -> bool:
-    """Whether Taichi is installed; it is not looked at."""
+    """Whether Taichi is installed; it is not imported."""
     return find_spec("taichi") is not None
 
 
@@ -120,10 +120,10 @@ def start(device: DeviceName = "auto") -> str:
     return _running
 
 
-def backend(plan: RenderPlan, sight: Sight | None = None) -> Backend:
-    """What renders a plan on the device of this process; a GPU needs no `Sight`."""
+def backend(plan: RenderPlan, ray_support: RaySupport | None = None) -> Backend:
+    """What renders a plan on the device of this process; a GPU needs no `RaySupport`."""
     if start() == "cpu":
-        return CpuBackend(plan, sight)
+        return CpuBackend(plan, ray_support)
     on_gpu: Backend = import_module("smokelift.render.gpu.backend").GpuBackend(plan)
     return on_gpu
 

@@ -20,12 +20,12 @@ Floats = NDArray[np.float32]
 BLOCKS = 24
 """Blocks along the longest side of a domain, about: coarse grids show what fine ones show."""
 
-SMALLEST, LARGEST = 2, 4
+MIN_BLOCK, MAX_BLOCK = 2, 4
 """Voxels along the edge of a block: one voxel says nothing of how its emission changes across it, and larger blocks are
 too dark (docs/experiments/multiple-scattering.md)."""
 
 FIELDS = 4
-"""Of what is linear across a block: the mean, and the slopes along x, y and z."""
+"""Fields of what is linear across a block: the mean, and the slopes along x, y and z."""
 
 
 class DiffuseLight:
@@ -40,7 +40,7 @@ class DiffuseLight:
         self._alike = [(self._albedo, whole)] if plan.medium.is_grey else _channels(albedos)
         shares = np.ones(plan.lighting.channels) if plan.medium.is_grey else np.array(albedos) / self._albedo
         self._shares = shares.astype(np.float32).repeat(FIELDS)[:, None, None, None]
-        size = min(max(round(max(plan.domain.resolution) / BLOCKS), SMALLEST), LARGEST)
+        size = min(max(round(max(plan.domain.resolution) / BLOCKS), MIN_BLOCK), MAX_BLOCK)
         self._edge = size * plan.domain.voxel_size
         # blocks lie alike in the domain whatever the box; their centres reach around all voxels of the box
         corner, count = np.array(plan.corner), np.array(plan.shape)

@@ -95,7 +95,7 @@ class EnvironmentCells:
         self.direction = direction[lit]
 
     def lights(self, count: int) -> tuple[DirectionalLight, ...]:
-        """At most so many lights, as `environment_lights`."""
+        """Return at most so many lights, as `environment_lights`."""
         if count < 1:
             raise ValueError(f"An environment needs at least 1 light, not {count}.")
         return tuple(self._light(stratum) for stratum in self._strata(count))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.footage.background import background_picture
-from smokelift.render.cpu_backend import Sight
+from smokelift.render.cpu_backend import RaySupport
 from smokelift.render.light_sampling import sampled_lights
 from smokelift.render.renderer import Image, Renderer
 from smokelift.scene import Camera, CompleteScene, Domain, FiniteLight, Medium, PointLight, Scattering
@@ -38,10 +38,12 @@ class Optics:
         camera: Camera,
         background: Image,
         support: NDArray[np.bool_] | None = None,
-        sight: Sight | None = None,
+        ray_support: RaySupport | None = None,
     ) -> Renderer:
         """The renderer of a camera before a background; see `Renderer` for the parameters."""
-        return Renderer(camera, self.domain, self.medium, self.lights, background, self.scattering, support, sight)
+        return Renderer(
+            camera, self.domain, self.medium, self.lights, background, self.scattering, support, ray_support
+        )
 
     def unshadowed_source(self) -> NDArray[np.float64]:
         """Source radiance (3,), W/m^2/sr, of isotropic smoke in the middle of the domain, with nothing before it.

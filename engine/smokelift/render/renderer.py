@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from smokelift.render import device
 from smokelift.render.blas import products_on_one_thread
-from smokelift.render.cpu_backend import Sight
+from smokelift.render.cpu_backend import RaySupport
 from smokelift.render.plan import plan_render
 from smokelift.scene import Camera, Domain, FiniteLight, Medium, Scattering
 
@@ -42,7 +42,7 @@ class Renderer:
     support : (nx, ny, nz) bool, optional
         Voxels that may hold smoke: what the density says elsewhere does not count, the gradient is zero there, and
         the work follows their number.
-    sight
+    ray_support
         Of another renderer with the same camera, domain, support and lights, so that it is not found again.
 
     Raises
@@ -60,13 +60,13 @@ class Renderer:
         background: Image,
         scattering: Scattering = "single",
         support: NDArray[np.bool_] | None = None,
-        sight: Sight | None = None,
+        ray_support: RaySupport | None = None,
     ) -> None:
         self.camera, self.domain, self.medium = camera, domain, medium
         plan = plan_render(camera, domain, medium, lights, scattering, support)
         self._colour = np.asarray(plan.lighting.colour, np.float32)
         self._background = np.asarray(background, np.float32)
-        self._backend = device.backend(plan, sight)
+        self._backend = device.backend(plan, ray_support)
         self._depth: Image = np.zeros(camera.size[::-1], np.float32)
 
     def image(self, density: Volume, *, keep_record: bool = False) -> Image:
@@ -90,9 +90,9 @@ class Renderer:
         return np.asarray(coloured + self.transmittance[..., None] * self._background)
 
     @property
-    def sight(self) -> Sight | None:
+    def ray_support(self) -> RaySupport | None:
         """What another renderer of the same camera, domain, support and lights can take over; None on a GPU."""
-        return self._backend.sight
+        return self._backend.ray_support
 
     @property
     def absorbs_only(self) -> bool:

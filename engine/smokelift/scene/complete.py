@@ -67,7 +67,7 @@ def require_scene(scene: object) -> None:
 
 
 def completed(scene: Scene | CompleteScene, camera: Camera | None = None) -> CompleteScene:
-    """Complete a description with defaults, without looking at any footage.
+    """Complete a description with defaults, without any footage.
 
     Parameters
     ----------

@@ -29,7 +29,7 @@ from smokelift.scene.reading import read_file
 from smokelift.scene.view import View
 from smokelift.scene.writing import write_file
 
-MOST_LISTED = 256
+MAX_LISTED = 256
 """Lights, inlets or views of a scene, at most: the time of a run grows with their number."""
 
 
@@ -75,8 +75,8 @@ class Scene:
         """Check what no table can check alone."""
         self._check_kinds()
         for table, given in (("inlet", self.inlets), ("lights", self.lights), ("views", self.views)):
-            if len(given) > MOST_LISTED:
-                raise SceneError(f"is given {len(given)} times; {MOST_LISTED} at most", table=table)
+            if len(given) > MAX_LISTED:
+                raise SceneError(f"is given {len(given)} times; {MAX_LISTED} at most", table=table)
         set_fields(self, closed=checked_sides(self.closed), scattering=checked_scattering(self.scattering))
         if self.domain is not None:
             self._check_places(self.domain)

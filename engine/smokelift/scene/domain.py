@@ -198,7 +198,7 @@ def box_around(voxels: NDArray[np.bool_], margin: int) -> tuple[slice, slice, sl
 
 
 def _span(marked: NDArray[np.bool_], margin: int) -> slice:
-    """From the first to the last mark of a row, and so many more at both ends; empty without any."""
+    """Return the slice from the first to the last mark of a row, and so many more at both ends; empty without any."""
     places = np.flatnonzero(marked)
     if not places.size:
         return slice(0, 0)

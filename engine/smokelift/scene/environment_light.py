@@ -7,7 +7,7 @@ from pathlib import Path
 
 from smokelift.scene.checks import file_path, integer, number, set_fields, unexpected
 
-MOST_DIRECTIONS = 4096
+MAX_DIRECTIONS = 4096
 """Parallel lights that stand for one environment, at most: every picture sweeps the voxels once for each."""
 
 
@@ -41,8 +41,8 @@ class EnvironmentLight:
         rotation = number(self.rotation_degrees, "rotation_degrees")
         set_fields(self, image=image, rotation_degrees=rotation, strength=strength)
         if self.directions is not None:
-            expected = f"a whole number from 1 to {MOST_DIRECTIONS}"
-            set_fields(self, directions=integer(self.directions, "directions", expected, 1, MOST_DIRECTIONS))
+            expected = f"a whole number from 1 to {MAX_DIRECTIONS}"
+            set_fields(self, directions=integer(self.directions, "directions", expected, 1, MAX_DIRECTIONS))
 
     def scaled(self, factor: float) -> EnvironmentLight:
         """Return the light ``factor`` times as strong."""

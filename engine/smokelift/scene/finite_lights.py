@@ -10,7 +10,7 @@ from smokelift.checks import shown
 from smokelift.scene.checks import SceneError, Vector, colour, set_fields, vector
 from smokelift.scene.domain import Box, Domain
 
-FARTHEST = 1e6
+MAX_DISTANCE_VOXELS = 1e6
 """Voxels between a point light and the box, at most: its rays are parallel long before."""
 
 
@@ -84,7 +84,10 @@ class PointLight:
         at = f"position {shown(list(self.position))} is"
         if domain.contains(self.position):
             raise SceneError(f"{at} inside the domain; it must be outside", key="position")
-        if isinstance(domain, Domain) and math.dist(self.position, domain.centre) > FARTHEST * domain.voxel_size:
+        if (
+            isinstance(domain, Domain)
+            and math.dist(self.position, domain.centre) > MAX_DISTANCE_VOXELS * domain.voxel_size
+        ):
             raise SceneError(f"{at} more than a million voxels away; give a directional light instead", key="position")
 
 

@@ -14,7 +14,7 @@ Scattering = Literal["multiple", "single", "unshadowed", "absorption"]
 SCATTERINGS: tuple[Scattering, ...] = ("multiple", "single", "unshadowed", "absorption")
 
 SHADOWED: tuple[Scattering, ...] = ("multiple", "single")
-"""Those in which smoke casts shadows on itself."""
+"""Models of scattering in which smoke casts shadows on itself."""
 
 
 @dataclass(frozen=True)

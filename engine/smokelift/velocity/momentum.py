@@ -43,7 +43,7 @@ class Prediction:
         return self.dt / self.velocity.voxel_size
 
     def displacement(self) -> StaggeredGrid:
-        """In voxels a frame."""
+        """Displacement in voxels a frame."""
         return self.velocity.displacement(self.dt)
 
 
@@ -73,7 +73,7 @@ class Centre:
         return grid.with_faces(_core.add_momentum(density, self.momentum, weight, faces, grid.walls))
 
     def refined(self) -> Centre:
-        """The same on a grid that is twice as fine."""
+        """Return the centre on a grid that is twice as fine."""
         return Centre(self.trust, self.dissipation, 2 * self.momentum)
 
 

@@ -10,7 +10,7 @@ from smokelift.scene.domain import box_around
 from smokelift.transport import Array, Velocity, VoxelBox, advect, face_shapes, faces_in
 from smokelift.velocity.estimator import Mask, refined_in
 
-LARGE = 4_000_000
+MIN_SLAB_VOXELS = 4_000_000
 """Voxels of a box around smoke, above which it is cut into slabs: each is as narrow as the smoke is there."""
 
 SLAB = 64
@@ -116,7 +116,7 @@ def _boxes(smoke: Mask, reach: int, *, whole: bool = False) -> list[tuple[VoxelB
     sides = [side.stop - side.start for side in box]
     if math.prod(sides) == 0:
         return []
-    if whole or math.prod(sides) <= LARGE:
+    if whole or math.prod(sides) <= MIN_SLAB_VOXELS:
         return [(box, box)]
     axis, boxes = int(np.argmax(sides)), []
     lead = (slice(None),) * axis

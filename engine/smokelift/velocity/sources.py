@@ -23,7 +23,7 @@ import numpy.typing as npt
 import smokelift._core as _core
 from smokelift.transport import Array, Faces, ResidualMeans
 
-FAINT = np.float32(1e-4)
+MIN_DENSITY_SHARE = np.float32(1e-4)
 """Fraction of the largest density below which a residual means nothing."""
 
 RESTING = np.float32(0.05)
@@ -102,7 +102,7 @@ class SourceDetection:
         """
         squares = np.square(change), np.sum([np.square(g) for g in direction], axis=0)
         moved, steepness = (_core.blur(values, 1.0, 3.0) for values in squares)
-        speed = moved / (steepness + FAINT * max(steepness.max(), np.float32(1e-20)))
+        speed = moved / (steepness + MIN_DENSITY_SHARE * max(steepness.max(), np.float32(1e-20)))
         # where most smoke is at rest, what stands still is believed
         usual = float(np.median(speed[smoke])) if smoke.any() else 0.0
         weight: Array = (speed + RESTING**2) / (speed + RESTING**2 + np.float32(self.still**2 * usual))
@@ -127,9 +127,9 @@ class SourceDetection:
         typical = float(np.median(np.abs(mean[smoke]))) if smoke.any() else 0.0
         if typical == 0.0:
             return np.ones(mean.shape, np.float32)
-        coherent = _ramp(mean / (found.magnitude + FAINT), self.coherence)
+        coherent = _ramp(mean / (found.magnitude + MIN_DENSITY_SHARE), self.coherence)
         strong = _ramp(mean / np.float32(typical), self.strength)
-        prominent = _ramp(mean / max(np.max(coherent * mean), FAINT), self.prominence)
+        prominent = _ramp(mean / max(np.max(coherent * mean), MIN_DENSITY_SHARE), self.prominence)
         weight: Array = 1 - coherent * strong * prominent
         return weight
 

@@ -23,7 +23,7 @@ report: dict[str, object] = {}
 
 
 def perform(story: Callable[[], Iterator[float]]) -> None:
-    """Have a story told beside Blender's own life: it yields how long to wait before going on. Then Blender quits."""
+    """Play a story beside Blender's own life: it yields how long to wait before going on. Then Blender quits."""
     bpy.context.preferences.view.show_splash = False
     bpy.context.preferences.system.viewport_aa = "OFF"  # else every picture is drawn eight times, in software
     faulthandler.enable()  # where a crash of Blender came from

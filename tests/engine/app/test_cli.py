@@ -110,24 +110,24 @@ def test_a_cancelled_run_can_be_resumed(plume, tmp_path, monkeypatch, capsys, nu
     ) as process:
         assert process.stdout is not None
         assert process.stderr is not None
-        told = []
+        sent = []
         for line in process.stdout:
-            told.append(json.loads(line))
-            if told[-1]["event"] == "frame":
+            sent.append(json.loads(line))
+            if sent[-1]["event"] == "frame":
                 process.send_signal(number)
                 break
-        told += events(process.stdout.read())
+        sent += events(process.stdout.read())
         errors = process.stderr.read()
         assert process.wait(60) == 130
     assert "KeyboardInterrupt" not in errors
-    assert (told[-1]["event"], told[-1]["status"]) == ("error", 130)
-    assert "--resume" in told[-1]["text"]
+    assert (sent[-1]["event"], sent[-1]["status"]) == ("error", 130)
+    assert "--resume" in sent[-1]["text"]
     begun = Sequence.open(out)
     assert 1 <= len(begun.frames) < 8
     assert not [name for name in names(out) if name.endswith(".tmp") or name == "run.lock"]
     assert command(*words, "--out", "out", "--resume") == 0
-    told = events(capsys.readouterr().out)
-    start = next(event for event in told if event["event"] == "start")
+    sent = events(capsys.readouterr().out)
+    start = next(event for event in sent if event["event"] == "start")
     assert (start["done"], start["total"]) == (len(begun.frames), 8)
     assert Sequence.open(out).frames == tuple(range(1, 9))
     assert command("reconstruct", tmp_path / "scene.toml", "--out", tmp_path / "whole", "--npz", *QUICK) == 0

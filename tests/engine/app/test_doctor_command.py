@@ -32,6 +32,6 @@ def test_doctor_without_taichi(capsys, monkeypatch) -> None:
 def test_doctor_as_json(capsys) -> None:
     """Programs get the same lines as notes."""
     assert command("doctor", "--progress", "json") == 0
-    told = events(capsys.readouterr().out)
-    assert {event["event"] for event in told} == {"note"}
-    assert any(event["text"].startswith("GPU:") for event in told)
+    sent = events(capsys.readouterr().out)
+    assert {event["event"] for event in sent} == {"note"}
+    assert any(event["text"].startswith("GPU:") for event in sent)

@@ -17,13 +17,13 @@ def test_the_size_is_said_before(finished, tmp_path, capsys) -> None:
     out = tmp_path / "out"
     words = ("export", finished, "--out", out, "--precision", "quantised", "--proxy", 2, "--progress", "json")
     assert command(*words, "--size") == 0
-    (told,) = events(capsys.readouterr().out)
-    assert told["event"] == "done" and told["size"] > 0
+    (sent,) = events(capsys.readouterr().out)
+    assert sent["event"] == "done" and sent["size"] > 0
     assert not out.exists()
     assert command(*words) == 0
     note, start, *frames, done = events(capsys.readouterr().out)
     assert "MB" in note["text"] and start["total"] == len(frames) == done["frames"]
-    assert done["size"] == pytest.approx(told["size"], rel=0.2)
+    assert done["size"] == pytest.approx(sent["size"], rel=0.2)
     assert len(names(out)) == 2 * done["frames"] + 2
     assert "sequence.json" in refused(capsys, "export", finished, "--out", finished)
     assert "no sequence" in refused(capsys, "export", out, "--out", tmp_path / "again")

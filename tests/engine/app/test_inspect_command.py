@@ -87,7 +87,7 @@ def test_an_inlet_outside_the_box(plume, tmp_path, capsys) -> None:
 
 @pytest.mark.parametrize("kind", [".png", ".html"])
 def test_a_page_shows_what_is_known(plume, tmp_path, capsys, kind) -> None:
-    """What cannot be told is called undetermined, what is given is called given."""
+    """What nothing shows is called undetermined, what is given is called given."""
     page = tmp_path / f"page{kind}"
     assert command("inspect", plume.scene.clip.path, "--page", page, "--progress", "json", *QUICK) == 0
     done = events(capsys.readouterr().out)[-1]
@@ -170,7 +170,7 @@ def test_a_clip_without_smoke_has_a_page_that_says_so(plume, tmp_path, capsys) -
     assert command("inspect", clip, "--page", page, "--progress", "json", *QUICK) == 0
     *notes, done = events(capsys.readouterr().out)
     said = " ".join(event["text"] for event in notes)
-    assert "No smoke found in the 2 frames that were looked at" in said
+    assert "No smoke found in the 2 frames" in said
     assert '<p class="warning">No smoke found' in page.read_text(encoding="utf-8")
     assert "around the smoke" not in said + str(done["facts"])
     assert "thickest smoke" not in said + str(done["facts"])
@@ -260,6 +260,6 @@ def test_a_camera_that_was_steadied_is_found_again(tmp_path, capsys) -> None:
 
 
 def test_pages_of_other_kinds_are_refused(shot, tmp_path, capsys) -> None:
-    """Before the clip is looked at."""
+    """Before the clip is inspected."""
     assert ".png or .html" in refused(capsys, "inspect", shot, "--page", tmp_path / "page.pdf")
     assert "does not exist" in refused(capsys, "inspect", shot, "--write", tmp_path / "none" / "scene.toml")

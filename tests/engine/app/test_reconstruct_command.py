@@ -44,7 +44,7 @@ def test_reconstruct_writes_vdb_files(shot, tmp_path, capsys) -> None:
 
 
 def test_a_wrong_mask_is_refused_in_a_sentence(shot, tmp_path, capsys) -> None:
-    """Before anything is looked at."""
+    """Before anything is read."""
     write_image(tmp_path / "black.png", np.zeros((4, 4, 3)))
     words = ("reconstruct", shot, "--out", tmp_path / "out", *QUICK, "--mask")
     assert "no such file" in refused(capsys, *words, tmp_path / "none.png")
@@ -60,31 +60,31 @@ def test_progress_as_json(plume, tmp_path, capsys) -> None:
     out = tmp_path / "out"
     assert command("reconstruct", tmp_path / "scene.toml", "--out", out, "--npz", "--progress", "json", *QUICK) == 0
     captured = capsys.readouterr()
-    told = events(captured.out)
+    sent = events(captured.out)
     assert captured.err == ""
-    notes = [event["text"] for event in told if event["event"] == "note"]
-    assert [event["event"] for event in told] == [*["note"] * len(notes), "start", *["frame"] * 5, "done"]
+    notes = [event["text"] for event in sent if event["event"] == "note"]
+    assert [event["event"] for event in sent] == [*["note"] * len(notes), "start", *["frame"] * 5, "done"]
     assert notes[0].startswith("Medium not given")
-    start, *frames = told[len(notes) : -1]
+    start, *frames = sent[len(notes) : -1]
     assert (start["total"], start["done"]) == (5, 0)
     assert [(event["frame"], event["done"], event["total"]) for event in frames] == [(n, n, 5) for n in range(1, 6)]
     assert all(event["figures"]["psnr"] > 30 for event in frames)
-    assert told[-2]["seconds_left"] == 0
-    assert (told[-1]["directory"], told[-1]["frames"]) == (str(out), 5)
+    assert sent[-2]["seconds_left"] == 0
+    assert (sent[-1]["directory"], sent[-1]["frames"]) == (str(out), 5)
     middle = float(np.median([event["figures"]["psnr"] for event in frames]))
-    assert told[-1]["psnr"] == pytest.approx(middle)
-    assert f"{middle:.1f} dB inside the smoke at the clip's pixels (median)" in told[-1]["text"]
+    assert sent[-1]["psnr"] == pytest.approx(middle)
+    assert f"{middle:.1f} dB inside the smoke at the clip's pixels (median)" in sent[-1]["text"]
 
 
 def test_further_views_of_a_scene_file_are_used(two_views, tmp_path, capsys) -> None:
     """They are named before the run, keep step with a range of frames, and their fit is on record."""
     two_views.save(tmp_path / "scene.toml")
-    told = "View 1: frame_####.png, 90 degrees from the input, frames 3 to 4."
+    sent = "View 1: frame_####.png, 90 degrees from the input, frames 3 to 4."
     assert command("inspect", tmp_path / "scene.toml", "--frames", "2:3", *QUICK) == 0
-    assert told in " ".join(capsys.readouterr().out.split())
+    assert sent in " ".join(capsys.readouterr().out.split())
     arguments = ("--npz", "--frames", "2:3", *QUICK)
     assert command("reconstruct", tmp_path / "scene.toml", "--out", tmp_path / "out", *arguments) == 0
-    assert told in " ".join(capsys.readouterr().out.split())
+    assert sent in " ".join(capsys.readouterr().out.split())
     sequence = Sequence.open(tmp_path / "out")
     assert all(sequence.figures(number)["psnr_view_1"] > 30 for number in (1, 2))
 
@@ -167,7 +167,7 @@ def test_another_seed_is_another_smoke_with_the_same_front(shot, finished, tmp_p
 
 
 def test_without_detail_nothing_is_said_to_be_made_up(shot, capsys) -> None:
-    """Neither is it with the paper's method, which cannot be told to."""
+    """Neither is it with the paper's method, which cannot do it."""
     for words in (("--detail", "0", *QUICK), ("--method", "paper", *QUICK)):
         assert command("inspect", shot, *words) == 0
         assert MADE_UP not in " ".join(capsys.readouterr().out.split())

@@ -171,7 +171,7 @@ def test_what_cannot_be_written_is_refused_before_the_clip_is_looked_at(
     """The analysis of a clip takes minutes."""
 
     def look(*_arguments: object) -> None:
-        raise AssertionError("the clip was looked at")
+        raise AssertionError("the clip was read")
 
     monkeypatch.setattr("smokelift.app.commands.reconstruct.reconstruct", look)
     monkeypatch.chdir(tmp_path)

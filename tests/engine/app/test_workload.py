@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from smokelift.app.workload import LONGEST, Workload
+from smokelift.app.workload import MAX_SIDE_VOXELS, Workload
 from smokelift.footage.clip import Clip
 from smokelift.pipeline import Reconstruction, compose
 from smokelift.setup.prepare import prepare_shot
@@ -28,7 +28,7 @@ def shares_of_a_run(shot: Shot) -> list[float]:
 
 
 def test_shares_are_those_of_the_run(plume, shot) -> None:
-    """Of a grid that is looked at as it is."""
+    """Of a grid that is measured as it is."""
     found, shares = Workload.of(shot, SMOOTH), shares_of_a_run(shot)
     assert found.largest == pytest.approx(max(shares), rel=0.02)
     assert found.mean == pytest.approx(sum(shares) / len(shares), rel=0.1)
@@ -39,7 +39,7 @@ def test_a_large_grid_is_looked_at_coarsely(plume) -> None:
     """Then shares are a little larger than those of the run."""
     with Clip.open(plume.scene.clip) as clip:
         shot = prepare_shot(clip, plume.scene, replace(SMOOTH, resolution=(96, 96, 128)))
-        assert max(shot.optics.domain.resolution) > LONGEST
+        assert max(shot.optics.domain.resolution) > MAX_SIDE_VOXELS
         assert 1 < Workload.of(shot, SMOOTH).largest / max(shares_of_a_run(shot)) < 1.4
 
 

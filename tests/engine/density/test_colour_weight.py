@@ -121,10 +121,10 @@ def test_the_other_colours_tell_smoke_from_a_wall_that_is_continued_too_dark(tru
         found = reconstruct_density(picture, small, settings=settings, plate=found_plate(deviation)).density
         return abs(found.sum() / truth.sum() - 1), psnr(render(found, small), render(truth, small))
 
-    told, plain = errors(0.2), errors(0.0)
-    assert told[0] < 0.1
+    coloured, plain = errors(0.2), errors(0.0)
+    assert coloured[0] < 0.1
     assert plain[0] > 0.5
-    assert told[1] > plain[1] + 10
+    assert coloured[1] > plain[1] + 10
 
 
 def test_a_wall_that_is_continued_too_bright_is_no_smoke_in_shadow(optics) -> None:

@@ -1,4 +1,4 @@
-"""Depth with detail: the front is met, the side has detail, and nothing of it is there where it is not asked for."""
+"""Depth with detail: the front is fitted, the side has detail, and nothing of it is there where it is not asked for."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def detail(density: np.ndarray, axis: int) -> float:
 
 
 def test_the_side_gets_detail_and_the_front_stays(shot) -> None:
-    """More with more of it, nearly as much as the front has, for some decibels of a front that is met."""
+    """More with more of it, nearly as much as the front has, for some decibels of a front that is fitted."""
     strengths = (0.0, 0.5, 1.0)
     found = [fitted(shot, DetailedDepth(RoundDepth(), detail=strength)) for strength in strengths]
     sides = [detail(density, 0) for density, _ in found]
@@ -71,7 +71,7 @@ def test_the_side_gets_detail_and_the_front_stays(shot) -> None:
 
 
 def test_no_detail_is_the_smooth_prior_itself(shot) -> None:
-    """To the bit, and the clip is not looked at."""
+    """To the bit, and the clip is not read."""
     views = ViewSet.of(shot.observe(2), shot.optics, 2)
     prior = DetailedDepth(RoundDepth(), detail=0.0).of_clip(shot)
     assert prior.texture is None
@@ -123,7 +123,7 @@ def test_lobes_are_as_strong_on_every_grid(plume, tmp_path, monkeypatch) -> None
     coarse = lobes(scene, 36)
     assert coarse > 0.15
     assert lobes(scene, 72) == pytest.approx(coarse, rel=0.25)
-    monkeypatch.setattr(moment_levels, "LARGE", 10_000)
+    monkeypatch.setattr(moment_levels, "MIN_COARSENED_VOXELS", 10_000)
     assert lobes(scene, 72) == pytest.approx(coarse, rel=0.25)
 
 
@@ -143,7 +143,7 @@ def test_no_azimuth_is_near_to_a_camera(two_views) -> None:
 
 @pytest.mark.parametrize("count", [1, 2])
 def test_a_short_clip_gives_what_it_has(plume, tmp_path, count) -> None:
-    """A single picture is enough: the front is met all the same."""
+    """A single picture is enough: the front is fitted all the same."""
     scene: Scene = plume.write(tmp_path, rising(FRAMES)[:count])
     with Clip.open(scene.clip) as clip:
         shot = prepare_shot(clip, scene, Settings.preset("draft"))

@@ -288,7 +288,7 @@ def test_smoke_that_the_picture_hardly_shows_does_not_grow() -> None:
 
 
 def term_of(scene: Scene, observation: Observation, hull: np.ndarray | None = None) -> Term:
-    """A picture before black to be met, every pixel counted alike."""
+    """A picture before black to be fitted, every pixel counted alike."""
     optics = scene_optics(completed(scene))
     black = noisy_plate(np.zeros_like(observation.image))
     view = View.of(replace(observation, plate=black), optics)
@@ -504,7 +504,7 @@ def mean_place(density: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("degrees", [40.0, 90.0])
 def test_a_second_view_tells_the_depth(plume, small, degrees) -> None:
-    """Smoke off the middle of the box stands where it stood, which one picture cannot know; all pictures are met."""
+    """Smoke off the middle of the box stands where it stood, which one picture cannot know; all pictures are fitted."""
     truth = moved(plume.densities[1], 5)
     target = render(truth, small)
     alone = reconstruct_density(target, small).density

@@ -33,8 +33,8 @@ def shot(plume, tmp_path_factory) -> Iterator[Shot]:
 @pytest.fixture
 def large(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let every grid of this size count as large, and one half as fine as small."""
-    monkeypatch.setattr(module, "LARGE", 2500)
-    monkeypatch.setattr(expecting, "LARGE", 2500)
+    monkeypatch.setattr(module, "MIN_COARSENED_VOXELS", 2500)
+    monkeypatch.setattr(expecting, "MIN_COARSENED_VOXELS", 2500)
 
 
 def level(shot: Shot) -> Level:
@@ -86,7 +86,7 @@ def test_values_between_middles_are_linear(shot, large) -> None:
 def test_expected_smoke_is_the_same(shot, monkeypatch: pytest.MonkeyPatch) -> None:
     """But for few voxels at its edge."""
     before = level(shot).views.hull
-    monkeypatch.setattr(expecting, "LARGE", 2500)
+    monkeypatch.setattr(expecting, "MIN_COARSENED_VOXELS", 2500)
     after = level(shot).views.hull
     assert not (after & ~before).any()
     assert np.count_nonzero(after) > 0.99 * np.count_nonzero(before)
@@ -101,7 +101,7 @@ def test_the_front_is_met_as_without_it(shot, monkeypatch: pytest.MonkeyPatch) -
         return found.density, found.figures["psnr"]
 
     plain, psnr = fitted()
-    monkeypatch.setattr(module, "LARGE", 2500)
+    monkeypatch.setattr(module, "MIN_COARSENED_VOXELS", 2500)
     density, coarse_to_fine = fitted()
     again, _ = fitted()
     np.testing.assert_array_equal(density, again)

@@ -125,20 +125,20 @@ def blurred(density: Volume) -> Volume:
 
 
 @pytest.fixture(scope="module")
-def guess(moment) -> DepthEstimate:
+def prior_start(moment) -> DepthEstimate:
     """What a depth prior says that has made something up: its smooth answer beside a density."""
     return replace(moment.depth, smooth=moment.prior, density=0.9 * moment.prior + 0.1 * blurred(moment.prior))
 
 
-def guided(moment: Moment, guess: DepthEstimate, carried: Volume) -> Start:
+def guided(moment: Moment, prior_start: DepthEstimate, carried: Volume) -> Start:
     """Where a guided simulation starts, with all of what is carried."""
-    return GuidedSimulation(LARGEST, kept=1.0).start(moment.views, guess, carried, moment.before)
+    return GuidedSimulation(LARGEST, kept=1.0).start(moment.views, prior_start, carried, moment.before)
 
 
-def test_a_simulation_is_guided_to_the_smooth_answers_amounts(moment, guess) -> None:
+def test_a_simulation_is_guided_to_the_smooth_answers_amounts(moment, prior_start) -> None:
     """Coarsely the start is the smooth answer, finely it is what was carried, however much that was."""
     hull = moment.views.hull
-    starts = [guided(moment, guess, np.float32(factor) * moment.true).density for factor in (1.0, 8.0)]
+    starts = [guided(moment, prior_start, np.float32(factor) * moment.true).density for factor in (1.0, 8.0)]
     wanted, found = blurred(moment.prior)[hull], blurred(starts[0])[hull]
     assert np.linalg.norm(found - wanted) < 0.15 * np.linalg.norm(wanted)
     detail, carried = ((density - blurred(density))[hull] for density in (starts[0], moment.true))
@@ -146,26 +146,26 @@ def test_a_simulation_is_guided_to_the_smooth_answers_amounts(moment, guess) -> 
     np.testing.assert_allclose(starts[1], starts[0], rtol=1e-3, atol=1e-6)
 
 
-def test_detail_is_born_where_nothing_is_carried(moment, guess) -> None:
+def test_detail_is_born_where_nothing_is_carried(moment, prior_start) -> None:
     """There the prior's density is all that there is; likewise where far too little is carried."""
     hull = moment.views.hull
-    empty = guided(moment, guess, np.zeros_like(moment.true))
-    np.testing.assert_array_equal(empty.density[hull], guess.density[hull])
+    empty = guided(moment, prior_start, np.zeros_like(moment.true))
+    np.testing.assert_array_equal(empty.density[hull], prior_start.density[hull])
     assert empty.figures["share"] == 0
-    little = guided(moment, guess, np.float32(0.01) * moment.prior)
+    little = guided(moment, prior_start, np.float32(0.01) * moment.prior)
     assert 0 < little.figures["share"] <= 0.011 * LARGEST_GAIN
-    np.testing.assert_allclose(little.density.sum(), guess.density[hull].sum(), rtol=0.02)
+    np.testing.assert_allclose(little.density.sum(), prior_start.density[hull].sum(), rtol=0.02)
 
 
-def test_a_simulation_works_about_the_hull_alone(moment, guess, monkeypatch) -> None:
+def test_a_simulation_works_about_the_hull_alone(moment, prior_start, monkeypatch) -> None:
     """What it finds there is what it finds in the whole box, to the bit."""
     hull = moment.views.hull.copy()
     hull[:, :, 3:] = False
     low = replace(moment, views=replace(moment.views, hull=hull))
     monkeypatch.setattr(temporal_prior, "GUIDED_BLUR", 1.0)
-    found = guided(low, guess, moment.true).density
+    found = guided(low, prior_start, moment.true).density
     monkeypatch.setattr(temporal_prior, "box_around", lambda voxels, margin: (slice(None),) * 3)
-    np.testing.assert_array_equal(found, guided(low, guess, moment.true).density)
+    np.testing.assert_array_equal(found, guided(low, prior_start, moment.true).density)
     assert found.any()
 
 

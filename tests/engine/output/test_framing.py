@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from smokelift.footage.clip import Clip
-from smokelift.output.framing import NARROWEST, frame_smoke
+from smokelift.output.framing import MIN_ASPECT, frame_smoke
 from smokelift.output.sequence import Sequence
 from smokelift.output.viewer import Viewer
 from smokelift.output.writer import SequenceWriter
@@ -41,7 +41,7 @@ def test_a_column_gets_room_beside_it(plume, tmp_path) -> None:
     column = np.zeros_like(plume.densities[0])
     column[15:17, 15:17, 4:40] = 1
     framing = frame_smoke(written(plume.scene, [column], tmp_path / "out"))
-    assert framing.width >= NARROWEST * framing.height - 2
+    assert framing.width >= MIN_ASPECT * framing.height - 2
 
 
 def test_without_smoke_the_box_is_shown(plume, tmp_path) -> None:

@@ -70,7 +70,7 @@ def test_rays_between_pixels_are_left_out_and_none_is_moved(shot, sharp, step) -
 
 
 def test_detail_that_the_grid_lacks_counts(sharp, draft) -> None:
-    """The working picture has none of it, and is met far better."""
+    """The working picture has none of it, and is fitted far better."""
     with Clip.open(sharp.scene.clip) as clip:
         for frame in reconstruct(clip, sharp.scene, draft):
             assert 15 < frame.figures["psnr"] < frame.figures["psnr_working"] - 5

@@ -113,7 +113,7 @@ def along_the_path(tracked, draft) -> list[Frame]:
 
 
 def test_density_is_carried_from_the_third_frame_on(by_themselves, all_carried) -> None:
-    """The carried density is a part of the first guess, so its share matters once there is a velocity."""
+    """The carried density is a part of the initial density, so its share matters once there is a velocity."""
     for alone, carried in zip(by_themselves, all_carried, strict=True):
         same = np.array_equal(alone.density, carried.density)
         assert same == (alone.number <= 2)
@@ -443,7 +443,7 @@ def test_detail_that_is_made_up_shows_no_motion(plume, draft, by_themselves) -> 
 
 
 def test_smoke_from_a_moving_camera_stands_where_it_stood(plume, tracked, draft, along_the_path) -> None:
-    """The pictures are met, the smoke is in its place to half a voxel; a still camera's would drift off."""
+    """The pictures are fitted, the smoke is in its place to half a voxel; a still camera's would drift off."""
     found = {"path": along_the_path, "still": frames_of(replace(tracked, camera=tracked.camera.at(0)), draft)}
     off = {
         name: [
@@ -486,7 +486,7 @@ def test_smoke_that_a_moving_camera_loses_goes_on(plume, tracked, draft, tmp_pat
 
 
 def test_a_clean_plate_for_every_frame(plume, tracked, draft, tmp_path) -> None:
-    """A wall that passes by behind the smoke is no smoke, and the pictures are met."""
+    """A wall that passes by behind the smoke is no smoke, and the pictures are fitted."""
     blocks = np.random.default_rng(0).uniform(0.05, 0.2, (7, 7, 3)).astype(np.float32)
     wide = np.kron(blocks, np.ones((8, 8, 1), np.float32))
     for n, density in enumerate(plume.densities):

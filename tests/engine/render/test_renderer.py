@@ -244,7 +244,7 @@ def test_thinner_smoke_is_seen_along_the_same_rays(density):
     camera, support = make_camera(EYES["along a diagonal"]), density > 0.3
     thick = Renderer(camera, DOMAIN, Medium(5.0), (), np.ones(3), "absorption", support)
     thick.image(density)
-    thin = Renderer(camera, DOMAIN, Medium(2.0), (), np.ones(3), "absorption", support, thick.sight)
+    thin = Renderer(camera, DOMAIN, Medium(2.0), (), np.ones(3), "absorption", support, thick.ray_support)
     alone = Renderer(camera, DOMAIN, Medium(2.0), (), np.ones(3), "absorption", support)
     picture = thin.image(density, keep_record=True)
     assert (picture == alone.image(density, keep_record=True)).all()

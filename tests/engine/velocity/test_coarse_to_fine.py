@@ -166,8 +166,8 @@ def growing_source():
 def test_inflow_that_is_marked_is_not_taken_for_motion():
     before, after, source = growing_source()
     plain = estimate_velocity(before, after, DT, VOXEL, VelocitySettings(sources=None))
-    told = estimate_velocity(before, after, DT, VOXEL, inflow=ndimage.binary_dilation(source, iterations=2))
-    assert np.linalg.norm(told.centres()) < 0.1 * np.linalg.norm(plain.centres())
+    given = estimate_velocity(before, after, DT, VOXEL, inflow=ndimage.binary_dilation(source, iterations=2))
+    assert np.linalg.norm(given.centres()) < 0.1 * np.linalg.norm(plain.centres())
 
 
 def test_inflow_is_found():

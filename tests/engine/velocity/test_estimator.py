@@ -30,7 +30,7 @@ def test_prediction_is_free_of_divergence_and_keeps_a_uniform_flow():
     ],
 )
 def test_part_of_a_finer_velocity_is_what_the_whole_has_there(shape, box):
-    """Computed around the box alone, over two halvings, with what is known of the estimate."""
+    """Computed around the box alone, on a grid coarsened twice, with what is known of the estimate."""
     rng = np.random.default_rng(2)
     coarse_shape = tuple(-(-n // 4) for n in shape)
     coarse = Velocity(

@@ -62,7 +62,7 @@ def test_slabs_of_a_large_box_are_as_the_box(monkeypatch: pytest.MonkeyPatch) ->
     density, velocity = puff(), flow(1.0)
     density[30:34, 28:32, 40:44] = 0.5
     carried, near = carry(density, velocity, 1.0, 1.0), near_smoke(velocity, density > 0, 1.0, 1.0)
-    monkeypatch.setattr(module, "LARGE", 0)
+    monkeypatch.setattr(module, "MIN_SLAB_VOXELS", 0)
     monkeypatch.setattr(module, "SLAB", 3)
     np.testing.assert_allclose(carry(density, velocity, 1.0, 1.0), carried, atol=1e-5)
     again = near_smoke(velocity, density > 0, 1.0, 1.0)

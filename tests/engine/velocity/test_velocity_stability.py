@@ -180,12 +180,12 @@ def rising_column(speed, frame):
     return np.exp(-(x**2 + y**2) / 25) * texture * ends, (x**2 + y**2 < 49) & (np.abs(z - 6) <= 2 + speed)
 
 
-@pytest.mark.parametrize("told", [False, True], ids=["found", "told"])
+@pytest.mark.parametrize("given", [False, True], ids=["found", "given"])
 @pytest.mark.parametrize("speed", [0.3, 1, 3])
-def test_smoke_rises_from_its_inlet(speed, told):
+def test_smoke_rises_from_its_inlet(speed, given):
     """Read as motion, new smoke turns the flow at the base around."""
     (before, _), (after, inlet) = rising_column(speed, 0), rising_column(speed, 1)
-    found = voxels_a_frame(estimate_velocity(before, after, DT, VOXEL, inflow=inlet if told else None))[..., 2]
+    found = voxels_a_frame(estimate_velocity(before, after, DT, VOXEL, inflow=inlet if given else None))[..., 2]
     for height in (6, 7, 8, 10, 14, 20, 30):
         assert 0.3 < np.average(found[..., height], weights=after[..., height]) / speed < 1.4
 

@@ -68,7 +68,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         unfinished = [state for state in states.values() if not state.finished]
         unknown = [(state.shot, state.record) for state in unfinished if state.record.forecast is None]
         if unknown:
-            say.note(f"Looking at {counted(len(unknown), 'clip')} ...")
+            say.note(f"Inspecting {counted(len(unknown), 'clip')} ...")
         with closing(_look_at_shots(options.scheduler, unknown, stop, say)) as looked_at:
             for shot, record in looked_at:
                 states[shot.name] = read_state(shot)._replace(record=record)
@@ -118,7 +118,7 @@ def _run_remaining(
 def _look_at_shots(
     scheduler: str | None, unknown: Sequence[tuple[Shot, Record]], stop: threading.Event, say: Reporter
 ) -> Generator[tuple[Shot, Record], None, None]:
-    """Look at shots, one after the other or on a cluster, and yield each with its forecast."""
+    """Inspect shots, one after the other or on a cluster, and yield each with its forecast."""
     if scheduler is not None:
         yield from run_on_cluster(unknown, look_at_shot, scheduler, say.note)
     else:

@@ -9,7 +9,7 @@ from typing import Any
 from smokelift.app.options import named_path
 from smokelift.app.progress import Reporter
 from smokelift.checks import counted
-from smokelift.output.proxy import LARGE, TIMES, write_proxies
+from smokelift.output.proxy import MIN_PROXY_VOXELS, TIMES, write_proxies
 from smokelift.output.sequence import Sequence
 
 
@@ -20,7 +20,7 @@ def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
         "proxy",
         parents=[common],
         help=text,
-        description=f"Write {text}. A run writes them itself from {LARGE:,} voxels on.",
+        description=f"Write {text}. A run writes them itself from {MIN_PROXY_VOXELS:,} voxels on.",
     )
     parser.add_argument("directory", type=named_path, help="of the sequence")
     parser.set_defaults(run=run)

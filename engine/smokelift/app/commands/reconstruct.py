@@ -62,7 +62,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     scene, source = scene_of(options)
     device.start(options.device)
     with Clip.open(source) as clip:
-        written_kinds(options.npz)  # before the clip is looked at, which takes minutes
+        written_kinds(options.npz)  # before the clip is inspected, which takes minutes
         reconstruction = reconstruct(clip, scene, settings)
         shot = reconstruction.shot
         require_memory(
@@ -84,9 +84,9 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         say.note(note)
     seconds = time.monotonic() - began
     fit = median_psnr(figures)
-    met = "" if fit is None else f", {fit:.1f} dB inside the smoke at the clip's pixels (median)"
+    fitted = "" if fit is None else f", {fit:.1f} dB inside the smoke at the clip's pixels (median)"
     say.finish(
-        f"{counted(len(sequence.frames), 'frame')} in {options.out} ({seconds:.0f} s){met}.",
+        f"{counted(len(sequence.frames), 'frame')} in {options.out} ({seconds:.0f} s){fitted}.",
         {"directory": str(options.out), "frames": len(sequence.frames), "seconds": round(seconds, 1), "psnr": fit},
     )
 

@@ -22,13 +22,13 @@ DIRECTIONS = 32
 """Random directions, orthogonal to each other, on which patches are projected; always the same ones."""
 
 QUANTILES = 512
-"""At which distributions on a direction are compared."""
+"""Quantiles at which distributions on a direction are compared."""
 
 PATCHES = 20_000
-"""Of a picture and scale about so many count, evenly chosen: forty a quantile say enough, and large grids have ten
-times as many."""
+"""Patches of a picture and scale that count, about, evenly chosen: forty a quantile say enough, and large grids
+have ten times as many."""
 
-SMOKE = 0.05
+SMOKE_SHARE = 0.05
 """Share of a picture's largest value: a patch without a brighter pixel shows no smoke."""
 
 
@@ -135,7 +135,7 @@ def _averaged(picture: Array, scale: int) -> Array:
 def _patches(picture: Array) -> Array:
     """The patches around pixels with smoke near them, each without its mean, [patch, pixel]; one of zeros if none."""
     around = sliding_window_view(np.pad(picture, PATCH // 2), (PATCH, PATCH))
-    rows, columns = np.nonzero(around.max((2, 3)) > SMOKE * picture.max())
+    rows, columns = np.nonzero(around.max((2, 3)) > SMOKE_SHARE * picture.max())
     step = max(1, len(rows) // PATCHES)
     chosen = around[rows[::step], columns[::step]].reshape(-1, PATCH**2)
     return chosen - chosen.mean(1, keepdims=True) if len(chosen) else np.zeros((1, PATCH**2))

@@ -22,7 +22,7 @@ Floats = NDArray[np.float32]
 class GpuBackend:
     """Picture and derivative of one `RenderPlan` in channels; `Renderer` makes colours of them."""
 
-    sight = None
+    ray_support = None
 
     def __init__(self, plan: RenderPlan) -> None:
         self._plan = plan

@@ -1,4 +1,4 @@
-"""Make the picture of the front page, docs/blender_render.png: ``python tests/blender/front_page.py SEQUENCE``.
+"""Make the picture of the front page, docs/blender_render.png: ``python -m benchmarks.blender.front_page SEQUENCE``.
 
 It takes a Python with bpy, and a sequence of the example:
 ``smokelift reconstruct examples/plume/scene.toml --quality fine --frames 25:36 --out SEQUENCE``.
@@ -12,12 +12,12 @@ import tempfile
 from pathlib import Path
 
 import bpy
-from looks import rendered, shown_example
 from mathutils import Matrix, Vector
-from pictures import beside, save
 from PIL import Image
-from room import painted, panel
 
+from benchmarks.blender.looks import rendered, shown_example
+from benchmarks.blender.pictures import beside, save
+from benchmarks.blender.room import painted, panel
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import area_average, linear_to_srgb
 from tests.example_shot import FULL_SIZE, add, set_world

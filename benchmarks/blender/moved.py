@@ -1,4 +1,4 @@
-"""Make the picture of the projection in docs/: ``python tests/blender/moved.py demo/sequence``.
+"""Make the picture of the projection in docs/: ``python -m benchmarks.blender.moved demo/sequence``.
 
 The camera moves away from the clip's. It takes a Python with bpy, and the example's sequence from `make demo`.
 """
@@ -10,11 +10,11 @@ import tempfile
 from pathlib import Path
 
 import bpy
-from looks import FRAME, RIM, rendered, shown_example
 from mathutils import Vector
-from pictures import beside, save
 
 from addon import projection
+from benchmarks.blender.looks import FRAME, RIM, rendered, shown_example
+from benchmarks.blender.pictures import beside, save
 from tests.example_shot import add
 
 SAMPLES = 24

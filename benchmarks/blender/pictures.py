@@ -1,4 +1,7 @@
-"""Make the pictures of the add-on in docs/ from what `make test-blender` left: ``python tests/blender/pictures.py``."""
+"""Make the pictures of the add-on in docs/ from what `make test-blender` left.
+
+python -m benchmarks.blender.pictures
+"""
 
 from __future__ import annotations
 

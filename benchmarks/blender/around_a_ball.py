@@ -1,4 +1,4 @@
-"""The example's smoke in Blender, which goes on around a ball: ``python -m tests.blender.around_a_ball PICTURE``.
+"""The example's smoke in Blender, which goes on around a ball: ``python -m benchmarks.blender.around_a_ball PICTURE``.
 
 Needs bpy and Pillow. Everything is done by the add-on's own buttons.
 """

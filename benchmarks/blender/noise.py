@@ -1,4 +1,4 @@
-"""Make the picture of Cycles' two ways through smoke in docs/: ``python tests/blender/noise.py demo/sequence``.
+"""Make the picture of Cycles' two ways through smoke in docs/: ``python -m benchmarks.blender.noise demo/sequence``.
 
 It takes a Python with bpy 5.0 or later, and the example's sequence from `make demo`. On the left is null scattering, on
 the right marching, without denoising. It prints the processor's seconds of each, and its noise beside a picture of many
@@ -14,9 +14,10 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from looks import shown_example
-from pictures import beside, save
 from PIL import Image
+
+from benchmarks.blender.looks import shown_example
+from benchmarks.blender.pictures import beside, save
 
 FRAME, PERCENT = 30, 75
 SAMPLES, MANY = 32, 256

@@ -1,4 +1,4 @@
-"""Cycles' picture of a result beside the clip: ``python -m tests.blender.beside_the_clip OUT SCENE ...``.
+"""Cycles' picture of a result beside the clip: ``python -m benchmarks.blender.beside_the_clip OUT SCENE ...``.
 
 A SCENE is a folder of `benchmarks.truth.picture` whose clip shows its smoke in a sun, before one colour, or one of
 `benchmarks.background.flames` with fire. Camera, box, sun, medium and background are given to Blender as far as its
@@ -167,7 +167,7 @@ def colours(pictures: list[Any], wanted: Any, inside: Any) -> str:
 
 
 def decibels(pair: list[Any], wanted: Any, inside: Any) -> float:
-    """Of displayed values, without the noise of a pair of pictures."""
+    """Decibels of displayed values, without the noise of a pair of pictures."""
     one, other = (picture[inside] - wanted[inside] for picture in pair)
     return -10 * math.log10(max(float(np.mean(one * other)), 1e-9))
 

@@ -1,4 +1,4 @@
-"""Make the picture of two smokes in a room in docs/: ``python tests/blender/room.py FIRST SECOND``.
+"""Make the picture of two smokes in a room in docs/: ``python -m benchmarks.blender.room FIRST SECOND``.
 
 It takes a Python with bpy and two sequences: the example's from `make demo`, and one of a scene that
 `benchmarks/truth` makes: ``smokelift reconstruct SCENES/puff-1/scene.toml --quality draft --frames 14:18``.
@@ -12,14 +12,14 @@ import tempfile
 from pathlib import Path
 
 import bpy
-from looks import rendered
 from mathutils import Vector
-from pictures import save
 
 import addon
 from addon import volume
 from addon.smoke import new_smoke
 from addon.take import Take
+from benchmarks.blender.looks import rendered
+from benchmarks.blender.pictures import save
 from tests.example_shot import FULL_SIZE, add, add_camera, set_world
 
 SIZE, SAMPLES = (640, 400), 32

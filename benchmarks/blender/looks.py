@@ -1,4 +1,4 @@
-"""Make the picture of the presets and of the composite in docs/: ``python tests/blender/looks.py demo/sequence``.
+"""Make the picture of the presets and of the composite in docs/: ``python -m benchmarks.blender.looks demo/sequence``.
 
 It takes a Python with bpy, and the example's sequence from `make demo`.
 """
@@ -10,12 +10,12 @@ import tempfile
 from pathlib import Path
 
 import bpy
-from pictures import beside, save
 from PIL import Image
 
 import addon
 from addon import compositing, look, volume
 from addon.take import Take
+from benchmarks.blender.pictures import beside, save
 from tests.example_shot import FULL_SIZE, set_up_example, smoke
 
 FRAME = 30

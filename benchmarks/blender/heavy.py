@@ -1,4 +1,6 @@
-"""What a proxy saves: ``python -m tests.blender.heavy FOLDER`` writes and plays three frames of 288 x 288 x 496 voxels.
+"""What a proxy saves: write and play three frames of 288 x 288 x 496 voxels.
+
+    python -m benchmarks.blender.heavy FOLDER
 
 The smoke is a cone of noise that fills a quarter of the box, with its velocity.
 """

@@ -1,0 +1,166 @@
+"""What is found of baked smoke whose colour, fire and thickness are known, before several backgrounds.
+
+    python -m benchmarks.background.probes colour | fire | thickness SCENES/plume-1 SCENES/jet-2 ... [--every 2]
+
+A scene is a folder that `benchmarks.truth.picture` filled. Its radiance is multiplied by the colours of light and
+smoke, as single scattering does. *Colour*: scenes where the smoke's own colour was found, and the mean angle between it
+and the true one in degrees. *Fire*: share of the smoke's pixels that is taken for fire, a scene each. *Thickness*:
+source radiance over the true one, as texture shows it, as it is taken, and as it would be without texture; thin smoke
+has 0.3 of its optical depth.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from benchmarks.background.clips import Smoke, backdrop, exposed, filmed, sky, wall
+from smokelift.footage.clip import Clip
+from smokelift.footage.fire import fire_share
+from smokelift.footage.images import Picture
+from smokelift.footage.plate import known_plate
+from smokelift.scene import Medium
+from smokelift.setup.background import find_plates
+from smokelift.setup.choice import UNDETERMINED
+from smokelift.setup.light import ambient_sun
+from smokelift.setup.smoke import sample_smoke
+from smokelift.setup.smoke_colour import smoke_colour
+from smokelift.setup.thickness import smoke_thickness
+
+Array = npt.NDArray[np.float64]
+Plates = Mapping[str, Picture]
+
+LIGHTS = {"white": (1.0, 1.0, 1.0), "4 degrees warm": (1.0, 0.93, 0.84), "10 degrees warm": (1.0, 0.82, 0.64)}
+COLOURS = {
+    "grey": (1.0, 1.0, 1.0),
+    "pale dust": (1.0, 0.87, 0.7),
+    "sepia dust": (1.0, 0.75, 0.48),
+    "orange": (1.0, 0.5, 0.1),
+    "red": (1.0, 0.2, 0.15),
+    "violet": (0.6, 0.25, 1.0),
+    "green": (0.3, 1.0, 0.35),
+}
+
+FLAME = (1.0, 0.4, 0.08)
+"""Colour of the light that the lowest quarter of the smoke adds, up to 2.5."""
+
+STRENGTHS = (0.1, 0.3, 1.0)
+"""Brightness of the smoke that a flame is put into, over that of the scene."""
+
+THIN = 0.3
+"""Share of the optical depth that thin smoke has."""
+
+
+def main() -> None:
+    """Print the table of a probe, row by row."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("probe", choices=PROBES)
+    parser.add_argument("scenes", nargs="+", type=Path)
+    parser.add_argument("--every", type=int, default=1, help="take every so many frames")
+    options = parser.parse_args()
+    smokes = {folder.name: Smoke.load(folder) for folder in options.scenes}
+    smokes = {
+        name: Smoke(smoke.radiance[:: options.every], smoke.transmittance[:: options.every])
+        for name, smoke in smokes.items()
+    }
+    _, rows, columns = next(iter(smokes.values())).radiance.shape
+    shape = (rows, columns)
+    plates = {"black": backdrop(shape, 0), "brick wall": wall(shape), "sky": sky(shape)}
+    for number, row in enumerate(PROBES[options.probe](smokes, plates)):
+        print(f"| {' | '.join(row)} |", flush=True)
+        if number == 0:
+            print("| --- " * len(row) + "|")
+
+
+def _colour(smokes: Mapping[str, Smoke], plates: Plates) -> Iterator[list[str]]:
+    rows, columns, _ = plates["black"].shape
+    shape = (rows, columns)
+    plates = {
+        **plates,
+        "blue sky": backdrop(shape, (0.25, 0.45, 0.9)),
+        "lawn": wall(shape) * np.array([0.6, 1.4, 0.4], np.float32),
+    }
+    yield ["light", "smoke", *plates]
+    for light, tint in LIGHTS.items():
+        for name, colour in COLOURS.items():
+            yield [
+                light,
+                name,
+                *(_angles(smokes, np.array(tint), np.array(colour), plate) for plate in plates.values()),
+            ]
+
+
+def _angles(smokes: Mapping[str, Smoke], light: Array, colour: Array, plate: Picture) -> str:
+    angles = []
+    behind: Picture = (plate * light).astype(np.float32)
+    for smoke in smokes.values():
+        clip = _filmed(smoke, colour * light, behind)
+        found = smoke_colour(sample_smoke(clip, known_plate(behind, clip)), np.ones(3))
+        if found.choice.chosen != UNDETERMINED:
+            own = np.array(found.color)
+            cosine = float(own @ colour / (np.linalg.norm(own) * np.linalg.norm(colour)))
+            angles.append(math.degrees(math.acos(min(cosine, 1.0))))
+    return f"{len(angles)} of {len(smokes)}" + (f", {np.mean(angles):.0f}" if angles else "")
+
+
+def _fire(smokes: Mapping[str, Smoke], plates: Plates) -> Iterator[list[str]]:
+    yield ["smoke", "flame", *plates]
+    cases = [(name, np.array(colour), False) for name, colour in COLOURS.items()]
+    cases += [(f"grey, {strength:g} as bright", np.full(3, strength), True) for strength in STRENGTHS]
+    for name, colour, burns in cases:
+        shares = [[_fire_share(smoke, colour, burns, plate) for smoke in smokes.values()] for plate in plates.values()]
+        yield [name, "yes" if burns else "no", *(", ".join(f"{share:.1%}" for share in each) for each in shares)]
+
+
+def _fire_share(smoke: Smoke, colour: Array, burns: bool, plate: Picture) -> float:
+    clip = _filmed(smoke, colour, plate, flame(smoke) if burns else None)
+    samples = sample_smoke(clip, known_plate(plate, clip))
+    return fire_share(samples.colours, samples.behind)
+
+
+def flame(smoke: Smoke) -> Picture:
+    """Light (frames, rows, columns, 3) of a fire at the base of the smoke."""
+    rows = smoke.radiance.shape[1]
+    height = (rows - np.arange(rows)) / rows
+    hot = np.exp(-((height / 0.25) ** 2))[:, None] * (1 - smoke.transmittance) ** 2
+    return np.asarray(2.5 * hot[..., None] * np.array(FLAME), np.float32)
+
+
+def _filmed(smoke: Smoke, colour: Array, plate: Picture, light: Picture | None = None) -> Clip:
+    """The clip of smoke of a colour before a plate, and of light that is added."""
+    pictures = smoke.radiance[..., None] * colour + smoke.transmittance[..., None] * plate
+    pictures = (pictures if light is None else pictures + light).astype(np.float32)
+    return filmed(np.clip(exposed(pictures, np.ones(len(pictures))), 0, 1), "baked")
+
+
+def _thickness(smokes: Mapping[str, Smoke], plates: Plates) -> Iterator[list[str]]:
+    yield ["scene", "smoke", "behind", "found", "taken", "without"]
+    for name, baked in smokes.items():
+        for kind, share in (("as baked", 1.0), ("thin", THIN)):
+            smoke = baked.thinned(share)
+            for behind, plate in plates.items():
+                yield [name, kind, behind, *_sources(smoke, plate, True)]
+            yield [name, kind, "brick wall, estimated", *_sources(smoke, plates["brick wall"], False)]
+
+
+def _sources(smoke: Smoke, plate: Picture, given: bool) -> list[str]:
+    """Source radiance over the true one, three times."""
+    true = float(smoke.radiance.sum() / (1 - smoke.transmittance).sum())
+    clip = filmed(exposed(smoke.before(plate), np.ones(len(smoke.radiance))), "baked")
+    plates = known_plate(plate, clip) if given else find_plates(clip, None, None).plates
+    samples, medium = sample_smoke(clip, plates), Medium(albedo=1.0)
+    source = smoke_thickness(samples.textures).source
+    suns = [ambient_sun(samples, medium, each) for each in (source, None)]
+    taken = [float(np.mean(sun.irradiance)) / (4 * np.pi) / true for sun in suns]
+    return ["undetermined" if source is None else f"{source.mean() / true:.2f}", *(f"{each:.2f}" for each in taken)]
+
+
+PROBES = {"colour": _colour, "fire": _fire, "thickness": _thickness}
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,140 @@
+"""The words: names, docstrings, messages and pages say what `CONTRIBUTING.md` says, and not what it says not."""
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+from test_docs import IN_WORK
+
+ROOT = Path(__file__).resolve().parents[1]
+
+BANNED = {
+    "foot": r"\b(?:foot|feet)\b",
+    "clots": r"\bclots?\b",
+    "streaks": r"\bstreak\w*",
+    "banding": r"\bbanding\b",
+    "realism, likeness": r"\b(?:realism|likeness)\b",
+    "halvings": r"\bhalvings\b",
+    "warp (of the solver)": r"\bwarp(?:s|ed|ing)?\b",
+    "push": r"\bpush(?:es|ed|ing)?\b",
+    "thinning": r"\bthinning\b",
+    "guess, evidence guess": r"\bguess\w*",
+    "look, sight, first look, evidence": r"\b(?:evidence|sight|looked at|looking at|look at (?:a|any|every|the|an)\b"
+    r"|(?:a|an|one|first|another|second|earlier|later) look)\b|\bfirst_look\b|\bFirstLook\b|\bdef looks\b|\bSight\b",
+    "turn_run": r"\bturn_run\b",
+    "hold back": r"\b(?:hold(?:s|ing)?|held)[ _]back\b",
+    "told, not told": r"\b(?:un)?told\b",
+    "met": r"\bmet\b",
+    "FEWEST, MOST, LEAST": r"\b(?:FEWEST|MOST|LEAST)(?:_[A-Z_]+)?\b",
+    "Wave::cos1": r"\bWave::\w+",
+}
+"""What the table says not, as it stands there, and how it is found."""
+
+CASED = ("FEWEST, MOST, LEAST", "Wave::cos1")
+"""Those of which capital letters make another word."""
+
+ALLOWED = (
+    r"line of sight",
+    r"look-up",
+    r"a look of its own",  # what *Look* in Blender sets
+    r"visibility push",
+    r"warp[ _]error|warps? a density exactly",  # a measure of the literature
+    r"looks? at (?:the|a|an) (?:screen|point|zip)",
+)
+"""Standard terms, and cameras, which look at something."""
+
+GUESS = "the choice *Guess* of the panel, which is rewritten"
+
+EXCEPTIONS = {
+    "engine/smokelift/footage": "its modules are rewritten as backdrop and media",
+    "engine/smokelift/setup": "its modules are rewritten as geometry, illumination and shot",
+    "engine/smokelift/direct": "its simulation is rewritten with larger boxes",
+    "engine/smokelift/density/axis": "the place in depth is measured anew",
+    "tests/engine/footage": "with its modules",
+    "tests/engine/setup": "with its modules",
+    "tests/engine/direct": "with its modules",
+    "tests/engine/density/test_axis": "with its modules",
+    "engine/smokelift/render/environment_count.py": "setup imports its constants",
+    "addon/camera_table.py": GUESS,
+    "addon/properties.py": GUESS,
+    "addon/shot_setup.py": GUESS,
+    "addon/smoke": GUESS,
+    "tests/addon/inside": GUESS,
+    "docs/blender.md": "rewritten with the add-on",
+    "docs/directing.md": "rewritten with the add-on",
+    "docs/shooting.md": "rewritten with the add-on",
+    "tests/test_vocabulary.py": "the list itself",
+    "CONTRIBUTING.md": "the table itself",
+    **{f"docs/experiments/{page}.md": "shortened when its subject is measured anew" for page in IN_WORK},
+}
+"""Where other words still stand, by the beginning of the path, and why."""
+
+STANDARD = re.compile("|".join(ALLOWED), re.IGNORECASE)
+FOUND = re.compile("|".join(pattern if words in CASED else f"(?i:{pattern})" for words, pattern in BANNED.items()))
+
+FOLDERS = ("addon", "benchmarks", "cpp", "docs", "engine", "examples", "integrations", "tests", "tools")
+SUFFIXES = {".cpp", ".h", ".md", ".py", ".pyi", ".toml"}
+
+
+def name(path: Path) -> str:
+    """The path within the checkout."""
+    return path.relative_to(ROOT).as_posix()
+
+
+FILES = [
+    path
+    for path in [*ROOT.glob("*.md"), *(path for folder in FOLDERS for path in sorted((ROOT / folder).rglob("*")))]
+    if path.suffix in SUFFIXES and not name(path).startswith(tuple(EXCEPTIONS))
+]
+
+
+def banned(text: str) -> set[str]:
+    """What of a text the table says not."""
+    lines = " ".join(line.strip().lstrip("#/ ") for line in text.splitlines())
+    return {match[0] for match in FOUND.finditer(re.sub(STANDARD, "", lines))}
+
+
+def test_files_have_the_words_of_the_field() -> None:
+    found = {name(path): banned(path.read_text(encoding="utf-8")) for path in FILES}
+    assert {path: words for path, words in found.items() if words} == {}
+
+
+def test_the_table_is_what_is_enforced() -> None:
+    rows = re.findall(
+        r"^\| ([^|]+) \| ([^|]+) \|$", (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8"), re.MULTILINE
+    )
+    assert {avoided for say, avoided in rows if say != "say" and "---" not in say} == set(BANNED)
+
+
+FRAGMENT = re.compile(r"(?:Of|That of|Those|By|In|From|As|With|On|At|The same) ")
+"""How docstrings begin that leave their noun to the name beside them."""
+
+
+def docstrings(source: str) -> list[str]:
+    """Every string of a module that stands by itself."""
+    bodies = [body for node in ast.walk(ast.parse(source)) if isinstance(body := getattr(node, "body", None), list)]
+    values = [each.value for body in bodies for each in body if isinstance(each, ast.Expr)]
+    return [each.value for each in values if isinstance(each, ast.Constant) and isinstance(each.value, str)]
+
+
+def test_docstrings_have_their_noun() -> None:
+    modules = [
+        path for path in FILES if path.suffix == ".py" and name(path).startswith(("benchmarks", "engine", "tools"))
+    ]
+    found = {
+        name(path): [each for each in docstrings(path.read_text(encoding="utf-8")) if FRAGMENT.match(each)]
+        for path in modules
+    }
+    assert {path: each for path, each in found.items() if each} == {}
+
+
+@pytest.mark.parametrize("sentence", ["It is told.", "first_look(clip)", "LEAST_SHARE = 0.3", "looked\n    at"])
+def test_a_word_is_found(sentence: str) -> None:
+    assert banned(sentence)
+
+
+@pytest.mark.parametrize("sentence", ["It looks like smoke.", "the line of\n# sight", "most of it", "at least"])
+def test_other_words_stay(sentence: str) -> None:
+    assert not banned(sentence)
