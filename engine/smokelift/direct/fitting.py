@@ -14,12 +14,11 @@ does not tell it, since estimates err by more than that. How far the smoke rises
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from scipy import optimize
 
 from smokelift.direct.constraint import Mask
 from smokelift.direct.fire import fit_fire
@@ -38,7 +37,13 @@ MIN_MOMENTS = 8
 voxel, which is within its error."""
 
 TRIALS = 6
-"""Buoyancies that are tried: the centre's height is nearly linear in it."""
+"""Steps of the secant method at most: the centre's height is nearly linear in the buoyancy."""
+
+FLAT = 1e-6
+"""Voxels of difference in height, at most, that are rounding."""
+
+PRECISION = 0.01
+"""Relative change of the buoyancy below which it is found."""
 
 
 def fit_simulation(
@@ -111,8 +116,24 @@ def _buoyancy(moments: Sequence[Moment], dt: float, inlets: Mask, dissipation: f
     density = moments[half].density
     typical = float(np.vdot(density, density) / density.sum(dtype=np.float64))
     by_a_voxel = moments[0].velocity.voxel_size / (typical * (half * dt) ** 2)
-    found = optimize.root_scalar(missed, x0=0.0, x1=by_a_voxel, method="secant", rtol=0.01, maxiter=TRIALS).root
-    return float(found) if math.isfinite(found) else 0.0
+    return _root(missed, by_a_voxel)
+
+
+def _root(function: Callable[[float], float], start: float) -> float:
+    """The root of a function that is nearly linear, by the secant method from 0; 0 where the function does not change.
+
+    Of the package's libraries `scipy.optimize` alone is not in the extension.
+    """
+    before, now = 0.0, start
+    at_before, at_now = function(before), function(now)
+    for _ in range(TRIALS):
+        if abs(at_now - at_before) <= FLAT:
+            return 0.0
+        before, now, at_before = now, now - at_now * (now - before) / (at_now - at_before), at_now
+        if abs(now - before) <= PRECISION * abs(now):
+            break
+        at_now = function(now)
+    return now
 
 
 def _dissipation(moments: Sequence[Moment], dt: float, inlets: Mask) -> float:

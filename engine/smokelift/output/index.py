@@ -29,7 +29,7 @@ BOX = "box"
 is simulated outgrows the clip's."""
 
 SAME_SIZE = 1e-3
-"""By which part the sizes of voxels may differ that count as the same: places have so many digits at least."""
+"""Relative difference below which two sizes of voxels are the same: files hold their edges with so many digits."""
 
 FILES = ("path", "image")
 """Keys of a scene that hold paths."""
