@@ -102,6 +102,22 @@ def test_the_truth_beside_itself(perfect, truth, capsys) -> None:
     assert figures["warp_error"] == pytest.approx(figures["warp_error_truth"], abs=1e-3)
 
 
+def test_smoke_that_has_left_the_truths_box(plume, perfect, truth, tmp_path, capsys) -> None:
+    """It is compared in that box: what is beyond makes no difference."""
+    domain = plume.scene.domain
+    larger = domain.grown((8, 0, 0), (0, 0, 8))
+    with SequenceWriter(tmp_path / "out", plume.scene, {"density": {"scattering": "single"}}, npz=True) as writer:
+        for number, density in enumerate(plume.densities, 1):
+            box = domain if number == 1 else larger
+            faces = Velocity.zero(box.resolution, box.voxel_size).faces
+            faces[2][:] = RISE * box.voxel_size * 24
+            whole = np.full(box.shape, 0.5, np.float32)
+            whole[domain.slices_in(box)] = density
+            writer.write(number, whole, faces, box=box)
+    figures = evaluate(capsys, tmp_path / "out", "--truth", truth)["truth"]
+    assert figures["density_error"] < 1e-3
+
+
 def test_a_wrong_sequence_beside_the_truth(plume, truth, tmp_path, capsys) -> None:
     """Smoke that lies too deep and is said to stand still."""
     folder = write(tmp_path / "out", plume.scene, [np.roll(d, 4, 1) for d in plume.densities], speed=0.0)
