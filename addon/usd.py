@@ -21,13 +21,12 @@ def complete_import(folder: Path) -> None:
     """
     try:
         note = json.loads((folder / EXPORT_FILE).read_text(encoding="utf-8"))
-        medium, grids = note["medium"], note["grids"]
-        known = {**note, "medium": {"color": (1.0, 1.0, 1.0), **medium}}  # that of earlier versions has no color
+        grids, _ = note["grids"], note["medium"]
     except (OSError, ValueError, LookupError, TypeError):
         return
     for obj in bpy.data.objects:
         if obj.type == "VOLUME" and not obj.data.materials and absolute(obj.data.filepath).parent == folder:
-            fit_look(obj, known)
+            fit_look(obj, note)
             obj.data.velocity_unit = "SECOND"
             obj.data.velocity_grid = next((name for name in grids if name.startswith("vel")), "velocity")
 
