@@ -19,7 +19,7 @@ from benchmarks.blender.pictures import beside, save
 from tests.example_shot import FULL_SIZE, set_up_example, smoke
 
 FRAME = 30
-PERCENT, SAMPLES = 75, 24
+PERCENT, SAMPLES = 30, 24
 RIM = 0.3
 """Metres from the floor to the bowl's rim, where the smoke's box begins."""
 
