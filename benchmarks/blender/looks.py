@@ -19,7 +19,7 @@ from benchmarks.blender.pictures import beside, save
 from tests.example_shot import FULL_SIZE, set_up_example, smoke
 
 FRAME = 30
-PERCENT, SAMPLES = 75, 24
+PERCENT, SMALL, SAMPLES = 75, 30, 24
 RIM = 0.3
 """Metres from the floor to the bowl's rim, where the smoke's box begins."""
 
@@ -32,16 +32,16 @@ def main() -> None:
         bpy.ops.smokelift.set_up()
         for preset in look.PRESETS:
             bpy.ops.smokelift.use_look(preset=preset)
-            pictures.append(rendered(scene, Path(folder)))
+            pictures.append(rendered(scene, Path(folder), SMALL))
         obj.smokelift.plate_place = "COMPOSITE"
         bpy.ops.smokelift.set_up()
         scene.objects[compositing.FLOOR].location.z -= RIM
         bpy.ops.smokelift.use_look(preset="SMOKE")
-        pictures.append(rendered(scene, Path(folder)))
+        pictures.append(rendered(scene, Path(folder), SMALL))
         obj.location.x += 0.55
         bpy.data.objects["Sun"].rotation_euler = (0.9, 0.0, 0.9)
         bpy.ops.smokelift.use_look(preset="SOOT")
-        pictures.append(rendered(scene, Path(folder)))
+        pictures.append(rendered(scene, Path(folder), SMALL))
     save("blender_looks.png", beside(pictures))
 
 
@@ -59,9 +59,9 @@ def shown_example(sequence: Path, samples: int, frame: int) -> tuple[bpy.types.S
     return scene, obj
 
 
-def rendered(scene: bpy.types.Scene, folder: Path) -> Image.Image:
+def rendered(scene: bpy.types.Scene, folder: Path, percent: int = PERCENT) -> Image.Image:
     """The current frame, small."""
-    scene.render.resolution_percentage = PERCENT
+    scene.render.resolution_percentage = percent
     scene.render.image_settings.file_format = "PNG"
     scene.render.filepath = str(folder / "render.png")
     bpy.ops.render.render(write_still=True)

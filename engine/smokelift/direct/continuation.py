@@ -189,7 +189,7 @@ def _simulated(
             box = larger
         moment = emerged(simulation.next(moment, step), clip.slices_in(box), cut, step, dt)
         mass = float(moment.density.sum(dtype=np.float64))
-        moment = dissolved(moment, growth.stopped(box), dt)
+        moment = dissolved(moment, growth.stopped(box), dt, box.first_in(clip))
         gone = 1 - float(moment.density.sum(dtype=np.float64)) / mass if mass > 0 else 0.0
         left = np.float32(_share_left(step, continuation))
         faded = replace(

@@ -35,6 +35,15 @@ FADE = 0.25
 FADE_POWER = 2.0
 """Power of the distance to such a side that is left of the smoke: its value and its slope end at zero."""
 
+AT_SIDE = np.float32(0.5)
+"""Voxels from the surface at which smoke is gone to a voxel's centre, at least."""
+
+BUMPS = 0.6
+"""Share of that length by which the surface has bumps at which the smoke is gone."""
+
+WAVES = ((0.3, 0.9, 0.0), (1.4, 1.3, 2.1), (2.5, 0.7, 4.0), (2.0, 2.1, 1.0))
+"""Of the bumps: direction in radians, number in a fade's length, and phase. No two agree, so no pattern is seen."""
+
 EMERGING = 1.0
 """Seconds after the clip in which smoke becomes dense that comes out of a side that had cut it. The clip shows none
 beyond, and smoke that came out at once would have a flat top."""
@@ -151,24 +160,48 @@ def in_larger_box(moment: Moment, ends: Moves, before: Surroundings, after: Surr
     return Moment(np.pad(moment.density, ends), flow.with_faces(faces), flame)
 
 
-def dissolved(moment: Moment, stopped: tuple[Side, ...], dt: float) -> Moment:
+def dissolved(moment: Moment, stopped: tuple[Side, ...], dt: float, first: tuple[int, ...] = (0, 0, 0)) -> Moment:
     """A moment whose smoke has lost what it loses in a step on its way to sides that cannot move.
 
-    What is left of it goes with the distance to the side to the power `FADE_POWER`. So it is gone at the side however
-    fast it gets there, and what does not move towards it stays.
+    What is left of it goes with the distance to the power `FADE_POWER`, to a surface before the side that has bumps. So
+    it is gone there however fast it arrives, what does not move towards it stays, and its end is not straight.
+
+    Parameters
+    ----------
+    moment
+        The moment.
+    stopped
+        The sides.
+    dt
+        Seconds of the step.
+    first
+        Voxel at which the box begins, counted from the clip's box: the bumps stay where they are when the box grows.
     """
     left = np.ones((), np.float32)
+    shape = moment.density.shape
     for side, axis, is_high in _open(()):
         if side not in stopped:
             continue
-        count = moment.density.shape[axis]
-        inside = (np.arange(count, dtype=np.float32) + 0.5).reshape([-1 if d == axis else 1 for d in range(3)])
-        distance = count - inside if is_high else inside
+        count, band = shape[axis], np.float32(FADE * shape[axis])
+        inside = np.arange(count, dtype=np.float32).reshape([-1 if d == axis else 1 for d in range(3)])
+        distance = (count - 1 - inside if is_high else inside) - BUMPS * band * _bumps(shape, axis, float(band), first)
         voxels = np.float32((1 if is_high else -1) * dt / moment.velocity.voxel_size)
-        moved = voxels * at_centres(moment.velocity.faces)[axis]
-        before, now = (np.minimum(d, FADE * count) for d in (distance + np.maximum(moved, 0), distance))
-        left = left * (now / before) ** np.float32(FADE_POWER)
+        moved = np.maximum(voxels * at_centres(moment.velocity.faces)[axis], 0)
+        now = np.clip(distance, 0, band)
+        before = np.minimum(now + moved, band)
+        left = left * ((now + AT_SIDE) / (before + AT_SIDE)) ** np.float32(FADE_POWER)
     return _thinned(moment, left)
+
+
+def _bumps(shape: tuple[int, ...], axis: int, width: float, first: tuple[int, ...]) -> Array:
+    """Bumps from 0 to 1 over a side across an axis: waves in several directions, a few of them about a width long."""
+    total = np.zeros((), np.float32)
+    places = np.ix_(*((1.0 + start + np.arange(n)) / width for n, start in zip(shape, first, strict=True)))
+    one, other = (place for d, place in enumerate(places) if d != axis)
+    for angle, pitch, phase in WAVES:
+        wave = np.cos(2 * np.pi * pitch * (np.cos(angle) * one + np.sin(angle) * other) + phase + axis)
+        total = total + wave.take([0], axis).astype(np.float32) / len(WAVES)
+    return np.float32(0.5) + np.float32(0.5) * total
 
 
 def emerged(moment: Moment, clip: tuple[slice, ...], cut: tuple[Side, ...], step: int, dt: float) -> Moment:
