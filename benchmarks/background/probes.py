@@ -24,12 +24,10 @@ from smokelift.footage.clip import Clip
 from smokelift.footage.fire import fire_share
 from smokelift.footage.images import Picture
 from smokelift.footage.plate import known_plate
-from smokelift.scene import Medium
 from smokelift.setup.background import find_plates
 from smokelift.setup.choice import UNDETERMINED
-from smokelift.setup.light import ambient_sun
 from smokelift.setup.smoke import sample_smoke
-from smokelift.setup.smoke_colour import smoke_colour
+from smokelift.setup.source import smoke_colour, source_radiance
 from smokelift.setup.thickness import smoke_thickness
 
 Array = npt.NDArray[np.float64]
@@ -100,9 +98,9 @@ def _angles(smokes: Mapping[str, Smoke], light: Array, colour: Array, plate: Pic
     behind: Picture = (plate * light).astype(np.float32)
     for smoke in smokes.values():
         clip = _filmed(smoke, colour * light, behind)
-        found = smoke_colour(sample_smoke(clip, known_plate(behind, clip)), np.ones(3))
-        if found.choice.chosen != UNDETERMINED:
-            own = np.array(found.color)
+        color, choice = smoke_colour(sample_smoke(clip, known_plate(behind, clip)), np.ones(3))
+        if choice.chosen != UNDETERMINED:
+            own = np.array(color)
             cosine = float(own @ colour / (np.linalg.norm(own) * np.linalg.norm(colour)))
             angles.append(math.degrees(math.acos(min(cosine, 1.0))))
     return f"{len(angles)} of {len(smokes)}" + (f", {np.mean(angles):.0f}" if angles else "")
@@ -153,10 +151,9 @@ def _sources(smoke: Smoke, plate: Picture, given: bool) -> list[str]:
     true = float(smoke.radiance.sum() / (1 - smoke.transmittance).sum())
     clip = filmed(exposed(smoke.before(plate), np.ones(len(smoke.radiance))), "baked")
     plates = known_plate(plate, clip) if given else find_plates(clip, None, None).plates
-    samples, medium = sample_smoke(clip, plates), Medium(albedo=1.0)
-    source = smoke_thickness(samples.textures).source
-    suns = [ambient_sun(samples, medium, each) for each in (source, None)]
-    taken = [float(np.mean(sun.irradiance)) / (4 * np.pi) / true for sun in suns]
+    samples = sample_smoke(clip, plates)
+    source, _ = smoke_thickness(samples.textures)
+    taken = [float(source_radiance(samples, each).mean()) / true for each in (source, None)]
     return ["undetermined" if source is None else f"{source.mean() / true:.2f}", *(f"{each:.2f}" for each in taken)]
 
 

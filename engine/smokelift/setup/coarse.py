@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
-from smokelift.footage.clip import Clip
+import numpy as np
+from numpy.typing import NDArray
+
 from smokelift.footage.matte import matte
-from smokelift.footage.plate import Plate, Plates
-from smokelift.footage.working_picture import CameraError, WorkingPicture, working_picture
+from smokelift.footage.plate import Plate
+from smokelift.footage.working_picture import CameraError, working_picture
 from smokelift.render import Image
-from smokelift.scene import Camera, CompleteScene, Domain, Scattering
+from smokelift.scene import Camera, CompleteScene, Domain, Light, Scattering
 from smokelift.scene.projection import voxel_width
+from smokelift.setup.shot import ShotView
 
 LONGEST = 32
 """Voxels along the longest side at most: a few per cent of the work of 96, with every large shadow in its place."""
 
-FEWEST = 4
+SHORTEST = 4
 """Voxels along the shortest side at least."""
 
 PIXELS = 2.0
@@ -25,67 +29,74 @@ PIXELS = 2.0
 
 
 @dataclass(frozen=True, eq=False)
-class Halves:
-    """A frame as two small pictures, each from the pixels of one colour of a chequerboard; made once it is asked for.
+class CoarseView:
+    """One camera's picture of one moment, at two pixels of the clip a coarse voxel at least.
 
     Attributes
     ----------
-    clip, number
-        Where the frame is from.
-    working
-        The small picture.
-    """
-
-    clip: Clip
-    number: int
-    working: WorkingPicture
-
-    @property
-    def fitted(self) -> Image:
-        """One of them, (rows, columns, 3)."""
-        return self._both[0]
-
-    @property
-    def held_out(self) -> Image:
-        """The other."""
-        return self._both[1]
-
-    @cached_property
-    def _both(self) -> tuple[Image, Image]:
-        working = self.working
-        first = (working.top + working.left) % 2  # the colours are those of the whole picture's pixels
-        return self.clip.chequered_averages(self.number, *working.camera.size, working.part, first)
-
-
-@dataclass(frozen=True, eq=False)
-class CoarseFrame:
-    """One frame before a coarse grid.
-
-    Attributes
-    ----------
-    scene
-        With the camera of the small picture and the coarse domain.
+    camera
+        Of the small picture.
     plate
         Of the small picture.
     picture : (rows, columns, 3)
         The small picture, linear radiance.
-    halves
-        The same from one half of the clip's pixels each.
+    read_halves
+        Makes the same of the two colours of a chequerboard of the clip's pixels each.
+    """
+
+    camera: Camera
+    plate: Plate
+    picture: Image
+    read_halves: Callable[[], tuple[Image, Image]]
+
+    @property
+    def fitted(self) -> Image:
+        """The picture (rows, columns, 3) of one half of the clip's pixels."""
+        return self._halves[0]
+
+    @property
+    def held_out(self) -> Image:
+        """That of the other half."""
+        return self._halves[1]
+
+    @cached_property
+    def smoke(self) -> NDArray[np.bool_]:
+        """Pixels (rows, columns) that show smoke."""
+        return matte(self.picture, self.plate).mask
+
+    def over(self, gain: NDArray[np.float32]) -> CoarseView:
+        """The view with its pictures and background over a gain (3,)."""
+        plate = self.plate.through(lambda part: part / gain if part.ndim == 3 else part)
+        return CoarseView(self.camera, plate, self.picture / gain, lambda: (self.fitted / gain, self.held_out / gain))
+
+    @cached_property
+    def _halves(self) -> tuple[Image, Image]:
+        return self.read_halves()
+
+
+@dataclass(frozen=True, eq=False)
+class CoarseFrame:
+    """One moment before a coarse grid.
+
+    Attributes
+    ----------
+    scene
+        With the first camera's small picture and the coarse domain.
+    views
+        What the cameras saw, the input's first.
     """
 
     scene: CompleteScene
-    plate: Plate
-    picture: Image
-    halves: Halves
+    views: tuple[CoarseView, ...]
 
     @property
     def shows_smoke(self) -> bool:
-        """Whether it does."""
-        return bool(matte(self.picture, self.plate).mask.any())
+        """Whether every camera does."""
+        return all(bool(view.smoke.any()) for view in self.views)
 
-    def in_light_of(self, scene: CompleteScene) -> CoarseFrame:
-        """The frame with the lights of a scene."""
-        return replace(self, scene=replace(self.scene, lights=scene.lights))
+    def lit_by(self, lights: tuple[Light, ...]) -> CoarseFrame:
+        """The frame with other lights."""
+        return replace(self, scene=replace(self.scene, lights=lights))
 
     def scattered_by(self, scattering: Scattering) -> CoarseFrame:
         """The frame with another model of scattering."""
@@ -98,29 +109,27 @@ class CoarseClip:
 
     Attributes
     ----------
-    clip
-        The footage.
+    views
+        The cameras, the input first.
     scene
         With the camera of the clip's full pictures and the fine domain.
-    plates
-        Of the full pictures.
     """
 
-    clip: Clip
+    views: Sequence[ShotView]
     scene: CompleteScene
-    plates: Plates
+    _frames: dict[tuple[int, int], CoarseFrame | None] = field(default_factory=dict)
 
     def frame(self, number: int, times: int = 1) -> CoarseFrame | None:
         """A frame on a grid so many times finer than `LONGEST` asks for; None if it does not show the domain."""
         key = number, times
         if key not in self._frames:
-            camera, plate = self.scene.camera.at(number), self.plates.at(number)
-            self._frames[key] = coarse_frame(self.clip, number, camera, self.scene, plate, times * LONGEST)
+            self._frames[key] = coarse_frame(self.views, number, self.scene, times * LONGEST)
         return self._frames[key]
 
-    @cached_property
-    def _frames(self) -> dict[tuple[int, int], CoarseFrame | None]:
-        return {}
+    def smoky(self, numbers: Sequence[int]) -> dict[int, CoarseFrame]:
+        """Those of some frames that show smoke, by their numbers."""
+        frames = {number: self.frame(number) for number in numbers}
+        return {number: frame for number, frame in frames.items() if frame is not None and frame.shows_smoke}
 
 
 def coarse_domain(domain: Domain, pixels: float, most_voxels: int = LONGEST) -> Domain:
@@ -140,12 +149,12 @@ def coarse_domain(domain: Domain, pixels: float, most_voxels: int = LONGEST) -> 
     common = math.gcd(*domain.resolution)
     for times in (n for n in range(1, common + 1) if common % n == 0):
         counts = [n // times for n in domain.resolution]
-        if max(counts) <= most and min(counts) >= FEWEST:
+        if max(counts) <= most and min(counts) >= SHORTEST:
             if max(counts) >= most / 2:
                 return replace(domain, resolution=(counts[0], counts[1], counts[2]))
             break
     # nor so coarse that a side has less than one
-    times_finer = min(max(longest / max(most, FEWEST), 1.0), min(domain.resolution))
+    times_finer = min(max(longest / max(most, SHORTEST), 1.0), min(domain.resolution))
     voxel = domain.voxel_size * times_finer
     # never beyond the box, where a light may stand
     x, y, z = (max(1, math.floor(n / times_finer + 1e-6)) for n in domain.resolution)
@@ -153,31 +162,36 @@ def coarse_domain(domain: Domain, pixels: float, most_voxels: int = LONGEST) -> 
 
 
 def coarse_frame(
-    clip: Clip, number: int, camera: Camera, scene: CompleteScene, plate: Plate, most_voxels: int = LONGEST
+    views: Sequence[ShotView], number: int, scene: CompleteScene, most_voxels: int = LONGEST
 ) -> CoarseFrame | None:
-    """Make a frame coarse; None if its camera does not see the domain.
+    """Make a frame coarse; None if one of the cameras does not see the domain.
 
     Parameters
     ----------
-    clip, number
-        The frame.
-    camera
-        Of the full picture, where it is in this frame.
+    views
+        The cameras, the input first.
+    number
+        Of the frame.
     scene
         With the fine domain.
-    plate
-        Of the full picture.
     most_voxels
         Along the longest side of the coarse domain, at most.
     """
     try:
-        domain = coarse_domain(scene.domain, voxel_width(camera, scene.domain), most_voxels)
-        working = working_picture(camera, domain)
+        domain = coarse_domain(scene.domain, voxel_width(views[0].camera.at(number), scene.domain), most_voxels)
+        seen = tuple(_coarse_view(view, number, domain) for view in views)
     except CameraError:
         return None
-    return CoarseFrame(
-        replace(scene, camera=working.camera, domain=domain),
-        plate.through(working.cut, working.pixels),
-        working.of(clip, number),
-        Halves(clip, number, working),
-    )
+    return CoarseFrame(replace(scene, camera=seen[0].camera, domain=domain), seen)
+
+
+def _coarse_view(view: ShotView, number: int, domain: Domain) -> CoarseView:
+    """What one camera saw of a frame."""
+    working = working_picture(view.camera.at(number), domain)
+    first = (working.top + working.left) % 2  # the colours are those of the whole picture's pixels
+
+    def halves() -> tuple[Image, Image]:
+        return view.clip.chequered_averages(number, *working.camera.size, working.part, first)
+
+    plate = view.plates.at(number).through(working.cut, working.pixels)
+    return CoarseView(working.camera, plate, working.of(view.clip, number), halves)

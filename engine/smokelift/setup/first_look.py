@@ -17,7 +17,7 @@ from smokelift.setup.background import FoundPlates, between_bars, cut_notes, exp
 from smokelift.setup.fire import Fire, find_fire
 from smokelift.setup.no_smoke import nothing_seen
 from smokelift.setup.smoke import SmokeSamples, sample_smoke
-from smokelift.setup.smoke_colour import several_colours
+from smokelift.setup.source import several_colours
 
 
 @dataclass(frozen=True, eq=False)

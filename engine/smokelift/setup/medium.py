@@ -2,42 +2,29 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
-from smokelift.scene import Camera, Domain, Light, Medium
+import numpy as np
+from numpy.typing import NDArray
+
+from smokelift.render import scene_optics
+from smokelift.scene import Background, Camera, CompleteScene, Domain, EnvironmentLight, Light, Medium
 from smokelift.setup.choice import Choice
 from smokelift.setup.fire import fire_choice
 from smokelift.setup.first_look import FirstLook
-from smokelift.setup.light import light_colour
-from smokelift.setup.smoke_colour import smoke_colour
+from smokelift.setup.source import smoke_colour
 
 OPTICAL_DEPTH_AT_ONE = 5.0
 """Optical depth of smoke of density 1 across the domain when the medium is not given: thick, not solid."""
 
-
-@dataclass(frozen=True)
-class FoundMedium:
-    """The medium of a shot.
-
-    Attributes
-    ----------
-    medium
-        With the colour of its flame, where fire burns.
-    choices
-        What was measured for it.
-    notes
-        What was assumed, a sentence each.
-    """
-
-    medium: Medium
-    choices: tuple[Choice[Any], ...] = ()
-    notes: tuple[str, ...] = ()
+DIRECTIONS = 8
+"""Directions of an environment of which only the colour is needed."""
 
 
 def find_medium(
     given: Medium | None, look: FirstLook, lights: tuple[Light, ...], camera: Camera, domain: Domain
-) -> FoundMedium:
+) -> tuple[Medium, tuple[Choice[Any], ...], tuple[str, ...]]:
     """Complete the medium.
 
     Parameters
@@ -50,23 +37,37 @@ def find_medium(
         Those that the scene gives; smoke has their colour times its own.
     camera, domain
         Where the light is looked at.
+
+    Returns
+    -------
+    medium
+        With the colour of its flame, where fire burns.
+    choices
+        What was measured for it.
+    notes
+        What was assumed, a sentence each.
     """
-    found = _usual(look, lights, camera, domain) if given is None else FoundMedium(given)
-    if look.fire is None:
-        return found
-    colour = found.medium.flame_color
-    medium = replace(found.medium, flame_color=colour or look.fire.color)
-    return FoundMedium(medium, (*found.choices, fire_choice(look.fire, colour)), found.notes)
+    choices: tuple[Choice[Any], ...] = ()
+    notes: tuple[str, ...] = ()
+    medium = given
+    if medium is None:
+        width = min(high - low for low, high in zip(domain.min, domain.max, strict=True))
+        grey = Medium(extinction=OPTICAL_DEPTH_AT_ONE / width)
+        color, choice = smoke_colour(look.samples, _light_colour(lights, camera, domain, grey))
+        medium, choices = replace(grey, color=color), (choice,)
+        notes = (
+            f"Medium not given: extinction {grey.extinction:.3g} 1/m (density 1 is thick smoke), "
+            f"albedo {grey.albedo:g}, isotropic.",
+        )
+    if look.fire is not None:
+        choices = (*choices, fire_choice(look.fire, medium.flame_color))
+        medium = replace(medium, flame_color=medium.flame_color or look.fire.color)
+    return medium, choices, notes
 
 
-def _usual(look: FirstLook, lights: tuple[Light, ...], camera: Camera, domain: Domain) -> FoundMedium:
-    """The medium of a scene that gives none."""
-    width = min(high - low for low, high in zip(domain.min, domain.max, strict=True))
-    grey = Medium(extinction=OPTICAL_DEPTH_AT_ONE / width)
-    colour = smoke_colour(look.samples, light_colour(lights, camera, domain, grey))
-    medium = replace(grey, color=colour.color)
-    note = (
-        f"Medium not given: extinction {medium.extinction:.3g} 1/m (density 1 is thick smoke), "
-        f"albedo {medium.albedo:g}, isotropic."
-    )
-    return FoundMedium(medium, (colour.choice,), (note,))
+def _light_colour(lights: tuple[Light, ...], camera: Camera, domain: Domain, grey: Medium) -> NDArray[np.float64]:
+    """Colour (3,) of the light in the middle of a box, the largest 1; ones where no light is known."""
+    few = tuple(replace(each, directions=DIRECTIONS) if isinstance(each, EnvironmentLight) else each for each in lights)
+    scene = CompleteScene(camera, domain, grey, few, Background(), "single")
+    source = scene_optics(scene).unshadowed_source()
+    return source / source.max() if source.max() > 0 else np.ones(3)

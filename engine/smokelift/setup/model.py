@@ -1,8 +1,8 @@
-"""All that is chosen on coarse densities: the light, and the grids that velocities are estimated on."""
+"""What a run needs besides the light and is measured on coarse densities: iterations, and the grids of velocities."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
@@ -10,12 +10,9 @@ from typing import Any
 import numpy as np
 
 from smokelift.density import FittedDensity, reconstruct_density
-from smokelift.footage.clip import Clip
-from smokelift.footage.plate import Plates
 from smokelift.scene import CompleteScene, Domain
 from smokelift.setup.choice import Choice
-from smokelift.setup.coarse import CoarseClip
-from smokelift.setup.light_model import choose_light_model
+from smokelift.setup.coarse import CoarseClip, CoarseFrame
 from smokelift.setup.settings import Settings
 from smokelift.setup.velocity_grid import choose_coarsening, choose_levels
 from smokelift.velocity import VelocitySettings
@@ -27,77 +24,52 @@ class Model:
 
     Attributes
     ----------
-    scene
-        With its model of scattering, a number of directions for each environment, and lights as strong as the clip
-        needs.
     velocity
         With the grids that velocities are estimated on.
     choices
-        All of them, with their figures.
+        With their figures.
     """
 
-    scene: CompleteScene
     velocity: VelocitySettings
     choices: tuple[Choice[Any], ...]
 
 
 def choose_model(
-    clip: Clip,
-    scene: CompleteScene,
-    plates: Plates,
-    smoky: Sequence[int],
-    by_hand: bool,
-    settings: Settings,
-    guessed: bool,
+    scene: CompleteScene, clip: CoarseClip, frames: Mapping[int, CoarseFrame], settings: Settings
 ) -> Model:
-    """Choose all that is chosen on coarse densities.
+    """Choose what is measured on coarse densities.
 
     Parameters
     ----------
-    clip
-        The footage.
     scene
-        Its scattering is the richest that the known light allows, or what the user says.
-    plates
-        Background of each frame.
-    smoky
-        Frames with smoke, those with the most first.
-    by_hand
-        Whether the user says how light is scattered.
+        In the light and with the model of scattering that were chosen.
+    clip
+        The input.
+    frames
+        Its frames that models are tried on, by their numbers.
     settings
         What they decide is taken.
-    guessed
-        Whether nothing tells the light, not even its strength.
     """
     coarsened = choose_coarsening(scene.domain, settings.velocity, settings.selection.velocity_side)
     velocity = replace(settings.velocity, coarsening=coarsened.chosen)
-    coarse = CoarseClip(clip, scene, plates)
-    tried = ((number, coarse.frame(number)) for number in tried_frames(smoky))
-    frames = {number: frame for number, frame in tried if frame is not None and frame.shows_smoke}
     if not frames:
-        return Model(scene, replace(velocity, levels=velocity.grids), ())
-    light = choose_light_model(coarse, frames, by_hand, guessed, settings)
+        return Model(replace(velocity, levels=velocity.grids), ())
 
     @cache
     def density(number: int) -> FittedDensity | None:
-        frame = coarse.frame(number)
+        frame = clip.frame(number)
         if frame is None:
             return None
-        own = frame.in_light_of(light.scene).scattered_by(light.scene.scattering)
-        return reconstruct_density(frame.picture, own.scene, settings=settings.density, plate=frame.plate)
+        own, seen = frame.lit_by(scene.lights).scattered_by(scene.scattering).scene, frame.views[0]
+        return reconstruct_density(seen.picture, own, settings=settings.density, plate=seen.plate)
 
     densities = [found for found in map(density, frames) if found is not None]
     # before the last frame, since something has to follow
-    followed = sorted({min(number, len(clip) - 2) for number in frames if len(clip) > 1})
+    length = len(clip.views[0].clip)
+    followed = sorted({min(number, length - 2) for number in frames if length > 1})
     levels = _levels(followed, density, next(iter(frames.values())).scene.domain, scene.domain, velocity)
-    choices: tuple[Choice[Any], ...] = (
-        _inside(densities, scene),
-        *light.choices,
-        _iterations(densities, settings),
-        coarsened,
-        levels,
-    )
-    return Model(light.scene, replace(velocity, levels=levels.chosen), choices)
+    chosen = (_inside(densities, scene), _iterations(densities, settings), coarsened, levels)
+    return Model(replace(velocity, levels=levels.chosen), chosen)
 
 
 def tried_frames(smoky: Sequence[int]) -> tuple[int, ...]:

@@ -17,17 +17,17 @@ from smokelift.footage.working_picture import CameraError, WorkingPicture, worki
 from smokelift.render import scene_optics
 from smokelift.scene import Background, Camera, CompleteScene, Domain, Medium, Scene
 from smokelift.setup.choice import Choice
+from smokelift.setup.coarse import CoarseClip
 from smokelift.setup.first_look import FirstLook, first_look
 from smokelift.setup.further_views import disagreement, open_view
 from smokelift.setup.geometry import Geometry, clip_lens, find_geometry
-from smokelift.setup.light import FoundLight, find_light
+from smokelift.setup.illumination import Illumination, first_light, light_notes, measured_light, sunlight
 from smokelift.setup.medium import find_medium
 from smokelift.setup.model import choose_model, tried_frames
 from smokelift.setup.place import placed
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot, ShotView
 from smokelift.setup.smoke import SAMPLES
-from smokelift.setup.sun import find_sun
 from smokelift.setup.view_gain import balanced
 
 
@@ -63,23 +63,24 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
     camera, domain = geometry.camera, geometry.domain
     if settings.axis_depth is not None:
         SmokeAxis.given(settings.axis_depth, camera, domain)  # refuse early what cannot be
-    smoke = find_medium(scene.medium, look, scene.lights, camera, domain)
+    medium, coloured, taken = find_medium(scene.medium, look, scene.lights, camera, domain)
     asked = scene.scattering if settings.scattering == "auto" else settings.scattering
-    light = find_light(scene.lights, asked, smoke.medium, samples)
-    complete = _complete(scene, look, geometry, smoke.medium, light)
+    light = first_light(scene.lights, asked, medium, samples)
+    complete = _complete(scene, look, geometry, medium, light)
     first = ShotView(steadied, camera, plates, _working(camera, domain))
-    model = None
-    if settings.selection.measure:
-        model = choose_model(steadied, complete, plates, samples.smoky, asked is not None, settings, light.guessed)
-        complete = model.scene
+    measure, tried = settings.selection.measure, tried_frames(samples.smoky)
+    coarse = CoarseClip((first,), complete)
+    frames = coarse.smoky(tried) if measure else {}
+    if frames:
+        light = measured_light(light, coarse, frames, settings)
+        complete = replace(complete, lights=light.lights, scattering=light.scattering)
     others, gains, said = _further_views(first, complete, look, settings, bool(scene.lights))
-    if settings.selection.measure and asked is None and light.thickness is not None and look.fire is None:
-        light = light.seen_by(find_sun((first, *others), complete, tried_frames(samples.smoky), settings.density))
+    if frames and look.fire is None:
+        light = sunlight(light, CoarseClip((first, *others), complete), tried, settings)
         if light.sunny:
-            lit = _complete(scene, look, geometry, smoke.medium, light)
-            model = choose_model(steadied, lit, plates, samples.smoky, False, settings, guessed=False)
-            complete = model.scene
-    tried = () if model is None else model.choices
+            light = measured_light(light, coarse, frames, settings)
+        complete = replace(complete, lights=light.lights, scattering=light.scattering)
+    model = choose_model(complete, coarse, frames, settings) if measure else None
     clip.expect()  # lets go of frames that are kept as they were decoded
     shot = Shot(
         scene=complete,
@@ -91,12 +92,18 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
             *remarks,
             *look.notes,
             *geometry.notes,
-            *smoke.notes,
-            *light.notes(complete, tried, samples, plates.noise),
+            *taken,
+            *light_notes(light, samples, plates.noise),
             *said,
         ),
         doubts=look.doubts,
-        choices=(*geometry.choices, *smoke.choices, *tried, *light.choices(complete), *gains),
+        choices=(
+            *geometry.choices,
+            *coloured,
+            *light.choices,
+            *(() if model is None else model.choices),
+            *gains,
+        ),
         qualities=geometry.qualities,
         exposure=samples.exposure,
         smoky=samples.smoky,
@@ -106,7 +113,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
     return replace(shot, notes=(*shot.notes, *disagreement(shot))) if scene.views else placed(shot)
 
 
-def _complete(scene: Scene, look: FirstLook, geometry: Geometry, medium: Medium, light: FoundLight) -> CompleteScene:
+def _complete(scene: Scene, look: FirstLook, geometry: Geometry, medium: Medium, light: Illumination) -> CompleteScene:
     """The scene with all that it left open."""
     return CompleteScene(
         camera=geometry.camera,

@@ -16,7 +16,7 @@ from smokelift.footage.panorama import WidePicture
 from smokelift.footage.plate import Plates
 from smokelift.footage.steady import exposures
 from smokelift.footage.turning import Turns
-from smokelift.setup.thickness import Texture, seen_texture
+from smokelift.setup.thickness import seen_texture
 
 SAMPLES = 16
 """Frames that are looked at."""
@@ -61,7 +61,7 @@ class SmokeSamples:
     behind: NDArray[np.float32]
     smoky: tuple[int, ...]
     gains: Mapping[int, NDArray[np.float32]]
-    textures: tuple[Texture, ...] = ()
+    textures: tuple[NDArray[np.float64], ...] = ()
     small: Mapping[int, Picture] = field(default_factory=dict)
 
     @property

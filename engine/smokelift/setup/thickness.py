@@ -13,8 +13,8 @@ background may be smoke, says how well that is known. Figures: docs/experiments/
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,55 +32,17 @@ CONTRAST = 2.0
 that no frame shows."""
 
 CONFIDENCE = 0.5
-"""Confidence of the background at least."""
+"""Confidence of the background at least: what was hardly ever free of smoke holds some of it."""
 
 ERROR = 0.15
-"""Largest relative error (standard deviation) of the source radiance that counts as told: half of the 30 % within which
-it has to be right."""
+"""Largest relative error (standard deviation) of the source radiance that counts as measured: half of the 30 % within
+which it has to be right."""
 
-FEWEST = 3
-"""Frames at least that their deviation is estimated from."""
-
-
-@dataclass(frozen=True, eq=False)
-class Texture:
-    """What a frame shows of the texture behind its smoke, sums over blocks.
-
-    Attributes
-    ----------
-    hidden, added
-        Share of light that the smoke takes away, and radiance (3,) that it adds, over its blocks.
-    smoke, unsure
-        Weight of its blocks, and how much of that has a background that may be smoke itself.
-    clear, missing
-        Weight of the blocks without smoke, and how much of the texture is missing from them, where all should be seen.
-    """
-
-    hidden: float
-    added: Array
-    smoke: float
-    unsure: float
-    clear: float
-    missing: float
+FRAMES = 3
+"""Smallest number of frames that their deviation is estimated from."""
 
 
-@dataclass(frozen=True, eq=False)
-class Thickness:
-    """The source radiance that the texture tells.
-
-    Attributes
-    ----------
-    source : (3,), optional
-        None where nothing tells it.
-    choice
-        The same in words.
-    """
-
-    source: Array | None
-    choice: Choice[str]
-
-
-def seen_texture(picture: NDArray[np.float32], plate: Plate, smoke: NDArray[np.bool_]) -> Texture:
+def seen_texture(picture: NDArray[np.float32], plate: Plate, smoke: NDArray[np.bool_]) -> Array:
     """Compare the texture of a frame with that of its background.
 
     Parameters
@@ -91,83 +53,65 @@ def seen_texture(picture: NDArray[np.float32], plate: Plate, smoke: NDArray[np.b
         The background, of the same size.
     smoke : (rows, columns) bool
         Pixels that show smoke.
+
+    Returns
+    -------
+    (8,)
+        Sums over blocks. Of those with smoke: the share of light that it takes away, their weight, how much of that has
+        a background that may be smoke itself. Of those without: their weight, how much of the texture is missing from
+        them, where all should be seen. Of those with smoke again: the radiance (3) that it adds.
     """
     behind = _behind(plate)
-    known, power, confidence = behind.known, behind.power, behind.confidence
-    covered = _blocks(smoke.astype(np.float64))
-    if not known.any():
-        return Texture(0.0, np.zeros(3), 0.0, 0.0, 0.0, 0.0)
-    before = np.asarray(picture, np.float64)
-    shared = _texture(_differences(before), behind.differences)
-    smoky, clear = known & (covered > 0.5), known & (covered == 0)
+    covered, before = _blocks(smoke.astype(np.float64)), np.asarray(picture, np.float64)
+    smoky, clear = behind.known & (covered > 0.5), behind.known & (covered == 0)
     # one sharp edge would outweigh all else
-    usual = float(np.median(power[smoky])) if smoky.any() else 0.0
-    weight = power / (power + max(usual, 1e-12))
-    passed = np.divide(shared, power, out=np.ones_like(power), where=power > 0)
-    added = _blocks(before) - passed[..., None] * behind.light
-    return Texture(
-        hidden=float(np.sum((weight * (1 - passed))[smoky])),
-        added=np.asarray(np.sum((weight[..., None] * added)[smoky], axis=0)),
-        smoke=float(np.sum(weight[smoky])),
-        unsure=float(np.sum((weight * (1 - confidence))[smoky])),
-        clear=float(np.sum(weight[clear])),
-        missing=float(np.sum((weight * (1 - passed))[clear])),
-    )
+    usual = float(np.median(behind.power[smoky])) if smoky.any() else 0.0
+    weight = behind.power / (behind.power + max(usual, 1e-12))
+    shared = _texture(_differences(before), behind.differences)
+    passed = np.divide(shared, behind.power, out=np.ones_like(shared), where=behind.power > 0)
+    hidden, unsure = weight * (1 - passed), weight * (1 - behind.confidence)
+    added = weight[..., None] * (_blocks(before) - passed[..., None] * behind.light)
+    sums = [part[smoky].sum() for part in (hidden, weight, unsure)] + [part[clear].sum() for part in (weight, hidden)]
+    return np.array([*sums, *added[smoky].sum(0)])
 
 
-def smoke_thickness(frames: Sequence[Texture]) -> Thickness:
-    """Say what frames together tell of the smoke's thickness."""
-    frames = [frame for frame in frames if frame.smoke > 0]
-    sums = ("hidden", "smoke", "unsure", "clear", "missing")
-    hidden, smoke, unsure, clear, missing = (float(sum(getattr(f, name) for f in frames)) for name in sums)
-    if len(frames) < FEWEST or not hidden > 0 or not clear > 0:
-        return _undetermined("too little texture shows through it")
-    added = np.sum([frame.added for frame in frames], axis=0)
-    others = np.array([(added - frame.added).sum() / max(hidden - frame.hidden, 1e-12) for frame in frames])
-    whole = max(float(added.sum() / hidden), 1e-12)
-    spread = np.sqrt((len(frames) - 1) * np.mean((others - others.mean()) ** 2)) / whole
+def smoke_thickness(frames: Sequence[Array]) -> tuple[Array | None, Choice[str]]:
+    """Return the source radiance (3,) that the sums of `seen_texture` of frames show, None if they show none; in words.
+
+    The deviation is estimated by leaving one frame out after the other (the jackknife).
+    """
+    seen = np.array([frame for frame in frames if frame[1] > 0]).reshape(-1, 8)
+    hidden, smoke, unsure, clear, missing, *added = (float(total) for total in seen.sum(0))
+    if len(seen) < FRAMES or not (hidden > 0 and clear > 0):
+        return None, _undetermined("too little texture shows through it")
+    rest = seen.sum(0) - seen
+    others = rest[:, 5:].sum(1) / np.maximum(rest[:, 0], 1e-12)
+    spread = np.sqrt((len(seen) - 1) * np.var(others)) / max(sum(added) / hidden, 1e-12)
     # what a background of smoke hides is missing from what the smoke before it seems to hide
     error = float(np.linalg.norm((spread, missing / clear * smoke / hidden, unsure / hidden)))
     if not error <= ERROR:
-        return _undetermined("the texture behind it tells it no better than that", error)
+        return None, _undetermined("the texture behind it tells it no better than that", error)
     share = hidden / smoke
-    return Thickness(
-        np.maximum(added / hidden, 0),
-        Choice(
-            "smoke thickness",
-            f"{share:.3f}",
-            f"Smoke thickness: by the texture behind it the smoke hides {share:.0%} of what it covers, right to "
-            f"{error:.0%}; its light is as strong as that asks for.",
-            {"hidden": share, "error": error},
-            ERROR,
-        ),
+    reason = (
+        f"Smoke thickness: by the texture behind it the smoke hides {share:.0%} of what it covers, right to "
+        f"{error:.0%}; its light is as strong as that asks for."
     )
+    choice = Choice("smoke thickness", f"{share:.3f}", reason, {"hidden": share, "error": error}, ERROR)
+    return np.maximum(np.array(added) / hidden, 0), choice
 
 
-def _undetermined(why: str, error: float | None = None) -> Thickness:
+def _undetermined(why: str, error: float | None = None) -> Choice[str]:
     known = "" if error is None else f" (error {min(error, 9.99):.0%}, {ERROR:.0%} at most would do)"
     reason = (
         f"Smoke thickness: undetermined, {why}{known}; thinner smoke in stronger light looks the same. "
         "Give [[lights]] if you know the light."
     )
-    measured = {} if error is None else {"error": error}
-    return Thickness(None, Choice("smoke thickness", UNDETERMINED, reason, measured, ERROR))
+    return Choice("smoke thickness", UNDETERMINED, reason, {} if error is None else {"error": error}, ERROR)
 
 
-@dataclass(frozen=True, eq=False)
-class _Behind:
-    """What is needed of a background, of blocks but for the first.
-
-    Attributes
-    ----------
-    differences
-        Of neighbouring pixels, down and across.
-    light : (rows, columns, 3)
-        Mean radiance.
-    power, confidence : (rows, columns)
-        Of its texture, and the mean of its pixels'.
-    known : (rows, columns) bool
-        Where its texture can be told from noise and is its own.
+class _Behind(NamedTuple):
+    """What is needed of a background: differences of its pixels, down and across; and of its blocks the mean radiance,
+    the power of the texture, the mean confidence, and whether the texture is its own and stands out from noise.
     """
 
     differences: tuple[Array, Array]
@@ -185,7 +129,6 @@ def _behind(plate: Plate) -> _Behind:
     power = _texture(differences, differences)
     # the noise of two neighbours, down and across
     noise = 4 * _blocks(np.sum(np.square(noise_at(plate.image, plate), dtype=np.float64), -1))
-    # what was hardly ever free of smoke holds some of it
     known = (power > CONTRAST**2 * noise) & (confidence > CONFIDENCE)
     return _Behind(differences, _blocks(behind), power, confidence, known)
 

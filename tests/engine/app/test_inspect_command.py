@@ -15,7 +15,7 @@ from smokelift.output.images import write_image
 from smokelift.output.sequence import Sequence
 from smokelift.scene import Background, DirectionalLight, Inlet, Medium, Scene
 from smokelift.setup.settings import QUALITIES
-from smokelift.setup.surroundings import light_around
+from smokelift.setup.sky import light_around
 from tests.engine.setup.shots import filmed_around, flickering
 
 
@@ -36,7 +36,7 @@ def test_choices_are_said_and_kept(shot, finished, capsys) -> None:
     """The same from inspect, as sentences and as JSON, and with the sequence, each with its figures."""
     kept = Sequence.open(finished).choices
     assert [choice["what"] for choice in kept] == [
-        "resolution", "domain", "scattering", "iterations", "velocity grid coarsening", "velocity levels",
+        "resolution", "scattering", "domain", "iterations", "velocity grid coarsening", "velocity levels",
         "axis depth",
     ]  # fmt: skip
     assert json.loads((finished / "sequence.json").read_text())["choices"] == list(kept)

@@ -16,6 +16,7 @@ from smokelift.footage.clip import Clip
 from smokelift.footage.matte import matte
 from smokelift.footage.noise import EIGHT_BIT_NOISE
 from smokelift.footage.plate import Plate
+from smokelift.footage.working_picture import working_picture
 from smokelift.output.images import write_image
 from smokelift.pipeline import Reconstruction, compose
 from smokelift.render import scene_optics
@@ -30,13 +31,13 @@ from smokelift.scene import (
     completed,
     look_at_matrix,
 )
-from smokelift.setup import light_strength, scattering
+from smokelift.setup import illumination, scattering
 from smokelift.setup.choice import Choice
 from smokelift.setup.coarse import LONGEST, coarse_domain, coarse_frame
+from smokelift.setup.held_out import HeldOut
 from smokelift.setup.prepare import prepare_shot
-from smokelift.setup.scattering import HeldOut
 from smokelift.setup.settings import Settings
-from smokelift.setup.shot import Shot
+from smokelift.setup.shot import Shot, ShotView
 from smokelift.setup.velocity_grid import choose_coarsening, choose_levels, levels_for
 from smokelift.transport import Velocity
 from smokelift.velocity import CoarseToFine, VelocitySettings
@@ -111,9 +112,9 @@ def test_thick_white_smoke_scatters_light_many_times(white, plume, draft) -> Non
 def test_single_scattering_is_kept_where_both_meet_the_picture(plume, draft, monkeypatch) -> None:
     """Multiple scattering has to be clearly nearer: it finds half as dense a smoke for the same picture."""
     own = {"single": 0.028, "multiple": 0.026}
-    for module in (scattering, light_strength):
+    for module in (scattering, illumination):
         monkeypatch.setattr(
-            module, "held_out", lambda _, model, judge, __: HeldOut(own[judge] if model == judge else 0.4, 1.0)
+            module, "held_out", lambda _, model, judge, __: HeldOut(own[judge] if model == judge else 0.4)
         )
     choice = chosen(shot_of(plume.scene, draft), "scattering")
     assert choice.chosen == "single"
@@ -132,10 +133,10 @@ def test_models_that_coarse_frames_do_not_tell_apart_are_tried_on_finer_ones(
         voxels = max(frames[0].scene.domain.resolution)
         fitted_on.add((voxels, settings.descent_iterations))
         errors = {"single": 0.05, "multiple": near if voxels == 8 else 0.01}
-        return HeldOut(errors[judge] if fitted == judge else 0.4, 1.0)
+        return HeldOut(errors[judge] if fitted == judge else 0.4)
 
     monkeypatch.setattr("smokelift.setup.coarse.LONGEST", 8)
-    for module in (scattering, light_strength):
+    for module in (scattering, illumination):
         monkeypatch.setattr(module, "held_out", known)
     choice = chosen(shot_of(plume.scene, draft), "scattering")
     assert fitted_on == asked
@@ -152,7 +153,7 @@ def test_no_model_is_measured_twice(plume, draft, monkeypatch) -> None:
         return held_out(frames, model, judge, settings)
 
     held_out = scattering.held_out
-    for module in (scattering, light_strength):
+    for module in (scattering, illumination):
         monkeypatch.setattr(module, "held_out", counted)
     shot_of(plume.scene, draft)
     assert len(measured) == len(set(measured))
@@ -269,16 +270,20 @@ def test_the_halves_of_a_picture_are_apart(plume, tmp_path) -> None:
     rows, columns = np.indices((height, width))
     picture = np.repeat(np.where((rows + columns) % 2, 0.5, 0.2)[..., None], 3, -1).astype(np.float32)
     plate = Plate(np.zeros_like(picture), np.ones((height, width), np.float32), EIGHT_BIT_NOISE)
-    scene = replace(plume.scene, camera=plume.scene.camera.resized(width, height))
+    scene = completed(replace(plume.scene, camera=plume.scene.camera.resized(width, height)))
     write_image(tmp_path / "frame_1.exr", picture, half=False)
-    clip = Clip.open(tmp_path / "frame_1.exr")
-    frame = coarse_frame(clip, 0, scene.camera, completed(scene), plate)
-    np.testing.assert_allclose(frame.halves.fitted, 0.2, atol=1e-5)
-    np.testing.assert_allclose(frame.halves.held_out, 0.5, atol=1e-5)
-    assert frame.in_light_of(frame.scene).halves is frame.halves  # which are made once
-    assert 0.3 < frame.picture.mean() < 0.4
-    away = plume.scene.camera.look_at((0, -4, 0.8), (0, -9, 0.8), fov_y_degrees=27, size=(width, height))
-    assert coarse_frame(clip, 0, away, completed(scene), plate) is None
+    view = ShotView(
+        Clip.open(tmp_path / "frame_1.exr"), scene.camera, plate, working_picture(scene.camera, scene.domain)
+    )
+    (seen,) = coarse_frame([view], 0, scene).views
+    np.testing.assert_allclose(seen.fitted, 0.2, atol=1e-5)
+    np.testing.assert_allclose(seen.held_out, 0.5, atol=1e-5)
+    assert seen.held_out is seen.held_out  # which is made once
+    assert 0.3 < seen.picture.mean() < 0.4
+    dimmed = seen.over(np.full(3, 2, np.float32))
+    np.testing.assert_allclose(dimmed.held_out, 0.25, atol=1e-5)
+    away = scene.camera.look_at((0, -4, 0.8), (0, -9, 0.8), fov_y_degrees=27, size=(width, height))
+    assert coarse_frame([view, replace(view, camera=away)], 0, scene) is None
 
 
 # velocity
@@ -382,7 +387,7 @@ def test_every_choice_has_a_sentence_and_a_figure(plume, draft) -> None:
     """JSON holds it, and the sentence says what was chosen."""
     shot = shot_of(plume.scene, draft)
     assert [choice.what for choice in shot.choices] == [
-        "resolution", "domain", "scattering", "iterations", "velocity grid coarsening", "velocity levels",
+        "resolution", "scattering", "domain", "iterations", "velocity grid coarsening", "velocity levels",
         "axis depth",
     ]  # fmt: skip
     for choice in shot.choices:

@@ -5,11 +5,10 @@ import pytest
 
 from smokelift.footage.noise import lasting_noise
 from smokelift.footage.plate import Plate
-from smokelift.scene import Medium
 from smokelift.setup.choice import UNDETERMINED
-from smokelift.setup.light import ambient_sun
 from smokelift.setup.smoke import SmokeSamples
-from smokelift.setup.thickness import Thickness, seen_texture, smoke_thickness
+from smokelift.setup.source import source_radiance
+from smokelift.setup.thickness import seen_texture, smoke_thickness
 
 SIZE = (80, 96)
 SOURCE = np.array((0.7, 0.6, 0.5))
@@ -27,7 +26,7 @@ def transmittance(depth, frame):
     return np.exp(-depth * np.exp(-((x - 48) ** 2 + (y - 55 + 4 * frame) ** 2) / 300))[..., None]
 
 
-def thickness(depth=1.0, texture=0.04, noise=0.003, frames=5, fade=1.0, confidence=1.0) -> Thickness:
+def thickness(depth=1.0, texture=0.04, noise=0.003, frames=5, fade=1.0, confidence=1.0):
     """What clips of that blob tell; the background of its pictures is `fade` times as strong as it was."""
     behind, rng, seen = backdrop(texture), np.random.default_rng(2), []
     plate = Plate(behind, np.full(SIZE, confidence, np.float32), lasting_noise(max(noise, 0.004)))
@@ -41,10 +40,10 @@ def thickness(depth=1.0, texture=0.04, noise=0.003, frames=5, fade=1.0, confiden
 @pytest.mark.parametrize("depth", [0.3, 1.0, 3.0])
 def test_texture_tells_thick_smoke_from_thin(depth) -> None:
     """The source is the same, however little of it the smoke shows."""
-    told = thickness(depth)
-    assert told.source == pytest.approx(SOURCE, rel=0.15)
-    assert told.choice.measured["error"] < 0.15
-    assert "hides" in told.choice.reason
+    source, choice = thickness(depth)
+    assert source == pytest.approx(SOURCE, rel=0.15)
+    assert choice.measured["error"] < 0.15
+    assert "hides" in choice.reason
 
 
 @pytest.mark.parametrize(
@@ -61,22 +60,22 @@ def test_texture_tells_thick_smoke_from_thin(depth) -> None:
     ids=["no texture", "noise for texture", "few frames", "no smoke", "noise", "clear", "unsure background"],
 )
 def test_what_nothing_tells_is_undetermined(clip) -> None:
-    told = thickness(**clip)
-    assert told.source is None
-    assert told.choice.chosen == UNDETERMINED
-    assert "[[lights]]" in told.choice.reason
+    source, choice = thickness(**clip)
+    assert source is None
+    assert choice.chosen == UNDETERMINED
+    assert "[[lights]]" in choice.reason
 
 
 def test_texture_that_is_lost_without_smoke_tells_nothing() -> None:
     """A codec that smooths the wall looks like smoke; the clear parts of the picture show that it is none."""
-    assert thickness(fade=0.7).source is None
-    assert thickness(fade=0.98).source is not None
+    assert thickness(fade=0.7)[0] is None
+    assert thickness(fade=0.98)[0] is not None
 
 
 def test_a_background_that_may_be_smoke_tells_nothing_of_thin_smoke() -> None:
     """What is unsure is held against what the smoke hides: thick smoke stands out from it."""
-    assert thickness(depth=0.3, confidence=0.95).source is None
-    assert thickness(depth=3.0, confidence=0.95).source is not None
+    assert thickness(depth=0.3, confidence=0.95)[0] is None
+    assert thickness(depth=3.0, confidence=0.95)[0] is not None
 
 
 def test_thin_smoke_is_lit_as_strongly_as_it_hides() -> None:
@@ -86,11 +85,6 @@ def test_thin_smoke_is_lit_as_strongly_as_it_hides() -> None:
     behind = backdrop(0.0)
     colours, hidden = (clear * behind + (1 - clear) * SOURCE)[smoky], behind[smoky]
     samples = SmokeSamples(1.0, (0, 0, 1, 1), smoky, ~smoky, colours.astype("f4"), hidden, (0,), {})
-    medium = Medium(albedo=0.8)
-
-    def source(told=None):
-        return 0.8 / (4 * np.pi) * np.array(ambient_sun(samples, medium, told).irradiance)
-
-    assert source().max() < 0.6 * SOURCE.max()
-    assert source(SOURCE) == pytest.approx(SOURCE)
-    assert (source(0.1 * SOURCE) >= colours.max(0) * 0.97).all()  # what is there is met
+    assert source_radiance(samples).max() < 0.6 * SOURCE.max()
+    assert source_radiance(samples, SOURCE) == pytest.approx(SOURCE)
+    assert (source_radiance(samples, 0.1 * SOURCE) >= colours.max(0) * 0.97).all()  # what is there is met

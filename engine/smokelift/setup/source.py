@@ -1,15 +1,13 @@
-"""The smoke's own colour, where the clip shows one that is not the light's.
+"""What the smoke's pixels say of its source radiance: how bright smoke of any thickness is, and of what colour.
 
-A pixel shows T behind + (1 - T) source: it lies between its background and the source radiance, which is the light's
-colour times the smoke's. So the source lies on the line from the background through the smoke, beyond the thickest
+A pixel shows T behind + (1 - T) source: it lies between its background and the source radiance, which is the light
+times the smoke's colour. So the source lies on the line from the background through the smoke, beyond the thickest
 smoke that is seen. Before black the line has one colour; before anything else it has many. Smoke has a colour of its
 own if no source on that line has a colour that light may have: white, as cameras balance it, or that of what is behind
 the smoke, which stands in the same light. Figures: docs/experiments/smoke-colour.md.
 """
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +19,11 @@ from smokelift.setup.smoke import SmokeSamples
 
 Array = NDArray[np.float64]
 
-LEAST = 12.0
+BEYOND = 0.1
+"""Share by which the source radiance exceeds the 99th percentile of the smoke's. That smoke then has an optical depth
+of about 2.4, not an infinite one."""
+
+COLOURED = 12.0
 """Degrees between two colours as vectors of linear light, from which white balance does not explain their difference.
 Grey world and its kin are 5 to 6 degrees wrong on the mean, and 10 in the worst quarter of pictures (Gijsenij, Gevers
 and van de Weijer, "Computational color constancy: survey and experiments", 2011)."""
@@ -32,33 +34,46 @@ THICKEST = 90
 CLIPPED = 0.95
 """Linear value from which on a channel may have been larger."""
 
-FEWEST = 50
-"""Smoke pixels at least."""
+PIXELS = 50
+"""Smallest number of smoke pixels that have a colour."""
 
 FAINTEST = 0.01
 """Linear value of the brightest channel at least: a darker source has no colour that 8 bits show."""
 
 PLACES = 256
-"""Points of the line that are looked at."""
+"""Points of the line that are compared with the light."""
 
 
-@dataclass(frozen=True)
-class SmokeColour:
-    """The colour of the smoke.
+def source_radiance(samples: SmokeSamples, measured: Array | None = None) -> Array:
+    """Return the source radiance (3,) of the smoke; white where the clip shows none.
 
-    Attributes
+    Thick smoke shows it: the brightest smoke where smoke brightens its background, the darkest where it darkens it.
+
+    Parameters
     ----------
-    color
-        Red, green and blue, the largest 1; white where nothing says that the smoke is not grey.
-    choice
-        The same in words.
+    samples
+        Smoke pixels of the clip and what is behind them.
+    measured : (3,), optional
+        The same for the mean of the smoke, if a texture behind it shows it (`thickness`). Smoke that is brighter than
+        that, or darker where it darkens, is still fitted.
     """
+    if len(samples.colours) == 0:
+        return np.ones(3)
+    brightens = samples.brightens
+    if measured is not None:
+        changes = np.sum(samples.colours - samples.behind, -1) >= 0
+        bound = np.percentile(samples.colours[changes == brightens], 99 if brightens else 1, axis=0)
+        return np.maximum(measured, bound) if brightens else np.minimum(measured, bound)
+    if not brightens:
+        return np.asarray((1 - BEYOND) * np.percentile(samples.colours, 1, axis=0))
+    # on the line of colours: the brightest of each channel may be other smoke, and together a colour that none shows
+    colours, behind = samples.colours.astype(np.float64), samples.behind.astype(np.float64)
+    axis, start = _line_of_colours(colours, behind), behind.mean(0)
+    farthest = start + (np.percentile(colours @ axis, 99) - start @ axis) * axis
+    return np.asarray(np.maximum(farthest + BEYOND * np.linalg.norm(farthest) * axis, 0))
 
-    color: Vector
-    choice: Choice[str]
 
-
-def smoke_colour(samples: SmokeSamples, light: Array) -> SmokeColour:
+def smoke_colour(samples: SmokeSamples, light: Array) -> tuple[Vector, Choice[str]]:
     """Find the smoke's own colour.
 
     Parameters
@@ -67,37 +82,34 @@ def smoke_colour(samples: SmokeSamples, light: Array) -> SmokeColour:
         Smoke pixels of the clip and what is behind them.
     light : (3,)
         Colour of the light, ones where it is unknown.
+
+    Returns
+    -------
+    color
+        Red, green and blue, the largest 1; white where nothing says that the smoke is not grey.
+    choice
+        The same in words.
     """
-    line = _line(samples)
+    line = _thickest(samples)
     if line is None:
         return _grey("no smoke is thick, bright and free of clipped pixels enough to show a colour")
     behind, seen = line
     sources = _sources(behind, seen)
     white = _degrees(sources, light)
-    least = white
-    if behind.max() > FAINTEST:
-        least = np.minimum(white, _degrees(sources, behind))
-    if least.min() < LEAST:
-        nearest = "grey smoke" if white.min() < LEAST else "what is behind it"
-        return _grey(
-            f"it may be {least.min():.0f} degrees from {nearest} in colour, less than the {LEAST:g} of coloured light",
-            float(least.min()),
-        )
+    least = np.minimum(white, _degrees(sources, behind)) if behind.max() > FAINTEST else white
+    if least.min() < COLOURED:
+        nearest = "grey smoke" if white.min() < COLOURED else "what is behind it"
+        near = f"it may be {least.min():.0f} degrees from {nearest} in colour"
+        return _grey(f"{near}, less than the {COLOURED:g} of coloured light", float(least.min()))
     # the palest that explains the clip
     own = sources[white.argmin()] / np.maximum(light, 1e-6)
     red, green, blue = (float(round(v, 3)) for v in own / own.max())
     named = f"{red:.2f}, {green:.2f}, {blue:.2f}"
-    return SmokeColour(
-        (red, green, blue),
-        Choice(
-            "smoke colour",
-            named,
-            f"Smoke colour: {named} (linear), at least {white.min():.0f} degrees from that of grey smoke; if the light "
-            "has this colour and the smoke is grey, say so by color = [1, 1, 1] in [medium].",
-            {"degrees": float(white.min())},
-            LEAST,
-        ),
+    reason = (
+        f"Smoke colour: {named} (linear), at least {white.min():.0f} degrees from that of grey smoke; if the light has "
+        "this colour and the smoke is grey, say so by color = [1, 1, 1] in [medium]."
     )
+    return (red, green, blue), Choice("smoke colour", named, reason, {"degrees": float(white.min())}, COLOURED)
 
 
 def several_colours(samples: SmokeSamples) -> tuple[str, ...]:
@@ -107,13 +119,13 @@ def several_colours(samples: SmokeSamples) -> tuple[str, ...]:
     explains the most of the light is another colour's. White that is clipped has none.
     """
     shown = samples.colours[samples.colours.min(-1, initial=1.0) < CLIPPED].astype(np.float64)
-    if len(shown) < FEWEST or np.percentile(samples.behind.max(-1), THICKEST) >= FAINTEST:
+    if len(shown) < PIXELS or np.percentile(samples.behind.max(-1), THICKEST) >= FAINTEST:
         return ()
     if np.percentile(shown.max(-1), THICKEST) < FAINTEST:
         return ()
     along = np.linalg.eigvalsh(shown.T @ shown)
     off = float(np.degrees(np.arcsin(np.sqrt(along[:-1].sum().clip(0) / along.sum()))))
-    if off < LEAST:
+    if off < COLOURED:
         return ()
     return (
         f"The smoke has more than one colour: its light is {off:.0f} degrees from the nearest single one on the mean, "
@@ -122,7 +134,7 @@ def several_colours(samples: SmokeSamples) -> tuple[str, ...]:
     )
 
 
-def line_of_colours(colours: Array, behind: Array) -> Array:
+def _line_of_colours(colours: Array, behind: Array) -> Array:
     """Direction (3,), of length 1, in which smoke changes what is behind it: the one that explains most of the change.
 
     Parameters
@@ -135,20 +147,20 @@ def line_of_colours(colours: Array, behind: Array) -> Array:
     return np.asarray(axis if np.sum(change @ axis) >= 0 else -axis)
 
 
-def _grey(why: str, degrees: float | None = None) -> SmokeColour:
+def _grey(why: str, degrees: float | None = None) -> tuple[Vector, Choice[str]]:
     reason = f"Smoke colour: undetermined, grey is taken: {why}."
     measured = {} if degrees is None else {"degrees": degrees}
-    return SmokeColour((1.0, 1.0, 1.0), Choice("smoke colour", UNDETERMINED, reason, measured, LEAST))
+    return (1.0, 1.0, 1.0), Choice("smoke colour", UNDETERMINED, reason, measured, COLOURED)
 
 
-def _line(samples: SmokeSamples) -> tuple[Array, Array] | None:
+def _thickest(samples: SmokeSamples) -> tuple[Array, Array] | None:
     """Background and colour of the thickest smoke that is not clipped; None if there is too little of it."""
     clear = brightest_channel(samples.colours) < CLIPPED
-    if clear.sum() < max(FEWEST, 0.1 * len(clear)):
+    if clear.sum() < max(PIXELS, 0.1 * len(clear)):
         return None
     colours, behind = (values[clear].astype(np.float64) for values in (samples.colours, samples.behind))
-    change, axis = colours - behind, line_of_colours(colours, behind)
-    # a small error of the line is all of a dark colour: that is told by the thickest pixels alone
+    change, axis = colours - behind, _line_of_colours(colours, behind)
+    # a small error of the line is all of a dark colour: only the thickest pixels show that
     amount = change @ axis if samples.brightens else np.linalg.norm(change, axis=-1)
     thick = amount >= np.percentile(amount, THICKEST)
     start = np.maximum(behind[thick].mean(0), 0)

@@ -1,0 +1,246 @@
+"""The light of a shot: what is given stays unless the clip contradicts it, and what is not is taken from the clip."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from smokelift.footage.clip import Clip
+from smokelift.footage.noise import lasting_noise
+from smokelift.scene import Background, DirectionalLight, Medium, Scene
+from smokelift.setup import illumination
+from smokelift.setup.choice import Choice
+from smokelift.setup.held_out import HeldOut
+from smokelift.setup.illumination import Illumination, light_notes
+from smokelift.setup.settings import Settings
+from smokelift.setup.shot import Shot
+from smokelift.setup.sky import light_around
+from tests.engine.setup.shots import shot_of
+
+# a light that is not given
+
+
+def test_brightening_smoke_has_a_bright_source(plume, draft) -> None:
+    """Thick smoke looks at least as bright as the brightest smoke in the clip."""
+    shot = shot_of(replace(plume.scene, lights=()), draft)
+    with Clip.open(plume.scene.clip) as clip:
+        brightest = max(float(frame.max()) for frame in clip)
+    source = shot.scene.medium.albedo / (4 * np.pi) * np.array(shot.scene.lights[0].irradiance)
+    assert 0.7 * brightest < source.max() < 1.5 * brightest
+
+
+def test_darkening_smoke_has_a_dark_source(plume, draft, tmp_path) -> None:
+    """Before a bright wall, thick dark smoke looks no brighter than the darkest smoke in the clip."""
+    sooty = replace(
+        plume.scene,
+        medium=Medium(extinction=8.0, albedo=0.3),
+        lights=(DirectionalLight((0, 0.5, -0.8), (2.0, 2.0, 2.0)),),
+        background=Background(color=(0.8, 0.8, 0.8)),
+    )
+    scene = plume.write(tmp_path / "clip", plume.densities, sooty)
+    shot = shot_of(replace(scene, lights=()), draft)
+    with Clip.open(scene.clip) as clip:
+        darkest = min(float(frame.min()) for frame in clip)
+    source = 0.3 / (4 * np.pi) * np.array(shot.scene.lights[0].irradiance)
+    assert source.max() <= 1.1 * darkest
+    assert source.max() < 0.4
+
+
+def test_smoke_that_scatters_nothing_needs_no_light(plume, draft, tmp_path) -> None:
+    """Albedo 0 is soot: whatever the light, it only darkens, so none has to be guessed."""
+    black = replace(
+        plume.scene,
+        medium=Medium(extinction=8.0, albedo=0.0),
+        lights=(),
+        background=Background(color=(0.8, 0.8, 0.8)),
+    )
+    scene = plume.write(tmp_path / "clip", plume.densities, black)
+    shot = shot_of(scene, draft)
+    assert shot.scene.medium == black.medium
+
+
+# given lights
+
+
+@pytest.fixture(scope="module")
+def thick(plume, tmp_path_factory) -> Scene:
+    """The blob, so thick that more smoke makes it no brighter."""
+    (sun,) = plume.scene.lights
+    scene = replace(plume.scene, medium=Medium(20.0, 0.9), lights=(sun.scaled(0.4),), scattering="multiple")
+    return replace(plume.write(tmp_path_factory.mktemp("thick"), plume.densities, scene), scattering=None)
+
+
+def strengths(scene: Scene, draft: Settings) -> tuple[float, list[str]]:
+    """The light of the shot over the given one, and what is said of it."""
+    shot = shot_of(scene, draft)
+    said = [choice.reason for choice in shot.choices if choice.what == "light strength"]
+    return shot.scene.lights[0].irradiance[0] / scene.lights[0].irradiance[0], said
+
+
+def test_a_light_that_the_clip_does_not_contradict_stays(thick, draft) -> None:
+    assert strengths(thick, draft) == (1.0, [])
+
+
+def test_a_light_that_is_too_weak_becomes_stronger(thick, draft) -> None:
+    """Between once and twice what was taken away, since thicker smoke makes up for some of it."""
+    (sun,) = thick.lights
+    factor, said = strengths(replace(thick, lights=(sun.scaled(0.4),)), draft)
+    assert 1.5 < factor < 3.2
+    assert said[0].startswith(f"Light: {factor:.2f} times as strong as given")
+
+
+def test_a_light_is_not_blamed_because_thinner_smoke_fits_better(thick, draft, monkeypatch) -> None:
+    """The less smoke, the simpler its picture: only densities that are too dark speak against a light."""
+    (sun,) = thick.lights
+    asked: dict[float, float] = {}
+
+    def held_out(frames, *_) -> HeldOut:
+        factor = frames[0].scene.lights[0].irradiance[0] / sun.irradiance[0]
+        return HeldOut(0.08 / factor, asked.get(round(factor, 4), 1.0))
+
+    monkeypatch.setattr(illumination, "held_out", held_out)
+    asked[1.0] = 1.02
+    assert strengths(thick, draft) == (1.0, [])
+    asked[1.0], asked[1.25] = 1.4, 1.1
+    assert strengths(thick, draft)[0] == pytest.approx(1.5625)
+
+
+def test_single_scattering_by_hand_blames_no_light(thick, draft) -> None:
+    """It is darker than the clip because orders of scattering are missing."""
+    assert strengths(replace(thick, scattering="single"), draft) == (1.0, [])
+
+
+def test_a_light_is_not_blamed_where_a_stronger_one_leaves_as_much_dark(thick, draft, monkeypatch) -> None:
+    """Thin smoke before a wall, whose densities are wrong for other reasons: each step gains a little, and no light."""
+    (sun,) = thick.lights
+
+    def held_out(frames, *_) -> HeldOut:
+        factor = frames[0].scene.lights[0].irradiance[0] / sun.irradiance[0]
+        return HeldOut(0.21 + 0.001 / factor, 1.08 + 0.01 * factor)
+
+    monkeypatch.setattr(illumination, "held_out", held_out)
+    assert strengths(thick, draft) == (1.0, [])
+
+
+# light from everywhere with shadows
+
+BEHIND = 0.4
+
+
+@pytest.fixture(scope="module")
+def lit(plume, tmp_path_factory) -> Scene:
+    """The blob, thick, in a sun from the side, before something that is brighter than most of it."""
+    sun = DirectionalLight((-0.7, 0.6, -0.5), (6.0, 5.5, 5.0))
+    scene = replace(plume.scene, medium=Medium(20.0, 0.9), lights=(sun,), background=Background(color=(BEHIND,) * 3))
+    return plume.write(tmp_path_factory.mktemp("lit"), plume.densities, scene)
+
+
+def unlit(scene: Scene) -> Scene:
+    """The same clip, of which neither light nor medium is known."""
+    return replace(scene, lights=(), medium=None)
+
+
+def scattering_of(shot: Shot) -> Choice[str]:
+    (choice,) = (choice for choice in shot.choices if choice.what == "scattering")
+    return choice
+
+
+@pytest.fixture
+def leaves(monkeypatch):
+    """Makes light from everywhere leave a given error; returns its strengths over that of what is behind the smoke."""
+
+    def of(error: float) -> list[float]:
+        tried = []
+
+        def known(frames, _, judge, __) -> HeldOut:
+            if judge == "multiple":  # of given lights
+                return HeldOut(1.0)
+            lights = frames[0].scene.lights
+            radiance = 0.9 * np.sum([light.irradiance for light in lights], 0) / (4 * np.pi)
+            tried.append(round(float(radiance.mean()) / BEHIND, 2))
+            coloured = radiance[0] > 1.1 * radiance[2]
+            return HeldOut(error if coloured else 1.0, 1.0, np.array([[1.2, 1.0, 0.8]]))
+
+        monkeypatch.setattr(illumination, "held_out", known)
+        return tried
+
+    return of
+
+
+def test_what_is_clearly_nearer_is_taken_in_the_colour_that_the_clip_asks_for(lit, draft, leaves) -> None:
+    """The strength stays that of what is behind the smoke, and the direction undetermined."""
+    tried = leaves(0.02)
+    shot = shot_of(unlit(lit), draft)
+    choice, lights = scattering_of(shot), shot.scene.lights
+    assert tried == [1.0, 1.0]
+    assert shot.scene.scattering == choice.chosen == "single"
+    assert choice.measured["error_single"] == 0.02
+    assert "for want of a known one" in choice.reason
+    radiance = 0.9 * np.sum([light.irradiance for light in lights], 0) / (4 * np.pi)
+    assert radiance == pytest.approx(BEHIND * np.array([1.2, 1.0, 0.8]), rel=0.01)
+    assert next(found.chosen for found in shot.choices if found.what == "light direction") == "undetermined"
+    (note,) = (note for note in shot.notes if note.startswith("Light not given"))
+    assert "comes from behind the smoke" in note
+    assert "with shadows" in note
+
+
+def test_what_is_nearer_by_little_is_not_taken(lit, draft, leaves) -> None:
+    """It is no special case of smoke without shadows: it has to be nearer by a quarter, and by the tolerance."""
+    leaves(1.0)
+    choice = scattering_of(shot_of(unlit(lit), draft))
+    error = choice.measured[f"error_{choice.chosen}"]
+    limit = min(0.75 * error, error - draft.selection.scattering_error)
+    leaves(limit + 0.001)
+    assert scattering_of(shot_of(unlit(lit), draft)) == choice
+    leaves(limit - 0.001)
+    assert scattering_of(shot_of(unlit(lit), draft)).chosen == "single"
+
+
+def test_a_light_that_is_given_stays(lit, draft, leaves) -> None:
+    """Only a light that nothing tells is replaced."""
+    tried = leaves(1.0)
+    assert shot_of(lit, draft).scene.lights == lit.lights
+    assert not tried
+
+
+@pytest.mark.parametrize("light", [0.0, 0.4])
+def test_dark_smoke_before_something_bright_stays_dark(plume, draft, tmp_path, light) -> None:
+    """Black smoke, and smoke that is lit a little, would have to be very thick to be as dark in that light."""
+    faint = DirectionalLight((-0.7, 0.6, -0.5), (light,) * 3)
+    dark = replace(plume.scene, medium=Medium(6.0, 0.9), lights=(faint,), background=Background(color=(0.8, 0.9, 1.0)))
+    shot = shot_of(unlit(plume.write(tmp_path, plume.densities, dark)), draft)
+    assert shot.scene.scattering in ("absorption", "unshadowed")
+
+
+@pytest.mark.parametrize(
+    ("error", "behind", "noise", "said"),
+    [
+        (0.13, (0.4, 0.4, 0.4), 1, True),
+        (0.11, (0.4, 0.4, 0.4), 1, False),
+        (0.13, (0.003, 0.003, 0.003), 1, False),
+        (0.13, (0.4, 0.4, 0.4), 5, False),
+        (0.13, None, 1, False),
+    ],
+    ids=["one colour", "well explained", "black", "noise", "a wall"],
+)
+def test_a_light_that_explains_little_before_one_colour_is_said_to_be_wrong(error, behind, noise, said) -> None:
+    """Elsewhere other things may be what is left."""
+    shown = np.linspace(0.1, 0.5, 300).reshape(100, 3) if behind is None else np.tile(behind, (100, 1))
+    samples = SimpleNamespace(behind=shown, smoky=(0,))
+    choice = Choice("scattering", "absorption", "", {"error_absorption": error, "error_unshadowed": error})
+    unknown = Choice("smoke thickness", "undetermined", "")
+    light = Illumination(light_around(np.ones(3)), "absorption", "assumed", False, (choice,), unknown, unknown)
+    _, *notes = light_notes(light, samples, lasting_noise(noise / 255))
+    assert bool(notes) == said
+    assert all("[[lights]]" in note for note in notes)
+
+
+def test_the_doubt_is_said_of_a_shot(lit, draft, leaves, monkeypatch) -> None:
+    """Once, beside the light that is taken, and never of one that is given."""
+    leaves(1.0)
+    monkeypatch.setattr("smokelift.setup.illumination.DOUBTFUL", 0.01)
+    doubts = [sum("likely wrong" in note for note in shot_of(scene, draft).notes) for scene in (unlit(lit), lit)]
+    assert doubts == [1, 0]

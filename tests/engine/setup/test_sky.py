@@ -1,0 +1,94 @@
+"""A sun that no scene gives: cameras all around tell where it stands, fewer do not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import nnls
+
+from smokelift.scene import DirectionalLight
+from smokelift.setup.choice import UNDETERMINED
+from smokelift.setup.shot import Shot
+from smokelift.setup.sky import SHADING, SPREAD, light_around, sphere, strengths
+from tests.engine.setup.shots import AROUND, filmed_around, shot_of
+
+SUN = np.array((-0.5, -0.6, -0.4))
+LIGHT = DirectionalLight((-0.5, -0.6, -0.4), (12.0, 11.0, 10.0))
+
+
+def direction(shot: Shot):
+    """What was found."""
+    (found,) = [choice for choice in shot.choices if choice.what == "light direction"]
+    return found
+
+
+def test_four_cameras_around_the_smoke_tell_the_sun(plume, tmp_path, draft) -> None:
+    shot = shot_of(filmed_around(plume, tmp_path, (LIGHT,)), draft)
+    found = direction(shot)
+    told = np.array([float(value) for value in found.chosen.split(",")])
+    assert np.degrees(np.arccos(told @ SUN / np.linalg.norm(told) / np.linalg.norm(SUN))) < 20
+    assert found.measured["ambient_share"] <= found.tolerance
+    strongest = max(shot.scene.lights, key=lambda light: sum(light.irradiance))
+    np.testing.assert_allclose(strongest.direction, told, atol=0.02)
+    assert shot.scene.scattering in ("single", "multiple")
+    assert any("Light direction" in choice.reason for choice in shot.choices)
+
+
+def test_light_from_everywhere_is_no_sun(plume, tmp_path, draft) -> None:
+    shot = shot_of(filmed_around(plume, tmp_path, light_around(np.full(3, 0.6))), draft)
+    found = direction(shot)
+    assert found.chosen == UNDETERMINED
+    assert found.measured["ambient_share"] > found.tolerance
+
+
+def test_three_cameras_that_agree_are_enough(plume, tmp_path, draft) -> None:
+    """However close together: without one of them the sun stands where it did."""
+    shot = shot_of(filmed_around(plume, tmp_path, (LIGHT,), AROUND[:3]), draft)
+    found = direction(shot)
+    assert found.measured["spread"] < SPREAD
+    assert found.chosen != UNDETERMINED
+
+
+def test_one_camera_is_not_asked(plume, tmp_path, draft) -> None:
+    found = direction(shot_of(filmed_around(plume, tmp_path, (LIGHT,), AROUND[:1]), draft))
+    assert found.chosen == UNDETERMINED
+    assert not found.measured
+
+
+def test_smoke_that_hardly_shades_itself_tells_no_sun(plume, tmp_path, draft) -> None:
+    thin = replace(plume, densities=tuple(0.02 * density for density in plume.densities))
+    bright = replace(LIGHT, irradiance=tuple(20 * value for value in LIGHT.irradiance))
+    found = direction(shot_of(filmed_around(thin, tmp_path, (bright,)), draft))
+    assert found.chosen == UNDETERMINED
+    assert found.measured["shading"] < SHADING
+
+
+def test_directions_are_spread_evenly() -> None:
+    """No two are close, and none is far from all others."""
+    ways = sphere(48)
+    np.testing.assert_allclose(np.linalg.norm(ways, axis=1), 1)
+    between = np.degrees(np.arccos(np.clip(ways @ ways.T - 2 * np.eye(48), -1, 1))).min(1)
+    assert 20 < between.min() <= between.max() < 35
+
+
+def test_light_around_has_its_radiance_and_no_direction() -> None:
+    """Thin smoke that scatters all light is as bright as what is behind it."""
+    lights = light_around(np.array([0.2, 0.3, 0.4]))
+    assert np.allclose(np.sum([light.irradiance for light in lights], 0) / (4 * np.pi), (0.2, 0.3, 0.4))
+    assert np.allclose(np.sum([light.direction for light in lights], 0), 0)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_strengths_are_the_least_squares_of_lights_that_add(seed: int) -> None:
+    """Also where one of the two, or both, would take light away."""
+    rng = np.random.default_rng(seed)
+    lit, around = rng.uniform(0, 1, (6, 40)), rng.uniform(0, 1, 40)
+    for seen in (0.5 * lit[0] + 0.2 * around, lit[1] - 0.3 * around, around - 0.5 * lit[2], -lit[0]):
+        sums = np.array([np.sum(lit**2, 1), lit @ around, lit @ seen])
+        found = np.array(strengths(sums, np.array([around @ around, around @ seen])))
+        for sun, (strength, ambient, explained) in zip(lit, found.T, strict=True):
+            both, left = nnls(np.stack([sun, around], 1), seen)
+            np.testing.assert_allclose((strength, ambient), both, atol=1e-9)
+            assert seen @ seen - explained == pytest.approx(left**2, abs=1e-9)
