@@ -39,7 +39,6 @@ IN_WORK = {
     "bright-background",
     "continuation",
     "density-axis",
-    "density-axis-light",
     "environment-directions",
     "every-view",
     "flicker",

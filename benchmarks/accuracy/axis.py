@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from benchmarks.tables import markdown
 from smokelift.density.axis import SmokeAxis
-from smokelift.density.axis_from_picture import estimate_axis
+from smokelift.density.axis_posterior import estimate_axis
 from smokelift.evaluation.truth import Truth
 from smokelift.render import Renderer
 from smokelift.scene import Camera, Domain, Medium
@@ -87,7 +87,8 @@ def errors(path: Path) -> Array:
 
 def error(shot: Shot, domain: Domain, found: SmokeAxis) -> float:
     """Return the error of an axis (m), weighted by the smoke's mass."""
-    difference = found.at(shot.heights - domain.centre[2]) - shot.depths
+    heights = shot.heights - domain.centre[2]
+    difference = found.at(heights, np.zeros_like(heights)) - shot.depths
     return float(np.sqrt(np.average(difference**2, weights=shot.mass)))
 
 

@@ -1,61 +1,54 @@
-"""Where in depth the smoke stands: the axis that depth profiles are centred on, and how well it is known."""
+"""The axis that depth profiles are centred on, and how well it is known."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from smokelift.density.screen import reach_along, view_frame
 from smokelift.scene import Camera, Domain
 
-
-@dataclass(frozen=True, eq=False)
-class Column:
-    """One of several columns of smoke, by height.
-
-    Attributes
-    ----------
-    begins
-        Height (m above the domain's centre) of its lower end.
-    middles, widths, depths : (n,)
-        Lateral place of its axis, lateral standard deviation and depth, in metres, at the heights of its `SmokeAxis`.
-    """
-
-    begins: float
-    middles: NDArray[np.float64]
-    widths: NDArray[np.float64]
-    depths: NDArray[np.float64]
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class SmokeAxis:
-    """How far behind the domain's centre the middle of the smoke is, by height, and by column where there are several.
+    """How far behind the domain's centre the middle of the smoke is, at the places of the upright screen through it.
 
     Attributes
     ----------
     heights : (n,)
         In metres above the domain's centre, ascending, along `view_frame`'s height.
-    depths : (n,)
-        In metres along `view_frame`'s depth, away from the camera.
-    spreads : (n,)
-        Standard deviation (m) about it of several columns that are known to stand behind one another.
-    columns
-        Known columns, if there are several. Beside one another they have depths of their own.
+    laterals : (m,)
+        In metres from the domain's centre, ascending, along its lateral direction; one where there is one column.
+    depths : (n, m)
+        In metres along its depth, away from the camera.
+    spreads : (n, m)
+        Standard deviation (m) of the depth over several columns that are known to stand behind one another.
+    widths : (n, m)
+        Lateral standard deviation (m) of the column that shows there, of several; zero of a single one.
     """
 
-    heights: NDArray[np.float64]
-    depths: NDArray[np.float64]
-    spreads: NDArray[np.float64]
-    columns: tuple[Column, ...] = ()
+    heights: Array
+    laterals: Array
+    depths: Array
+    spreads: Array
+    widths: Array
+
+    @staticmethod
+    def by_height(heights: Array, depths: Array) -> SmokeAxis:
+        """One column, whose depth (n,) depends on the height (n,) alone."""
+        nothing = np.zeros((len(depths), 1))
+        return SmokeAxis(heights, np.zeros(1), np.reshape(depths, (-1, 1)), nothing, nothing)
 
     @staticmethod
     def upright(depth: float = 0.0) -> SmokeAxis:
         """The same depth at all heights."""
-        return SmokeAxis(np.zeros(1), np.full(1, float(depth)), np.zeros(1))
+        return SmokeAxis.by_height(np.zeros(1), np.full(1, float(depth)))
 
     @staticmethod
     def given(depth: float, camera: Camera, domain: Domain) -> SmokeAxis:
@@ -74,49 +67,33 @@ class SmokeAxis:
             )
         return SmokeAxis.upright(depth)
 
-    def at(self, heights: NDArray[np.float64], laterals: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
-        """Depths at some heights, and lateral places if it is not to be the mean over the columns."""
-        if not self.columns or laterals is None:
-            return np.asarray(np.interp(heights, self.heights, self.depths))
-        return self._mean([column.depths for column in self.columns], heights, laterals)
+    @property
+    def several(self) -> bool:
+        """Whether several columns are known."""
+        return len(self.laterals) > 1
 
-    def spread_at(
-        self, heights: NDArray[np.float64], laterals: NDArray[np.float64] | None = None
-    ) -> NDArray[np.float64]:
-        """Spreads at some heights, and lateral places."""
-        if not self.columns or laterals is None:
-            return np.asarray(np.interp(heights, self.heights, self.spreads))
-        square = self._mean([column.depths**2 for column in self.columns], heights, laterals)
-        return np.asarray(np.sqrt(np.maximum(square - self.at(heights, laterals) ** 2, 0)))
+    def at(self, heights: Array, laterals: Array | float = 0.0) -> Array:
+        """Depths at some heights and lateral places."""
+        return self._read(self.depths, heights, laterals)
 
-    def width_at(self, heights: NDArray[np.float64], laterals: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Lateral standard deviation (m) of the columns at some heights and lateral places."""
-        return self._mean([column.widths for column in self.columns], heights, laterals)
+    def spread_at(self, heights: Array, laterals: Array | float = 0.0) -> Array:
+        """Spreads at some heights and lateral places."""
+        return self._read(self.spreads, heights, laterals)
 
-    def _mean(
-        self, values: Sequence[NDArray[np.float64]], heights: NDArray[np.float64], laterals: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
-        """Mean over the columns that may hold the smoke at some places."""
-        total, shares = np.zeros(np.shape(heights)), np.zeros(np.shape(heights))
-        for column, value in zip(self.columns, values, strict=True):
-            middle, width = (np.interp(heights, self.heights, of) for of in (column.middles, column.widths))
-            share = likelihood(laterals, middle, width) * (heights >= column.begins)
-            total += share * np.interp(heights, self.heights, value)
-            shares += share
-        lowest = min(range(len(values)), key=lambda k: self.columns[k].begins)
-        below = np.interp(heights, self.heights, values[lowest])
-        return np.where(shares > 0, total / np.maximum(shares, 1e-30), below)
+    def width_at(self, heights: Array, laterals: Array | float = 0.0) -> Array:
+        """Widths at some heights and lateral places."""
+        return self._read(self.widths, heights, laterals)
+
+    def _read(self, values: Array, heights: Array, laterals: Array | float) -> Array:
+        if not self.several:
+            return np.asarray(np.interp(heights, self.heights, values[:, 0]))
+        rows = np.interp(heights, self.heights, np.arange(len(self.heights)))
+        columns = np.interp(laterals, self.laterals, np.arange(len(self.laterals)))
+        return np.asarray(ndimage.map_coordinates(values, np.broadcast_arrays(rows, columns), order=1, mode="nearest"))
 
 
-def likelihood(
-    places: NDArray[np.float64], middles: NDArray[np.float64], widths: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """How likely smoke at some lateral places belongs to columns; never quite impossible."""
-    return np.asarray(np.exp(-(((places - middles) / widths) ** 2) / 2) + 1e-9)
-
-
-Cue = Literal["box", "floor contact", "inlets", "lamps"]
-"""What tells where the smoke stands; the box alone leaves it undetermined."""
+Cue = Literal["box", "floor contact", "inlets"]
+"""What shows where the smoke stands; the box alone leaves it undetermined."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,9 +103,9 @@ class AxisEstimate:
     Attributes
     ----------
     axis
-        The most likely one.
+        Its posterior mean.
     cue
-        What tells it.
+        What shows it.
     depth
         Mean depth (m behind the domain's centre) of smoke that stands on it.
     deviation

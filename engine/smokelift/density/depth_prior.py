@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.density.axis import SmokeAxis
-from smokelift.density.clip_axis import AXIS_FRAMES
 from smokelift.density.halves import MIN_COARSENED_VOXELS, any_of_two, every_second, spread_to_two, with_neighbours
 from smokelift.density.hull import Places, centres_of
 from smokelift.density.objective import Term
@@ -103,12 +102,9 @@ class RoundDepth:
         """Take the axis that the clip's smoke was found to have, unless one is given."""
         if self.axis is not None:
             return self
-        if self.axis_depth is None:
-            return self if clip.place is None else replace(self, axis=clip.place.axis)
-        first = next(filter(None, map(clip.observe, clip.spread(AXIS_FRAMES))), None)
-        if first is None:
-            return self
-        return replace(self, axis=SmokeAxis.given(self.axis_depth, first[0].camera, clip.optics.domain))
+        if self.axis_depth is not None:
+            return replace(self, axis=SmokeAxis.upright(self.axis_depth))
+        return self if clip.place is None else replace(self, axis=clip.place.axis)
 
     def estimate(self, views: ViewSet) -> DepthEstimate:
         """Spread the pictures' smoke by the profiles."""
@@ -212,4 +208,4 @@ def _common_axis(view: View, views: ViewSet) -> SmokeAxis:
         return SmokeAxis.upright()
     mean = np.bincount(level, weight * (offset @ depth))[known] / total[known]
     heights = (np.nonzero(known)[0] + lowest) * domain.voxel_size
-    return SmokeAxis(heights, mean, np.zeros(heights.shape))
+    return SmokeAxis.by_height(heights, mean)

@@ -101,4 +101,4 @@ def _middle(density: Volume, camera: Camera, domain: Domain) -> SmokeAxis:
     known = total > MIN_PROFILE_SHARE * total.max()
     depths = moment[known] / total[known]
     heights = (np.flatnonzero(known) + lowest) * h
-    return SmokeAxis(heights, depths, np.zeros_like(depths))
+    return SmokeAxis.by_height(heights, depths)

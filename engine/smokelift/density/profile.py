@@ -177,7 +177,7 @@ class DepthProfile:
         self, height: NDArray[np.float64], lateral: NDArray[np.float64], balls: NDArray[np.float32]
     ) -> NDArray[np.float64]:
         """A, in metres."""
-        if self._axis.columns:
+        if self._axis.several:
             across = self._axis.width_at(height, lateral)
         else:
             across = np.interp(height, self._heights, self._spread)

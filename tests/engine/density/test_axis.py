@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from smokelift.density.axis import SmokeAxis
-from smokelift.density.axis_from_picture import estimate_axis
+from smokelift.density.axis_posterior import estimate_axis
 from smokelift.render import Renderer
 from smokelift.scene import Camera, Domain, Inlet, Medium
 
@@ -71,18 +71,11 @@ def test_floating_smoke_is_left_on_the_axis(depth) -> None:
         assert not axis_of(seen(ball, ball), FRONT, BOX).depths.any()
 
 
-def test_smoke_that_joins_ends_what_the_foot_says() -> None:
-    """Above a second source the axis is the domain's again; below it the contact's still holds."""
-    both = column(-0.25, radius=0.2) + column(0.3, low=1.0, radius=0.3)
-    found = axis_of(seen(both, both), FRONT, BOX)
-    assert found.at(np.array([-1.2])) == pytest.approx(-0.2, abs=0.05)
-    assert abs(found.at(np.array([0.2]))) < 0.02
-
-
 def test_drifting_smoke_is_believed_less() -> None:
     """What leans across the picture may lean in depth as well."""
     straight, leaning = (axis_of(seen(column(-0.25, lean)), FRONT, BOX).at(np.array([0.4])) for lean in (0.0, 0.2))
-    assert 0.5 * straight < leaning < 0
+    assert straight < -0.15
+    assert abs(leaning) < 0.5 * abs(straight)
 
 
 def test_smoke_from_the_side_of_the_box_comes_back() -> None:
@@ -90,23 +83,33 @@ def test_smoke_from_the_side_of_the_box_comes_back() -> None:
     found = axis_of(rising(-0.6), FRONT, BOX)
     contact, head = found.at(np.array([-1.3, 0.7]))
     assert contact < -0.3
-    assert head > 0.25 * contact
+    assert head > 0.5 * contact
 
 
-def test_a_foot_in_few_frames_is_chance() -> None:
+def test_smoke_that_leans_back_across_the_picture_does_so_in_depth() -> None:
+    """Wind that blows across the picture hardly ever blows across it alone."""
+    upright, leaning = (
+        axis_of(seen(*2 * [np.roll(column(-0.3, lean), by, 0)]), FRONT, BOX).at(np.array([-1.2, 0.0]))
+        for lean, by in ((0.0, -3), (-0.3, 5))
+    )
+    assert upright[1] / upright[0] > 0.7
+    assert leaning[1] / leaning[0] < 0.3
+
+
+def test_a_contact_in_few_frames_is_chance() -> None:
     """Most frames have to show it."""
     ball = column(0.3, low=1.0)
     assert not axis_of(seen(column(0.3), ball, ball), FRONT, BOX).depths.any()
 
 
 @pytest.mark.parametrize("height", [-0.5, 0.02])
-def test_a_camera_that_does_not_look_down_on_the_floor_sees_no_foot(height) -> None:
+def test_a_camera_that_does_not_look_down_on_the_floor_sees_no_contact(height) -> None:
     """The floor is a line to it."""
     low = Camera.look_at((0, -7, height), (0, 0, 1.5), fov_y_degrees=35, size=(75, 113))
     assert not axis_of(seen(column(0.3), camera=low), low, BOX).depths.any()
 
 
-def test_smoke_that_goes_on_below_the_box_has_no_foot() -> None:
+def test_smoke_that_goes_on_below_the_box_has_no_contact() -> None:
     """The box cuts it; where it stands is not seen."""
     deep = Domain((-1, -1, -1), (1, 1, 3), (32, 32, 64))
     z = -1 + (np.arange(64) + 0.5) / 16
@@ -133,15 +136,15 @@ def test_depth_is_away_from_the_camera() -> None:
     assert found.at(np.array([0.0])) == pytest.approx(-0.2, abs=0.06)
 
 
-def test_known_sources_need_no_foot() -> None:
+def test_known_inlets_need_no_contact() -> None:
     """Floating smoke stands where it is said to enter; above the second of two sources, between them."""
     smoke = seen(column(0.3, low=1.0), column(0.3, low=1.1))
     one = axis_of(smoke, FRONT, BOX, [Inlet((0.2, 0.25, 0.5), 0.2)])
-    np.testing.assert_allclose(one.at(np.array([-1.0, 0.2])), 0.25, atol=0.01)
+    np.testing.assert_allclose(one.at(np.array([-1.0, 0.2])), 0.25, atol=0.03)
     sources = [Inlet((0.2, -0.05, 1.0), 0.2), Inlet((0.2, 0.25, 0.2), 0.2)]
-    two = axis_of(smoke, FRONT, BOX, sources)
-    np.testing.assert_allclose(two.at(np.array([-1.3, 0.2])), (0.25, 0.1), atol=0.01)
-    np.testing.assert_allclose(two.spread_at(np.array([-1.3, 0.2])), (0.0, 0.15), atol=0.01)
+    two, places = axis_of(smoke, FRONT, BOX, sources), (np.array([-1.3, 0.2]), np.full(2, 0.2))
+    np.testing.assert_allclose(two.at(*places), (0.25, 0.1), atol=0.02)
+    np.testing.assert_allclose(two.spread_at(*places), (0.0, 0.15), atol=0.02)
 
 
 @pytest.mark.parametrize("depth", [-0.9, 0.9])
@@ -191,14 +194,11 @@ def test_columns_are_followed_where_they_lean() -> None:
     smoke = beside(lean=0.12)
     found = axis_of(seen(smoke, smoke), FRONT, BOX, [NEAR_RIGHT, FAR_LEFT])
     heights = np.array([-1.2, -0.5])
-    np.testing.assert_allclose(
-        found.columns[0].middles[np.searchsorted(found.heights, heights)], (0.41, 0.33), atol=0.03
-    )
     low, high = found.at(heights, 0.45 - 0.12 * (heights + 1.5))
-    assert -0.3 < low < -0.28 < high < -0.22
+    assert -0.3 < low < -0.27 < high < -0.15
 
 
-def test_what_nothing_tells_is_as_uncertain_as_the_box_is_badly_centred() -> None:
+def test_what_nothing_shows_is_as_uncertain_as_the_box_is_badly_centred() -> None:
     """Across the picture the smoke's distance from the middle is seen, and in depth it may be as large."""
     floating = column(0.3, low=1.0)
     aside, central = (estimate_axis(seen(np.roll(floating, by, 0)), FRONT, BOX) for by in (6, -3))
@@ -211,7 +211,8 @@ def test_what_nothing_tells_is_as_uncertain_as_the_box_is_badly_centred() -> Non
 def test_a_floor_contact_is_less_certain_the_less_of_it_is_believed() -> None:
     """Before the middle it is believed most; far behind it may be smoke that begins above the floor."""
     before, behind, far = (estimate_axis(rising(depth), FRONT, BOX) for depth in (-0.25, 0.25, 0.6))
-    assert before.cue == behind.cue == far.cue == "floor contact"
+    assert before.cue == behind.cue == "floor contact"
+    assert far.cue == "box"
     assert before.depth == pytest.approx(-0.2, abs=0.05)
     assert before.deviation < behind.deviation < far.deviation
     assert before.deviation < 0.6 * estimate_axis(seen(column(-0.25, low=1.0)), FRONT, BOX).deviation

@@ -183,7 +183,7 @@ def test_the_profile_follows_the_axis(plume) -> None:
     """At every height its middle is where the axis is."""
     domain = plume.scene.domain
     h = domain.voxel_size
-    axis = SmokeAxis(np.array([-8 * h, 8 * h]), np.array([-3 * h, 3 * h]), np.zeros(2))
+    axis = SmokeAxis.by_height(np.array([-8 * h, 8 * h]), np.array([-3 * h, 3 * h]))
     profile = profile_of(amount_of(6), domain, axis)
     y = (np.arange(24) - 11.5) * h
     middle = (profile * y[None, :, None]).sum(1)[12] / profile.sum(1)[12]
@@ -197,7 +197,8 @@ def test_columns_behind_one_another_make_it_deeper(plume) -> None:
     y = (np.arange(24) - 11.5) * h
     depths = []
     for apart in (0.0, 8 * h):
-        axis = SmokeAxis(np.zeros(1), np.zeros(1), np.full(1, apart))
+        nothing = np.zeros((1, 1))
+        axis = SmokeAxis(np.zeros(1), np.zeros(1), nothing, np.full((1, 1), apart), nothing)
         profile = profile_of(amount_of(6), domain, axis)[12, :, 16]
         depths.append(np.sqrt((profile * y**2).sum() / profile.sum()))
     assert depths[1] > 1.8 * depths[0]

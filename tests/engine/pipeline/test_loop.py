@@ -31,8 +31,6 @@ from smokelift.scene import (
     ClipSource,
     DirectionalLight,
     Inlet,
-    Medium,
-    PointLight,
     Scene,
     completed,
     look_at_matrix,
@@ -149,18 +147,6 @@ def test_the_example_stands_upright() -> None:
     with Clip.open(scene.clip) as clip:
         axis = axis_of(prepare_shot(clip, scene, Settings.preset()))
     np.testing.assert_allclose(axis.at(np.linspace(-1.4, 1.2, 14)), 0.1, atol=0.2)
-
-
-@pytest.mark.parametrize(("scattering", "expected"), [("single", -0.15), ("unshadowed", 0.0)])
-def test_coloured_lamps_show_the_depth_of_a_clip(plume, draft, tmp_path, scattering, expected) -> None:
-    """Of smoke that floats, where the light is known; where it is not, the light says nothing."""
-    x, y, z = np.moveaxis(voxel_centres(plume.scene.domain), -1, 0)
-    ball = np.clip(2 - np.sqrt(x**2 + (y + 0.15) ** 2 + (z - 0.8) ** 2) / 0.15, 0, 1).astype(np.float32)
-    lamps = PointLight((0.8, -1.2, 1.6), (20, 10, 3)), PointLight((-0.8, 1.2, 1.6), (3, 10, 20))
-    scene = plume.write(tmp_path, [ball] * 2, replace(plume.scene, lights=lamps, medium=Medium(2.0, 0.9)))
-    with Clip.open(scene.clip) as clip:
-        axis = axis_of(prepare_shot(clip, scene, replace(draft, scattering=scattering)))
-    assert axis.at(np.array([0.0]))[0] == pytest.approx(expected, abs=0.06)
 
 
 def test_frames_come_in_order(run, plume) -> None:
