@@ -47,7 +47,7 @@ class SmokeAxis:
 
     @staticmethod
     def upright(depth: float = 0.0) -> SmokeAxis:
-        """The same depth at all heights."""
+        """One column of the same depth (m) at all heights."""
         return SmokeAxis.by_height(np.zeros(1), np.full(1, float(depth)))
 
     @staticmethod
