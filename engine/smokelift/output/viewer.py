@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from smokelift.checks import require_kind
-from smokelift.footage.background import background_picture, behind, open_plates
+from smokelift.footage.given_background import background_picture, behind, open_plates
 from smokelift.render import Image, Renderer, Volume, scene_optics
 from smokelift.render.emission import emitted
 from smokelift.scene import Camera, CompleteScene, shared_part

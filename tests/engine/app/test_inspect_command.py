@@ -106,14 +106,6 @@ def test_a_page_shows_what_is_known(plume, tmp_path, capsys, kind) -> None:
     assert page.stat().st_size > 5000
 
 
-def test_exposure_that_flickers_before_black_is_called_measured(plume, tmp_path, capsys) -> None:
-    clip = flickering(plume, tmp_path / "clip", plume.scene, 0.1).clip
-    assert command("inspect", clip.path, "--page", tmp_path / "page.html", "--progress", "json", *QUICK) == 0
-    (fact,) = (fact for fact in events(capsys.readouterr().out)[-1]["facts"] if fact["what"] == "exposure")
-    assert fact["origin"] == "measured"
-    assert fact["value"].startswith("flickers by up to 1")
-
-
 def test_a_sun_that_four_cameras_tell_is_called_measured(plume, tmp_path, capsys) -> None:
     sun = DirectionalLight((-0.5, -0.6, -0.4), (12.0, 11.0, 10.0))
     filmed_around(plume, tmp_path, (sun,)).save(tmp_path / "scene.toml")

@@ -14,7 +14,6 @@ from PIL import Image
 
 from smokelift.footage.clip import Clip, ClipError
 from smokelift.footage.images import CodedPicture, Picture, area_average, linear_to_srgb, srgb_to_linear
-from smokelift.footage.noise import encode_sample
 from smokelift.footage.video import Video
 from smokelift.output.images import write_image
 from smokelift.scene import ClipSource
@@ -227,14 +226,16 @@ def test_a_frame_through_a_function_is_the_function_of_the_frame(tmp_path: Path)
     for path in (video, tmp_path / "alpha.png"):
         with Clip.open(path) as clip, Clip.open(path) as other:
             last = len(clip) - 1
-            found = clip.frame_through(last, encode_sample)
-            assert found.dtype == np.uint16
-            assert np.array_equal(found, encode_sample(other.frame(last)))
-            some = clip.frame_through(last, encode_sample, lambda picture: picture[3:9, ::2])
+            found = clip.frame_through(last, linear_to_srgb)
+            assert found.dtype == np.float32
+            assert np.array_equal(found, linear_to_srgb(other.frame(last)))
+            some = clip.frame_through(last, linear_to_srgb, lambda picture: picture[3:9, ::2])
             assert np.array_equal(some, found[3:9, ::2])
-            assert np.array_equal(clip.glimpse_through(last, 16, encode_sample), encode_sample(other.glimpse(last, 16)))
+            assert np.array_equal(
+                clip.glimpse_through(last, 16, linear_to_srgb), linear_to_srgb(other.glimpse(last, 16))
+            )
             with pytest.raises(ClipError, match="no frame"):
-                clip.frame_through(last + 1, encode_sample)
+                clip.frame_through(last + 1, linear_to_srgb)
 
 
 def test_reduced_frames_are_means_of_light_and_kept(tmp_path: Path) -> None:
