@@ -175,7 +175,8 @@ def _estimated(clip: Clip, lens: Lens | None, lens_is_known: bool, moves: bool) 
                 "Clean Plate in Blender)."
             )
         red, green, blue = (float(v) for v in found.colour)
-        return Backdrop("given", clip, known_plate(found.colour, clip), Background(color=(red, green, blue)))
+        told = Background(color=(red, green, blue))
+        return Backdrop("colour", clip, known_plate(found.colour, clip), told, (red, green, blue), len(proxy.numbers))
     made = partial(Backdrop, clip=clip, frames=len(part.numbers), cut=cut, costs=found.costs)
     # black, and what is mostly one colour, is the same wherever the camera looks; else texture may pass by
     plain = found.colour is not None and (found.clear > MOSTLY or not found.colour.any())

@@ -16,7 +16,7 @@ from smokelift.output.sequence import Sequence
 from smokelift.scene import Background, DirectionalLight, Inlet, Medium, Scene
 from smokelift.setup.settings import QUALITIES
 from smokelift.setup.sky import light_around
-from tests.engine.setup.shots import filmed_around, flickering
+from tests.engine.setup.shots import filmed_around
 
 
 def test_inspect_says_how_smoke_gets_in_and_out(plume, tmp_path, capsys) -> None:
