@@ -166,7 +166,7 @@ def _expect(clip: Clip, scene: Scene) -> None:
     looked_at, estimates = clip.spread(SAMPLES), scene.background is None
     # a velocity needs the frame after one with smoke, and a background more frames than the smoke
     perhaps = {n + 1 for n in looked_at} | {n - clip.first for n in (proxy_frames(clip) if estimates else ())}
-    clip.expect(looked_at, perhaps={n for n in perhaps if n >= 0}.difference(looked_at))
+    clip.expect(looked_at, {n for n in perhaps if n >= 0}.difference(looked_at))
 
 
 def _further_views(

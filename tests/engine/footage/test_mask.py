@@ -149,7 +149,7 @@ def test_frames_outside_the_clip_are_said_before_its_masks(tmp_path: Path) -> No
 
 
 def test_frames_are_continued_where_they_are_hidden(tmp_path: Path, mask: Path) -> None:
-    """As their surroundings are, whatever is there; all the rest stays, also of glimpses."""
+    """As their surroundings are, whatever is there; all the rest stays."""
     file = filmed(tmp_path / "clip")
     with Clip.open(file) as plain, Clip.open(file, mask=mask) as clip:
         for n in (0, 12):

@@ -12,7 +12,7 @@ from PIL import Image
 from smokelift.footage.backdrop import find_backdrop
 from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import Look
-from smokelift.footage.images import CodedPicture, area_average, code_values, linear_to_srgb, srgb_to_linear
+from smokelift.footage.images import CodedPicture, code_values, linear_to_srgb, srgb_to_linear
 from smokelift.footage.mask import Mask, Masked
 from smokelift.footage.plate import Plate
 
@@ -21,7 +21,7 @@ SIZE = (80, 1280)
 
 
 class Filmed:
-    """Frames in memory as a video's: a glimpse takes means of codes."""
+    """Frames in memory as a video's."""
 
     warning: str | None = None
     lens: float | None = None
@@ -35,11 +35,6 @@ class Filmed:
 
     def read(self, n: int) -> CodedPicture:
         return CodedPicture(self.codes[n], code_values(255))
-
-    def glimpse(self, n: int, divisor: int) -> CodedPicture:
-        rows, columns = self.codes.shape[1:3]
-        reduced = area_average(self.codes[n], columns // divisor, rows // divisor)
-        return CodedPicture((reduced + 0.5).astype(np.uint8), code_values(255))
 
     def damaged(self, first: int, last: int, look: Look | None = None) -> tuple[int, ...]:
         return ()
