@@ -16,7 +16,7 @@ from smokelift.scene import Camera, CompleteScene, shared_part
 class Viewer:
     """Renders the frames of a sequence for one camera; where nothing moves, one renderer serves all of them.
 
-    `smokelift.footage.background.behind` says what another camera than the scene's own sees of a clean plate.
+    `smokelift.footage.given_background.behind` says what another camera than the scene's own sees of a clean plate.
 
     Parameters
     ----------
