@@ -49,7 +49,11 @@ TELEPHOTO = 3.0
 bends a pan more than the longer one does, so that either is found from one within a factor of about two."""
 
 MOSTLY = 0.5
-"""Share of the picture that shows one colour, on the mean, from which on no texture is looked for that passes by."""
+"""Share of the picture that shows one colour, on the mean, from which on it is no texture that
+passes by."""
+
+TEXTURE = np.float32(6 / 255)
+"""White noise in sRGB values from which on it is texture that a moving camera sees."""
 
 NO_ERRORS = np.zeros((3, 3), np.float32)
 """Covariance of the errors of what is known."""
@@ -168,7 +172,8 @@ def _estimated(clip: Clip, lens: Lens | None, lens_is_known: bool, moves: bool) 
     even, gains = part.evened()
     found = rank(even, white)
     if moves:
-        if found.colour is None or found.objects.any():
+        passes_by = found.clear < MOSTLY or white.max() > TEXTURE
+        if found.colour is None or found.objects.any() or passes_by:
             raise ValueError(
                 "The camera moves, so what is behind the smoke cannot be found from the clip; give a clean plate with "
                 "a picture for every frame (a video or plate_####.png), or a colour ([background] in a scene file, "

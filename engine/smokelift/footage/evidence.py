@@ -125,7 +125,7 @@ def rank(proxy: Proxy, white: Picture) -> Evidence:
         cost = np.where(stands, np.minimum(own - np.log(OBJECT), cost), cost)
         # smoke of one brightness draws a colour to one side only
         brighter = float((values[~clear].mean(-1) > candidate.mean()).mean()) if not clear.all() else 0.0
-        sides = -sum(share * np.log(max(share, 1e-6)) for share in (brighter, 1 - brighter))
+        sides = -sum(part * np.log(max(part, 1e-6)) for part in (brighter, 1 - brighter))
         total = float(cost.mean()) + sides * float((~clear).sum(0).mean())
         costs[", ".join(f"{255 * v:.0f}" for v in candidate)] = total
         if total < best and stands.mean() <= OBJECT and shows.mean() >= SHOWN:
