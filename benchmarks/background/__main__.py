@@ -18,9 +18,9 @@ import numpy as np
 from benchmarks.background.clips import Case, Smoke, cases
 from benchmarks.background.score import score
 from benchmarks.background.turning import panned, shaken
+from smokelift.footage.backdrop import find_backdrop
 from smokelift.footage.plate import Plates, known_plate
 from smokelift.footage.steady import without_noise_light
-from smokelift.setup.background import find_plates
 
 FIGURES = ("plate", "lost", "missed", "false", "unknown")
 
@@ -44,9 +44,9 @@ def main() -> None:
             began = time.process_time()
             if case.given:
                 plates: Plates = known_plate(case.plate, case.clip)
-                clip = without_noise_light(case.clip, plates)
+                clip = without_noise_light(case.clip, plates.noise)
             else:
-                found = find_plates(case.clip, None, None, case.lens)
+                found = find_backdrop(case.clip, None, None, case.lens)
                 plates, clip = found.plates, found.clip
             seconds += time.process_time() - began
             rows.append(score(replace(case, clip=clip), plates))

@@ -144,10 +144,6 @@ class Frames:
         """Return a frame, linear."""
         return srgb_to_linear(self.codes[n].astype(np.float32) / np.float32(255))
 
-    def glimpse(self, n: int, divisor: int) -> Picture:
-        """Return a frame whole."""
-        return self.read(n)
-
     def damaged(self, first: int, last: int, look: Look | None = None) -> tuple[int, ...]:
         """None."""
         return ()

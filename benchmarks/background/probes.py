@@ -20,11 +20,11 @@ import numpy as np
 import numpy.typing as npt
 
 from benchmarks.background.clips import Smoke, backdrop, exposed, filmed, sky, wall
+from smokelift.footage.backdrop import find_backdrop
 from smokelift.footage.clip import Clip
 from smokelift.footage.fire import fire_share
 from smokelift.footage.images import Picture
 from smokelift.footage.plate import known_plate
-from smokelift.setup.background import find_plates
 from smokelift.setup.choice import UNDETERMINED
 from smokelift.setup.smoke import sample_smoke
 from smokelift.setup.source import smoke_colour, source_radiance
@@ -150,7 +150,7 @@ def _sources(smoke: Smoke, plate: Picture, given: bool) -> list[str]:
     """Source radiance over the true one, three times."""
     true = float(smoke.radiance.sum() / (1 - smoke.transmittance).sum())
     clip = filmed(exposed(smoke.before(plate), np.ones(len(smoke.radiance))), "baked")
-    plates = known_plate(plate, clip) if given else find_plates(clip, None, None).plates
+    plates = known_plate(plate, clip) if given else find_backdrop(clip, None, None).plates
     samples = sample_smoke(clip, plates)
     source, _ = smoke_thickness(samples.textures)
     taken = [float(source_radiance(samples, each).mean()) / true for each in (source, None)]

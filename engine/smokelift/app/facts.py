@@ -10,7 +10,7 @@ from smokelift.checks import counted
 from smokelift.footage.exposure import shows_exposure, small
 from smokelift.footage.plate import Plate
 from smokelift.scene import SHADOWED, Scene
-from smokelift.setup.background import BLACK
+from smokelift.setup.backdrop_notes import BLACK
 from smokelift.setup.choice import UNDETERMINED, Choice
 from smokelift.setup.geometry import PICTURE_HEIGHT
 from smokelift.setup.shot import Shot
@@ -114,11 +114,6 @@ def _mask(shot: Shot) -> tuple[Fact, ...]:
 
 def _exposure(shot: Shot, plate: Plate) -> Fact:
     if not shows_exposure(small(plate.image)):
-        if shot.exposure > 0:
-            value = f"flickers by up to {shot.exposure:.0%}, evened out"
-            return Fact(
-                "exposure", value, "measured", "Of all smoke in the picture; slower changes are taken for smoke's."
-            )
         how = "The background is too dark or too bright to show it: what flickers is taken for smoke."
         return Fact("exposure", "taken to be steady", UNDETERMINED, how)
     value = f"changes by up to {shot.exposure:.0%}, evened out" if shot.exposure > 0 else "steady"

@@ -22,7 +22,7 @@ from smokelift.density.hull import inside
 from smokelift.density.multiplicative import fit_multiplicative
 from smokelift.density.objective import camera_terms
 from smokelift.density.observation import BLACK, Observation, ViewSet, eight_bit_plate
-from smokelift.footage.background import background_picture
+from smokelift.footage.given_background import background_picture
 from smokelift.footage.plate import Plate
 from smokelift.render import Image, Volume, scene_optics
 from smokelift.render.blas import products_on_one_thread

@@ -1,187 +1,255 @@
-"""Backgrounds of one colour, before which most stock footage stands.
+"""What stands behind the smoke of a clip, and how it is decided.
 
-Where the pixels that never change have one colour, it is behind all that do. Where they have two, it is the one that
-all pixels have at some time: the other is ink that stays. Mist that hardly moves changes as little as what it is in
-front of, and has many colours; where all of it fades into black, that is behind it.
-
-A camera that moves shows another part of the background in every frame, so a pixel has no value of its own. One colour
-is known all the same.
+In this order: what an alpha channel says; what the scene gives; one colour, if the evidence of the whole file is for it
+(`evidence`); a panorama, if the camera turns (`turning`); else the picture that the clear frames show
+(`clear_picture`). The clip's noise is told from what cannot be smoke, before all else (`noise`).
 """
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
-from smokelift.footage.behind_smoke import DETAIL, ISLAND
-from smokelift.footage.images import Picture, blurred, linear_to_srgb
-from smokelift.footage.matte import matte
+from smokelift.footage.alignment import Lens
+from smokelift.footage.behind_smoke import DETAIL
+from smokelift.footage.clear_picture import ClearPicture, clear_picture
+from smokelift.footage.clip import Clip
+from smokelift.footage.evidence import LIMIT, Mask, colour_around, rank, within
+from smokelift.footage.focal_length import FocalLength, focal_length
+from smokelift.footage.given_background import given_plates
+from smokelift.footage.images import Picture, linear_to_srgb
 from smokelift.footage.noise import (
-    BLOCK,
-    SMOKE_TO_NOISE,
+    EIGHT_BIT_STEP,
     Noise,
-    block_means,
-    decode_samples,
-    linear_samples,
-    over_time,
-    whole_blocks,
+    lasting_noise,
+    noise_of,
+    some_blocks,
+    spread_about,
+    white_noise,
 )
-from smokelift.footage.plate import Plate
-from smokelift.footage.seen import median_of_seen, quantile_of_seen
+from smokelift.footage.panorama import estimate_panorama
+from smokelift.footage.plate import Plate, Plates, known_plate
+from smokelift.footage.proxy import Proxy
+from smokelift.footage.quantiser import median_quantiser
+from smokelift.footage.seen import median_of_seen
+from smokelift.footage.steady import cleared, uncovered, without_noise_light
+from smokelift.footage.turning import Turns, find_turns
+from smokelift.footage.whole_plate import spread_out, whole_plate
+from smokelift.scene import Background, Camera
 
-ONE_COLOUR = 0.8
-"""Share of the pixels that never change which has to have one colour for it to be the backdrop's; the others are a
-nozzle, a floor, a logo."""
+NOISE_FRAMES = 16
+"""Frames whose pixels tell the white noise."""
 
-ONE_COLOUR_NOISE = np.float32(6 / 255)
-"""Most noise of a background of one colour, in sRGB values: a pixel that varies more while the camera moves sees more
-than one colour."""
+TELEPHOTO = 3.0
+"""Focal length over the usual one that is supposed where no turn with the usual one explains the clip. The wider lens
+bends a pan more than the longer one does, so that either is found from one within a factor of about two."""
 
-AT_ONCE = 0.5
-"""Share of the blocks that smoke comes over between two samples, less than a fade or a cut changes at once
-(docs/experiments/background.md)."""
+MOSTLY = 0.5
+"""Share of the picture that shows one colour, on the mean, from which on it is no texture that
+passes by."""
 
-BLACK = 0.1
-"""Share of the picture that is black all the time, at least, for what fades into it to be mist. Of 43 public clips
-those before something have less, but for a stage with sharp edges (docs/experiments/background.md)."""
+TEXTURE = np.float32(6 / 255)
+"""White noise in sRGB values from which on it is texture that a moving camera sees."""
 
-ENOUGH = 8
-"""Samples of which the clearest view of each pixel is taken."""
+NO_ERRORS = np.zeros((3, 3), np.float32)
+"""Covariance of the errors of what is known."""
 
-SHARPEST = 0.99
-"""Quantile of that view's detail which is looked at: a speck is no object."""
-
-SHARP = np.float32(15 / 255)
-"""Detail of mist and smoke in front of black, in sRGB values, at most (1 to 13 of 255 in 26 clips); walls and stages in
-the dark have edges (17 to 40; docs/experiments/background.md)."""
-
-AROUND, MOST = np.float32(2 / 255), 0.5
-"""Difference in sRGB values up to which a block has the colour around a single picture, and share of the blocks along
-its sides that have to, on three of them: 0.56 to 1 of 18 frames of public clips before one colour, 0.2 at most of
-others but for stages in the dark (docs/experiments/background.md)."""
+Source = Literal["alpha", "given", "colour", "colour around one frame", "picture", "panorama"]
 
 
-def backdrop_plate(
-    samples: npt.NDArray[np.uint16], noise: Noise, seen: npt.NDArray[np.bool_] | None = None
-) -> Plate | None:
-    """Return the plate of a background of one colour, or None if it has more.
+@dataclass(frozen=True, eq=False)
+class Backdrop:
+    """What stands behind the smoke of a clip.
 
-    ``samples`` (frames, rows, columns, 3) are of one exposure, as of `SteadySamples`, and so is what is ``seen`` of
-    them (frames, rows, columns).
+    Attributes
+    ----------
+    source
+        Where it is from, and so what it is.
+    clip
+        Without the brightness that noise adds to it, and its background where a mask hides it.
+    plates
+        Of the full pictures.
+    background
+        As a scene would give it; None where it was estimated, unless the camera moves.
+    colour
+        Linear, where one was found; black counts as such below half a step of 8 bit video.
+    frames
+        Of the file that were evidence for it, up to the next cut.
+    turns, focal
+        Of a camera that was found to turn; its focal length where it is measured.
+    lens_is_known
+        Whether the camera or the file says the focal length.
+    quantiser
+        Of the file, if it says it and the background is not of one colour.
+    cut
+        Frames of the file before and after a cut within the clip, if there is one.
+    costs
+        As of `smokelift.footage.evidence.Evidence`; empty where nothing was compared.
     """
-    backdrop = _backdrop(samples, noise, seen)
-    return None if backdrop is None else Plate(backdrop, np.ones(backdrop.shape[:2], np.float32), noise)
+
+    source: Source
+    clip: Clip
+    plates: Plates
+    background: Background | None = None
+    colour: tuple[float, float, float] | None = None
+    frames: int = 0
+    turns: Turns | None = None
+    focal: FocalLength | None = None
+    lens_is_known: bool = False
+    quantiser: float | None = None
+    cut: tuple[int, int] | None = None
+    costs: dict[str, float] = field(default_factory=dict)
 
 
-def one_colour(plate: Plate) -> tuple[float, float, float] | None:
-    """Return the linear colour of a plate that was estimated from a moving camera, or None if it has more than one."""
-    known = plate.confidence > 0.5
-    if known.mean() < 0.5 or plate.noise.total.max() > ONE_COLOUR_NOISE:
-        return None
-    red, green, blue = (float(v) for v in np.median(plate.image[known], axis=0))
-    colour = np.broadcast_to(np.array([red, green, blue], np.float32), plate.image.shape)
-    differs = matte(plate.image, Plate(colour, np.ones_like(plate.confidence), plate.noise)).mask
-    return None if (differs & known).any() else (red, green, blue)
+def find_backdrop(
+    clip: Clip, camera: Camera | None, background: Background | None, lens: Lens | None = None
+) -> Backdrop:
+    """Find what stands behind the smoke.
 
+    Parameters
+    ----------
+    clip
+        The footage.
+    camera
+        If it is known; one that moves allows no estimate but that of one colour.
+    background
+        What the scene says.
+    lens
+        Of the clip; without it the camera is taken to stand still unless it is known to move.
 
-def colour_around(picture: Picture) -> tuple[float, float, float] | None:
-    """Return the linear colour along the sides of a single picture (rows, columns, 3), or None if they have more.
-
-    One picture does not tell what never changes, so that smoke may be all that has another colour. It may come in from
-    one side, and cover more of the picture than its background does.
+    Raises
+    ------
+    ClipError
+        If a frame cannot be read.
+    ValueError
+        If a camera moves before a background of more than one colour that is not given, or turns too far.
     """
-    linear = block_means(picture[None])[0]
-    blocks = linear_to_srgb(linear)
-    sides = [(values[0], values[-1], values[:, 0], values[:, -1]) for values in (blocks, linear)]
-    colour = np.median(np.concatenate(sides[0]), axis=0)
-    alike = [(np.abs(side - colour) <= AROUND).all(-1) for side in sides[0]]
-    if sum(side.mean() >= MOST for side in alike) < 3:
-        return None
-    red, green, blue = (float(v) for v in np.median(np.concatenate(sides[1])[np.concatenate(alike)], axis=0))
-    return red, green, blue
+    if clip.backdrop is not None:
+        grey = (clip.backdrop,) * 3
+        quiet, plates = _before(clip, lambda of: known_plate(grey, of))
+        found = Backdrop("alpha", quiet, plates, Background(color=grey))
+    elif (given := given_plates(background, camera, clip)) is not None:
+        quiet, plates = _before(clip, lambda of: given if of is clip else _given(background, camera, of))
+        found = Backdrop("given", quiet, plates, background)
+    else:
+        known = camera is not None or clip.lens is not None
+        found = _estimated(clip, lens, known, camera is not None and camera.moves)
+    shown = uncovered(found.plates, found.clip)
+    return replace(found, clip=cleared(found.clip, shown), plates=shown)
 
 
-def _backdrop(
-    samples: npt.NDArray[np.uint16], noise: Noise, seen_pixels: npt.NDArray[np.bool_] | None
-) -> Picture | None:
-    """The linear picture (rows, columns, 3) of a background of one colour, or None if it has more.
+def _before(clip: Clip, plates_of: Callable[[Clip], Plates]) -> tuple[Clip, Plates]:
+    """A clip without the light that its noise adds, and plates that are known."""
+    plates = plates_of(clip)
+    quiet = without_noise_light(clip, plates.noise)
+    if quiet is clip:
+        return clip, plates
+    again = plates_of(quiet)
+    # noise is that of the pictures as they were filmed: sRGB values of the others are too low on the mean
+    return quiet, replace(again, noise=plates.noise)  # type: ignore[type-var]  # all plates are dataclasses
 
-    Whatever never changes and has another colour stands before the backdrop, and is part of the picture.
-    """
-    linear = np.concatenate([block_means(linear_samples(sample[None])) for sample in samples])
-    shown_blocks = np.ones(linear.shape[:3], np.bool_) if seen_pixels is None else whole_blocks(seen_pixels)
-    linear[~shown_blocks] = np.nan
-    visible = shown_blocks.any(0)
-    blocks = linear_to_srgb(linear)
-    middle, limit = median_of_seen(blocks), SMOKE_TO_NOISE * noise.averaged(BLOCK**2).total
-    still = (over_time(blocks - middle) <= limit).all(-1)
-    if not still.any():
-        return None
-    # the median of many samples has less noise than they have, by pi / 2 more variance than their mean
-    settled = SMOKE_TO_NOISE * noise.averaged(BLOCK**2 * max(1.0, len(samples) / (np.pi / 2))).total
-    colours: list[Picture] = []
-    kinds: list[npt.NDArray[np.bool_]] = []
-    left = still
-    while left.any() and len(kinds) < 2:  # the backdrop, and what stays before it
-        colours.append(np.median(middle[left], axis=0))
-        kinds.append((np.abs(middle - colours[-1]) <= settled).all(-1))
-        left = left & ~kinds[-1]
-    if left.sum() > (1 - ONE_COLOUR) * still.sum():
-        return _black(samples, noise, blocks, visible)
-    seen = [(np.abs(blocks - colour) <= limit).all(-1) for colour in colours]
-    covered = next(
-        (n for n, shown in enumerate(seen) if (still & kinds[n]).any() and _comes_over(shown[:, visible])), None
+
+def _given(background: Background | None, camera: Camera | None, clip: Clip) -> Plates:
+    given = given_plates(background, camera, clip)
+    assert given is not None
+    return given
+
+
+def _estimated(clip: Clip, lens: Lens | None, lens_is_known: bool, moves: bool) -> Backdrop:
+    """The background of a clip of which nothing is given."""
+    if len(clip) == len(clip.whole()) == 1 and (around := colour_around(clip.frame(0))) is not None:
+        return Backdrop("colour around one frame", clip, known_plate(around, clip), frames=1)
+    proxy = Proxy.of(clip)
+    white = _white_noise(clip, proxy)
+    quiet = without_noise_light(clip, Noise(white, lasting_noise(EIGHT_BIT_STEP).lasting))
+    if quiet is not clip:
+        clip, proxy = quiet, Proxy.of(quiet)
+    part, cut = proxy.shot(clip)
+    even, gains = part.evened()
+    found = rank(even, white)
+    if moves:
+        passes_by = found.clear < MOSTLY or white.max() > TEXTURE
+        if found.colour is None or found.objects.any() or passes_by:
+            raise ValueError(
+                "The camera moves, so what is behind the smoke cannot be found from the clip; give a clean plate with "
+                "a picture for every frame (a video or plate_####.png), or a colour ([background] in a scene file, "
+                "Clean Plate in Blender)."
+            )
+        red, green, blue = (float(v) for v in found.colour)
+        told = Background(color=(red, green, blue))
+        return Backdrop("colour", clip, known_plate(found.colour, clip), told, (red, green, blue), len(proxy.numbers))
+    made = partial(Backdrop, clip=clip, frames=len(part.numbers), cut=cut, costs=found.costs)
+    # black, and what is mostly one colour, is the same wherever the camera looks; else texture may pass by
+    plain = found.colour is not None and (found.clear > MOSTLY or not found.colour.any())
+    if lens is not None and not plain:
+        turns, focal = _turned(clip, lens, lens_is_known)
+        if turns is not None:
+            made = partial(made, turns=turns, focal=focal, lens_is_known=lens_is_known, cut=None)
+            return made("panorama", plates=estimate_panorama(clip, turns), quantiser=median_quantiser(clip.path))
+    if found.colour is not None:
+        red, green, blue = (float(v) for v in found.colour)
+        plate = _of_one_colour(clip, part, even, gains, found.colour, found.objects, white)
+        return made("colour", plates=plate, colour=(red, green, blue))
+    noise = _noise(even, median_of_seen(even.pictures), white)
+    picture = clear_picture(even.pictures, even.seen, noise.averaged(even.scale**2), DETAIL / even.scale, masked=True)
+    plate = Plate(
+        whole_plate(clip, part, gains, picture),
+        spread_out(picture.known, clip.size).astype(np.float32),
+        _noise(even, picture.image, white),
+        picture.errors,
     )
-    if covered is None and kinds[0][still].mean() < ONE_COLOUR:
-        return _black(samples, noise, blocks, visible)
-    alike = kinds[covered or 0]
-    bare = alike if covered is None else seen[covered].any(0)
-    clear = median_of_seen(linear)
-    low, high = (quantile_of_seen(blocks, share) for share in (0.05, 0.95))
-    fixed = still & ~alike & ~bare & ((high - low) <= limit).all(-1)
-    picture = np.where(fixed[..., None], clear, clear[still & alike].mean(0))
-    whole: Picture = _pixels(picture, samples.shape[1:3]).astype(np.float32)
-    own = _pixels(fixed, samples.shape[1:3])
-    if own.any():
-        whole[own] = np.median(linear_samples(samples[:, own]), axis=0)
-    return whole
+    return made("picture", plates=plate, quantiser=median_quantiser(clip.path))
 
 
-def _black(
-    samples: npt.NDArray[np.uint16], noise: Noise, blocks: Picture, visible: npt.NDArray[np.bool_]
-) -> Picture | None:
-    """A black picture if much of the samples is black all the time and the rest fades into that, else None.
-
-    ``blocks`` (frames, rows, columns, 3) are their block means in sRGB values, of which some are ``visible``.
-    """
-    limit = SMOKE_TO_NOISE * noise.averaged(BLOCK**2).total
-    if (over_time(blocks) <= limit).all(-1)[visible].mean() < BLACK:
-        return None
-    some = samples[:: -(-len(samples) // ENOUGH)]
-    # smoke brightens black; one sample may be astray
-    clearest = np.sort([decode_samples(sample).mean(-1) for sample in some], axis=0)[min(1, len(some) - 1)]
-    detail = np.abs(clearest - blurred(clearest, DETAIL))[_pixels(visible, samples.shape[1:3])]
-    if np.quantile(detail, SHARPEST) > SHARP + SMOKE_TO_NOISE * noise.white.max():
-        return None
-    return np.zeros((*samples.shape[1:3], 3), np.float32)
-
-
-def _pixels(blocks: npt.NDArray[Any], shape: tuple[int, ...]) -> npt.NDArray[Any]:
-    """Values of blocks (rows, columns, ...) at the pixels of a picture (height, width)."""
-    size = min(BLOCK, *shape)
-    rows, columns = (np.minimum(np.arange(n) // size, m - 1) for n, m in zip(shape, blocks.shape, strict=False))
-    return np.asarray(blocks[rows][:, columns])
+def _of_one_colour(
+    clip: Clip, part: Proxy, even: Proxy, gains: Picture, colour: Picture, objects: Mask, white: Picture
+) -> Plate:
+    """The plate of one colour with the objects before it."""
+    image = np.tile(colour, (*objects.shape, 1))
+    noise = _noise(even, image, white)
+    whole = np.tile(colour, (*clip.size[::-1], 1))
+    if objects.any():
+        own = np.median(even.pictures[:, objects], axis=0)
+        image[objects] = own
+        clear = np.zeros(even.seen.shape, np.bool_)
+        limit = LIMIT * noise.averaged(even.scale**2).total
+        clear[:, objects] = within(even.encoded[:, objects] - linear_to_srgb(own), limit)
+        known = np.ones(objects.shape, np.bool_)
+        picture = whole_plate(clip, part, gains, ClearPicture(image, known, clear, known.astype(np.float32), NO_ERRORS))
+        whole = np.where(spread_out(objects, clip.size)[..., None], picture, whole)
+    return Plate(whole, np.ones(clip.size[::-1], np.float32), noise)
 
 
-def _comes_over(shown: npt.NDArray[np.bool_]) -> bool:
-    """Whether what has a colour in samples (frames, blocks) is what smoke comes over.
+def _white_noise(clip: Clip, proxy: Proxy) -> Picture:
+    """The white noise (3,) of a clip's pixels, at one exposure."""
+    own = np.flatnonzero([clip.first <= number < clip.first + len(clip) for number in proxy.numbers])
+    part = proxy.only(own[np.unique(np.linspace(0, len(own) - 1, NOISE_FRAMES).round().astype(int))])
+    _, gains = part.evened()
+    blocks = []
+    for number, gain in zip(part.numbers, gains, strict=True):
+        n = number - clip.first
+        picture = clip.frame_through(n, linear_to_srgb) if (gain == 1).all() else linear_to_srgb(clip.frame(n) / gain)
+        blocks.append(some_blocks(clip.as_seen(n, picture)))
+    return white_noise(np.stack(blocks))
 
-    Ink that spreads and stays is as still as what it hides. But its own colour is never seen where it has not come to,
-    and what it hides is seen everywhere. A clip that fades in from black is black everywhere at a time, too: that
-    leaves all of the picture at once, and smoke comes over one part after the other.
-    """
-    changes = shown[:, ~shown.all(0)]
-    at_once = np.abs(np.diff(changes.mean(-1))).max(initial=0.0) if changes.size else 0.0
-    return bool(shown.any(0).mean() >= 1 - ISLAND and at_once < AT_ONCE)
+
+def _noise(proxy: Proxy, background: Picture, white: Picture) -> Noise:
+    """The noise of the file's pixels before a linear background (rows, columns, 3)."""
+    deviations = proxy.encoded - linear_to_srgb(background)
+    deviations[~proxy.seen] = np.nan
+    return noise_of(white, spread_about(deviations), proxy.scale**2)
+
+
+def _turned(clip: Clip, lens: Lens, is_known: bool) -> tuple[Turns | None, FocalLength | None]:
+    """How the camera turned, and the focal length where it is measured since it is not known."""
+    if is_known:
+        return find_turns(clip, lens), None
+    turns = find_turns(clip, lens, FocalLength(TELEPHOTO, 0.0).of(lens))
+    focal = None if turns is None else focal_length(clip, turns)
+    if turns is None or focal is None or not focal.determined:
+        return turns, None
+    return find_turns(clip, focal.of(turns.lens)) or turns, focal

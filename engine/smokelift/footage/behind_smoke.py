@@ -136,7 +136,7 @@ def push_pull(image: Picture, confidence: Picture) -> Picture:
     """
     height, width = confidence.shape
     weight: Picture = confidence[..., None]
-    if min(height, width) == 1 or float(confidence.min()) >= 1.0:
+    if max(height, width) == 1 or float(confidence.min()) >= 1.0:
         return image
     small_size = ((width + 1) // 2, (height + 1) // 2)
     total = area_average(weight, *small_size)

@@ -342,26 +342,6 @@ class Clip:
         image = self._cache[n] if n in self._cache else self._read(n, self._source.read)
         return _through(image, change, cut)
 
-    def glimpse_through(self, n: int, longest: int, change: Callable[[Picture], NDArray[Value]]) -> NDArray[Value]:
-        """Return `glimpse` with a function applied as by `frame_through`."""
-        return _through(self._glimpsed(n, longest), change, _whole)
-
-    def glimpse_average(
-        self, n: int, longest: int, change: Callable[[Picture], Picture], width: int, height: int
-    ) -> Picture:
-        """Return the area averages of `glimpse_through`."""
-        image = self._glimpsed(n, longest)
-        if isinstance(image, CodedPicture):
-            return CodedPicture(image.codes, change(image.table)).averaged(width, height)
-        return area_average(change(image), width, height)
-
-    def _glimpsed(self, n: int, longest: int) -> Picture | CodedPicture:
-        """What `glimpse` makes linear, as it is stored if it is stored in codes."""
-        divisor = max(self.size) // longest
-        if divisor < 2:
-            return self._kept_or_coded(n)
-        return self._read(n, lambda number: self._source.glimpse(number, divisor))
-
     def reduced(self, n: int) -> Picture:
         """Return frame ``n`` as means of light, with `REDUCED` pixels along the longer side at most.
 
@@ -381,47 +361,22 @@ class Clip:
         scale = max(1.0, max(self.size) / REDUCED)
         return max(1, round(width / scale)), max(1, round(height / scale))
 
-    def glimpse(self, n: int, longest: int) -> Picture:
-        """Return frame ``n`` for a look, linear: it may be reduced while it is read, which is cheaper.
-
-        Parameters
-        ----------
-        n
-            As of `frame`.
-        longest
-            Pixels along the longer side that a reduced frame has at least.
-
-        Raises
-        ------
-        ClipError
-            As `frame` does.
-        """
-        if max(self.size) // longest < 2:
-            return self.frame(n)
-        return linear_picture(self._glimpsed(n, longest))
-
-    def expect(
-        self, whole: Iterable[int] = (), glimpses: Iterable[int] = (), longest: int = 1, perhaps: Iterable[int] = ()
-    ) -> None:
-        """Say which frames, and which glimpses, are asked for next: those met while `damaged` is found out are kept.
+    def expect(self, whole: Iterable[int] = (), perhaps: Iterable[int] = ()) -> None:
+        """Say which frames are asked for next: those met while `damaged` is found out are kept.
 
         It has no effect on a clip whose frames are `changed`.
 
         Parameters
         ----------
-        whole, glimpses
+        whole
             Numbers of frames.
-        longest
-            As of `glimpse`.
         perhaps
-            Numbers of frames of which some are asked for, whole or as glimpses: they are kept as they are decoded, in
-            `DECODED_BYTES` if that holds them all, until other frames are expected.
+            Numbers of frames of which some are asked for: they are kept as they are decoded, in `DECODED_BYTES` if that
+            holds them all, until other frames are expected.
         """
-        divisor = max(self.size) // longest
         if isinstance(self._source, KeptFrames):
-            small = [self.first + n for n in glimpses] if divisor > 1 else []
             some = [self.first + n for n in perhaps if n < len(self)]
-            self._source.expect([self.first + n for n in whole], small, divisor, some)
+            self._source.expect([self.first + n for n in whole], some)
 
     def _read(self, n: int, read: Callable[[int], Image]) -> Image:
         """Return a frame from the file, or what stands in for it: the last sound one lasts on, as when one drops."""
@@ -507,9 +462,6 @@ class _Changed:
         if self._keeps is not None and self._keeps(number, lambda: _small(image)):
             return image
         return self._change(number, linear_picture(image))
-
-    def glimpse(self, n: int, divisor: int) -> Picture | CodedPicture:
-        return self.read(n)  # a change may be meant for the whole picture
 
     def damaged(self, first: int, last: int, look: Look | None = None) -> tuple[int, ...]:
         clip = self._clip

@@ -1,94 +1,248 @@
-"""How much of a file shows what a clip of it does: all of that is evidence for the background, whatever is trimmed."""
+"""Whether a clip stands before one colour or a picture: one evidence ranks them.
+
+A block of the picture is in one of two states: clear, when it shows its background within the noise, and smoke, when it
+shows anything. Smoke goes on as it was, or jumps to any other value. So each background explains the blocks at a cost,
+the negative logarithm of their probability with the likeliest states (Viterbi, "Error bounds for convolutional codes",
+1967). One colour is behind all blocks, but for a few objects before it. A picture has a colour for each block, and as
+it may be any, each costs as much as a jump does.
+
+A frame that is black everywhere says nothing against a picture, for clips fade. What is black, or another colour, at
+some time of the file is evidence for all of its frames up to the next cut, whatever part of it is used.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.footage.clip import Clip, ClipError
-from smokelift.footage.exposure import LONGEST, gain_of, small
-from smokelift.footage.images import Picture, Value, linear_to_srgb
+from smokelift.footage.behind_smoke import DETAIL
+from smokelift.footage.images import Picture, area_average, blurred, channel_mean, linear_to_srgb, srgb_to_linear
+from smokelift.footage.noise import EIGHT_BIT_STEP, block_means, spread_about
+from smokelift.footage.proxy import Proxy
+from smokelift.footage.seen import median_of_seen
 
-SAMPLES = 24
-"""Frames of the file that are compared, and as many of the clip at most."""
+BLOCKS = 64
+"""Blocks along the longer side: means over some pixels, of which white noise is gone."""
 
-SAMPLES_OF_LARGE = 16
-"""The same where pictures are large, as many as are looked at whole anyway."""
+LIMIT = 3.0
+"""Standard deviations of noise up to which a block is as its background."""
 
-GLIMPSE = 4 * LONGEST
-"""Pixels along the longer side of what is read, four for each one that is compared: light is averaged over them."""
+LASTING = np.float32(2 / 255)
+"""Noise of such means that is not white, in sRGB values, at most: of H.264 at crf 45 it is less than half of that
+(docs/experiments/background.md)."""
 
-STILL = 4 / 255
-"""Change of a pixel, in sRGB values, up to which it has not changed."""
+STAYS, SWITCHES = 0.98, 0.03
+"""Probability that smoke stays as it is from one frame to the next of those that are looked at, and that a block
+becomes clear or smoke. What ranks the backgrounds are jumps; these only break ties."""
 
-SAME_SHOT = 0.25
-"""Share of the pixels that do not change within the clip which a frame of the same shot leaves as they are; smoke may
-be over the others."""
+OBJECT = 0.1
+"""Probability of a block to be an object before one colour, a nozzle, a floor or a logo, and share of all blocks that
+are at most. Of public clips those on one colour have up to .02 (docs/clips.md)."""
+
+SHOWN = 0.25
+"""Share of the blocks that show the one colour at some time, at least."""
+
+STILL = 0.9
+"""Share of the frames in which an object is as it mostly is, within half of the limit: smoke wavers more."""
+
+WHOLE = 0.99
+"""Share of a block that is seen, at least."""
+
+CANDIDATES = 4
+"""Colours that are tried: those that most of all blocks have."""
+
+EMPTY = 0.98
+"""Share of the blocks that are black in a frame that is black everywhere."""
+
+CLEAREST = 8
+"""Frames of which the clearest view of each pixel is taken."""
+
+SHARPEST, SHARP = 0.99, np.float32(15 / 255)
+"""Quantile of the detail of what stands still before black, in sRGB values, and how much of it mist has at most: 1 to
+13 of 255 in 26 clips of smoke; walls and stages in the dark have 17 to 40 (docs/experiments/background.md)."""
+
+AROUND, MOST = np.float32(2 / 255), 0.5
+"""Difference in sRGB values up to which a block has the colour around a single picture, and share of the blocks along
+its sides that have to, on three of them: 0.56 to 1 of 18 frames of public clips before one colour, 0.2 at most of
+others but for stages in the dark (docs/experiments/background.md)."""
+
+Mask = NDArray[np.bool_]
 
 
-def are_large(clip: Clip) -> bool:
-    """Return whether the pictures of a clip are larger than glimpses at them."""
-    return max(clip.size) >= 2 * GLIMPSE
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """What the frames of a clip say of its background.
 
-
-def looks(clip: Clip) -> list[int]:
-    """Return the numbers of the frames of a clip that are compared."""
-    return clip.spread(SAMPLES_OF_LARGE if are_large(clip) else SAMPLES)
-
-
-def evidence(clip: Clip) -> Clip:
-    """Return the part of a clip's file around it that was filmed in one shot with it.
-
-    Raises
-    ------
-    ClipError
-        If a frame cannot be read.
+    Attributes
+    ----------
+    colour : (3,), optional
+        Linear, if it has one; None of a picture.
+    objects : (rows, columns) bool
+        Pixels of the proxy that show something else before the colour all the time.
+    clear
+        Share of all blocks and frames that show the colour.
+    costs
+        Of the kinds that were compared, in nats a block, by the colour in codes of 8 bit; the least is the likeliest.
     """
-    whole = clip.whole()
-    if len(whole) == len(clip):
-        return clip
-    own = np.stack([small(clip.glimpse(number, GLIMPSE)) for number in looks(clip)])
-    reference = np.median(own, axis=0)
-    still = np.quantile(np.abs(linear_to_srgb(own) - linear_to_srgb(reference)).max(-1), 0.9, axis=0) < STILL
-    first, last = clip.first, clip.first + len(clip) - 1
-    numbers = looks(whole)
-    for number in [n for n in numbers if n > last]:
-        if not _same(whole, number, reference, still):
-            break
-        last = number
-    start = None
-    for number in [n for n in numbers if n < first]:  # backwards each would be decoded from the last key frame on
-        if not _same(whole, number, reference, still):
-            start = None
-        elif start is None:
-            start = number
-    return whole.part(first if start is None else start, last)
+
+    colour: Picture | None
+    objects: Mask
+    clear: float
+    costs: dict[str, float]
 
 
-def glimpses(clip: Clip, shot: Clip, look: Callable[[Clip, int], NDArray[Value]]) -> Iterator[NDArray[Value]]:
-    """Look again, in some way, at the frames from which `evidence` found that a clip belongs to a shot."""
-    yield from (look(clip, number) for number in looks(clip))
-    if len(shot) > len(clip):
-        whole = clip.whole()
-        for number in looks(whole):
-            if 0 <= number - shot.first < len(shot) and not 0 <= number - clip.first < len(clip):
-                yield look(whole, number)
+def rank(proxy: Proxy, white: Picture) -> Evidence:
+    """Rank the kinds of background that frames of one exposure may have, whose pixels have white noise (3,)."""
+    every, shape = _blocks(proxy)
+    visible = _visible(proxy, shape)
+    values = every[:, visible]
+
+    def on_picture(blocks: Mask) -> Mask:
+        whole = np.zeros(len(visible), np.bool_)
+        whole[visible] = blocks
+        return _at_pixels(whole.reshape(shape), proxy)
+
+    limit = _limit(values, white * np.float32(np.sqrt(np.prod(shape) / np.prod(proxy.seen.shape[1:])) / proxy.scale))
+    jump = -float(np.log(2 * limit.mean()))
+    goes_on = _goes_on(values, limit, jump)
+    empty = within(values, limit)
+    empty = empty & (empty.mean(1) > EMPTY)[:, None]
+    picture = np.full(values.shape[1], np.inf)
+    for value in values:
+        picture = np.minimum(picture, _cost(within(values - value, limit) | empty, goes_on, jump))
+    best = float(picture.mean()) + jump
+    costs, colour, found, share = {"picture": best}, None, np.zeros(values.shape[1], np.bool_), 0.0
+    still = within(values - median_of_seen(values), limit / 2).mean(0) >= STILL
+    for candidate in _candidates(values, limit):
+        clear = within(values - candidate, limit)
+        shows = clear.any(0)
+        cost, own = _cost(clear, goes_on, jump), picture + jump
+        stands = ~shows & (own < cost)
+        if candidate.max() <= EIGHT_BIT_STEP and not _sharp(proxy, white):
+            stands[:] = False
+        cost = np.where(stands, np.minimum(own - np.log(OBJECT), cost), cost)
+        # smoke of one brightness draws a colour to one side only
+        brighter = float((values[~clear].mean(-1) > candidate.mean()).mean()) if not clear.all() else 0.0
+        sides = -sum(part * np.log(max(part, 1e-6)) for part in (brighter, 1 - brighter))
+        total = float(cost.mean()) + sides * float((~clear).sum(0).mean())
+        costs[", ".join(f"{255 * v:.0f}" for v in candidate)] = total
+        if total < best and stands.mean() <= OBJECT and shows.mean() >= SHOWN:
+            best, found, share = total, stands & still, float(clear.mean())
+            colour = srgb_to_linear(values[clear].mean(0, dtype=np.float64))
+            colour[linear_to_srgb(colour) < EIGHT_BIT_STEP / 2] = 0
+    return Evidence(colour, on_picture(found), share, costs)
 
 
-def linear(values: Picture) -> Picture:
-    """Return linear values as they are."""
-    return values
+def colour_around(picture: Picture) -> tuple[float, float, float] | None:
+    """Return the linear colour along the sides of a single picture (rows, columns, 3), or None if they have more.
+
+    One picture does not tell what never changes, so that smoke may be all that has another colour. It may come in from
+    one side, and cover more of the picture than its background does.
+    """
+    linear = block_means(picture[None])[0]
+    blocks = linear_to_srgb(linear)
+    sides = [(values[0], values[-1], values[:, 0], values[:, -1]) for values in (blocks, linear)]
+    colour = np.median(np.concatenate(sides[0]), axis=0)
+    alike = [(np.abs(side - colour) <= AROUND).all(-1) for side in sides[0]]
+    if sum(side.mean() >= MOST for side in alike) < 3:
+        return None
+    red, green, blue = (float(v) for v in np.median(np.concatenate(sides[1])[np.concatenate(alike)], axis=0))
+    return red, green, blue
 
 
-def _same(whole: Clip, number: int, reference: Picture, still: NDArray[np.bool_]) -> bool:
-    """Whether a frame of the file can be read and belongs to the shot."""
-    try:
-        picture = small(whole.glimpse(number, GLIMPSE))
-    except ClipError:
-        return False
-    if not still.any():
-        return True
-    alike = np.abs(linear_to_srgb(picture / gain_of(picture, reference)) - linear_to_srgb(reference)).max(-1) < STILL
-    return bool(alike[still].mean() >= SAME_SHOT)
+def _goes_on(values: Picture, limit: Picture, jump: float) -> Picture:
+    """What it costs smoke to go on from one frame to the next (frames - 1, blocks), at most a jump.
+
+    It stays as it is within the noise, or changes as often by so much as smoke of the clip does: exponentially.
+    """
+    changes = np.diff(values, axis=0)
+    alike = within(changes, np.float32(np.sqrt(2)) * limit)
+    size = np.abs(changes).mean(-1)
+    usual = float(size[~alike].mean()) if not alike.all() else 1.0
+    change = np.log(max(usual / float(limit.mean()), 1)) + size / usual
+    return np.asarray(np.where(alike, -np.log(STAYS), np.minimum(change, jump)), np.float32)
+
+
+def _cost(clear: Mask, goes_on: Picture, jump: float) -> Picture:
+    """What blocks (n,) cost that may be clear in some frames (frames, n), with the likeliest states."""
+    switch, leave = -np.log(SWITCHES), -np.log(1 - SWITCHES)
+    is_clear, is_smoke = np.where(clear[0], 0, np.inf), np.full(clear.shape[1], jump)
+    for now, going in zip(clear[1:], goes_on, strict=True):
+        before = is_clear
+        is_clear = np.where(now, np.minimum(is_clear + leave, is_smoke + switch), np.inf)
+        is_smoke = np.minimum(is_smoke + leave, before + switch) + going
+    return np.asarray(np.minimum(is_clear, is_smoke), np.float32)
+
+
+def _blocks(proxy: Proxy) -> tuple[Picture, tuple[int, int]]:
+    """The colours of blocks (frames, blocks, 3), in sRGB values, and how many rows and columns of them there are."""
+    rows, columns = proxy.seen.shape[1:]
+    scale = max(1.0, max(rows, columns) / BLOCKS)
+    high, wide = max(1, round(rows / scale)), max(1, round(columns / scale))
+    values = np.stack([linear_to_srgb(area_average(picture, wide, high)) for picture in proxy.pictures])
+    return values.reshape(len(values), -1, 3), (high, wide)
+
+
+def _limit(values: Picture, white: Picture) -> Picture:
+    """Deviation (3,) up to which blocks show the background that most frames of each agree on."""
+    limit = np.asarray(LIMIT * np.hypot(white, EIGHT_BIT_STEP), np.float32)
+    most, usual = np.zeros(values.shape[1]), values[0].copy()
+    for value in values:
+        count = within(values - value, limit).sum(0)
+        more = count > most
+        most[more], usual[more] = count[more], value[more]
+    near = within(values - usual, limit)[..., None]
+    usual = np.where(near, values, 0).sum(0) / near.sum(0)
+    spread = spread_about(values - usual, np.hypot(LASTING, white).max())
+    return np.asarray(LIMIT * np.maximum(spread, np.hypot(white, EIGHT_BIT_STEP)), np.float32)
+
+
+def _candidates(values: Picture, limit: Picture) -> list[Picture]:
+    """The colours that most of all blocks have, and black."""
+    left = values.reshape(-1, 3)
+    found = [np.zeros(3, np.float32)]
+    while len(left) and len(found) <= CANDIDATES:
+        cells = np.floor(left / (2 * limit)).astype(np.int64) @ np.array([1, 1 << 20, 1 << 40])
+        _, which, counts = np.unique(cells, return_inverse=True, return_counts=True)
+        colour = np.median(left[which == counts.argmax()], axis=0)
+        for _ in range(3):  # mean shift settles it
+            near = within(left - colour, limit)
+            colour = left[near].mean(0) if near.any() else colour
+        found.append(colour)
+        left = left[~within(left - colour, 2 * limit)]
+    return found
+
+
+def _sharp(proxy: Proxy, white: Picture) -> bool:
+    """Whether the clearest view of a picture has edges, as what stands before black has, and mist has not."""
+    # smoke brightens black; one frame may be astray
+    some = proxy.pictures[:: -(-len(proxy.pictures) // CLEAREST)]
+    clearest = np.sort([channel_mean(linear_to_srgb(picture)) for picture in some], axis=0)[min(1, len(some) - 1)]
+    detail = np.abs(clearest - blurred(clearest, DETAIL))[proxy.seen.any(0)]
+    return bool(np.quantile(detail, SHARPEST) > SHARP + LIMIT * float(white.max()) / proxy.scale)
+
+
+def within(deviations: Picture, limit: Picture) -> Mask:
+    """Return where deviations (..., 3) are within a limit (3,)."""
+    red, green, blue = (np.abs(deviations[..., channel]) <= limit[channel] for channel in range(3))
+    return np.asarray(red & green & blue)
+
+
+def _at_pixels(blocks: Mask, proxy: Proxy) -> Mask:
+    """What holds in blocks (rows, columns) at the pixels of a proxy."""
+    rows, columns = (
+        np.minimum(np.arange(pixels) * count // pixels, count - 1)
+        for pixels, count in zip(proxy.seen.shape[1:], blocks.shape, strict=True)
+    )
+    return np.asarray(blocks[rows][:, columns])
+
+
+def _visible(proxy: Proxy, shape: tuple[int, int]) -> Mask:
+    """Which blocks (n,) no mask hides in any frame; of masks that hide all at some time, in some frame."""
+    if proxy.seen.all():
+        return np.ones(shape[0] * shape[1], np.bool_)
+    rows, columns = shape
+    shown = np.stack([area_average(seen.astype(np.float32), columns, rows).ravel() > WHOLE for seen in proxy.seen])
+    return np.asarray(shown.all(0) if shown.all(0).any() else shown.any(0))

@@ -58,10 +58,6 @@ class FrameSource(Protocol):
         """Return a frame, linear or with its way to that; raise `DamagedFrameError` if it cannot be decoded."""
         ...
 
-    def glimpse(self, n: int, divisor: int) -> Picture | CodedPicture:
-        """Return a frame as `read` does, with sides divided by up to a number if it is cheaper to read so."""
-        ...
-
     def damaged(self, first: int, last: int, look: Look | None = None) -> tuple[int, ...]:
         """Return which frames from one to another, both included, raise `DamagedFrameError`; look at the others."""
         ...

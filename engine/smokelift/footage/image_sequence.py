@@ -74,10 +74,6 @@ class ImageSequence:
         divisor = reduction(width, height)
         return image if divisor == 1 else area_average(image, round(width / divisor), round(height / divisor))
 
-    def glimpse(self, n: int, divisor: int) -> Picture:
-        """Return a picture reduced after it is read."""
-        return _reduced(self.read(n), divisor)
-
     def _layer(self, n: int) -> Layer:
         try:
             return Layer(*read_layer(self.files[n], self._transfer))

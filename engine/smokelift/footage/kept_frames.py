@@ -10,7 +10,6 @@ from typing import TypeVar
 from smokelift.footage.frame_source import FrameSource, Look
 from smokelift.footage.images import CodedPicture, Picture
 
-Key = TypeVar("Key", int, tuple[int, int])
 Image = TypeVar("Image", Picture, Picture | CodedPicture)
 
 KEPT_BYTES = 128 * 2**20
@@ -21,17 +20,12 @@ DECODED_BYTES = 256 * 2**20
 """Memory for the frames of a file that are kept as they were decoded, reckoned as if stored: what most videos decode to
 takes half of that."""
 
-GLIMPSE_BYTES = 64 * 2**20
-"""Memory for the glimpses of a file that are kept: a hundred at a third of 1080p."""
-
 
 @dataclass(frozen=True)
 class _Expected:
-    """Frames of a source that are asked for next: whole, as glimpses with sides divided by a number, or perhaps."""
+    """Frames of a source that are asked for next: for certain, or perhaps."""
 
     whole: frozenset[int] = frozenset()
-    glimpses: frozenset[int] = frozenset()
-    divisor: int = 1
     perhaps: frozenset[int] = frozenset()
 
 
@@ -41,7 +35,6 @@ class KeptFrames:
     def __init__(self, source: FrameSource) -> None:
         self._source = source
         self._kept: OrderedDict[int, Picture | CodedPicture] = OrderedDict()
-        self._glimpses: OrderedDict[tuple[int, int], Picture | CodedPicture] = OrderedDict()
         self._decoded: dict[int, Callable[[int], Picture | CodedPicture]] = {}
         self._damaged: dict[tuple[int, int], tuple[int, ...]] = {}
         self._expected = _Expected()
@@ -60,32 +53,21 @@ class KeptFrames:
         keep(self._kept, n, image, KEPT_BYTES)
         return image
 
-    def glimpse(self, n: int, divisor: int) -> Picture | CodedPicture:
-        if (n, divisor) not in self._glimpses:
-            image = self._decoded[n](divisor) if n in self._decoded else self._source.glimpse(n, divisor)
-            keep(self._glimpses, (n, divisor), image, GLIMPSE_BYTES)
-        return self._glimpses[n, divisor]
-
-    def expect(self, whole: Sequence[int], glimpses: Sequence[int], divisor: int, perhaps: Sequence[int]) -> None:
+    def expect(self, whole: Sequence[int], perhaps: Sequence[int]) -> None:
         size = max((image.nbytes for image in self._kept.values()), default=0)
         self._decoded.clear()
         self._expected = _Expected(
             # of larger pictures the first would be gone before the last is there
             frozenset(whole if len(whole) * size <= KEPT_BYTES else ()),
-            frozenset(glimpses),
-            divisor,
             frozenset(perhaps if len(perhaps) * size <= DECODED_BYTES else ()),
         )
 
     def damaged(self, first: int, last: int, look: Look | None = None) -> tuple[int, ...]:
         expected = self._expected
-        divisor = expected.divisor
 
         def look_at(n: int, picture: Callable[[int], Picture | CodedPicture]) -> None:
             if n in expected.whole and n not in self._kept:
                 keep(self._kept, n, picture(1), KEPT_BYTES)
-            if n in expected.glimpses and (n, divisor) not in self._glimpses:
-                keep(self._glimpses, (n, divisor), picture(divisor), GLIMPSE_BYTES)
             if n in expected.perhaps and n not in self._kept:
                 self._decoded[n] = picture
             if look is not None:
@@ -99,7 +81,7 @@ class KeptFrames:
         self._source.close()
 
 
-def keep(kept: OrderedDict[Key, Image], key: Key, image: Image, most: int) -> None:
+def keep(kept: OrderedDict[int, Image], key: int, image: Image, most: int) -> None:
     """Put a picture, which is read-only from now on, beside the last ones in so many bytes."""
     (image.codes if isinstance(image, CodedPicture) else image).flags.writeable = False
     kept[key] = image

@@ -162,9 +162,6 @@ class Masked:
     def read(self, n: int) -> Picture | CodedPicture:
         return self._continued(n, self.filmed.read(n))
 
-    def glimpse(self, n: int, divisor: int) -> Picture | CodedPicture:
-        return self._continued(n, self.filmed.glimpse(n, divisor))
-
     def damaged(self, first: int, last: int, look: Look | None = None) -> tuple[int, ...]:
         def look_at(n: int, picture: Callable[[int], Picture | CodedPicture]) -> None:
             if look is not None:

@@ -3,65 +3,50 @@
 It has two parts: one that differs from pixel to pixel, of which a mean over n pixels keeps the n-th part of the
 variance, and one that lasts over many pixels, as a codec's does, of which a mean keeps all.
 
-All statistics are quantiles over time, so that a flash, a cut or a dropped frame changes none of them.
+Neither comes from what moves, which may be smoke over all of the picture. The first is what differences of neighbouring
+pixels change by from frame to frame: smoke has hardly any detail so fine. The second is how far the samples that agree
+on a background spread about it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from smokelift.footage.images import Picture, linear_to_srgb, look_up, srgb_to_linear
-from smokelift.footage.seen import median_of_seen, quantile_of_seen
+from smokelift.footage.images import Picture, srgb_to_linear
+from smokelift.footage.seen import median_of_seen
 
 EIGHT_BIT_STEP = np.float32(1 / 255)
 """One step of 8 bit video, in sRGB values: the least noise that a clip is taken to have, since codecs shift whole
 blocks by that."""
 
-NOISE_STRIDE = 3
-"""Pixels from one row or column to the next where noise is measured: a ninth of the picture is enough for a median."""
-
 BLOCK = 5
-"""Pixels along the blocks over whose means the lasting noise is measured; they hold about as many as `matte` averages
-over."""
+"""Pixels along the blocks in which neighbours are compared, and over whose means lasting noise is measured; they hold
+about as many as `matte` averages over."""
 
 BLOCKS_APART = 3
-"""Blocks from one row or column of them to the next that tell the noise of large pictures: a median of so many needs no
-more."""
+"""Blocks from one row or column of them to the next that tell the noise of pixels: a median of so many needs no more.
+"""
 
-STEADY_SHARE, STEADY_WIDTH = 0.9, 1.645
-"""Share of a pixel's deviations over time that its noise is measured on, and how many standard deviations normal ones
-reach there. The others may be a flash, a cut or smoke; a smaller share would miss the drift of a codec."""
+MEDIAN_OF_BLOCK = 0.955
+"""Median over mean of a block's sum of squared differences: 20 of neighbours in rows of five have as many degrees of
+freedom as 14.5 that are independent, k, and the median of chi-squared is 1 - 2 / (9 k) of its mean, cubed."""
 
-CALM_SHARE, CALM_WIDTH = 0.25, 0.319
-"""The same for smoke that comes over all of the picture for longer than `STEADY_SHARE` leaves out, as a burst does."""
+LARGEST_LASTING = np.float32(4 / 255)
+"""Lasting noise at most, in sRGB values: a codec's changes are up to twice as large (`behind_smoke.DRIFT`)."""
 
-BURST = 10.0
-"""Ratio of the two, each at the stillest tenth of the pixels, from which on it is such smoke. Of 161 public clips three
-bursts on black have 32 to 86, a rendered scene 13, codecs, hands and lights that change 9 at most
-(docs/experiments/background.md)."""
+SPREAD_SAMPLES, SPREAD_ROUNDS = 50_000, 25
+"""Deviations that tell a spread, at most, and rounds in which it settles to a hundredth."""
 
-FEWEST_CALM = 16
-"""Samples over time from which on a quarter of them tells how still a pixel is: the nearest two of five may be alike by
-chance, as stripes are that a moving camera sees."""
-
-SMOKE_TO_NOISE = 3.0
-"""Deviation over time, in units of the stillest tenth's, above which it is smoke and not noise
-(docs/experiments/background.md)."""
+LEAST_SPREAD = EIGHT_BIT_STEP / 4
+"""Spread at least that is told from none: rounding to 8 bits makes as much."""
 
 CLIPPED_MEAN = 1.1
 """Mean of normal noise whose negative half is clipped, at most, in median differences of two of its values: it is 1.02
 of them, and rounding adds some."""
-
-_FIXED_POINT = 8192
-"""Steps of a stored sample in one unit of sRGB: 16 bits hold values up to 8."""
-
-_SAMPLE_BYTES = 512 * 2**20
-"""Memory for the stored samples of a clip: 32 frames of 1080p fit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,31 +84,6 @@ EIGHT_BIT_NOISE = lasting_noise(EIGHT_BIT_STEP)
 """Of footage that is as clean as eight bits allow."""
 
 
-def sampled_count(count: int, width: int, height: int) -> int:
-    """Return how many pictures of a size are stored of so many that are asked for."""
-    return min(count, max(3, _SAMPLE_BYTES // (width * height * 6)))
-
-
-def encode_sample(linear: Picture) -> npt.NDArray[np.uint16]:
-    """Return a linear picture in sRGB values as fixed point."""
-    return as_samples(linear_to_srgb(linear))
-
-
-def as_samples(encoded: Picture) -> npt.NDArray[np.uint16]:
-    """Return sRGB values as fixed point."""
-    return np.clip(encoded * _FIXED_POINT + 0.5, 0, 65535).astype(np.uint16)
-
-
-def decode_samples(samples: npt.NDArray[np.uint16] | npt.NDArray[np.uint32]) -> Picture:
-    """Return what `encode_sample` stored, or sums of that, as float32 sRGB values."""
-    return samples.astype(np.float32) / np.float32(_FIXED_POINT)
-
-
-def linear_samples(samples: npt.NDArray[np.uint16]) -> Picture:
-    """Return what `encode_sample` stored as float32 linear values."""
-    return look_up(_LINEAR, samples)
-
-
 def block_means(pictures: Picture) -> Picture:
     """Return the means over blocks of pictures (frames, rows, columns, 3); what fills no block is left out."""
     size = min(BLOCK, *pictures.shape[1:3])
@@ -134,76 +94,88 @@ def block_means(pictures: Picture) -> Picture:
     return means
 
 
-def even_out(samples: npt.NDArray[np.uint16], gains: Picture) -> None:
-    """Bring samples (frames, rows, columns, 3), as of `encode_sample`, to one exposure, in place.
-
-    ``gains`` (frames, 3) say by how much each is brighter than the others.
-    """
-    for sample, gain in zip(samples, gains, strict=True):
-        if (gain != 1).any():
-            sample[...] = encode_sample(linear_samples(sample) / gain)
-
-
-def sample_block_means(sample: npt.NDArray[np.uint16]) -> Picture:
-    """Return the `block_means` of a sample (rows, columns, 3) in sRGB values, (rows, columns, 3).
-
-    The sums are whole numbers below 2^24, which float32 holds exactly: as if the sample were decoded first.
-    """
-    size = min(BLOCK, *sample.shape[:2])
-    rows, columns = sample.shape[0] // size, sample.shape[1] // size
-    lines = sample[: rows * size, : columns * size].reshape(rows, size, columns * size * 3)
-    sums = _sum_of([lines[:, k] for k in range(size)]).reshape(rows, columns, size, 3)
-    total = _sum_of([sums[:, :, k] for k in range(size)])
-    return total.astype(np.float32) / np.float32(_FIXED_POINT) / np.float32(size**2)
-
-
 def some_blocks(picture: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """Return a picture of some blocks of another, side by side, `BLOCKS_APART`."""
+    """Return a picture of some blocks of another, side by side, `BLOCKS_APART`; a small one as it is."""
     step = BLOCKS_APART * BLOCK
+    if min(picture.shape[:2]) < step:
+        return picture
     rows, columns = (n // step for n in picture.shape[:2])
     values = picture.shape[2:]
     whole = picture[: rows * step, : columns * step].reshape(rows, step, columns, step, *values)
     return np.ascontiguousarray(whole[:, :BLOCK, :, :BLOCK]).reshape(rows * BLOCK, columns * BLOCK, *values)
 
 
-def whole_blocks(seen: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-    """Return which of the blocks of `block_means` are seen whole, of pixels (frames, rows, columns) that are seen."""
-    size = min(BLOCK, *seen.shape[1:])
-    frames, rows, columns = len(seen), seen.shape[1] // size, seen.shape[2] // size
-    whole = seen[:, : rows * size, : columns * size].reshape(frames, rows, size, columns, size)
-    return np.asarray(whole.all(axis=(2, 4)))
+def white_noise(blocks: Picture) -> Picture:
+    """Return the standard deviation (3,) of noise that differs from pixel to pixel.
+
+    Parameters
+    ----------
+    blocks : (frames, rows, columns, 3)
+        `some_blocks` of pictures of one exposure, or of their deviations, in sRGB values. What a mask hides is not a
+        number.
+    """
+    frames, rows, columns = blocks.shape[:3]
+    size = min(BLOCK, rows, columns)
+    if frames < 2 or size < 2:
+        return np.zeros(3, np.float32)
+    whole = blocks[:, : rows // size * size, : columns // size * size]
+    apart = np.diff(whole.reshape(frames, rows // size, size, columns // size, size, 3), axis=4)
+    # of four values, hence of four times the variance
+    variances = np.square(np.diff(apart, axis=0)).mean((2, 4)) / 4
+    median = np.nan_to_num(np.nanmedian(variances, axis=(0, 1, 2)))
+    return np.asarray(np.sqrt(median / MEDIAN_OF_BLOCK), np.float32)
 
 
-def _sum_of(parts: Sequence[npt.NDArray[Any]]) -> npt.NDArray[np.uint32]:
-    """Whole numbers added up without a copy of them all."""
-    total = parts[0].astype(np.uint32)
-    for part in parts[1:]:
-        total += part
-    return total
+def spread_about(deviations: Picture, largest: np.float32 = LARGEST_LASTING) -> Picture:
+    """Return the `peak_spread` (3,) of deviations (..., 3)."""
+    return np.array([peak_spread(deviations[..., channel], largest) for channel in range(3)], np.float32)
 
 
-def temporal_noise(deviations: Picture, blocks: Picture) -> Noise:
-    """Return the noise of the pixels that show no smoke; of it at least one step of 8 bit video lasts.
+def peak_spread(deviations: Picture, largest: np.float32 = LARGEST_LASTING) -> float:
+    """Return the standard deviation of those deviations from a background that are noise, in sRGB values.
 
-    A pixel's noise follows from the quantile of its deviations over time that holds `STEADY_SHARE` of them. Smoke is
-    over the pixels whose noise exceeds that of the stillest tenth by `SMOKE_TO_NOISE`; the median of the
-    others is the clip's. Differences of successive frames would be too small: a codec repeats a static block for some
-    frames and then replaces it.
+    They are a mixture of noise, normal about zero, and of smoke, whose deviations are of all sizes, each as often as
+    its double. The likeliest mixture is found from little noise upwards, so that it is that of the peak at zero
+    (Dempster, Laird and Rubin, "Maximum likelihood from incomplete data via the EM algorithm", 1977).
+
+    Parameters
+    ----------
+    deviations
+        What is not a number is left out.
+    largest
+        Of all standard deviations that noise has.
+    """
+    some = deviations.ravel()[:: max(1, deviations.size // SPREAD_SAMPLES)]
+    size = np.abs(some[np.isfinite(some)])
+    squares = np.square(size)
+    smoke = 1 / (np.maximum(size, EIGHT_BIT_STEP) * np.float32(1 - np.log(EIGHT_BIT_STEP)))
+    variance, share = float(EIGHT_BIT_STEP**2), 0.5
+    for _ in range(SPREAD_ROUNDS if squares.size else 0):
+        noise = share * np.sqrt(2 / np.pi / variance) * np.exp(-0.5 * squares / np.float32(variance))
+        weight = noise / (noise + np.float32(1 - share) * smoke)
+        share = float(weight.mean())
+        variance = float((weight * squares).sum() / max(float(weight.sum()), 1e-6))
+        variance = min(max(variance, float(LEAST_SPREAD**2)), float(largest**2))
+    return float(np.sqrt(variance))
+
+
+def noise_about(deviations: Picture, blocks: Picture) -> Noise:
+    """Return the noise of pictures before a background that is known.
 
     Parameters
     ----------
     deviations : (frames, rows, columns, 3)
-        From the background, in sRGB values.
+        `some_blocks` of how they differ from the background, in sRGB values.
     blocks : (frames, rows, columns, 3)
-        The same of `block_means`.
+        `block_means` of all of that.
     """
-    single, shared = (
-        np.array([clear_deviation(each[..., channel]) for channel in range(3)]) for each in (deviations, blocks)
-    )
-    pixels = np.float32(BLOCK**2)
-    white = np.maximum(single**2 - shared**2, 0) * pixels / (pixels - 1)
-    lasting = np.sqrt(np.maximum(single**2 - white, 0))
-    return Noise(np.sqrt(white).astype(np.float32), np.maximum(lasting, EIGHT_BIT_STEP).astype(np.float32))
+    return noise_of(white_noise(deviations), spread_about(blocks), BLOCK**2)
+
+
+def noise_of(white: Picture, spread: Picture, pixels: float) -> Noise:
+    """Return the noise that has a white part (3,), and that spreads means over so many pixels by so much (3,)."""
+    shared = np.sqrt(np.maximum(spread**2 - white**2 / np.float32(pixels), 0))
+    return Noise(white, np.maximum(shared, EIGHT_BIT_STEP).astype(np.float32))
 
 
 def clipped_black(deviations: Picture, blocks: Picture) -> Picture:
@@ -216,7 +188,7 @@ def clipped_black(deviations: Picture, blocks: Picture) -> Picture:
     Parameters
     ----------
     deviations, blocks
-        As `temporal_noise` takes them.
+        As `noise_about` takes them.
 
     Returns
     -------
@@ -226,52 +198,6 @@ def clipped_black(deviations: Picture, blocks: Picture) -> Picture:
     explained = CLIPPED_MEAN * np.nanmedian(apart, axis=(0, 1, 2)) if apart.size else 0
     offset = np.minimum(np.nanquantile(median_of_seen(blocks), 0.1, axis=(0, 1)), explained)
     return np.where(offset < EIGHT_BIT_STEP, 0, offset).astype(np.float32)
-
-
-def over_time(deviations: Picture) -> Picture:
-    """Return the standard deviation over time, the first axis, of all but a flash.
-
-    Where even the stillest tenth deviates far more than in the calmest part of the time (`BURST`), smoke comes over
-    all of the picture, and that part tells it.
-    """
-    size = np.abs(deviations)
-    width: Picture = quantile_of_seen(size, STEADY_SHARE) / np.float32(STEADY_WIDTH)
-    if len(size) >= FEWEST_CALM and _stillest(width) > BURST * EIGHT_BIT_STEP:  # no less can exceed it
-        calm: Picture = quantile_of_seen(size, CALM_SHARE) / np.float32(CALM_WIDTH)
-        if _stillest(width) > BURST * _stillest(calm):
-            return calm
-    return width
-
-
-def clear_deviation(deviations: Picture) -> float:
-    """Return the standard deviation over time of the pixels without smoke; see `temporal_noise`.
-
-    Parameters
-    ----------
-    deviations : (frames, rows, columns)
-        From the background.
-    """
-    return float(np.median(_of_clear(over_time(deviations))))
-
-
-def drift(deviations: Picture, white: float) -> float:
-    """Return the root mean square where `clear_deviation` returns the median: what a codec lets drift counts.
-
-    White noise of a standard deviation is taken off first, lest smoke as thin as that noise counts.
-    """
-    squares = np.maximum(over_time(deviations) ** 2 - np.float32(white**2), 0)
-    return float(np.sqrt(np.mean(_of_clear(np.sqrt(squares)) ** 2)))
-
-
-def _of_clear(each: Picture) -> Picture:
-    """Those of the pixels' deviations over time that no smoke explains, (n,)."""
-    clear: Picture = each[each <= SMOKE_TO_NOISE * _stillest(each)]
-    return clear
-
-
-def _stillest(each: Picture) -> float:
-    """The deviation over time of the stillest tenth of the pixels that are seen, at least a step of 8 bit video."""
-    return max(float(np.quantile(each[np.isfinite(each)], 0.1)), float(EIGHT_BIT_STEP))
 
 
 def linear_excess(encoded: Picture, deviation: npt.ArrayLike) -> Picture:
@@ -297,7 +223,3 @@ def linear_per_srgb(encoded: Picture) -> Picture:
     """Return the derivative of linear light by the sRGB value, at sRGB values: what turns their noise into linear."""
     half = EIGHT_BIT_STEP / 2
     return (srgb_to_linear(encoded + half) - srgb_to_linear(encoded - half)) / EIGHT_BIT_STEP
-
-
-_LINEAR = srgb_to_linear(np.arange(65536, dtype=np.float32) / np.float32(_FIXED_POINT))
-"""Linear values of all stored samples."""

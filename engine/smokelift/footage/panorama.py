@@ -12,17 +12,22 @@ from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from smokelift.footage.alignment import Lens
+from smokelift.footage.behind_smoke import DETAIL
+from smokelift.footage.clear_picture import clear_picture
 from smokelift.footage.clip import Clip
 from smokelift.footage.exposure import sample_gains, small
-from smokelift.footage.images import Picture
-from smokelift.footage.noise import Noise, encode_sample, lasting_noise, sampled_count
+from smokelift.footage.images import Picture, linear_to_srgb
+from smokelift.footage.noise import Noise, block_means, lasting_noise, noise_about, some_blocks
 from smokelift.footage.plate import Plate, noise_before
-from smokelift.footage.plate_estimation import clear_picture, clip_noise
+from smokelift.footage.seen import median_of_seen
 from smokelift.footage.turning import Turns, file_turns
 
 WIDEST = 3.0
 """Width and height of the wide picture over those of a frame, at most: beyond, what is far aside gets ever larger on a
 flat picture."""
+
+SAMPLE_BYTES = 512 * 2**20
+"""Memory for the frames from which the wide picture is made."""
 
 PADDING = 8
 """Pixels by which a frame is continued beyond its border, so that it can be smoothed there as a still one is."""
@@ -152,7 +157,7 @@ def estimate_panorama(clip: Clip, turns: Turns, sample_count: int = 32) -> Panor
     turns
         Of its camera.
     sample_count
-        Frames that are sampled, as by `smokelift.footage.plate_estimation.estimate_plate`.
+        Frames that are sampled, spread evenly; fewer of very large pictures.
 
     Raises
     ------
@@ -163,24 +168,30 @@ def estimate_panorama(clip: Clip, turns: Turns, sample_count: int = 32) -> Panor
     """
     place = WidePicture.around(turns)
     samples, seen = wide_samples(clip, place, sample_count)
-    found = clear_picture(samples, clip_noise(samples, seen), seen)
+    deviations = linear_to_srgb(samples)
+    deviations[~seen] = np.nan
+    deviations -= median_of_seen(deviations)
+    noise = noise_about(np.stack([some_blocks(each) for each in deviations]), block_means(deviations))
+    found = clear_picture(samples, seen, noise, DETAIL, masked=False)
     plates = PanoramaPlate(place, found.image, found.known.astype(np.float32), found.errors, lasting_noise(0.0))
     return replace(plates, noise=noise_before(plates, clip))
 
 
-def wide_samples(clip: Clip, place: WidePicture, count: int) -> tuple[npt.NDArray[np.uint16], npt.NDArray[np.bool_]]:
+def wide_samples(clip: Clip, place: WidePicture, count: int) -> tuple[Picture, npt.NDArray[np.bool_]]:
     """Return frames spread over a clip's shot in its file as parts of the wide picture, all of one exposure.
 
     Returns
     -------
-    samples : (frames, rows, columns, 3) uint16
-        As of `smokelift.footage.plate_estimation.SteadySamples`.
+    samples : (frames, rows, columns, 3)
+        Linear.
     seen : (frames, rows, columns) bool
         What each frame shows.
     """
     columns, rows = place.size
     whole, of_file = clip.whole(), sorted(file_turns(clip, place.turns).items())
-    chosen = np.linspace(0, len(of_file) - 1, min(sampled_count(count, columns, rows), len(of_file))).round()
+    chosen = np.linspace(
+        0, len(of_file) - 1, min(count, max(3, SAMPLE_BYTES // (12 * columns * rows)), len(of_file))
+    ).round()
     numbers, rotations = zip(*(of_file[int(n)] for n in chosen), strict=True)
     place = replace(place, turns=replace(place.turns, rotations=Rotation.concatenate(rotations)))
     all_of_it = np.ones(clip.size[::-1], np.float32)
@@ -192,9 +203,9 @@ def wide_samples(clip: Clip, place: WidePicture, count: int) -> tuple[npt.NDArra
         wide[~shown] = np.nan
         tiny.append(small(wide))
     gains = sample_gains(np.stack(tiny))
-    samples = np.empty((len(numbers), rows, columns, 3), np.uint16)
+    samples = np.empty((len(numbers), rows, columns, 3), np.float32)
     for n, (sample, number, gain) in enumerate(zip(samples, numbers, gains, strict=True)):
-        sample[...] = encode_sample(place.spread_out(whole.frame(number), n, PADDING) / gain)
+        sample[...] = place.spread_out(whole.frame(number), n, PADDING) / gain
     return samples, seen
 
 

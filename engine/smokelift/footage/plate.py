@@ -13,14 +13,18 @@ from smokelift.footage.clip import Clip
 from smokelift.footage.exposure import gain_of, small
 from smokelift.footage.images import Picture, area_average, linear_to_srgb, srgb_to_linear
 from smokelift.footage.noise import (
-    NOISE_STRIDE,
     Noise,
     block_means,
     clipped_black,
     lasting_noise,
     linear_per_srgb,
-    temporal_noise,
+    noise_about,
+    some_blocks,
 )
+
+CLIPPED_LEVEL = np.float32(0.1)
+"""Lasting part of white noise that is clipped at black: so little is known of the mean that is left, since
+it depends on how the file rounds."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,8 +161,11 @@ def known_plate(background: npt.ArrayLike, clip: Clip, sample_count: int = 32) -
     raised = np.maximum(told, clipped_black(deviations, blocks)) - told
     if raised.any():
         image = srgb_to_linear(told + raised)
-        deviations, blocks = deviations - raised[::NOISE_STRIDE, ::NOISE_STRIDE], blocks - block_means(raised[None])
-    return Plate(image, confidence, temporal_noise(deviations, blocks))
+        deviations, blocks = deviations - some_blocks(raised), blocks - block_means(raised[None])
+    noise = noise_about(deviations, blocks)
+    if raised.any():
+        noise = Noise(noise.white, np.maximum(noise.lasting, CLIPPED_LEVEL * noise.white))
+    return Plate(image, confidence, noise)
 
 
 def changing_plate(plates: Clip, clip: Clip, sample_count: int = 32) -> ChangingPlate:
@@ -192,11 +199,11 @@ def changing_plate(plates: Clip, clip: Clip, sample_count: int = 32) -> Changing
 
 def noise_before(plates: Plates, clip: Clip, sample_count: int = 32) -> Noise:
     """Return the noise of a clip before backgrounds that are known, from so many of its frames."""
-    return temporal_noise(*_deviations(plates, clip, sample_count))
+    return noise_about(*_deviations(plates, clip, sample_count))
 
 
 def _deviations(plates: Plates, clip: Clip, count: int) -> tuple[Picture, Picture]:
-    """How a clip differs from backgrounds that are known, as `temporal_noise` takes it: single pixels, block means.
+    """How a clip differs from backgrounds that are known, as `noise_about` takes it.
 
     What a mask hides is not a number.
     """
@@ -205,7 +212,7 @@ def _deviations(plates: Plates, clip: Clip, count: int) -> tuple[Picture, Pictur
         behind, frame = plates.at(number).image, clip.as_seen(number, clip.frame(number))
         gains = gain_of(small(frame), small(behind))
         deviation = linear_to_srgb(frame / gains) - linear_to_srgb(behind)
-        single.append(deviation[::NOISE_STRIDE, ::NOISE_STRIDE])
+        single.append(some_blocks(deviation))
         blocks.append(block_means(deviation[None])[0])
     return np.stack(single), np.stack(blocks)
 

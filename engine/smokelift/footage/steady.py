@@ -12,7 +12,7 @@ import numpy as np
 from smokelift.footage.clip import Clip
 from smokelift.footage.exposure import gain_of, small
 from smokelift.footage.images import Picture, linear_to_srgb
-from smokelift.footage.noise import EIGHT_BIT_STEP, linear_excess, linear_per_srgb
+from smokelift.footage.noise import EIGHT_BIT_STEP, Noise, linear_excess, linear_per_srgb
 from smokelift.footage.plate import Plate, Plates
 
 MIDDLE = np.full(3, 0.5, np.float32)
@@ -45,7 +45,7 @@ def steady(clip: Clip, plates: Plates, known: Mapping[int, Picture] = MappingPro
     return clip.changed(balanced, lambda number, tiny: bool((gains(number, tiny) == 1).all()))
 
 
-def without_noise_light(clip: Clip, plates: Plates) -> Clip:
+def without_noise_light(clip: Clip, noise: Noise) -> Clip:
     """Return a clip without the light that its noise adds to means (`linear_excess`).
 
     A clip that is brightened by less than rounding to 8 bits may do is returned as it is. Before black too little is
@@ -55,15 +55,14 @@ def without_noise_light(clip: Clip, plates: Plates) -> Clip:
     ----------
     clip
         The footage. It is read when the frames of the result are.
-    plates
-        Its backgrounds, with its noise.
+    noise
+        Of its pixels.
     """
-    noise = plates.noise.total
-    if (linear_excess(MIDDLE, noise) <= 0.5 * EIGHT_BIT_STEP * linear_per_srgb(MIDDLE)).all():
+    if (linear_excess(MIDDLE, noise.total) <= 0.5 * EIGHT_BIT_STEP * linear_per_srgb(MIDDLE)).all():
         return clip
 
     def lessened(_: int, picture: Picture) -> Picture:
-        return np.maximum(picture - linear_excess(linear_to_srgb(picture), noise), 0)
+        return np.maximum(picture - linear_excess(linear_to_srgb(picture), noise.total), 0)
 
     return clip.changed(lessened)
 

@@ -25,9 +25,7 @@ from scipy.spatial.transform import Rotation
 
 from smokelift.footage.alignment import Lens, align, judged, level_size, levels, points_of, shift
 from smokelift.footage.clip import Clip, ClipError
-from smokelift.footage.evidence import GLIMPSE, linear, looks
 from smokelift.footage.images import Picture
-from smokelift.footage.large_plate import large_frames
 from smokelift.footage.parallax import travels
 from smokelift.scene import Camera, as_matrix
 
@@ -40,9 +38,8 @@ MOVED = 0.5
 MOVING_FRAMES = 0.1
 """Share of the frames that have to: a knock is not worth a mosaic."""
 
-FIRST_LOOKS, FIRST_OF_LARGE = slice(None, None, 2), slice(None, None, 3)
-"""Those of the frames that `smokelift.footage.evidence` looks at which are looked at first, and of large pictures of
-those that `smokelift.footage.large_plate` does: less than `MOVING_FRAMES` lie between two of them."""
+FIRST_LOOKS = 12
+"""Frames that are looked at first: less than `MOVING_FRAMES` of a clip lie between two of them."""
 
 LEAST = 1.0
 """Pixels that the picture has to be off its mean place in some frame: less blurs it no more than a lens does."""
@@ -160,10 +157,10 @@ def file_turns(clip: Clip, turns: Turns) -> dict[int, Rotation]:
 
 def _stands_still(clip: Clip, lens: Lens) -> bool:
     """Whether none of the frames that are looked at shows more of the same once it is turned."""
-    numbers = large_frames(clip)[FIRST_OF_LARGE] or looks(clip)[FIRST_LOOKS]
+    numbers = clip.spread(FIRST_LOOKS)
 
     def seen(number: int) -> Picture:
-        return clip.glimpse_average(number, GLIMPSE, linear, *level_size(lens))
+        return clip.area_average(number, *level_size(lens))
 
     key = levels(seen(numbers.pop(len(numbers) // 2)), lens)
     first, same = points_of(key), []

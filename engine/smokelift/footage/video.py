@@ -252,10 +252,6 @@ class Video:
         """Return a frame, or raise `DamagedFrameError`."""
         return self._shown_by(self._decode(self._shown[n]))
 
-    def glimpse(self, n: int, divisor: int) -> Picture | CodedPicture:
-        """Return a frame reduced by the converter, which takes means of codes and not of light, if it can be."""
-        return self._shown_by(self._decode(self._shown[n]), divisor)
-
     def _shown_by(self, frame: av.VideoFrame, divisor: int = 1) -> Picture | CodedPicture:
         """What a frame shows; its sides are divided by a number if its pixels need no more than a table."""
         if (

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from smokelift.footage.background import backdrop_colour, background_picture
 from smokelift.footage.clip import Clip
+from smokelift.footage.given_background import backdrop_colour, background_picture
 from smokelift.footage.images import area_average
 from smokelift.output.framing import Framing
 from smokelift.output.images import eight_bit

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from smokelift.checks import numbers, radiance, require_kind
-from smokelift.footage.background import background_picture
+from smokelift.footage.given_background import background_picture
 from smokelift.render.optics import scene_renderer
 from smokelift.render.renderer import Image, Renderer, Volume
 from smokelift.scene import Camera, CompleteScene, Scene, completed, require_scene

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.footage.background import background_picture
+from smokelift.footage.given_background import background_picture
 from smokelift.render.cpu_backend import RaySupport
 from smokelift.render.light_sampling import sampled_lights
 from smokelift.render.renderer import Image, Renderer

@@ -4,18 +4,23 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from smokelift.footage.alignment import Lens
+from smokelift.footage.backdrop import Backdrop, find_backdrop
 from smokelift.footage.clip import Clip
-from smokelift.footage.flicker import evened, flicker_gains
 from smokelift.footage.plate import Plate, Plates
 from smokelift.footage.steady import steady
 from smokelift.render import Image
 from smokelift.scene import Background, Camera
-from smokelift.setup.background import FoundPlates, between_bars, cut_notes, exposure_notes, find_plates, smoke_in_plate
+from smokelift.setup.backdrop_notes import (
+    backdrop_doubts,
+    backdrop_notes,
+    between_bars,
+    cut_notes,
+    exposure_notes,
+    nothing_seen,
+    smoke_in_plate,
+)
 from smokelift.setup.fire import Fire, find_fire
-from smokelift.setup.no_smoke import nothing_seen
 from smokelift.setup.smoke import SmokeSamples, sample_smoke
 from smokelift.setup.source import several_colours
 
@@ -27,8 +32,7 @@ class FirstLook:
     Attributes
     ----------
     clip
-        The footage at its background's exposure, or at that of the frames around each where only the smoke shows it;
-        without fire and without the brightness that noise adds.
+        The footage at its background's exposure, without fire and without the brightness that noise adds.
     found
         What stands behind the smoke, and how the camera turns before it.
     samples
@@ -37,16 +41,16 @@ class FirstLook:
         None where none burns.
     doubts
         Why the result may be nothing, or wrong, a sentence each.
-    flickers
-        Whether the smoke alone shows how the exposure changes.
+    unused
+        Whether a background is given that an alpha channel replaces.
     """
 
     clip: Clip
-    found: FoundPlates
+    found: Backdrop
     samples: SmokeSamples
     fire: Fire | None
     doubts: tuple[str, ...]
-    flickers: bool
+    unused: bool
 
     @property
     def plates(self) -> Plates:
@@ -63,26 +67,28 @@ class FirstLook:
     @property
     def notes(self) -> tuple[str, ...]:
         """What was assumed or estimated, a sentence each; the doubts are among them."""
-        return (*self.found.notes, *self.doubts, *exposure_notes(self.samples.exposure, self.flickers))
+        unused = ("[background] is not used.",) if self.unused else ()
+        return (*backdrop_notes(self.found), *unused, *self.doubts, *exposure_notes(self.samples.exposure))
 
 
 def first_look(clip: Clip, camera: Camera | None, background: Background | None, lens: Lens | None) -> FirstLook:
-    """Look at a clip; the parameters and errors are those of `find_plates`."""
-    found = find_plates(clip, camera, background, lens)
+    """Look at a clip; the parameters and errors are those of `find_backdrop`."""
+    found = find_backdrop(clip, camera, background, lens)
     samples = sample_smoke(found.clip, found.plates, found.turns)
-    cuts = cut_notes(found.clip, samples.small) if found.turns is None else ()
     clip = steady(found.clip, found.plates, samples.gains)
     fire = find_fire(clip, found.plates, samples)
-    flickers = False
     if fire is not None:
         clip = fire.doused
         samples = replace(sample_smoke(clip, found.plates, found.turns), gains=samples.gains)
-    # flames flicker by themselves
-    elif samples.smoky and (gains := flicker_gains(found.clip, found.plates, samples.smoky[0])) is not None:
-        clip = evened(clip, gains)
-        flickers, known = True, {number: np.full(3, gains[number], np.float32) for number in samples.gains}
-        samples = replace(sample_smoke(clip, found.plates, found.turns), gains=known)
+    cuts = cut_notes(found)
     nothing = nothing_seen(clip, found.plates, samples, background is not None, cuts)
     bars = between_bars(samples) if background is None else ()
-    doubts = (*(nothing or cuts), *found.doubts, *smoke_in_plate(samples), *bars, *several_colours(samples))
-    return FirstLook(clip, found, samples, fire, doubts, flickers)
+    doubts = (
+        *(nothing or cuts),
+        *backdrop_doubts(found),
+        *smoke_in_plate(samples),
+        *bars,
+        *several_colours(samples),
+    )
+    unused = found.source == "alpha" and background is not None
+    return FirstLook(clip, found, samples, fire, doubts, unused)

@@ -8,13 +8,12 @@ import numpy as np
 
 from smokelift.density import ViewSet
 from smokelift.density.hull import agreement
+from smokelift.footage.backdrop import find_backdrop
 from smokelift.footage.clip import Clip, is_video
-from smokelift.footage.exposure import largest_change
-from smokelift.footage.flicker import evened, flicker_gains
 from smokelift.footage.steady import steady
 from smokelift.footage.working_picture import CameraError, working_picture
 from smokelift.scene import ClipSource, CompleteScene
-from smokelift.setup.background import exposure_change, exposure_notes, find_plates
+from smokelift.setup.backdrop_notes import backdrop_notes, exposure_change, exposure_notes
 from smokelift.setup.geometry import fitting
 from smokelift.setup.shot import Shot, ShotView
 
@@ -29,7 +28,7 @@ SAME_RATE = 0.01
 """Relative difference of two frame rates that are the same."""
 
 
-def open_view(number: int, clip: Clip, scene: CompleteScene, smoky: int | None) -> tuple[ShotView, list[str]]:
+def open_view(number: int, clip: Clip, scene: CompleteScene) -> tuple[ShotView, list[str]]:
     """Open a further view of a complete scene and find its background; with what is to be said of it.
 
     Parameters
@@ -40,8 +39,6 @@ def open_view(number: int, clip: Clip, scene: CompleteScene, smoky: int | None) 
         The input.
     scene
         What both show.
-    smoky
-        Number of a frame with much smoke, if its exposure may flicker; None where fire does.
 
     Raises
     ------
@@ -64,16 +61,13 @@ def open_view(number: int, clip: Clip, scene: CompleteScene, smoky: int | None) 
     background = view.background
     if background is None and scene.background.color is not None:
         background = scene.background
-    found = find_plates(opened, camera, background)
+    found = find_backdrop(opened, camera, background)
     axes = [np.array(each.matrix)[:3, 2] for each in (scene.camera, camera)]
     angle = np.degrees(np.arccos(np.clip(axes[0] @ axes[1], -1, 1)))
     frames = f"frames {opened.first} to {opened.first + len(opened) - 1}"
-    uneven = None if smoky is None else flicker_gains(found.clip, found.plates, smoky)
-    change = exposure_change(found.clip, found.plates) if uneven is None else largest_change(list(uneven))
-    said = [*found.notes, *exposure_notes(change, flickers=uneven is not None)]
+    said = [*backdrop_notes(found), *exposure_notes(exposure_change(found.clip, found.plates))]
     notes.append(" ".join([f"{name}: {opened.path.name}, {angle:.0f} degrees from the input, {frames}.", *said]))
-    even = steady(found.clip, found.plates) if uneven is None else evened(found.clip, uneven)
-    return ShotView(even, camera, found.plates, working), notes
+    return ShotView(steady(found.clip, found.plates), camera, found.plates, working), notes
 
 
 def disagreement(shot: Shot) -> tuple[str, ...]:

@@ -11,8 +11,7 @@ from dataclasses import replace
 from smokelift.checks import counted, require_kind
 from smokelift.density.axis import SmokeAxis
 from smokelift.footage.clip import Clip
-from smokelift.footage.evidence import GLIMPSE, looks
-from smokelift.footage.large_plate import large_frames
+from smokelift.footage.proxy import proxy_frames
 from smokelift.footage.working_picture import CameraError, WorkingPicture, working_picture
 from smokelift.render import scene_optics
 from smokelift.scene import Background, Camera, CompleteScene, Domain, Medium, Scene
@@ -165,9 +164,9 @@ def _check(clip: Clip, scene: Scene) -> None:
 def _expect(clip: Clip, scene: Scene) -> None:
     """Say which frames are looked at, so that each of them is decoded once."""
     looked_at, estimates = clip.spread(SAMPLES), scene.background is None
-    # a velocity needs the frame after one with smoke, and a large background more frames than one colour does
-    perhaps = {n + 1 for n in looked_at} | set(large_frames(clip) if estimates else ())
-    clip.expect(looked_at, looks(clip) if estimates else (), GLIMPSE, perhaps.difference(looked_at))
+    # a velocity needs the frame after one with smoke, and a background more frames than the smoke
+    perhaps = {n + 1 for n in looked_at} | {n - clip.first for n in (proxy_frames(clip) if estimates else ())}
+    clip.expect(looked_at, {n for n in perhaps if n >= 0}.difference(looked_at))
 
 
 def _further_views(
@@ -178,7 +177,7 @@ def _further_views(
     gains: list[Choice[str]] = []
     smoky = look.samples.smoky
     for number in range(len(scene.views)):
-        view, said = open_view(number, first.clip, scene, smoky[0] if smoky and look.fire is None else None)
+        view, said = open_view(number, first.clip, scene)
         notes += said
         if settings.selection.measure:
             shows = tried_frames(smoky)

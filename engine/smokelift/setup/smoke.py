@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.footage.clip import REDUCED, Clip
 from smokelift.footage.exposure import largest_change, small
-from smokelift.footage.images import Picture, area_average
+from smokelift.footage.images import area_average
 from smokelift.footage.matte import matte
 from smokelift.footage.panorama import WidePicture
 from smokelift.footage.plate import Plates
@@ -49,8 +49,6 @@ class SmokeSamples:
         By how much each sample is brighter than its background, (3,), by the number of its frame; they are evened out.
     textures
         What the samples with smoke show of the texture behind it.
-    small
-        The `small_pictures` of the samples.
     """
 
     scale: float
@@ -62,7 +60,6 @@ class SmokeSamples:
     smoky: tuple[int, ...]
     gains: Mapping[int, NDArray[np.float32]]
     textures: tuple[NDArray[np.float64], ...] = ()
-    small: Mapping[int, Picture] = field(default_factory=dict)
 
     @property
     def exposure(self) -> float:
@@ -74,11 +71,6 @@ class SmokeSamples:
         """Whether smoke adds more light to what is behind it than it takes away."""
         change = np.sum(self.colours - self.behind, -1)
         return bool(np.sum(np.maximum(change, 0)) >= np.sum(np.maximum(-change, 0)))
-
-
-def small_pictures(clip: Clip) -> dict[int, Picture]:
-    """Return `smokelift.footage.exposure.small` pictures of frames spread over a clip, by their numbers, ascending."""
-    return {number: small(clip.reduced(number)) for number in clip.spread(SAMPLES)}
 
 
 def unknown_part(plates: Plates, clip: Clip, number: int) -> NDArray[np.bool_]:
@@ -99,10 +91,10 @@ def sample_smoke(clip: Clip, plates: Plates, turns: Turns | None = None) -> Smok
     gains: dict[int, NDArray[np.float32]] = {}
     amounts: dict[int, int] = {}
     reduced = plates.through(lambda whole: area_average(whole, columns, rows), scale**2)
-    gains_of, tiny = exposures(reduced), small_pictures(clip)
-    for number, shown in tiny.items():
+    gains_of = exposures(reduced)
+    for number in clip.spread(SAMPLES):
         plate = reduced.at(number)
-        gains[number] = gains_of(number, shown)
+        gains[number] = gains_of(number, small(clip.reduced(number)))
         picture = clip.reduced(number) / gains[number]
         mask = matte(picture, plate).mask
         for whole, part in ((covered, mask), (unknown, unknown_part(reduced, clip, number))):
@@ -119,4 +111,4 @@ def sample_smoke(clip: Clip, plates: Plates, turns: Turns | None = None) -> Smok
         left, top, right, bottom = (scale * corner for corner in corners)
         bounds = (left, top, right, bottom)
     radiance = np.concatenate(colours), np.concatenate(behind)
-    return SmokeSamples(scale, bounds, covered, unknown, *radiance, smoky, gains, tuple(textures), tiny)
+    return SmokeSamples(scale, bounds, covered, unknown, *radiance, smoky, gains, tuple(textures))

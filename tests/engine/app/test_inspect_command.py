@@ -16,7 +16,7 @@ from smokelift.output.sequence import Sequence
 from smokelift.scene import Background, DirectionalLight, Inlet, Medium, Scene
 from smokelift.setup.settings import QUALITIES
 from smokelift.setup.sky import light_around
-from tests.engine.setup.shots import filmed_around, flickering
+from tests.engine.setup.shots import filmed_around
 
 
 def test_inspect_says_how_smoke_gets_in_and_out(plume, tmp_path, capsys) -> None:
@@ -104,14 +104,6 @@ def test_a_page_shows_what_is_known(plume, tmp_path, capsys, kind) -> None:
     assert known["background"]["origin"] == known["box"]["origin"] == "estimated"
     assert known["scattering"]["origin"] == known["grid"]["origin"] == known["noise"]["origin"] == "measured"
     assert page.stat().st_size > 5000
-
-
-def test_exposure_that_flickers_before_black_is_called_measured(plume, tmp_path, capsys) -> None:
-    clip = flickering(plume, tmp_path / "clip", plume.scene, 0.1).clip
-    assert command("inspect", clip.path, "--page", tmp_path / "page.html", "--progress", "json", *QUICK) == 0
-    (fact,) = (fact for fact in events(capsys.readouterr().out)[-1]["facts"] if fact["what"] == "exposure")
-    assert fact["origin"] == "measured"
-    assert fact["value"].startswith("flickers by up to 1")
 
 
 def test_a_sun_that_four_cameras_tell_is_called_measured(plume, tmp_path, capsys) -> None:

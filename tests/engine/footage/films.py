@@ -8,8 +8,10 @@ from pathlib import Path
 import av
 import numpy as np
 
+from smokelift.footage.backdrop import find_backdrop
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import linear_to_srgb, srgb_to_linear
+from smokelift.footage.plate import Plate
 from smokelift.output.images import write_image
 
 HEIGHT, WIDTH, COUNT = 72, 56, 24
@@ -93,3 +95,10 @@ def passing_wall() -> np.ndarray:
     """Return a textured linear background that is wide enough for a pan."""
     blocks = np.random.default_rng(0).uniform(0.2, 0.5, (HEIGHT // 8, (WIDTH + 2 * COUNT) // 8, 3))
     return srgb_to_linear(np.kron(blocks, np.ones((8, 8, 1))))
+
+
+def plate_of(clip: Clip) -> Plate:
+    """Return the background that is found for a clip whose camera stands still."""
+    found = find_backdrop(clip, None, None).plates
+    assert isinstance(found, Plate)
+    return found

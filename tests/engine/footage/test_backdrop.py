@@ -1,16 +1,21 @@
-"""Backgrounds of one colour."""
+"""What is found to stand behind the smoke."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from films import COUNT, HEIGHT, WIDTH, codes_apart, film, pan, passing_wall, puff, wall
+from films import COUNT, HEIGHT, WIDTH, codes_apart, film, pan, passing_wall, plate_of, puff, wall
+from scipy import ndimage
 
-from smokelift.footage.backdrop import colour_around, one_colour
+from smokelift.footage.backdrop import Backdrop, find_backdrop
+from smokelift.footage.clip import Clip
+from smokelift.footage.images import srgb_to_linear
 from smokelift.footage.matte import matte
-from smokelift.footage.plate_estimation import estimate_plate
+from smokelift.output.images import write_image
+from smokelift.scene import Camera
 
 
 def spreading_ink(n: int) -> np.ndarray:
@@ -19,12 +24,66 @@ def spreading_ink(n: int) -> np.ndarray:
     return np.clip((62 * np.sqrt(n / COUNT) - rows - 6 * np.cos(columns / 4)) / 6, 0, 1) if n else 0.0 * rows
 
 
+def fog(folder: Path, frames: tuple[int, int] | None = None) -> Clip:
+    """Billows that fill the picture and drift by two pixels a frame, and pure black at both ends of the file."""
+    count, rows, columns = 60, 90, 120
+    random = np.random.default_rng(5)
+    wide = sum(
+        width * ndimage.gaussian_filter(random.standard_normal((rows, columns + 2 * count)), width, mode="wrap")
+        for width in (6, 12, 24)
+    )
+    wide = (wide - wide.min()) / np.ptp(wide)
+    for n in range(count):
+        amount = 0.7 * np.clip(min(n, count - 1 - n) / 12, 0, 1)
+        write_image(folder / f"fog_{n:02d}.png", srgb_to_linear(amount * wide[:, 2 * n : 2 * n + columns]))
+    return Clip.open(folder / "fog_##.png", fps=24, frames=frames)
+
+
+@pytest.mark.parametrize("frames", [None, (24, 35)], ids=["whole", "middle"])
+def test_fog_that_fills_black_is_no_noise(tmp_path: Path, frames: tuple[int, int] | None) -> None:
+    """Most of its light is in the matte, also of a part of the file in which no pixel is ever black."""
+    with fog(tmp_path, frames) as clip:
+        found = find_backdrop(clip, None, None)
+        assert found.colour == (0, 0, 0)
+        assert found.plates.noise.total.max() < 2 / 255
+        picture = clip.frame(len(clip) // 2)
+        share = matte(picture, found.plates.at(0)).share[..., None]
+        assert (share * picture).sum() > 0.98 * picture.sum()
+
+
+def test_a_cloud_that_fills_a_part_of_the_file_is_not_what_black_is_before(tmp_path: Path) -> None:
+    """It grows over all of a picture that is black before, and stands still then, but for a hole that moves."""
+    rows, columns = np.mgrid[:HEIGHT, :WIDTH]
+    drawn = 0.3 + 0.2 * np.sin(rows / 9) * np.cos(columns / 11)
+    for n in range(36):
+        grown = np.clip(3 * n - np.hypot(rows - HEIGHT, columns - WIDTH / 2) / 1.2, 0, 1)
+        hole = np.clip(1.5 - np.hypot(rows - 30, columns - 10 - n) / 5, 0, 1)
+        light = (drawn * grown * (1 - hole))[..., None].repeat(3, -1)
+        write_image(tmp_path / f"cloud_{n:02d}.png", light.astype(np.float32))
+    with Clip.open(tmp_path / "cloud_##.png", fps=24, frames=(28, 35)) as clip:
+        found = find_backdrop(clip, None, None)
+    assert found.colour == (0, 0, 0)
+
+
+def test_a_trimmed_clip_has_the_background_of_its_file(tmp_path: Path) -> None:
+    """Twelve frames in which smoke hardly leaves its place before the wall, of a file that shows the wall."""
+    truth = wall(0.2, 0.5)
+
+    def opacity(n: int) -> np.ndarray:
+        return puff(8 + (n - 10) / 3) if 10 <= n < 22 else np.zeros((HEIGHT, WIDTH))
+
+    film(tmp_path, truth, opacity, 0.6)
+    trimmed = Clip.open(tmp_path / "frame_###.png", fps=24, frames=(11, 20))
+    plate = plate_of(trimmed)
+    assert np.percentile(codes_apart(plate.image, truth), 95) < 5
+
+
 @pytest.mark.parametrize(("colour", "ink"), [(1.0, 0.0), (0.2, 0.7)], ids=["black on white", "bright on grey"])
 def test_ink_that_stays_is_not_what_it_hides(tmp_path: Path, colour: float, ink: float) -> None:
     """Ink is over more of the picture that never changes than what it spreads over."""
     truth = np.full((HEIGHT, WIDTH, 3), colour)
     clip = film(tmp_path, truth, spreading_ink, ink)
-    plate = estimate_plate(clip)
+    plate = plate_of(clip)
     assert (plate.confidence == 1).all()
     assert codes_apart(plate.image, truth).max() < 2
     last = spreading_ink(COUNT - 1)
@@ -37,7 +96,7 @@ def test_a_clip_that_fades_in_from_black_is_not_before_black(tmp_path: Path) -> 
     """Its bar is black all the time, and all of it at first."""
     truth = np.full((HEIGHT, WIDTH, 3), 0.4)
     truth[:10] = 0
-    plate = estimate_plate(film(tmp_path, truth, lambda n: np.full((HEIGHT, WIDTH), max(1 - n / 2, 0)), 0.0))
+    plate = plate_of(film(tmp_path, truth, lambda n: np.full((HEIGHT, WIDTH), max(1 - n / 2, 0)), 0.0))
     assert np.median(codes_apart(plate.image, truth)) < 2
 
 
@@ -51,7 +110,7 @@ def mist(n: int) -> np.ndarray:
 def test_mist_that_hardly_moves_is_before_the_black_that_it_fades_into(tmp_path: Path) -> None:
     """It changes as little as a wall, and is most of what does not change."""
     clip = film(tmp_path, np.zeros((HEIGHT, WIDTH, 3)), mist, 0.4, 0.5)
-    plate = estimate_plate(clip)
+    plate = plate_of(clip)
     assert (plate.confidence == 1).all()
     assert not plate.image.any()
     assert matte(clip.frame(12), plate).mask[HEIGHT * 2 // 3 :].all()
@@ -66,39 +125,34 @@ def test_what_has_edges_is_no_mist(tmp_path: Path, lit: bool) -> None:
     if lit:
         rows, columns = np.mgrid[:HEIGHT, :WIDTH]
         truth = wall(0.2, 0.5) * np.exp(-((rows - 36) ** 2 + (columns - 28) ** 2) / 150)[..., None]
-    plate = estimate_plate(film(tmp_path, truth, puff, 0.6, 0.5))
+    plate = plate_of(film(tmp_path, truth, puff, 0.6, 0.5))
     middle = np.s_[28:44, 20:36]
     assert codes_apart(plate.image, truth)[middle].max() < 30
     assert plate.image[middle].min() > 0
 
 
+def moving(clip: Clip) -> Backdrop:
+    """What is found behind a camera that is known to move."""
+    cameras = [Camera.look_at((0, -3, 0.01 * n), (0, 0, 0), fov_y_degrees=40, size=clip.size) for n in range(COUNT)]
+    return find_backdrop(clip, replace(cameras[0], matrices=tuple(each.matrix for each in cameras)), None)
+
+
 @pytest.mark.parametrize("colour", [(0.0, 0.0, 0.0), (0.1, 0.3, 0.05)], ids=["black", "green"])
 def test_one_colour_behind_a_moving_camera_is_found(tmp_path: Path, colour: tuple[float, float, float]) -> None:
     wide = np.broadcast_to(colour, (HEIGHT, WIDTH + 2 * COUNT, 3))
-    found = one_colour(estimate_plate(pan(tmp_path, wide, 1.0)))
-    assert found == pytest.approx(colour, abs=0.003)
+    found = moving(pan(tmp_path, wide, 1.0)).background
+    assert found is not None
+    assert found.color == pytest.approx(colour, abs=0.003)
 
 
 @pytest.mark.parametrize("smoke", [0.0, 1.0])
-def test_more_than_one_colour_behind_a_moving_camera_is_noticed(tmp_path: Path, smoke: float) -> None:
-    assert one_colour(estimate_plate(pan(tmp_path, passing_wall(), smoke))) is None
+def test_more_than_one_colour_behind_a_moving_camera_is_refused(tmp_path: Path, smoke: float) -> None:
+    with pytest.raises(ValueError, match="The camera moves"):
+        moving(pan(tmp_path, passing_wall(), smoke))
 
 
 def test_a_slope_behind_a_moving_camera_is_not_one_colour(tmp_path: Path) -> None:
     """It passes up and down, so no pixel changes, and yet there are many colours."""
     wide = np.broadcast_to(np.linspace(0.1, 0.3, HEIGHT)[:, None, None], (HEIGHT, WIDTH + 2 * COUNT, 3))
-    assert one_colour(estimate_plate(pan(tmp_path, wide, 1.0))) is None
-
-
-def test_a_single_picture_has_a_colour_around_it() -> None:
-    """In noise, too, behind smoke that covers most of it and comes in from one side; not a wall, and no black bars."""
-    picture = np.full((60, 80, 3), 0.2, np.float32)
-    picture += np.random.default_rng(0).normal(0, 0.004, picture.shape).astype(np.float32)
-    picture[5:, 10:70] = np.linspace(0.3, 0.9, 60)[:, None]
-    assert colour_around(picture) == pytest.approx((0.2, 0.2, 0.2), abs=0.002)
-    picture[:, 10:70] = np.linspace(0.3, 0.9, 60)[:, None]
-    assert colour_around(picture) is None
-    bars = np.kron(np.random.default_rng(0).uniform(0.1, 0.6, (12, 16, 1)), np.ones((5, 5, 3))).astype(np.float32)
-    assert colour_around(bars) is None
-    bars[:10] = bars[-10:] = 0
-    assert colour_around(bars) is None
+    with pytest.raises(ValueError, match="The camera moves"):
+        moving(pan(tmp_path, wide, 1.0))

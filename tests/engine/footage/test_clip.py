@@ -14,7 +14,6 @@ from PIL import Image
 
 from smokelift.footage.clip import Clip, ClipError
 from smokelift.footage.images import CodedPicture, Picture, area_average, linear_to_srgb, srgb_to_linear
-from smokelift.footage.noise import encode_sample
 from smokelift.footage.video import Video
 from smokelift.output.images import write_image
 from smokelift.scene import ClipSource
@@ -164,12 +163,10 @@ def test_codes_are_those_that_ffmpeg_writes_as_pixels(tmp_path: Path, name: str,
     with av.open(str(path)) as file:
         frame = next(file.decode(video=0))
     video = Video(path, None)
-    for divisor, way in ((1, Interpolation.BICUBIC), (3, Interpolation.AREA)):
-        size = 102 // divisor, 50 // divisor
-        expected = frame.reformat(*size, "rgb24", interpolation=int(way | exact)).to_ndarray()
-        picture = video.glimpse(0, divisor)
-        assert isinstance(picture, CodedPicture)
-        assert np.array_equal(picture.codes, expected)
+    expected = frame.reformat(102, 50, "rgb24", interpolation=int(Interpolation.BICUBIC | exact)).to_ndarray()
+    picture = video.read(0)
+    assert isinstance(picture, CodedPicture)
+    assert np.array_equal(picture.codes, expected)
     video.close()
 
 
@@ -227,14 +224,13 @@ def test_a_frame_through_a_function_is_the_function_of_the_frame(tmp_path: Path)
     for path in (video, tmp_path / "alpha.png"):
         with Clip.open(path) as clip, Clip.open(path) as other:
             last = len(clip) - 1
-            found = clip.frame_through(last, encode_sample)
-            assert found.dtype == np.uint16
-            assert np.array_equal(found, encode_sample(other.frame(last)))
-            some = clip.frame_through(last, encode_sample, lambda picture: picture[3:9, ::2])
+            found = clip.frame_through(last, linear_to_srgb)
+            assert found.dtype == np.float32
+            assert np.array_equal(found, linear_to_srgb(other.frame(last)))
+            some = clip.frame_through(last, linear_to_srgb, lambda picture: picture[3:9, ::2])
             assert np.array_equal(some, found[3:9, ::2])
-            assert np.array_equal(clip.glimpse_through(last, 16, encode_sample), encode_sample(other.glimpse(last, 16)))
             with pytest.raises(ClipError, match="no frame"):
-                clip.frame_through(last + 1, encode_sample)
+                clip.frame_through(last + 1, linear_to_srgb)
 
 
 def test_reduced_frames_are_means_of_light_and_kept(tmp_path: Path) -> None:
@@ -267,18 +263,17 @@ def test_what_is_expected_is_kept_while_damage_is_looked_for(
     tmp_path: Path, ramp: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with Clip.open(ramp) as clip:
-        frames, glimpse = [clip.frame(n) for n in (2, 5)], clip.glimpse(4, 12)
+        frames = [clip.frame(n) for n in (2, 5)]
     read: list[int] = []
     decode = Video._decode
     monkeypatch.setattr(Video, "_decode", lambda video, index: read.append(index) or decode(video, index))
     with Clip.open(ramp) as clip:
         first = clip.part(1, 7)
-        first.expect([1, 4], [3], 12)
+        first.expect([1, 4])
         assert first.damaged == ()
         read.clear()
         assert np.array_equal(first.frame(1), frames[0])
         assert np.array_equal(clip.frame(5), frames[1])
-        assert np.array_equal(clip.glimpse(4, 12), glimpse)
         assert read == []
         clip.frame(6)
         assert read == [6]
@@ -286,17 +281,16 @@ def test_what_is_expected_is_kept_while_damage_is_looked_for(
 
 def test_what_is_perhaps_asked_for_is_kept_as_it_was_decoded(ramp: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with Clip.open(ramp) as clip:
-        frame, glimpse = clip.frame(5), clip.glimpse(6, 12)
+        frame = clip.frame(5)
     read: list[int] = []
     decode = Video._decode
     monkeypatch.setattr(Video, "_decode", lambda video, index: read.append(index) or decode(video, index))
     with Clip.open(ramp) as clip:
         first = clip.part(1, 7)
-        first.expect(perhaps=[4, 5, 6, 7], longest=12)
+        first.expect(perhaps=[4, 5, 6, 7])
         assert first.damaged == ()
         read.clear()
         assert np.array_equal(clip.frame(5), frame)
-        assert np.array_equal(clip.glimpse(6, 12), glimpse)
         assert read == []
         clip.frame(8)  # which the part does not have
         first.expect()
@@ -350,36 +344,11 @@ def test_what_is_expected_of_pictures_is_kept(tmp_path: Path) -> None:
     for n in range(3):
         write_image(tmp_path / f"a{n}.png", np.full((8, 16, 3), 0.1 * n, np.float32))
     with Clip.open(tmp_path / "a#.png", fps=24) as clip:
-        clip.expect([2], [1], 4)
+        clip.expect([2])
         assert clip.damaged == ()
         for n in range(3):
             (tmp_path / f"a{n}.png").unlink()
         assert clip.frame(2).mean() == pytest.approx(0.2, abs=0.01)
-        assert clip.glimpse(1, 4).mean() == pytest.approx(0.1, abs=0.01)
-
-
-@pytest.mark.parametrize("rotation", [None, 90])
-def test_a_glimpse_is_a_smaller_picture_of_the_same(tmp_path: Path, rotation: int | None) -> None:
-    blocks = np.kron(np.random.default_rng(0).integers(30, 220, (9, 16, 3)), np.ones((16, 16, 1))).astype(np.uint8)
-    path = encode(tmp_path / "blocks.mp4", [blocks] * 3, pixels="yuv444p", rotation=rotation)
-    with Clip.open(path) as clip:
-        glimpse, whole = clip.glimpse(1, 100), clip.frame(1)
-        width, height = clip.size
-        assert glimpse.shape == (height // 2, width // 2, 3)
-        assert np.abs(linear_to_srgb(glimpse) - linear_to_srgb(whole[::2, ::2])).max() < 2 / 255
-        assert clip.glimpse(1, 1000) is whole
-        for longest in (100, 1000):
-            found = clip.glimpse_average(1, longest, linear_to_srgb, 40, 30)
-            assert np.array_equal(found, area_average(linear_to_srgb(clip.glimpse(1, longest)), 40, 30))
-        with pytest.raises(ClipError, match="no frame"):
-            clip.glimpse(3, 100)
-
-
-def test_a_glimpse_of_a_damaged_frame_is_of_what_stands_in(tmp_path: Path) -> None:
-    path = encode(tmp_path / "a.mov", [flat(v) for v in LEVELS[:6]], codec="png", pixels="rgb24")
-    with Clip.open(blanked(path, [3])) as clip:
-        assert clip.glimpse(3, 16).shape == (8, 16, 3)
-        assert np.array_equal(clip.glimpse(3, 16), clip.glimpse(2, 16))
 
 
 def test_a_range_of_frames(ramp: Path) -> None:

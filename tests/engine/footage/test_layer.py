@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from smokelift.footage.backdrop import find_backdrop
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import srgb_to_linear
 from smokelift.footage.layer import Layer, backdrop_of
 from smokelift.scene import Background
-from smokelift.setup.background import find_plates
 
 
 def layer(grey: float, alpha: float | None) -> Layer:
@@ -45,8 +45,7 @@ def test_the_backdrop_is_the_background_and_nothing_is_estimated(tmp_path: Path)
         half = 128 / 255
         np.testing.assert_allclose(clip.frame(3)[20, 15], srgb_to_linear(40 / 255) * half + 1 - half, rtol=1e-5)
         for given in (None, Background(color=(0.0, 0.0, 0.0))):
-            found = find_plates(clip, None, given)
+            found = find_backdrop(clip, None, given)
             assert found.background == Background(color=(1.0, 1.0, 1.0))
             assert (found.plates.at(2).image == 1).all()
-            assert "alpha channel, which is the matte" in found.notes[0]
-            assert (len(found.notes) == 2) == (given is not None)
+            assert found.source == "alpha"

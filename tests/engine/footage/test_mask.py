@@ -7,15 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from films import COUNT, HEIGHT, WIDTH, codes_apart, film, puff, wall
+from films import COUNT, HEIGHT, WIDTH, codes_apart, film, plate_of, puff, wall
 from PIL import Image
 
+from smokelift.footage.backdrop import find_backdrop
 from smokelift.footage.clip import Clip, ClipError
-from smokelift.footage.images import ImageError, linear_to_srgb, srgb_to_linear
+from smokelift.footage.images import ImageError, linear_to_srgb
 from smokelift.footage.mask import Mask, continued
-from smokelift.footage.noise import encode_sample
 from smokelift.footage.plate import Plate, known_plate
-from smokelift.footage.plate_estimation import SteadySamples, estimate_plate
 from smokelift.footage.steady import cleared, uncovered
 from smokelift.output.images import write_image
 from smokelift.output.video import write_video
@@ -150,7 +149,7 @@ def test_frames_outside_the_clip_are_said_before_its_masks(tmp_path: Path) -> No
 
 
 def test_frames_are_continued_where_they_are_hidden(tmp_path: Path, mask: Path) -> None:
-    """As their surroundings are, whatever is there; all the rest stays, also of glimpses."""
+    """As their surroundings are, whatever is there; all the rest stays."""
     file = filmed(tmp_path / "clip")
     with Clip.open(file) as plain, Clip.open(file, mask=mask) as clip:
         for n in (0, 12):
@@ -169,22 +168,16 @@ def test_what_is_far_from_all_that_is_seen_has_its_colour() -> None:
     np.testing.assert_allclose(continued(picture, seen), 0.3, rtol=1e-3)
 
 
-def test_what_is_hidden_speaks_for_no_background_of_one_colour() -> None:
+def test_what_is_hidden_speaks_for_no_background_of_one_colour(tmp_path: Path) -> None:
     """Most of a wall's picture is hidden, and as continued it never changes; before grey, grey is found."""
-    random = np.random.default_rng(0)
-    seen = np.zeros((8, 60, 800), np.bool_)
-    seen[:, :, :50] = True
-    frames = {}
-    for name, texture in (("wall", 0.1), ("grey", 0.0)):
-        encoded = 0.5 + texture * np.kron(random.standard_normal((12, 160, 3)), np.ones((5, 5, 1)))
-        linear = srgb_to_linear(np.clip(encoded, 0, 1)).astype(np.float32)
-        linear[~seen[0]] = continued(linear, seen[0])
-        shown = linear_to_srgb(linear) + random.normal(0, 1 / 255, (8, 60, 800, 3)) * seen[..., None]
-        frames[name] = np.stack([encode_sample(srgb_to_linear(np.clip(each, 0, 1))) for each in shown])
-    assert SteadySamples(frames["wall"], seen).backdrop() is None
-    grey = SteadySamples(frames["grey"], seen).backdrop()
-    assert grey is not None
-    np.testing.assert_allclose(linear_to_srgb(grey.image), 0.5, atol=0.01)
+    file = painted(tmp_path / "mask.png", np.where(np.arange(WIDTH) < 20, 255, 0) * np.ones((HEIGHT, 1)))
+    for name, behind in (("wall", wall(0.2, 0.5)), ("grey", np.full((HEIGHT, WIDTH, 3), 0.2))):
+        (tmp_path / name).mkdir()
+        film(tmp_path / name, behind, lambda n: np.zeros((HEIGHT, WIDTH)), 0.8).close()
+        with Clip.open(tmp_path / name / "frame_###.png", mask=file) as clip:
+            found = find_backdrop(clip, None, None)
+        assert found.source == ("picture" if name == "wall" else "colour")
+        assert np.median(codes_apart(found.plates.at(0).image, behind)[:, :20]) < 2
 
 
 def test_codes_are_continued_as_light_is(tmp_path: Path) -> None:
@@ -204,10 +197,10 @@ def test_codes_are_continued_as_light_is(tmp_path: Path) -> None:
 def test_background_and_noise_are_those_of_what_is_seen(tmp_path: Path, mask: Path) -> None:
     """A block that moves over half of the picture changes neither; without the mask it is in both."""
     with Clip.open(filmed(tmp_path / "clean", with_block=False)) as clean:
-        expected = estimate_plate(clean)
+        expected = plate_of(clean)
     file = filmed(tmp_path / "clip")
     with Clip.open(file, mask=mask) as clip:
-        found = estimate_plate(clip)
+        found = plate_of(clip)
         before = known_plate(wall(0.3, 0.5), clip)
     assert codes_apart(found.image, expected.image)[:, :SIDE].max() < 4
     for plate in (found, before):
@@ -220,7 +213,7 @@ def test_large_masks_do_not_hide_the_noise(tmp_path: Path) -> None:
     film(tmp_path / "clip", wall(0.3, 0.5), lambda n: np.zeros((HEIGHT, WIDTH)), 0.8, noise=4.0).close()
     small = painted(tmp_path / "mask.png", np.where(np.arange(WIDTH) < 16, 255, 0) * np.ones((HEIGHT, 1)))
     with Clip.open(tmp_path / "clip" / "frame_###.png", mask=small) as clip:
-        for plate in (estimate_plate(clip), known_plate(wall(0.3, 0.5), clip)):
+        for plate in (plate_of(clip), known_plate(wall(0.3, 0.5), clip)):
             np.testing.assert_allclose(255 * plate.noise.total, 4, rtol=0.2)
 
 
@@ -239,12 +232,10 @@ def test_what_is_hidden_all_the_time_is_shown_as_it_was_filmed(tmp_path: Path, m
     """Behind the result there would be a blur; where the background is known it stays."""
     file = filmed(tmp_path / "clip", with_block=False)
     with Clip.open(file, mask=mask) as clip:
-        estimated = estimate_plate(clip)
-        shown = uncovered(estimated, clip)
-        assert codes_apart(estimated.image, wall(0.3, 0.5))[:, SIDE:].max() > 10
-        assert codes_apart(shown.image, wall(0.3, 0.5))[:, SIDE:].max() < 4
-        np.testing.assert_array_equal(shown.image[:, :SIDE], estimated.image[:, :SIDE])
+        found = plate_of(clip)
+        assert codes_apart(found.image, wall(0.3, 0.5)).max() < 4
+        assert not found.confidence[:, SIDE:].any()
         given = known_plate(np.full(3, 0.1), clip)
         np.testing.assert_array_equal(uncovered(given, clip).image, given.image)
     with Clip.open(file) as clip:
-        assert uncovered(estimated, clip) is estimated
+        assert uncovered(found, clip) is found

@@ -6,20 +6,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from films import HEIGHT, WIDTH, film, overlap, wall
+from films import HEIGHT, WIDTH, film, overlap, plate_of, wall
 
 from smokelift.footage.images import srgb_to_linear
 from smokelift.footage.matte import FAINTEST, MOST_SMOOTHING, SMOOTHING, matte, smoothing
 from smokelift.footage.noise import Noise, lasting_noise
 from smokelift.footage.plate import Plate, known_plate
-from smokelift.footage.plate_estimation import estimate_plate
 from smokelift.footage.steady import without_noise_light
 
 
 def test_an_empty_clip_has_no_smoke(tmp_path: Path) -> None:
     truth = wall(0.2, 0.8)
     clip = film(tmp_path, truth, lambda n: np.zeros((HEIGHT, WIDTH)), 1.0, 2.0)
-    plate = estimate_plate(clip)
+    plate = plate_of(clip)
     assert plate.confidence.min() == 1.0
     assert not any(matte(frame, plate).mask.any() for frame in clip)
 
@@ -53,7 +52,7 @@ def test_faint_smoke_is_seen_in_noise(tmp_path: Path) -> None:
     truth = wall(0.2, 0.3)
     clip = film(tmp_path, truth, lambda n: veil, 0.6, 25.0)
     plate = known_plate(truth, clip)
-    found = matte(without_noise_light(clip, plate).frame(5), plate).mask
+    found = matte(without_noise_light(clip, plate.noise).frame(5), plate).mask
     assert overlap(found, veil > 0) > 0.7
 
 

@@ -1,22 +1,44 @@
-"""Means over blocks of what is stored of a clip."""
+"""The noise of a clip, told from what cannot be smoke."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
-from smokelift.footage.noise import block_means, decode_samples, sample_block_means, whole_blocks
-
-
-@pytest.mark.parametrize("size", [(20, 35), (23, 41), (3, 40)])
-def test_block_means_of_samples_are_those_of_decoded_samples_to_the_bit(size: tuple[int, int]) -> None:
-    sample = np.random.default_rng(0).integers(0, 65536, (*size, 3)).astype(np.uint16)
-    sample[:10] = 65535  # the largest sums
-    assert np.array_equal(sample_block_means(sample), block_means(decode_samples(sample[None]))[0])
+from smokelift.footage.noise import BLOCK, noise_about, peak_spread, some_blocks, white_noise
 
 
-def test_a_block_is_known_where_all_of_it_is_seen() -> None:
-    seen = np.random.default_rng(0).uniform(size=(4, 23, 31)) < 0.97
-    pictures = np.where(seen[..., None], np.float32(0.5), np.float32(np.nan)) * np.ones(3, np.float32)
-    assert np.array_equal(whole_blocks(seen), np.isfinite(block_means(pictures)[..., 0]))
-    assert 0 < whole_blocks(seen).mean() < 1
+def drifting(frames: int, amount: float) -> np.ndarray:
+    """Return smooth billows over all of the picture that drift, in sRGB values."""
+    billows = ndimage.gaussian_filter(np.random.default_rng(0).standard_normal((120, 400)), 8)
+    billows *= amount / billows.std()
+    return np.stack([billows[:, 2 * n : 2 * n + 160] for n in range(frames)])[..., None].repeat(3, -1)
+
+
+@pytest.mark.parametrize("codes", [0.0, 1.0, 4.0, 25.0])
+def test_white_noise_is_told_from_smoke_that_fills_the_picture(codes: float) -> None:
+    random = np.random.default_rng(1)
+    fog = drifting(8, 0.15)
+    noisy = fog + random.normal(0, codes / 255, fog.shape)
+    found = white_noise(np.stack([some_blocks(picture) for picture in noisy]))
+    np.testing.assert_allclose(255 * found, codes, rtol=0.05, atol=0.5)
+
+
+@pytest.mark.parametrize("codes", [0.5, 1.0, 3.0])
+@pytest.mark.parametrize("smoke", [0.0, 0.4])
+def test_the_spread_of_what_is_clear_is_told_from_smoke(codes: float, smoke: float) -> None:
+    random = np.random.default_rng(2)
+    deviations = random.normal(0, codes / 255, 40000)
+    covered = random.uniform(size=deviations.size) < smoke
+    deviations[covered] = random.uniform(0, 0.6, covered.sum())
+    assert 255 * peak_spread(deviations) == pytest.approx(codes, rel=0.3)
+
+
+def test_what_neighbours_share_lasts(codes: float = 3.0) -> None:
+    random = np.random.default_rng(3)
+    blocks = random.normal(0, codes / 255, (12, 20, 30, 3))
+    pixels = blocks.repeat(BLOCK, 1).repeat(BLOCK, 2) + random.normal(0, 2 / 255, (12, 20 * BLOCK, 30 * BLOCK, 3))
+    found = noise_about(np.stack([some_blocks(picture) for picture in pixels]), blocks)
+    np.testing.assert_allclose(255 * found.lasting, codes, rtol=0.1)
+    np.testing.assert_allclose(255 * found.white, 2, rtol=0.1)

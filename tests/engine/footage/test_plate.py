@@ -7,12 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from films import HEIGHT, WIDTH, codes_apart, film, overlap, pan, passing_wall, puff, wall
+from films import HEIGHT, WIDTH, codes_apart, film, overlap, pan, passing_wall, plate_of, puff, wall
 
 from smokelift.footage.clip import Clip
 from smokelift.footage.matte import matte
 from smokelift.footage.plate import changing_plate, known_plate
-from smokelift.footage.plate_estimation import estimate_plate
 from smokelift.footage.steady import without_noise_light
 from smokelift.output.images import write_image
 
@@ -25,7 +24,7 @@ def test_a_known_black_background(tmp_path: Path) -> None:
     np.testing.assert_allclose(plate.noise.total, 1 / 255, rtol=1e-3)
     for n in (4, 12, 20):
         assert overlap(matte(clip.frame(n), plate).mask, puff(n) > 0.002) > 0.75
-    estimated = estimate_plate(clip)
+    estimated = plate_of(clip)
     assert codes_apart(estimated.image, black).max() < 1.0
     picture = known_plate(wall(0.2, 0.5)[::2, ::2], clip)
     assert picture.image.shape == (HEIGHT, WIDTH, 3)
@@ -34,7 +33,7 @@ def test_a_known_black_background(tmp_path: Path) -> None:
 def test_what_does_not_fit_is_refused(tmp_path: Path) -> None:
     write_image(tmp_path / "still.png", wall(0.2, 0.8))
     clip = Clip.open(tmp_path / "still.png")
-    plate = estimate_plate(clip)
+    plate = plate_of(clip)
     with pytest.raises(ValueError, match="one shape"):
         matte(clip.frame(0)[1:], plate)
     with pytest.raises(ValueError, match="finite"):
@@ -82,7 +81,7 @@ def test_smoke_is_found_before_a_noisy_black(tmp_path: Path, codes: float) -> No
     plate = known_plate((0.0, 0.0, 0.0), clip)
     np.testing.assert_allclose(codes_apart(plate.image, np.zeros_like(plate.image)), 0.4 * codes, rtol=0.1)
     assert plate.noise.lasting.max() * 255 < 0.15 * codes
-    quiet = without_noise_light(clip, plate)
+    quiet = without_noise_light(clip, plate.noise)
     behind = replace(known_plate((0.0, 0.0, 0.0), quiet), noise=plate.noise)
     for n in (8, 12):
         for picture, known in ((clip.frame(n), plate), (quiet.frame(n), behind)):

@@ -6,12 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from films import COUNT, HEIGHT, WIDTH, codes_apart, film, overlap, puff, wall
+from films import COUNT, HEIGHT, WIDTH, codes_apart, film, overlap, plate_of, puff, wall
 
 from smokelift.footage.clip import Clip
 from smokelift.footage.matte import matte
 from smokelift.footage.plate import known_plate
-from smokelift.footage.plate_estimation import estimate_plate
 from smokelift.footage.steady import steady, without_noise_light
 
 
@@ -31,7 +30,7 @@ def test_every_frame_gets_the_exposure_of_its_background(tmp_path: Path) -> None
 
 def test_the_smoke_of_no_frame_is_lost(tmp_path: Path) -> None:
     changing = unsteady(film(tmp_path, wall(0.2, 0.5), puff, 0.6))
-    plate = estimate_plate(changing)
+    plate = plate_of(changing)
     found = steady(changing, plate)
     for n in (4, 8, 20):
         assert overlap(matte(found.frame(n), plate).mask, puff(n) > 0.05) > 0.7
@@ -53,7 +52,7 @@ def test_noise_does_not_brighten_a_clip(tmp_path: Path) -> None:
     """The mean of noisy sRGB values is brighter in linear light, and what is brighter would count as smoke."""
     truth = wall(0.2, 0.6)
     noisy = film(tmp_path, truth, lambda n: np.zeros(truth.shape[:2]), 0.6, 25.0)
-    quiet = without_noise_light(noisy, known_plate(truth, noisy))
+    quiet = without_noise_light(noisy, known_plate(truth, noisy).noise)
     before, after = (np.mean(list(clip), axis=(0, 1, 2)) - truth.mean((0, 1)) for clip in (noisy, quiet))
     assert before.min() > 0.005
     assert np.abs(after).max() < 0.1 * before.min()
@@ -64,7 +63,7 @@ def test_noise_does_not_brighten_smoke_before_black(tmp_path: Path) -> None:
     black = np.zeros((HEIGHT, WIDTH, 3), np.float32)
     half = np.tile(np.arange(WIDTH) < WIDTH // 2, (HEIGHT, 1)).astype(np.float32)
     noisy = film(tmp_path, black, lambda n: half, 0.3, 25.0)
-    quiet = without_noise_light(noisy, known_plate(black, noisy))
+    quiet = without_noise_light(noisy, known_plate(black, noisy).noise)
     before, after = (np.mean(list(clip), axis=0)[:, : WIDTH // 2].mean() - 0.3 for clip in (noisy, quiet))
     assert before > 0.008
     assert after < 0.8 * before
@@ -73,4 +72,4 @@ def test_noise_does_not_brighten_smoke_before_black(tmp_path: Path) -> None:
 def test_a_clip_with_little_noise_stays_as_it_is(tmp_path: Path) -> None:
     truth = wall(0.2, 0.6)
     clip = film(tmp_path, truth, puff, 0.6, 5.0)
-    assert without_noise_light(clip, known_plate(truth, clip)) is clip
+    assert without_noise_light(clip, known_plate(truth, clip).noise) is clip

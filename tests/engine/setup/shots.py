@@ -8,9 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from smokelift.footage.clip import Clip
-from smokelift.output.images import write_image
-from smokelift.render import render
-from smokelift.scene import ClipSource, Light, Scene, View, orbit
+from smokelift.scene import Light, Scene, View, orbit
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
@@ -43,13 +41,3 @@ def burning(number: int, picture: np.ndarray) -> np.ndarray:
     row, column = np.unravel_index(np.argmax(picture.sum(-1)), rows.shape)
     flame = np.exp(-(((rows - row) / 2) ** 2) - ((columns - column) / 2) ** 2)[..., None]
     return picture + np.float32((1, 0.4, 0.08)) * flame.astype(np.float32)
-
-
-def flickering(plume, folder: Path, scene: Scene, share: float, change=lambda picture: picture) -> Scene:
-    """The clip of a scene whose exposure goes up and down, each picture changed before."""
-    folder.mkdir(exist_ok=True)
-    for number in range(8):
-        seen = render(plume.densities[number % len(plume.densities)], scene)
-        picture = np.float32(1 + share * (-1.0) ** number) * change(seen)
-        write_image(folder / f"frame_{number}.exr", picture, half=False)
-    return replace(scene, clip=ClipSource(folder / "frame_#.exr", fps=24.0), scattering=None)

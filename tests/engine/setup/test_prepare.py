@@ -271,7 +271,7 @@ def test_one_colour_behind_a_moving_camera_is_found(tracked, draft) -> None:
     shot = shot_of(replace(tracked, background=None), draft)
     assert shot.scene.background.color == pytest.approx((0, 0, 0), abs=1e-3)
     assert shot.estimated_background is None
-    assert [note for note in shot.notes if note.startswith("Background not given: one colour")]
+    assert [note for note in shot.notes if note.startswith("Background not given: it is black")]
 
 
 def test_a_background_that_moves_must_be_given(tracked, draft, tmp_path) -> None:

@@ -25,11 +25,9 @@ from smokelift.output.writer import check_directory, written_kinds
 from smokelift.pipeline import Frame, reconstruct
 from smokelift.render import device
 from smokelift.scene import Domain
-from smokelift.setup.background import cut_notes
-from smokelift.setup.no_smoke import what_helps
+from smokelift.setup.backdrop_notes import what_helps
 from smokelift.setup.provenance import made_up
 from smokelift.setup.shot import Shot
-from smokelift.setup.smoke import small_pictures
 
 
 def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
@@ -74,11 +72,10 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         sequence = reconstruction.write(options.out, npz=options.npz, resume=options.resume, on_frame=report)
     figures = [sequence.figures(number) for number in sequence.frames]
     if count_empty(figures) == len(figures):
-        cuts = cut_notes(shot.clip, small_pictures(shot.clip))
         raise ValueError(
             f"No smoke found: in no frame does a patch differ from the background by {2 * SMOKE_THRESHOLD:g} times the "
             f"clip's noise, so all frames in {options.out} are empty. "
-            f"{what_helps(shot.clip, shot.views[0].plates, scene.background is not None, cuts)}"
+            f"{what_helps(shot.clip, shot.views[0].plates, scene.background is not None)}"
         )
     for note in shortcomings(figures):
         say.note(note)

@@ -1,4 +1,4 @@
-"""What is said of a background that was found."""
+"""What is said of the background that was found, and of clips in which no smoke is."""
 
 from __future__ import annotations
 
@@ -10,18 +10,27 @@ from scipy import ndimage
 from scipy.spatial.transform import Rotation
 
 from smokelift.footage.alignment import Lens
+from smokelift.footage.backdrop import find_backdrop
 from smokelift.footage.clip import Clip
-from smokelift.footage.evidence import GLIMPSE
 from smokelift.footage.images import linear_to_srgb, srgb_to_linear
 from smokelift.footage.matte import matte
+from smokelift.footage.noise import lasting_noise
 from smokelift.footage.panorama import PanoramaPlate
-from smokelift.footage.plain import plain_plate
+from smokelift.footage.plate import Plate
 from smokelift.output.images import write_image
 from smokelift.scene import Background
-from smokelift.setup import background
-from smokelift.setup.background import between_bars, cut_notes, find_plates, focal_notes, smoke_in_plate
+from smokelift.setup.backdrop_notes import (
+    FROM_ONE,
+    backdrop_doubts,
+    backdrop_notes,
+    between_bars,
+    cut_notes,
+    nothing_seen,
+    smoke_in_plate,
+    what_helps,
+)
 from smokelift.setup.geometry import clip_lens
-from smokelift.setup.smoke import SmokeSamples, sample_smoke, small_pictures
+from smokelift.setup.smoke import SmokeSamples, sample_smoke
 from tests.engine.footage.films import coded, puff, wall
 
 
@@ -61,14 +70,14 @@ def test_smoke_before_a_wall_that_no_frame_shows_is_undetermined(tmp_path) -> No
         same = np.where(across < 6, colour * thinner + flatter * (1 - thinner), tiles)
         np.testing.assert_allclose(shown, same)
         write_image(tmp_path / f"frame_{n:02d}.png", shown)
-    (note,) = find_plates(Clip.open(tmp_path / "frame_##.png", fps=24), None, None).notes
+    (note,) = backdrop_notes(find_backdrop(Clip.open(tmp_path / "frame_##.png", fps=24), None, None))
     assert "how thick the smoke is there is undetermined" in note
 
 
 def test_one_colour_is_said(tmp_path) -> None:
     """Behind a puff before black."""
-    found = find_plates(before(0.0, tmp_path), None, None)
-    assert found.notes == ("Background not given: it is black.",)
+    found = find_backdrop(before(0.0, tmp_path), None, None)
+    assert backdrop_notes(found) == ("Background not given: it is black.",)
 
 
 @pytest.mark.parametrize(("quantiser", "said"), [(36, False), (46, True)])
@@ -77,29 +86,16 @@ def test_a_clip_that_is_strongly_compressed_is_said(tmp_path, quantiser, said) -
     for plate, doubted in ((wall(0.2, 0.5), said), (np.zeros((72, 56, 3)), False)):
         path = coded(tmp_path / f"{doubted}.mp4", plate, puff, 0.8, quantiser)
         with Clip.open(path) as clip:
-            doubts = find_plates(clip, None, None).doubts
+            doubts = backdrop_doubts(find_backdrop(clip, None, None))
             assert any(doubt.startswith("The clip is strongly compressed") for doubt in doubts) is doubted
-            assert not find_plates(clip, None, Background(color=(0.1, 0.1, 0.1))).doubts
+            assert not backdrop_doubts(find_backdrop(clip, None, Background(color=(0.1, 0.1, 0.1))))
 
 
 def test_what_never_changes_before_one_colour_is_said(tmp_path) -> None:
     """It may be a floor, or smoke that stands still."""
-    (note,) = find_plates(before(0.3, tmp_path), None, None).notes
+    (note,) = backdrop_notes(find_backdrop(before(0.3, tmp_path), None, None))
     assert "it is black, but for" in note
     assert "If that is smoke" in note
-
-
-def test_what_of_a_noisy_file_is_evidence_is_looked_for_once(tmp_path, monkeypatch) -> None:
-    """Its background is found twice: with the light that noise adds, and without."""
-    random, asked = np.random.default_rng(0), []
-    wall = np.kron(random.uniform(0.5, 0.7, (6, 5, 1)), np.ones((8, 8, 3)))
-    for n in range(8):
-        noisy = np.clip(wall + random.normal(0, 0.08, wall.shape), 0, 1)
-        write_image(tmp_path / f"frame_{n}.png", srgb_to_linear(noisy))
-    clip = Clip.open(tmp_path / "frame_#.png", fps=24)
-    monkeypatch.setattr(background, "evidence", lambda of: asked.append(of) or of)
-    assert find_plates(clip, None, None).clip is not clip
-    assert asked == [clip]
 
 
 def panned(folder, lens: Lens, pixels: float) -> Clip:
@@ -124,46 +120,23 @@ def test_pictures_of_a_panning_camera_tell_background_and_focal_length(tmp_path)
     clip = panned(tmp_path, true, 40)
     supposed = clip_lens(None, clip)
     assert supposed is not None
-    found = find_plates(clip, None, None, supposed)
+    found = find_backdrop(clip, None, None, supposed)
     assert isinstance(found.plates, PanoramaPlate)
     assert found.turns is not None
     assert found.turns.lens.focal[0] == pytest.approx(150, rel=0.03)
-    assert any("Focal length measured on how the picture turns: 34 mm" in note for note in found.notes)
+    assert any("Focal length measured on how the picture turns: 34 mm" in note for note in backdrop_notes(found))
     assert not smoke_in_plate(sample_smoke(found.clip, found.plates, found.turns))
     never_clear = replace(found.plates, confidence=np.zeros_like(found.plates.confidence))
     (said,) = smoke_in_plate(sample_smoke(found.clip, never_clear, found.turns))
     assert "may hold most of the smoke: 100%" in said
 
 
-def test_a_focal_length_that_is_not_found_is_said() -> None:
+def test_a_focal_length_that_is_not_found_is_said(tmp_path) -> None:
     lens = Lens((160, 120), (150.0, 150.0), (80.0, 60.0))
-    assert focal_notes(lens, True, None) == ()
-    assert "undetermined" in focal_notes(lens, False, None)[0]
-
-
-def test_one_colour_needs_no_frame_beyond_the_clip(tmp_path, monkeypatch) -> None:
-    """Of large pictures, which show it on a few glimpses."""
-    for n in range(8):
-        picture = np.zeros((45, 2 * GLIMPSE, 3), np.float32)
-        picture[10:30, 150 * n : 150 * n + 100] = 0.6
-        write_image(tmp_path / f"frame_{n}.png", picture)
-    trimmed = Clip.open(tmp_path / "frame_#.png", fps=24, frames=(2, 6))
-    monkeypatch.setattr(background, "evidence", None)
-    (note,) = find_plates(trimmed, None, None).notes
-    assert note == "Background not given: it is black."
-
-
-def test_one_colour_that_smoke_hides_is_found_on_frames_beyond_the_clip(tmp_path) -> None:
-    """Half of the file's pictures are free of what fills those of the clip."""
-    random = np.random.default_rng(0)
-    for n in range(24):
-        picture = np.full((45, 2 * GLIMPSE, 3), 0.02, np.float32)
-        if 8 <= n < 12:
-            picture[:, : 2 * GLIMPSE - 200] = random.uniform(0.1, 0.9, (9, 216, 1)).repeat(5, 0).repeat(5, 1)[:, :1080]
-        write_image(tmp_path / f"frame_{n:02d}.png", picture)
-    trimmed = Clip.open(tmp_path / "frame_##.png", fps=24, frames=(8, 11))
-    assert plain_plate(trimmed, trimmed) is None
-    assert "one colour" in find_plates(trimmed, None, None).notes[0]
+    found = find_backdrop(panned(tmp_path, lens, 40), None, None, lens)
+    known, unknown = (replace(found, lens_is_known=is_known, focal=None) for is_known in (True, False))
+    assert not any("Focal length" in note for note in backdrop_notes(known))
+    assert any("Focal length undetermined" in note for note in backdrop_notes(unknown))
 
 
 def test_a_cut_is_said_with_the_frames_of_each_side(tmp_path) -> None:
@@ -177,11 +150,11 @@ def test_a_cut_is_said_with_the_frames_of_each_side(tmp_path) -> None:
         )
         write_image(tmp_path / f"frame_{n:02d}.png", wall * (1 - smoke) + 0.6 * smoke)
     with Clip.open(tmp_path / "frame_##.png", frames=(2, 12)) as clip:
-        (said,) = cut_notes(clip, small_pictures(clip))
+        (said,) = cut_notes(find_backdrop(clip, None, None))
     assert "between frames 6 and 7" in said
     assert "--frames 2:6 or 7:12" in said
     with Clip.open(tmp_path / "frame_##.png", frames=(7, 13)) as clip:
-        assert cut_notes(clip, small_pictures(clip)) == ()
+        assert cut_notes(find_backdrop(clip, None, None)) == ()
 
 
 @pytest.mark.parametrize("colour", [0.0, 0.2], ids=["black", "grey"])
@@ -194,13 +167,13 @@ def test_one_frame_before_one_colour_shows_its_background(tmp_path, colour) -> N
         tmp_path / "photograph.png", srgb_to_linear(shown + np.random.default_rng(0).normal(0, 0.004, (120, 80, 1)))
     )
     with Clip.open(tmp_path / "photograph.png") as clip:
-        found = find_plates(clip, None, None)
-        told = find_plates(clip, None, Background(color=(colour,) * 3))
+        found = find_backdrop(clip, None, None)
+        told = find_backdrop(clip, None, Background(color=(colour,) * 3))
         masks = [matte(clip.frame(0), each.plates.at(0)).mask for each in (found, told)]
         assert masks[0][smoke > 0.1].all() and masks[0].mean() < 0.6
         assert (masks[0] != masks[1]).mean() < 0.01
-    assert found.doubts == (background.FROM_ONE,)
-    assert "Background not given: it is" in found.notes[0]
+    assert backdrop_doubts(found) == (FROM_ONE,)
+    assert "Background not given: it is" in backdrop_notes(found)[0]
 
 
 @pytest.mark.parametrize(("count", "doubted"), [(1, False), (2, True), (4, False)])
@@ -212,7 +185,7 @@ def test_a_background_that_few_frames_show_is_doubted(tmp_path, count, doubted) 
         smoke = 0.6 * np.clip(1.5 - np.hypot(rows - 60 + 8 * n, columns - 28) / 9, 0, 1)
         write_image(tmp_path / f"frame_{n}.png", wall * (1 - smoke) + 0.6 * smoke)
     with Clip.open(tmp_path / "frame_#.png") as clip:
-        doubts = find_plates(clip, None, None).doubts
+        doubts = backdrop_doubts(find_backdrop(clip, None, None))
     assert any(f"Only {count} frames show" in doubt for doubt in doubts) is doubted
 
 
@@ -236,3 +209,57 @@ def test_a_picture_between_bars_that_is_taken_for_smoke_is_said(rows, missing, a
     gains = dict.fromkeys(range(2), np.ones(3, np.float32))
     (*notes,) = between_bars(SmokeSamples(1.0, (0, 0, 1, 1), covered, ~covered, seen, seen, (0,), gains))
     assert [("left" if turned else "above") in note for note in notes] == [True] * said
+
+
+@pytest.fixture
+def grey(tmp_path):
+    """A clip of four frames of a grey wall, and its plate."""
+    picture = np.full((24, 32, 3), 0.2, np.float32)
+    for n in range(4):
+        write_image(tmp_path / f"wall_{n}.png", picture)
+    with Clip.open(tmp_path / "wall_#.png") as clip:
+        yield clip, Plate(clip.frame(0), np.ones((24, 32), np.float32), lasting_noise(1 / 255))
+
+
+def test_how_many_frames_were_looked_at_is_said(grey) -> None:
+    """And what helps."""
+    clip, plate = grey
+    said, advice = nothing_seen(clip, plate, sample_smoke(clip, plate), given=False, cuts=())
+    assert "No smoke found in the 4 frames that were looked at" in said
+    assert "give a clean plate, or a colour" in advice
+
+
+def test_nothing_is_said_of_smoke(grey) -> None:
+    """Where the plate is darker than the clip."""
+    clip, plate = grey
+    image = plate.image.copy()
+    image[6:18, 8:24] *= 0.5
+    dark = replace(plate, image=image)
+    assert nothing_seen(clip, dark, sample_smoke(clip, dark), given=False, cuts=()) == ()
+
+
+def test_the_background_that_is_given_is_doubted(grey) -> None:
+    """Nothing else is asked for."""
+    assert "Check the background that is given" in what_helps(*grey, given=True)
+
+
+def test_a_cut_is_said_before_all_else(grey) -> None:
+    """No background fits both of its sides."""
+    clip, plate = grey
+    said = nothing_seen(clip, plate, sample_smoke(clip, plate), given=True, cuts=("There is a cut.",))
+    assert said[1:] == ("There is a cut.",)
+
+
+def test_one_frame_shows_no_background(grey) -> None:
+    """A photograph of smoke."""
+    clip, plate = grey
+    assert "One frame alone does not show" in what_helps(clip.part(2, 2), plate, given=False)
+
+
+@pytest.mark.parametrize(("codes", "moves"), [(5, False), (20, True)])
+def test_a_background_that_changes_may_be_that_of_a_camera_that_moves(grey, codes, moves) -> None:
+    """More than noise does."""
+    clip, plate = grey
+    said = what_helps(clip, replace(plate, noise=lasting_noise(codes / 255)), given=False)
+    assert ("track it in Blender" in said) is moves
+    assert (f"by {codes} of 255" in said) is moves

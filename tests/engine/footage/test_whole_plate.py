@@ -1,4 +1,4 @@
-"""Backgrounds of large pictures, found on reduced ones."""
+"""Backgrounds of large pictures, found on small ones."""
 
 from __future__ import annotations
 
@@ -9,22 +9,19 @@ import pytest
 from films import codes_apart
 from PIL import Image
 
+from smokelift.footage.backdrop import find_backdrop
 from smokelift.footage.clip import Clip
-from smokelift.footage.evidence import GLIMPSE
 from smokelift.footage.frame_source import Look
-from smokelift.footage.images import CodedPicture, area_average, code_values, linear_to_srgb, srgb_to_linear
-from smokelift.footage.large_plate import large_frames, large_samples
+from smokelift.footage.images import CodedPicture, code_values, linear_to_srgb, srgb_to_linear
 from smokelift.footage.mask import Mask, Masked
 from smokelift.footage.plate import Plate
-from smokelift.footage.plate_estimation import steady_samples
-from smokelift.setup.background import find_plates
 
 COUNT = 16
-SIZE = (80, 2 * GLIMPSE)
+SIZE = (80, 1280)
 
 
 class Filmed:
-    """Frames in memory as a video's: a glimpse takes means of codes."""
+    """Frames in memory as a video's."""
 
     warning: str | None = None
     lens: float | None = None
@@ -38,11 +35,6 @@ class Filmed:
 
     def read(self, n: int) -> CodedPicture:
         return CodedPicture(self.codes[n], code_values(255))
-
-    def glimpse(self, n: int, divisor: int) -> CodedPicture:
-        rows, columns = self.codes.shape[1:3]
-        reduced = area_average(self.codes[n], columns // divisor, rows // divisor)
-        return CodedPicture((reduced + 0.5).astype(np.uint8), code_values(255))
 
     def damaged(self, first: int, last: int, look: Look | None = None) -> tuple[int, ...]:
         return ()
@@ -81,10 +73,10 @@ def wall(size: tuple[int, int] = SIZE) -> np.ndarray:
 
 
 def found(clip: Clip) -> Plate:
-    samples = large_samples(clip)
-    assert samples is not None
-    assert samples.backdrop() is None
-    return samples.plate()
+    backdrop = find_backdrop(clip, None, None)
+    assert backdrop.source == "picture"
+    assert isinstance(backdrop.plates, Plate)
+    return backdrop.plates
 
 
 @pytest.mark.parametrize("steps", [False, True], ids=["steady", "exposure steps"])
@@ -124,10 +116,7 @@ def test_what_smoke_never_leaves_keeps_the_detail_that_shows_through() -> None:
 
 @pytest.mark.parametrize("codes", [1.0, 6.0])
 def test_noise_is_that_of_whole_pictures(codes: float) -> None:
-    clip = film(wall(), noise=codes)
-    samples = large_samples(clip)
-    assert samples is not None
-    np.testing.assert_allclose(samples.noise.total, steady_samples(clip).noise.total, rtol=0.15)
+    np.testing.assert_allclose(255 * found(film(wall(), noise=codes)).noise.white, codes, rtol=0.15)
 
 
 def test_noise_and_wall_are_those_of_what_a_mask_leaves(tmp_path: Path) -> None:
@@ -150,21 +139,11 @@ def test_one_colour_is_told_with_what_stands_before_it() -> None:
     random = np.random.default_rng(2)
     logo = np.s_[20:60, 1200:1280]
     behind[logo] = random.uniform(0.1, 0.4, (40, 80, 3))
-    samples = large_samples(film(behind))
-    assert samples is not None
-    plate = samples.backdrop()
-    assert plate is not None
+    backdrop = find_backdrop(film(behind), None, None)
+    assert backdrop.source == "colour"
+    plate = backdrop.plates.at(0)
     assert (plate.confidence == 1).all()
     assert np.median(codes_apart(plate.image, behind)[logo]) < 2
     colour = plate.image[0, 0]
     assert codes_apart(colour[None, None], behind[:1, :1])[0, 0] < 0.5
     assert (plate.image[:, :1150] == colour).all()
-
-
-def test_large_pictures_are_looked_at_so_and_small_ones_whole(monkeypatch: pytest.MonkeyPatch) -> None:
-    large, small = film(wall()), film(wall()[:, :-2], size=(SIZE[0], SIZE[1] - 2))
-    assert len(large_frames(large)) == COUNT
-    assert large_frames(small) == []
-    assert large_samples(small) is None
-    monkeypatch.setattr("smokelift.setup.background.steady_samples", None)
-    assert find_plates(large, None, None).plates.at(0).image.shape == (*SIZE, 3)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from films import COUNT, HEIGHT, WIDTH, codes_apart, pan, passing_wall
 
-from smokelift.footage.background import background_picture, given_plates, open_plates
+from smokelift.footage.given_background import background_picture, given_plates, open_plates
 from smokelift.footage.plate import ChangingPlate, Plate
 from smokelift.output.images import write_image
 from smokelift.scene import Background, Camera, ClipSource, Scene, look_at_matrix

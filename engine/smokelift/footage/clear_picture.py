@@ -1,0 +1,260 @@
+"""The picture behind smoke that moves: which frames show each of its pixels clear, and what is there where none does.
+
+A pixel is a mixture of two states: clear, when it has one value within the noise, and smoke, when it has any. Two facts
+tell them apart:
+
+- A clear pixel stays; smoke goes on. Of two successive frames of smoke, some share is alike by chance, and it is
+  measured on the pixel. A value at which a pixel stays for so many pairs of successive frames that smoke does so once
+  in `FALSE_ALARM` only is its background, or smoke as steady as a background.
+- Smoke draws every background towards its own brightness. So of several such values, the background is the one that is
+  farthest from the smoke's.
+
+A pixel that only drifts is clear as well if it looks like its surroundings, or so unlike them that smoke would change
+more. What is left is continued by `behind_smoke`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from smokelift.footage.behind_smoke import (
+    DRIFT,
+    ISLAND,
+    completed,
+    continuation_errors,
+    in_one_piece,
+    mostly_beside,
+    push_pull,
+    thin_rim,
+    unlike,
+)
+from smokelift.footage.images import Picture, blurred, channel_mean, linear_to_srgb, srgb_to_linear
+from smokelift.footage.matte import smoothing
+from smokelift.footage.noise import Noise, peak_spread
+from smokelift.footage.seen import at_rank, count_of_seen, median_of_seen
+
+WINDOW = 6.0
+"""Width of the window of a pixel's clear values in units of noise: plus and minus three standard deviations."""
+
+LEAST_WINDOW = np.float32(3 / 255)
+"""The same at least: rounding to eight bits, and the shift of a codec by a step either way."""
+
+STRIDE = 4
+"""Pixels from one row or column to the next where it is measured what the smoke is like."""
+
+BAND = 2**14
+"""Pixels whose values are compared at a time: they fit the cache."""
+
+MOST = 0.8
+"""Share of a pixel's values that are alike which are then its background for certain."""
+
+LEAST_SEEN = 1 / 8
+"""Share of the frames that have to show a pixel of which all values are alike, for that to be its background. While a
+camera turns, others show it for a moment only."""
+
+ONE_SIDED = 0.9
+"""Share of the changes by smoke to one side from which on it only brightens, or darkens, and the rest is noise."""
+
+FALSE_ALARM = 1e-3
+"""Share of the pixels always under smoke that pass for clear at times."""
+
+PRIOR_PAIRS = 4.0
+"""Pairs of frames that the clip's share of like pairs counts for beside a pixel's own."""
+
+LIKE_SURROUNDINGS = 3 * DRIFT
+"""Difference in sRGB values from what the surroundings let expect, of a background."""
+
+LEAST_CHANGE = 1 / 4
+"""Range of smoke over time, as a share of its difference from the background: what is steadier is a chair or a jacket.
+"""
+
+Mask = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class ClearPicture:
+    """The background of pictures of one exposure.
+
+    Attributes
+    ----------
+    image : (rows, columns, 3)
+        Linear.
+    known : (rows, columns) bool
+        Pixels that some of the pictures show without smoke.
+    clear : (frames, rows, columns) bool
+        Where each of them shows the background that is known.
+    contrast : (rows, columns)
+        By what the detail of the pictures' mean is multiplied to be that of the background; 0 where smoke hides it.
+    errors : (3, 3)
+        As of `smokelift.footage.plate.Plate`.
+    """
+
+    image: Picture
+    known: Mask
+    clear: Mask
+    contrast: Picture
+    errors: Picture
+
+
+@dataclass(frozen=True, eq=False)
+class _Smoke:
+    """What the smoke of a clip is like, in sRGB values: see `_smoke_of`."""
+
+    likeness: float
+    brightness: float
+    brightens: Mask
+
+
+def clear_picture(pictures: Picture, seen: Mask, noise: Noise, detail: float, masked: bool) -> ClearPicture:
+    """Return the background of pictures.
+
+    Parameters
+    ----------
+    pictures : (frames, rows, columns, 3)
+        Linear, of one exposure.
+    seen : (frames, rows, columns) bool
+        Which pixels each of them shows.
+    noise
+        Of them.
+    detail
+        Standard deviation of the Gaussian as of `behind_smoke.DETAIL`, in pixels.
+    masked
+        Whether what no picture shows is hidden by a mask: then it is unknown. Else it lies beyond all of them.
+    """
+    width = smoothing(noise)
+    grey = np.stack([blurred(channel_mean(linear_to_srgb(picture)), width) for picture in pictures])
+    grey[~seen] = np.nan
+    some = np.ascontiguousarray(grey[:, ::STRIDE, ::STRIDE])
+    window = max(WINDOW * peak_spread(some - median_of_seen(some)), float(LEAST_WINDOW))
+    smoke = _smoke_of(some, window)
+    height, across = grey.shape[1:]
+    brightens = np.repeat(np.repeat(smoke.brightens, STRIDE, 0), STRIDE, 1)[:height, :across]
+    grey *= np.where(brightens, np.float32(1), np.float32(-1))
+    image = np.empty((height, across, 3), np.float32)
+    known, calm = np.empty((2, height, across), np.bool_)
+    clear = np.empty(grey.shape, np.bool_)
+    rows = max(1, BAND // across)
+    for row in range(0, height, rows):
+        band = slice(row, row + rows)
+        image[band], known[band], calm[band], clear[:, band] = _clear_values(
+            pictures[:, band], grey[:, band], window, smoke.likeness
+        )
+    sure, known = _known(image, known, calm, clear | ~seen, brightens, window)
+    mean = sum(linear_to_srgb(picture) * shown[..., None] for picture, shown in zip(pictures, seen, strict=True))
+    mean = np.asarray(mean / np.maximum(seen.sum(0), 1)[..., None], np.float32)
+    never = ~seen.any(0)
+    if never.any():
+        if masked:
+            sure, known = sure & ~never, known & ~never
+        mean[never] = push_pull(linear_to_srgb(image), sure.astype(np.float32))[never]
+        image[never] = srgb_to_linear(mean[never])
+    whole, contrast = completed(image, known, sure, mean, smoke.brightness, brightens, detail)
+    return ClearPicture(whole, known, clear, contrast, continuation_errors(whole, sure))
+
+
+def _known(image: Picture, known: Mask, calm: Mask, clear: Mask, brightens: Mask, window: float) -> tuple[Mask, Mask]:
+    """Of which pixels the background is sure, and of which it is known, from those with a certain value."""
+    known = in_one_piece(known)
+    if known.all():
+        return known, known
+    # what changes by drift at most is no smoke if it is too little like its surroundings for smoke so steady
+    known = in_one_piece(known | (calm & (LEAST_CHANGE * unlike(image, known) >= window + DRIFT)))
+    if known.all():
+        return known, known
+    # or if it looks like them, too; that its difference is drift, and not faint smoke, is sure of a small one only
+    apart = unlike(image, known)
+    alike = (in_one_piece(known | (calm & (apart <= most))) for most in (DRIFT, LIKE_SURROUNDINGS))
+    # surroundings that are unknown themselves speak for nothing
+    sure, known = (mostly_beside(each, known) for each in alike)
+    thin = thin_rim(image, known, brightens, clear)
+    return sure & ~thin, known & ~thin
+
+
+def _smoke_of(grey: Picture, window: float) -> _Smoke:
+    """What the smoke in grey pictures (frames, rows, columns) is like.
+
+    Its likeness is the share of pairs of successive frames of smoke that are alike within a window. Its brightness is
+    the value that it draws every background towards; it brightens the pixels whose background is darker than that.
+    """
+    shape = grey.shape[1:]
+    values = grey.reshape(len(grey), -1)
+    ordered = np.sort(values, axis=0)
+    counts = np.ones(ordered.shape, np.int16)  # values from each one up to a window above it
+    for lag in range(1, len(ordered)):
+        counts[:-lag] += ordered[lag:] - ordered[:-lag] <= window
+    background = np.nan_to_num(at_rank(ordered, counts.argmax(0))) + np.float32(0.5 * window)
+    away = values - background
+    smoky = np.abs(away) > window
+    pairs = smoky[1:] & smoky[:-1]
+    likeness = float((np.abs(np.diff(values, axis=0)) <= window)[pairs].mean()) if pairs.any() else 0.5
+    # what most frames agree on is the background for certain
+    number = count_of_seen(values)
+    certain = (counts.max(0) > MOST * number) & (number >= LEAST_SEEN * len(values))
+    behind = push_pull(background.reshape(*shape, 1), certain.reshape(shape).astype(np.float32)).ravel()
+    # there, what a codec's drift may be says nothing of smoke
+    beyond = 0.5 * window + DRIFT
+    change = np.where((np.abs(away) > beyond) & certain, away, 0.0)
+    turn = _turn(background, change)
+    if (change != 0).any(0).mean() < ISLAND:
+        # Smoke that never leaves its place shows beside it by accident only, and in its place all the time. If that is
+        # no one-sided change, other things move, too, and say nothing of smoke.
+        in_place = values - behind
+        in_place = np.where(np.abs(in_place) > beyond, in_place, 0.0)
+        if in_place.any() and np.isinf(side := _turn(behind, in_place)):
+            change, turn = in_place, side
+    if not change.any():
+        return _Smoke(likeness, 1.0, np.ones(shape, np.bool_))
+    thickest = np.quantile(values[change != 0], [0.01, 0.99])
+    return _Smoke(likeness, float(np.clip(turn, *thickest)), (behind <= turn).reshape(shape))
+
+
+def _turn(background: Picture, change: Picture) -> float:
+    """The grey value below which changes (frames, n) brighten backgrounds (n,) and above which they darken them."""
+    brighter, darker = (np.square(np.maximum(each, 0)).sum(0) for each in (change, -change))
+    one_sided = ONE_SIDED * float((brighter + darker).sum())
+    if brighter.sum() >= one_sided:
+        return np.inf
+    if darker.sum() >= one_sided:
+        return -np.inf
+    order = np.argsort(background)
+    # the value that explains the most of the changes
+    wrong = np.cumsum(darker[order]) + np.cumsum(brighter[order][::-1])[::-1]
+    return float(background[order][wrong.argmin()])
+
+
+def _clear_values(pictures: Picture, away: Picture, window: float, likeness: float) -> tuple[Picture, Mask, Mask, Mask]:
+    """The background of each pixel, linear; whether it is certain; whether it drifts only; the frames that show it.
+
+    Where it is not certain it is the least smoky value. That of a pixel that drifts is its middle one. ``away`` is the
+    grey value of the pictures, with its sign turned where smoke darkens: the less, the clearer.
+    """
+    unseen, number = np.isnan(away), count_of_seen(away)
+    alike = (np.abs(np.diff(away, axis=0)) <= window).sum(0)
+    pairs = (~unseen[1:] & ~unseen[:-1]).sum(0)
+    ordered, last = np.sort(away, axis=0), np.maximum(number - 1, 0)
+    # one value may be astray
+    lowest, highest = at_rank(ordered, np.minimum(1, last)), at_rank(ordered, np.maximum(last - 1, 0))
+    calm = highest - lowest <= window + DRIFT
+    often = number >= LEAST_SEEN * len(away)
+    best = np.full(away.shape[1:], np.inf, np.float32)
+    for value in away:
+        inside = (away >= value) & (away <= value + np.float32(window))
+        stays = (inside[1:] & inside[:-1]).sum(0)
+        by_chance = (np.maximum(alike - stays, 0) + PRIOR_PAIRS * likeness) / (
+            np.maximum(pairs - stays, 0) + PRIOR_PAIRS
+        )
+        certain = stays * np.log(np.clip(by_chance, 1e-6, 1 - 1e-6)) < np.log(FALSE_ALARM)
+        certain |= (inside | unseen).all(0) & often
+        np.copyto(best, value, where=certain & (value < best))
+    known = np.isfinite(best)
+    centre = np.where(known, best, lowest) + np.float32(0.5 * window)
+    centre = np.where(calm, at_rank(ordered, np.minimum(number // 2, last)), centre)
+    for _ in range(3):  # the window starts at a value; mean shift settles it around the mean of its values
+        inside = np.abs(away - centre) <= 0.5 * window * 1.001
+        within = np.maximum(inside.sum(0), 1)
+        centre = np.where(inside, away, 0).sum(axis=0) / within
+    value = np.einsum("tyxc,tyx->yxc", pictures, inside.astype(np.float32)) / within[..., None]
+    return value.astype(np.float32), known, calm, inside

@@ -1,0 +1,174 @@
+"""A clip in small: what every estimate of its background, its noise and its smoke reads.
+
+The file is decoded once, at frames spread evenly over all of it and over the part that is used, and kept at one size.
+What happens in the rest of the file tells what is behind the smoke of a short part of it.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smokelift.footage.clip import Clip, ClipError
+from smokelift.footage.exposure import gain_of, sample_gains, small
+from smokelift.footage.images import Picture, brightest_channel, linear_to_srgb
+
+LONGEST = 480
+"""Pixels along the longer side: the lengths in pixels of `behind_smoke` hold at some hundred
+(docs/experiments/background.md)."""
+
+OF_FILE, OF_CLIP = 32, 32
+"""Frames of the file and of the clip, at most: a half of them is enough for a median, a third for a false-alarm rate of
+1e-3 where every second pair of smoke's samples is alike."""
+
+STILL = np.float32(4 / 255)
+"""Change of a pixel, in sRGB values, up to which it has not changed."""
+
+SAME_SHOT, STEADY = 0.25, 0.5
+"""Share of the pixels that a cut leaves as they are, at most, and that stay so from one frame to the next beside it, at
+least: where a camera moves or smoke fills the picture fewer do, all the time."""
+
+
+@dataclass(frozen=True, eq=False)
+class Proxy:
+    """Frames of a clip's file, small.
+
+    Attributes
+    ----------
+    numbers
+        Of the frames, in the file, ascending.
+    clip
+        First and last frame of the file that the clip uses.
+    pictures : (frames, rows, columns, 3)
+        Linear; what a mask hides is continued from around it.
+    seen : (frames, rows, columns) bool
+        What no mask hides.
+    scale
+        Pixels of the file along one of them.
+    """
+
+    numbers: tuple[int, ...]
+    clip: tuple[int, int]
+    pictures: Picture
+    seen: NDArray[np.bool_]
+    scale: float
+
+    @staticmethod
+    def of(clip: Clip) -> Proxy:
+        """Read the frames of a clip's file.
+
+        Raises
+        ------
+        ClipError
+            If a frame of the clip cannot be read.
+        """
+        first, last = clip.first, clip.first + len(clip) - 1
+        (columns, rows), whole = proxy_size(*clip.size), clip.whole()
+        pictures, seen = {}, []
+        for number in proxy_frames(clip):
+            inside = first <= number <= last
+            of, own = (clip, number - first) if inside else (whole, number)
+            with suppress(*() if inside else (ClipError,)):
+                pictures[number] = of.area_average(own, columns, rows)
+                shown = of.seen(own, columns, rows)
+                seen.append(np.ones((rows, columns), np.bool_) if shown is None else shown)
+        scale = max(clip.size) / max(columns, rows)
+        return Proxy(tuple(pictures), (first, last), np.stack(list(pictures.values())), np.stack(seen), scale)
+
+    @cached_property
+    def encoded(self) -> Picture:
+        """The pictures in sRGB values."""
+        return linear_to_srgb(self.pictures)
+
+    def between(self, first: int, last: int) -> Proxy:
+        """Return the frames from one number of the file to another, both included, as even as `OF_FILE` of them are."""
+        inside = np.array([n for n, number in enumerate(self.numbers) if first <= number <= last])
+        numbers = np.array(self.numbers)[inside]
+        wanted = np.linspace(numbers[0], numbers[-1], min(OF_FILE, len(numbers)))
+        chosen = np.unique(np.abs(numbers - wanted[:, None]).argmin(1))
+        return self.only(inside[chosen])
+
+    def shot(self, clip: Clip) -> tuple[Proxy, tuple[int, int] | None]:
+        """Return the frames that belong to a clip's shot, and the frames of the file before and after a cut in it.
+
+        At a cut most of the picture changes at once and for good, and little does before and after it.
+
+        Raises
+        ------
+        ClipError
+            If a frame cannot be read.
+        """
+        tiny = [small(picture) for picture in self.pictures]
+        shares = [_alike(one, other) for one, other in pairwise(tiny)]
+        first, last, within = self.numbers[0], self.numbers[-1], None
+        for n in range(len(shares)):
+            beside = min(shares[max(n - 1, 0)], shares[min(n + 1, len(shares) - 1)])
+            if n in (0, len(shares) - 1):
+                beside = max(shares[max(n - 1, 0)], shares[min(n + 1, len(shares) - 1)])
+            if shares[n] >= SAME_SHOT or beside < STEADY:
+                continue
+            if _alike(*(np.median(side, axis=0) for side in (tiny[: n + 1], tiny[n + 1 :]))) >= SAME_SHOT:
+                continue
+            before, after = self.numbers[n], self.numbers[n + 1]
+            if after <= self.clip[0]:
+                first = after
+            elif before >= self.clip[1]:
+                last = min(last, before)
+            elif within is None:
+                within = _cut(clip, before, after, tiny[n], tiny[n + 1])
+        return self.between(first, last), within
+
+    def only(self, which: NDArray[np.intp]) -> Proxy:
+        """Return some of the frames, by their places here."""
+        numbers = tuple(self.numbers[n] for n in which)
+        return replace(self, numbers=numbers, pictures=self.pictures[which], seen=self.seen[which])
+
+    def evened(self) -> tuple[Proxy, Picture]:
+        """Return the pictures at one exposure, with the gains (frames, 3) that they had against it."""
+        hidden = np.where(self.seen[..., None], self.pictures, np.float32(np.nan))
+        gains = sample_gains(np.stack([small(picture) for picture in hidden]))
+        if (gains == 1).all():
+            return self, gains
+        return replace(self, pictures=self.pictures / gains[:, None, None, :]), gains
+
+
+def proxy_size(width: int, height: int) -> tuple[int, int]:
+    """Return width and height of the pictures of a proxy."""
+    scale = max(1.0, max(width, height) / LONGEST)
+    return max(1, round(width / scale)), max(1, round(height / scale))
+
+
+def proxy_frames(clip: Clip) -> list[int]:
+    """Return the numbers in its file of the frames of a clip that its proxy reads, ascending."""
+    own = {clip.first + number for number in clip.spread(OF_CLIP)}
+    return sorted(own | set(clip.whole().spread(OF_FILE)))
+
+
+def _cut(clip: Clip, last: int, first: int, before: Picture, after: Picture) -> tuple[int, int]:
+    """The frames beside a cut between two frames of a clip's file, by bisection."""
+    rows, columns = before.shape[:2]
+    whole = clip.whole()
+    while first - last > 1:
+        middle = (last + first) // 2
+        picture = whole.area_average(middle, columns, rows)
+        if _alike(before, picture) >= _alike(picture, after):
+            last = middle
+        else:
+            first = middle
+    return last, first
+
+
+def _alike(one: Picture, other: Picture) -> float:
+    """Share of the pixels that are alike in two pictures, at one exposure if that makes more of them so."""
+    encoded = linear_to_srgb(one)
+
+    def share(picture: Picture) -> float:
+        return float((brightest_channel(np.abs(linear_to_srgb(picture) - encoded)) < STILL).mean())
+
+    found = share(other)
+    return found if found >= STEADY else max(found, share(other / gain_of(other, one)))

@@ -1,0 +1,92 @@
+"""The background to the last pixel, from whole frames where a small picture says that they are clear.
+
+Which pixels show the background, and in which frames, is as smooth in the picture as smoke is, so that a proxy tells
+it. What the background is there, the mean of whole frames tells where and when they are clear. Where they never are,
+the small background is enlarged, and the detail of the mean is given its contrast back.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from smokelift.footage.behind_smoke import MOST_DETAIL
+from smokelift.footage.clear_picture import ClearPicture
+from smokelift.footage.clip import Clip
+from smokelift.footage.images import Edges, Picture, area_average, linear_to_srgb, srgb_to_linear
+from smokelift.footage.proxy import Proxy
+
+STEP = 2
+"""Every so manieth frame is read whole: half of those that are looked at."""
+
+AROUND = 16
+"""Pixels of the proxy around what is unknown whose detail bounds that of the unknown."""
+
+
+def whole_plate(clip: Clip, proxy: Proxy, gains: Picture, found: ClearPicture) -> Picture:
+    """Return a linear background (rows, columns, 3) of full size.
+
+    Parameters
+    ----------
+    clip
+        The footage.
+    proxy
+        Its frames, as they are exposed.
+    gains : (frames, 3)
+        By how much each is brighter than the background.
+    found
+        The background of the proxy.
+
+    Raises
+    ------
+    ClipError
+        If a frame cannot be read.
+    """
+    if found.image.shape[1::-1] == clip.size:
+        return found.image
+    shown = (found.clear & found.known)[::STEP]
+    told = shown.any(0)
+    whole = _mean(clip, proxy.numbers[::STEP], gains[::STEP], np.where(told, shown, True))
+    if told.all():
+        return whole
+    rows, columns = (np.flatnonzero(~told.all(axis)) for axis in (1, 0))
+    (top, down), (left, right) = (
+        (max(0, int(lines[0]) - AROUND), min(n, int(lines[-1]) + 1 + AROUND))
+        for lines, n in ((rows, told.shape[0]), (columns, told.shape[1]))
+    )
+    small = np.s_[top:down, left:right]
+    y, x = (_edges(*sizes) for sizes in zip(told.shape, clip.size[::-1], strict=True))
+    part = np.s_[y[top] : y[down], x[left] : x[right]]
+    size = x[right] - x[left], y[down] - y[top]
+    mean = linear_to_srgb(whole[part])
+    detail = mean - area_average(area_average(mean, right - left, down - top), *size)
+    clearly = spread_out(told, clip.size)[part]
+    most = np.quantile(np.abs(detail[clearly]), MOST_DETAIL, axis=0) if clearly.any() else np.zeros(3, np.float32)
+    detail = np.clip(detail * spread_out(found.contrast, clip.size)[part][..., None], -most, most)
+    filled = srgb_to_linear(np.maximum(area_average(linear_to_srgb(found.image[small]), *size) + detail, 0))
+    whole[part] = np.where(clearly[..., None], whole[part], filled)
+    return whole
+
+
+def spread_out(values: NDArray[Any], size: tuple[int, int]) -> NDArray[Any]:
+    """Return values (rows, columns) of small pixels at those of a picture of a width and a height."""
+    rows, columns = (np.diff(_edges(*sizes)) for sizes in zip(values.shape, size[::-1], strict=True))
+    return np.repeat(np.repeat(values, rows, axis=0), columns, axis=1)
+
+
+def _mean(clip: Clip, numbers: tuple[int, ...], gains: Picture, shown: NDArray[np.bool_]) -> Picture:
+    """The linear mean of whole frames of a file over the times at which they are ``shown``, of pixels of the proxy."""
+    file, width, height = clip.whole(), *clip.size
+    down, across = (_edges(*each) for each in zip(shown.shape[1:], (height, width), strict=True))
+    total = np.zeros((height, width, 3), np.float32)
+    times = shown.sum(0, dtype=np.float32)[..., None]
+    for number, gain, clear in zip(numbers, gains, shown, strict=True):
+        file.add_weighted(number, clear[..., None] / (gain * times), (down, across), total)
+    return total
+
+
+def _edges(count: int, pixels: int) -> Edges:
+    """Where each of so many parts of a line of pixels begins, and the end of the last."""
+    return np.asarray(-(-np.arange(count + 1) * pixels // count), np.int32)
