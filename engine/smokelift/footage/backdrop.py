@@ -1,7 +1,7 @@
 """What stands behind the smoke of a clip, and how it is decided.
 
-In this order: what an alpha channel says; what the scene gives; one colour, if the evidence of the whole file is for it
-(`evidence`); a panorama, if the camera turns (`turning`); else the picture that the clear frames show
+In this order: what an alpha channel says; what the scene gives; one colour, if that is the likeliest by the whole file
+(`background_kind`); a panorama, if the camera turns (`turning`); else the picture that the clear frames show
 (`clear_picture`). The clip's noise is told from what cannot be smoke, before all else (`noise`).
 """
 
@@ -15,10 +15,10 @@ from typing import Literal
 import numpy as np
 
 from smokelift.footage.alignment import Lens
+from smokelift.footage.background_kind import LIMIT, Mask, colour_around, rank, within
 from smokelift.footage.behind_smoke import DETAIL
 from smokelift.footage.clear_picture import ClearPicture, clear_picture
 from smokelift.footage.clip import Clip
-from smokelift.footage.evidence import LIMIT, Mask, colour_around, rank, within
 from smokelift.footage.focal_length import FocalLength, focal_length
 from smokelift.footage.given_background import given_plates
 from smokelift.footage.images import Picture, linear_to_srgb
@@ -78,7 +78,7 @@ class Backdrop:
     colour
         Linear, where one was found; black counts as such below half a step of 8 bit video.
     frames
-        Of the file that were evidence for it, up to the next cut.
+        Of the file that decided on it, up to the next cut.
     turns, focal
         Of a camera that was found to turn; its focal length where it is measured.
     lens_is_known
@@ -88,7 +88,7 @@ class Backdrop:
     cut
         Frames of the file before and after a cut within the clip, if there is one.
     costs
-        As of `smokelift.footage.evidence.Evidence`; empty where nothing was compared.
+        As of `smokelift.footage.background_kind.Ranking`; empty where nothing was compared.
     """
 
     source: Source

@@ -1,4 +1,4 @@
-"""Whether a clip stands before one colour or a picture: one evidence ranks them.
+"""Whether a clip stands before one colour or a picture: one cost ranks them.
 
 A block of the picture is in one of two states: clear, when it shows its background within the noise, and smoke, when it
 shows anything. Smoke goes on as it was, or jumps to any other value. So each background explains the blocks at a cost,
@@ -7,7 +7,7 @@ the negative logarithm of their probability with the likeliest states (Viterbi, 
 it may be any, each costs as much as a jump does.
 
 A frame that is black everywhere says nothing against a picture, for clips fade. What is black, or another colour, at
-some time of the file is evidence for all of its frames up to the next cut, whatever part of it is used.
+some time of the file counts for all of its frames up to the next cut, whatever part of it is used.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
-class Evidence:
+class Ranking:
     """What the frames of a clip say of its background.
 
     Attributes
@@ -93,7 +93,7 @@ class Evidence:
     costs: dict[str, float]
 
 
-def rank(proxy: Proxy, white: Picture) -> Evidence:
+def rank(proxy: Proxy, white: Picture) -> Ranking:
     """Rank the kinds of background that frames of one exposure may have, whose pixels have white noise (3,)."""
     every, shape = _blocks(proxy)
     visible = _visible(proxy, shape)
@@ -132,7 +132,7 @@ def rank(proxy: Proxy, white: Picture) -> Evidence:
             best, found, share = total, stands & still, float(clear.mean())
             colour = srgb_to_linear(values[clear].mean(0, dtype=np.float64))
             colour[linear_to_srgb(colour) < EIGHT_BIT_STEP / 2] = 0
-    return Evidence(colour, on_picture(found), share, costs)
+    return Ranking(colour, on_picture(found), share, costs)
 
 
 def colour_around(picture: Picture) -> tuple[float, float, float] | None:

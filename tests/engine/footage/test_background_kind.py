@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from smokelift.footage.evidence import colour_around
+from smokelift.footage.background_kind import colour_around
 
 
 def test_a_single_picture_has_a_colour_around_it() -> None:
