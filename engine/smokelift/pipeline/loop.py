@@ -67,38 +67,39 @@ class Frame:
 
 
 @dataclass(frozen=True, eq=False)
-class Past:
+class Carried:
     """What a frame needs of the one before: not its velocity on the fine grid, which takes much memory.
 
     Attributes
     ----------
+    number
+        Of the one before, from 1.
     density, estimated, smooth, steady
         As in `Frame`.
     """
 
+    number: int
     density: Volume
     estimated: Velocity
     smooth: Volume | None
     steady: Volume | None
 
     @staticmethod
-    def of(frame: Frame) -> Past:
+    def of(frame: Frame) -> Carried:
         """Return what the next frame needs of a frame."""
-        return Past(frame.density, frame.estimated, frame.smooth, frame.steady)
+        return Carried(frame.number, frame.density, frame.estimated, frame.smooth, frame.steady)
 
 
-def frames_after(start: Frame | None, shot: Shot, method: Method) -> Iterator[Frame]:
+def frames_after(before: Carried | None, shot: Shot, method: Method) -> Iterator[Frame]:
     """Yield a shot's frames after one, or all; the first waits until the second gives it a velocity."""
     count = len(shot.clip)
     with products_on_one_thread():
         method = replace(method, depth_prior=method.depth_prior.of_clip(shot))
-    number, before = (0, None) if start is None else (start.number, Past.of(start))
-    del start
     first: Frame | None = None
-    for index in range(number, count):
+    for index in range(before.number if before else 0, count):
         with products_on_one_thread():
             frame = _frame(index, before, shot, method)
-        before = Past.of(frame)
+        before = Carried.of(frame)
         if index == 0 and count > 1:
             first = frame
             continue
@@ -109,7 +110,7 @@ def frames_after(start: Frame | None, shot: Shot, method: Method) -> Iterator[Fr
         del frame  # velocities take most of the memory
 
 
-def _frame(index: int, before: Past | None, shot: Shot, method: Method) -> Frame:
+def _frame(index: int, before: Carried | None, shot: Shot, method: Method) -> Frame:
     """One frame, counted from 0, from its pictures and the frame before."""
     began = time.perf_counter()
     domain, dt = shot.optics.domain, 1.0 / shot.clip.fps
@@ -156,7 +157,7 @@ def _fit_figures(index: int, fitted: FittedDensity, shot: Shot) -> dict[str, flo
     return {**clip_psnr(shot, index, fitted.density), **working}
 
 
-def _measured(before: Past, fitted: FittedDensity) -> tuple[Volume, Volume]:
+def _measured(before: Carried, fitted: FittedDensity) -> tuple[Volume, Volume]:
     """The densities of two frames, without what is made up if that is known of both: it shows no motion of its own."""
     if before.smooth is None or fitted.smooth is None:
         return before.density, fitted.density
@@ -164,7 +165,7 @@ def _measured(before: Past, fitted: FittedDensity) -> tuple[Volume, Volume]:
 
 
 def _density(
-    index: int, before: Past | None, carried: Volume | None, shot: Shot, method: Method
+    index: int, before: Carried | None, carried: Volume | None, shot: Shot, method: Method
 ) -> tuple[FittedDensity, Mapping[str, float]]:
     """The density of a frame, and what was taken over of the carried one."""
     observations = shot.observe(index)

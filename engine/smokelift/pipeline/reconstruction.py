@@ -12,7 +12,7 @@ from smokelift.output.index import Origins
 from smokelift.output.resume import ResumeState
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
-from smokelift.pipeline.loop import Frame, frames_after
+from smokelift.pipeline.loop import Carried, Frame, frames_after
 from smokelift.pipeline.method import Method, compose
 from smokelift.pipeline.sources import sources
 from smokelift.scene import Scene
@@ -110,7 +110,7 @@ class Reconstruction:
                     frame.velocity.faces,
                     frame.figures,
                     flame=frame.flame,
-                    state=_state(frame),
+                    state=_state(Carried.of(frame)),
                 )
                 if on_frame is not None:
                     on_frame(frame)
@@ -148,22 +148,21 @@ def reconstruct(
     return Reconstruction(shot, method or compose(shot.settings))
 
 
-def _state(frame: Frame) -> ResumeState:
-    """What the next frame needs of one, for a run that goes on."""
-    memory = frame.estimated.residual
+def _state(carried: Carried) -> ResumeState:
+    """What is carried to the next frame, for a run that goes on."""
+    memory = carried.estimated.residual
     kept = {} if memory is None else {"residual_mean": memory.mean, "residual_magnitude": memory.magnitude}
-    volumes = {"smooth": frame.smooth, "steady": frame.steady}
+    volumes = {"smooth": carried.smooth, "steady": carried.steady}
     kept |= {name: volume for name, volume in volumes.items() if volume is not None}
-    return ResumeState(frame.number, frame.density, frame.estimated.faces, kept)
+    return ResumeState(carried.number, carried.density, carried.estimated.faces, kept)
 
 
-def _resumed(state: ResumeState, shot: Shot) -> Frame:
-    """The last finished frame of a run that goes on."""
+def _resumed(state: ResumeState, shot: Shot) -> Carried:
+    """The inverse of `_state`."""
     mean, magnitude = state.extra.get("residual_mean"), state.extra.get("residual_magnitude")
     residual = None if mean is None or magnitude is None else ResidualMeans(mean, magnitude)
     velocity = Velocity(state.velocity, shot.optics.domain.voxel_size, shot.scene.closed, residual=residual)
     shape = shot.optics.domain.resolution
     while shape != velocity.shape:
         shape, velocity = halved(shape), replace(velocity, voxel_size=2 * velocity.voxel_size)
-    smooth, steady = state.extra.get("smooth"), state.extra.get("steady")
-    return Frame(state.number, state.density, velocity, {}, velocity, smooth, steady)
+    return Carried(state.number, state.density, velocity, state.extra.get("smooth"), state.extra.get("steady"))
