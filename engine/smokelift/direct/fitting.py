@@ -148,7 +148,7 @@ def _dissipation(moments: Sequence[Moment], dt: float, inlets: Mask) -> float:
 
 
 def _height(density: Array) -> float:
-    """Of the centre of mass, in voxels."""
+    """Height of the centre of mass, in voxels."""
     layers = density.sum((0, 1), dtype=np.float64)
     return float(layers @ np.arange(len(layers)) / max(layers.sum(), 1e-30))
 

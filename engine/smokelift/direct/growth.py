@@ -42,7 +42,7 @@ BUMPS = 0.6
 """Share of that length by which the surface has bumps at which the smoke is gone."""
 
 WAVES = ((0.3, 0.9, 0.0), (1.4, 1.3, 2.1), (2.5, 0.7, 4.0), (2.0, 2.1, 1.0))
-"""Of the bumps: direction in radians, number in a fade's length, and phase. No two agree, so no pattern is seen."""
+"""Bumps of the end: direction in radians, number in a fade's length, and phase. No two agree, so no pattern is seen."""
 
 EMERGING = 1.0
 """Seconds after the clip in which smoke becomes dense that comes out of a side that had cut it. The clip shows none

@@ -56,7 +56,7 @@ class Inflow:
         return self.moments[abs(last - step % (2 * last))] if last else self.moments[0]
 
     def forwards(self) -> Inflow:
-        """The same from the first moment on, so that step n replays moment n."""
+        """The inflow from the first moment on, so that step n replays moment n."""
         return replace(self, moments=self.moments[::-1])
 
     @property

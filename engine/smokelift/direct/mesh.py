@@ -23,10 +23,10 @@ Values = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
 
 HEADER, RECORD = 84, np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-"""Of a binary STL file: bytes before the triangles, the last four of them their number, and a triangle."""
+"""Sizes in a binary STL file: bytes before the triangles, the last four of them their number, and a triangle."""
 
 PAIRS_AT_ONCE = 2**20
-"""Pairs of a triangle and a column that are looked at together, which bounds the memory."""
+"""Pairs of a triangle and a column in one pass, which bounds the memory."""
 
 ORDERS = [1, 2, 0], [2, 0, 1], [0, 1, 2]
 """Axes of the columns along x, y and z: their own comes last."""
@@ -181,7 +181,7 @@ def _pairs(triangles: Integers, low: Integers, size: Integers) -> tuple[Integers
 
 
 def _crossed(corners: Values, triangle: Integers, column: Integers, shape: tuple[int, ...]) -> Crossings:
-    """Those of pairs of a triangle, with its corners (k, 3, 3), and a column (k, 2) that cross."""
+    """Pairs of a triangle, with its corners (k, 3, 3), and a column (k, 2) that cross."""
     areas, left = zip(*(_side(corners[:, k, :2], corners[:, (k + 1) % 3, :2], column) for k in range(3)), strict=True)
     total = areas[0] + areas[1] + areas[2]
     same = (left[0] == left[1]) & (left[1] == left[2]) & (total != 0)

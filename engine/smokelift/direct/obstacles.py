@@ -88,7 +88,7 @@ class Solid(NamedTuple):
     def projected(self, velocity: Velocity) -> Velocity:
         """The nearest velocity that is without divergence outside, and moves with the solid on its faces and inside.
 
-        Nothing goes through the solid's faces but what it pushes; one that swells pushes air away.
+        Nothing goes through the solid's faces but what it displaces; one that swells displaces air.
         """
         inside = faces_of(self.voxels)
         wanted = velocity.with_faces(self.velocity or (np.float32(0) * component for component in velocity.faces))

@@ -76,7 +76,7 @@ class Simulation:
         return self._driven(moment, step, self.surroundings.solid(step, self.dt))
 
     def in_larger_box(self, ends: tuple[tuple[int, int], ...], surroundings: Surroundings) -> Simulation:
-        """The same in a larger box.
+        """The simulation in a larger box.
 
         Parameters
         ----------

@@ -22,7 +22,7 @@ def speed(velocity: Velocity) -> float:
     return float(np.sqrt(sum(np.square(component).mean() for component in velocity.faces)))
 
 
-def likeness(a: Velocity, b: Velocity) -> float:
+def correlation(a: Velocity, b: Velocity) -> float:
     """Correlation of two velocities."""
     return sum(float((u * v).mean()) for u, v in zip(a.faces, b.faces, strict=True)) / (speed(a) * speed(b))
 
@@ -41,8 +41,8 @@ def test_eddies_have_the_speed_and_the_size_asked_for():
 def test_eddies_change_in_the_time_that_air_takes_to_cross_them():
     now = eddies(Turbulence(0.5, 0.4))
     soon, late = (eddies(Turbulence(0.5, 0.4), time) for time in (0.08, 3.2))
-    assert likeness(now, soon) > 0.95
-    assert abs(likeness(now, late)) < 0.2
+    assert correlation(now, soon) > 0.95
+    assert abs(correlation(now, late)) < 0.2
 
 
 def test_a_seed_makes_the_same_eddies_on_any_grid():
@@ -50,7 +50,7 @@ def test_a_seed_makes_the_same_eddies_on_any_grid():
     coarse, fine = (Turbulence(0.5, 0.4, 7).velocity(grid, 0.3)[0] for grid in (STILL, finer))
     middles = fine[::2].reshape(41, 40, 2, 40, 2).mean(axis=(2, 4))
     assert np.abs(middles - coarse).max() < 0.05
-    assert abs(likeness(eddies(Turbulence(0.5, 0.4, 7)), eddies(Turbulence(0.5, 0.4, 8)))) < 0.2
+    assert abs(correlation(eddies(Turbulence(0.5, 0.4, 7)), eddies(Turbulence(0.5, 0.4, 8)))) < 0.2
 
 
 def test_still_smoke_is_stirred_and_stays_as_much():
