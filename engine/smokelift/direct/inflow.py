@@ -120,7 +120,9 @@ def _detect_inlets(moments: Sequence[Moment], dt: float) -> Mask:
     halves = [_means(part).mean for part in (changes[:middle], changes[middle:]) if part]
     densest = changes[-1][1]
     entering = SourceDetection().weight(means, densest > FAINT * densest.max()) < MOTION
-    given = np.mean([_given_away(moment) for moment in moments], axis=0)
+    given = np.zeros_like(densest)
+    for moment in moments:
+        given += _given_away(moment)
     return _strongest_inlets(entering, means.mean, np.minimum.reduce(halves), given)
 
 
