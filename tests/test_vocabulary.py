@@ -49,10 +49,7 @@ GUESS = "the choice *Guess* of the panel, which is rewritten"
 
 EXCEPTIONS = {
     "engine/smokelift/footage": "its modules are rewritten as backdrop and media",
-    "engine/smokelift/setup": "its modules are rewritten as geometry, illumination and shot",
     "tests/engine/footage": "with its modules",
-    "tests/engine/setup": "with its modules",
-    "engine/smokelift/render/environment_count.py": "setup imports its constants",
     "addon/camera_table.py": GUESS,
     "addon/properties.py": GUESS,
     "addon/shot_setup.py": GUESS,

@@ -11,8 +11,8 @@ from smokelift.render.renderer import Image, Renderer, Volume
 from smokelift.scene import Camera, DirectionalLight, Domain, EnvironmentLight, Medium
 from smokelift.scene.projection import voxel_width
 
-FEWEST, MOST = 4, 256
-"""Lights that `environment_count` chooses between (docs/experiments/environment-directions.md)."""
+MIN_LIGHTS, MAX_LIGHTS = 4, 256
+"""Numbers of lights that `environment_count` chooses between (docs/experiments/environment-directions.md)."""
 
 TOLERANCE = 0.01
 """Relative L2 change of the picture. Single scattering at a voxel a step is itself good to a few tenths of a percent,
@@ -81,15 +81,15 @@ def lights_needed(
         As `smokelift.render.environment.environment_lights`.
     """
     cells = EnvironmentCells(light)
-    count, image = FEWEST, picture(cells.lights(FEWEST))
+    count, image = MIN_LIGHTS, picture(cells.lights(MIN_LIGHTS))
     while True:
         finer = picture(cells.lights(2 * count))
         bright = float(np.linalg.norm(finer))
         change = float(np.linalg.norm(finer - image)) / bright if bright > 0 else 0.0
-        if change <= TOLERANCE or 2 * count >= MOST:
+        if change <= TOLERANCE or 2 * count >= MAX_LIGHTS:
             break
         count, image = 2 * count, finer
-    return (count if change <= TOLERANCE else MOST), change
+    return (count if change <= TOLERANCE else MAX_LIGHTS), change
 
 
 def _coarse(domain: Domain) -> Domain:

@@ -1,1 +1,1 @@
-"""From a description and its footage to a complete shot: geometry, light, medium, and no more model than needed."""
+"""Set-up of a shot from a description and its footage: geometry, light, medium, and no more model than needed."""

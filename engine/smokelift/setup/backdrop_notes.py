@@ -17,7 +17,7 @@ BLACK = 0.001
 """Linear radiance below which a background is called black."""
 
 EXPOSURE_SAMPLES = 16
-"""Frames whose exposure is looked at before a run."""
+"""Frames whose exposure is measured before a run."""
 
 MOSTLY = 0.5
 """Share from which on it is most of a whole: of the smoke's pixels, those without a known background; of a picture,
@@ -135,16 +135,16 @@ def nothing_seen(
     plates, given
         What is behind the smoke, and whether the scene says so.
     samples
-        The frames that were looked at.
+        The frames that were examined.
     cuts
         The `cut_notes` of the clip.
     """
     if samples.smoky:
         return ()
     count = len(clip.spread(SAMPLES))
-    looked = f"the {count} frames that were looked at" if count > 1 else "the one frame that was looked at"
+    examined = f"the {count} frames that were examined" if count > 1 else "the one frame that was examined"
     return (
-        f"No smoke found in {looked}, so that nothing of it could be measured.",
+        f"No smoke found in {examined}, so that nothing of it could be measured.",
         *(cuts or (what_helps(clip, plates, given),)),
     )
 

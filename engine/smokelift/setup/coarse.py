@@ -56,7 +56,7 @@ class CoarseView:
 
     @property
     def held_out(self) -> Image:
-        """That of the other half."""
+        """The picture (rows, columns, 3) of the other half."""
         return self._halves[1]
 
     @cached_property
@@ -127,7 +127,7 @@ class CoarseClip:
         return self._frames[key]
 
     def smoky(self, numbers: Sequence[int]) -> dict[int, CoarseFrame]:
-        """Those of some frames that show smoke, by their numbers."""
+        """Frames of the given numbers that show smoke, by number."""
         frames = {number: self.frame(number) for number in numbers}
         return {number: frame for number, frame in frames.items() if frame is not None and frame.shows_smoke}
 

@@ -24,16 +24,16 @@ OUTLINE = 320
 """Pixels along the longer side of the picture, at most, in which the smoke is found. Noise is measured beside it."""
 
 EDGE = 3
-"""Of these pixels, around the smoke, in which there may be some that is too thin to be found."""
+"""Width of the margin around the smoke, in these pixels, in which there may be some that is too thin to be found."""
 
-LEAST_STILL = 0.05
+MIN_STILL_SHARE = 0.05
 """Share of the picture without smoke from which its noise is measured there."""
 
 RINGS_AN_OCTAVE = 16
-"""Into which spatial frequencies are sorted: 4 % wide, about as far apart as the grids are."""
+"""Rings of an octave, into which spatial frequencies are sorted: 4 % wide, about as far apart as the grids are."""
 
 RINGS = 6 * RINGS_AN_OCTAVE
-"""From single pixels of the picture down to a 64th of their frequency, where what is coarser counts as well."""
+"""Rings from single pixels of the picture down to a 64th of their frequency, where what is coarser counts as well."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +97,7 @@ def _still(picture: Image, plate: Plate) -> NDArray[np.bool_]:
 
 def _noise(change: NDArray[np.float64], still: NDArray[np.bool_], otherwise: float) -> float:
     """Standard deviation of the noise: of the still pixels, if there are enough."""
-    return float(np.sqrt(np.mean(change[still] ** 2))) if still.mean() > LEAST_STILL else otherwise
+    return float(np.sqrt(np.mean(change[still] ** 2))) if still.mean() > MIN_STILL_SHARE else otherwise
 
 
 def _beyond_noise(change: NDArray[np.float64], noise: float) -> NDArray[np.float64]:

@@ -1,4 +1,4 @@
-"""The fire of a clip, told from its smoke before anything is measured on either."""
+"""The fire of a clip, distinguished from its smoke before anything is measured on either."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ from smokelift.setup.shot import Shot, ShotView
 AGREEMENT_SAMPLES = 4
 """Frames in which the views are compared."""
 
-LEAST_AGREED = 0.9
+MIN_AGREED_SHARE = 0.9
 """Share of the smoke's pixels that the views agree on below which something is wrong. True views agree on all of it,
 cameras upside down on a tenth to nine tenths (docs/experiments/view-agreement.md)."""
 
@@ -77,7 +77,7 @@ def disagreement(shot: Shot) -> tuple[str, ...]:
         views = ViewSet.of(shot.observe(frame), shot.optics).views
         shares.append(agreement([view.mask for view in views], [view.projection for view in views]))
     agreed = float(np.median(shares))
-    if agreed >= LEAST_AGREED:
+    if agreed >= MIN_AGREED_SHARE:
         return ()
     return (
         f"The views agree on {agreed:.0%} of the smoke that they show: check where their cameras stand, which frames "

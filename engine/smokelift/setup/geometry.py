@@ -1,4 +1,4 @@
-"""Camera, domain and resolution: as the scene gives them, or guessed from where the smoke is in the picture."""
+"""Camera, domain and resolution: as the scene gives them, or estimated from where the smoke is in the picture."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ LENS = 50 / FILM_WIDTH
 lens."""
 
 MARGIN = 0.06
-"""Margin on each side of a guessed box, as a fraction of its longer side."""
+"""Margin on each side of an estimated box, as a fraction of its longer side."""
 
 NARROWEST = 0.25
-"""Width over height of a guessed box at least, and the reverse."""
+"""Width over height of an estimated box at least, and the reverse."""
 
 COARSEST = 32
 """Voxels along the longest side at least: with fewer there is nothing more to save."""
@@ -330,7 +330,7 @@ def _resolved(
     smoky: tuple[int, ...],
     settings: Settings,
 ) -> tuple[Domain, Choice[Shape], Mapping[Quality, Grid]]:
-    """Of a quality's grids the coarsest that loses no more of what the finest shows than tolerated, and why.
+    """The coarsest of a quality's grids that loses no more of what the finest shows than tolerated, and why.
 
     The clip's detail is measured once, and says what each quality would take.
     """

@@ -77,7 +77,7 @@ class HalfFit:
 
     @cached_property
     def added(self) -> list[Array]:
-        """The same as the held-out pixels show it: what they hold beside the background that the smoke lets through."""
+        """Light (n, 3) of each camera's held-out pixels beside the background that the smoke lets through."""
 
         def rest(frame: CoarseFrame, view: CoarseView, fitted: FittedDensity) -> Image:
             optics = Optics(frame.scene.domain, frame.scene.medium, (), "absorption")

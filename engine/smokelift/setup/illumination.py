@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from smokelift.density import DensitySettings
 from smokelift.footage.noise import Noise
 from smokelift.render import Image
-from smokelift.render.environment_count import FEWEST, TOLERANCE, lights_needed
+from smokelift.render.environment_count import MIN_LIGHTS, TOLERANCE, lights_needed
 from smokelift.scene import SHADOWED, DirectionalLight, EnvironmentLight, Light, Medium, Scattering
 from smokelift.setup.choice import UNDETERMINED, Choice
 from smokelift.setup.coarse import CoarseClip, CoarseFrame
@@ -258,7 +258,7 @@ def _with_directions(
         return lights, ()
     # without shadows the fewest do, since only the sum of the light counts
     few = tuple(
-        replace(light, directions=light.directions or FEWEST) if isinstance(light, EnvironmentLight) else light
+        replace(light, directions=light.directions or MIN_LIGHTS) if isinstance(light, EnvironmentLight) else light
         for light in lights
     )
     fitted = fit_half([frame.lit_by(few).scattered_by("unshadowed") for frame in frames], settings)

@@ -12,7 +12,7 @@ from smokelift.render import scene_optics
 from smokelift.scene import Background, Camera, CompleteScene, Domain, EnvironmentLight, Light, Medium
 from smokelift.setup.choice import Choice
 from smokelift.setup.fire import fire_choice
-from smokelift.setup.first_look import FirstLook
+from smokelift.setup.first_estimate import FirstEstimate
 from smokelift.setup.source import smoke_colour
 
 OPTICAL_DEPTH_AT_ONE = 5.0
@@ -23,7 +23,7 @@ DIRECTIONS = 8
 
 
 def find_medium(
-    given: Medium | None, look: FirstLook, lights: tuple[Light, ...], camera: Camera, domain: Domain
+    given: Medium | None, estimate: FirstEstimate, lights: tuple[Light, ...], camera: Camera, domain: Domain
 ) -> tuple[Medium, tuple[Choice[Any], ...], tuple[str, ...]]:
     """Complete the medium.
 
@@ -31,12 +31,12 @@ def find_medium(
     ----------
     given
         What the scene says.
-    look
+    estimate
         What the clip shows.
     lights
         Those that the scene gives; smoke has their colour times its own.
     camera, domain
-        Where the light is looked at.
+        The view and the box in whose middle the colour of the light is computed.
 
     Returns
     -------
@@ -53,15 +53,15 @@ def find_medium(
     if medium is None:
         width = min(high - low for low, high in zip(domain.min, domain.max, strict=True))
         grey = Medium(extinction=OPTICAL_DEPTH_AT_ONE / width)
-        color, choice = smoke_colour(look.samples, _light_colour(lights, camera, domain, grey))
+        color, choice = smoke_colour(estimate.samples, _light_colour(lights, camera, domain, grey))
         medium, choices = replace(grey, color=color), (choice,)
         notes = (
             f"Medium not given: extinction {grey.extinction:.3g} 1/m (density 1 is thick smoke), "
             f"albedo {grey.albedo:g}, isotropic.",
         )
-    if look.fire is not None:
-        choices = (*choices, fire_choice(look.fire, medium.flame_color))
-        medium = replace(medium, flame_color=medium.flame_color or look.fire.color)
+    if estimate.fire is not None:
+        choices = (*choices, fire_choice(estimate.fire, medium.flame_color))
+        medium = replace(medium, flame_color=medium.flame_color or estimate.fire.color)
     return medium, choices, notes
 
 

@@ -1,4 +1,4 @@
-"""From what a user gives (a clip, perhaps a scene file) to a shot in which everything is decided.
+"""A shot in which everything is decided, from what a user gives (a clip, perhaps a scene file).
 
 What a scene leaves out is estimated from the clip or defaulted, and every such choice is put into words.
 """
@@ -17,7 +17,7 @@ from smokelift.render import scene_optics
 from smokelift.scene import Background, Camera, CompleteScene, Domain, Medium, Scene
 from smokelift.setup.choice import Choice
 from smokelift.setup.coarse import CoarseClip
-from smokelift.setup.first_look import FirstLook, first_look
+from smokelift.setup.first_estimate import FirstEstimate, first_estimate
 from smokelift.setup.further_views import disagreement, open_view
 from smokelift.setup.geometry import Geometry, clip_lens, find_geometry
 from smokelift.setup.illumination import Illumination, first_light, light_notes, measured_light, sunlight
@@ -56,16 +56,16 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
     remarks = clip.remarks()
     # cameras that belong together are measured, and stand where they are said to
     lens = None if scene.views else clip_lens(scene.camera, clip)
-    look = first_look(clip, scene.camera, scene.background, lens)
-    steadied, plates, samples = look.clip, look.plates, look.samples
-    geometry = find_geometry(steadied, scene, settings, plates, samples, look.found.turns)
+    estimate = first_estimate(clip, scene.camera, scene.background, lens)
+    steadied, plates, samples = estimate.clip, estimate.plates, estimate.samples
+    geometry = find_geometry(steadied, scene, settings, plates, samples, estimate.found.turns)
     camera, domain = geometry.camera, geometry.domain
     if settings.axis_depth is not None:
         SmokeAxis.given(settings.axis_depth, camera, domain)  # refuse early what cannot be
-    medium, coloured, taken = find_medium(scene.medium, look, scene.lights, camera, domain)
+    medium, coloured, taken = find_medium(scene.medium, estimate, scene.lights, camera, domain)
     asked = scene.scattering if settings.scattering == "auto" else settings.scattering
     light = first_light(scene.lights, asked, medium, samples)
-    complete = _complete(scene, look, geometry, medium, light)
+    complete = _complete(scene, estimate, geometry, medium, light)
     first = ShotView(steadied, camera, plates, _working(camera, domain))
     measure, tried = settings.selection.measure, tried_frames(samples.smoky)
     coarse = CoarseClip((first,), complete)
@@ -73,8 +73,8 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
     if frames:
         light = measured_light(light, coarse, frames, settings)
         complete = replace(complete, lights=light.lights, scattering=light.scattering)
-    others, gains, said = _further_views(first, complete, look, settings, bool(scene.lights))
-    if frames and look.fire is None:
+    others, gains, said = _further_views(first, complete, estimate, settings, bool(scene.lights))
+    if frames and estimate.fire is None:
         light = sunlight(light, CoarseClip((first, *others), complete), tried, settings)
         if light.sunny:
             light = measured_light(light, coarse, frames, settings)
@@ -86,16 +86,16 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
         optics=scene_optics(complete),
         views=(first, *others),
         settings=settings if model is None else replace(settings, velocity=model.velocity),
-        estimated_background=look.picture,
+        estimated_background=estimate.picture,
         notes=(
             *remarks,
-            *look.notes,
+            *estimate.notes,
             *geometry.notes,
             *taken,
             *light_notes(light, samples, plates.noise),
             *said,
         ),
-        doubts=look.doubts,
+        doubts=estimate.doubts,
         choices=(
             *geometry.choices,
             *coloured,
@@ -107,21 +107,23 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
         exposure=samples.exposure,
         smoky=samples.smoky,
         place=None,
-        fire=None if look.fire is None else replace(first, clip=look.fire.light),
+        fire=None if estimate.fire is None else replace(first, clip=estimate.fire.light),
     )
     return replace(shot, notes=(*shot.notes, *disagreement(shot))) if scene.views else placed(shot)
 
 
-def _complete(scene: Scene, look: FirstLook, geometry: Geometry, medium: Medium, light: Illumination) -> CompleteScene:
+def _complete(
+    scene: Scene, estimate: FirstEstimate, geometry: Geometry, medium: Medium, light: Illumination
+) -> CompleteScene:
     """The scene with all that it left open."""
     return CompleteScene(
         camera=geometry.camera,
         domain=geometry.domain,
         medium=medium,
         lights=light.lights,
-        background=look.found.background or Background(),
+        background=estimate.found.background or Background(),
         scattering=light.scattering,
-        clip=None if scene.clip is None else replace(scene.clip, fps=look.clip.fps),
+        clip=None if scene.clip is None else replace(scene.clip, fps=estimate.clip.fps),
         views=scene.views,
         closed=scene.closed,
         inlets=scene.inlets,
@@ -144,7 +146,7 @@ def boundaries(scene: CompleteScene, settings: Settings) -> tuple[str, ...]:
 
 
 def _check(clip: Clip, scene: Scene) -> None:
-    """Refuse what can be seen to be wrong before anything is looked at."""
+    """Refuse what can be seen to be wrong before anything is examined."""
     moves = scene.camera is not None and scene.camera.moves
     if scene.views and (scene.camera is None or scene.domain is None):
         raise ValueError("Further [[views]] need the input's [camera] and the [domain], in the same metres as theirs.")
@@ -162,20 +164,20 @@ def _check(clip: Clip, scene: Scene) -> None:
 
 
 def _expect(clip: Clip, scene: Scene) -> None:
-    """Say which frames are looked at, so that each of them is decoded once."""
-    looked_at, estimates = clip.spread(SAMPLES), scene.background is None
+    """Say which frames are examined, so that each of them is decoded once."""
+    examined, estimates = clip.spread(SAMPLES), scene.background is None
     # a velocity needs the frame after one with smoke, and a background more frames than the smoke
-    perhaps = {n + 1 for n in looked_at} | {n - clip.first for n in (proxy_frames(clip) if estimates else ())}
-    clip.expect(looked_at, {n for n in perhaps if n >= 0}.difference(looked_at))
+    perhaps = {n + 1 for n in examined} | {n - clip.first for n in (proxy_frames(clip) if estimates else ())}
+    clip.expect(examined, {n for n in perhaps if n >= 0}.difference(examined))
 
 
 def _further_views(
-    first: ShotView, scene: CompleteScene, look: FirstLook, settings: Settings, lit: bool
+    first: ShotView, scene: CompleteScene, estimate: FirstEstimate, settings: Settings, lit: bool
 ) -> tuple[list[ShotView], list[Choice[str]], list[str]]:
     """The further views of a scene, at the first one's exposure; with what was measured and is to be said of them."""
     views, notes = [], []
     gains: list[Choice[str]] = []
-    smoky = look.samples.smoky
+    smoky = estimate.samples.smoky
     for number in range(len(scene.views)):
         view, said = open_view(number, first.clip, scene)
         notes += said

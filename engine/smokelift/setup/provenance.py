@@ -39,7 +39,7 @@ class Provenance:
     settings: Mapping[str, float] = field(default_factory=dict)
 
     def as_dict(self) -> dict[str, Any]:
-        """The same as JSON holds it."""
+        """The fields as JSON holds them."""
         return asdict(self)
 
 

@@ -22,7 +22,7 @@ from smokelift.setup.coarse import CoarseFrame
 from smokelift.setup.held_out import held_out
 
 MODELS: tuple[Scattering, ...] = ("absorption", "unshadowed", "single", "multiple")
-"""From the cheapest to the richest."""
+"""Models of scattering, from the cheapest to the richest."""
 
 NEARER = 0.75
 """Error of one model over that of another of which it is no special case, below which it is taken. Multiple over single
@@ -30,8 +30,8 @@ scattering: 0.01 to 0.63 where paths were traced, but for smoke that either mode
 is scattered once (docs/experiments/scattering-selection.md)."""
 
 SETTLED = 64
-"""Steps of descent that a fit may take where models are told apart that differ little: enough for every fit to end by
-itself. One that is cut off has the error of the steps which it lacks (docs/experiments/scattering-selection.md)."""
+"""Steps of descent that a fit may take where models are distinguished that differ little: enough for every fit to end
+by itself. One that is cut off has the error of the steps which it lacks (docs/experiments/scattering-selection.md)."""
 
 WORDS: Mapping[str, str] = {
     "absorption": "absorption only",

@@ -49,8 +49,8 @@ LIMITS: Mapping[Quality, GridLimit] = {
     "fine": GridLimit(1 / 2, 144, 256),
     "final": GridLimit(1, 0, LONGEST),
 }
-"""Of each quality. What a share loses is much the same whatever the clip's size; the bounds keep the time of a frame,
-which goes with the voxels, from growing with the size of the clip (docs/experiments/resolution-selection.md)."""
+"""Limits of each quality. What a share loses is much the same whatever the clip's size; the bounds keep the time of a
+frame, which goes with the voxels, from growing with the size of the clip (docs/experiments/resolution-selection.md)."""
 
 LOST_DETAIL: Mapping[Quality, float] = {"draft": 0.02, "balanced": 0.01, "fine": 0.005, "final": 0.0025}
 """Share of the smoke's contrast that a chosen grid may lose beside the finest of its quality: each loses half as
@@ -69,8 +69,8 @@ class SelectionSettings:
     Attributes
     ----------
     measure
-        Measure open choices on the clip. Without it a guessed box gets the finest grid of the quality, and the richest
-        model of scattering that the known light allows is taken.
+        Measure open choices on the clip. Without it an estimated box gets the finest grid of the quality, and the
+        richest model of scattering that the known light allows is taken.
     lost_detail
         Share of the smoke's contrast that a grid may lose of what the finest of the quality shows; a preset has that
         of `LOST_DETAIL`.

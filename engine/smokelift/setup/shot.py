@@ -61,7 +61,7 @@ class ShotView:
 
     @cached_property
     def _still_plates(self) -> Plates:
-        """Those of the small picture of a camera that stands still."""
+        """Plates of the small picture of a camera that stands still."""
         return self.plates.through(self.working.cut, self.working.pixels)
 
 
@@ -92,7 +92,7 @@ class Shot:
     exposure
         Largest relative change of exposure, which is evened out; 0 where it is steady.
     smoky
-        Numbers of the frames, of those looked at, that show smoke, those with the most first.
+        Numbers of the frames, of those examined, that show smoke, those with the most first.
     place
         Where in depth the smoke was found to stand; None where it is given, or seen by several cameras or one
         that travels.

@@ -83,7 +83,7 @@ class Sky:
 
     @property
     def ambient_share(self) -> float:
-        """Of all the light."""
+        """Share of the light from everywhere in all of the light."""
         return self.ambient / max(self.sun + self.ambient, 1e-30)
 
     @property
@@ -193,7 +193,7 @@ def _explained(fit: HalfFit, colour: Array) -> Sky:
         return [np.array([picture[camera].mean(-1) for picture in lit]) for camera in cameras]
 
     def sums_of(suns: list[Array]) -> Array:
-        """As in `strengths`, of each camera: (3, cameras, directions)."""
+        """Sums as in `strengths`, of each camera: (3, cameras, directions)."""
         parts = zip(suns, everywhere, added, strict=True)
         return np.stack([(np.sum(lit**2, 1), lit @ around, lit @ seen) for lit, around, seen in parts], 1)
 

@@ -1,4 +1,4 @@
-"""Where and how bright the smoke of a clip is, at reduced size: what camera, domain and light are guessed from."""
+"""Where and how bright the smoke of a clip is, at reduced size: what camera, domain and light are estimated from."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from smokelift.footage.turning import Turns
 from smokelift.setup.thickness import seen_texture
 
 SAMPLES = 16
-"""Frames that are looked at."""
+"""Frames that are examined."""
 
 UNKNOWN = 0.5
 """Confidence of a plate below which what is behind the smoke is unknown there."""

@@ -29,7 +29,7 @@ Grey world and its kin are 5 to 6 degrees wrong on the mean, and 10 in the worst
 and van de Weijer, "Computational color constancy: survey and experiments", 2011)."""
 
 THICKEST = 90
-"""Percentile of the change from which on smoke is looked at: the thickest is nearest to the source."""
+"""Percentile of the change from which on smoke is measured: the thickest is nearest to the source."""
 
 CLIPPED = 0.95
 """Linear value from which on a channel may have been larger."""

@@ -134,7 +134,7 @@ def _behind(plate: Plate) -> _Behind:
 
 
 def _differences(picture: Array) -> tuple[Array, Array]:
-    """Those of neighbouring pixels, down and across."""
+    """Differences of neighbouring pixels, down and across."""
     return np.diff(picture, axis=0), np.diff(picture, axis=1)
 
 

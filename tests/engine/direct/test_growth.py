@@ -87,7 +87,7 @@ def test_a_larger_box_changes_nothing_where_the_smaller_was():
     part = clip.slices_in(larger)
     np.testing.assert_array_equal(found.density[part], moment.density)
     np.testing.assert_array_equal(found.flame[part], moment.density)
-    assert found.density.sum() == moment.density.sum()
+    assert np.count_nonzero(found.density) == np.count_nonzero(moment.density)
     for here, there in zip(found.velocity.faces, after.air(found.velocity, 0.5), strict=True):
         np.testing.assert_allclose(here, there, atol=2e-5)
 

@@ -168,8 +168,8 @@ def test_one_frame_before_one_colour_shows_its_background(tmp_path, colour) -> N
     )
     with Clip.open(tmp_path / "photograph.png") as clip:
         found = find_backdrop(clip, None, None)
-        told = find_backdrop(clip, None, Background(color=(colour,) * 3))
-        masks = [matte(clip.frame(0), each.plates.at(0)).mask for each in (found, told)]
+        given = find_backdrop(clip, None, Background(color=(colour,) * 3))
+        masks = [matte(clip.frame(0), each.plates.at(0)).mask for each in (found, given)]
         assert masks[0][smoke > 0.1].all() and masks[0].mean() < 0.6
         assert (masks[0] != masks[1]).mean() < 0.01
     assert backdrop_doubts(found) == (FROM_ONE,)
@@ -221,11 +221,11 @@ def grey(tmp_path):
         yield clip, Plate(clip.frame(0), np.ones((24, 32), np.float32), lasting_noise(1 / 255))
 
 
-def test_how_many_frames_were_looked_at_is_said(grey) -> None:
+def test_how_many_frames_were_examined_is_said(grey) -> None:
     """And what helps."""
     clip, plate = grey
     said, advice = nothing_seen(clip, plate, sample_smoke(clip, plate), given=False, cuts=())
-    assert "No smoke found in the 4 frames that were looked at" in said
+    assert "No smoke found in the 4 frames that were examined" in said
     assert "give a clean plate, or a colour" in advice
 
 

@@ -50,7 +50,7 @@ def test_darkening_smoke_has_a_dark_source(plume, draft, tmp_path) -> None:
 
 
 def test_smoke_that_scatters_nothing_needs_no_light(plume, draft, tmp_path) -> None:
-    """Albedo 0 is soot: whatever the light, it only darkens, so none has to be guessed."""
+    """Albedo 0 is soot: whatever the light, it only darkens, so none has to be assumed."""
     black = replace(
         plume.scene,
         medium=Medium(extinction=8.0, albedo=0.0),

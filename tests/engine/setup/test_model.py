@@ -238,7 +238,7 @@ def test_a_moving_camera_is_no_hindrance(plume, tracked, draft, tmp_path) -> Non
     assert chosen(shot_of(scene, draft), "scattering").chosen == "single"
 
 
-# what is looked at
+# coarse boxes and pictures
 
 
 @given(

@@ -46,7 +46,7 @@ def passing(plume, tmp_path_factory) -> Scene:
 
 
 @pytest.fixture(scope="module")
-def guessed(passing, draft) -> Shot:
+def estimated(passing, draft) -> Shot:
     """The shot of the clip alone."""
     return shot_of(bare(passing), draft)
 
@@ -92,47 +92,47 @@ def test_a_camera_of_other_size_but_same_shape_is_scaled(plume, draft) -> None:
 
 
 @pytest.mark.parametrize("word", ["Camera not given", "Domain", "Medium not given", "Light not given", "Background"])
-def test_all_that_a_clip_lacks_is_noted(guessed, word) -> None:
+def test_all_that_a_clip_lacks_is_noted(estimated, word) -> None:
     """One note for each thing that was assumed."""
-    assert sum(note.startswith(word) for note in guessed.notes) == 1
-    assert len(guessed.notes) == 5
+    assert sum(note.startswith(word) for note in estimated.notes) == 1
+    assert len(estimated.notes) == 5
 
 
-def test_a_clip_alone_gives_a_complete_scene(guessed, passing) -> None:
+def test_a_clip_alone_gives_a_complete_scene(estimated, passing) -> None:
     """Nothing is left open, and light without a direction casts no shadows."""
-    scene = guessed.scene
+    scene = estimated.scene
     assert len(scene.lights) == 1
-    assert scene.scattering == guessed.optics.scattering == "unshadowed"
+    assert scene.scattering == estimated.optics.scattering == "unshadowed"
     assert scene.clip == passing.clip
     with Clip.open(passing.clip) as clip:
         assert scene.camera.size == clip.size
 
 
-def test_the_light_that_nothing_tells_is_called_undetermined(guessed) -> None:
+def test_the_light_that_nothing_tells_is_called_undetermined(estimated) -> None:
     """Before black neither its strength nor where it comes from, in choices that are said and kept."""
-    told = {choice.what: choice for choice in guessed.choices}
-    assert told["smoke thickness"].chosen == told["light direction"].chosen == UNDETERMINED
-    reason = told["light direction"].reason
+    choices = {choice.what: choice for choice in estimated.choices}
+    assert choices["smoke thickness"].chosen == choices["light direction"].chosen == UNDETERMINED
+    reason = choices["light direction"].reason
     assert all(part in reason for part in ("direction", "colour of a sun", "share of light from everywhere", "[["))
 
 
-def test_the_background_is_found(guessed) -> None:
+def test_the_background_is_found(estimated) -> None:
     """The plume passes before black, and every pixel is clear for a while."""
-    assert guessed.estimated_background.max() < 0.02
+    assert estimated.estimated_background.max() < 0.02
 
 
-def test_the_domain_holds_the_smoke(guessed, passing, draft) -> None:
+def test_the_domain_holds_the_smoke(estimated, passing, draft) -> None:
     """Every clearly smoky pixel lies in the domain's picture; voxels are cubes, no more than the quality says."""
-    domain = guessed.scene.domain
+    domain = estimated.scene.domain
     edges = (np.array(domain.max) - domain.min) / domain.resolution
     np.testing.assert_allclose(edges, edges[0], rtol=1e-6)
     assert COARSEST <= max(domain.resolution) <= LIMITS[draft.quality].most + 4
-    pixels, depth = project(guessed.scene.camera, domain.corners())
+    pixels, depth = project(estimated.scene.camera, domain.corners())
     assert (depth > 0).all()
     with Clip.open(passing.clip) as clip:
         smoky = np.max([frame.max(-1) for frame in clip], axis=0) > 0.1
     rows, columns = np.nonzero(smoky)
-    width, height = guessed.scene.camera.size
+    width, height = estimated.scene.camera.size
     low, high = np.maximum(pixels.min(0), 0), np.minimum(pixels.max(0), (width, height))
     assert low[0] <= columns.min() + 1
     assert high[0] >= columns.max()
@@ -166,15 +166,15 @@ def test_a_box_is_found_for_a_camera_that_is_given(plume, draft, tilt: float) ->
     turn = Rotation.from_euler("xz", [90 + tilt, 30], degrees=True).as_matrix()
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = turn, (3, 4, 5)
-    told = replace(camera, matrix=as_matrix(matrix), cx=0.6 * camera.cx)
-    shot = shot_of(replace(plume.scene, camera=told, domain=None), draft)
+    given = replace(camera, matrix=as_matrix(matrix), cx=0.6 * camera.cx)
+    shot = shot_of(replace(plume.scene, camera=given, domain=None), draft)
     level = shot_of(replace(plume.scene, camera=None, domain=None), draft)
-    assert shot.scene.camera == told.resized(*shot.clip.size)
+    assert shot.scene.camera == given.resized(*shot.clip.size)
     assert any(note.startswith("Box not given: the picture taken to be 2 m high") for note in shot.notes)
     low, high = (np.array(corner) for corner in (shot.scene.domain.min, shot.scene.domain.max))
     centre = (low + high) / 2
     ends = [
-        project(told.resized(*shot.clip.size), np.array([*centre[:2], z]))[0] for z in (low[2], (low[2] + high[2]) / 2)
+        project(given.resized(*shot.clip.size), np.array([*centre[:2], z]))[0] for z in (low[2], (low[2] + high[2]) / 2)
     ]
     box = level.scene.domain
     wanted = [project(level.scene.camera, np.array([*box.centre[:2], z]))[0] for z in (box.min[2], box.centre[2])]
@@ -297,7 +297,7 @@ def test_a_domain_beside_the_picture_is_refused(plume, draft) -> None:
 
 @pytest.mark.parametrize("given", [True, False])
 def test_a_clip_without_smoke_gives_a_shot(plume, draft, tmp_path, given) -> None:
-    """There is nothing to guess from, and no failure."""
+    """There is nothing to estimate from, and no failure."""
     scene = plume.write(tmp_path / "clip", [np.zeros_like(plume.densities[0])] * 3)
     if given:
         scene = replace(scene, lights=(), medium=None)

@@ -1,4 +1,4 @@
-"""Fire in a shot: it is told from the smoke, and its colour is what the clip shows or the scene says."""
+"""Fire in a shot: it is distinguished from the smoke, and its colour is what the clip shows or the scene says."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ def test_fire_is_said_and_does_not_light_the_smoke(plume, draft, tmp_path) -> No
 
 def test_a_color_of_fire_that_is_given_is_taken(plume, draft, tmp_path) -> None:
     dim = replace(plume.scene, lights=(DirectionalLight((0.3, 0.5, -0.8), (0.6, 0.6, 0.6)),))
-    told = replace(dim, medium=replace(dim.medium, flame_color=(1.0, 0.5, 0.2)))
-    scene = plume.write(tmp_path, plume.densities, told)
+    given = replace(dim, medium=replace(dim.medium, flame_color=(1.0, 0.5, 0.2)))
+    scene = plume.write(tmp_path, plume.densities, given)
     with Clip.open(scene.clip) as clip:
         shot = prepare_shot(clip.changed(burning), scene, draft)
     assert shot.scene.medium.flame_color == (1.0, 0.5, 0.2)

@@ -27,11 +27,11 @@ def direction(shot: Shot):
 def test_four_cameras_around_the_smoke_tell_the_sun(plume, tmp_path, draft) -> None:
     shot = shot_of(filmed_around(plume, tmp_path, (LIGHT,)), draft)
     found = direction(shot)
-    told = np.array([float(value) for value in found.chosen.split(",")])
-    assert np.degrees(np.arccos(told @ SUN / np.linalg.norm(told) / np.linalg.norm(SUN))) < 20
+    estimated = np.array([float(value) for value in found.chosen.split(",")])
+    assert np.degrees(np.arccos(estimated @ SUN / np.linalg.norm(estimated) / np.linalg.norm(SUN))) < 20
     assert found.measured["ambient_share"] <= found.tolerance
     strongest = max(shot.scene.lights, key=lambda light: sum(light.irradiance))
-    np.testing.assert_allclose(strongest.direction, told, atol=0.02)
+    np.testing.assert_allclose(strongest.direction, estimated, atol=0.02)
     assert shot.scene.scattering in ("single", "multiple")
     assert any("Light direction" in choice.reason for choice in shot.choices)
 

@@ -1,4 +1,4 @@
-"""How thick the smoke is: told where a textured background shows through it, undetermined elsewhere."""
+"""How thick the smoke is: measured where a textured background shows through it, undetermined elsewhere."""
 
 import numpy as np
 import pytest
@@ -87,4 +87,4 @@ def test_thin_smoke_is_lit_as_strongly_as_it_hides() -> None:
     samples = SmokeSamples(1.0, (0, 0, 1, 1), smoky, ~smoky, colours.astype("f4"), hidden, (0,), {})
     assert source_radiance(samples).max() < 0.6 * SOURCE.max()
     assert source_radiance(samples, SOURCE) == pytest.approx(SOURCE)
-    assert (source_radiance(samples, 0.1 * SOURCE) >= colours.max(0) * 0.97).all()  # what is there is met
+    assert (source_radiance(samples, 0.1 * SOURCE) >= colours.max(0) * 0.97).all()  # what is there is reached

@@ -26,7 +26,7 @@ from smokelift.setup.source import several_colours
 
 
 @dataclass(frozen=True, eq=False)
-class FirstLook:
+class FirstEstimate:
     """What a clip shows.
 
     Attributes
@@ -54,7 +54,7 @@ class FirstLook:
 
     @property
     def plates(self) -> Plates:
-        """Of the full pictures."""
+        """Plates of the full pictures."""
         return self.found.plates
 
     @property
@@ -71,8 +71,10 @@ class FirstLook:
         return (*backdrop_notes(self.found), *unused, *self.doubts, *exposure_notes(self.samples.exposure))
 
 
-def first_look(clip: Clip, camera: Camera | None, background: Background | None, lens: Lens | None) -> FirstLook:
-    """Look at a clip; the parameters and errors are those of `find_backdrop`."""
+def first_estimate(
+    clip: Clip, camera: Camera | None, background: Background | None, lens: Lens | None
+) -> FirstEstimate:
+    """Estimate what a clip shows; the parameters and errors are those of `find_backdrop`."""
     found = find_backdrop(clip, camera, background, lens)
     samples = sample_smoke(found.clip, found.plates, found.turns)
     clip = steady(found.clip, found.plates, samples.gains)
@@ -91,4 +93,4 @@ def first_look(clip: Clip, camera: Camera | None, background: Background | None,
         *several_colours(samples),
     )
     unused = found.source == "alpha" and background is not None
-    return FirstLook(clip, found, samples, fire, doubts, unused)
+    return FirstEstimate(clip, found, samples, fire, doubts, unused)
