@@ -40,6 +40,8 @@ ALLOWED = (
     r"look-up",
     r"a look of its own",  # what *Look* in Blender sets
     r"visibility push",
+    r"push-pull",  # the algorithm of Gortler et al.
+    r"guessed_rate",  # an attribute of PyAV's streams
     r"warp[ _]error|warps? a density exactly",  # a measure of the literature
     r"looks? at (?:the|a|an) (?:screen|point|zip)",
 )
@@ -48,8 +50,6 @@ ALLOWED = (
 GUESS = "the choice *Guess* of the panel, which is rewritten"
 
 EXCEPTIONS = {
-    "engine/smokelift/footage": "its modules are rewritten as backdrop and media",
-    "tests/engine/footage": "with its modules",
     "addon/camera_table.py": GUESS,
     "addon/properties.py": GUESS,
     "addon/shot_setup.py": GUESS,

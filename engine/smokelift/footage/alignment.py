@@ -57,7 +57,7 @@ TUKEY = 4.685
 DEVIATION = 1.4826
 """Standard deviation of normal values in units of the median of their magnitudes."""
 
-LEAST_SPREAD = 0.01
+MIN_SPREAD = 0.01
 """Spread of the residuals below which two pictures are the same."""
 
 SAME = 0.8
@@ -67,8 +67,8 @@ TEXTURE = 0.7
 """Standard deviation of a cell's points, in units of its contrast and `FAINT` together, from which on the contrast is
 the greater."""
 
-FEWEST_CELLS = 8
-"""Cells with texture that can tell a turn: a tenth of those of a picture full of it."""
+MIN_CELLS = 8
+"""Cells with texture that can tell a turn, at least: a tenth of those of a picture full of it."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ class Lens:
         return np.asarray(rays[:, :2] / ahead * self.focal + self.centre)
 
     def matrix(self) -> Array:
-        """From directions (3,) to homogeneous places in the picture, (3, 3)."""
+        """Matrix (3, 3) from directions (3,) to homogeneous places in the picture."""
         (across, down), (x, y) = self.focal, self.centre
         return np.array([[across, 0, x], [0, down, y], [0, 0, 1.0]])
 
@@ -137,8 +137,8 @@ class Level:
 def levels(picture: Picture, lens: Lens, count: int = LEVELS) -> tuple[Level, ...]:
     """Return a linear picture (rows, columns, 3) at all resolutions or the finest of them, the coarsest first."""
     found = []
-    for halvings in range(count):
-        columns, rows = level_size(lens, halvings)
+    for coarsenings in range(count):
+        columns, rows = level_size(lens, coarsenings)
         picture = area_average(picture, columns, rows)
         grey = channel_mean(linear_to_srgb(picture))
         detail = blurred(grey, FINE) - blurred(grey, COARSE)
@@ -147,9 +147,9 @@ def levels(picture: Picture, lens: Lens, count: int = LEVELS) -> tuple[Level, ..
     return tuple(found[::-1])
 
 
-def level_size(lens: Lens, halvings: int = 0) -> tuple[int, int]:
-    """Return width and height of a picture of a lens at its finest resolution, or after so many halvings."""
-    scale = max(1.0, max(lens.size) / LONGEST) * 2**halvings
+def level_size(lens: Lens, coarsenings: int = 0) -> tuple[int, int]:
+    """Return width and height of a picture of a lens at its finest resolution, or coarsened by two so many times."""
+    scale = max(1.0, max(lens.size) / LONGEST) * 2**coarsenings
     columns, rows = (max(8, round(n / scale)) for n in lens.size)
     return columns, rows
 
@@ -286,7 +286,7 @@ def judged(points: Points, level: Level, turn: Rotation) -> Alignment:
         return Alignment(turn, 0.0, 0.0)
     correlation = cell_correlations(points, values, inside)
     correlation = correlation[np.isfinite(correlation)]
-    same = float((correlation >= SAME).mean()) if len(correlation) >= FEWEST_CELLS else 0.0
+    same = float((correlation >= SAME).mean()) if len(correlation) >= MIN_CELLS else 0.0
     return Alignment(turn, same, float(inside.mean()))
 
 
@@ -299,7 +299,7 @@ def _residual(points: Points, level: Level, turn: Rotation) -> tuple[Array, Arra
 
 def robust_weights(residual: Array, inside: NDArray[np.bool_]) -> Array:
     """Return what each residual counts: nothing outside the second picture, and nothing of what moves by itself."""
-    spread = max(DEVIATION * float(np.median(np.abs(residual[inside]))), LEAST_SPREAD) if inside.any() else 1.0
+    spread = max(DEVIATION * float(np.median(np.abs(residual[inside]))), MIN_SPREAD) if inside.any() else 1.0
     return np.where(inside, np.maximum(1 - (residual / (TUKEY * spread)) ** 2, 0) ** 2, 0.0)
 
 

@@ -2,7 +2,7 @@
 
 In this order: what an alpha channel says; what the scene gives; one colour, if that is the likeliest by the whole file
 (`background_kind`); a panorama, if the camera turns (`turning`); else the picture that the clear frames show
-(`clear_picture`). The clip's noise is told from what cannot be smoke, before all else (`noise`).
+(`clear_picture`). The clip's noise is measured on what cannot be smoke, before all else (`noise`).
 """
 
 from __future__ import annotations
@@ -180,8 +180,8 @@ def _estimated(clip: Clip, lens: Lens | None, lens_is_known: bool, moves: bool) 
                 "Clean Plate in Blender)."
             )
         red, green, blue = (float(v) for v in found.colour)
-        told = Background(color=(red, green, blue))
-        return Backdrop("colour", clip, known_plate(found.colour, clip), told, (red, green, blue), len(proxy.numbers))
+        behind = Background(color=(red, green, blue))
+        return Backdrop("colour", clip, known_plate(found.colour, clip), behind, (red, green, blue), len(proxy.numbers))
     made = partial(Backdrop, clip=clip, frames=len(part.numbers), cut=cut, costs=found.costs)
     # black, and what is mostly one colour, is the same wherever the camera looks; else texture may pass by
     plain = found.colour is not None and (found.clear > MOSTLY or not found.colour.any())

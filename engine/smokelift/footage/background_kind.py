@@ -34,7 +34,7 @@ LASTING = np.float32(2 / 255)
 (docs/experiments/background.md)."""
 
 STAYS, SWITCHES = 0.98, 0.03
-"""Probability that smoke stays as it is from one frame to the next of those that are looked at, and that a block
+"""Probability that smoke stays as it is from one frame to the next of those that are examined, and that a block
 becomes clear or smoke. What ranks the backgrounds are jumps; these only break ties."""
 
 OBJECT = 0.1
@@ -63,7 +63,7 @@ SHARPEST, SHARP = 0.99, np.float32(15 / 255)
 """Quantile of the detail of what stands still before black, in sRGB values, and how much of it mist has at most: 1 to
 13 of 255 in 26 clips of smoke; walls and stages in the dark have 17 to 40 (docs/experiments/background.md)."""
 
-AROUND, MOST = np.float32(2 / 255), 0.5
+AROUND, MIN_SIDE_SHARE = np.float32(2 / 255), 0.5
 """Difference in sRGB values up to which a block has the colour around a single picture, and share of the blocks along
 its sides that have to, on three of them: 0.56 to 1 of 18 frames of public clips before one colour, 0.2 at most of
 others but for stages in the dark (docs/experiments/background.md)."""
@@ -146,7 +146,7 @@ def colour_around(picture: Picture) -> tuple[float, float, float] | None:
     sides = [(values[0], values[-1], values[:, 0], values[:, -1]) for values in (blocks, linear)]
     colour = np.median(np.concatenate(sides[0]), axis=0)
     alike = [(np.abs(side - colour) <= AROUND).all(-1) for side in sides[0]]
-    if sum(side.mean() >= MOST for side in alike) < 3:
+    if sum(side.mean() >= MIN_SIDE_SHARE for side in alike) < 3:
         return None
     red, green, blue = (float(v) for v in np.median(np.concatenate(sides[1])[np.concatenate(alike)], axis=0))
     return red, green, blue

@@ -24,11 +24,11 @@ SPECK = 7
 DETAIL = 4.0
 """Standard deviation in pixels of the Gaussian above which a background's detail is finer than that of smoke."""
 
-MOST_DETAIL = 0.95
+DETAIL_QUANTILE = 0.95
 """Quantile of the known background's detail that bounds that of the unknown; what is beyond it is smoke's."""
 
-LEAST_TRANSMITTANCE = 0.2
-"""Light let through by the smoke from which the detail behind it can be told from noise."""
+MIN_TRANSMITTANCE = 0.2
+"""Light let through by the smoke from which the detail behind it can be distinguished from noise."""
 
 RIM = 14
 """Pixels from what is unknown within which smoke may be so thin that it passes for clear
@@ -76,21 +76,21 @@ def completed(
     contrast = smooth.mean(-1) - brightness
     seen = (coarse.mean(-1) - brightness) / np.where(np.abs(contrast) > 0.02, contrast, np.inf)
     detail = mean - coarse
-    most = np.quantile(np.abs(detail[sure]), MOST_DETAIL, axis=0) if sure.any() else np.zeros(3, np.float32)
-    passed = np.clip(seen, LEAST_TRANSMITTANCE, 1)
+    most = np.quantile(np.abs(detail[sure]), DETAIL_QUANTILE, axis=0) if sure.any() else np.zeros(3, np.float32)
+    passed = np.clip(seen, MIN_TRANSMITTANCE, 1)
     detail = np.clip(detail / passed[..., None], -most, most)
-    filled = smooth + np.where(seen > LEAST_TRANSMITTANCE, 1, 0)[..., None] * detail
+    filled = smooth + np.where(seen > MIN_TRANSMITTANCE, 1, 0)[..., None] * detail
     # smoke has drawn the pixel towards its own brightness, never away from it
     beyond = filled.mean(-1) - linear_to_srgb(image).mean(-1)
     beyond -= np.clip(beyond, -DRIFT, DRIFT)
     filled -= np.where(brightens, np.maximum(beyond, 0), np.minimum(beyond, 0))[..., None]
     filled = srgb_to_linear(np.maximum(filled, 0))
-    contrast = np.where(known, 1, np.where(seen > LEAST_TRANSMITTANCE, 1 / passed, 0)).astype(np.float32)
+    contrast = np.where(known, 1, np.where(seen > MIN_TRANSMITTANCE, 1 / passed, 0)).astype(np.float32)
     return np.where(known[..., None], image, filled), contrast
 
 
 def unlike(image: Picture, known: npt.NDArray[np.bool_]) -> Picture:
-    """By how much a linear picture differs from what is known around, in grey sRGB values (rows, columns)."""
+    """Return by how much a linear picture differs from what is known around, in grey sRGB values (rows, columns)."""
     encoded = linear_to_srgb(image)
     return np.asarray(np.abs((encoded - push_pull(encoded, known.astype(np.float32))).mean(-1)))
 
@@ -166,8 +166,8 @@ def continuation_errors(image: Picture, known: npt.NDArray[np.bool_]) -> Picture
         left_out = known & _moved(~known, round(shift * width))
         if left_out.mean() < ISLAND:
             continue
-        guess = srgb_to_linear(push_pull(encoded, (known & ~left_out).astype(np.float32)))
-        error = np.where(left_out[..., None], guess - image, 0)
+        continued = srgb_to_linear(push_pull(encoded, (known & ~left_out).astype(np.float32)))
+        error = np.where(left_out[..., None], continued - image, 0)
         share = blurred(left_out.astype(np.float32), DETAIL)[left_out]
         coarse = blurred(error, DETAIL)[left_out] / share[:, None]
         total += coarse.T.astype(np.float64) @ coarse

@@ -39,8 +39,8 @@ from smokelift.footage.seen import at_rank, count_of_seen, median_of_seen
 WINDOW = 6.0
 """Width of the window of a pixel's clear values in units of noise: plus and minus three standard deviations."""
 
-LEAST_WINDOW = np.float32(3 / 255)
-"""The same at least: rounding to eight bits, and the shift of a codec by a step either way."""
+MIN_WINDOW = np.float32(3 / 255)
+"""Width of that window at least, in sRGB values: rounding to eight bits, and a codec's shift by a step either way."""
 
 STRIDE = 4
 """Pixels from one row or column to the next where it is measured what the smoke is like."""
@@ -48,10 +48,10 @@ STRIDE = 4
 BAND = 2**14
 """Pixels whose values are compared at a time: they fit the cache."""
 
-MOST = 0.8
+MIN_ALIKE_SHARE = 0.8
 """Share of a pixel's values that are alike which are then its background for certain."""
 
-LEAST_SEEN = 1 / 8
+MIN_SEEN_SHARE = 1 / 8
 """Share of the frames that have to show a pixel of which all values are alike, for that to be its background. While a
 camera turns, others show it for a moment only."""
 
@@ -67,7 +67,7 @@ PRIOR_PAIRS = 4.0
 LIKE_SURROUNDINGS = 3 * DRIFT
 """Difference in sRGB values from what the surroundings let expect, of a background."""
 
-LEAST_CHANGE = 1 / 4
+MIN_CHANGE_SHARE = 1 / 4
 """Range of smoke over time, as a share of its difference from the background: what is steadier is a chair or a jacket.
 """
 
@@ -103,7 +103,7 @@ class ClearPicture:
 class _Smoke:
     """What the smoke of a clip is like, in sRGB values: see `_smoke_of`."""
 
-    likeness: float
+    similarity: float
     brightness: float
     brightens: Mask
 
@@ -128,7 +128,7 @@ def clear_picture(pictures: Picture, seen: Mask, noise: Noise, detail: float, ma
     grey = np.stack([blurred(channel_mean(linear_to_srgb(picture)), width) for picture in pictures])
     grey[~seen] = np.nan
     some = np.ascontiguousarray(grey[:, ::STRIDE, ::STRIDE])
-    window = max(WINDOW * peak_spread(some - median_of_seen(some)), float(LEAST_WINDOW))
+    window = max(WINDOW * peak_spread(some - median_of_seen(some)), float(MIN_WINDOW))
     smoke = _smoke_of(some, window)
     height, across = grey.shape[1:]
     brightens = np.repeat(np.repeat(smoke.brightens, STRIDE, 0), STRIDE, 1)[:height, :across]
@@ -140,7 +140,7 @@ def clear_picture(pictures: Picture, seen: Mask, noise: Noise, detail: float, ma
     for row in range(0, height, rows):
         band = slice(row, row + rows)
         image[band], known[band], calm[band], clear[:, band] = _clear_values(
-            pictures[:, band], grey[:, band], window, smoke.likeness
+            pictures[:, band], grey[:, band], window, smoke.similarity
         )
     sure, known = _known(image, known, calm, clear | ~seen, brightens, window)
     mean = sum(linear_to_srgb(picture) * shown[..., None] for picture, shown in zip(pictures, seen, strict=True))
@@ -156,12 +156,12 @@ def clear_picture(pictures: Picture, seen: Mask, noise: Noise, detail: float, ma
 
 
 def _known(image: Picture, known: Mask, calm: Mask, clear: Mask, brightens: Mask, window: float) -> tuple[Mask, Mask]:
-    """Of which pixels the background is sure, and of which it is known, from those with a certain value."""
+    """The pixels whose background is sure, and those where it is known, from those with a certain value."""
     known = in_one_piece(known)
     if known.all():
         return known, known
     # what changes by drift at most is no smoke if it is too little like its surroundings for smoke so steady
-    known = in_one_piece(known | (calm & (LEAST_CHANGE * unlike(image, known) >= window + DRIFT)))
+    known = in_one_piece(known | (calm & (MIN_CHANGE_SHARE * unlike(image, known) >= window + DRIFT)))
     if known.all():
         return known, known
     # or if it looks like them, too; that its difference is drift, and not faint smoke, is sure of a small one only
@@ -176,7 +176,7 @@ def _known(image: Picture, known: Mask, calm: Mask, clear: Mask, brightens: Mask
 def _smoke_of(grey: Picture, window: float) -> _Smoke:
     """What the smoke in grey pictures (frames, rows, columns) is like.
 
-    Its likeness is the share of pairs of successive frames of smoke that are alike within a window. Its brightness is
+    Its similarity is the share of pairs of successive frames of smoke that are alike within a window. Its brightness is
     the value that it draws every background towards; it brightens the pixels whose background is darker than that.
     """
     shape = grey.shape[1:]
@@ -189,10 +189,10 @@ def _smoke_of(grey: Picture, window: float) -> _Smoke:
     away = values - background
     smoky = np.abs(away) > window
     pairs = smoky[1:] & smoky[:-1]
-    likeness = float((np.abs(np.diff(values, axis=0)) <= window)[pairs].mean()) if pairs.any() else 0.5
+    similarity = float((np.abs(np.diff(values, axis=0)) <= window)[pairs].mean()) if pairs.any() else 0.5
     # what most frames agree on is the background for certain
     number = count_of_seen(values)
-    certain = (counts.max(0) > MOST * number) & (number >= LEAST_SEEN * len(values))
+    certain = (counts.max(0) > MIN_ALIKE_SHARE * number) & (number >= MIN_SEEN_SHARE * len(values))
     behind = push_pull(background.reshape(*shape, 1), certain.reshape(shape).astype(np.float32)).ravel()
     # there, what a codec's drift may be says nothing of smoke
     beyond = 0.5 * window + DRIFT
@@ -206,9 +206,9 @@ def _smoke_of(grey: Picture, window: float) -> _Smoke:
         if in_place.any() and np.isinf(side := _turn(behind, in_place)):
             change, turn = in_place, side
     if not change.any():
-        return _Smoke(likeness, 1.0, np.ones(shape, np.bool_))
+        return _Smoke(similarity, 1.0, np.ones(shape, np.bool_))
     thickest = np.quantile(values[change != 0], [0.01, 0.99])
-    return _Smoke(likeness, float(np.clip(turn, *thickest)), (behind <= turn).reshape(shape))
+    return _Smoke(similarity, float(np.clip(turn, *thickest)), (behind <= turn).reshape(shape))
 
 
 def _turn(background: Picture, change: Picture) -> float:
@@ -225,7 +225,9 @@ def _turn(background: Picture, change: Picture) -> float:
     return float(background[order][wrong.argmin()])
 
 
-def _clear_values(pictures: Picture, away: Picture, window: float, likeness: float) -> tuple[Picture, Mask, Mask, Mask]:
+def _clear_values(
+    pictures: Picture, away: Picture, window: float, similarity: float
+) -> tuple[Picture, Mask, Mask, Mask]:
     """The background of each pixel, linear; whether it is certain; whether it drifts only; the frames that show it.
 
     Where it is not certain it is the least smoky value. That of a pixel that drifts is its middle one. ``away`` is the
@@ -238,12 +240,12 @@ def _clear_values(pictures: Picture, away: Picture, window: float, likeness: flo
     # one value may be astray
     lowest, highest = at_rank(ordered, np.minimum(1, last)), at_rank(ordered, np.maximum(last - 1, 0))
     calm = highest - lowest <= window + DRIFT
-    often = number >= LEAST_SEEN * len(away)
+    often = number >= MIN_SEEN_SHARE * len(away)
     best = np.full(away.shape[1:], np.inf, np.float32)
     for value in away:
         inside = (away >= value) & (away <= value + np.float32(window))
         stays = (inside[1:] & inside[:-1]).sum(0)
-        by_chance = (np.maximum(alike - stays, 0) + PRIOR_PAIRS * likeness) / (
+        by_chance = (np.maximum(alike - stays, 0) + PRIOR_PAIRS * similarity) / (
             np.maximum(pairs - stays, 0) + PRIOR_PAIRS
         )
         certain = stays * np.log(np.clip(by_chance, 1e-6, 1 - 1e-6)) < np.log(FALSE_ALARM)

@@ -42,7 +42,7 @@ CACHE_BYTES = 64 * 2**20
 """Memory for the linear frames of a clip that are kept: two of 1080p."""
 
 REDUCED = 320
-"""Pixels along the longer side of the frames on which smoke and exposure are looked at."""
+"""Pixels along the longer side of the frames on which smoke and exposure are examined."""
 
 REDUCED_BYTES = 32 * 2**20
 """Memory for such frames that are kept: twenty-five at least."""
@@ -185,13 +185,13 @@ class Clip:
         ClipError
             If most frames are damaged.
         """
-        told = [self.warning] if self.warning else []
+        remarks = [self.warning] if self.warning else []
         if self.damaged:
-            told.append(
+            remarks.append(
                 f"{self.path}: {numbered([self.first + n for n in self.damaged])} missing or damaged; the last sound "
                 "frame stands in."
             )
-        return (*told, *self.notes)
+        return (*remarks, *self.notes)
 
     @cached_property
     def damaged(self) -> tuple[int, ...]:
@@ -362,7 +362,7 @@ class Clip:
         return max(1, round(width / scale)), max(1, round(height / scale))
 
     def expect(self, whole: Iterable[int] = (), perhaps: Iterable[int] = ()) -> None:
-        """Say which frames are asked for next: those met while `damaged` is found out are kept.
+        """Say which frames are asked for next: those decoded while `damaged` is determined are kept.
 
         It has no effect on a clip whose frames are `changed`.
 

@@ -16,7 +16,7 @@ Values = npt.NDArray[np.float32]
 Encoding = Literal["srgb", "linear", "hlg", "pq"]
 
 ENCODINGS: Mapping[int, Encoding] = {8: "linear", 16: "pq", 18: "hlg"}
-"""By their transfer characteristics; all others are read as sRGB, as screens show them."""
+"""Encodings by transfer characteristics; all others are read as sRGB, as screens show them."""
 
 _D65 = (0.3127, 0.3290)
 _BT709 = ((0.640, 0.330), (0.300, 0.600), (0.150, 0.060))

@@ -10,8 +10,8 @@ from av.container import InputContainer
 ENOUGH = 2**25
 """Bytes that a file is opened with: the contexts of its decoders, and some frames to know them by."""
 
-MOST_BOXES = 1000
-"""Boxes of an MP4 file that are looked at; a whole one has a handful, one in fragments its index among the first."""
+MAX_BOXES = 1000
+"""Boxes of an MP4 file that are read; a whole one has a handful, one in fragments its index among the first."""
 
 
 def open_container(path: Path, form: str | None = None, **options: str) -> InputContainer:
@@ -47,7 +47,7 @@ def lacks_index(path: Path) -> bool:
     """
     with path.open("rb") as file:
         end, start = path.stat().st_size, 0
-        for number in range(MOST_BOXES):
+        for number in range(MAX_BOXES):
             file.seek(start)
             head = file.read(16)
             if number == 0 and head[4:8] != b"ftyp":

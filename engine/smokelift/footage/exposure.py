@@ -21,8 +21,8 @@ LONGEST = 160
 USABLE = (0.005, 0.9)
 """Linear values between which a ratio says anything: below is noise, above is clipped."""
 
-FEWEST = 0.01
-"""Share of the picture that has to be usable."""
+MIN_USABLE_SHARE = 0.01
+"""Share of the picture that has to be usable, at least."""
 
 AGREEING = 1 / 3
 """Share of the usable pixels that has to show one gain."""
@@ -38,7 +38,7 @@ SPREAD = 0.06
 
 
 def gain_of(picture: Picture, background: Picture) -> Picture:
-    """Return how much brighter a picture is than its background, (3,); ones where that cannot be told or seen.
+    """Return how much brighter a picture is than its background, (3,); ones where that cannot be measured or seen.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def gain_of(picture: Picture, background: Picture) -> Picture:
     low, high = USABLE
     gains = np.ones(3, np.float32)
     usable = _all_three((background > low) & (background < high) & (picture > low) & (picture < high))
-    if usable.mean() < FEWEST:
+    if usable.mean() < MIN_USABLE_SHARE:
         return gains
     ratios = np.log(picture[usable] / background[usable])
     if _all_three(np.abs(ratios) < SAME).mean() >= UNCHANGED:
@@ -62,7 +62,7 @@ def gain_of(picture: Picture, background: Picture) -> Picture:
 def shows_exposure(background: Picture) -> bool:
     """Return whether a linear background (rows, columns, 3) is bright enough somewhere, and not too bright, to tell."""
     low, high = USABLE
-    return bool(((background > low) & (background < high)).all(-1).mean() >= FEWEST)
+    return bool(((background > low) & (background < high)).all(-1).mean() >= MIN_USABLE_SHARE)
 
 
 def largest_change(gains: Sequence[Picture]) -> float:

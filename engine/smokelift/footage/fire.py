@@ -27,7 +27,7 @@ WARM = 0.75
 DARKER = 1 / 3
 """What smoke of another colour adds to the background over what the fire adds, at most."""
 
-LEAST_FIRE, LEAST_SMOKE = 0.002, 0.1
+MIN_FIRE_SHARE, MIN_SMOKE_SHARE = 0.002, 0.1
 """Shares of the smoke's pixels that are fire, and that have another colour, at least: fire lights the smoke near it."""
 
 FAINTEST = 0.01
@@ -59,7 +59,7 @@ def fire_share(colours: Picture, behind: Picture) -> float:
     brightest = brightest_channel(colours)
     # a core that is clipped to yellow or white does not show its color
     other = ~_warm(colours) & (brightest > FAINTEST) & (brightest < CLIPPED)
-    if fire.mean() < LEAST_FIRE or other.mean() < LEAST_SMOKE:
+    if fire.mean() < MIN_FIRE_SHARE or other.mean() < MIN_SMOKE_SHARE:
         return 0.0
     added = brightest_channel(colours - behind)
     smoke, flame = np.percentile(added[other], 95), np.median(added[fire])

@@ -40,7 +40,7 @@ NEAREST, FARTHEST = 0.04, 0.5
 """How far apart the frames of a pair look, in widths of the picture: less shows nothing of the lens, of more too little
 is in both."""
 
-FEWEST = 3
+MIN_PAIRS = 3
 """Pairs from which on their spread says something."""
 
 STARTS = (0.0, -0.35, 0.35, -0.7, 0.7)
@@ -57,10 +57,10 @@ CONVERGED = 1e-4
 """Change of the logarithm of the focal length that is the last."""
 
 LONGEST_STEP = 0.2
-"""The same of a step at most."""
+"""Change of the logarithm of the focal length by a step, at most."""
 
 FARTHEST_OFF = 1.5
-"""The same in all at most: of a lens four times as long nothing is found that is to be believed."""
+"""Change of it by all steps, at most: of a lens four times as long nothing is found that is to be believed."""
 
 FINEST = 2
 """Levels on which both are fitted: the turn is known to some pixels."""
@@ -119,7 +119,7 @@ def focal_length(clip: Clip, turns: Turns) -> FocalLength | None:
         If a frame cannot be read.
     """
     pairs = [_Pair.of(clip, turns, *numbers) for numbers in _pairs(clip, turns)]
-    if len(pairs) < FEWEST:
+    if len(pairs) < MIN_PAIRS:
         return None
     same, found = max((_fitted(pairs, start) for start in STARTS), key=lambda each: each[0])
     return found if same >= EXPLAINED else None

@@ -59,7 +59,7 @@ class FrameSource(Protocol):
         ...
 
     def damaged(self, first: int, last: int, look: Look | None = None) -> tuple[int, ...]:
-        """Return which frames from one to another, both included, raise `DamagedFrameError`; look at the others."""
+        """Return which frames from one to another, both included, raise `DamagedFrameError`; others go to ``look``."""
         ...
 
     def close(self) -> None:

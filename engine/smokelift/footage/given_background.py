@@ -10,7 +10,7 @@ from smokelift.footage.images import Picture, area_average, linear_to_srgb, read
 from smokelift.footage.plate import Plates, changing_plate, known_plate
 from smokelift.scene import Background, Camera, CompleteScene, Scene, shared_part
 
-ALIKE, MOST = 8 / 255, 0.8
+ALIKE, MIN_ALIKE_SHARE = 8 / 255, 0.8
 """Difference in sRGB values up to which a pixel has a backdrop's colour, and share of the pixels that have to have it:
 the others are a nozzle, a floor, a logo."""
 
@@ -122,4 +122,4 @@ def backdrop_colour(plate: Picture) -> Picture | None:
     """Return the linear colour (3,) of a clean plate (rows, columns, 3) that has one, and None of others."""
     colour = np.asarray(np.median(plate.reshape(-1, 3), axis=0), np.float32)
     alike = (np.abs(linear_to_srgb(plate) - linear_to_srgb(colour)) <= ALIKE).all(-1)
-    return colour if alike.mean() >= MOST else None
+    return colour if alike.mean() >= MIN_ALIKE_SHARE else None

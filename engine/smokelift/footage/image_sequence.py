@@ -90,7 +90,7 @@ class ImageSequence:
                     return
 
     def damaged(self, first: int, last: int, look: Look | None = None) -> tuple[int, ...]:
-        """Return which pictures from one to another are missing or cannot be read; look at the others."""
+        """Return which pictures from one to another are missing or cannot be read; others go to ``look``."""
         return tuple(n for n in range(first, last + 1) if not self._readable(n, look))
 
     def _readable(self, n: int, look: Look | None) -> bool:

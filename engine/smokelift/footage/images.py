@@ -35,7 +35,7 @@ Edges = npt.NDArray[np.int32]
 Value = TypeVar("Value", np.float32, np.uint16)
 Number = TypeVar("Number", np.float32, np.float64)
 
-MOST_PIXELS = 2**28
+MAX_PIXELS = 2**28
 """Pixels of a picture, at most."""
 
 LONGEST_SIDE = 4096
@@ -252,7 +252,7 @@ def reduction(width: int, height: int) -> int:
 
 def _require_size(path: Path, width: int, height: int) -> None:
     """Refuse what a header says before memory is taken for it."""
-    if not (0 < width <= LARGEST_PICTURE and 0 < height <= LARGEST_PICTURE and width * height <= MOST_PIXELS):
+    if not (0 < width <= LARGEST_PICTURE and 0 < height <= LARGEST_PICTURE and width * height <= MAX_PIXELS):
         raise ImageError(f"{path}: cannot be read: it says that it has {width} x {height} pixels")
 
 
@@ -308,7 +308,7 @@ def _read_exr(path: Path) -> tuple[Picture, Picture | None]:
             _require_size(path, int(high[0]) - int(low[0]) + 1, int(high[1]) - int(low[1]) + 1)
     with _silent():
         parts = OpenEXR.File(str(path), separate_channels=True).parts
-    if not parts:  # the library's way to say that it met damaged pixels
+    if not parts:  # the library's way to say that it found damaged pixels
         raise ImageError(f"{path}: cannot be read: it is truncated or damaged")
     part = parts[0]
     left, top = (int(v) for v in part.header["displayWindow"][0])

@@ -25,8 +25,8 @@ CERTAIN_AREA = 1e-4
 SMOOTHING = 1.5
 """Standard deviation of the Gaussian that smooths the deviation, in pixels, at least."""
 
-MOST_SMOOTHING = 4.0
-"""The same at most, in noise: more hides the smoke's own shape."""
+MAX_SMOOTHING = 4.0
+"""Standard deviation of that Gaussian in noise, in pixels, at most: more hides the smoke's own shape."""
 
 FAINTEST = 1.5
 """Deviation from which on a pixel around certain smoke counts as smoke, in units of noise; with twice as much it counts
@@ -108,4 +108,4 @@ def _around_certain(deviation: Picture, threshold: float) -> npt.NDArray[np.bool
 def smoothing(noise: Noise) -> float:
     """Return the standard deviation in pixels of the Gaussian that leaves as much of white noise as lasts anyway."""
     even = float((noise.white / noise.lasting).max()) / np.sqrt(4 * np.pi)
-    return float(np.clip(even, SMOOTHING, MOST_SMOOTHING))
+    return float(np.clip(even, SMOOTHING, MAX_SMOOTHING))

@@ -41,8 +41,8 @@ LARGEST_LASTING = np.float32(4 / 255)
 SPREAD_SAMPLES, SPREAD_ROUNDS = 50_000, 25
 """Deviations that tell a spread, at most, and rounds in which it settles to a hundredth."""
 
-LEAST_SPREAD = EIGHT_BIT_STEP / 4
-"""Spread at least that is told from none: rounding to 8 bits makes as much."""
+MIN_SPREAD = EIGHT_BIT_STEP / 4
+"""Spread at least that is distinguished from none: rounding to 8 bits makes as much."""
 
 CLIPPED_MEAN = 1.1
 """Mean of normal noise whose negative half is clipped, at most, in median differences of two of its values: it is 1.02
@@ -81,7 +81,7 @@ def lasting_noise(deviation: npt.ArrayLike) -> Noise:
 
 
 EIGHT_BIT_NOISE = lasting_noise(EIGHT_BIT_STEP)
-"""Of footage that is as clean as eight bits allow."""
+"""Noise of footage that is as clean as eight bits allow."""
 
 
 def block_means(pictures: Picture) -> Picture:
@@ -155,7 +155,7 @@ def peak_spread(deviations: Picture, largest: np.float32 = LARGEST_LASTING) -> f
         weight = noise / (noise + np.float32(1 - share) * smoke)
         share = float(weight.mean())
         variance = float((weight * squares).sum() / max(float(weight.sum()), 1e-6))
-        variance = min(max(variance, float(LEAST_SPREAD**2)), float(largest**2))
+        variance = min(max(variance, float(MIN_SPREAD**2)), float(largest**2))
     return float(np.sqrt(variance))
 
 
@@ -182,7 +182,7 @@ def clipped_black(deviations: Picture, blocks: Picture) -> Picture:
     """Return how bright a noisy black is on the mean, since noise below black is clipped, in sRGB values.
 
     It is the deviation of the darkest tenth of the blocks, each at its median over time, as far as noise explains it: a
-    background that is told wrong, or smoke that fills the picture, deviates more. 0 for what is less than a step of 8
+    background that is given wrong, or smoke that fills the picture, deviates more. 0 for what is less than a step of 8
     bit video.
 
     Parameters

@@ -76,7 +76,7 @@ class WidePicture:
 
     @property
     def lens(self) -> Lens:
-        """Of the wide picture."""
+        """Lens of the wide picture."""
         x, y = self.turns.lens.centre
         return Lens(self.size, self.turns.lens.focal, (x - self.left, y - self.top))
 
@@ -95,12 +95,12 @@ class WidePicture:
         padded = Lens((width + margin, height + margin), lens.focal, (x + padding, y + padding))
         sides = [(padding, padding), (padding, padding), (0, 0)][: picture.ndim]
         matrix = _between(self.lens, self.turns.rotations[frame].inv(), padded)
-        return warped(np.pad(picture, sides, mode="edge"), matrix, self.size)
+        return reprojected(np.pad(picture, sides, mode="edge"), matrix, self.size)
 
     def part(self, picture: Picture, frame: int) -> Picture:
         """Return the part of a wide picture (rows, columns, ...) that a frame shows."""
         lens = self.turns.lens
-        return warped(picture, _between(lens, self.turns.rotations[frame], self.lens), lens.size)
+        return reprojected(picture, _between(lens, self.turns.rotations[frame], self.lens), lens.size)
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,7 +209,7 @@ def wide_samples(clip: Clip, place: WidePicture, count: int) -> tuple[Picture, n
     return samples, seen
 
 
-def warped(picture: Picture, matrix: npt.NDArray[np.float64], size: tuple[int, int]) -> Picture:
+def reprojected(picture: Picture, matrix: npt.NDArray[np.float64], size: tuple[int, int]) -> Picture:
     """Return a picture (rows, columns, ...) as a homography shows it, by cubic interpolation; 0 where it shows nothing.
 
     Parameters
@@ -223,7 +223,7 @@ def warped(picture: Picture, matrix: npt.NDArray[np.float64], size: tuple[int, i
     """
     numbers = (matrix / matrix[2, 2]).ravel()[:8]
     if picture.ndim == 3:
-        channels = [warped(picture[..., channel], matrix, size) for channel in range(picture.shape[2])]
+        channels = [reprojected(picture[..., channel], matrix, size) for channel in range(picture.shape[2])]
         return np.stack(channels, -1)
     whole = Image.fromarray(np.ascontiguousarray(picture, np.float32))
     turned = whole.transform(size, Image.Transform.PERSPECTIVE, numbers.tolist(), Image.Resampling.BICUBIC)

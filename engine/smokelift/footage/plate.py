@@ -118,7 +118,7 @@ class Plates(Protocol):
 
     @property
     def noise(self) -> Noise:
-        """Of the clip's pictures."""
+        """Noise of the clip's pictures."""
 
     def at(self, frame: int) -> Plate:
         """Return the plate of a frame, counted from 0."""
@@ -157,10 +157,10 @@ def known_plate(background: npt.ArrayLike, clip: Clip, sample_count: int = 32) -
     image = area_average(linear, width, height)
     confidence = np.ones((height, width), np.float32)
     deviations, blocks = _deviations(Plate(image, confidence, lasting_noise(0.0)), clip, sample_count)
-    told = linear_to_srgb(image)
-    raised = np.maximum(told, clipped_black(deviations, blocks)) - told
+    given = linear_to_srgb(image)
+    raised = np.maximum(given, clipped_black(deviations, blocks)) - given
     if raised.any():
-        image = srgb_to_linear(told + raised)
+        image = srgb_to_linear(given + raised)
         deviations, blocks = deviations - some_blocks(raised), blocks - block_means(raised[None])
     noise = noise_about(deviations, blocks)
     if raised.any():

@@ -18,7 +18,7 @@ from av.sidedata.sidedata import Type as SideData
 from smokelift.footage.container import open_container
 
 FRAMES = 21
-"""Frames at the start of a file whose quantisers are looked at."""
+"""Frames at the start of a file whose quantisers are read."""
 
 COARSE = 42.0
 """Quantiser from which on faint smoke is taken for background, in front of one of more than one colour. Before a brick
@@ -48,10 +48,10 @@ def median_quantiser(path: Path) -> float | None:
             if stream is None or stream.codec_context is None or stream.codec_context.name != CODEC:
                 return None
             stream.codec_context.options = {"export_side_data": "venc_params"}
-            told = [_mean_quantiser(frame) for frame in islice(container.decode(stream), FRAMES)]
+            found = [_mean_quantiser(frame) for frame in islice(container.decode(stream), FRAMES)]
     except (av.FFmpegError, ValueError):
         return None
-    means = [mean for mean in told if mean is not None]
+    means = [mean for mean in found if mean is not None]
     return float(np.median(means)) if means else None
 
 
@@ -61,11 +61,11 @@ def _mean_quantiser(frame: av.VideoFrame) -> float | None:
     side = sides.get(SideData.VIDEO_ENC_PARAMS)
     if side is None:
         return None
-    told = bytes(side)
-    header = np.frombuffer(told, HEADER, 1)[0]
+    data = bytes(side)
+    header = np.frombuffer(data, HEADER, 1)[0]
     if header["scale"] != H264:
         return None
     count, start, size = (int(header[name]) for name in ("blocks", "offset", "size"))
-    blocks = np.frombuffer(told, np.uint8, count * size, start).reshape(count, size)
+    blocks = np.frombuffer(data, np.uint8, count * size, start).reshape(count, size)
     differences = np.ascontiguousarray(blocks[:, DIFFERENCE : DIFFERENCE + 4]).view(np.int32)
     return float(header["quantiser"]) + float(differences.mean() if count else 0)

@@ -38,17 +38,17 @@ MOVED = 0.5
 MOVING_FRAMES = 0.1
 """Share of the frames that have to: a knock is not worth a mosaic."""
 
-FIRST_LOOKS = 12
-"""Frames that are looked at first: less than `MOVING_FRAMES` of a clip lie between two of them."""
+FIRST_FRAMES = 12
+"""Frames that are examined first: less than `MOVING_FRAMES` of a clip lie between two of them."""
 
-LEAST = 1.0
+MIN_OFFSET = 1.0
 """Pixels that the picture has to be off its mean place in some frame: less blurs it no more than a lens does."""
 
 IN_KEY = 0.6
 """Share of the key frame's points that have to be in a picture that is laid on it."""
 
 BEYOND = 24
-"""Frames of the file before a clip, and as many after it, that are looked at: the 32 of a plate are chosen of them."""
+"""Frames of the file before a clip, and as many after it, that are examined: the 32 of a plate are chosen of them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +123,7 @@ def find_turns(clip: Clip, *lenses: Lens) -> Turns | None:
     found[middle] = _Found(Rotation.identity(), 1.0, 1.0)
     rotations = Rotation.concatenate([found[number].turn for number in range(len(clip))])
     turns = Turns(lens, rotations.mean().inv() * rotations)
-    return turns if turns.farthest >= LEAST else None
+    return turns if turns.farthest >= MIN_OFFSET else None
 
 
 def file_turns(clip: Clip, turns: Turns) -> dict[int, Rotation]:
@@ -156,8 +156,8 @@ def file_turns(clip: Clip, turns: Turns) -> dict[int, Rotation]:
 
 
 def _stands_still(clip: Clip, lens: Lens) -> bool:
-    """Whether none of the frames that are looked at shows more of the same once it is turned."""
-    numbers = clip.spread(FIRST_LOOKS)
+    """Whether none of the frames that are examined shows more of the same once it is turned."""
+    numbers = clip.spread(FIRST_FRAMES)
 
     def seen(number: int) -> Picture:
         return clip.area_average(number, *level_size(lens))

@@ -35,7 +35,7 @@ from smokelift.footage.colour import ENCODINGS, Encoding, primaries_name, to_bt7
 from smokelift.footage.container import lacks_index, open_container
 from smokelift.footage.frame_source import DEFAULT_FPS, ClipError, DamagedFrameError, Look
 from smokelift.footage.images import (
-    MOST_PIXELS,
+    MAX_PIXELS,
     CodedPicture,
     Picture,
     Transfer,
@@ -115,11 +115,11 @@ class Video:
             self._container.close()
             raise ClipError(f"{self._path}: holds video of a kind that cannot be decoded")
         width, height = self._stream.width, self._stream.height
-        if max(width, height) > LARGEST_PICTURE or not 0 < width * height <= MOST_PIXELS:
+        if max(width, height) > LARGEST_PICTURE or not 0 < width * height <= MAX_PIXELS:
             self._container.close()
             raise ClipError(
                 f"{self._path}: has pictures of {width} x {height} pixels; those that are read have 1 to "
-                f"{LARGEST_PICTURE} along a side and at most {MOST_PIXELS} in all"
+                f"{LARGEST_PICTURE} along a side and at most {MAX_PIXELS} in all"
             )
         # A decoder of several frames at once takes sound ones along when one fails.
         self._stream.thread_type = "SLICE" if self._failed else "AUTO"
@@ -188,7 +188,7 @@ class Video:
         self._start()
 
     def _drop_undecodable_end(self) -> None:
-        """Cut the index after the last frame that decodes, looking at the end only."""
+        """Cut the index after the last frame that decodes, reading the end only."""
         while self._times:
             try:
                 self._decode(len(self._times) - 1)
@@ -265,7 +265,7 @@ class Video:
         return CodedPicture(upright, code_values(np.iinfo(codes.dtype).max, self._encoding(), _white(frame)))
 
     def damaged(self, first: int, last: int, look: Look | None = None) -> tuple[int, ...]:
-        """Return which frames from one to another cannot be decoded; look at the others, at some twice."""
+        """Return which frames from one to another cannot be decoded; others go to ``look``, some twice."""
         wanted = [self._times[self._shown[n]] for n in range(first, last + 1)]
         if not self._keys:
             return ()  # they were counted by decoding them
@@ -273,7 +273,7 @@ class Video:
         for n, time in enumerate(wanted, first):
             numbers.setdefault(time, []).append(n)
 
-        def met(time: int, frame: av.VideoFrame) -> None:
+        def pass_on(time: int, frame: av.VideoFrame) -> None:
             for n in numbers.get(time, ()):
                 if look is not None:
                     look(n, lambda divisor: self._shown_by(frame, divisor))
@@ -281,10 +281,10 @@ class Video:
         from_start = self._failed and wanted[0] == self._times[0]  # and one frame at a time
         self._container.seek(wanted[0], stream=self._stream)
         self._decoded = self._frames()
-        good = self._good_times(wanted[-1], met)
+        good = self._good_times(wanted[-1], pass_on)
         if not (from_start or good.issuperset(wanted)):  # as in `_decode`
             self._rewind()
-            good |= self._good_times(wanted[-1], met)
+            good |= self._good_times(wanted[-1], pass_on)
         damaged = tuple(first + n for n, time in enumerate(wanted) if time not in good)
         if damaged or self._failed:
             self._rewind()
@@ -293,13 +293,13 @@ class Video:
         self._lost.update(self._shown[n] for n in damaged)
         return damaged
 
-    def _good_times(self, last: int, met: Callable[[int, av.VideoFrame], None]) -> set[int]:
-        """Times of the frames that can be decoded from where the container stands, up to one; each of them is met."""
+    def _good_times(self, last: int, pass_on: Callable[[int, av.VideoFrame], None]) -> set[int]:
+        """Times of the frames that can be decoded from where the container stands, up to one; each is passed on."""
         good = set()
         for frame in self._decoded:
             if frame.pts is not None and not frame.is_corrupt:
                 good.add(frame.pts)
-                met(frame.pts, frame)
+                pass_on(frame.pts, frame)
             if frame.pts is not None and frame.pts >= last:
                 break
         return good

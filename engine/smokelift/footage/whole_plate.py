@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.footage.behind_smoke import MOST_DETAIL
+from smokelift.footage.behind_smoke import DETAIL_QUANTILE
 from smokelift.footage.clear_picture import ClearPicture
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import Edges, Picture, area_average, linear_to_srgb, srgb_to_linear
 from smokelift.footage.proxy import Proxy
 
 STEP = 2
-"""Every so manieth frame is read whole: half of those that are looked at."""
+"""Every so manieth frame is read whole: half of those that are examined."""
 
 AROUND = 16
 """Pixels of the proxy around what is unknown whose detail bounds that of the unknown."""
@@ -47,23 +47,23 @@ def whole_plate(clip: Clip, proxy: Proxy, gains: Picture, found: ClearPicture) -
     if found.image.shape[1::-1] == clip.size:
         return found.image
     shown = (found.clear & found.known)[::STEP]
-    told = shown.any(0)
-    whole = _mean(clip, proxy.numbers[::STEP], gains[::STEP], np.where(told, shown, True))
-    if told.all():
+    known = shown.any(0)
+    whole = _mean(clip, proxy.numbers[::STEP], gains[::STEP], np.where(known, shown, True))
+    if known.all():
         return whole
-    rows, columns = (np.flatnonzero(~told.all(axis)) for axis in (1, 0))
+    rows, columns = (np.flatnonzero(~known.all(axis)) for axis in (1, 0))
     (top, down), (left, right) = (
         (max(0, int(lines[0]) - AROUND), min(n, int(lines[-1]) + 1 + AROUND))
-        for lines, n in ((rows, told.shape[0]), (columns, told.shape[1]))
+        for lines, n in ((rows, known.shape[0]), (columns, known.shape[1]))
     )
     small = np.s_[top:down, left:right]
-    y, x = (_edges(*sizes) for sizes in zip(told.shape, clip.size[::-1], strict=True))
+    y, x = (_edges(*sizes) for sizes in zip(known.shape, clip.size[::-1], strict=True))
     part = np.s_[y[top] : y[down], x[left] : x[right]]
     size = x[right] - x[left], y[down] - y[top]
     mean = linear_to_srgb(whole[part])
     detail = mean - area_average(area_average(mean, right - left, down - top), *size)
-    clearly = spread_out(told, clip.size)[part]
-    most = np.quantile(np.abs(detail[clearly]), MOST_DETAIL, axis=0) if clearly.any() else np.zeros(3, np.float32)
+    clearly = spread_out(known, clip.size)[part]
+    most = np.quantile(np.abs(detail[clearly]), DETAIL_QUANTILE, axis=0) if clearly.any() else np.zeros(3, np.float32)
     detail = np.clip(detail * spread_out(found.contrast, clip.size)[part][..., None], -most, most)
     filled = srgb_to_linear(np.maximum(area_average(linear_to_srgb(found.image[small]), *size) + detail, 0))
     whole[part] = np.where(clearly[..., None], whole[part], filled)

@@ -62,8 +62,8 @@ def coded(
         stream = out.add_stream(codec, rate=24)
         stream.height, stream.width = plate.shape[:2]
         stream.pix_fmt = "yuv420p"
-        told = options if qp is None else {"qp": qp, **options}
-        stream.options = {name: str(value) for name, value in told.items()}
+        given = options if qp is None else {"qp": qp, **options}
+        stream.options = {name: str(value) for name, value in given.items()}
         for n in range(COUNT):
             alpha = np.clip(opacity(n), 0.0, 1.0)[..., None]
             codes = np.rint(255 * linear_to_srgb(plate * (1.0 - alpha) + colour * alpha)).astype(np.uint8)

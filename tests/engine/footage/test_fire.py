@@ -1,4 +1,4 @@
-"""Fire is told from coloured smoke, and smoke is continued over it."""
+"""Fire is distinguished from coloured smoke, and smoke is continued over it."""
 
 from pathlib import Path
 

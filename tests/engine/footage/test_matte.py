@@ -9,7 +9,7 @@ import pytest
 from films import HEIGHT, WIDTH, film, overlap, plate_of, wall
 
 from smokelift.footage.images import srgb_to_linear
-from smokelift.footage.matte import FAINTEST, MOST_SMOOTHING, SMOOTHING, matte, smoothing
+from smokelift.footage.matte import FAINTEST, MAX_SMOOTHING, SMOOTHING, matte, smoothing
 from smokelift.footage.noise import Noise, lasting_noise
 from smokelift.footage.plate import Plate, known_plate
 from smokelift.footage.steady import without_noise_light
@@ -41,8 +41,8 @@ def test_noise_is_smoothed_as_far_as_that_helps() -> None:
     """Clean pictures stay sharp; noise that neighbours share is not lessened by it."""
     codes = np.full(3, 1 / 255, np.float32)
     assert smoothing(lasting_noise(0.1)) == smoothing(Noise(2 * codes, codes)) == SMOOTHING
-    assert SMOOTHING < smoothing(Noise(10 * codes, codes)) < MOST_SMOOTHING
-    assert smoothing(Noise(50 * codes, codes)) == MOST_SMOOTHING
+    assert SMOOTHING < smoothing(Noise(10 * codes, codes)) < MAX_SMOOTHING
+    assert smoothing(Noise(50 * codes, codes)) == MAX_SMOOTHING
 
 
 def test_faint_smoke_is_seen_in_noise(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""The noise of a clip, told from what cannot be smoke."""
+"""The noise of a clip, measured on what cannot be smoke."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from turning_camera import COUNT, LENS, SIZE, Frames, clip_of, pan, pictures, sh
 from smokelift.footage.clip import Clip
 from smokelift.footage.mask import Mask, Masked
 from smokelift.footage.matte import matte
-from smokelift.footage.panorama import WidePicture, estimate_panorama, warped
+from smokelift.footage.panorama import WidePicture, estimate_panorama, reprojected
 from smokelift.footage.turning import Turns
 
 
@@ -90,7 +90,7 @@ def test_what_a_mask_hides_in_some_frames_comes_from_the_others(tmp_path: Path) 
 def test_a_homography_of_whole_pixels_copies() -> None:
     """Pixel centres are at half integers."""
     picture = np.random.default_rng(0).random((20, 30, 3)).astype(np.float32)
-    moved = warped(picture, np.array([[1.0, 0, 3], [0, 1, 2], [0, 0, 1]]), (30, 20))
+    moved = reprojected(picture, np.array([[1.0, 0, 3], [0, 1, 2], [0, 0, 1]]), (30, 20))
     np.testing.assert_allclose(moved[:18, :27], picture[2:, 3:], atol=1e-6)
     assert not moved[18:].any()
 

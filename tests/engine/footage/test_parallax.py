@@ -38,7 +38,7 @@ def test_a_camera_that_hardly_travels_is_not() -> None:
 
 
 def test_smoke_before_a_wall_is_no_travel() -> None:
-    """The wall that shows through stands still, even where the smoke leaves too little of it for a turn to be told."""
+    """The wall that shows through stands still, even where the smoke leaves too little of it to estimate a turn."""
     frames, _ = pictures(wall(), Rotation.identity(COUNT), smoke=1.0)
     assert not travels(clip_of(frames), LENS, range(COUNT))
 

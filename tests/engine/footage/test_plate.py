@@ -97,7 +97,7 @@ def test_a_background_that_is_told_wrong_stays_as_it_is_told(tmp_path: Path) -> 
 
 
 def test_detailed_smoke_over_most_of_the_picture_is_no_noise(tmp_path: Path) -> None:
-    """It brightens black pixels, and neighbours differ; but some pixels show the black as it is told."""
+    """It brightens black pixels, and neighbours differ; but some pixels show the black as it is given."""
     texture = np.random.default_rng(0).uniform(0.2, 1.0, (HEIGHT, WIDTH))
     texture[:, : WIDTH // 5] = 0
     plate = known_plate((0.0, 0.0, 0.0), film(tmp_path, np.zeros((HEIGHT, WIDTH, 3)), lambda n: texture, 0.5, 0.0))

@@ -36,12 +36,12 @@ def test_the_smoke_of_no_frame_is_lost(tmp_path: Path) -> None:
         assert overlap(matte(found.frame(n), plate).mask, puff(n) > 0.05) > 0.7
 
 
-def test_frames_whose_exposure_is_known_are_not_looked_at(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_frames_whose_exposure_is_known_are_not_examined(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     truth = wall(0.2, 0.5)
     clip = film(tmp_path, truth, puff, 0.6)
     known = {2: np.ones(3, np.float32), 3: np.full(3, 2, np.float32)}
     even = steady(clip, known_plate(truth, clip), known)
-    monkeypatch.setattr("smokelift.footage.clip._small", lambda _: pytest.fail("looked at"))
+    monkeypatch.setattr("smokelift.footage.clip._small", lambda _: pytest.fail("examined"))
     assert np.array_equal(even.frame(2), clip.frame(2))
     assert np.array_equal(even.frame(3), clip.frame(3) / 2)
     with pytest.raises(pytest.fail.Exception):

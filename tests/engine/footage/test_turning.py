@@ -32,7 +32,7 @@ def test_a_still_camera_stays_still(smoke: float, noise: float) -> None:
 
 
 def test_some_frames_prove_that_a_camera_stands_still(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Most are not looked at."""
+    """Most are not examined."""
     frames, _ = pictures(wall(), Rotation.identity(COUNT), smoke=1.0)
     clip, looks = clip_of(np.repeat(frames, 4, axis=0)), set[int]()
     monkeypatch.setattr(clip, "frame", lambda n, frame=clip.frame: looks.add(n) or frame(n))
