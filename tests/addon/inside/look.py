@@ -103,7 +103,7 @@ def test_a_preset_needs_our_material(lit, tmp_path) -> None:
 def test_edges_and_density(lit, tmp_path, name, value, least, most) -> None:
     """Edge contrast acts where smoke is thin; below 1 thin smoke is seen better."""
     lit.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0.0
-    lit.cycles.samples = 512
+    lit.cycles.samples = 4096
     volume.show(smoke(lit), made(tmp_path, medium=Medium(0.02, 0.8)))  # so thin that all of it is an edge
     before = rendered(lit, tmp_path / "before.exr").sum()
     node(lit).inputs[name].default_value = value
@@ -167,7 +167,7 @@ def test_fire_is_as_bright_as_the_grid_says_in_the_color_of_the_clip(lit, tmp_pa
     """Radiance per metre: 4 of it along 0.25 m are 1, in smoke that hides nothing."""
     lit.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0.0
     bpy.data.objects["Sun"].hide_render = True
-    lit.cycles.samples = 512
+    lit.cycles.samples = 4096
     take = made(tmp_path, medium=Medium(1e-4, 0.8, flame_color=(1.0, 0.4, 0.1)))
     file = take.directory / "smoke_0003.vdb"
     grids, metadata = vdb_module().readAll(str(file))
