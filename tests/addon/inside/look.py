@@ -103,7 +103,7 @@ def test_a_preset_needs_our_material(lit, tmp_path) -> None:
 def test_edges_and_density(lit, tmp_path, name, value, least, most) -> None:
     """Edge contrast acts where smoke is thin; below 1 thin smoke is seen better."""
     lit.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0.0
-    lit.cycles.samples = 4096
+    lit.cycles.samples = 512
     volume.show(smoke(lit), made(tmp_path, medium=Medium(0.02, 0.8)))  # so thin that all of it is an edge
     before = rendered(lit, tmp_path / "before.exr").sum()
     node(lit).inputs[name].default_value = value
