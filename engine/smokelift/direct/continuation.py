@@ -48,9 +48,9 @@ DISSOLVED = "dissolved"
 SMALLEST_EDDY = 3
 """Voxels across an eddy, at least: fewer do not show that it turns."""
 
-
 ROOM = 8.0
-"""Usual room for the smoke, in the clip's boxes: what a minute of wind of the smoke's own speed fills."""
+"""Usual room for the smoke, in the clip's boxes: two seconds of wind, of a fan and around a ball fill 4 to 6
+(docs/directing.md)."""
 
 
 @dataclass(frozen=True)
@@ -167,16 +167,18 @@ def _simulated(
     # the first frame has no velocity of its own
     moments = [read_moment(sequence, number) for number in kept[1:][-FITTED_MOMENTS:]]
     simulation = fit_simulation(moments, dt, sequence.scene.inflow(), _surroundings(continuation, clip, clip))
-    moment, state = spun_up(simulation, moments), writer.state
-    del moments  # they are large
-    moment = replace(moment, velocity=replace(moment.velocity, closed=growth.closed))
-    cut = cut_sides(moment)
-    box, larger = clip, _start_box(continuation, growth)
+    cut = cut_sides(moments[-1].density, growth.closed)
+    state = writer.state
     if state is not None and state.number > start:
         box = writer.box(state.number)
         moment = _resumed(state, box, growth.closed)
         larger = growth.after(box, moment, dt)
         simulation = simulation.in_larger_box(moves(clip, box), _surroundings(continuation, box, clip))
+    else:
+        box, larger = clip, _start_box(continuation, growth)
+        moment = spun_up(simulation, moments)
+        moment = replace(moment, velocity=replace(moment.velocity, closed=growth.closed))
+    del moments  # they are large
     for step in range(1, continuation.frames + 1):
         number = start + step
         if number in writer.finished:

@@ -28,6 +28,7 @@ from smokelift.direct.physics import Physics
 from smokelift.direct.simulation import Simulation
 from smokelift.direct.surroundings import Surroundings
 from smokelift.transport import Array, Velocity, advect
+from smokelift.velocity.pyramid import coarsen, coarsen_faces
 
 COARSE = 64
 """Voxels along the longest side, at most, of the grid that the buoyancy is fitted on: a centre needs no more."""
@@ -101,7 +102,7 @@ def _buoyancy(moments: Sequence[Moment], dt: float, inlets: Mask, dissipation: f
     if len(moments) < MIN_MOMENTS or not all(moment.density.any() for moment in moments):
         return 0.0
     while max(moments[0].density.shape) > COARSE:
-        moments, inlets = [_halved(moment) for moment in moments], _any_of_two(inlets)
+        moments, inlets = [_halved(moment) for moment in moments], coarsen(inlets.astype(np.float32)) > 0
     half = len(moments) // 2
     still = Simulation(Physics(0.0, dissipation), Inflow(inlets, moments).cropped(), Surroundings(), dt)
     goal = _height(moments[-1].density)
@@ -124,15 +125,14 @@ def _root(function: Callable[[float], float], start: float) -> float:
 
     Of the package's libraries `scipy.optimize` alone is not in the extension.
     """
-    before, now = 0.0, start
-    at_before, at_now = function(before), function(now)
+    before, at_before, now = 0.0, function(0.0), start
     for _ in range(TRIALS):
+        at_now = function(now)
         if abs(at_now - at_before) <= FLAT:
             return 0.0
         before, now, at_before = now, now - at_now * (now - before) / (at_now - at_before), at_now
         if abs(now - before) <= PRECISION * abs(now):
             break
-        at_now = function(now)
     return now
 
 
@@ -154,29 +154,6 @@ def _height(density: Array) -> float:
 
 
 def _halved(moment: Moment) -> Moment:
-    """The moment on a grid half as fine: means of the density, and of the velocity through the larger faces."""
-    faces = []
-    for axis, component in enumerate(moment.velocity.faces):
-        even = np.pad(component, [(0, count % 2) for count in moment.density.shape], mode="edge")
-        for other in range(3):
-            even = _pairs(even, other) if other != axis else even.take(range(0, even.shape[axis], 2), axis)
-        faces.append(np.ascontiguousarray(even))
-    density = np.pad(moment.density, [(0, count % 2) for count in moment.density.shape])
-    for axis in range(3):
-        density = _pairs(density, axis)
-    velocity = moment.velocity
-    x, y, z = faces
-    return Moment(np.ascontiguousarray(density), Velocity((x, y, z), 2 * velocity.voxel_size, velocity.closed))
-
-
-def _pairs(values: Array, axis: int) -> Array:
-    """Means of pairs along an axis of even length."""
-    count = values.shape[axis]
-    return 0.5 * (values.take(range(0, count, 2), axis) + values.take(range(1, count, 2), axis))
-
-
-def _any_of_two(mask: Mask) -> Mask:
-    """Whether any of two voxels of a mask (nx, ny, nz) along every axis is marked."""
-    for axis in range(3):
-        mask = np.logical_or.reduceat(mask, range(0, mask.shape[axis], 2), axis)
-    return mask
+    """The moment on a grid half as fine."""
+    coarse = coarsen_faces(moment.velocity)
+    return Moment(coarsen(moment.density), Velocity(coarse.faces, coarse.voxel_size, coarse.closed))

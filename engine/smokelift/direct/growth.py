@@ -177,6 +177,8 @@ def dissolved(moment: Moment, stopped: tuple[Side, ...], dt: float, first: tuple
     first
         Voxel at which the box begins, counted from the clip's box: the bumps stay where they are when the box grows.
     """
+    if not stopped:
+        return moment
     left = np.ones((), np.float32)
     shape = moment.density.shape
     for side, axis, is_high in _open(()):
@@ -233,10 +235,10 @@ def emerged(moment: Moment, clip: tuple[slice, ...], cut: tuple[Side, ...], step
     return _thinned(moment, left)
 
 
-def cut_sides(moment: Moment) -> tuple[Side, ...]:
-    """The sides of a moment's box at which there is smoke."""
-    seen = moment.density > SEEN * moment.density.max()
-    return tuple(side for side, axis, is_high in _open(moment.velocity.closed) if seen.take(-is_high, axis).any())
+def cut_sides(density: Array, closed: tuple[Side, ...]) -> tuple[Side, ...]:
+    """The sides of the box of a density (nx, ny, nz), but for the walls, at which there is smoke."""
+    seen = density > SEEN * density.max()
+    return tuple(side for side, axis, is_high in _open(closed) if seen.take(-is_high, axis).any())
 
 
 def _thinned(moment: Moment, left: Array) -> Moment:

@@ -7,6 +7,9 @@ from collections.abc import Iterator
 import pytest
 
 from smokelift import _core
+from smokelift.direct import open_source
+from smokelift.output.sequence import Sequence
+from tests.engine.direct.rising import write_plume
 
 
 @pytest.fixture(autouse=True)
@@ -15,3 +18,11 @@ def one_thread() -> Iterator[None]:
     _core.set_threads(1)
     yield
     _core.set_threads(0)
+
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory: pytest.TempPathFactory) -> Sequence:
+    """The plume as a sequence that is directed."""
+    directory = tmp_path_factory.mktemp("source") / "smoke"
+    write_plume(directory)
+    return open_source(directory)

@@ -11,13 +11,6 @@ from smokelift.output.sequence import Sequence
 from tests.engine.direct.rising import plume, write_plume
 
 
-@pytest.fixture(scope="module")
-def source(tmp_path_factory):
-    directory = tmp_path_factory.mktemp("source") / "smoke"
-    write_plume(directory)
-    return open_source(directory)
-
-
 def run(source, out, continuation, **options):
     return [number for number, _ in continue_sequence(source, out, continuation, npz=True, **options)]
 

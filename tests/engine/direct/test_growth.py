@@ -23,16 +23,9 @@ from smokelift.direct.surroundings import Surroundings
 from smokelift.output.sequence import Sequence
 from smokelift.scene import PointLight
 from smokelift.transport import Velocity, advect
-from tests.engine.direct.rising import DOMAIN, DT, SCENE, at_rest, blob, write_plume
+from tests.engine.direct.rising import DOMAIN, DT, SCENE, at_rest, blob
 
 ROOMY = Growth(DOMAIN, ("z-",), 20 * DOMAIN.resolution[0] * DOMAIN.resolution[1] * DOMAIN.resolution[2])
-
-
-@pytest.fixture(scope="module")
-def source(tmp_path_factory):
-    directory = tmp_path_factory.mktemp("source") / "smoke"
-    write_plume(directory)
-    return open_source(directory)
 
 
 def run(source, out, continuation, **options):
@@ -122,7 +115,7 @@ def test_the_end_of_smoke_that_dissolves_is_not_straight():
 def test_smoke_that_the_clip_cut_comes_out_thinly_at_first():
     larger = DOMAIN.grown((0, 0, 0), (0, 0, 8))
     cut = np.ones(DOMAIN.shape, np.float32)
-    assert cut_sides(at_rest(cut)) == ("x-", "x+", "y-", "y+", "z+")
+    assert cut_sides(cut, ("z-",)) == ("x-", "x+", "y-", "y+", "z+")
     velocity = Velocity.zero(larger.shape, larger.voxel_size, ("z-",))
     x, y, z = velocity.faces
     z[:, :, 1:] = larger.voxel_size / DT
