@@ -21,7 +21,6 @@ from .panel import draw_text
 from .paths import PATH_OPTIONS, absolute
 from .smoke import active_smoke, find_smoke
 from .subpanel import OfResult, redraw
-from .wording import in_panel
 
 TICK_SECONDS = 0.1
 REST_SECONDS = 0.4
@@ -130,9 +129,9 @@ class _Session:
         self.job = None
         done = job.outcome == "done"
         if not self.operator:
-            self.size = iface_("About {:s}").format(megabytes(job.details["size"])) if done else in_panel(job.sentence)
+            self.size = iface_("About {:s}").format(megabytes(job.details["size"])) if done else job.sentence
             return None
-        self.sentence = in_panel(job.sentence)
+        self.sentence = job.sentence
         smoke = find_smoke(self.smoke)
         if smoke is None or not done:
             return None
@@ -230,7 +229,7 @@ class _Writes(NeedsResult):
         while _session.poll() is not None:
             time.sleep(TICK_SECONDS)
         if job.outcome != "done":
-            self.report({"ERROR"}, in_panel(job.sentence))
+            self.report({"ERROR"}, job.sentence)
             return {"CANCELLED"}
         return {"FINISHED"}
 

@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import IO, Any, Literal
 
 from .contract import CANCELLED
+from .sentences import sentence
 
 Outcome = Literal["waiting", "running", "done", "failed", "cancelled"]
 ENDED: tuple[Outcome, ...] = ("done", "failed", "cancelled")
@@ -216,7 +217,7 @@ class Job:
     def _handle(self, event: str, message: dict[str, Any]) -> bool:
         match event:
             case "note":
-                self.notes.append(str(message["text"]))
+                self.notes.append(sentence(message))
                 if self.done:
                     self.warnings.append(self.notes[-1])
                 self._write_log(self.notes[-1])
@@ -227,7 +228,7 @@ class Job:
                 self.seconds_left = float(message["seconds_left"])
                 self._write_log(f"frame {message['frame']}: {self.done} of {self.total}")
             case "done":
-                self.sentence, self.details = str(message["text"]), message
+                self.sentence, self.details = sentence(message), message
                 self._write_log(self.sentence)
             case "error":
                 self._error = str(message["text"])

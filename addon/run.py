@@ -13,7 +13,6 @@ from .smoke import find_smoke
 from .smoke_takes import show_while_made
 from .subpanel import redraw
 from .take import Take, TakeError
-from .wording import in_panel
 
 TICK_SECONDS = 0.1
 """Between two checks of the engine."""
@@ -178,8 +177,8 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
     def _update_row(self, row: bpy.types.PropertyGroup, job: Job) -> None:
         """Show a job's progress in the panel."""
         new_frames = job.done != row.done
-        row.outcome, row.sentence = job.outcome, in_panel(job.sentence)
-        row.warnings = "\n".join(map(in_panel, job.warnings))
+        row.outcome, row.sentence = job.outcome, job.sentence
+        row.warnings = "\n".join(job.warnings)
         row.done, row.total = job.done, job.total
         row.seconds_left = -1.0 if job.seconds_left is None else job.seconds_left
         if new_frames or job.ended:
@@ -203,7 +202,7 @@ class SMOKELIFT_OT_work(bpy.types.Operator):
                 # an undo to a step before new objects leaves Blender with dangling pointers
                 bpy.ops.ed.undo_push(message="Make Smoke")
             if job.ended:
-                self.report({"ERROR" if job.outcome == "failed" else "INFO"}, in_panel(job.sentence))
+                self.report({"ERROR" if job.outcome == "failed" else "INFO"}, job.sentence)
 
     def _thumbnail(self, take: Take) -> int:
         """The icon of the take's thumbnail; 0 if there is none."""

@@ -17,7 +17,6 @@ from .job import EngineMissingError, Job, engine_command
 from .scene_file import options, shot_tables
 from .smoke import active_smoke, find_smoke
 from .take import Take, TakeError
-from .wording import in_panel
 
 TICKS = 4
 """Ticks of `run.TICK_SECONDS` without a change of settings before the engine checks the shot."""
@@ -48,7 +47,7 @@ def found_lines(facts: Iterable[Mapping[str, str]]) -> list[str]:
         The engine's, each with ``what`` it is about and its ``value``.
     """
     shown = [(WORDS[fact["what"]], fact["value"].partition(",")[0]) for fact in facts if fact["what"] in WORDS]
-    short = (("box of ", ""), (" of the box", ""), ("colour", "color"))
+    short = (("box of ", ""), (" of the box", ""))
     lines = []
     for word, value in shown:
         for long, brief in short:
@@ -113,7 +112,7 @@ class ShotCheck:
         job, self._job = self._job, None
         details = job.details
         state.check_done = job.outcome == "done"
-        state.check_error = "" if state.check_done else in_panel(job.sentence)
+        state.check_error = "" if state.check_done else job.sentence
         state.notes = "\n".join(found_lines(details.get("facts", ())))
         if state.check_done:
             keep_costs(state, state.check_smoke, details)

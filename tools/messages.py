@@ -17,8 +17,8 @@ ROOT = Path(__file__).resolve().parents[1]
 GAP = "…"
 """Stands for what a message fills in: a path, a number, a name."""
 
-_FIELD = re.compile(r"\{:[^{}]*\}")
-"""What `str.format` fills in, in sentences that are translated first."""
+_FIELD = re.compile(r"\{\w*(?::[^{}]*)?\}")
+"""What `str.format` fills in, in sentences of a table or that are translated first."""
 
 SPEAKERS = {"fail", "note", "report", "error", "unexpected", "warn"}
 """Functions that say their first argument to the user; classes of exceptions do so as well."""
@@ -30,6 +30,7 @@ TOPICS = {
     "Command line": ("engine/smokelift/app", "engine/smokelift_command"),
     "Clip and background": ("engine/smokelift/footage",),
     "Scene file": ("engine/smokelift/checks", "engine/smokelift/scene"),
+    "Shot and result": ("engine/smokelift/report",),
     "Set-up of the shot": ("engine/smokelift/setup",),
     "Density and rendering": ("engine/smokelift/density", "engine/smokelift/render"),
     "Velocity and transport": ("engine/smokelift/velocity", "engine/smokelift/transport", "engine/smokelift/pipeline"),

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from av.video.reformatter import Interpolation
 from scipy import ndimage
 
+from smokelift.checks import Remark
 from smokelift.footage.alignment import Lens
 from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import Look
@@ -130,12 +131,12 @@ class Case:
 class Frames:
     """Frames in memory; a `smokelift.footage.frame_source.FrameSource`."""
 
-    warning: str | None = None
+    warning: Remark | None = None
     lens: float | None = None
     backdrop: float | None = None
     fps = FPS
     files: tuple[Path, ...] = ()
-    notes: tuple[str, ...] = ()
+    notes: tuple[Remark, ...] = ()
 
     def __init__(self, codes: npt.NDArray[np.uint8]) -> None:
         self.codes, self.count = codes, len(codes)

@@ -25,7 +25,7 @@ from smokelift.footage.clip import Clip
 from smokelift.footage.fire import fire_share
 from smokelift.footage.images import Picture
 from smokelift.footage.plate import known_plate
-from smokelift.setup.choice import UNDETERMINED
+from smokelift.setup.estimate import UNDETERMINED
 from smokelift.setup.smoke import sample_smoke
 from smokelift.setup.source import smoke_colour, source_radiance
 from smokelift.setup.thickness import smoke_thickness
@@ -98,8 +98,8 @@ def _angles(smokes: Mapping[str, Smoke], light: Array, colour: Array, plate: Pic
     behind: Picture = (plate * light).astype(np.float32)
     for smoke in smokes.values():
         clip = _filmed(smoke, colour * light, behind)
-        color, choice = smoke_colour(sample_smoke(clip, known_plate(behind, clip)), np.ones(3))
-        if choice.chosen != UNDETERMINED:
+        color, estimate = smoke_colour(sample_smoke(clip, known_plate(behind, clip)), np.ones(3))
+        if estimate.value != UNDETERMINED:
             own = np.array(color)
             cosine = float(own @ colour / (np.linalg.norm(own) * np.linalg.norm(colour)))
             angles.append(math.degrees(math.acos(min(cosine, 1.0))))

@@ -85,13 +85,13 @@ def measure(scene: Scene, settings: Settings) -> Row:
                 shares.append(detail_shares(beside))
             del frame
             began = time.process_time()
-        lost = next((choice.measured.get("lost") for choice in shot.choices if choice.what == "resolution"), None)
+        grid = shot.qualities.get(shot.settings.quality)
     return Row(
         size=shot.scene.domain.resolution,
         psnr=float(np.median(psnr)),
         psnr_working=float(np.median(working)),
         shares=tuple(map(float, np.median(shares, 0))),
-        lost=lost,
+        lost=None if grid is None else grid.lost,
         seconds=float(np.median(seconds)),
     )
 

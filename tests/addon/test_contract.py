@@ -16,8 +16,8 @@ from smokelift.footage.images import READABLE
 from smokelift.output.export import ASSET, NOTE
 from smokelift.output.layout import INDEX, frame_path, proxy_path
 from smokelift.output.proxy import MIN_PROXY_VOXELS
+from smokelift.report.provenance import Origin
 from smokelift.scene import SIDES, EnvironmentLight, SceneError
-from smokelift.setup.provenance import Origin
 from smokelift.setup.settings import LIMITS, QUALITIES, Settings
 
 

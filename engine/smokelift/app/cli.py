@@ -96,7 +96,7 @@ def _run(options: argparse.Namespace, hint: str) -> int:
         raise
     except (DeviceError, MemoryError) as error:
         out_of_memory = isinstance(error, MemoryError)
-        say.fail(str(error) or "Out of memory; choose a lower --resolution.", NO_DEVICE, retryable=out_of_memory)
+        say.fail(str(error) or "Out of memory; choose a lower resolution.", NO_DEVICE, retryable=out_of_memory)
         return NO_DEVICE
     except (ValueError, VdbUnavailable, OSError, RuntimeError) as error:
         # the system's limits: ulimit -v, ulimit -u

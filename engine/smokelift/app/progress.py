@@ -15,6 +15,9 @@ from typing import Any, Literal, Protocol
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from smokelift.checks import Remark
+from smokelift.report.sentences import all_figures, sentence
+
 Style = Literal["text", "json"]
 
 
@@ -60,7 +63,7 @@ class Reporter(Protocol):
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None: ...
 
-    def note(self, text: str) -> None:
+    def note(self, said: Remark | str) -> None:
         """Something that was assumed or noticed."""
 
     def start(self, total: int, done: int) -> None:
@@ -69,7 +72,7 @@ class Reporter(Protocol):
     def frame(self, number: int, figures: Mapping[str, Any]) -> None:
         """One more frame is finished."""
 
-    def finish(self, text: str, details: Mapping[str, Any]) -> None:
+    def finish(self, said: Remark | str, details: Mapping[str, Any]) -> None:
         """The job is done."""
 
     def fail(self, text: str, status: int, retryable: bool = False) -> None:
@@ -96,6 +99,16 @@ def median_psnr(figures: Iterable[Mapping[str, Any]]) -> float | None:
     """Return the median of ``psnr`` over the figures of frames; None if none has any."""
     decibels = [of_frame["psnr"] for of_frame in figures if of_frame.get("psnr") is not None]
     return median(decibels) if decibels else None
+
+
+def _words(said: Remark | str) -> str:
+    return said if isinstance(said, str) else sentence(said)
+
+
+def _fields(said: Remark | str) -> dict[str, Any]:
+    """The text of an event, and the kind and figures from which other programs make their own."""
+    known = {} if isinstance(said, str) else {"kind": said.kind, "figures": all_figures(said)}
+    return {"text": _words(said), **known}
 
 
 class _Text:
@@ -127,9 +140,9 @@ class _Text:
             if self._bar.live.is_started:  # a bar that never started would leave an empty line
                 self._bar.stop()
 
-    def note(self, text: str) -> None:
+    def note(self, said: Remark | str) -> None:
         with _output():
-            self._console.print(printable(text), markup=False, soft_wrap=True)
+            self._console.print(printable(_words(said)), markup=False, soft_wrap=True)
 
     def start(self, total: int, done: int) -> None:
         with _output():
@@ -145,9 +158,9 @@ class _Text:
         with _output():
             self._bar.update(self._task, advance=1, fit=fit)
 
-    def finish(self, text: str, details: Mapping[str, Any]) -> None:
+    def finish(self, said: Remark | str, details: Mapping[str, Any]) -> None:
         self._stop()
-        self.note(text)
+        self.note(said)
 
     def fail(self, text: str, status: int, retryable: bool = False) -> None:
         self._stop()
@@ -155,7 +168,10 @@ class _Text:
 
 
 class _Json:
-    """Events ``note``, ``start``, ``frame``, ``done`` and ``error``, each with its fields, one a line."""
+    """Events ``note``, ``start``, ``frame``, ``done`` and ``error``, each with its fields, one a line.
+
+    What is said has its ``text``, and where `smokelift.report.sentences` has the words its ``kind`` and ``figures``.
+    """
 
     def __init__(self) -> None:
         self._total = self._done = 0
@@ -169,8 +185,8 @@ class _Json:
     ) -> None:
         return None
 
-    def note(self, text: str) -> None:
-        self._say("note", text=text)
+    def note(self, said: Remark | str) -> None:
+        self._say("note", **_fields(said))
 
     def start(self, total: int, done: int) -> None:
         self._total, self._done = total, done
@@ -190,8 +206,8 @@ class _Json:
             figures=dict(figures),
         )
 
-    def finish(self, text: str, details: Mapping[str, Any]) -> None:
-        self._say("done", text=text, **details)
+    def finish(self, said: Remark | str, details: Mapping[str, Any]) -> None:
+        self._say("done", **_fields(said), **details)
 
     def fail(self, text: str, status: int, retryable: bool = False) -> None:
         self._say("error", text=text, status=status, later=retryable)

@@ -84,7 +84,7 @@ def loop_length(sequence: Sequence, first: int, last: int, overlap: int) -> int:
     if count < SHORTEST or not 1 <= overlap <= count // 2:
         raise ValueError(
             f"{there}; a loop of {count} of them can overlap by {max(count // 2, 1)} at most, not by {overlap}: "
-            f"choose another --overlap, or more frames ({SHORTEST} at least)."
+            f"choose another overlap, or more frames ({SHORTEST} at least)."
         )
     return count - overlap
 

@@ -185,5 +185,5 @@ def require_place(what: str, thing: Obstacle, domain: Domain, reach: Space) -> N
     if not here and (within or not meets):
         raise ValueError(
             f"the {what} holds no voxel of the box from {domain.min} to {domain.max} m, nor of what the box can grow "
-            "to; move it in, make it larger, or give the box more --room."
+            "to; move it in, make it larger, or give the box more room."
         )

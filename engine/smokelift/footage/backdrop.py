@@ -176,8 +176,8 @@ def _estimated(clip: Clip, lens: Lens | None, lens_is_known: bool, moves: bool) 
         if found.colour is None or found.objects.any() or passes_by:
             raise ValueError(
                 "The camera moves, so what is behind the smoke cannot be found from the clip; give a clean plate with "
-                "a picture for every frame (a video or plate_####.png), or a colour ([background] in a scene file, "
-                "Clean Plate in Blender)."
+                "a picture for every frame (a video or plate_####.png), or a color, "
+                "as background."
             )
         red, green, blue = (float(v) for v in found.colour)
         behind = Background(color=(red, green, blue))

@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from smokelift.checks import Remark
 from smokelift.footage.exposure import small, small_size
 from smokelift.footage.frame_source import ClipError, DamagedFrameError, FrameSource, Look
 from smokelift.footage.image_sequence import ImageSequence
@@ -68,7 +69,7 @@ class Clip:
     first
         Number in the file of the clip's frame 0 (not 0 if a range was asked for).
     warning
-        A sentence about a defect (a truncated file, say), else None.
+        A remark on a defect (a truncated file, say), else None.
     lens
         Focal length in millimetres on 35 mm film, if the file says it.
     backdrop
@@ -173,12 +174,12 @@ class Clip:
         return tuple(file for file in own if file.exists())
 
     @property
-    def notes(self) -> tuple[str, ...]:
-        """How the pictures are read where that is not the usual way, a sentence each."""
+    def notes(self) -> tuple[Remark, ...]:
+        """How the pictures are read where that is not the usual way."""
         return self._source.notes
 
-    def remarks(self) -> tuple[str, ...]:
-        """What is to be said of the clip, a sentence each: defects, frames that are replaced, how pictures are read.
+    def remarks(self) -> tuple[Remark, ...]:
+        """Remarks on the clip: defects, frames that are replaced, how pictures are read.
 
         Raises
         ------
@@ -187,10 +188,8 @@ class Clip:
         """
         remarks = [self.warning] if self.warning else []
         if self.damaged:
-            remarks.append(
-                f"{self.path}: {numbered([self.first + n for n in self.damaged])} missing or damaged; the last sound "
-                "frame stands in."
-            )
+            frames = numbered([self.first + n for n in self.damaged])
+            remarks.append(Remark("damaged frames", {"path": str(self.path), "frames": frames}))
         return (*remarks, *self.notes)
 
     @cached_property
@@ -454,7 +453,7 @@ class _Changed:
         self.files, self.lens, self.backdrop = source.files, clip.lens, clip.backdrop
 
     @property
-    def notes(self) -> tuple[str, ...]:
+    def notes(self) -> tuple[Remark, ...]:
         return self._source.notes
 
     def read(self, n: int) -> Picture | CodedPicture:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol
 
+from smokelift.checks import Remark
 from smokelift.footage.images import CodedPicture, Picture
 
 Look = Callable[[int, Callable[[int], Picture | CodedPicture]], None]
@@ -33,7 +34,7 @@ class FrameSource(Protocol):
     fps
         Frames a second.
     warning
-        A sentence about a defect, else None.
+        A remark on a defect, else None.
     files
         The video, or a picture a frame.
     lens
@@ -44,14 +45,14 @@ class FrameSource(Protocol):
 
     count: int
     fps: float
-    warning: str | None
+    warning: Remark | None
     files: tuple[Path, ...]
     lens: float | None
     backdrop: float | None
 
     @property
-    def notes(self) -> tuple[str, ...]:
-        """How the pictures are read where that is not the usual way, a sentence each."""
+    def notes(self) -> tuple[Remark, ...]:
+        """How the pictures are read where that is not the usual way."""
         ...
 
     def read(self, n: int) -> Picture | CodedPicture:

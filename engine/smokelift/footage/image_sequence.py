@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
+from smokelift.checks import Remark
 from smokelift.footage import lens
 from smokelift.footage.frame_source import DEFAULT_FPS, ClipError, DamagedFrameError, Look
 from smokelift.footage.images import READABLE, ImageError, Picture, Transfer, area_average, read_layer, reduction
@@ -42,7 +43,7 @@ class ImageSequence:
         self.fps = DEFAULT_FPS
         self.warning = None
         if fps is None and self.count > 1:
-            self.warning = f"{path}: pictures carry no frame rate; {DEFAULT_FPS:g} frames a second are taken"
+            self.warning = Remark("pictures without a frame rate", {"path": str(path), "fps": DEFAULT_FPS})
         self.lens = lens.of_picture(self.files[0])
         self._shape: tuple[int, ...] | None = None
         self.backdrop = backdrop_of(self._samples())
@@ -53,13 +54,13 @@ class ImageSequence:
         return is_pattern(path) or path.suffix.lower() in READABLE
 
     @property
-    def notes(self) -> tuple[str, ...]:
+    def notes(self) -> tuple[Remark, ...]:
         """That the pictures are reduced, if they are."""
         if self._shape is None or reduction(*self._shape[:2]) == 1:
             return ()
         height, width = self._shape[:2]
-        small = " x ".join(str(round(side / reduction(width, height))) for side in (width, height))
-        return (f"The pictures of {width} x {height} pixels are reduced to {small}.",)
+        small = tuple(round(side / reduction(width, height)) for side in (width, height))
+        return (Remark("reduced pictures", {"size": (width, height), "reduced": small}),)
 
     def read(self, n: int) -> Picture:
         """Return a picture, or raise ClipError if it is damaged or of another size than the first."""

@@ -269,7 +269,7 @@ def _read_radiance(path: Path) -> npt.NDArray[Any]:
     with path.open("rb") as file:
         head = file.read(4096)
     if b"FORMAT=32-bit_rle_xyze" in head or re.search(rb"\n(\+Y|[+-]X) \d+ [+-][XY] \d+\n|\n-Y \d+ -X \d+\n", head):
-        raise ImageError(f"{path}: is turned, mirrored or in XYZ colours; save it as an ordinary .hdr, or as .exr")
+        raise ImageError(f"{path}: is turned, mirrored or in XYZ colors; save it as an ordinary .hdr, or as .exr")
     return _read_with_ffmpeg(path, "gbrpf32le")
 
 

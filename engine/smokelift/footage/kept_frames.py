@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
+from smokelift.checks import Remark
 from smokelift.footage.frame_source import FrameSource, Look
 from smokelift.footage.images import CodedPicture, Picture
 
@@ -42,7 +43,7 @@ class KeptFrames:
         self.files, self.lens, self.backdrop = source.files, source.lens, source.backdrop
 
     @property
-    def notes(self) -> tuple[str, ...]:
+    def notes(self) -> tuple[Remark, ...]:
         return self._source.notes
 
     def read(self, n: int) -> Picture | CodedPicture:

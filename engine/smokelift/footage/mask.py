@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
+from smokelift.checks import Remark
 from smokelift.footage.behind_smoke import push_pull
 from smokelift.footage.frame_source import ClipError, FrameSource, Look
 from smokelift.footage.image_sequence import ImageSequence, is_pattern
@@ -156,7 +157,7 @@ class Masked:
         self.lens, self.backdrop = source.lens, source.backdrop
 
     @property
-    def notes(self) -> tuple[str, ...]:
+    def notes(self) -> tuple[Remark, ...]:
         return self.filmed.notes
 
     def read(self, n: int) -> Picture | CodedPicture:

@@ -69,7 +69,7 @@ class WidePicture:
         if (rays[:, 2] <= 0).any() or ((high - low) > WIDEST * np.array([width, height])).any():
             raise ValueError(
                 "The camera turns too far to be steadied against the background; track it in Blender, and give its "
-                "matrices in [camera] and what is behind the smoke in [background], or use fewer frames."
+                "camera and a clean plate, or use fewer frames."
             )
         (left, top), (across, down) = low.astype(int), (high - low).astype(int)
         return WidePicture(turns, int(left), int(top), (int(across), int(down)))

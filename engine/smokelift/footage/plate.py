@@ -153,7 +153,7 @@ def known_plate(background: npt.ArrayLike, clip: Clip, sample_count: int = 32) -
     if linear.shape == (3,):
         linear = np.broadcast_to(linear, (height, width, 3))
     if linear.ndim != 3 or linear.shape[2] != 3 or not np.isfinite(linear).all():
-        raise ValueError(f"a background must be a finite colour or RGB picture, not of shape {linear.shape}")
+        raise ValueError(f"a background must be a finite color or RGB picture, not of shape {linear.shape}")
     image = area_average(linear, width, height)
     confidence = np.ones((height, width), np.float32)
     deviations, blocks = _deviations(Plate(image, confidence, lasting_noise(0.0)), clip, sample_count)
@@ -191,7 +191,7 @@ def changing_plate(plates: Clip, clip: Clip, sample_count: int = 32) -> Changing
     if last >= len(plates):
         raise ValueError(
             f"{plates.path}: has {len(plates)} of the frames 0 to {last} that are needed; give a clean plate with a "
-            "picture for every frame of the clip, or a colour, in [background]."
+            "picture for every frame of the clip, or a color, as background."
         )
     silent = ChangingPlate(plates, clip.first, clip.size, lasting_noise(0.0))
     return replace(silent, noise=noise_before(silent, clip, sample_count))

@@ -115,7 +115,7 @@ def find_turns(clip: Clip, *lenses: Lens) -> Turns | None:
         if travels(clip, lens, {number for number, each in found.items() if each.same < HELD}):
             raise ValueError(
                 "The camera travels or zooms, so near and far move unlike each other and no turn steadies the clip; "
-                "track it in Blender, and give its matrices in [camera] and what is behind the smoke in [background]."
+                "track it in Blender, and give its camera and a clean plate."
             )
         return None
     if np.mean([each.as_it_stands <= MOVED * each.same for each in found.values()]) < MOVING_FRAMES:

@@ -29,7 +29,7 @@ from av.video.plane import VideoPlane
 from av.video.reformatter import ColorRange, Interpolation
 
 import smokelift._core as _core
-from smokelift.checks import counted
+from smokelift.checks import Remark
 from smokelift.footage import lens
 from smokelift.footage.colour import ENCODINGS, Encoding, primaries_name, to_bt709
 from smokelift.footage.container import lacks_index, open_container
@@ -76,7 +76,7 @@ class Video:
         self._path = path
         self.files: tuple[Path, ...] = (path,)
         self._transfer = transfer
-        self.warning: str | None = None
+        self.warning: Remark | None = None
         if not path.exists():
             raise ClipError(f"{path}: no such file")
         if path.is_dir():
@@ -92,7 +92,7 @@ class Video:
             raise ClipError(f"{path}: holds no frame that can be decoded")
         if broken:
             self._drop_undecodable_end()
-            self.warning = f"{path}: is truncated; {counted(len(self._times), 'frame')} of it can be used"
+            self.warning = Remark("truncated clip", {"path": str(path), "frames": len(self._times)})
         self._varies, self._interlaced = False, False
         self.fps, self._shown = self._steady()
         self.count = len(self._shown)
@@ -216,32 +216,29 @@ class Video:
         return float(Fraction(1) / (Fraction(mean) * base)), shown
 
     @property
-    def notes(self) -> tuple[str, ...]:
+    def notes(self) -> tuple[Remark, ...]:
         """How the pictures are read, as far as they have been."""
         if not self._interlaced:
             return self._format
-        return (
-            *self._format,
-            "The clip is interlaced: one field of each frame is used, so its lines are half as fine.",
-        )
+        return (*self._format, Remark("interlaced clip"))
 
-    def _described(self) -> tuple[str, ...]:
+    def _described(self) -> tuple[Remark, ...]:
         """How the file's format is read."""
         context, stream = self._stream.codec_context, self._stream
         encoding, primaries = ENCODINGS.get(context.color_trc), primaries_name(context.color_primaries)
         width, height = self._size()
-        notes = [f"The frame rate varies: the clip is read at its mean, {self.fps:.4g} frames a second."] * self._varies
+        notes = [Remark("varying frame rate", {"fps": self.fps})] * self._varies
         if encoding in ("hlg", "pq") and self._transfer is None:
-            notes.append(f"Transfer {encoding.upper()}: diffuse white is brought to 1, highlights exceed it.")
+            notes.append(Remark("high dynamic range", {"transfer": encoding.upper()}))
         if primaries is not None:
-            notes.append(f"Primaries {primaries} are brought to BT.709.")
+            notes.append(Remark("other primaries", {"primaries": primaries}))
         if (width, height) != (stream.width, stream.height):
+            sizes = {"size": (stream.width, stream.height), "scaled": (width, height)}
             shape = float(self._pixel_shape())
-            oblong = f", {shape:.3g} times as wide as high," if shape != 1 else ""
-            notes.append(
-                f"Pictures of {stream.width} x {stream.height} pixels{oblong} are scaled to {width} x {height} square "
-                "ones."
-            )
+            if shape == 1:
+                notes.append(Remark("scaled pictures", sizes))
+            else:
+                notes.append(Remark("oblong pixels", {**sizes, "shape": shape}))
         return tuple(notes)
 
     def close(self) -> None:

@@ -42,11 +42,11 @@ class Sequence:
     complete
         Whether the run that made it came to its end.
     choices
-        What was chosen for the clip: ``what``, ``chosen``, ``reason``, ``measured``, ``tolerance`` and ``by_hand`` of
-        each (see `smokelift.setup`).
+        What was chosen for the clip: ``what``, ``chosen``, ``kind``, ``reason``, ``measured``, ``tolerance`` and
+        ``by_hand`` of each (see `smokelift.report`).
     provenance
         What of the result is measured, estimated, assumed and made up: ``what``, ``origin``, ``how`` and ``settings``
-        of each part (see `smokelift.setup`).
+        of each part (see `smokelift.report`).
     """
 
     directory: Path

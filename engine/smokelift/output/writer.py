@@ -286,7 +286,7 @@ class SequenceWriter:
         reason = "the disk is full" if error.errno in DISK_FULL else str(error)
         return SequenceError(
             f"{self.directory}: {what} could not be written: {reason}; "
-            f"finished frames stay ({len(self.finished)}), and --resume goes on from them"
+            f"finished frames stay ({len(self.finished)}), and a resumed run goes on from them"
         )
 
 
@@ -347,7 +347,7 @@ def _begun(directory: Path, resume: bool) -> Index | None:
         return there
     if there.frames:
         count = counted(len(there.frames), "finished frame")
-        raise SequenceError(f"{directory}: holds {count}; go on with --resume, or choose another directory")
+        raise SequenceError(f"{directory}: holds {count}; resume the run, or choose another directory")
     return None
 
 

@@ -15,10 +15,10 @@ from smokelift.output.writer import SequenceWriter
 from smokelift.pipeline.loop import Carried, Frame, frames_after
 from smokelift.pipeline.method import Method, compose
 from smokelift.pipeline.sources import sources
+from smokelift.report.provenance import provenance, record
 from smokelift.scene import Scene
 from smokelift.scene.checks import file_path
 from smokelift.setup.prepare import prepare_shot
-from smokelift.setup.provenance import provenance
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
 from smokelift.transport import ResidualMeans, Velocity, halved
@@ -87,7 +87,7 @@ class Reconstruction:
             resume=resume,
             background=shot.estimated_background,
             origins=Origins(
-                choices=[choice.as_dict() for choice in shot.choices],
+                choices=[record(estimate) for estimate in shot.estimates],
                 provenance=[part.as_dict() for part in provenance(shot)],
                 sources=sources(shot),
             ),

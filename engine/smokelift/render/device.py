@@ -106,10 +106,11 @@ def start(device: DeviceName = "auto") -> str:
     wanted = device == "gpu" or (device == "auto" and gpu_present())
     gpu = available_gpu() if wanted else None
     if device == "gpu" and not has_taichi():
-        raise DeviceError(f"A GPU cannot be used, as {NO_TAICHI}, or use --device cpu.")
+        raise DeviceError(f"A GPU cannot be used, as {NO_TAICHI}, or choose cpu as the device.")
     if device == "gpu" and gpu is None:
         raise DeviceError(
-            "No GPU that Taichi can use was found (CUDA, Metal or Vulkan); use --device cpu or update the driver."
+            "No GPU that Taichi can use was found (CUDA, Metal or Vulkan); choose cpu as the device, or update the "
+            "driver."
         )
     if gpu is not None:
         chip = _taichi().start(gpu)

@@ -8,7 +8,7 @@ from smokelift.footage.clip import Clip
 from smokelift.footage.fire import fire_colour, fire_share, firelight, without_fire
 from smokelift.footage.plate import Plates
 from smokelift.scene.checks import Vector
-from smokelift.setup.choice import Choice
+from smokelift.setup.estimate import Estimate
 from smokelift.setup.smoke import SmokeSamples
 
 
@@ -44,12 +44,13 @@ def find_fire(clip: Clip, plates: Plates, samples: SmokeSamples) -> Fire | None:
     return Fire(share, light, fire_colour(clip, light), doused)
 
 
-def fire_choice(fire: Fire, given: Vector | None) -> Choice[str]:
+def fire_estimate(fire: Fire, given: Vector | None) -> Estimate[str]:
     """Say what becomes of fire, whose colour the scene may give."""
     red, green, blue = given or fire.color
-    reason = (
-        f"Fire: {fire.share:.1%} of the smoke's pixels shine by themselves. The grid flame holds their light, of the "
-        f"colour {red:g}, {green:g}, {blue:g}{' that is given' if given else ''}; the smoke beside it is continued "
-        "over it."
+    return Estimate(
+        "fire of a given colour" if given else "fire",
+        {"share": fire.share, "red": red, "green": green, "blue": blue},
+        what="fire",
+        value=f"{fire.share:.3f}",
+        source="measured",
     )
-    return Choice("fire", f"{fire.share:.3f}", reason, {"share": fire.share, "red": red, "green": green, "blue": blue})

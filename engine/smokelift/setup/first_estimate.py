@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from smokelift.checks import Doubt, Remark
 from smokelift.footage.alignment import Lens
 from smokelift.footage.backdrop import Backdrop, find_backdrop
 from smokelift.footage.clip import Clip
@@ -11,12 +12,12 @@ from smokelift.footage.plate import Plate, Plates
 from smokelift.footage.steady import steady
 from smokelift.render import Image
 from smokelift.scene import Background, Camera
-from smokelift.setup.backdrop_notes import (
+from smokelift.setup.backdrop_remarks import (
     backdrop_doubts,
-    backdrop_notes,
+    backdrop_remarks,
     between_bars,
-    cut_notes,
-    exposure_notes,
+    cut_doubts,
+    exposure_remarks,
     nothing_seen,
     smoke_in_plate,
 )
@@ -40,7 +41,7 @@ class FirstEstimate:
     fire
         None where none burns.
     doubts
-        Why the result may be nothing, or wrong, a sentence each.
+        Why the result may be nothing, or wrong.
     unused
         Whether a background is given that an alpha channel replaces.
     """
@@ -49,7 +50,7 @@ class FirstEstimate:
     found: Backdrop
     samples: SmokeSamples
     fire: Fire | None
-    doubts: tuple[str, ...]
+    doubts: tuple[Doubt, ...]
     unused: bool
 
     @property
@@ -65,10 +66,10 @@ class FirstEstimate:
         return None
 
     @property
-    def notes(self) -> tuple[str, ...]:
-        """What was assumed or estimated, a sentence each; the doubts are among them."""
-        unused = ("[background] is not used.",) if self.unused else ()
-        return (*backdrop_notes(self.found), *unused, *self.doubts, *exposure_notes(self.samples.exposure))
+    def remarks(self) -> tuple[Remark, ...]:
+        """What was assumed or estimated; the doubts are among them."""
+        unused = (Remark("background unused"),) if self.unused else ()
+        return (*backdrop_remarks(self.found), *unused, *self.doubts, *exposure_remarks(self.samples.exposure))
 
 
 def first_estimate(
@@ -82,7 +83,7 @@ def first_estimate(
     if fire is not None:
         clip = fire.doused
         samples = replace(sample_smoke(clip, found.plates, found.turns), gains=samples.gains)
-    cuts = cut_notes(found)
+    cuts = cut_doubts(found)
     nothing = nothing_seen(clip, found.plates, samples, background is not None, cuts)
     bars = between_bars(samples) if background is None else ()
     doubts = (

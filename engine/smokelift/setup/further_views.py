@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from smokelift.checks import Doubt, Figures, Remark
 from smokelift.density import ViewSet
 from smokelift.density.hull import agreement
 from smokelift.footage.backdrop import find_backdrop
@@ -13,7 +14,7 @@ from smokelift.footage.clip import Clip, is_video
 from smokelift.footage.steady import steady
 from smokelift.footage.working_picture import CameraError, working_picture
 from smokelift.scene import ClipSource, CompleteScene
-from smokelift.setup.backdrop_notes import backdrop_notes, exposure_change, exposure_notes
+from smokelift.setup.backdrop_remarks import backdrop_remarks, exposure_change, exposure_remarks
 from smokelift.setup.geometry import fitting
 from smokelift.setup.shot import Shot, ShotView
 
@@ -28,8 +29,8 @@ SAME_RATE = 0.01
 """Relative difference of two frame rates that are the same."""
 
 
-def open_view(number: int, clip: Clip, scene: CompleteScene) -> tuple[ShotView, list[str]]:
-    """Open a further view of a complete scene and find its background; with what is to be said of it.
+def open_view(number: int, clip: Clip, scene: CompleteScene) -> tuple[ShotView, list[Remark]]:
+    """Open a further view of a complete scene and find its background; with remarks on it.
 
     Parameters
     ----------
@@ -47,11 +48,10 @@ def open_view(number: int, clip: Clip, scene: CompleteScene) -> tuple[ShotView, 
     """
     view, name = scene.views[number], f"View {number + 1}"
     opened = _opened(view.clip, clip, scene)
-    notes = [*opened.remarks()]
     if abs(opened.fps - clip.fps) > SAME_RATE * clip.fps:
         raise ValueError(
             f"{opened.path}: has {opened.fps:g} frames a second, the input {clip.fps:g}; all views need the same, so "
-            "convert one, or give fps in the [clip] whose file says it wrongly."
+            "convert one, or give the frame rate of the clip whose file says it wrongly."
         )
     camera = fitting(view.camera, opened)
     try:
@@ -64,25 +64,26 @@ def open_view(number: int, clip: Clip, scene: CompleteScene) -> tuple[ShotView, 
     found = find_backdrop(opened, camera, background)
     axes = [np.array(each.matrix)[:3, 2] for each in (scene.camera, camera)]
     angle = np.degrees(np.arccos(np.clip(axes[0] @ axes[1], -1, 1)))
-    frames = f"frames {opened.first} to {opened.first + len(opened) - 1}"
-    said = [*backdrop_notes(found), *exposure_notes(exposure_change(found.clip, found.plates))]
-    notes.append(" ".join([f"{name}: {opened.path.name}, {angle:.0f} degrees from the input, {frames}.", *said]))
-    return ShotView(steady(found.clip, found.plates), camera, found.plates, working), notes
+    last = opened.first + len(opened) - 1
+    which: Figures = {"name": opened.path.name, "degrees": float(angle), "first": opened.first, "last": last}
+    remarks = [
+        *opened.remarks(),
+        Remark("further view", which),
+        *backdrop_remarks(found),
+        *exposure_remarks(exposure_change(found.clip, found.plates)),
+    ]
+    of_view = [replace(remark, figures={**remark.figures, "view": number + 1}) for remark in remarks]
+    return ShotView(steady(found.clip, found.plates), camera, found.plates, working), of_view
 
 
-def disagreement(shot: Shot) -> tuple[str, ...]:
-    """A warning if the views do not agree about where the smoke is."""
+def disagreement(shot: Shot) -> tuple[Doubt, ...]:
+    """A doubt if the views do not agree about where the smoke is."""
     shares = []
     for frame in shot.spread(AGREEMENT_SAMPLES):
         views = ViewSet.of(shot.observe(frame), shot.optics).views
         shares.append(agreement([view.mask for view in views], [view.projection for view in views]))
     agreed = float(np.median(shares))
-    if agreed >= MIN_AGREED_SHARE:
-        return ()
-    return (
-        f"The views agree on {agreed:.0%} of the smoke that they show: check where their cameras stand, which frames "
-        "belong together and what stands behind the smoke.",
-    )
+    return () if agreed >= MIN_AGREED_SHARE else (Doubt("disagreeing views", {"agreed": agreed}),)
 
 
 def _opened(source: ClipSource, clip: Clip, scene: CompleteScene) -> Clip:
@@ -98,6 +99,6 @@ def _opened(source: ClipSource, clip: Clip, scene: CompleteScene) -> Clip:
     if first < 0 or last >= have:
         raise ValueError(
             f"{source.path}: has frames 0 to {have - 1}, but {first} to {last} are those of the input's moments; use "
-            "fewer frames of the input, or say with frames in the view's [clip] which ones belong to them."
+            "fewer frames of the input, or say which frames of the view belong to them."
         )
     return Clip.open(source, fps=fps, frames=(first, last))

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from smokelift.checks import Remark
 from smokelift.density.screen import view_frame
 from smokelift.footage.alignment import Array, Lens
 from smokelift.footage.clip import Clip
@@ -18,8 +19,8 @@ from smokelift.footage.turning import Turns
 from smokelift.footage.working_picture import CameraError, working_picture
 from smokelift.scene import Box, Camera, Domain, Scene, as_matrix
 from smokelift.scene.projection import voxel_width
-from smokelift.setup.choice import Choice, Grid
 from smokelift.setup.detail import Detail, smoke_detail
+from smokelift.setup.estimate import Estimate, Grid
 from smokelift.setup.settings import LIMITS, LOST_DETAIL, QUALITIES, Quality, Settings
 from smokelift.setup.smoke import SmokeSamples
 
@@ -57,20 +58,20 @@ class Geometry:
         With its final resolution.
     resolution
         Why it has that resolution; None for the finest grid of a quality that nothing was measured for.
-    notes
-        What was assumed, a sentence each.
+    remarks
+        What was assumed.
     qualities
         The grid that each quality would take of this clip; empty where nothing was measured.
     """
 
     camera: Camera
     domain: Domain
-    resolution: Choice[Shape] | None
-    notes: tuple[str, ...] = ()
+    resolution: Estimate[Shape] | None
+    remarks: tuple[Remark, ...] = ()
     qualities: Mapping[Quality, Grid] = field(default_factory=dict)
 
     @property
-    def choices(self) -> tuple[Choice[Shape], ...]:
+    def estimates(self) -> tuple[Estimate[Shape], ...]:
         """What was measured for it."""
         return () if self.resolution is None else (self.resolution,)
 
@@ -92,12 +93,12 @@ def find_geometry(
         box, division, qualities = _divided(scene.domain, clip, camera, settings, plates, samples)
         return Geometry(camera, box, division, _grown(scene.domain, box), qualities)
     if scene.domain is not None:
-        raise ValueError("The scene gives a [domain] but no [camera]; give the camera that filmed it.")
+        raise ValueError("The scene gives a box but no camera; give the camera that filmed it.")
     if scene.inlets:
-        raise ValueError("The scene marks an [[inlet]] but gives no [domain]; give camera and box to say where it is.")
+        raise ValueError("The scene marks an inlet but gives no box; give camera and box to say where it is.")
     if given is not None and not _boxes(given):
         raise ValueError(
-            "The scene gives a camera but no box in [domain]; give the one that holds the smoke. It is found only for "
+            "The scene gives a camera but no box; give the one that holds the smoke. It is found only for "
             "a perspective camera that does not move or look steeply up or down."
         )
     focal = _focal(clip) if turns is None else turns.lens.focal[0]
@@ -109,28 +110,25 @@ def find_geometry(
         # multiples of four, so that pyramids halve them evenly
         return _grids(base, size, LIMITS[quality].voxels(max(size) / metres), 4)
 
-    choice: Choice[Shape] | None = None
+    estimate: Estimate[Shape] | None = None
     by_quality: Mapping[Quality, Grid] = {}
     if isinstance(settings.resolution, tuple):
         domain = _filled(base, size, settings.resolution)
-        choice = _resolution_by_hand(domain)
+        estimate = _given_resolution(domain)
     elif settings.selection.measure:
-        domain, choice, by_quality = _resolved(clip, camera, grids, plates, samples.smoky, settings)
+        domain, estimate, by_quality = _resolved(clip, camera, grids, plates, samples.smoky, settings)
     else:
         domain = grids(settings.quality)[-1]
-    metric = " x ".join(f"{high - low:.2f}" for low, high in zip(domain.min, domain.max, strict=True))
-    missing = "Box not given:" if given is not None else f"Camera not given: {_assumed_lens(clip, focal)},"
-    where = "around the smoke" if samples.smoky else "over all of the picture"
-    notes = (
-        f"{missing} the picture taken to be {PICTURE_HEIGHT:g} m high where the smoke is.",
-        f"Domain {where}: {metric} m, {' x '.join(map(str, domain.resolution))} voxels.",
+    around = Remark(
+        "box around the smoke" if samples.smoky else "box over the picture",
+        {"size": _size(domain), "resolution": domain.resolution},
     )
-    return Geometry(camera, domain, choice, notes, by_quality)
+    return Geometry(camera, domain, estimate, (_assumed(given, clip, focal), around), by_quality)
 
 
 def _divided(
     box: Box, clip: Clip, camera: Camera, settings: Settings, plates: Plates, samples: SmokeSamples
-) -> tuple[Domain, Choice[Shape], Mapping[Quality, Grid]]:
+) -> tuple[Domain, Estimate[Shape], Mapping[Quality, Grid]]:
     """A box that is given, with as many voxels as are asked for, and why; and the grid of each quality."""
     floor, size = np.array([*box.centre[:2], box.min[2]]), np.subtract(box.max, box.min)
     if isinstance(settings.resolution, tuple):
@@ -138,9 +136,9 @@ def _divided(
             domain = replace(box, resolution=settings.resolution)
         else:
             domain = _filled(floor, size, settings.resolution)
-        return domain, _resolution_by_hand(domain), {}
+        return domain, _given_resolution(domain), {}
     if isinstance(box, Domain) and settings.resolution is None:
-        return box, _resolution_by_hand(box), {}
+        return box, _given_resolution(box), {}
     still = camera.at(next(iter(samples.smoky), 0))
 
     def grids(quality: Quality) -> tuple[Domain, ...]:
@@ -192,21 +190,28 @@ def fitting(camera: Camera, clip: Clip) -> Camera:
     if camera.size[0] * clip.size[1] != camera.size[1] * clip.size[0]:
         raise ValueError(
             f"The camera's picture is {camera.size[0]} x {camera.size[1]}, the clip's {clip.size[0]} x {clip.size[1]} "
-            f"({clip.path.name}); [camera] size must have the clip's shape."
+            f"({clip.path.name}); the camera's size must have the clip's shape."
         )
     return camera.resized(*clip.size)
 
 
-def _resolution_by_hand(domain: Domain) -> Choice[Shape]:
-    said = " x ".join(map(str, domain.resolution))
-    return Choice("resolution", domain.resolution, f"Resolution by hand: {said} voxels.", by_hand=True)
+def _given_resolution(domain: Domain) -> Estimate[Shape]:
+    return Estimate("given resolution", what="resolution", value=domain.resolution, source="given")
 
 
-def _assumed_lens(clip: Clip, focal: float) -> str:
-    """What is assumed of a camera that is not given, with its focal length in pixels."""
+def _assumed(given: Camera | None, clip: Clip, focal: float) -> Remark:
+    """What is assumed of a camera, with its focal length in pixels, or of the scale where that alone is unknown."""
+    if given is not None:
+        return Remark("assumed scale", {"height": PICTURE_HEIGHT})
     if clip.lens is not None:
-        return f"level, {clip.lens:g} mm as the file says"
-    return f"a level {FILM_WIDTH * focal / max(clip.size):.0f} mm lens on {FILM_WIDTH:g} mm film"
+        return Remark("assumed camera with the file's lens", {"height": PICTURE_HEIGHT, "lens": clip.lens})
+    lens = FILM_WIDTH * focal / max(clip.size)
+    return Remark("assumed camera", {"height": PICTURE_HEIGHT, "lens": lens, "film": FILM_WIDTH})
+
+
+def _size(box: Box) -> tuple[float, ...]:
+    """Lengths of the sides of a box in metres."""
+    return tuple(high - low for low, high in zip(box.min, box.max, strict=True))
 
 
 def _level(clip: Clip, focal: float) -> Camera:
@@ -276,12 +281,11 @@ def _grids(floor: Array, size: Array, allowed: int, multiple: int) -> tuple[Doma
     return tuple(grids)
 
 
-def _grown(given: Box, domain: Domain) -> tuple[str, ...]:
-    """A note where a box that is given without a resolution grows to whole voxels."""
+def _grown(given: Box, domain: Domain) -> tuple[Remark, ...]:
+    """A remark where a box that is given without a resolution grows to whole voxels."""
     if np.allclose([domain.min, domain.max], [given.min, given.max], rtol=0, atol=1e-3 * domain.voxel_size):
         return ()
-    size = " x ".join(f"{high - low:.4g}" for low, high in zip(domain.min, domain.max, strict=True))
-    return (f"The box grows to {size} m, a whole number of cubic voxels along every side.",)
+    return (Remark("grown box", {"size": _size(domain)}),)
 
 
 def _standing_on(floor: Array, voxel: float, resolution: Shape) -> Domain:
@@ -329,16 +333,15 @@ def _resolved(
     plates: Plates,
     smoky: tuple[int, ...],
     settings: Settings,
-) -> tuple[Domain, Choice[Shape], Mapping[Quality, Grid]]:
+) -> tuple[Domain, Estimate[Shape], Mapping[Quality, Grid]]:
     """The coarsest of a quality's grids that loses no more of what the finest shows than tolerated, and why.
 
     The clip's detail is measured once, and says what each quality would take.
     """
     own = grids(settings.quality)
     if not smoky:
-        said = " x ".join(map(str, own[0].resolution))
-        reason = f"Resolution: {said} voxels, since no smoke is seen."
-        return own[0], Choice("resolution", own[0].resolution, reason), {}
+        coarse = Estimate("resolution without smoke", what="resolution", value=own[0].resolution, source="assumed")
+        return own[0], coarse, {}
     detail = _detail(clip, camera, own[-1], plates, smoky)
 
     def coarsest(allowed: tuple[Domain, ...], tolerance: float) -> Domain:
@@ -349,15 +352,23 @@ def _resolved(
     domain = coarsest(own, tolerance)
     longest, finest = max(domain.resolution), max(own[-1].resolution)
     lost = detail.lost(longest)
-    reason = (
-        f"Resolution: {' x '.join(map(str, domain.resolution))} voxels for {detail.pixels:.0f} pixels along the "
-        f"longest side: {settings.quality} loses {lost:.1%} of the smoke's contrast in the clip."
+    estimate = Estimate(
+        "resolution",
+        {
+            "lost": lost,
+            "lost_beside_finest": detail.lost(longest, finest),
+            "pixels": detail.pixels,
+            "quality": settings.quality,
+        },
+        what="resolution",
+        value=domain.resolution,
+        source="measured",
+        tolerance=tolerance,
     )
-    measured = {"lost": lost, "lost_beside_finest": detail.lost(longest, finest), "pixels": detail.pixels}
     others = {quality: coarsest(grids(quality), LOST_DETAIL[quality]) for quality in QUALITIES}
     taken = {**others, settings.quality: domain}
     by_quality = {name: Grid(grid.resolution, detail.lost(max(grid.resolution))) for name, grid in taken.items()}
-    return domain, Choice("resolution", domain.resolution, reason, measured, tolerance), by_quality
+    return domain, estimate, by_quality
 
 
 def _detail(clip: Clip, camera: Camera, box: Domain, plates: Plates, smoky: tuple[int, ...]) -> Detail:

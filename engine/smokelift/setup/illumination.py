@@ -16,17 +16,18 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from smokelift.checks import Doubt, Figures, Remark
 from smokelift.density import DensitySettings
 from smokelift.footage.noise import Noise
 from smokelift.render import Image
 from smokelift.render.environment_count import MIN_LIGHTS, TOLERANCE, lights_needed
 from smokelift.scene import SHADOWED, DirectionalLight, EnvironmentLight, Light, Medium, Scattering
-from smokelift.setup.choice import UNDETERMINED, Choice
 from smokelift.setup.coarse import CoarseClip, CoarseFrame
+from smokelift.setup.estimate import UNDETERMINED, Estimate
 from smokelift.setup.held_out import HalfFit, HeldOut, fit_half, held_out
-from smokelift.setup.scattering import NEARER, WORDS, choose_scattering, tries_multiple
+from smokelift.setup.scattering import NEARER, choose_scattering, tries_multiple
 from smokelift.setup.settings import Settings
-from smokelift.setup.sky import AMBIENT, EXPLAINED, SHADING, SPREAD, directional, find_sky, light_around
+from smokelift.setup.sky import AMBIENT, directional, find_sky, light_around
 from smokelift.setup.smoke import SmokeSamples
 from smokelift.setup.source import FAINTEST, source_radiance
 from smokelift.setup.thickness import smoke_thickness
@@ -78,17 +79,17 @@ class Illumination:
     scattering: Scattering
     origin: Literal["given", "measured", "assumed"]
     by_hand: bool
-    measured: tuple[Choice[Any], ...] = ()
-    thickness: Choice[str] | None = None
-    direction: Choice[str] | None = None
+    measured: tuple[Estimate[Any], ...] = ()
+    thickness: Estimate[str] | None = None
+    direction: Estimate[str] | None = None
 
     @property
     def sunny(self) -> bool:
         """Whether the lights are those of a sun that was found."""
-        return self.direction is not None and self.direction.chosen != UNDETERMINED
+        return self.direction is not None and self.direction.value != UNDETERMINED
 
     @property
-    def choices(self) -> tuple[Choice[Any], ...]:
+    def estimates(self) -> tuple[Estimate[Any], ...]:
         """All that was measured of it, if its model of scattering asks for light."""
         if self.thickness is None or self.direction is None or self.scattering == "absorption":
             return self.measured
@@ -107,8 +108,7 @@ def first_light(
     """
     if scattering in SHADOWED and not given:
         raise ValueError(
-            f'Scattering "{scattering}" needs a light that casts the shadows; give one in [[lights]], or leave it to '
-            '"auto".'
+            f'Scattering "{scattering}" needs a light that casts the shadows; give one, or leave scattering to "auto".'
         )
     richest = scattering or ("absorption" if medium.albedo == 0 else "single" if given else "unshadowed")
     by_hand = scattering is not None
@@ -118,11 +118,8 @@ def first_light(
     radiance = source_radiance(samples, source)
     share = np.array(medium.albedos) / (4 * np.pi)
     sun = directional(np.array((0.0, 0.0, 1.0)), np.divide(radiance, share, out=np.zeros(3), where=share > 0))
-    unknown = Choice(
-        "light direction",
-        UNDETERMINED,
-        "Light direction: undetermined, and so are the colour of a sun and the share of light from everywhere; suns "
-        "from many sides explain one view alike. Give [[lights]] if you know them.",
+    unknown = Estimate(
+        "light direction undetermined by one view", what="light direction", value=UNDETERMINED, source="assumed"
     )
     origin: Literal["measured", "assumed"] = "assumed" if source is None else "measured"
     return Illumination((sun,), richest, origin, by_hand, (), thickness, unknown)
@@ -154,19 +151,19 @@ def measured_light(
         lights, known["multiple"], strength = _strengthened(lights, seen, fit)
         measured += strength
     if light.by_hand:
-        choice = Choice("scattering", richest, f"Scattering by hand: {richest}.", by_hand=True)
-        return replace(light, lights=lights, measured=(*measured, choice))
+        given = Estimate("given scattering", what="scattering", value=richest, source="given")
+        return replace(light, lights=lights, measured=(*measured, given))
     seen = [frame.lit_by(lights) for frame in seen]
 
     def finer() -> CoarseFrame | None:
         return clip.frame(next(iter(frames)), times=2)
 
-    chosen, choice = choose_scattering(seen, richest, fit, tolerance, known, finer)
-    around = _surroundings(seen, choice, fit) if light.origin == "assumed" else None
+    chosen, scattered = choose_scattering(seen, richest, fit, tolerance, known, finer)
+    around = _surroundings(seen, scattered, fit) if light.origin == "assumed" else None
     if around is not None:
-        lights, choice = around
+        lights, scattered = around
         chosen = "single"
-    return replace(light, lights=lights, scattering=chosen, measured=(*measured, choice))
+    return replace(light, lights=lights, scattering=chosen, measured=(*measured, scattered))
 
 
 def sunlight(light: Illumination, clip: CoarseClip, numbers: Sequence[int], settings: Settings) -> Illumination:
@@ -189,70 +186,55 @@ def sunlight(light: Illumination, clip: CoarseClip, numbers: Sequence[int], sett
     sky = find_sky(frames, clip.scene, settings.density) if frames else None
     if sky is None:
         return light
-    measured = {name: getattr(sky, name) for name in ("ambient_share", "shading", "explained", "spread")}
+    shown = Estimate(
+        "light direction" if sky.determined else "light direction undetermined by several views",
+        {
+            "views": len(clip.views),
+            "ambient_share": sky.ambient_share,
+            "shading": sky.shading,
+            "explained": sky.explained,
+        },
+        what="light direction",
+        value=", ".join(f"{value:.2f}" for value in -sky.towards) if sky.determined else UNDETERMINED,
+        source="measured" if sky.determined else "assumed",
+        spread=sky.spread,
+        tolerance=AMBIENT,
+    )
     if not sky.determined:
-        reason = (
-            "Light direction: undetermined, and so are the colour of a sun and the share of light from everywhere; the "
-            f"{len(clip.views)} views are explained best with {sky.ambient_share:.0%} of the light from everywhere "
-            f"({AMBIENT:.0%} at most would do); that alone leaves {sky.shading:.0%} of the smoke's light "
-            f"({SHADING:.0%} at least would do), of which the sun explains {sky.explained:.0%} "
-            f"({EXPLAINED:.0%} at least would do); its direction is right to {sky.spread:.0f} degrees "
-            f"({SPREAD:g} at most would do). Give [[lights]] if you know them."
-        )
-        return replace(light, direction=Choice("light direction", UNDETERMINED, reason, measured, AMBIENT))
-    named = ", ".join(f"{value:.2f}" for value in -sky.towards)
-    reason = (
-        f"Light direction: {named}, give or take 20 degrees, as the {len(clip.views)} views show together; "
-        f"{sky.ambient_share:.0%} of the light comes from everywhere."
-    )
-    return Illumination(
-        sky.lights(),
-        "single",
-        "measured",
-        False,
-        (),
-        light.thickness,
-        Choice("light direction", named, reason, measured, AMBIENT),
-    )
+        return replace(light, direction=shown)
+    return Illumination(sky.lights(), "single", "measured", False, (), light.thickness, shown)
 
 
-def light_notes(light: Illumination, samples: SmokeSamples, noise: Noise) -> tuple[str, ...]:
-    """Say what light is taken for one that is not given, and whether it is likely wrong.
+def light_remarks(light: Illumination, samples: SmokeSamples, noise: Noise) -> tuple[Remark, ...]:
+    """What light is taken for one that is not given, and whether it is likely wrong.
 
     Before one colour, and not black, what moves is smoke, and its brightness says something of its light: there what
     the light leaves unexplained is its own fault.
     """
     if light.thickness is None or light.sunny:
         return ()
-    shadows = light.scattering in SHADOWED
-    if shadows:
-        amount = "comes from behind the smoke"
+    if light.scattering in SHADOWED:
+        kind = "light as behind the smoke"
     elif light.origin == "measured":
-        amount = "the smoke adds for what it hides"
+        kind = "light as the smoke hides"
     else:
-        amount = "the thickest smoke shows" if samples.smoky else "makes thick smoke white"
-    irradiance = np.sum([each.irradiance for each in light.lights if isinstance(each, DirectionalLight)], 0)
-    note = (
-        f"Light not given: as much from everywhere as {amount}, "
-        f"irradiance {', '.join(f'{v:.2f}' for v in irradiance)}, {'with' if shadows else 'without'} shadows."
-    )
-    scattered = next((choice for choice in light.measured if choice.what == "scattering"), None)
-    error = 0.0 if scattered is None else scattered.measured.get(f"error_{scattered.chosen}", 0.0)
+        kind = "light as the thickest smoke" if samples.smoky else "light without smoke"
+    red, green, blue = np.sum([each.irradiance for each in light.lights if isinstance(each, DirectionalLight)], 0)
+    taken = Remark(kind, {"irradiance": (float(red), float(green), float(blue))})
+    scattered = next((each for each in light.measured if each.what == "scattering"), None)
+    error = 0.0 if scattered is None else scattered.figures.get(f"error_{scattered.value}", 0.0)
+    assert isinstance(error, float)
     if error < DOUBTFUL or not len(samples.behind) or noise.total.max() > QUIET:
-        return (note,)
+        return (taken,)
     low, high = np.percentile(samples.behind.max(-1), (5, 95))
     if high < FAINTEST or high - low > EVEN * high:
-        return (note,)
-    return (
-        note,
-        "The light that is taken is likely wrong, and the smoke too thick or too thin by half and more: it leaves "
-        f"{error:.0%} of what the smoke changes unexplained. Give [[lights]] in a scene file.",
-    )
+        return (taken,)
+    return taken, Doubt("likely wrong light", {"error": error})
 
 
 def _with_directions(
     lights: tuple[Light, ...], frames: Sequence[CoarseFrame], settings: DensitySettings
-) -> tuple[tuple[Light, ...], tuple[Choice[Any], ...]]:
+) -> tuple[tuple[Light, ...], tuple[Estimate[Any], ...]]:
     """Give every environment as many directions as change the picture of the clip's own smoke."""
     if not any(isinstance(light, EnvironmentLight) for light in lights):
         return lights, ()
@@ -263,28 +245,35 @@ def _with_directions(
     )
     fitted = fit_half([frame.lit_by(few).scattered_by("unshadowed") for frame in frames], settings)
     scattering = frames[0].scene.scattering
-    choices = {light: _directions(light, fitted, scattering) for light in lights if isinstance(light, EnvironmentLight)}
-    found = (replace(light, directions=choices[light].chosen) if light in choices else light for light in lights)
-    return tuple(found), tuple(choices.values())
+    found = {light: _directions(light, fitted, scattering) for light in lights if isinstance(light, EnvironmentLight)}
+    taken = (replace(light, directions=found[light].value) if light in found else light for light in lights)
+    return tuple(taken), tuple(found.values())
 
 
-def _directions(light: EnvironmentLight, fitted: HalfFit, scattering: Scattering) -> Choice[int]:
+def _directions(light: EnvironmentLight, fitted: HalfFit, scattering: Scattering) -> Estimate[int]:
     """How many directions stand for an environment: their number doubles until the picture hardly changes."""
     if light.directions is not None:
-        reason = f"Environment by hand: {light.directions} directions."
-        return Choice("environment directions", light.directions, reason, by_hand=True)
+        return Estimate(
+            "given environment directions", what="environment directions", value=light.directions, source="given"
+        )
 
     def picture(lights: tuple[DirectionalLight, ...]) -> Image:
         return np.concatenate(fitted.lit(lights, scattering)).astype(np.float32)
 
     count, change = lights_needed(light, picture)
-    reason = f"Environment: {count} directions; the last doubling changed the picture by {change:.1%}."
-    return Choice("environment directions", count, reason, {"change": change}, TOLERANCE)
+    return Estimate(
+        "environment directions",
+        {"change": change},
+        what="environment directions",
+        value=count,
+        source="measured",
+        tolerance=TOLERANCE,
+    )
 
 
 def _strengthened(
     lights: tuple[Light, ...], frames: Sequence[CoarseFrame], settings: DensitySettings
-) -> tuple[tuple[Light, ...], float, tuple[Choice[Any], ...]]:
+) -> tuple[tuple[Light, ...], float, tuple[Estimate[Any], ...]]:
     """Given lights as strong as the clip needs, and what multiple scattering leaves in them.
 
     Given lights are measured or tracked, and a picture hardly contradicts them: stronger light with thinner smoke fits
@@ -307,18 +296,20 @@ def _strengthened(
         factor, found = factor * STEP, stronger
     if factor == 1.0:
         return lights, given.error, ()
-    reason = (
-        f"Light: {factor:.2f} times as strong as given, since the smoke is brighter than the given light can make it: "
-        f"the densities that come nearest ask for {given.light:.2f} times as much, and now for {found.light:.2f}."
+    strength = Estimate(
+        "stronger light",
+        {"factor": factor, "asked_for": found.light, "asked_for_as_given": given.light, "error": found.error},
+        what="light strength",
+        value=f"{factor:.3g}",
+        source="measured",
+        tolerance=1 + MISSING,
     )
-    figures = {"factor": factor, "asked_for": found.light, "asked_for_as_given": given.light, "error": found.error}
-    choice = Choice("light strength", f"{factor:.3g}", reason, figures, 1 + MISSING)
-    return tuple(light.scaled(factor) for light in lights), found.error, (choice,)
+    return tuple(light.scaled(factor) for light in lights), found.error, (strength,)
 
 
 def _surroundings(
-    frames: Sequence[CoarseFrame], scattered: Choice[str], settings: DensitySettings
-) -> tuple[tuple[Light, ...], Choice[str]] | None:
+    frames: Sequence[CoarseFrame], scattered: Estimate[str], settings: DensitySettings
+) -> tuple[tuple[Light, ...], Estimate[str]] | None:
     """Light from everywhere that casts shadows, where it explains the clip clearly better; None where it does not.
 
     Thick smoke has a lit side and a shaded one, which a light without shadows explains by thin smoke. What is behind
@@ -328,7 +319,8 @@ def _surroundings(
     shadows, so errors are compared as a ratio. Dark smoke before a bright sky stays dark
     (docs/experiments/surroundings.md).
     """
-    error, tolerance = scattered.measured[f"error_{scattered.chosen}"], scattered.tolerance or 0.0
+    error, tolerance = scattered.figures[f"error_{scattered.value}"], scattered.tolerance or 0.0
+    assert isinstance(error, float)
     views = [frame.views[0] for frame in frames]
     behind = np.concatenate([view.plate.image[view.smoke] for view in views]).mean(0, dtype=np.float64)
     if error <= tolerance or behind.max() < FAINTEST:
@@ -344,10 +336,10 @@ def _surroundings(
     found = left(coloured).error
     if not found < min(NEARER * error, error - tolerance):
         return None
-    reason = (
-        f"Scattering: {WORDS['single']}, in light from everywhere, for want of a known one; with "
-        f"{WORDS[scattered.chosen]} held-out pixels differ by {error:.1%} of the smoke's contrast instead of "
-        f"{found:.1%}."
+    compared: Figures = {"error": found, "error_single": found, "other": scattered.value, "other_error": error}
+    return light_around(coloured), replace(
+        scattered,
+        kind="scattering in light from everywhere",
+        figures={**scattered.figures, **compared},
+        value="single",
     )
-    measured = {**scattered.measured, "error_single": found}
-    return light_around(coloured), Choice("scattering", "single", reason, measured, tolerance)

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from smokelift.checks import Remark
 from smokelift.render import scene_optics
 from smokelift.scene import Background, Camera, CompleteScene, Domain, EnvironmentLight, Light, Medium
-from smokelift.setup.choice import Choice
-from smokelift.setup.fire import fire_choice
+from smokelift.setup.estimate import Estimate
+from smokelift.setup.fire import fire_estimate
 from smokelift.setup.first_estimate import FirstEstimate
 from smokelift.setup.source import smoke_colour
 
@@ -24,7 +25,7 @@ DIRECTIONS = 8
 
 def find_medium(
     given: Medium | None, estimate: FirstEstimate, lights: tuple[Light, ...], camera: Camera, domain: Domain
-) -> tuple[Medium, tuple[Choice[Any], ...], tuple[str, ...]]:
+) -> tuple[Medium, tuple[Estimate[Any], ...], tuple[Remark, ...]]:
     """Complete the medium.
 
     Parameters
@@ -42,27 +43,24 @@ def find_medium(
     -------
     medium
         With the colour of its flame, where fire burns.
-    choices
+    estimates
         What was measured for it.
-    notes
-        What was assumed, a sentence each.
+    remarks
+        What was assumed.
     """
-    choices: tuple[Choice[Any], ...] = ()
-    notes: tuple[str, ...] = ()
+    estimates: tuple[Estimate[Any], ...] = ()
+    remarks: tuple[Remark, ...] = ()
     medium = given
     if medium is None:
         width = min(high - low for low, high in zip(domain.min, domain.max, strict=True))
         grey = Medium(extinction=OPTICAL_DEPTH_AT_ONE / width)
-        color, choice = smoke_colour(estimate.samples, _light_colour(lights, camera, domain, grey))
-        medium, choices = replace(grey, color=color), (choice,)
-        notes = (
-            f"Medium not given: extinction {grey.extinction:.3g} 1/m (density 1 is thick smoke), "
-            f"albedo {grey.albedo:g}, isotropic.",
-        )
+        color, coloured = smoke_colour(estimate.samples, _light_colour(lights, camera, domain, grey))
+        medium, estimates = replace(grey, color=color), (coloured,)
+        remarks = (Remark("assumed medium", {"extinction": grey.extinction, "albedo": grey.albedo}),)
     if estimate.fire is not None:
-        choices = (*choices, fire_choice(estimate.fire, medium.flame_color))
+        estimates = (*estimates, fire_estimate(estimate.fire, medium.flame_color))
         medium = replace(medium, flame_color=medium.flame_color or estimate.fire.color)
-    return medium, choices, notes
+    return medium, estimates, remarks
 
 
 def _light_colour(lights: tuple[Light, ...], camera: Camera, domain: Domain, grey: Medium) -> NDArray[np.float64]:

@@ -11,8 +11,8 @@ import numpy as np
 
 from smokelift.density import FittedDensity, reconstruct_density
 from smokelift.scene import CompleteScene, Domain
-from smokelift.setup.choice import Choice
 from smokelift.setup.coarse import CoarseClip, CoarseFrame
+from smokelift.setup.estimate import Estimate
 from smokelift.setup.settings import Settings
 from smokelift.setup.velocity_grid import choose_coarsening, choose_levels
 from smokelift.velocity import VelocitySettings
@@ -26,12 +26,12 @@ class Model:
     ----------
     velocity
         With the grids that velocities are estimated on.
-    choices
+    estimates
         With their figures.
     """
 
     velocity: VelocitySettings
-    choices: tuple[Choice[Any], ...]
+    estimates: tuple[Estimate[Any], ...]
 
 
 def choose_model(
@@ -51,7 +51,7 @@ def choose_model(
         What they decide is taken.
     """
     coarsened = choose_coarsening(scene.domain, settings.velocity, settings.selection.velocity_side)
-    velocity = replace(settings.velocity, coarsening=coarsened.chosen)
+    velocity = replace(settings.velocity, coarsening=coarsened.value)
     if not frames:
         return Model(replace(velocity, levels=velocity.grids), ())
 
@@ -69,7 +69,7 @@ def choose_model(
     followed = sorted({min(number, length - 2) for number in frames if length > 1})
     levels = _levels(followed, density, next(iter(frames.values())).scene.domain, scene.domain, velocity)
     chosen = (_inside(densities, scene), _iterations(densities, settings), coarsened, levels)
-    return Model(replace(velocity, levels=levels.chosen), chosen)
+    return Model(replace(velocity, levels=levels.value), chosen)
 
 
 def tried_frames(smoky: Sequence[int]) -> tuple[int, ...]:
@@ -83,34 +83,32 @@ def _levels(
     coarse: Domain,
     final: Domain,
     settings: VelocitySettings,
-) -> Choice[int]:
+) -> Estimate[int]:
     """How many grids velocities are estimated on, by the coarse densities of some frames and those after them."""
     if settings.levels is not None:
-        reason = f"Velocity grids by hand: {settings.levels}."
-        return Choice("velocity levels", settings.levels, reason, by_hand=True)
+        return Estimate("given velocity levels", what="velocity levels", value=settings.levels, source="given")
     ends = [(density(number), density(number + 1)) for number in numbers]
     pairs = [(before.density, after.density) for before, after in ends if before is not None and after is not None]
     return choose_levels(pairs, coarse, final, settings)
 
 
-def _inside(densities: Sequence[FittedDensity], scene: CompleteScene) -> Choice[tuple[int, int, int]]:
+def _inside(densities: Sequence[FittedDensity], scene: CompleteScene) -> Estimate[tuple[int, int, int]]:
     """The part of the box that is worked on."""
     share = float(np.mean([density.hull.mean() for density in densities]))
-    reason = (
-        f"Domain: only voxels that the picture allows to hold smoke are worked on, {share:.0%} of the box; frames "
-        "without smoke cost nothing."
-    )
-    return Choice("domain", scene.domain.resolution, reason, {"hull_share": share})
+    return Estimate("domain", {"hull_share": share}, what="domain", value=scene.domain.resolution, source="measured")
 
 
-def _iterations(densities: Sequence[FittedDensity], settings: Settings) -> Choice[int]:
+def _iterations(densities: Sequence[FittedDensity], settings: Settings) -> Estimate[int]:
     """How long a density is fitted."""
     fit = settings.density
     most = fit.fit_iterations + fit.descent_iterations
     used = float(np.mean([density.figures["iterations"] for density in densities]))
     by_hand = fit != Settings.preset(settings.quality, settings.method).density
-    reason = (
-        f"Iterations: until one lowers the error by less than {fit.tolerance:.0%} or noise is all that is left, "
-        f"{used:.0f} on the coarse frames, {most} at most{' (by hand)' if by_hand else ''}."
+    return Estimate(
+        "given iterations" if by_hand else "iterations",
+        {"iterations": used},
+        what="iterations",
+        value=most,
+        source="given" if by_hand else "measured",
+        tolerance=fit.tolerance,
     )
-    return Choice("iterations", most, reason, {"iterations": used}, fit.tolerance, by_hand)

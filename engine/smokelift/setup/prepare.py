@@ -1,6 +1,6 @@
 """A shot in which everything is decided, from what a user gives (a clip, perhaps a scene file).
 
-What a scene leaves out is estimated from the clip or defaulted, and every such choice is put into words.
+What a scene leaves out is estimated from the clip or defaulted; remarks and estimates say what, and why.
 """
 
 from __future__ import annotations
@@ -8,19 +8,19 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import replace
 
-from smokelift.checks import counted, require_kind
+from smokelift.checks import Remark, counted, require_kind
 from smokelift.density.axis import SmokeAxis
 from smokelift.footage.clip import Clip
 from smokelift.footage.proxy import proxy_frames
 from smokelift.footage.working_picture import CameraError, WorkingPicture, working_picture
 from smokelift.render import scene_optics
 from smokelift.scene import Background, Camera, CompleteScene, Domain, Medium, Scene
-from smokelift.setup.choice import Choice
 from smokelift.setup.coarse import CoarseClip
+from smokelift.setup.estimate import Estimate
 from smokelift.setup.first_estimate import FirstEstimate, first_estimate
 from smokelift.setup.further_views import disagreement, open_view
 from smokelift.setup.geometry import Geometry, clip_lens, find_geometry
-from smokelift.setup.illumination import Illumination, first_light, light_notes, measured_light, sunlight
+from smokelift.setup.illumination import Illumination, first_light, light_remarks, measured_light, sunlight
 from smokelift.setup.medium import find_medium
 from smokelift.setup.model import choose_model, tried_frames
 from smokelift.setup.place import placed
@@ -87,20 +87,19 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
         views=(first, *others),
         settings=settings if model is None else replace(settings, velocity=model.velocity),
         estimated_background=estimate.picture,
-        notes=(
+        remarks=(
             *remarks,
-            *estimate.notes,
-            *geometry.notes,
+            *estimate.remarks,
+            *geometry.remarks,
             *taken,
-            *light_notes(light, samples, plates.noise),
+            *light_remarks(light, samples, plates.noise),
             *said,
         ),
-        doubts=estimate.doubts,
-        choices=(
-            *geometry.choices,
+        estimates=(
+            *geometry.estimates,
             *coloured,
-            *light.choices,
-            *(() if model is None else model.choices),
+            *light.estimates,
+            *(() if model is None else model.estimates),
             *gains,
         ),
         qualities=geometry.qualities,
@@ -109,7 +108,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
         place=None,
         fire=None if estimate.fire is None else replace(first, clip=estimate.fire.light),
     )
-    return replace(shot, notes=(*shot.notes, *disagreement(shot))) if scene.views else placed(shot)
+    return replace(shot, remarks=(*shot.remarks, *disagreement(shot))) if scene.views else placed(shot)
 
 
 def _complete(
@@ -130,36 +129,21 @@ def _complete(
     )
 
 
-def boundaries(scene: CompleteScene, settings: Settings) -> tuple[str, ...]:
-    """How smoke gets in and out of the box of a complete scene, a sentence each."""
-    inflow = scene.inflow()
-    if inflow is None:
-        search = settings.method == "default" and settings.velocity.sources
-        entry = f"No inlet marked: {'where smoke enters is found from the densities' if search else 'none is assumed'}."
-    else:
-        places, voxels = counted(len(scene.inlets), "marked inlet"), counted(int(inflow.sum()), "voxel")
-        entry = f"Smoke enters at {places} ({voxels}); others are not looked for."
-    if not scene.closed:
-        return entry, "All sides of the box are open."
-    walls = ", ".join(scene.closed)
-    return entry, f"Closed sides of the box: {walls}; the others are open."
-
-
 def _check(clip: Clip, scene: Scene) -> None:
     """Refuse what can be seen to be wrong before anything is examined."""
     moves = scene.camera is not None and scene.camera.moves
     if scene.views and (scene.camera is None or scene.domain is None):
-        raise ValueError("Further [[views]] need the input's [camera] and the [domain], in the same metres as theirs.")
+        raise ValueError("Further views need the input's camera and the box, in the same metres as theirs; give both.")
     if scene.domain is not None:
         for camera in (scene.camera, *(view.camera for view in scene.views)):
             if camera is not None:
                 camera.require_outside(scene.domain)
     if scene.views and (moves or any(view.camera.moves for view in scene.views)):
-        raise ValueError("With further [[views]] no camera may move; give one matrix a camera, or one view only.")
+        raise ValueError("With further views no camera may move; give one matrix a camera, or one view only.")
     if scene.camera is not None and moves and len(scene.camera.matrices) != len(clip):
         given, used = counted(len(scene.camera.matrices), "frame"), counted(len(clip), "frame")
         raise ValueError(
-            f"[camera] matrices are given for {given}, but the clip is used with {used}; give one matrix for each."
+            f"The camera's matrices are given for {given}, but the clip is used with {used}; give one matrix for each."
         )
 
 
@@ -173,21 +157,21 @@ def _expect(clip: Clip, scene: Scene) -> None:
 
 def _further_views(
     first: ShotView, scene: CompleteScene, estimate: FirstEstimate, settings: Settings, lit: bool
-) -> tuple[list[ShotView], list[Choice[str]], list[str]]:
-    """The further views of a scene, at the first one's exposure; with what was measured and is to be said of them."""
-    views, notes = [], []
-    gains: list[Choice[str]] = []
+) -> tuple[list[ShotView], list[Estimate[str]], list[Remark]]:
+    """The further views of a scene, at the first one's exposure; with what was measured and noticed."""
+    views, remarks = [], []
+    gains: list[Estimate[str]] = []
     smoky = estimate.samples.smoky
     for number in range(len(scene.views)):
         view, said = open_view(number, first.clip, scene)
-        notes += said
+        remarks += said
         if settings.selection.measure:
             shows = tried_frames(smoky)
             tolerance = settings.selection.scattering_error
             view, gain = balanced(number + 1, first, view, scene, lit, shows, settings.density, tolerance)
             gains += gain
         views.append(view)
-    return views, gains, notes
+    return views, gains, remarks
 
 
 def _working(camera: Camera, domain: Domain) -> WorkingPicture:

@@ -17,8 +17,8 @@ from dataclasses import replace
 
 from smokelift.density import DensitySettings
 from smokelift.scene import CompleteScene, Scattering
-from smokelift.setup.choice import Choice
 from smokelift.setup.coarse import CoarseFrame
+from smokelift.setup.estimate import Estimate
 from smokelift.setup.held_out import held_out
 
 MODELS: tuple[Scattering, ...] = ("absorption", "unshadowed", "single", "multiple")
@@ -33,13 +33,6 @@ SETTLED = 64
 """Steps of descent that a fit may take where models are distinguished that differ little: enough for every fit to end
 by itself. One that is cut off has the error of the steps which it lacks (docs/experiments/scattering-selection.md)."""
 
-WORDS: Mapping[str, str] = {
-    "absorption": "absorption only",
-    "unshadowed": "scattering without shadows",
-    "single": "single scattering with shadows",
-    "multiple": "multiple scattering",
-}
-
 
 def choose_scattering(
     frames: Sequence[CoarseFrame],
@@ -48,7 +41,7 @@ def choose_scattering(
     tolerance: float,
     known: Mapping[Scattering, float],
     finer: Callable[[], CoarseFrame | None],
-) -> tuple[Scattering, Choice[str]]:
+) -> tuple[Scattering, Estimate[str]]:
     """Choose the model of scattering.
 
     Parameters
@@ -89,7 +82,7 @@ def choose_scattering(
         if errors[model] <= errors[richest] + tolerance:
             chosen = model
             break
-    return chosen, _choice(chosen, richest, errors, tolerance)
+    return chosen, _estimate(chosen, richest, errors, tolerance)
 
 
 def tries_multiple(scene: CompleteScene) -> bool:
@@ -97,20 +90,20 @@ def tries_multiple(scene: CompleteScene) -> bool:
     return scene.medium.anisotropy == 0.0
 
 
-def _choice(
+def _estimate(
     chosen: Scattering, richest: Scattering, errors: Mapping[Scattering, float], tolerance: float
-) -> Choice[str]:
-    reason = f"Scattering: {WORDS[chosen]}"
-    if chosen != richest:
-        reason += (
-            f"; held-out pixels differ by {errors[chosen]:.1%} of the smoke's contrast, with {WORDS[richest]} by "
-            f"{errors[richest]:.1%}"
-        )
-    elif len(errors) > 1:
-        cheaper = MODELS[MODELS.index(richest) - 1]
-        reason += (
-            f"; with {WORDS[cheaper]} held-out pixels differ by {errors[cheaper]:.1%} of the smoke's contrast instead "
-            f"of {errors[richest]:.1%}"
-        )
+) -> Estimate[str]:
+    """The choice of a model beside the one that it is compared with: the richest, or of that the next cheaper one."""
+    kind, other = "cheaper scattering", richest
+    if chosen == richest:
+        kind, other = "richest scattering", MODELS[MODELS.index(richest) - 1]
     measured = {f"error_{name}": value for name, value in errors.items()}
-    return Choice("scattering", chosen, f"{reason}.", measured, tolerance)
+    compared = {"error": errors[chosen], "other": other, "other_error": errors.get(other, 0.0)}
+    return Estimate(
+        kind if len(errors) > 1 else "scattering",
+        {**measured, **(compared if len(errors) > 1 else {})},
+        what="scattering",
+        value=chosen,
+        source="measured",
+        tolerance=tolerance,
+    )

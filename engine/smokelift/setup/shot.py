@@ -7,13 +7,14 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+from smokelift.checks import Remark
 from smokelift.density import AxisEstimate, Observation
 from smokelift.footage.clip import Clip
 from smokelift.footage.plate import Plates
 from smokelift.footage.working_picture import CameraError, WorkingPicture, working_picture
 from smokelift.render import Image, Optics
 from smokelift.scene import Camera, CompleteScene, Domain, Inlet
-from smokelift.setup.choice import Choice, Grid
+from smokelift.setup.estimate import Estimate, Grid
 from smokelift.setup.settings import Quality, Settings
 
 
@@ -81,12 +82,10 @@ class Shot:
         With all that was left open decided.
     estimated_background : (rows, columns, 3), optional
         Full picture behind the smoke where the scene does not give one.
-    notes
-        What was assumed or estimated, a sentence each.
-    doubts
-        Those of the notes that say why the result may be nothing, or wrong.
-    choices
-        What was chosen by measurement or by hand, with the figures that decided it.
+    remarks
+        What was assumed or noticed, with the doubts: why the result may be nothing, or wrong.
+    estimates
+        What was decided, with the figures that decided it.
     qualities
         The grid that each quality would take of this clip; empty where the resolution was not measured.
     exposure
@@ -105,9 +104,8 @@ class Shot:
     views: tuple[ShotView, ...]
     settings: Settings
     estimated_background: Image | None
-    notes: tuple[str, ...]
-    doubts: tuple[str, ...]
-    choices: tuple[Choice[Any], ...]
+    remarks: tuple[Remark, ...]
+    estimates: tuple[Estimate[Any], ...]
     qualities: Mapping[Quality, Grid]
     exposure: float
     smoky: tuple[int, ...]

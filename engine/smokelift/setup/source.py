@@ -9,12 +9,15 @@ the smoke, which stands in the same light. Figures: docs/experiments/smoke-colou
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
+from smokelift.checks import Doubt
 from smokelift.footage.images import brightest_channel
 from smokelift.scene.checks import Vector
-from smokelift.setup.choice import UNDETERMINED, Choice
+from smokelift.setup.estimate import UNDETERMINED, Estimate
 from smokelift.setup.smoke import SmokeSamples
 
 Array = NDArray[np.float64]
@@ -73,7 +76,7 @@ def source_radiance(samples: SmokeSamples, measured: Array | None = None) -> Arr
     return np.asarray(np.maximum(farthest + BEYOND * np.linalg.norm(farthest) * axis, 0))
 
 
-def smoke_colour(samples: SmokeSamples, light: Array) -> tuple[Vector, Choice[str]]:
+def smoke_colour(samples: SmokeSamples, light: Array) -> tuple[Vector, Estimate[str]]:
     """Find the smoke's own colour.
 
     Parameters
@@ -87,33 +90,34 @@ def smoke_colour(samples: SmokeSamples, light: Array) -> tuple[Vector, Choice[st
     -------
     color
         Red, green and blue, the largest 1; white where nothing says that the smoke is not grey.
-    choice
-        The same in words.
+    estimate
+        The same with what decided it.
     """
     line = _thickest(samples)
     if line is None:
-        return _grey("no smoke is thick, bright and free of clipped pixels enough to show a colour")
+        return _grey("smoke colour unseen")
     behind, seen = line
     sources = _sources(behind, seen)
     white = _degrees(sources, light)
     least = np.minimum(white, _degrees(sources, behind)) if behind.max() > FAINTEST else white
     if least.min() < COLOURED:
-        nearest = "grey smoke" if white.min() < COLOURED else "what is behind it"
-        near = f"it may be {least.min():.0f} degrees from {nearest} in colour"
-        return _grey(f"{near}, less than the {COLOURED:g} of coloured light", float(least.min()))
+        near = "near grey" if white.min() < COLOURED else "near the background's"
+        return _grey(f"smoke colour {near}", {"degrees": float(least.min())})
     # the palest that explains the clip
     own = sources[white.argmin()] / np.maximum(light, 1e-6)
     red, green, blue = (float(round(v, 3)) for v in own / own.max())
-    named = f"{red:.2f}, {green:.2f}, {blue:.2f}"
-    reason = (
-        f"Smoke colour: {named} (linear), at least {white.min():.0f} degrees from that of grey smoke; if the light has "
-        "this colour and the smoke is grey, say so by color = [1, 1, 1] in [medium]."
+    return (red, green, blue), Estimate(
+        "smoke colour",
+        {"degrees": float(white.min())},
+        what="smoke colour",
+        value=f"{red:.2f}, {green:.2f}, {blue:.2f}",
+        source="measured",
+        tolerance=COLOURED,
     )
-    return (red, green, blue), Choice("smoke colour", named, reason, {"degrees": float(white.min())}, COLOURED)
 
 
-def several_colours(samples: SmokeSamples) -> tuple[str, ...]:
-    """Return what is to be said of smoke of more than one colour before black, a sentence; nothing of other smoke.
+def several_colours(samples: SmokeSamples) -> tuple[Doubt, ...]:
+    """Return a doubt about smoke of more than one colour before black.
 
     Before black all light of smoke of one colour has that colour, however thick it is. What is off the one colour that
     explains the most of the light is another colour's. White that is clipped has none.
@@ -127,11 +131,7 @@ def several_colours(samples: SmokeSamples) -> tuple[str, ...]:
     off = float(np.degrees(np.arcsin(np.sqrt(along[:-1].sum().clip(0) / along.sum()))))
     if off < COLOURED:
         return ()
-    return (
-        f"The smoke has more than one colour: its light is {off:.0f} degrees from the nearest single one on the mean, "
-        "but one is taken for all of it, so colours are wrong and the thickness may be. Crop the clip to smoke of one "
-        "colour, or give it a mask.",
-    )
+    return (Doubt("smoke of several colours", {"degrees": off}),)
 
 
 def _line_of_colours(colours: Array, behind: Array) -> Array:
@@ -147,10 +147,10 @@ def _line_of_colours(colours: Array, behind: Array) -> Array:
     return np.asarray(axis if np.sum(change @ axis) >= 0 else -axis)
 
 
-def _grey(why: str, degrees: float | None = None) -> tuple[Vector, Choice[str]]:
-    reason = f"Smoke colour: undetermined, grey is taken: {why}."
-    measured = {} if degrees is None else {"degrees": degrees}
-    return (1.0, 1.0, 1.0), Choice("smoke colour", UNDETERMINED, reason, measured, COLOURED)
+def _grey(kind: str, measured: Mapping[str, float] | None = None) -> tuple[Vector, Estimate[str]]:
+    return (1.0, 1.0, 1.0), Estimate(
+        kind, measured or {}, what="smoke colour", value=UNDETERMINED, source="assumed", tolerance=COLOURED
+    )
 
 
 def _thickest(samples: SmokeSamples) -> tuple[Array, Array] | None:

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.footage.plate import Plate, noise_at
-from smokelift.setup.choice import UNDETERMINED, Choice
+from smokelift.setup.estimate import UNDETERMINED, Estimate
 
 Array = NDArray[np.float64]
 
@@ -37,6 +37,9 @@ CONFIDENCE = 0.5
 ERROR = 0.15
 """Largest relative error (standard deviation) of the source radiance that counts as measured: half of the 30 % within
 which it has to be right."""
+
+LARGEST_ERROR = 9.99
+"""Largest error that is said: further figures say nothing more."""
 
 FRAMES = 3
 """Smallest number of frames that their deviation is estimated from."""
@@ -75,38 +78,37 @@ def seen_texture(picture: NDArray[np.float32], plate: Plate, smoke: NDArray[np.b
     return np.array([*sums, *added[smoky].sum(0)])
 
 
-def smoke_thickness(frames: Sequence[Array]) -> tuple[Array | None, Choice[str]]:
-    """Return the source radiance (3,) that the sums of `seen_texture` of frames show, None if they show none; in words.
+def smoke_thickness(frames: Sequence[Array]) -> tuple[Array | None, Estimate[str]]:
+    """Return the source radiance (3,) that the sums of `seen_texture` of frames show, None if none; and the thickness.
 
     The deviation is estimated by leaving one frame out after the other (the jackknife).
     """
     seen = np.array([frame for frame in frames if frame[1] > 0]).reshape(-1, 8)
     hidden, smoke, unsure, clear, missing, *added = (float(total) for total in seen.sum(0))
     if len(seen) < FRAMES or not (hidden > 0 and clear > 0):
-        return None, _undetermined("too little texture shows through it")
+        return None, _undetermined("smoke thickness without texture")
     rest = seen.sum(0) - seen
     others = rest[:, 5:].sum(1) / np.maximum(rest[:, 0], 1e-12)
     spread = np.sqrt((len(seen) - 1) * np.var(others)) / max(sum(added) / hidden, 1e-12)
     # what a background of smoke hides is missing from what the smoke before it seems to hide
     error = float(np.linalg.norm((spread, missing / clear * smoke / hidden, unsure / hidden)))
     if not error <= ERROR:
-        return None, _undetermined("the texture behind it tells it no better than that", error)
+        return None, _undetermined("uncertain smoke thickness", min(error, LARGEST_ERROR))
     share = hidden / smoke
-    reason = (
-        f"Smoke thickness: by the texture behind it the smoke hides {share:.0%} of what it covers, right to "
-        f"{error:.0%}; its light is as strong as that asks for."
+    thickness = Estimate(
+        "smoke thickness",
+        {"hidden": share},
+        what="smoke thickness",
+        value=f"{share:.3f}",
+        source="measured",
+        spread=error,
+        tolerance=ERROR,
     )
-    choice = Choice("smoke thickness", f"{share:.3f}", reason, {"hidden": share, "error": error}, ERROR)
-    return np.maximum(np.array(added) / hidden, 0), choice
+    return np.maximum(np.array(added) / hidden, 0), thickness
 
 
-def _undetermined(why: str, error: float | None = None) -> Choice[str]:
-    known = "" if error is None else f" (error {min(error, 9.99):.0%}, {ERROR:.0%} at most would do)"
-    reason = (
-        f"Smoke thickness: undetermined, {why}{known}; thinner smoke in stronger light looks the same. "
-        "Give [[lights]] if you know the light."
-    )
-    return Choice("smoke thickness", UNDETERMINED, reason, {} if error is None else {"error": error}, ERROR)
+def _undetermined(kind: str, error: float | None = None) -> Estimate[str]:
+    return Estimate(kind, what="smoke thickness", value=UNDETERMINED, source="assumed", spread=error, tolerance=ERROR)
 
 
 class _Behind(NamedTuple):

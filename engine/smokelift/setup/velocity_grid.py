@@ -7,10 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from smokelift.checks import counted
 from smokelift.render import Volume
 from smokelift.scene import Domain
-from smokelift.setup.choice import Choice
+from smokelift.setup.estimate import Estimate
 from smokelift.velocity import VelocitySettings, estimate_velocity
 from smokelift.velocity.settings import LEVELS
 
@@ -21,7 +20,7 @@ MARGIN = 1.25
 """Factor by which grids reach further than the motion that is found, since coarse densities show less than there is."""
 
 
-def choose_coarsening(domain: Domain, settings: VelocitySettings, finest: int) -> Choice[int]:
+def choose_coarsening(domain: Domain, settings: VelocitySettings, finest: int) -> Estimate[int]:
     """Choose how much coarser than the densities the grid of the velocity is, and leave at least eight voxels a side.
 
     Parameters
@@ -35,13 +34,13 @@ def choose_coarsening(domain: Domain, settings: VelocitySettings, finest: int) -
     """
     what = "velocity grid coarsening"
     if settings.coarsening is not None:
-        reason = f"Velocity grid by hand: coarsened {counted(settings.coarsening, 'time')}."
-        return Choice(what, settings.coarsening, reason, by_hand=True)
+        return Estimate("given velocity grid", what=what, value=settings.coarsening, source="given")
     coarsening, longest, shortest = 0, max(domain.resolution), min(domain.resolution)
     while longest > finest and shortest >= 16:
         coarsening, longest, shortest = coarsening + 1, -(-longest // 2), -(-shortest // 2)
-    reason = f"Velocity grid: {longest} voxels along the longest side, because the depth of the smoke is uncertain."
-    return Choice(what, coarsening, reason, {"voxels": float(longest)}, finest)
+    return Estimate(
+        "velocity grid", {"voxels": float(longest)}, what=what, value=coarsening, source="measured", tolerance=finest
+    )
 
 
 def levels_for(motion: float) -> int:
@@ -54,7 +53,7 @@ def levels_for(motion: float) -> int:
 
 def choose_levels(
     pairs: Sequence[tuple[Volume, Volume]], coarse: Domain, final: Domain, settings: VelocitySettings
-) -> Choice[int]:
+) -> Estimate[int]:
     """Choose the number of grids.
 
     Parameters
@@ -66,13 +65,13 @@ def choose_levels(
     settings
         How velocities are estimated.
     """
+    what = "velocity levels"
     if not pairs:
-        return Choice("velocity levels", LEVELS, f"Velocity grids: {LEVELS}, since there is no motion to measure.")
+        return Estimate("velocity levels without motion", what=what, value=LEVELS, source="assumed")
     finer = coarse.voxel_size / final.voxel_size
     motion = finer * max(_motion(before, after, settings) for before, after in pairs)
     levels = levels_for(motion / 2 ** (settings.coarsening or 0))
-    reason = f"Velocity grids: {levels}, because the fastest smoke goes {motion:.1f} voxels a frame."
-    return Choice("velocity levels", levels, reason, {"voxels_a_frame": motion})
+    return Estimate("velocity levels", {"voxels_a_frame": motion}, what=what, value=levels, source="measured")
 
 
 def _motion(before: Volume, after: Volume, settings: VelocitySettings) -> float:

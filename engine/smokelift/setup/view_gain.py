@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from smokelift.density import DensitySettings
 from smokelift.scene import CompleteScene
-from smokelift.setup.choice import Choice
 from smokelift.setup.coarse import CoarseClip
+from smokelift.setup.estimate import Estimate
 from smokelift.setup.held_out import HeldOut, held_out
 from smokelift.setup.shot import ShotView
 
@@ -47,7 +47,7 @@ def balanced(
     smoky: Sequence[int],
     settings: DensitySettings,
     tolerance: float,
-) -> tuple[ShotView, tuple[Choice[str], ...]]:
+) -> tuple[ShotView, tuple[Estimate[str], ...]]:
     """Bring a further view to the exposure of the input.
 
     Parameters
@@ -71,7 +71,7 @@ def balanced(
     -------
     view
         The same one where its gain is no better than none.
-    choices
+    estimates
         One where it is, else none.
     """
     frames = CoarseClip((front, view), scene).smoky(smoky).values()
@@ -97,14 +97,15 @@ def balanced(
     error = tried(gain).error
     if error >= as_it_is - tolerance:
         return view, ()
-    named = ", ".join(f"{value:.2f}" for value in gain)
-    reason = (
-        f"View {number}: shows the smoke {named} times (red, green, blue) as bright as the input, which is evened out; "
-        f"the pictures differ by {error:.1%} of the smoke's contrast instead of {as_it_is:.1%}. If the cameras are "
-        "exposed alike, light is missing: give it in [[lights]]."
+    estimate = Estimate(
+        "gain of a view",
+        {"view": number, "error": error, "error_as_it_is": as_it_is},
+        what=f"gain of view {number}",
+        value=", ".join(f"{value:.2f}" for value in gain),
+        source="measured",
+        tolerance=tolerance,
     )
-    measured = {"error": error, "error_as_it_is": as_it_is}
-    return _over(view, gain), (Choice(f"gain of view {number}", named, reason, measured, tolerance),)
+    return _over(view, gain), (estimate,)
 
 
 def _best(error_of: Callable[[float], float], at_one: float) -> float:

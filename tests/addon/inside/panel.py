@@ -215,7 +215,7 @@ def test_a_failed_result_has_no_other_variation(shot, tmp_path, complete) -> Non
 
 
 FACTS = [
-    ("background", "one colour, 0.2, 0.2, 0.2 (linear), 8% of it unknown"),
+    ("background", "one color, 0.2, 0.2, 0.2 (linear), 8% of it unknown"),
     ("exposure", "steady"),
     ("scale", "box of 1.29 x 1.29 x 1.71 m"),
     ("smoke colour", "grey"),

@@ -36,4 +36,4 @@ def test_a_missing_frame_fails(copy, capsys) -> None:
 def test_an_unfinished_run_fails(copy, capsys) -> None:
     path = copy / "sequence.json"
     path.write_text(json.dumps({**json.loads(path.read_text()), "complete": False}))
-    assert refused(capsys, "check", copy).endswith("has 5 finished frames and is no complete run; --resume goes on.")
+    assert refused(capsys, "check", copy).endswith("has 5 finished frames and is no complete run; resume it.")

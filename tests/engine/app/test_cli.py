@@ -19,11 +19,11 @@ import numpy as np
 import pytest
 from command_line import ENVIRONMENT, MODULE, QUICK, command, events, names, refused
 
-from smokelift.app import cost
-from smokelift.app.workload import Workload
 from smokelift.footage.clip import Clip
 from smokelift.output.sequence import Sequence
 from smokelift.render import device
+from smokelift.report import cost
+from smokelift.report.workload import Workload
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import Settings
 
@@ -49,7 +49,7 @@ def test_a_gpu_that_is_not_there(shot, tmp_path) -> None:
     )
     assert done.returncode == 3
     assert done.stderr.startswith("No GPU")
-    assert "--device cpu" in done.stderr
+    assert "choose cpu as the device" in done.stderr
     assert len(done.stderr.splitlines()) == 1
     assert not (tmp_path / "out").exists()
 
@@ -69,7 +69,7 @@ def test_a_grid_too_large_for_the_memory(plume, tmp_path, capsys) -> None:
         *QUICK,
         status=3,
     )
-    named = re.search(r"--resolution (\d+),(\d+),(\d+)", sentence)
+    named = re.search(r"resolution that fits is (\d+),(\d+),(\d+)", sentence)
     assert named
     x, y, z = (int(count) for count in named.groups())
     even_without_smoke = cost.memory_needed((x, y, z), replace(workload(plume), largest=0.0))

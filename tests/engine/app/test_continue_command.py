@@ -7,7 +7,7 @@ import shutil
 import numpy as np
 from command_line import command, events, names, refused
 
-from smokelift.app import cost
+from smokelift.report import cost
 
 
 def test_continue_adds_frames(finished, tmp_path, capsys) -> None:
@@ -31,7 +31,7 @@ def test_one_sentence_says_that_the_box_cannot_grow(finished, tmp_path, capsys, 
         return [event["text"] for event in events(capsys.readouterr().out) if event["event"] == "note"]
 
     (sentence,) = said("--room", 1)
-    assert "dissolves" in sentence and "more --room than 1" in sentence
+    assert "dissolves" in sentence and "more room than 1" in sentence
     shutil.rmtree(tmp_path / "out")
     monkeypatch.setattr(cost, "memory_free", lambda: 0)
     assert "grows to 1 times" in said()[0]

@@ -25,9 +25,7 @@ def test_inspect_says_how_smoke_gets_in_and_out(plume, tmp_path, capsys) -> None
     scene.save(tmp_path / "scene.toml")
     assert command("inspect", tmp_path / "scene.toml", "--progress", "json", *QUICK) == 0
     *notes, done = events(capsys.readouterr().out)
-    said = " ".join(event["text"] for event in notes)
-    assert "Smoke enters at 1 marked inlet" in said
-    assert "Closed sides of the box: z-;" in said
+    assert {"inlets", "closed sides"} < {event["kind"] for event in notes}
     assert done["scene"]["domain"]["closed"] == ["z-"]
     assert done["scene"]["inlet"] == [{"centre": [0.0, 0.0, 0.2], "radius": 0.1}]
 
@@ -98,7 +96,6 @@ def test_a_page_shows_what_is_known(plume, tmp_path, capsys, kind) -> None:
     assert known["light strength"]["how"] != known["smoke thickness"]["how"]
     for what in ("sun's direction", "sun's colour", "ambient share"):
         assert known[what]["origin"] == "undetermined"
-        assert "Give [[lights]]" in known[what]["how"]
     if kind == ".html":
         assert "sun&#x27;s direction" in page.read_text(encoding="utf-8")
     assert known["background"]["origin"] == known["box"]["origin"] == "estimated"
@@ -162,7 +159,7 @@ def test_a_clip_without_smoke_has_a_page_that_says_so(plume, tmp_path, capsys) -
     assert command("inspect", clip, "--page", page, "--progress", "json", *QUICK) == 0
     *notes, done = events(capsys.readouterr().out)
     said = " ".join(event["text"] for event in notes)
-    assert "No smoke found in the 2 frames" in said
+    assert "no smoke examined" in [event.get("kind") for event in notes]
     assert '<p class="warning">No smoke found' in page.read_text(encoding="utf-8")
     assert "around the smoke" not in said + str(done["facts"])
     assert "thickest smoke" not in said + str(done["facts"])

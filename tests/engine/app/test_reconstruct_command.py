@@ -62,9 +62,10 @@ def test_progress_as_json(plume, tmp_path, capsys) -> None:
     captured = capsys.readouterr()
     sent = events(captured.out)
     assert captured.err == ""
-    notes = [event["text"] for event in sent if event["event"] == "note"]
+    notes = [event["kind"] for event in sent if event["event"] == "note"]
     assert [event["event"] for event in sent] == [*["note"] * len(notes), "start", *["frame"] * 5, "done"]
-    assert notes[0].startswith("Medium not given")
+    assert notes[0] == "assumed medium"
+    assert sent[0]["text"].startswith("Medium not given") and sent[0]["figures"]["albedo"] == 0.9
     start, *frames = sent[len(notes) : -1]
     assert (start["total"], start["done"]) == (5, 0)
     assert [(event["frame"], event["done"], event["total"]) for event in frames] == [(n, n, 5) for n in range(1, 6)]
@@ -73,7 +74,7 @@ def test_progress_as_json(plume, tmp_path, capsys) -> None:
     assert (sent[-1]["directory"], sent[-1]["frames"]) == (str(out), 5)
     middle = float(np.median([event["figures"]["psnr"] for event in frames]))
     assert sent[-1]["psnr"] == pytest.approx(middle)
-    assert f"{middle:.1f} dB inside the smoke at the clip's pixels (median)" in sent[-1]["text"]
+    assert (sent[-1]["kind"], sent[-1]["figures"]["psnr"]) == ("reconstructed", pytest.approx(middle))
 
 
 def test_further_views_of_a_scene_file_are_used(two_views, tmp_path, capsys) -> None:

@@ -131,7 +131,7 @@ def test_a_file_as_directory(shot, tmp_path, capsys) -> None:
 def test_again_without_resume(finished, shot, capsys) -> None:
     """The sentence says how to go on."""
     sentence = refused(capsys, "reconstruct", shot, "--out", finished, "--npz", *QUICK)
-    assert "--resume" in sentence
+    assert "resume the run" in sentence
     assert finished.name in sentence
 
 

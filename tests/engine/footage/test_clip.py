@@ -12,6 +12,7 @@ import pytest
 from av.video.reformatter import Interpolation
 from PIL import Image
 
+from smokelift.checks import Remark
 from smokelift.footage.clip import Clip, ClipError
 from smokelift.footage.images import CodedPicture, Picture, area_average, linear_to_srgb, srgb_to_linear
 from smokelift.footage.video import Video
@@ -399,8 +400,7 @@ def test_a_truncated_clip_offers_what_is_there(tmp_path: Path, name: str) -> Non
     whole.write_bytes(data[: len(data) * 6 // 10])
     with Clip.open(whole) as clip:
         assert 10 <= len(clip) <= 20
-        assert clip.warning is not None
-        assert f"is truncated; {len(clip)} frames of it can be used" in clip.warning
+        assert clip.warning == Remark("truncated clip", {"path": str(clip.path), "frames": len(clip)})
         for n, image in enumerate(clip):
             np.testing.assert_array_equal(image, wanted[n])
     whole.write_bytes(data[:300])
@@ -444,7 +444,7 @@ def test_a_damaged_frame_is_as_one_that_a_camera_dropped(tmp_path: Path, broken:
     with Clip.open(blanked(path, broken)) as clip:
         assert codes(clip) == [LEVELS[n] for n in levels]
         assert clip.damaged == tuple(broken)
-        assert clip.remarks() == (f"{path}: frame {broken[0]} is missing or damaged; the last sound frame stands in.",)
+        assert clip.remarks() == (Remark("damaged frames", {"path": str(path), "frames": f"frame {broken[0]} is"}),)
         assert clip.part(4, 5).damaged == ()
         changed = clip.changed(lambda n, picture: picture * (n == broken[0]))
         assert codes_of(changed, broken[0]) == 0
@@ -484,7 +484,8 @@ def test_hlg_pq_and_linear_video(tmp_path: Path, transfer: int, luma: float, lin
     path = wide_codes(tmp_path / "a.mkv", [round(luma), 512, 512], color_trc=transfer, color_primaries=9, colorspace=9)
     with Clip.open(path) as clip:
         np.testing.assert_allclose(clip.frame(0)[8, 8], linear, rtol=0.005)
-        assert ("BT.2020" in " ".join(clip.remarks())) and (("HLG" in clip.notes[0]) == (transfer == 18))
+        assert Remark("other primaries", {"primaries": "BT.2020"}) in clip.remarks()
+        assert (Remark("high dynamic range", {"transfer": "HLG"}) in clip.notes) == (transfer == 18)
 
 
 def test_colours_of_bt_2020_are_brought_to_bt_709(tmp_path: Path) -> None:
@@ -512,7 +513,8 @@ def test_anamorphic_pixels_become_square(tmp_path: Path, shape: Fraction) -> Non
         edge = round(16 * shape)
         assert linear_to_srgb(clip.frame(0)[24, : edge - 3]).min() > 0.75
         assert linear_to_srgb(clip.frame(0)[24, edge + 3 :]).max() < 0.05
-        assert f"are scaled to {clip.size[0]} x 48 square ones" in clip.notes[0]
+        (note,) = clip.notes
+        assert (note.kind, note.figures["scaled"]) == ("oblong pixels", (clip.size[0], 48))
 
 
 def test_interlaced_video_is_of_one_moment(tmp_path: Path) -> None:
@@ -528,7 +530,7 @@ def test_interlaced_video_is_of_one_moment(tmp_path: Path) -> None:
         out.mux(stream.encode(av.VideoFrame.from_ndarray(picture)))
         out.mux(stream.encode())
     with Clip.open(path) as clip:
-        assert "interlaced" in clip.notes[0]
+        assert clip.notes == (Remark("interlaced clip"),)
         found = linear_to_srgb(clip.frame(0)[:63, 32]) * 255
         lines = np.interp(np.arange(63), np.arange(0, 64, 2), picture[::2, 0, 0])
         np.testing.assert_allclose(found, lines[:, None].repeat(3, 1), atol=2.5)
@@ -542,7 +544,7 @@ def test_huge_pictures_are_reduced(tmp_path: Path) -> None:
     for file in (path, tmp_path / "a.png"):
         with Clip.open(file) as clip:
             assert clip.size == (2500, 8)
-            assert "5000 x 16" in clip.notes[0]
+            assert [note.figures["size"] for note in clip.notes] == [(5000, 16)]
             np.testing.assert_allclose(linear_to_srgb(clip.frame(0)[4, [1240, 1260], 1]) * 255, [0, 200], atol=1.1)
 
 
@@ -561,7 +563,7 @@ def test_picture_sequences(tmp_path: Path) -> None:
         assert codes(clip) == [40, 50, 60]
         assert clip.fps == 24.0
         assert clip.warning is not None
-        assert "24 frames a second" in clip.warning
+        assert (clip.warning.kind, clip.warning.figures["fps"]) == ("pictures without a frame rate", 24)
     pictures(tmp_path, [1, 2], "exr")
     with Clip.open(tmp_path / "frame_####.exr", frames=(1, 1)) as clip:
         assert codes(clip) == [20]
@@ -585,7 +587,7 @@ def test_gaps_in_picture_sequences_are_named(tmp_path: Path) -> None:
     with Clip.open(tmp_path / "frame_####.png", fps=24) as clip:
         assert codes(clip) == [10, 20, 20, 40, 40]
         assert [file.name for file in clip.files] == [f"frame_000{n}.png" for n in (1, 2, 4, 5)]
-        assert "frames 2 and 4 are missing or damaged" in clip.remarks()[0]
+        assert clip.remarks()[0].figures["frames"] == "frames 2 and 4 are"
     (tmp_path / "frame_0005.png").unlink()
     pictures(tmp_path, [400])
     with pytest.raises(ClipError, match=r"frame_0003\.png: this picture is missing, as most .* frame_0400\.png"):

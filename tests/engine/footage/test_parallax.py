@@ -28,7 +28,7 @@ def over_a_plain(pixels: float) -> np.ndarray:
 
 def test_a_camera_that_travels_is_refused() -> None:
     """In one sentence that says what to do."""
-    with pytest.raises(ValueError, match=r"^The camera travels or zooms, .*; track it in Blender, .*\[background\]\.$"):
+    with pytest.raises(ValueError, match=r"^The camera travels or zooms, .*; track it in Blender, .*clean plate\.$"):
         find_turns(clip_of(over_a_plain(30)[::2]), LENS)
 
 

@@ -39,7 +39,7 @@ def test_what_does_not_fit_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="finite"):
         matte(clip.frame(0) * np.nan, plate)
     for background in ((1.0, 2.0), np.full((4, 4, 3), np.nan), np.ones((4, 4))):
-        with pytest.raises(ValueError, match="finite colour or RGB picture"):
+        with pytest.raises(ValueError, match="finite color or RGB picture"):
             known_plate(background, clip)
 
 

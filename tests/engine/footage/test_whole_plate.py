@@ -9,6 +9,7 @@ import pytest
 from films import codes_apart
 from PIL import Image
 
+from smokelift.checks import Remark
 from smokelift.footage.backdrop import find_backdrop
 from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import Look
@@ -28,7 +29,7 @@ class Filmed:
     backdrop: float | None = None
     fps = 24.0
     files: tuple[Path, ...] = ()
-    notes: tuple[str, ...] = ()
+    notes: tuple[Remark, ...] = ()
 
     def __init__(self, codes: np.ndarray) -> None:
         self.codes, self.count = codes, len(codes)

@@ -93,7 +93,7 @@ def test_numpy_files_alone_need_no_vdb_module(tmp_path: Path, no_vdb: None) -> N
 def test_finished_frames_are_not_overwritten(tmp_path: Path, no_vdb: None) -> None:
     write(tmp_path, [1, 2])
     before = {file.name: file.read_bytes() for file in tmp_path.iterdir()}
-    with pytest.raises(SequenceError, match=r"holds 2 finished frames; go on with --resume, or choose another"):
+    with pytest.raises(SequenceError, match=r"holds 2 finished frames; resume the run, or choose another"):
         write(tmp_path, [1])
     assert {file.name: file.read_bytes() for file in tmp_path.iterdir()} == before
 

@@ -515,7 +515,7 @@ def test_resuming_what_is_complete_yields_nothing(run, plume, draft) -> None:
 def test_a_second_run_needs_resume(run, plume, draft) -> None:
     """Finished frames are not overwritten."""
     _, out = run
-    with pytest.raises(SequenceError, match="--resume"):
+    with pytest.raises(SequenceError, match="resume"):
         frames_written(plume.scene, draft, out)
 
 

@@ -22,7 +22,7 @@ def test_what_cannot_be_is_refused_at_the_call(plume, draft) -> None:
     scene = Scene(clip=plume.scene.clip, domain=plume.scene.domain)
     with (
         Clip.open(plume.scene.clip) as clip,
-        pytest.raises(ValueError, match="gives a \\[domain\\] but no \\[camera\\]"),
+        pytest.raises(ValueError, match="gives a box but no camera"),
     ):
         reconstruct(clip, scene, draft)
 

@@ -52,7 +52,7 @@ def test_without_taichi(monkeypatch):
     monkeypatch.setattr(device, "_running", None)
     monkeypatch.setattr(device, "find_spec", lambda name: None)
     monkeypatch.setattr(device, "driver_installed", lambda: True)
-    with pytest.raises(DeviceError, match=r"Taichi is not installed: .*smokelift_gpu.*or use --device cpu\.$"):
+    with pytest.raises(DeviceError, match=r"Taichi is not installed: .*smokelift_gpu.*or choose cpu as the device\.$"):
         device.start("gpu")
     assert device.available_gpu() is None
     assert device.start("auto") == "cpu"

@@ -75,11 +75,10 @@ def test_a_blurred_clip_gets_a_coarser_grid(filmed) -> None:
     assert sides[0] > sides[1] >= sides[2]
     assert sides[2] <= 36
     for shot in (sharp, soft, blurred):
-        (choice,) = (choice for choice in shot.choices if choice.what == "resolution")
-        assert choice.chosen == shot.scene.domain.resolution
-        assert choice.measured["lost_beside_finest"] <= choice.tolerance
-        assert f"draft loses {choice.measured['lost']:.1%} of the smoke's contrast in the clip" in choice.reason
-        assert not choice.by_hand
+        (choice,) = (choice for choice in shot.estimates if choice.what == "resolution")
+        assert choice.value == shot.scene.domain.resolution
+        assert choice.figures["lost_beside_finest"] <= choice.tolerance
+        assert (choice.kind, choice.source) == ("resolution", "measured")
         assert (shot.scene.domain.min, shot.scene.domain.max) == ((-1, -1, 0), (1, 1, 3))
         x, y, z = shot.scene.domain.resolution
         assert x == y == z / 3 * 2
@@ -106,7 +105,7 @@ def test_a_given_resolution_wins(filmed) -> None:
     assert shot_of(scene, Settings.preset("draft")).scene.domain == scene.domain
     by_hand = shot_of(scene, Settings.preset("draft", resolution=(20, 20, 30)))
     assert by_hand.scene.domain.resolution == (20, 20, 30)
-    assert by_hand.choices[0].by_hand
+    assert by_hand.estimates[0].source == "given"
 
 
 @pytest.mark.parametrize("size", [(2, 2, 3), (1.97, 2, 2.9)])
@@ -117,10 +116,10 @@ def test_a_box_without_a_resolution_gets_that_of_the_quality(filmed, size) -> No
     shot = shot_of(scene, Settings.preset("draft"))
     domain = shot.scene.domain
     assert LIMITS["draft"].most - 8 <= max(domain.resolution) <= LIMITS["draft"].most
-    assert not shot.choices[0].by_hand
+    assert shot.estimates[0].source == "measured"
     over = np.subtract(domain.max, box.max)
     assert np.all((over > -1e-6) & (over < domain.voxel_size)) and domain.min[2] == 0
-    assert (np.abs(over).max() > 1e-6) == any("The box grows" in note for note in shot.notes)
+    assert (np.abs(over).max() > 1e-6) == ("grown box" in [remark.kind for remark in shot.remarks])
 
 
 def test_a_box_without_a_resolution_holds_whatever_is_given_by_hand(filmed) -> None:
@@ -154,26 +153,26 @@ def test_final_has_a_voxel_a_pixel(filmed, box) -> None:
         scene = filmed(blur, grain=0.3)
         scene = scene if box else Scene(clip=scene.clip, background=scene.background)
         shot = shot_of(scene, Settings.preset("final", resolution="auto"))
-        (choice,) = (choice for choice in shot.choices if choice.what == "resolution")
-        pixels = choice.measured["pixels"]
-        across = voxel_width(shot.scene.camera, shot.scene.domain) * max(choice.chosen)
+        (choice,) = (choice for choice in shot.estimates if choice.what == "resolution")
+        pixels = choice.figures["pixels"]
+        across = voxel_width(shot.scene.camera, shot.scene.domain) * max(choice.value)
         assert pixels == pytest.approx(across, rel=1e-3)
         if blur:
-            assert max(choice.chosen) < 0.6 * pixels
+            assert max(choice.value) < 0.6 * pixels
         else:
-            assert max(choice.chosen) == pytest.approx(pixels, rel=0.05)
-        assert choice.measured["lost"] < 0.005
+            assert max(choice.value) == pytest.approx(pixels, rel=0.05)
+        assert choice.figures["lost"] < 0.005
 
 
 def test_what_is_lost_is_measured_against_the_clip(filmed) -> None:
     """A quality says what its own finest grid loses, and finer ones lose less."""
     scene = filmed(0.0, grain=0.8)
     lost = [
-        next(c for c in shot_of(scene, Settings.preset(quality, resolution="auto")).choices if c.what == "resolution")
+        next(c for c in shot_of(scene, Settings.preset(quality, resolution="auto")).estimates if c.what == "resolution")
         for quality in ("draft", "balanced", "final")
     ]
-    assert lost[0].measured["lost"] > 0.05
-    assert lost[0].measured["lost"] > 1.2 * lost[1].measured["lost"] > 1.2 * lost[2].measured["lost"]
+    assert lost[0].figures["lost"] > 0.05
+    assert lost[0].figures["lost"] > 1.2 * lost[1].figures["lost"] > 1.2 * lost[2].figures["lost"]
 
 
 def test_a_grid_loses_what_is_finer_than_two_of_its_voxels() -> None:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from smokelift.checks import Remark
 from smokelift.footage.clip import Clip
 from smokelift.output.images import write_image
 from smokelift.scene import Background, ClipSource, Scene, SceneError, completed, look_at_matrix
@@ -26,8 +26,11 @@ def test_a_further_view_is_opened_in_step(two_views, draft) -> None:
     assert front.camera == shot.views[0].working.camera
     assert seen.image.shape == seen.plate.image.shape == (*seen.camera.size[::-1], 3)
     np.testing.assert_array_equal(seen.image, view.working.cut(view.clip.frame(2)))
-    (note,) = shot.notes
-    assert note == "View 1: frame_####.png, 90 degrees from the input, frames 1 to 5."
+    (remark,) = shot.remarks
+    assert remark.kind == "further view"
+    assert remark.figures == {
+        "view": 1, "name": "frame_####.png", "degrees": pytest.approx(90), "first": 1, "last": 5,
+    }  # fmt: skip
     assert shot.scene == completed(two_views)
 
 
@@ -65,7 +68,7 @@ def test_a_further_views_background(two_views, draft, tmp_path) -> None:
     pictured = shot_of(replace(two_views, background=wall), as_filmed)
     assert behind(pictured, 0) == pytest.approx(0.5, abs=1e-2)
     assert behind(pictured, 1) < 0.2
-    assert "Background not given: it is black" in " ".join(pictured.notes)
+    assert Remark("black background", {"view": 1}) in pictured.remarks
     for n in range(6):
         write_image(tmp_path / f"wall_{n}.exr", np.full((56, 40, 3), n / 10, np.float32))
     changing = replace(view, background=Background(image=tmp_path / "wall_#.exr"))
@@ -81,8 +84,8 @@ def test_views_that_do_not_agree_are_noted(two_views, draft, wrong) -> None:
         view = replace(view, camera=replace(view.camera, matrix=lower))
     else:
         view = replace(view, background=Background(color=(0.5, 0.5, 0.5)))
-    notes = shot_of(replace(two_views, views=(view,)), draft).notes
-    assert any(re.match(r"The views agree on [0-7]?\d% of the smoke", note) for note in notes)
+    remarks = shot_of(replace(two_views, views=(view,)), draft).remarks
+    assert [remark.figures["agreed"] < 0.8 for remark in remarks if remark.kind == "disagreeing views"] == [True]
 
 
 def spoilt(scene: Scene, what: str, folder: Path) -> Scene:
@@ -113,7 +116,7 @@ def spoilt(scene: Scene, what: str, folder: Path) -> Scene:
         ("shape", r"56 x 40, the clip's 40 x 56 \(frame_####.png\)"),
         ("moving", r"no camera may move"),
         ("missing", r"none.mp4: no such file"),
-        ("box", r"need the input's \[camera\] and the \[domain\]"),
+        ("box", "need the input's camera and the box"),
     ],
 )
 def test_a_further_view_that_does_not_belong_is_refused(two_views, draft, tmp_path, what, sentence) -> None:

@@ -8,13 +8,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from smokelift.checks import Doubt
 from smokelift.footage.clip import Clip
 from smokelift.footage.noise import lasting_noise
 from smokelift.scene import Background, DirectionalLight, Medium, Scene
 from smokelift.setup import illumination
-from smokelift.setup.choice import Choice
+from smokelift.setup.estimate import Estimate
 from smokelift.setup.held_out import HeldOut
-from smokelift.setup.illumination import Illumination, light_notes
+from smokelift.setup.illumination import Illumination, light_remarks
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
 from smokelift.setup.sky import light_around
@@ -73,10 +74,10 @@ def thick(plume, tmp_path_factory) -> Scene:
     return replace(plume.write(tmp_path_factory.mktemp("thick"), plume.densities, scene), scattering=None)
 
 
-def strengths(scene: Scene, draft: Settings) -> tuple[float, list[str]]:
-    """The light of the shot over the given one, and what is said of it."""
+def strengths(scene: Scene, draft: Settings) -> tuple[float, list[float]]:
+    """The light of the shot over the given one, and the factors that are said of it."""
     shot = shot_of(scene, draft)
-    said = [choice.reason for choice in shot.choices if choice.what == "light strength"]
+    said = [estimate.figures["factor"] for estimate in shot.estimates if estimate.what == "light strength"]
     return shot.scene.lights[0].irradiance[0] / scene.lights[0].irradiance[0], said
 
 
@@ -89,7 +90,7 @@ def test_a_light_that_is_too_weak_becomes_stronger(thick, draft) -> None:
     (sun,) = thick.lights
     factor, said = strengths(replace(thick, lights=(sun.scaled(0.4),)), draft)
     assert 1.5 < factor < 3.2
-    assert said[0].startswith(f"Light: {factor:.2f} times as strong as given")
+    assert said == [pytest.approx(factor)]
 
 
 def test_a_light_is_not_blamed_because_thinner_smoke_fits_better(thick, draft, monkeypatch) -> None:
@@ -143,8 +144,8 @@ def unlit(scene: Scene) -> Scene:
     return replace(scene, lights=(), medium=None)
 
 
-def scattering_of(shot: Shot) -> Choice[str]:
-    (choice,) = (choice for choice in shot.choices if choice.what == "scattering")
+def scattering_of(shot: Shot) -> Estimate[str]:
+    (choice,) = (choice for choice in shot.estimates if choice.what == "scattering")
     return choice
 
 
@@ -176,27 +177,25 @@ def test_what_is_clearly_nearer_is_taken_in_the_colour_that_the_clip_asks_for(li
     shot = shot_of(unlit(lit), draft)
     choice, lights = scattering_of(shot), shot.scene.lights
     assert tried == [1.0, 1.0]
-    assert shot.scene.scattering == choice.chosen == "single"
-    assert choice.measured["error_single"] == 0.02
-    assert "for want of a known one" in choice.reason
+    assert shot.scene.scattering == choice.value == "single"
+    assert choice.figures["error_single"] == 0.02
+    assert choice.kind == "scattering in light from everywhere"
     radiance = 0.9 * np.sum([light.irradiance for light in lights], 0) / (4 * np.pi)
     assert radiance == pytest.approx(BEHIND * np.array([1.2, 1.0, 0.8]), rel=0.01)
-    assert next(found.chosen for found in shot.choices if found.what == "light direction") == "undetermined"
-    (note,) = (note for note in shot.notes if note.startswith("Light not given"))
-    assert "comes from behind the smoke" in note
-    assert "with shadows" in note
+    assert next(found.value for found in shot.estimates if found.what == "light direction") == "undetermined"
+    assert "light as behind the smoke" in [remark.kind for remark in shot.remarks]
 
 
 def test_what_is_nearer_by_little_is_not_taken(lit, draft, leaves) -> None:
     """It is no special case of smoke without shadows: it has to be nearer by a quarter, and by the tolerance."""
     leaves(1.0)
     choice = scattering_of(shot_of(unlit(lit), draft))
-    error = choice.measured[f"error_{choice.chosen}"]
+    error = choice.figures[f"error_{choice.value}"]
     limit = min(0.75 * error, error - draft.selection.scattering_error)
     leaves(limit + 0.001)
     assert scattering_of(shot_of(unlit(lit), draft)) == choice
     leaves(limit - 0.001)
-    assert scattering_of(shot_of(unlit(lit), draft)).chosen == "single"
+    assert scattering_of(shot_of(unlit(lit), draft)).value == "single"
 
 
 def test_a_light_that_is_given_stays(lit, draft, leaves) -> None:
@@ -230,17 +229,19 @@ def test_a_light_that_explains_little_before_one_colour_is_said_to_be_wrong(erro
     """Elsewhere other things may be what is left."""
     shown = np.linspace(0.1, 0.5, 300).reshape(100, 3) if behind is None else np.tile(behind, (100, 1))
     samples = SimpleNamespace(behind=shown, smoky=(0,))
-    choice = Choice("scattering", "absorption", "", {"error_absorption": error, "error_unshadowed": error})
-    unknown = Choice("smoke thickness", "undetermined", "")
+    choice = Estimate(
+        "scattering", {"error_absorption": error}, what="scattering", value="absorption", source="measured"
+    )
+    unknown = Estimate("unknown", what="smoke thickness", value="undetermined", source="assumed")
     light = Illumination(light_around(np.ones(3)), "absorption", "assumed", False, (choice,), unknown, unknown)
-    _, *notes = light_notes(light, samples, lasting_noise(noise / 255))
-    assert bool(notes) == said
-    assert all("[[lights]]" in note for note in notes)
+    _, *doubts = light_remarks(light, samples, lasting_noise(noise / 255))
+    assert doubts == [Doubt("likely wrong light", {"error": error})] * said
 
 
 def test_the_doubt_is_said_of_a_shot(lit, draft, leaves, monkeypatch) -> None:
     """Once, beside the light that is taken, and never of one that is given."""
     leaves(1.0)
     monkeypatch.setattr("smokelift.setup.illumination.DOUBTFUL", 0.01)
-    doubts = [sum("likely wrong" in note for note in shot_of(scene, draft).notes) for scene in (unlit(lit), lit)]
-    assert doubts == [1, 0]
+    for scene, doubts in ((unlit(lit), 1), (lit, 0)):
+        kinds = [remark.kind for remark in shot_of(scene, draft).remarks]
+        assert kinds.count("likely wrong light") == doubts

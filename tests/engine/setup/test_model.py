@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -32,8 +31,8 @@ from smokelift.scene import (
     look_at_matrix,
 )
 from smokelift.setup import illumination, scattering
-from smokelift.setup.choice import Choice
 from smokelift.setup.coarse import LONGEST, coarse_domain, coarse_frame
+from smokelift.setup.estimate import Estimate
 from smokelift.setup.held_out import HeldOut
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import Settings
@@ -44,8 +43,8 @@ from smokelift.velocity import CoarseToFine, VelocitySettings
 from tests.engine.setup.shots import shot_of
 
 
-def chosen(shot: Shot, what: str) -> Choice:
-    (choice,) = (choice for choice in shot.choices if choice.what == what)
+def chosen(shot: Shot, what: str) -> Estimate:
+    (choice,) = (choice for choice in shot.estimates if choice.what == what)
     return choice
 
 
@@ -84,29 +83,29 @@ def test_a_backlit_silhouette_needs_no_light(silhouette, draft) -> None:
     """Dark smoke before a bright sky only absorbs, and the figures say that more would not be better."""
     shot = shot_of(silhouette, draft)
     choice = chosen(shot, "scattering")
-    assert shot.scene.scattering == choice.chosen == "absorption"
-    assert choice.measured["error_absorption"] <= choice.measured["error_unshadowed"] + choice.tolerance
-    assert "absorption only" in choice.reason
+    assert shot.scene.scattering == choice.value == "absorption"
+    assert choice.figures["error_absorption"] <= choice.figures["error_unshadowed"] + choice.tolerance
+    assert (choice.kind, choice.figures["other"]) == ("cheaper scattering", "unshadowed")
 
 
 def test_thick_lit_smoke_needs_shadows(plume, draft) -> None:
     """Without shadows the richest model sees at once that the density is wrong."""
     shot = shot_of(plume.scene, draft)
     choice = chosen(shot, "scattering")
-    assert shot.scene.scattering == choice.chosen == "single"
-    assert choice.measured["error_unshadowed"] > choice.measured["error_single"] + 2 * choice.tolerance
-    assert choice.measured["error_absorption"] > 0.9
+    assert shot.scene.scattering == choice.value == "single"
+    assert choice.figures["error_unshadowed"] > choice.figures["error_single"] + 2 * choice.tolerance
+    assert choice.figures["error_absorption"] > 0.9
 
 
 def test_thick_white_smoke_scatters_light_many_times(white, plume, draft) -> None:
     """Single scattering cannot be that bright; anisotropic smoke has no richer model."""
     shot = shot_of(white, draft)
     choice = chosen(shot, "scattering")
-    assert shot.scene.scattering == choice.chosen == "multiple"
-    assert choice.measured["error_multiple"] < choice.measured["error_single"] - choice.tolerance
-    assert "multiple scattering; with single scattering" in choice.reason
+    assert shot.scene.scattering == choice.value == "multiple"
+    assert choice.figures["error_multiple"] < choice.figures["error_single"] - choice.tolerance
+    assert (choice.kind, choice.figures["other"]) == ("richest scattering", "single")
     forward = replace(plume.scene, medium=replace(plume.scene.medium, anisotropy=0.3))
-    assert "error_multiple" not in chosen(shot_of(forward, draft), "scattering").measured
+    assert "error_multiple" not in chosen(shot_of(forward, draft), "scattering").figures
 
 
 def test_single_scattering_is_kept_where_both_meet_the_picture(plume, draft, monkeypatch) -> None:
@@ -117,9 +116,9 @@ def test_single_scattering_is_kept_where_both_meet_the_picture(plume, draft, mon
             module, "held_out", lambda _, model, judge, __: HeldOut(own[judge] if model == judge else 0.4)
         )
     choice = chosen(shot_of(plume.scene, draft), "scattering")
-    assert choice.chosen == "single"
+    assert choice.value == "single"
     own["single"] = 0.035  # by less than a cheaper model may add, which is no question here
-    assert chosen(shot_of(plume.scene, draft), "scattering").chosen == "multiple"
+    assert chosen(shot_of(plume.scene, draft), "scattering").value == "multiple"
 
 
 @pytest.mark.parametrize(("near", "asked"), [(0.05, {(8, 4), (16, 64)}), (0.01, {(8, 4)})])
@@ -140,8 +139,8 @@ def test_models_that_coarse_frames_do_not_tell_apart_are_tried_on_finer_ones(
         monkeypatch.setattr(module, "held_out", known)
     choice = chosen(shot_of(plume.scene, draft), "scattering")
     assert fitted_on == asked
-    assert choice.chosen == "multiple"
-    assert choice.measured["error_multiple"] == 0.01
+    assert choice.value == "multiple"
+    assert choice.figures["error_multiple"] == 0.01
 
 
 def test_no_model_is_measured_twice(plume, draft, monkeypatch) -> None:
@@ -162,8 +161,8 @@ def test_no_model_is_measured_twice(plume, draft, monkeypatch) -> None:
 def test_thin_smoke_needs_no_shadows(thin, draft) -> None:
     """It is lit, but casts none that are seen."""
     choice = chosen(shot_of(thin, draft), "scattering")
-    assert choice.chosen == "unshadowed"
-    assert set(choice.measured) == {"error_absorption", "error_unshadowed", "error_single", "error_multiple"}
+    assert choice.value == "unshadowed"
+    assert {"error_absorption", "error_unshadowed", "error_single", "error_multiple"} < set(choice.figures)
 
 
 @pytest.mark.parametrize("model", ["absorption", "unshadowed", "single", "multiple"])
@@ -172,13 +171,13 @@ def test_scattering_by_hand_wins(plume, thin, draft, model) -> None:
     for scene in (plume.scene, thin):
         shot = shot_of(scene, with_scattering(draft, model))
         choice = chosen(shot, "scattering")
-        assert (shot.scene.scattering, choice.by_hand, choice.measured) == (model, True, {})
+        assert (shot.scene.scattering, choice.source, choice.figures) == (model, "given", {})
 
 
 def test_shadows_need_a_light(silhouette, draft) -> None:
     """A light that was made up has no direction to cast them in."""
     for model in ("single", "multiple"):
-        with pytest.raises(ValueError, match=rf'"{model}" needs a light .* \[\[lights\]\]'):
+        with pytest.raises(ValueError, match=rf'"{model}" needs a light'):
             shot_of(silhouette, with_scattering(draft, model))
 
 
@@ -197,22 +196,22 @@ def test_smoke_that_scatters_nothing_absorbs(plume, draft) -> None:
 def test_choices_are_the_same_again(plume, thin, draft) -> None:
     """To the bit: what is gone on with is what was begun."""
     for scene in (plume.scene, thin):
-        assert shot_of(scene, draft).choices == shot_of(scene, draft).choices
+        assert shot_of(scene, draft).estimates == shot_of(scene, draft).estimates
 
 
 def test_the_papers_method_chooses_nothing(plume) -> None:
     """It is kept as it is."""
     shot = shot_of(plume.scene, Settings.preset("draft", "paper"))
     assert shot.scene.scattering == "single"
-    assert [choice.what for choice in shot.choices] == ["resolution"]
-    assert shot.choices[0].by_hand
+    assert [choice.what for choice in shot.estimates] == ["resolution"]
+    assert shot.estimates[0].source == "given"
 
 
 def test_without_smoke_nothing_is_measured(plume, draft, tmp_path) -> None:
     """The richest model stands by."""
     shot = shot_of(plume.write(tmp_path, [0 * plume.densities[0]] * 3), draft)
     assert shot.scene.scattering == "single"
-    assert [choice.what for choice in shot.choices] == ["resolution"]
+    assert [choice.what for choice in shot.estimates] == ["resolution"]
 
 
 def test_where_coarse_pictures_show_no_smoke_the_richest_model_stays(plume, draft, monkeypatch) -> None:
@@ -223,19 +222,19 @@ def test_where_coarse_pictures_show_no_smoke_the_richest_model_stays(plume, draf
     monkeypatch.setattr("smokelift.setup.coarse.matte", blind)
     shot = shot_of(plume.scene, draft)
     assert shot.scene.scattering == "single"
-    assert not any(choice.what == "scattering" for choice in shot.choices)
+    assert not any(choice.what == "scattering" for choice in shot.estimates)
 
 
 def test_a_moving_camera_is_no_hindrance(plume, tracked, draft, tmp_path) -> None:
     """Every frame is measured with its own; one that looks away is left out."""
-    assert chosen(shot_of(tracked, draft), "scattering").chosen == "single"
+    assert chosen(shot_of(tracked, draft), "scattering").value == "single"
     poses = tuple(
         look_at_matrix((0, -4, 0.8), (0, -9 if away else 0, 0.8), (0, 0, 1))
         for away in (False, True, True, True, False)
     )
     turning = replace(tracked, camera=replace(tracked.camera, matrix=poses[0], matrices=poses))
     scene = plume.write(tmp_path, plume.densities, turning)
-    assert chosen(shot_of(scene, draft), "scattering").chosen == "single"
+    assert chosen(shot_of(scene, draft), "scattering").value == "single"
 
 
 # coarse boxes and pictures
@@ -304,20 +303,20 @@ def test_faster_smoke_gets_more_grids(plume) -> None:
         for pair in (slow, fast)
         for final in (scene, finer)
     ]
-    motions = [choice.measured["voxels_a_frame"] for choice in found]
+    motions = [choice.figures["voxels_a_frame"] for choice in found]
     assert motions[1] == pytest.approx(2 * motions[0])
     assert motions[2] > 2 * motions[0]
-    assert [choice.chosen for choice in found] == [levels_for(motion) for motion in motions]
+    assert [choice.value for choice in found] == [levels_for(motion) for motion in motions]
 
 
 def test_grids_by_hand_win(plume, draft) -> None:
     """And are used; a single frame has no motion, and the usual number."""
     by_hand = replace(draft, velocity=replace(draft.velocity, levels=1))
     choice = chosen(shot_of(plume.scene, by_hand), "velocity levels")
-    assert (choice.chosen, choice.by_hand) == (1, True)
+    assert (choice.value, choice.source) == (1, "given")
     alone = replace(plume.scene, clip=replace(plume.scene.clip, frames=(0, 0)))
     choice = chosen(shot_of(alone, draft), "velocity levels")
-    assert (choice.chosen, choice.measured) == (3, {})
+    assert (choice.value, choice.figures) == (3, {})
 
 
 def test_the_velocity_grid_is_as_coarse_as_the_depth_is_unknown(plume, draft) -> None:
@@ -325,17 +324,17 @@ def test_the_velocity_grid_is_as_coarse_as_the_depth_is_unknown(plume, draft) ->
     free = draft.velocity
     shapes = [(20, 20, 30), (32, 32, 48), (64, 64, 96), (128, 128, 192), (256, 256, 288), (31, 20, 150)]
     choices = [choose_coarsening(Domain((0.0, 0.0, 0.0), shape, shape), free, 30) for shape in shapes]
-    assert [choice.chosen for choice in choices] == [0, 1, 2, 3, 4, 1]
-    assert [choice.measured["voxels"] for choice in choices] == [30, 24, 24, 24, 18, 75]
+    assert [choice.value for choice in choices] == [0, 1, 2, 3, 4, 1]
+    assert [choice.figures["voxels"] for choice in choices] == [30, 24, 24, 24, 18, 75]
     by_hand = choose_coarsening(plume.scene.domain, replace(free, coarsening=0), 30)
-    assert (by_hand.chosen, by_hand.by_hand) == (0, True)
+    assert (by_hand.value, by_hand.source) == (0, "given")
 
 
 def test_motion_is_measured_although_the_last_frame_has_the_most_smoke(plume, draft, tmp_path) -> None:
     """Nothing follows the last frame, so the one before is followed."""
     growing = [share * density for share, density in zip((0.02, 0.05, 0.15, 0.4, 1), plume.densities, strict=True)]
     choice = chosen(shot_of(plume.write(tmp_path, growing), draft), "velocity levels")
-    assert choice.measured["voxels_a_frame"] > 0.5
+    assert choice.figures["voxels_a_frame"] > 0.5
 
 
 # environments
@@ -359,11 +358,11 @@ def test_directions_are_doubled_until_the_smoke_looks_the_same(plume, draft, tmp
         scene = plume.write(tmp_path / name, plume.densities[1:3], replace(forward, lights=(light,)))
         shot = shot_of(scene, draft)
         choice = chosen(shot, "environment directions")
-        counts[name] = choice.chosen
-        assert shot.scene.lights == (replace(light, directions=choice.chosen),)
-        assert len(shot.optics.lights) <= choice.chosen
-        assert choice.measured["change"] <= choice.tolerance
-        assert not choice.by_hand
+        counts[name] = choice.value
+        assert shot.scene.lights == (replace(light, directions=choice.value),)
+        assert len(shot.optics.lights) <= choice.value
+        assert choice.figures["change"] <= choice.tolerance
+        assert choice.source == "measured"
     assert counts["lamp"] < counts["sky"]
 
 
@@ -375,7 +374,7 @@ def test_directions_by_hand_win(plume, draft, tmp_path) -> None:
     assert Scene.load(tmp_path / "scene.toml") == scene
     assert len(scene_optics(completed(scene)).lights) == 6
     choice = chosen(shot_of(scene, draft), "environment directions")
-    assert (choice.chosen, choice.by_hand) == (6, True)
+    assert (choice.value, choice.source) == (6, "given")
     with pytest.raises(SceneError, match="directions must be a whole number from 1 to 4096, not 0"):
         replace(light, directions=0)
 
@@ -383,26 +382,20 @@ def test_directions_by_hand_win(plume, draft, tmp_path) -> None:
 # what is said and kept
 
 
-def test_every_choice_has_a_sentence_and_a_figure(plume, draft) -> None:
-    """JSON holds it, and the sentence says what was chosen."""
+def test_every_estimate_has_its_figures(plume, draft) -> None:
     shot = shot_of(plume.scene, draft)
-    assert [choice.what for choice in shot.choices] == [
+    assert [choice.what for choice in shot.estimates] == [
         "resolution", "scattering", "domain", "iterations", "velocity grid coarsening", "velocity levels",
         "axis depth",
     ]  # fmt: skip
-    for choice in shot.choices:
-        record = choice.as_dict()
-        assert json.loads(json.dumps(record, allow_nan=False)) == record
-        assert set(record) == {"what", "chosen", "reason", "measured", "tolerance", "by_hand"}
-        assert record["reason"].endswith(".")
-        assert record["by_hand"] or record["measured"]
+    assert all(estimate.source == "given" or estimate.figures for estimate in shot.estimates)
 
 
 def test_iterations_by_hand_are_said(plume, draft) -> None:
     """Those of the quality are not."""
     by_hand = replace(draft, density=replace(draft.density, descent_iterations=1))
     found = [chosen(shot_of(plume.scene, settings), "iterations") for settings in (draft, by_hand)]
-    assert [(choice.by_hand, choice.chosen) for choice in found] == [(False, 8), (True, 5)]
+    assert [(choice.source, choice.value) for choice in found] == [("measured", 8), ("given", 5)]
 
 
 def test_frames_without_smoke_cost_nothing(plume, draft, tmp_path) -> None:
@@ -431,4 +424,4 @@ def test_a_light_close_to_the_box_is_no_hindrance(plume, draft, tmp_path) -> Non
     domain = Domain((-0.6, -0.6, 0), (0.6, 0.6, 1.55), (24, 24, 31))
     near = replace(plume.scene, domain=domain, lights=(lamp,))
     densities = [density[:, :, :31] for density in plume.densities[:2]]
-    assert shot_of(plume.write(tmp_path, densities, near), draft).choices
+    assert shot_of(plume.write(tmp_path, densities, near), draft).estimates

@@ -1,8 +1,7 @@
-"""What is said of where the smoke stands in depth."""
+"""Where the smoke stands in depth, and how well that is known."""
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -10,40 +9,38 @@ import pytest
 
 from smokelift.density.axis import AxisEstimate, Cue, SmokeAxis
 from smokelift.scene import Inlet, as_matrix
-from smokelift.setup.place import place_choice
+from smokelift.setup.place import place_estimate
 from smokelift.setup.settings import Settings
 from tests.engine.setup.shots import shot_of
 
 
 @pytest.mark.parametrize(
-    ("cue", "depth", "said"),
+    ("cue", "depth", "kind"),
     [
-        ("box", 0.0, "undetermined: it is taken to be in the middle of the box, give or take 0.12 m."),
-        ("floor contact", -0.25, "contact with the floor of the box the smoke stands 0.25 m before the middle"),
-        ("floor contact", 2e-5, "contact with the floor of the box the smoke stands in the middle of the box, give or"),
-        ("inlets", 0.1, "marked inlets the smoke stands 0.1 m behind the middle of the box, give or take 0.12 m."),
+        ("box", 0.0, "axis depth in the middle by box"),
+        ("floor contact", -0.25, "axis depth before the middle by floor contact"),
+        ("floor contact", 2e-5, "axis depth in the middle by floor contact"),
+        ("inlets", 0.1, "axis depth behind the middle by inlets"),
     ],
 )
-def test_the_cue_and_the_uncertainty_are_said(cue: Cue, depth: float, said: str) -> None:
-    """With a way to tell it where it is not known well."""
-    choice = place_choice(AxisEstimate(SmokeAxis.upright(depth), cue, depth, 0.123))
-    assert said in choice.reason
-    assert ("--axis-depth" in choice.reason) == (cue in ("box", "floor contact"))
-    assert (choice.chosen == "undetermined") == (cue == "box")
-    assert json.loads(json.dumps(choice.as_dict()))["measured"] == {"depth": depth, "deviation": 0.123}
+def test_the_cue_and_the_uncertainty_are_kept(cue: Cue, depth: float, kind: str) -> None:
+    """A depth that would look exact is called the middle."""
+    estimate = place_estimate(AxisEstimate(SmokeAxis.upright(depth), cue, depth, 0.123))
+    assert (estimate.kind, estimate.figures, estimate.spread) == (kind, {"depth": depth}, 0.123)
+    assert (estimate.value == "undetermined") == (estimate.source == "assumed") == (cue == "box")
 
 
 def test_a_shot_knows_where_its_smoke_stands(plume, draft: Settings) -> None:
     """Unless the user says it, or the method does not ask."""
     blind = replace(plume.scene, inlets=())
     found = shot_of(blind, draft)
-    assert found.place is not None and found.choices[-1] == place_choice(found.place)
+    assert found.place is not None and found.estimates[-1] == place_estimate(found.place)
     marked = shot_of(replace(blind, inlets=(Inlet(plume.scene.domain.centre, 0.2),)), draft)
     assert marked.place is not None and marked.place.cue == "inlets"
     for settings in (replace(draft, axis_depth=0.1), Settings.preset(draft.quality, method="paper")):
         known = shot_of(blind, settings)
         assert known.place is None
-        assert "axis depth" not in [choice.what for choice in known.choices]
+        assert "axis depth" not in [choice.what for choice in known.estimates]
 
 
 def test_a_camera_that_only_turns_tells_the_place_as_one_that_stands(plume, draft: Settings) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 
 import pytest
@@ -19,10 +18,10 @@ def test_fire_is_said_and_does_not_light_the_smoke(plume, draft, tmp_path) -> No
     scene = replace(plume.write(tmp_path, plume.densities, dim), lights=())
     with Clip.open(scene.clip) as clip:
         without, with_fire = (prepare_shot(each, scene, draft) for each in (clip, clip.changed(burning)))
-    assert not any(choice.what == "fire" for choice in without.choices)
-    (said,) = [choice.reason for choice in with_fire.choices if choice.what == "fire"]
-    assert re.match(r"Fire: \d+\.\d% of the smoke's pixels shine by themselves", said)
-    assert "of the colour 1, 0.4" in said
+    assert not any(choice.what == "fire" for choice in without.estimates)
+    (found,) = [choice for choice in with_fire.estimates if choice.what == "fire"]
+    assert found.kind == "fire"
+    assert found.figures["share"] > 0 and found.figures["green"] == pytest.approx(0.4, abs=0.05)
     assert without.fire is None and without.scene.medium.flame_color is None
     assert with_fire.observe_fire(2).image.max() > 0.5 and without.observe_fire(2) is None
     red, green, blue = with_fire.scene.medium.flame_color
@@ -37,5 +36,6 @@ def test_a_color_of_fire_that_is_given_is_taken(plume, draft, tmp_path) -> None:
     with Clip.open(scene.clip) as clip:
         shot = prepare_shot(clip.changed(burning), scene, draft)
     assert shot.scene.medium.flame_color == (1.0, 0.5, 0.2)
-    (said,) = [choice.reason for choice in shot.choices if choice.what == "fire"]
-    assert "of the colour 1, 0.5, 0.2 that is given" in said
+    (found,) = [choice for choice in shot.estimates if choice.what == "fire"]
+    assert found.kind == "fire of a given colour"
+    assert [found.figures[name] for name in ("red", "green", "blue")] == [1.0, 0.5, 0.2]

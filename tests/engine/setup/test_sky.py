@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import nnls
 
 from smokelift.scene import DirectionalLight
-from smokelift.setup.choice import UNDETERMINED
+from smokelift.setup.estimate import UNDETERMINED
 from smokelift.setup.shot import Shot
 from smokelift.setup.sky import SHADING, SPREAD, light_around, sphere, strengths
 from tests.engine.setup.shots import AROUND, filmed_around, shot_of
@@ -20,49 +20,49 @@ LIGHT = DirectionalLight((-0.5, -0.6, -0.4), (12.0, 11.0, 10.0))
 
 def direction(shot: Shot):
     """What was found."""
-    (found,) = [choice for choice in shot.choices if choice.what == "light direction"]
+    (found,) = [choice for choice in shot.estimates if choice.what == "light direction"]
     return found
 
 
 def test_four_cameras_around_the_smoke_tell_the_sun(plume, tmp_path, draft) -> None:
     shot = shot_of(filmed_around(plume, tmp_path, (LIGHT,)), draft)
     found = direction(shot)
-    estimated = np.array([float(value) for value in found.chosen.split(",")])
+    estimated = np.array([float(value) for value in found.value.split(",")])
     assert np.degrees(np.arccos(estimated @ SUN / np.linalg.norm(estimated) / np.linalg.norm(SUN))) < 20
-    assert found.measured["ambient_share"] <= found.tolerance
+    assert found.figures["ambient_share"] <= found.tolerance
     strongest = max(shot.scene.lights, key=lambda light: sum(light.irradiance))
     np.testing.assert_allclose(strongest.direction, estimated, atol=0.02)
     assert shot.scene.scattering in ("single", "multiple")
-    assert any("Light direction" in choice.reason for choice in shot.choices)
+    assert (found.kind, found.source) == ("light direction", "measured")
 
 
 def test_light_from_everywhere_is_no_sun(plume, tmp_path, draft) -> None:
     shot = shot_of(filmed_around(plume, tmp_path, light_around(np.full(3, 0.6))), draft)
     found = direction(shot)
-    assert found.chosen == UNDETERMINED
-    assert found.measured["ambient_share"] > found.tolerance
+    assert found.value == UNDETERMINED
+    assert found.figures["ambient_share"] > found.tolerance
 
 
 def test_three_cameras_that_agree_are_enough(plume, tmp_path, draft) -> None:
     """However close together: without one of them the sun stands where it did."""
     shot = shot_of(filmed_around(plume, tmp_path, (LIGHT,), AROUND[:3]), draft)
     found = direction(shot)
-    assert found.measured["spread"] < SPREAD
-    assert found.chosen != UNDETERMINED
+    assert found.spread < SPREAD
+    assert found.value != UNDETERMINED
 
 
 def test_one_camera_is_not_asked(plume, tmp_path, draft) -> None:
     found = direction(shot_of(filmed_around(plume, tmp_path, (LIGHT,), AROUND[:1]), draft))
-    assert found.chosen == UNDETERMINED
-    assert not found.measured
+    assert found.value == UNDETERMINED
+    assert not found.figures
 
 
 def test_smoke_that_hardly_shades_itself_tells_no_sun(plume, tmp_path, draft) -> None:
     thin = replace(plume, densities=tuple(0.02 * density for density in plume.densities))
     bright = replace(LIGHT, irradiance=tuple(20 * value for value in LIGHT.irradiance))
     found = direction(shot_of(filmed_around(thin, tmp_path, (bright,)), draft))
-    assert found.chosen == UNDETERMINED
-    assert found.measured["shading"] < SHADING
+    assert found.value == UNDETERMINED
+    assert found.figures["shading"] < SHADING
 
 
 def test_directions_are_spread_evenly() -> None:

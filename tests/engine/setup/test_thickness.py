@@ -5,7 +5,7 @@ import pytest
 
 from smokelift.footage.noise import lasting_noise
 from smokelift.footage.plate import Plate
-from smokelift.setup.choice import UNDETERMINED
+from smokelift.setup.estimate import UNDETERMINED
 from smokelift.setup.smoke import SmokeSamples
 from smokelift.setup.source import source_radiance
 from smokelift.setup.thickness import seen_texture, smoke_thickness
@@ -42,8 +42,8 @@ def test_texture_tells_thick_smoke_from_thin(depth) -> None:
     """The source is the same, however little of it the smoke shows."""
     source, choice = thickness(depth)
     assert source == pytest.approx(SOURCE, rel=0.15)
-    assert choice.measured["error"] < 0.15
-    assert "hides" in choice.reason
+    assert choice.spread < 0.15
+    assert choice.source == "measured"
 
 
 @pytest.mark.parametrize(
@@ -62,8 +62,8 @@ def test_texture_tells_thick_smoke_from_thin(depth) -> None:
 def test_what_nothing_tells_is_undetermined(clip) -> None:
     source, choice = thickness(**clip)
     assert source is None
-    assert choice.chosen == UNDETERMINED
-    assert "[[lights]]" in choice.reason
+    assert choice.value == UNDETERMINED
+    assert choice.source == "assumed"
 
 
 def test_texture_that_is_lost_without_smoke_tells_nothing() -> None:

@@ -38,7 +38,7 @@ def filmed(plume, tmp_path_factory):
 
 def gains(shot):
     """What was found, by view."""
-    return [choice for choice in shot.choices if choice.what.startswith("gain of view")]
+    return [choice for choice in shot.estimates if choice.what.startswith("gain of view")]
 
 
 @pytest.mark.parametrize("gain", [(0.6, 0.6, 0.6), (1.4, 1.0, 0.8)], ids=["exposure", "white balance"])
@@ -47,8 +47,8 @@ def test_another_exposure_is_found_and_undone(filmed, draft, gain) -> None:
     shot = shot_of(filmed(gain), draft)
     (found,) = gains(shot)
     assert found.what == "gain of view 1"
-    np.testing.assert_allclose([float(value) for value in found.chosen.split(", ")], gain, rtol=0.1)
-    assert found.measured["error"] < found.measured["error_as_it_is"]
+    np.testing.assert_allclose([float(value) for value in found.value.split(", ")], gain, rtol=0.1)
+    assert found.figures["error"] < found.figures["error_as_it_is"]
     plate = shot.views[1].plates.at(0).image
     np.testing.assert_allclose(plate.mean((0, 1)), BEHIND, rtol=0.1)
     brightest = shot.views[1].clip.frame(1).max((0, 1))
@@ -65,7 +65,7 @@ def test_unknown_light_explains_more(filmed, draft) -> None:
     """A ratio that counts in known light may be the light's where that is taken to come from everywhere."""
     scene = filmed((1.28,) * 3)
     (found,) = gains(shot_of(scene, draft))
-    assert float(found.chosen.split(",")[0]) == pytest.approx(1.28, rel=0.06)
+    assert float(found.value.split(",")[0]) == pytest.approx(1.28, rel=0.06)
     assert gains(shot_of(replace(scene, lights=()), draft)) == []
 
 

@@ -13,7 +13,6 @@ from typing import Any, NoReturn
 import psutil
 
 from smokelift.app.commands import reconstruct
-from smokelift.app.cost import memory_free
 from smokelift.app.options import named_path
 from smokelift.app.progress import Reporter
 from smokelift.batch import (
@@ -33,6 +32,7 @@ from smokelift.batch import (
     write_report,
 )
 from smokelift.checks import counted
+from smokelift.report.cost import memory_free
 
 MEMORY_SHARE = 0.9
 """Part of the free memory that the shots may take together; what is foretold is right to a tenth or two."""

@@ -7,9 +7,9 @@ from typing import Any
 
 from smokelift.app.options import named_path
 from smokelift.app.progress import Reporter
-from smokelift.app.shortcomings import count_empty, shortcomings
 from smokelift.checks import counted
 from smokelift.output.sequence import Sequence
+from smokelift.report.shortcomings import count_empty, shortcomings
 
 
 def add_parser(commands: Any, common: argparse.ArgumentParser) -> None:
@@ -30,7 +30,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     sequence = Sequence.open(options.directory)
     if not sequence.complete:
         there = counted(len(sequence.frames), "finished frame")
-        raise ValueError(f"{options.directory}: has {there} and is no complete run; --resume goes on.")
+        raise ValueError(f"{options.directory}: has {there} and is no complete run; resume it.")
     for number in sequence.frames:
         if not sequence.files(number):
             raise ValueError(f"{options.directory}: the file of frame {number} is missing.")

@@ -10,10 +10,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from smokelift.app.cost import affordable_room
 from smokelift.app.options import add_directed_options, finite, named_path, require_new
 from smokelift.app.progress import Reporter, say_frames
-from smokelift.checks import counted
+from smokelift.checks import Doubt, Figures, Remark
 from smokelift.direct import (
     DISSOLVED,
     ROOM,
@@ -31,6 +30,7 @@ from smokelift.direct.writing import Written
 from smokelift.output.index import Index
 from smokelift.output.layout import INDEX
 from smokelift.output.sequence import Sequence
+from smokelift.report.cost import affordable_room
 from smokelift.scene import SIDES
 
 NOTICED = 1e-3
@@ -127,10 +127,8 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     total = start - sequence.frames[0] + 1 + continuation.frames
     say_frames(say, written, sequence.frames[0], total)
     seconds = time.monotonic() - began
-    say.finish(
-        f"{counted(total, 'frame')} in {options.out}, {continuation.frames} of them simulated ({seconds:.0f} s).",
-        {"directory": str(options.out), "frames": total, "seconds": round(seconds, 1)},
-    )
+    result: Figures = {"directory": str(options.out), "frames": total, "seconds": round(seconds, 1)}
+    say.finish(Remark("continued", {**result, "simulated": continuation.frames}), result)
 
 
 def _room(options: argparse.Namespace, sequence: Sequence, say: Reporter) -> float:
@@ -155,10 +153,7 @@ def _with_note(written: Iterable[Written], room: float, say: Reporter) -> Iterat
         yield number, figures
         if not said and figures.get(DISSOLVED, 0.0) > NOTICED:
             said = True
-            say.note(
-                f"From frame {number} on the smoke dissolves before it reaches the end of its box, which cannot grow "
-                f"any more: give it more --room than {room:g}, or move a camera or a lamp that is in its way."
-            )
+            say.note(Doubt("dissolving smoke", {"frame": number, "room": room}))
 
 
 def _continuation(options: argparse.Namespace) -> Continuation:

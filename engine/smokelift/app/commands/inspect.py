@@ -8,21 +8,21 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from smokelift.app.cost import estimate_cost
-from smokelift.app.facts import facts
-from smokelift.app.inspection import inspection_page
 from smokelift.app.options import add_run_options, named_path, require_folder, scene_of, settings_of
-from smokelift.app.page import PAGE_KINDS, Fact, write_page
 from smokelift.app.progress import Reporter
-from smokelift.app.workload import Workload
 from smokelift.checks import counted
 from smokelift.footage.clip import Clip
 from smokelift.output.images import write_image
 from smokelift.render import device
+from smokelift.report.cost import estimate_cost
+from smokelift.report.facts import boundaries, facts
+from smokelift.report.inspection import inspection_page
+from smokelift.report.page import PAGE_KINDS, Fact, write_page
+from smokelift.report.provenance import made_up, record
+from smokelift.report.workload import Workload
 from smokelift.scene import Background, Scene, scene_to_dict
-from smokelift.setup.choice import Grid
-from smokelift.setup.prepare import boundaries, prepare_shot
-from smokelift.setup.provenance import made_up
+from smokelift.setup.estimate import Grid
+from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import QUALITIES
 from smokelift.setup.shot import Shot
 
@@ -68,17 +68,15 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         shot = prepare_shot(clip, scene, settings)
         frames = len(clip)
         domain = shot.scene.domain
-        choices = [choice.reason for choice in shot.choices]
-        notes = [*shot.notes, *boundaries(shot.scene, settings), *choices, *made_up(shot)]
-        for note in notes:
-            say.note(note)
+        remarks = (*shot.remarks, *boundaries(shot.scene, settings), *shot.estimates, *made_up(shot))
+        for remark in remarks:
+            say.note(remark)
         work = Workload.of(shot, settings)
         cost = estimate_cost(domain.resolution, work)
         known = facts(shot, scene, cost)
         files = list(options.page)
         if options.page:
-            said = {fact.how for fact in known}
-            page = inspection_page(shot, scene, known, [note for note in notes if note not in said])
+            page = inspection_page(shot, scene, known, remarks)
             for path in options.page:
                 write_page(path, page)
         if options.write is not None:
@@ -91,7 +89,7 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         {
             "frames": frames,
             "scene": scene_to_dict(shot.scene),
-            "choices": [choice.as_dict() for choice in shot.choices],
+            "choices": [record(estimate) for estimate in shot.estimates],
             "facts": [fact.as_dict() for fact in known],
             "files": [str(path) for path in files],
             "qualities": _qualities(shot, work),
@@ -135,7 +133,7 @@ def _write_scene(path: Path, shot: Shot, given: Scene, known: Sequence[Fact]) ->
     elif plate is not None:
         write_image(picture, plate, half=False)
         scene = replace(scene, background=None)
-        said.append(f"A run finds the background again. {picture.name} shows it: once mended, give it in [background].")
+        said.append(f"A run finds the background again. {picture.name} shows it: once mended, give it as background.")
     elif shot.moves and shot.scene.background == Background():
         scene = replace(scene, camera=given.camera, domain=given.domain, background=None)
     scene.save(path, said)

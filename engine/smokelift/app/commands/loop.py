@@ -8,7 +8,7 @@ from typing import Any
 
 from smokelift.app.options import add_directed_options, frame_range, require_new
 from smokelift.app.progress import Reporter, say_frames
-from smokelift.checks import counted
+from smokelift.checks import Figures, Remark
 from smokelift.direct import loop_length, loop_sequence, open_source, steady_part, usual_overlap
 
 
@@ -42,7 +42,5 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     written = loop_sequence(sequence, options.out, first, last, overlap, npz=options.npz, resume=options.resume)
     say_frames(say, written, 1, total)
     seconds = time.monotonic() - began
-    say.finish(
-        f"{counted(total, 'frame')} in {options.out}, which repeat frames {first} to {last} ({seconds:.0f} s).",
-        {"directory": str(options.out), "frames": total, "seconds": round(seconds, 1)},
-    )
+    result: Figures = {"directory": str(options.out), "frames": total, "seconds": round(seconds, 1)}
+    say.finish(Remark("looped", {**result, "first": first, "last": last}), result)

@@ -8,7 +8,7 @@ from typing import Any
 
 from smokelift.app.options import named_path
 from smokelift.app.progress import Reporter
-from smokelift.checks import counted
+from smokelift.checks import Remark
 from smokelift.output.proxy import MIN_PROXY_VOXELS, TIMES, write_proxies
 from smokelift.output.sequence import Sequence
 
@@ -35,5 +35,5 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         now = time.monotonic()
         say.frame(number, {"origin": "made coarser", "seconds_density": now - before, "seconds_velocity": 0.0})
         before = now
-    frames = counted(len(sequence.frames), "frame")
-    say.finish(f"A proxy of {frames} in {sequence.directory}.", {"frames": len(sequence.frames)})
+    frames = len(sequence.frames)
+    say.finish(Remark("proxy", {"frames": frames, "directory": str(sequence.directory)}), {"frames": frames})

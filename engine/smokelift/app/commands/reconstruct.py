@@ -11,12 +11,9 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from smokelift.app.cost import require_memory
 from smokelift.app.options import add_run_options, named_path, require_folder, scene_of, settings_of
 from smokelift.app.progress import Reporter, median_psnr
-from smokelift.app.shortcomings import count_empty, shortcomings
-from smokelift.app.workload import Workload
-from smokelift.checks import counted
+from smokelift.checks import Figures, Remark
 from smokelift.footage.clip import Clip
 from smokelift.footage.matte import SMOKE_THRESHOLD
 from smokelift.output.atomic import atomic_path
@@ -24,9 +21,13 @@ from smokelift.output.images import eight_bit
 from smokelift.output.writer import check_directory, written_kinds
 from smokelift.pipeline import Frame, reconstruct
 from smokelift.render import device
+from smokelift.report.cost import require_memory
+from smokelift.report.provenance import made_up
+from smokelift.report.sentences import sentence
+from smokelift.report.shortcomings import count_empty, shortcomings
+from smokelift.report.workload import Workload
 from smokelift.scene import Domain
-from smokelift.setup.backdrop_notes import what_helps
-from smokelift.setup.provenance import made_up
+from smokelift.setup.backdrop_remarks import what_helps
 from smokelift.setup.shot import Shot
 
 
@@ -66,8 +67,8 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         require_memory(
             shot.scene.domain.resolution, Workload.of(shot, settings), given=isinstance(scene.domain, Domain)
         )
-        for note in (*shot.notes, *(choice.reason for choice in shot.choices), *made_up(shot)):
-            say.note(note)
+        for remark in (*shot.remarks, *shot.estimates, *made_up(shot)):
+            say.note(remark)
         report = _report(shot, options.thumbnail, say)
         sequence = reconstruction.write(options.out, npz=options.npz, resume=options.resume, on_frame=report)
     figures = [sequence.figures(number) for number in sequence.frames]
@@ -75,17 +76,15 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
         raise ValueError(
             f"No smoke found: in no frame does a patch differ from the background by {2 * SMOKE_THRESHOLD:g} times the "
             f"clip's noise, so all frames in {options.out} are empty. "
-            f"{what_helps(shot.clip, shot.views[0].plates, scene.background is not None)}"
+            f"{sentence(what_helps(shot.clip, shot.views[0].plates, scene.background is not None))}"
         )
-    for note in shortcomings(figures):
-        say.note(note)
+    for doubt in shortcomings(figures):
+        say.note(doubt)
     seconds = time.monotonic() - began
     fit = median_psnr(figures)
-    fitted = "" if fit is None else f", {fit:.1f} dB inside the smoke at the clip's pixels (median)"
-    say.finish(
-        f"{counted(len(sequence.frames), 'frame')} in {options.out} ({seconds:.0f} s){fitted}.",
-        {"directory": str(options.out), "frames": len(sequence.frames), "seconds": round(seconds, 1), "psnr": fit},
-    )
+    result: Figures = {"directory": str(options.out), "frames": len(sequence.frames), "seconds": round(seconds, 1)}
+    done = Remark("written", result) if fit is None else Remark("reconstructed", {**result, "psnr": fit})
+    say.finish(done, {**result, "psnr": fit})
 
 
 def _report(shot: Shot, thumbnail: Path | None, say: Reporter) -> Callable[[Frame], None]:

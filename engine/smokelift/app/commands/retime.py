@@ -8,7 +8,7 @@ from typing import Any
 
 from smokelift.app.options import add_directed_options, finite, require_new
 from smokelift.app.progress import Reporter, say_frames
-from smokelift.checks import counted
+from smokelift.checks import Figures, Remark
 from smokelift.direct import open_source, playback, retime_sequence
 
 SPEEDS = 0.01, 100.0
@@ -42,7 +42,5 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     total = len(playback(len(sequence.frames), speeds)[0])
     say_frames(say, retime_sequence(sequence, options.out, speeds, npz=options.npz, resume=options.resume), 1, total)
     seconds = time.monotonic() - began
-    say.finish(
-        f"{counted(total, 'frame')} in {options.out} ({seconds:.0f} s).",
-        {"directory": str(options.out), "frames": total, "seconds": round(seconds, 1)},
-    )
+    result: Figures = {"directory": str(options.out), "frames": total, "seconds": round(seconds, 1)}
+    say.finish(Remark("written", result), result)

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import pytest
 
-from smokelift.app.workload import MAX_SIDE_VOXELS, Workload
 from smokelift.footage.clip import Clip
 from smokelift.pipeline import Reconstruction, compose
+from smokelift.report.workload import MAX_SIDE_VOXELS, Workload
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot

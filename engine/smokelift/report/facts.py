@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from typing import Any
 
-from smokelift.app.cost import Cost
-from smokelift.app.page import Fact
-from smokelift.checks import counted
+from smokelift.checks import Remark, counted
 from smokelift.footage.exposure import shows_exposure, small
 from smokelift.footage.plate import Plate
-from smokelift.scene import SHADOWED, Scene
-from smokelift.setup.backdrop_notes import BLACK
-from smokelift.setup.choice import UNDETERMINED, Choice
+from smokelift.report.cost import Cost
+from smokelift.report.page import Fact
+from smokelift.report.sentences import sentence
+from smokelift.scene import SHADOWED, CompleteScene, Scene
+from smokelift.setup.backdrop_remarks import BLACK
+from smokelift.setup.estimate import UNDETERMINED, Estimate
 from smokelift.setup.geometry import PICTURE_HEIGHT
+from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
 from smokelift.setup.smoke import unknown_part
 
@@ -37,9 +39,9 @@ def facts(shot: Shot, given: Scene, cost: Cost) -> tuple[Fact, ...]:
             "camera",
             f"{scene.camera.type}, {'moves' if scene.camera.moves else 'stands still'}",
             has_camera,
-            _note_about(shot, "Camera"),
+            _said(shot, "assumed camera"),
         ),
-        _given_or_undetermined("scale", f"box of {size} m", has_box, f"{height} Give [camera] and [domain] in metres."),
+        _given_or_undetermined("scale", f"box of {size} m", has_box, f"{height} Give camera and box in metres."),
         _box(shot, has_box),
         _chosen(shot, "resolution", "grid", " x ".join(map(str, domain.resolution)), has_box),
         *_medium(shot, given.medium is not None),
@@ -54,12 +56,12 @@ def _box(shot: Shot, is_given: bool) -> Fact:
     if is_given:
         return Fact("box", "as given", "given")
     if not shot.smoky:
-        return Fact("box", "over all of the picture", UNDETERMINED, _note_about(shot, "Domain"))
-    return Fact("box", "around the smoke of the whole clip", "estimated", _note_about(shot, "Domain"))
+        return Fact("box", "over all of the picture", UNDETERMINED, _said(shot, "box"))
+    return Fact("box", "around the smoke of the whole clip", "estimated", _said(shot, "box"))
 
 
 def _medium(shot: Shot, is_given: bool) -> tuple[Fact, ...]:
-    medium, know = shot.scene.medium, "Give [medium] if you know it."
+    medium, know = shot.scene.medium, "Give the medium if you know it."
     extinction = f"{medium.extinction:.3g} 1/m at density 1"
     colour = "grey" if medium.is_grey else ", ".join(f"{v:.2f}" for v in medium.color)
     product = f"A picture shows it times the density only. {know}"
@@ -77,9 +79,10 @@ def _cost(shot: Shot, cost: Cost) -> Fact:
     return Fact("cost", f"{counted(shot.length, 'frame')}: {spent}", "estimated", free)
 
 
-def _note_about(shot: Shot, about: str) -> str:
-    """The note of a shot that begins with a word: what was assumed of a part of the scene that is not given."""
-    return next((note for note in shot.notes if note.startswith(about)), "")
+def _said(shot: Shot, *about: str) -> str:
+    """The remark on the input whose kind begins so: what was assumed of a part of the scene that is not given."""
+    own = (remark for remark in shot.remarks if "view" not in remark.figures)
+    return next((sentence(remark) for remark in own if remark.kind.startswith(about)), "")
 
 
 def _given_or_undetermined(what: str, value: str, is_given: bool, how: str) -> Fact:
@@ -94,12 +97,12 @@ def _background(shot: Shot, given: Scene, plate: Plate) -> Fact:
     colour = plate.image[0, 0]
     value = "a picture"
     if (plate.image == colour).all():
-        value = "black" if colour.max() < BLACK else f"one colour, {', '.join(f'{v:.2g}' for v in colour)} (linear)"
+        value = "black" if colour.max() < BLACK else f"one color, {', '.join(f'{v:.2g}' for v in colour)} (linear)"
     return Fact(
         "background",
         f"{value}, {unknown:.0%} of it unknown" if unknown else value,
         "estimated",
-        _note_about(shot, "Background"),
+        _said(shot, "background", "black background"),
     )
 
 
@@ -128,20 +131,20 @@ def _noise(plate: Plate) -> Fact:
 
 
 def _light(shot: Shot, given: Scene) -> tuple[Fact, ...]:
-    """The lines of the light: how strong it is, and what of it one picture does not tell."""
+    """The lines of the light: how strong it is, and what of it one picture does not show."""
     if shot.scene.scattering == "absorption":
         return (Fact("light", "none is needed", "estimated" if given.scattering is None else "given"),)
-    strength, thickness = _choice(shot, "light strength"), _choice(shot, "smoke thickness")
+    strength, thickness = _estimate(shot, "light strength"), _estimate(shot, "smoke thickness")
     if strength is not None and given.lights:
-        return (Fact("light", f"{strength.chosen} times as strong as given", "measured", strength.reason),)
+        return (Fact("light", f"{strength.value} times as strong as given", "measured", sentence(strength)),)
     colour = ", ".join(f"{v:.2g}" for v in shot.optics.unshadowed_source())
-    direction = _choice(shot, "light direction")
-    if direction is not None and direction.chosen != UNDETERMINED:
+    direction = _estimate(shot, "light direction")
+    if direction is not None and direction.value != UNDETERMINED:
         return (
-            Fact("light strength", f"smoke of radiance {colour}", "measured", "Light strength: as the views tell it."),
-            _chosen(shot, "light direction", "sun's direction", str(direction.chosen), False),
+            Fact("light strength", f"smoke of radiance {colour}", "measured", "Light strength: as the views show it."),
+            _chosen(shot, "light direction", "sun's direction", str(direction.value), False),
             Fact("sun's colour", "that of all light", UNDETERMINED),
-            Fact("ambient share", f"{direction.measured['ambient_share']:.0%}", "measured"),
+            Fact("ambient share", f"{direction.figures['ambient_share']:.0%}", "measured"),
         )
     if given.lights or thickness is None:
         return (Fact("light", "as given", "given"),)
@@ -150,9 +153,9 @@ def _light(shot: Shot, given: Scene) -> tuple[Fact, ...]:
     if not shot.smoky:
         how = "Light strength: no smoke shows it."
     if shot.scene.scattering in SHADOWED:
-        how = "Light strength: as much as comes from behind the smoke, in the colour that the clip asks for."
-    if thickness.chosen != UNDETERMINED:
-        hides, origin = f"hides {thickness.measured['hidden']:.0%} of what it covers", "measured"
+        how = "Light strength: as much as comes from behind the smoke, in the color that the clip asks for."
+    if thickness.source == "measured":
+        hides, origin = f"hides {thickness.figures['hidden']:.0%} of what it covers", "measured"
         how = "Light strength: what the smoke adds for what it hides of the texture behind it."
     return (
         Fact("light strength", f"smoke of radiance {colour}", origin, how),
@@ -177,16 +180,24 @@ def _place(shot: Shot) -> Fact:
 
 
 def _chosen(shot: Shot, what: str, name: str, value: str, is_given: bool) -> Fact:
-    """The line of a choice, or of what was not chosen because it is given or was not measured."""
-    choice = _choice(shot, what)
-    if is_given or choice is None:
+    """The line of an estimate, or of what was not estimated because it is given or was not measured."""
+    estimate = _estimate(shot, what)
+    if is_given or estimate is None:
         return Fact(name, value, "given" if is_given else UNDETERMINED)
-    if choice.chosen == UNDETERMINED or not (shot.smoky or choice.by_hand):
-        origin = UNDETERMINED
+    origin = {"given": "by hand", "measured": "measured", "assumed": UNDETERMINED}[estimate.source]
+    return Fact(name, value, origin, sentence(estimate))
+
+
+def _estimate(shot: Shot, what: str) -> Estimate[Any] | None:
+    return next((estimate for estimate in shot.estimates if estimate.what == what), None)
+
+
+def boundaries(scene: CompleteScene, settings: Settings) -> tuple[Remark, ...]:
+    """How smoke gets in and out of the box of a complete scene."""
+    inflow = scene.inflow()
+    if inflow is None:
+        search = settings.method == "default" and settings.velocity.sources
+        entry = Remark("inlets found later" if search else "no inlets")
     else:
-        origin = "by hand" if choice.by_hand else "measured"
-    return Fact(name, value, origin, choice.reason)
-
-
-def _choice(shot: Shot, what: str) -> Choice[Any] | None:
-    return next((choice for choice in shot.choices if choice.what == what), None)
+        entry = Remark("inlets", {"inlets": len(scene.inlets), "voxels": int(inflow.sum())})
+    return entry, Remark("closed sides", {"sides": ", ".join(scene.closed)}) if scene.closed else Remark("open box")

@@ -8,9 +8,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from smokelift.app import cost
-from smokelift.app.cost import NotEnoughMemoryError, estimate_cost, memory_needed, require_memory, voxel_solves
-from smokelift.app.workload import Workload
+from smokelift.report import cost
+from smokelift.report.cost import NotEnoughMemoryError, estimate_cost, memory_needed, require_memory, voxel_solves
+from smokelift.report.workload import Workload
 from smokelift.scene import Domain
 from smokelift.setup.settings import Settings
 
@@ -51,7 +51,7 @@ def free(monkeypatch: pytest.MonkeyPatch, gigabytes: float) -> None:
 def suggestion(resolution: tuple[int, int, int], given: bool = True) -> tuple[int, int, int]:
     with pytest.raises(NotEnoughMemoryError) as caught:
         require_memory(resolution, WORK, given=given)
-    found = re.search(r"--resolution (\d+),(\d+),(\d+)", str(caught.value))
+    found = re.search(r"resolution that fits is (\d+),(\d+),(\d+)", str(caught.value))
     assert found
     x, y, z = (int(count) for count in found.groups())
     return x, y, z
@@ -139,7 +139,7 @@ def test_nothing_fits_is_said_too(monkeypatch) -> None:
     free(monkeypatch, 0.2)
     with pytest.raises(NotEnoughMemoryError) as caught:
         require_memory(SIZES["cube"], WORK)
-    assert "the largest that fits" not in str(caught.value)
+    assert "resolution that fits" not in str(caught.value)
 
 
 def test_more_frames_views_and_smoke_cost_more(monkeypatch) -> None:

@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import pytest
 
+from smokelift.report.provenance import Provenance, made_up, provenance, record
+from smokelift.report.sentences import sentence
 from smokelift.scene import orbit
-from smokelift.setup.provenance import Provenance, made_up, provenance
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
 from tests.engine.setup.shots import shot_of
@@ -33,7 +34,6 @@ def test_only_what_the_pictures_show_is_measured(shot) -> None:
         ("distribution along the rays", "assumed"),
         ("fine structure along the rays", "made up"),
     ]
-    assert all(part.how.endswith(".") for part in provenance(shot))
 
 
 def test_made_up_detail_names_its_settings(shot) -> None:
@@ -68,17 +68,23 @@ def test_what_is_assumed_depends_on_cameras_and_method(shot) -> None:
     """Further cameras limit it; the paper's method takes the picture for the side view."""
 
     def assumed(shot: Shot) -> str:
-        return parts(shot)["distribution along the rays"].how
+        return parts(shot)["distribution along the rays"].how.kind
 
-    assert "as deep as it is wide" in assumed(shot)
-    assert "90 degrees" in assumed(replace(shot, settings=Settings.preset(method="paper")))
+    assert assumed(shot) == "depth by the smoke's width in one view"
+    paper = replace(shot, settings=Settings.preset(method="paper"))
+    assert assumed(paper) == "depth by the view from the side in one view"
     two = replace(shot, views=shot.views * 2)
-    assert assumed(two).startswith("2 cameras limit it")
-    assert "pictures of 2 cameras" in parts(two)["optical depth of every ray"].how
+    assert assumed(two) == "depth by the smoke's width in several views"
+    assert parts(two)["optical depth of every ray"].how.figures == {"cameras": 2}
 
 
 def test_json_holds_it(shot) -> None:
-    """As plain values, nothing lost."""
+    """As plain values, in sentences."""
     plain = [part.as_dict() for part in provenance(shot)]
     assert json.loads(json.dumps(plain, allow_nan=False)) == plain
-    assert [Provenance(**part) for part in plain] == list(provenance(shot))
+    assert [part["how"] for part in plain] == [sentence(part.how) for part in provenance(shot)]
+    plain = [record(estimate) for estimate in shot.estimates]
+    assert json.loads(json.dumps(plain, allow_nan=False)) == plain
+    for each in plain:
+        assert set(each) == {"what", "chosen", "kind", "reason", "measured", "tolerance", "by_hand"}
+        assert each["by_hand"] or each["measured"]

@@ -16,8 +16,8 @@ import numpy as np
 import psutil
 import scipy.fft
 
-from smokelift.app.workload import Workload
 from smokelift.density.halves import MIN_COARSENED_VOXELS
+from smokelift.report.workload import Workload
 
 Resolution = tuple[int, int, int]
 
@@ -165,7 +165,7 @@ def require_memory(resolution: Resolution, work: Workload, *, given: bool = True
     smaller = _same_proportions(resolution) if given else _about_the_same(resolution)
     fits = next((each for each in smaller if memory_needed(each, work) <= free), None)
     advice = (
-        f"the largest that fits is --resolution {','.join(map(str, fits))}"
+        f"the largest resolution that fits is {','.join(map(str, fits))}"
         if fits
         else "close other programs; no grid of this shape fits"
     )

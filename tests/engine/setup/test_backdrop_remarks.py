@@ -1,4 +1,4 @@
-"""What is said of the background that was found, and of clips in which no smoke is."""
+"""What is noticed of the background that was found, and of clips in which no smoke is."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import pytest
 from scipy import ndimage
 from scipy.spatial.transform import Rotation
 
+from smokelift.checks import Doubt, Remark
 from smokelift.footage.alignment import Lens
 from smokelift.footage.backdrop import find_backdrop
 from smokelift.footage.clip import Clip
@@ -19,12 +20,11 @@ from smokelift.footage.panorama import PanoramaPlate
 from smokelift.footage.plate import Plate
 from smokelift.output.images import write_image
 from smokelift.scene import Background
-from smokelift.setup.backdrop_notes import (
-    FROM_ONE,
+from smokelift.setup.backdrop_remarks import (
     backdrop_doubts,
-    backdrop_notes,
+    backdrop_remarks,
     between_bars,
-    cut_notes,
+    cut_doubts,
     nothing_seen,
     smoke_in_plate,
     what_helps,
@@ -51,9 +51,8 @@ def test_smoke_that_may_be_in_the_plate_is_said(unknown_rows, said) -> None:
     unknown[:unknown_rows] = True
     covered[10:80] = True
     colours = np.zeros((0, 3), np.float32)
-    notes = smoke_in_plate(SmokeSamples(1.0, (0, 0, 50, 100), covered, unknown, colours, colours, (0,), {}))
-    assert bool(notes) is said
-    assert not said or "75% of where smoke is or may be" in notes[0]
+    doubts = smoke_in_plate(SmokeSamples(1.0, (0, 0, 50, 100), covered, unknown, colours, colours, (0,), {}))
+    assert doubts == (Doubt("smoke in the background", {"share": 0.75}),) * said
 
 
 def test_smoke_before_a_wall_that_no_frame_shows_is_undetermined(tmp_path) -> None:
@@ -70,14 +69,14 @@ def test_smoke_before_a_wall_that_no_frame_shows_is_undetermined(tmp_path) -> No
         same = np.where(across < 6, colour * thinner + flatter * (1 - thinner), tiles)
         np.testing.assert_allclose(shown, same)
         write_image(tmp_path / f"frame_{n:02d}.png", shown)
-    (note,) = backdrop_notes(find_backdrop(Clip.open(tmp_path / "frame_##.png", fps=24), None, None))
-    assert "how thick the smoke is there is undetermined" in note
+    (remark,) = backdrop_remarks(find_backdrop(Clip.open(tmp_path / "frame_##.png", fps=24), None, None))
+    assert remark.kind == "background partly seen"
 
 
 def test_one_colour_is_said(tmp_path) -> None:
     """Behind a puff before black."""
     found = find_backdrop(before(0.0, tmp_path), None, None)
-    assert backdrop_notes(found) == ("Background not given: it is black.",)
+    assert backdrop_remarks(found) == (Remark("black background"),)
 
 
 @pytest.mark.parametrize(("quantiser", "said"), [(36, False), (46, True)])
@@ -87,15 +86,14 @@ def test_a_clip_that_is_strongly_compressed_is_said(tmp_path, quantiser, said) -
         path = coded(tmp_path / f"{doubted}.mp4", plate, puff, 0.8, quantiser)
         with Clip.open(path) as clip:
             doubts = backdrop_doubts(find_backdrop(clip, None, None))
-            assert any(doubt.startswith("The clip is strongly compressed") for doubt in doubts) is doubted
+            assert [doubt.kind for doubt in doubts] == ["strong compression"] * doubted
             assert not backdrop_doubts(find_backdrop(clip, None, Background(color=(0.1, 0.1, 0.1))))
 
 
 def test_what_never_changes_before_one_colour_is_said(tmp_path) -> None:
     """It may be a floor, or smoke that stands still."""
-    (note,) = backdrop_notes(find_backdrop(before(0.3, tmp_path), None, None))
-    assert "it is black, but for" in note
-    assert "If that is smoke" in note
+    remarks = backdrop_remarks(find_backdrop(before(0.3, tmp_path), None, None))
+    assert [remark.kind for remark in remarks] == ["black background", "background with objects"]
 
 
 def panned(folder, lens: Lens, pixels: float) -> Clip:
@@ -124,19 +122,20 @@ def test_pictures_of_a_panning_camera_tell_background_and_focal_length(tmp_path)
     assert isinstance(found.plates, PanoramaPlate)
     assert found.turns is not None
     assert found.turns.lens.focal[0] == pytest.approx(150, rel=0.03)
-    assert any("Focal length measured on how the picture turns: 34 mm" in note for note in backdrop_notes(found))
+    remarks = {remark.kind: remark.figures for remark in backdrop_remarks(found)}
+    assert remarks["focal length"]["millimetres"] == pytest.approx(34, abs=0.5)
     assert not smoke_in_plate(sample_smoke(found.clip, found.plates, found.turns))
     never_clear = replace(found.plates, confidence=np.zeros_like(found.plates.confidence))
-    (said,) = smoke_in_plate(sample_smoke(found.clip, never_clear, found.turns))
-    assert "may hold most of the smoke: 100%" in said
+    (doubt,) = smoke_in_plate(sample_smoke(found.clip, never_clear, found.turns))
+    assert doubt.figures == {"share": 1}
 
 
 def test_a_focal_length_that_is_not_found_is_said(tmp_path) -> None:
     lens = Lens((160, 120), (150.0, 150.0), (80.0, 60.0))
     found = find_backdrop(panned(tmp_path, lens, 40), None, None, lens)
     known, unknown = (replace(found, lens_is_known=is_known, focal=None) for is_known in (True, False))
-    assert not any("Focal length" in note for note in backdrop_notes(known))
-    assert any("Focal length undetermined" in note for note in backdrop_notes(unknown))
+    said = [[remark.kind for remark in backdrop_remarks(each) if "focal" in remark.kind] for each in (known, unknown)]
+    assert said == [[], ["focal length undetermined"]]
 
 
 def test_a_cut_is_said_with_the_frames_of_each_side(tmp_path) -> None:
@@ -150,11 +149,10 @@ def test_a_cut_is_said_with_the_frames_of_each_side(tmp_path) -> None:
         )
         write_image(tmp_path / f"frame_{n:02d}.png", wall * (1 - smoke) + 0.6 * smoke)
     with Clip.open(tmp_path / "frame_##.png", frames=(2, 12)) as clip:
-        (said,) = cut_notes(find_backdrop(clip, None, None))
-    assert "between frames 6 and 7" in said
-    assert "--frames 2:6 or 7:12" in said
+        (doubt,) = cut_doubts(find_backdrop(clip, None, None))
+    assert doubt == Doubt("cut", {"before": 6, "after": 7, "first": 2, "last": 12})
     with Clip.open(tmp_path / "frame_##.png", frames=(7, 13)) as clip:
-        assert cut_notes(find_backdrop(clip, None, None)) == ()
+        assert cut_doubts(find_backdrop(clip, None, None)) == ()
 
 
 @pytest.mark.parametrize("colour", [0.0, 0.2], ids=["black", "grey"])
@@ -172,8 +170,8 @@ def test_one_frame_before_one_colour_shows_its_background(tmp_path, colour) -> N
         masks = [matte(clip.frame(0), each.plates.at(0)).mask for each in (found, given)]
         assert masks[0][smoke > 0.1].all() and masks[0].mean() < 0.6
         assert (masks[0] != masks[1]).mean() < 0.01
-    assert backdrop_doubts(found) == (FROM_ONE,)
-    assert "Background not given: it is" in backdrop_notes(found)[0]
+    assert backdrop_doubts(found) == (Doubt("background of one frame"),)
+    assert backdrop_remarks(found)[0].kind == ("background of one colour" if colour else "black background")
 
 
 @pytest.mark.parametrize(("count", "doubted"), [(1, False), (2, True), (4, False)])
@@ -186,7 +184,7 @@ def test_a_background_that_few_frames_show_is_doubted(tmp_path, count, doubted) 
         write_image(tmp_path / f"frame_{n}.png", wall * (1 - smoke) + 0.6 * smoke)
     with Clip.open(tmp_path / "frame_#.png") as clip:
         doubts = backdrop_doubts(find_backdrop(clip, None, None))
-    assert any(f"Only {count} frames show" in doubt for doubt in doubts) is doubted
+    assert doubts == (Doubt("background of few frames", {"frames": count}),) * doubted
 
 
 @pytest.mark.parametrize(
@@ -207,8 +205,8 @@ def test_a_picture_between_bars_that_is_taken_for_smoke_is_said(rows, missing, a
     covered = covered.T if turned else covered
     seen = np.zeros((round(2 * at_a_time * covered.sum()), 3), np.float32)  # in two samples
     gains = dict.fromkeys(range(2), np.ones(3, np.float32))
-    (*notes,) = between_bars(SmokeSamples(1.0, (0, 0, 1, 1), covered, ~covered, seen, seen, (0,), gains))
-    assert [("left" if turned else "above") in note for note in notes] == [True] * said
+    doubts = between_bars(SmokeSamples(1.0, (0, 0, 1, 1), covered, ~covered, seen, seen, (0,), gains))
+    assert doubts == (Doubt("bars left and right" if turned else "bars above and below"),) * said
 
 
 @pytest.fixture
@@ -224,9 +222,10 @@ def grey(tmp_path):
 def test_how_many_frames_were_examined_is_said(grey) -> None:
     """And what helps."""
     clip, plate = grey
-    said, advice = nothing_seen(clip, plate, sample_smoke(clip, plate), given=False, cuts=())
-    assert "No smoke found in the 4 frames that were examined" in said
-    assert "give a clean plate, or a colour" in advice
+    assert nothing_seen(clip, plate, sample_smoke(clip, plate), given=False, cuts=()) == (
+        Doubt("no smoke examined", {"frames": 4}),
+        Doubt("no smoke before an estimated background"),
+    )
 
 
 def test_nothing_is_said_of_smoke(grey) -> None:
@@ -239,27 +238,26 @@ def test_nothing_is_said_of_smoke(grey) -> None:
 
 
 def test_the_background_that_is_given_is_doubted(grey) -> None:
-    """Nothing else is asked for."""
-    assert "Check the background that is given" in what_helps(*grey, given=True)
+    assert what_helps(*grey, given=True) == Doubt("no smoke before the given background")
 
 
 def test_a_cut_is_said_before_all_else(grey) -> None:
     """No background fits both of its sides."""
     clip, plate = grey
-    said = nothing_seen(clip, plate, sample_smoke(clip, plate), given=True, cuts=("There is a cut.",))
-    assert said[1:] == ("There is a cut.",)
+    said = nothing_seen(clip, plate, sample_smoke(clip, plate), given=True, cuts=(Doubt("cut"),))
+    assert said[1:] == (Doubt("cut"),)
 
 
 def test_one_frame_shows_no_background(grey) -> None:
     """A photograph of smoke."""
     clip, plate = grey
-    assert "One frame alone does not show" in what_helps(clip.part(2, 2), plate, given=False)
+    assert what_helps(clip.part(2, 2), plate, given=False) == Doubt("no smoke in one frame")
 
 
 @pytest.mark.parametrize(("codes", "moves"), [(5, False), (20, True)])
 def test_a_background_that_changes_may_be_that_of_a_camera_that_moves(grey, codes, moves) -> None:
     """More than noise does."""
     clip, plate = grey
-    said = what_helps(clip, replace(plate, noise=lasting_noise(codes / 255)), given=False)
-    assert ("track it in Blender" in said) is moves
-    assert (f"by {codes} of 255" in said) is moves
+    doubt = what_helps(clip, replace(plate, noise=lasting_noise(codes / 255)), given=False)
+    assert (doubt.kind == "no smoke before a changing background") is moves
+    assert not moves or doubt.figures["codes"] == pytest.approx(codes, rel=1e-3)

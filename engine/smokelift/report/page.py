@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from smokelift.output.atomic import atomic_path
-from smokelift.setup.choice import UNDETERMINED
+from smokelift.setup.estimate import UNDETERMINED
 
 PAGE_KINDS = (".png", ".html")
 

@@ -9,7 +9,7 @@ import re
 import numpy as np
 from PIL import Image
 
-from smokelift.app.page import COLUMNS, TILE, Fact, Page, Panel, fitted, write_page
+from smokelift.report.page import COLUMNS, TILE, Fact, Page, Panel, fitted, write_page
 
 RED = np.zeros((50, 80, 3), np.uint8) + np.uint8([200, 10, 10])
 PAGE = Page(

@@ -9,12 +9,13 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 from scipy import ndimage
 
-from smokelift.app.page import TILE, Fact, Page, Panel, fitted
-from smokelift.checks import counted
+from smokelift.checks import Doubt, Remark, counted
 from smokelift.footage.images import area_average, linear_to_srgb
 from smokelift.footage.matte import SMOKE_THRESHOLD, Matte, matte
 from smokelift.footage.plate import Plate
 from smokelift.output.images import eight_bit
+from smokelift.report.page import TILE, Fact, Page, Panel, fitted
+from smokelift.report.sentences import sentence
 from smokelift.scene import SHADOWED, Camera, DirectionalLight, Domain, PointLight, Scene
 from smokelift.scene.projection import project
 from smokelift.setup.shot import Shot
@@ -38,7 +39,7 @@ BINS = 96
 """Bins of the histogram."""
 
 
-def inspection_page(shot: Shot, given: Scene, known: Sequence[Fact], notes: Iterable[str]) -> Page:
+def inspection_page(shot: Shot, given: Scene, known: Sequence[Fact], remarks: Iterable[Remark]) -> Page:
     """Return the page of a shot.
 
     Parameters
@@ -48,9 +49,9 @@ def inspection_page(shot: Shot, given: Scene, known: Sequence[Fact], notes: Iter
     given
         What the user said of it.
     known
-        The facts of it, see `smokelift.app.facts`.
-    notes
-        Sentences that are said as well.
+        The facts of it, see `smokelift.report.facts`.
+    remarks
+        What is said as well, doubts above the pictures.
     """
     number = shot.smoky[0] if shot.smoky else 0
     columns, rows = fitted(*shot.clip.size)
@@ -75,8 +76,10 @@ def inspection_page(shot: Shot, given: Scene, known: Sequence[Fact], notes: Iter
     name = given.clip.path.name if given.clip is not None else "clip"
     width, height = shot.clip.size
     frames = f"{counted(shot.length, 'frame')} of {width} x {height} at {shot.clip.fps:.4g} a second"
-    others = tuple(note for note in notes if note not in shot.doubts)
-    return Page(f"{name}: {frames}", shot.doubts, panels, known, others)
+    doubts = [sentence(remark) for remark in shot.remarks if isinstance(remark, Doubt)]
+    said = {*doubts, *(fact.how for fact in known)}
+    others = [words for words in map(sentence, remarks) if words not in said]
+    return Page(f"{name}: {frames}", doubts, panels, known, others)
 
 
 def _with_box(shot: Shot, camera: Camera, picture: NDArray[np.float32], number: int) -> Tile:

@@ -1,0 +1,47 @@
+"""What the engine says, in the panel's words where its own are those of a command line. Knows nothing of Blender."""
+
+from collections.abc import Mapping
+from typing import Any
+
+SENTENCES = {
+    "reconstructed": "{frames} made in {seconds:.0f} s. They match the clip to {psnr:.1f} dB; more is closer.",
+    "written": "{frames} made in {seconds:.0f} s.",
+    "continued": "{frames} made in {seconds:.0f} s, {simulated} of them simulated.",
+    "looped": "{frames} made in {seconds:.0f} s, which repeat.",
+    "proxy": "The proxy of {frames} is made.",
+    "hardly any smoke fitted": (
+        "Hardly any smoke was fitted: a typical frame still differs from the clip by {error:.0%} of what its smoke "
+        "changes there. Choose Clean Plate, Scene Lights or Smoke Material; Report says what was taken."
+    ),
+    "not all is smoke": (
+        "Not all that was taken for smoke may be smoke: a typical frame still differs from the clip by {error:.0%} of "
+        "what changes in it. What moves, light that changes and labels look like smoke, too; Report shows what was "
+        "taken. Hide what is no smoke by a Mask, crop the clip, or choose a Clean Plate."
+    ),
+    "cut": (
+        "The picture changes at once between frames {before} and {after}, as at a cut, so that no background fits both "
+        "sides; choose Frames {first} to {before} or {after} to {last}."
+    ),
+}
+"""By kind, with the figures that the engine gives."""
+
+FRAME_NUMBERS = ("before", "after", "first", "last")
+"""Figures that the engine counts from 0, and the panel from 1."""
+
+
+def sentence(message: Mapping[str, Any]) -> str:
+    """A message of the engine, as the panel shows it.
+
+    Parameters
+    ----------
+    message
+        With the engine's ``text``; with its ``kind`` and ``figures`` if it has those.
+    """
+    words = SENTENCES.get(message.get("kind", ""))
+    if words is None:
+        return str(message["text"])
+    figures = dict(message["figures"])
+    figures |= {name: figures[name] + 1 for name in FRAME_NUMBERS if name in figures}
+    if "frames" in figures:
+        figures["frames"] = "1 frame" if figures["frames"] == 1 else f"{figures['frames']} frames"
+    return words.format(**figures)

@@ -1,0 +1,57 @@
+"""What was decided for a clip, by what, and how well it is known; and what other qualities would take."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Generic, Literal, TypeVar
+
+from smokelift.checks import Remark
+
+UNDETERMINED = "undetermined"
+"""Value of an estimate that nothing in the clip or the scene decides."""
+
+Value = TypeVar("Value", str, int, tuple[int, int, int], covariant=True)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Estimate(Remark, Generic[Value]):
+    """One decision; its kind says what decided it, its figures are what was measured for it.
+
+    Attributes
+    ----------
+    what
+        ``"scattering"``, ``"light strength"``, ``"resolution"``, ``"domain"``, ``"environment directions"``,
+        ``"iterations"``, ``"velocity grid coarsening"``, ``"velocity levels"``, ``"axis depth"``, ``"smoke colour"``,
+        ``"smoke thickness"``, ``"light direction"``, ``"gain of view 1"`` or ``"fire"``.
+    value
+        What will be used, or `UNDETERMINED`.
+    source
+        The user gives it, the clip shows it, or nothing decides it and it is assumed.
+    spread
+        Standard deviation of what was measured: metres of an axis depth, degrees of a light direction, a share of a
+        smoke thickness; None of others.
+    tolerance
+        What the deciding figure was held against.
+    """
+
+    what: str
+    value: Value
+    source: Literal["given", "measured", "assumed"]
+    spread: float | None = None
+    tolerance: float | None = None
+
+
+@dataclass(frozen=True)
+class Grid:
+    """The grid that a quality takes of a clip.
+
+    Attributes
+    ----------
+    resolution
+        Voxels along x, y, z.
+    lost
+        Share of the smoke's contrast in the clip that is finer than it shows; None where that was not measured.
+    """
+
+    resolution: tuple[int, int, int]
+    lost: float | None

@@ -1,0 +1,76 @@
+"""What the engine says, in the words of the panel."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+from string import Formatter
+
+import pytest
+
+from addon.sentences import SENTENCES, sentence
+from smokelift.report.sentences import SENTENCES as OWN
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "tools"))
+from messages import all_messages
+
+TOPICS = (
+    "Clip and background",
+    "Set-up of the shot",
+    "Shot and result",
+    "Density and rendering",
+    "Velocity and transport",
+    "Sequence and files",
+    "Directed smoke",
+)
+"""What a run or a check of a shot can say; the add-on writes scene files and options itself, which are not wrong."""
+
+FOREIGN = ("smokelift inspect", "pip install", "--npz")
+"""Words of sentences that the panel has its own for, and of libraries that the extension brings with it."""
+
+
+def figures(words: str) -> set[str]:
+    """Names of what a sentence fills in."""
+    return {name for _, name, _, _ in Formatter().parse(words) if name}
+
+
+@pytest.mark.parametrize("kind", SENTENCES)
+def test_the_engine_gives_the_figures_of_the_panels_sentences(kind) -> None:
+    assert figures(SENTENCES[kind]) <= figures(OWN[kind])
+
+
+@pytest.mark.parametrize("topic", TOPICS)
+def test_no_word_of_a_scene_file_or_of_an_option_is_in_the_others(topic) -> None:
+    said = [text for text in all_messages()[topic] if not any(words in text for words in FOREIGN)]
+    assert said
+    assert [text for text in said if re.search(r"\[[a-z]|--[a-z]|scene file|[cC]olour", text)] == []
+
+
+def test_only_sentences_of_the_panels_own_name_a_command() -> None:
+    assert {kind for kind, words in OWN.items() if "smokelift inspect" in words} <= set(SENTENCES)
+
+
+@pytest.mark.parametrize(
+    ("message", "said"),
+    [
+        ({"text": "As it is."}, "As it is."),
+        ({"text": "As it is.", "kind": "black background", "figures": {}}, "As it is."),
+        (
+            {"text": "", "kind": "reconstructed", "figures": {"frames": 12, "seconds": 28.2, "psnr": 26.44}},
+            "12 frames made in 28 s. They match the clip to 26.4 dB; more is closer.",
+        ),
+        (
+            {"text": "", "kind": "looped", "figures": {"frames": 1, "seconds": 9, "first": 1, "last": 2}},
+            "1 frame made in 9 s, which repeat.",
+        ),
+        (
+            {"text": "", "kind": "cut", "figures": {"before": 4, "after": 5, "first": 0, "last": 9}},
+            "The picture changes at once between frames 5 and 6, as at a cut, so that no background fits both sides; "
+            "choose Frames 1 to 5 or 6 to 10.",
+        ),
+    ],
+)
+def test_a_sentence(message, said) -> None:
+    """The engine's where the panel has no other; frames are counted from 1."""
+    assert sentence(message) == said
