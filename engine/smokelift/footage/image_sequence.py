@@ -60,7 +60,7 @@ class ImageSequence:
             return ()
         height, width = self._shape[:2]
         small = tuple(round(side / reduction(width, height)) for side in (width, height))
-        return (Remark("reduced pictures", {"size": (width, height), "reduced": small}),)
+        return (Remark("scaled pictures", {"size": (width, height), "scaled": small}),)
 
     def read(self, n: int) -> Picture:
         """Return a picture, or raise ClipError if it is damaged or of another size than the first."""

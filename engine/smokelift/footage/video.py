@@ -233,12 +233,7 @@ class Video:
         if primaries is not None:
             notes.append(Remark("other primaries", {"primaries": primaries}))
         if (width, height) != (stream.width, stream.height):
-            sizes = {"size": (stream.width, stream.height), "scaled": (width, height)}
-            shape = float(self._pixel_shape())
-            if shape == 1:
-                notes.append(Remark("scaled pictures", sizes))
-            else:
-                notes.append(Remark("oblong pixels", {**sizes, "shape": shape}))
+            notes.append(Remark("scaled pictures", {"size": (stream.width, stream.height), "scaled": (width, height)}))
         return tuple(notes)
 
     def close(self) -> None:

@@ -10,7 +10,7 @@ from smokelift.footage.plate import Plate
 from smokelift.report.cost import Cost
 from smokelift.report.page import Fact
 from smokelift.report.sentences import sentence
-from smokelift.scene import SHADOWED, CompleteScene, Scene
+from smokelift.scene import CompleteScene, Scene
 from smokelift.setup.backdrop_remarks import BLACK
 from smokelift.setup.estimate import UNDETERMINED, Estimate
 from smokelift.setup.geometry import PICTURE_HEIGHT
@@ -149,16 +149,10 @@ def _light(shot: Shot, given: Scene) -> tuple[Fact, ...]:
     if given.lights or thickness is None:
         return (Fact("light", "as given", "given"),)
     hides, origin = "as the light asks for", UNDETERMINED
-    how = "Light strength: as much as the thickest smoke shows; if none is thick, the light is stronger."
-    if not shot.smoky:
-        how = "Light strength: no smoke shows it."
-    if shot.scene.scattering in SHADOWED:
-        how = "Light strength: as much as comes from behind the smoke, in the color that the clip asks for."
     if thickness.source == "measured":
         hides, origin = f"hides {thickness.figures['hidden']:.0%} of what it covers", "measured"
-        how = "Light strength: what the smoke adds for what it hides of the texture behind it."
     return (
-        Fact("light strength", f"smoke of radiance {colour}", origin, how),
+        Fact("light strength", f"smoke of radiance {colour}", origin, _said(shot, "light")),
         _chosen(shot, "smoke thickness", "smoke thickness", hides, False),
         _chosen(shot, "light direction", "sun's direction", "no sun", False),
         _chosen(shot, "light direction", "sun's colour", "that of all light", False),

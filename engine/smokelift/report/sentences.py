@@ -1,9 +1,8 @@
 """The sentences of remarks and estimates by their kinds: the only place of their words.
 
-A sentence fills in the figures of its remark, as `str.format` does, and for an estimate ``value``, ``tolerance`` and
-``spread``. Beside the usual ones there are four formats: several numbers are joined by commas, with " x" at the end of
-the format by that; "|" at its beginning leaves out a number's sign; a noun counts; the name of a model of scattering
-is said in words.
+A sentence fills in the figures of its remark, as `str.format` does, and for an estimate ``what``, ``value``,
+``tolerance`` and ``spread``. Beside the usual formats a noun counts, and "place" says a depth in words; numbers are
+joined by commas, lengths whose format ends with " x" and whole numbers by that; models of scattering have names.
 """
 
 from __future__ import annotations
@@ -23,7 +22,11 @@ MODELS: Mapping[object, str] = {
 }
 """Models of scattering in words."""
 
-CLIP = {
+MIN_DEPTH = 0.005
+"""Smallest distance from the middle of the box that is said, in metres: less would look exact."""
+
+SENTENCES: Mapping[str, str] = {
+    # how the clips are read
     "truncated clip": "{path}: is truncated; {frames:frame} of it can be used.",
     "damaged frames": "{path}: {frames} missing or damaged; the last sound frame stands in.",
     "pictures without a frame rate": "{path}: pictures carry no frame rate; {fps:g} frames a second are taken.",
@@ -31,11 +34,7 @@ CLIP = {
     "interlaced clip": "The clip is interlaced: one field of each frame is used, so its lines are half as fine.",
     "high dynamic range": "Transfer {transfer}: diffuse white is brought to 1, highlights exceed it.",
     "other primaries": "Primaries {primaries} are brought to BT.709.",
-    "scaled pictures": "Pictures of {size:d x} pixels are scaled to {scaled:d x} square ones.",
-    "oblong pixels": (
-        "Pictures of {size:d x} pixels, {shape:.3g} times as wide as high, are scaled to {scaled:d x} square ones."
-    ),
-    "reduced pictures": "The pictures of {size:d x} pixels are reduced to {reduced:d x}.",
+    "scaled pictures": "Pictures of {size} pixels are scaled to {scaled} square ones.",
     "further view": "{name}, {degrees:.0f} degrees from the input, frames {first} to {last}.",
     "disagreeing views": (
         "The views agree on {agreed:.0%} of the smoke that they show: check where their cameras stand, which frames "
@@ -45,10 +44,7 @@ CLIP = {
         "The picture changes at once between frames {before} and {after}, as at a cut, so that no background fits both "
         "sides; use frames {first} to {before} or {after} to {last}."
     ),
-}
-"""Remarks on how the clips are read."""
-
-BACKGROUND = {
+    # what is behind the smoke, and where it is
     "alpha channel": "The clip has an alpha channel, which is the matte: the smoke is shown before {behind}.",
     "background unused": "The background that is given is not used: the alpha channel says what is smoke.",
     "black background": "Background not given: it is black.",
@@ -92,13 +88,9 @@ BACKGROUND = {
         "The background may hold most of the smoke: {share:.0%} of where smoke is or may be is never free of it, so "
         "what stays there all the time is missing from the result. Give a clean plate or a color as background."
     ),
-    "bars above and below": (
-        "Only bars above and below the picture never change, so all between them is taken for smoke: crop them off, or "
-        "give a clean plate as background."
-    ),
-    "bars left and right": (
-        "Only bars to the left and right of the picture never change, so all between them is taken for smoke: crop "
-        "them off, or give a clean plate as background."
+    "bars": (
+        "Only bars beside the picture never change, so all between them is taken for smoke: crop them off, or give a "
+        "clean plate as background."
     ),
     "no smoke examined": "No smoke found in {frames:examined frame}, so that nothing of it could be measured.",
     "no smoke before the given background": (
@@ -120,10 +112,7 @@ BACKGROUND = {
         "mean, but one is taken for all of it, so colors are wrong and the thickness may be. Crop the clip to smoke of "
         "one color, or give it a mask."
     ),
-}
-"""Remarks on what is behind the smoke, and where it is."""
-
-GEOMETRY = {
+    # where the camera stands, and where the smoke is
     "assumed camera": (
         "Camera not given: a level {lens:.0f} mm lens on {film:g} mm film, the picture taken to be {height:g} m high "
         "where the smoke is."
@@ -133,47 +122,30 @@ GEOMETRY = {
         "smoke is."
     ),
     "assumed scale": "Box not given: the picture taken to be {height:g} m high where the smoke is.",
-    "box around the smoke": "Domain around the smoke: {size:.2f x} m, {resolution:d x} voxels.",
-    "box over the picture": "Domain over all of the picture: {size:.2f x} m, {resolution:d x} voxels.",
+    "box around the smoke": "Domain around the smoke: {size:.2f x} m, {resolution} voxels.",
+    "box over the picture": "Domain over all of the picture: {size:.2f x} m, {resolution} voxels.",
     "grown box": "The box grows to {size:.4g x} m, a whole number of cubic voxels along every side.",
     "resolution": (
-        "Resolution: {value:d x} voxels for {pixels:.0f} pixels along the longest side: {quality} loses {lost:.1%} of "
+        "Resolution: {value} voxels for {pixels:.0f} pixels along the longest side: {quality} loses {lost:.1%} of "
         "the smoke's contrast in the clip."
     ),
-    "resolution without smoke": "Resolution: {value:d x} voxels, since no smoke is seen.",
-    "given resolution": "Resolution by hand: {value:d x} voxels.",
+    "resolution without smoke": "Resolution: {value} voxels, since no smoke is seen.",
     "inlets": "Smoke enters at {inlets:marked inlet} ({voxels:voxel}); others are not looked for.",
     "inlets found later": "No inlet marked: where smoke enters is found from the densities.",
     "no inlets": "No inlet marked: none is assumed.",
     "open box": "All sides of the box are open.",
     "closed sides": "Closed sides of the box: {sides}; the others are open.",
-}
-"""Where the camera stands, and where the smoke is."""
-
-_PLACES = {
-    "in the middle": "in the middle of the box",
-    "behind the middle": "{depth:|.2g} m behind the middle of the box",
-    "before the middle": "{depth:|.2g} m before the middle of the box",
-}
-
-AXIS = {
-    f"axis depth {place} by {cue}": words
-    for place, where in _PLACES.items()
-    for cue, words in {
-        "box": (
-            f"Where the smoke stands in depth is undetermined: it is taken to be {where}, give or take {{spread:.2g}} "
-            "m. If you know better, give the axis depth, an inlet or a second view."
-        ),
-        "floor contact": (
-            f"By its contact with the floor of the box the smoke stands {where}, give or take {{spread:.2g}} m. If you "
-            "know better, give the axis depth, an inlet or a second view."
-        ),
-        "inlets": f"By the marked inlets the smoke stands {where}, give or take {{spread:.2g}} m.",
-    }.items()
-}
-"""Where in depth the smoke stands."""
-
-LIGHT = {
+    # where in depth it stands
+    "axis depth by box": (
+        "Where the smoke stands in depth is undetermined: it is taken to be {depth:place}, give or take {spread:.2g} "
+        "m. If you know better, give the axis depth, an inlet or a second view."
+    ),
+    "axis depth by floor contact": (
+        "By its contact with the floor of the box the smoke stands {depth:place}, give or take {spread:.2g} m. If you "
+        "know better, give the axis depth, an inlet or a second view."
+    ),
+    "axis depth by inlets": "By the marked inlets the smoke stands {depth:place}, give or take {spread:.2g} m.",
+    # the smoke as a medium, fire, and the light
     "assumed medium": (
         "Medium not given: extinction {extinction:.3g} 1/m (density 1 is thick smoke), albedo {albedo:g}, isotropic."
     ),
@@ -185,21 +157,13 @@ LIGHT = {
         "Smoke color: undetermined, grey is taken: no smoke is thick, bright and free of clipped pixels enough to show "
         "a color."
     ),
-    "smoke colour near grey": (
-        "Smoke color: undetermined, grey is taken: it may be {degrees:.0f} degrees from grey smoke in color, less than "
-        "the {tolerance:g} of colored light."
-    ),
-    "smoke colour near the background's": (
-        "Smoke color: undetermined, grey is taken: it may be {degrees:.0f} degrees from what is behind it in color, "
-        "less than the {tolerance:g} of colored light."
+    "smoke colour near the light's": (
+        "Smoke color: undetermined, grey is taken: it may be {degrees:.0f} degrees from grey smoke or what is behind "
+        "it, less than the {tolerance:g} of colored light."
     ),
     "fire": (
         "Fire: {share:.1%} of the smoke's pixels shine by themselves. The grid flame holds their light, of the color "
         "{red:g}, {green:g}, {blue:g}; the smoke beside it is continued over it."
-    ),
-    "fire of a given colour": (
-        "Fire: {share:.1%} of the smoke's pixels shine by themselves. The grid flame holds their light, of the color "
-        "{red:g}, {green:g}, {blue:g} that is given; the smoke beside it is continued over it."
     ),
     "light as behind the smoke": (
         "Light not given: as much from everywhere as comes from behind the smoke, irradiance {irradiance:.2f}, with "
@@ -221,7 +185,7 @@ LIGHT = {
         "The light that is taken is likely wrong, and the smoke too thick or too thin by half and more: it leaves "
         "{error:.0%} of what the smoke changes unexplained. Give the lights."
     ),
-    "stronger light": (
+    "light strength": (
         "Light: {factor:.2f} times as strong as given, since the smoke is brighter than the given light can make it: "
         "the densities that come nearest ask for {asked_for_as_given:.2f} times as much, and now for {asked_for:.2f}."
     ),
@@ -253,32 +217,24 @@ LIGHT = {
         "{spread:.0f} degrees. Give the lights if you know them."
     ),
     "scattering": "Scattering: {value}.",
-    "given scattering": "Scattering by hand: {value}.",
-    "cheaper scattering": (
+    "compared scattering": (
         "Scattering: {value}; held-out pixels differ by {error:.1%} of the smoke's contrast, with {other} by "
         "{other_error:.1%}."
     ),
-    "richest scattering": (
-        "Scattering: {value}; with {other} held-out pixels differ by {other_error:.1%} of the smoke's contrast instead "
-        "of {error:.1%}."
-    ),
     "scattering in light from everywhere": (
-        "Scattering: {value}, in light from everywhere, for want of a known one; with {other} held-out pixels differ "
-        "by {other_error:.1%} of the smoke's contrast instead of {error:.1%}."
+        "Scattering: {value}, in light from everywhere, for want of a known one; held-out pixels differ by {error:.1%} "
+        "of the smoke's contrast, with {other} by {other_error:.1%}."
     ),
     "environment directions": (
         "Environment: {value} directions; the last doubling changed the picture by {change:.1%}."
     ),
-    "given environment directions": "Environment by hand: {value} directions.",
     "gain of a view": (
         "It shows the smoke {value} times (red, green, blue) as bright as the input, which is evened out; the pictures "
         "differ by {error:.1%} of the smoke's contrast instead of {error_as_it_is:.1%}. If the cameras are exposed "
         "alike, light is missing: give the lights."
     ),
-}
-"""The smoke as a medium, fire, and the light."""
-
-MODEL = {
+    # what a run needs besides
+    "given": "{what} by hand: {value}.",
     "domain": (
         "Domain: only voxels that the picture allows to hold smoke are worked on, {hull_share:.0%} of the box; frames "
         "without smoke cost nothing."
@@ -287,21 +243,12 @@ MODEL = {
         "Iterations: until one lowers the error by less than {tolerance:.0%} or noise is all that is left, "
         "{iterations:.0f} on the coarse frames, {value} at most."
     ),
-    "given iterations": (
-        "Iterations by hand: until one lowers the error by less than {tolerance:.0%} or noise is all that is left, "
-        "{iterations:.0f} on the coarse frames, {value} at most."
-    ),
-    "velocity grid": (
+    "velocity grid coarsening": (
         "Velocity grid: {voxels:.0f} voxels along the longest side, because the depth of the smoke is uncertain."
     ),
-    "given velocity grid": "Velocity grid by hand: coarsened {value:time}.",
     "velocity levels": "Velocity grids: {value}, because the fastest smoke goes {voxels_a_frame:.1f} voxels a frame.",
     "velocity levels without motion": "Velocity grids: {value}, since there is no motion to measure.",
-    "given velocity levels": "Velocity grids by hand: {value}.",
-}
-"""What a run needs besides."""
-
-ORIGIN = {
+    # where the parts of a result come from
     "replaced pictures": "Those of {frames} missing or damaged; the last sound one stands in.",
     "pictures that are fitted": (
         "The density renders to the pictures of {cameras:camera} in the scene's light and medium; psnr in the figures "
@@ -331,10 +278,7 @@ ORIGIN = {
         "From sides that no camera is near to the smoke has the texture of the clip's own pictures. Another seed makes "
         "it differently, detail 0 not at all."
     ),
-}
-"""Where the parts of a result come from."""
-
-RESULT = {
+    # what is said of a result
     "reconstructed": (
         "{frames:frame} in {directory} ({seconds:.0f} s), {psnr:.1f} dB inside the smoke at the clip's pixels (median)."
     ),
@@ -359,19 +303,7 @@ RESULT = {
         "give it more room than {room:g}, or move a camera or a lamp that is in its way."
     ),
 }
-"""What is said of a result."""
-
-SENTENCES: Mapping[str, str] = {
-    **CLIP,
-    **BACKGROUND,
-    **GEOMETRY,
-    **AXIS,
-    **LIGHT,
-    **MODEL,
-    **ORIGIN,
-    **RESULT,
-}
-"""All of them, by kind."""
+"""All sentences."""
 
 
 def sentence(remark: Remark) -> str:
@@ -386,6 +318,7 @@ def all_figures(remark: Remark) -> dict[str, Any]:
     own = {}
     if isinstance(remark, Estimate):
         own = {"value": remark.value, "tolerance": remark.tolerance, "spread": remark.spread}
+        own["what"] = remark.what.capitalize()
     return {**remark.figures, **own}
 
 
@@ -395,10 +328,17 @@ class _Words(Formatter):
     def format_field(self, value: Any, format_spec: str) -> str:
         """Return one of them in words."""
         if isinstance(value, tuple):
-            each = format_spec.removesuffix(" x")
-            return (", " if each == format_spec else " x ").join(self.format_field(one, each) for one in value)
-        if format_spec.startswith("|"):
-            return self.format_field(abs(value), format_spec[1:])
+            lengths = format_spec.endswith(" x") or all(isinstance(one, int) for one in value)
+            return (" x " if lengths else ", ").join(format(one, format_spec.removesuffix(" x")) for one in value)
+        if format_spec == "place":
+            return _place(value)
         if isinstance(value, int) and len(format_spec) > 1 and format_spec.replace(" ", "").isalpha():
             return counted(value, format_spec)
         return format(MODELS.get(value, value), format_spec)
+
+
+def _place(depth: float) -> str:
+    """Say how far behind the middle of the box something is, in metres."""
+    if abs(depth) < MIN_DEPTH:
+        return "in the middle of the box"
+    return f"{abs(depth):.2g} m {'behind' if depth > 0 else 'before'} the middle of the box"

@@ -92,12 +92,12 @@ def smoke_in_plate(samples: SmokeSamples) -> tuple[Doubt, ...]:
 def between_bars(samples: SmokeSamples) -> tuple[Doubt, ...]:
     """A doubt about a clip of which only bars beside the picture are background."""
     at_a_time = len(samples.colours) / max(len(samples.gains), 1)
-    for where, covered in (("above and below", samples.covered), ("left and right", samples.covered.T)):
+    for covered in (samples.covered, samples.covered.T):
         rows = np.flatnonzero(covered.any(1))
         if len(rows) and rows[0] > 0 and rows[-1] < len(covered) - 1:
             picture = covered[rows[0] : rows[-1] + 1]
             if picture.mean() >= BETWEEN_BARS and at_a_time > MOSTLY * picture.size:
-                return (Doubt(f"bars {where}"),)
+                return (Doubt("bars"),)
     return ()
 
 

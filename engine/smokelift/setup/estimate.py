@@ -5,17 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Generic, Literal, TypeVar
 
-from smokelift.checks import Remark
+from smokelift.checks import Figures, Remark
 
 UNDETERMINED = "undetermined"
 """Value of an estimate that nothing in the clip or the scene decides."""
+
+NOTHING: Figures = {}
+"""Figures where nothing was measured."""
 
 Value = TypeVar("Value", str, int, tuple[int, int, int], covariant=True)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Estimate(Remark, Generic[Value]):
-    """One decision; its kind says what decided it, its figures are what was measured for it.
+    """One decision; its kind says what decided it, its figures are what was measured for it. See the functions below.
 
     Attributes
     ----------
@@ -39,6 +42,33 @@ class Estimate(Remark, Generic[Value]):
     source: Literal["given", "measured", "assumed"]
     spread: float | None = None
     tolerance: float | None = None
+
+
+def given(what: str, value: Value) -> Estimate[Value]:
+    """Return what the user decides."""
+    return Estimate("given", what=what, value=value, source="given")
+
+
+def measured(
+    kind: str,
+    value: Value,
+    figures: Figures,
+    *,
+    what: str | None = None,
+    spread: float | None = None,
+    tolerance: float | None = None,
+) -> Estimate[Value]:
+    """Return what the clip shows; without more ado its kind is what it is about."""
+    return Estimate(
+        kind, figures, what=what or kind, value=value, source="measured", spread=spread, tolerance=tolerance
+    )
+
+
+def undetermined(
+    kind: str, what: str, figures: Figures = NOTHING, *, spread: float | None = None, tolerance: float | None = None
+) -> Estimate[str]:
+    """Return what neither the user decides nor the clip shows well enough."""
+    return Estimate(kind, figures, what=what, value=UNDETERMINED, source="assumed", spread=spread, tolerance=tolerance)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from smokelift.footage.clip import Clip
 from smokelift.footage.fire import fire_colour, fire_share, firelight, without_fire
 from smokelift.footage.plate import Plates
 from smokelift.scene.checks import Vector
-from smokelift.setup.estimate import Estimate
+from smokelift.setup.estimate import Estimate, measured
 from smokelift.setup.smoke import SmokeSamples
 
 
@@ -47,10 +47,5 @@ def find_fire(clip: Clip, plates: Plates, samples: SmokeSamples) -> Fire | None:
 def fire_estimate(fire: Fire, given: Vector | None) -> Estimate[str]:
     """Say what becomes of fire, whose colour the scene may give."""
     red, green, blue = given or fire.color
-    return Estimate(
-        "fire of a given colour" if given else "fire",
-        {"share": fire.share, "red": red, "green": green, "blue": blue},
-        what="fire",
-        value=f"{fire.share:.3f}",
-        source="measured",
-    )
+    figures = {"share": fire.share, "red": red, "green": green, "blue": blue}
+    return measured("fire", f"{fire.share:.3f}", figures)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from smokelift.checks import Remark
+from smokelift.checks import Figures, Remark
 from smokelift.density.screen import view_frame
 from smokelift.footage.alignment import Array, Lens
 from smokelift.footage.clip import Clip
@@ -20,7 +20,7 @@ from smokelift.footage.working_picture import CameraError, working_picture
 from smokelift.scene import Box, Camera, Domain, Scene, as_matrix
 from smokelift.scene.projection import voxel_width
 from smokelift.setup.detail import Detail, smoke_detail
-from smokelift.setup.estimate import Estimate, Grid
+from smokelift.setup.estimate import Estimate, Grid, given, measured
 from smokelift.setup.settings import LIMITS, LOST_DETAIL, QUALITIES, Quality, Settings
 from smokelift.setup.smoke import SmokeSamples
 
@@ -87,22 +87,22 @@ def find_geometry(
         If the scene gives a box without its camera or an inlet without its box, or no box for a camera that moves,
         looks steeply up or down, or is orthographic.
     """
-    given = None if scene.camera is None else fitting(scene.camera, clip)
-    if given is not None and scene.domain is not None:
-        camera = _turning(given, turns)
+    known = None if scene.camera is None else fitting(scene.camera, clip)
+    if known is not None and scene.domain is not None:
+        camera = _turning(known, turns)
         box, division, qualities = _divided(scene.domain, clip, camera, settings, plates, samples)
         return Geometry(camera, box, division, _grown(scene.domain, box), qualities)
     if scene.domain is not None:
         raise ValueError("The scene gives a box but no camera; give the camera that filmed it.")
     if scene.inlets:
         raise ValueError("The scene marks an inlet but gives no box; give camera and box to say where it is.")
-    if given is not None and not _boxes(given):
+    if known is not None and not _boxes(known):
         raise ValueError(
             "The scene gives a camera but no box; give the one that holds the smoke. It is found only for "
             "a perspective camera that does not move or look steeply up or down."
         )
     focal = _focal(clip) if turns is None else turns.lens.focal[0]
-    camera = given or _level(clip, focal)
+    camera = known or _level(clip, focal)
     base, size, metres = _around(camera, samples)
     camera = _turning(camera, turns)
 
@@ -114,7 +114,7 @@ def find_geometry(
     by_quality: Mapping[Quality, Grid] = {}
     if isinstance(settings.resolution, tuple):
         domain = _filled(base, size, settings.resolution)
-        estimate = _given_resolution(domain)
+        estimate = given("resolution", domain.resolution)
     elif settings.selection.measure:
         domain, estimate, by_quality = _resolved(clip, camera, grids, plates, samples.smoky, settings)
     else:
@@ -123,7 +123,7 @@ def find_geometry(
         "box around the smoke" if samples.smoky else "box over the picture",
         {"size": _size(domain), "resolution": domain.resolution},
     )
-    return Geometry(camera, domain, estimate, (_assumed(given, clip, focal), around), by_quality)
+    return Geometry(camera, domain, estimate, (_assumed(known, clip, focal), around), by_quality)
 
 
 def _divided(
@@ -136,9 +136,9 @@ def _divided(
             domain = replace(box, resolution=settings.resolution)
         else:
             domain = _filled(floor, size, settings.resolution)
-        return domain, _given_resolution(domain), {}
+        return domain, given("resolution", domain.resolution), {}
     if isinstance(box, Domain) and settings.resolution is None:
-        return box, _given_resolution(box), {}
+        return box, given("resolution", box.resolution), {}
     still = camera.at(next(iter(samples.smoky), 0))
 
     def grids(quality: Quality) -> tuple[Domain, ...]:
@@ -193,10 +193,6 @@ def fitting(camera: Camera, clip: Clip) -> Camera:
             f"({clip.path.name}); the camera's size must have the clip's shape."
         )
     return camera.resized(*clip.size)
-
-
-def _given_resolution(domain: Domain) -> Estimate[Shape]:
-    return Estimate("given resolution", what="resolution", value=domain.resolution, source="given")
 
 
 def _assumed(given: Camera | None, clip: Clip, focal: float) -> Remark:
@@ -340,8 +336,8 @@ def _resolved(
     """
     own = grids(settings.quality)
     if not smoky:
-        coarse = Estimate("resolution without smoke", what="resolution", value=own[0].resolution, source="assumed")
-        return own[0], coarse, {}
+        shape = own[0].resolution
+        return own[0], Estimate("resolution without smoke", what="resolution", value=shape, source="assumed"), {}
     detail = _detail(clip, camera, own[-1], plates, smoky)
 
     def coarsest(allowed: tuple[Domain, ...], tolerance: float) -> Domain:
@@ -352,19 +348,13 @@ def _resolved(
     domain = coarsest(own, tolerance)
     longest, finest = max(domain.resolution), max(own[-1].resolution)
     lost = detail.lost(longest)
-    estimate = Estimate(
-        "resolution",
-        {
-            "lost": lost,
-            "lost_beside_finest": detail.lost(longest, finest),
-            "pixels": detail.pixels,
-            "quality": settings.quality,
-        },
-        what="resolution",
-        value=domain.resolution,
-        source="measured",
-        tolerance=tolerance,
-    )
+    figures: Figures = {
+        "lost": lost,
+        "lost_beside_finest": detail.lost(longest, finest),
+        "pixels": detail.pixels,
+        "quality": settings.quality,
+    }
+    estimate = measured("resolution", domain.resolution, figures, tolerance=tolerance)
     others = {quality: coarsest(grids(quality), LOST_DETAIL[quality]) for quality in QUALITIES}
     taken = {**others, settings.quality: domain}
     by_quality = {name: Grid(grid.resolution, detail.lost(max(grid.resolution))) for name, grid in taken.items()}

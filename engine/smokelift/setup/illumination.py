@@ -23,7 +23,7 @@ from smokelift.render import Image
 from smokelift.render.environment_count import MIN_LIGHTS, TOLERANCE, lights_needed
 from smokelift.scene import SHADOWED, DirectionalLight, EnvironmentLight, Light, Medium, Scattering
 from smokelift.setup.coarse import CoarseClip, CoarseFrame
-from smokelift.setup.estimate import UNDETERMINED, Estimate
+from smokelift.setup.estimate import UNDETERMINED, Estimate, given, measured, undetermined
 from smokelift.setup.held_out import HalfFit, HeldOut, fit_half, held_out
 from smokelift.setup.scattering import NEARER, choose_scattering, tries_multiple
 from smokelift.setup.settings import Settings
@@ -118,9 +118,7 @@ def first_light(
     radiance = source_radiance(samples, source)
     share = np.array(medium.albedos) / (4 * np.pi)
     sun = directional(np.array((0.0, 0.0, 1.0)), np.divide(radiance, share, out=np.zeros(3), where=share > 0))
-    unknown = Estimate(
-        "light direction undetermined by one view", what="light direction", value=UNDETERMINED, source="assumed"
-    )
+    unknown = undetermined("light direction undetermined by one view", "light direction")
     origin: Literal["measured", "assumed"] = "assumed" if source is None else "measured"
     return Illumination((sun,), richest, origin, by_hand, (), thickness, unknown)
 
@@ -144,15 +142,14 @@ def measured_light(
     fit, tolerance = settings.density, settings.selection.scattering_error
     richest, lights = light.scattering, light.lights
     seen = [frame.lit_by(lights).scattered_by(richest) for frame in frames.values()]
-    lights, measured = _with_directions(lights, seen, fit)
+    lights, found = _with_directions(lights, seen, fit)
     known: dict[Scattering, float] = {}
     # what single scattering lacks would be taken for light that is missing
     if richest == "multiple" or (richest == "single" and tries_multiple(clip.scene) and not light.by_hand):
         lights, known["multiple"], strength = _strengthened(lights, seen, fit)
-        measured += strength
+        found += strength
     if light.by_hand:
-        given = Estimate("given scattering", what="scattering", value=richest, source="given")
-        return replace(light, lights=lights, measured=(*measured, given))
+        return replace(light, lights=lights, measured=(*found, given("scattering", richest)))
     seen = [frame.lit_by(lights) for frame in seen]
 
     def finer() -> CoarseFrame | None:
@@ -163,7 +160,7 @@ def measured_light(
     if around is not None:
         lights, scattered = around
         chosen = "single"
-    return replace(light, lights=lights, scattering=chosen, measured=(*measured, scattered))
+    return replace(light, lights=lights, scattering=chosen, measured=(*found, scattered))
 
 
 def sunlight(light: Illumination, clip: CoarseClip, numbers: Sequence[int], settings: Settings) -> Illumination:
@@ -186,23 +183,19 @@ def sunlight(light: Illumination, clip: CoarseClip, numbers: Sequence[int], sett
     sky = find_sky(frames, clip.scene, settings.density) if frames else None
     if sky is None:
         return light
-    shown = Estimate(
-        "light direction" if sky.determined else "light direction undetermined by several views",
-        {
-            "views": len(clip.views),
-            "ambient_share": sky.ambient_share,
-            "shading": sky.shading,
-            "explained": sky.explained,
-        },
-        what="light direction",
-        value=", ".join(f"{value:.2f}" for value in -sky.towards) if sky.determined else UNDETERMINED,
-        source="measured" if sky.determined else "assumed",
-        spread=sky.spread,
-        tolerance=AMBIENT,
-    )
+    figures = {
+        "views": len(clip.views),
+        "ambient_share": sky.ambient_share,
+        "shading": sky.shading,
+        "explained": sky.explained,
+    }
     if not sky.determined:
-        return replace(light, direction=shown)
-    return Illumination(sky.lights(), "single", "measured", False, (), light.thickness, shown)
+        kind = "light direction undetermined by several views"
+        unknown = undetermined(kind, "light direction", figures, spread=sky.spread, tolerance=AMBIENT)
+        return replace(light, direction=unknown)
+    named = ", ".join(f"{value:.2f}" for value in -sky.towards)
+    direction = measured("light direction", named, figures, spread=sky.spread, tolerance=AMBIENT)
+    return Illumination(sky.lights(), "single", "measured", False, (), light.thickness, direction)
 
 
 def light_remarks(light: Illumination, samples: SmokeSamples, noise: Noise) -> tuple[Remark, ...]:
@@ -253,22 +246,13 @@ def _with_directions(
 def _directions(light: EnvironmentLight, fitted: HalfFit, scattering: Scattering) -> Estimate[int]:
     """How many directions stand for an environment: their number doubles until the picture hardly changes."""
     if light.directions is not None:
-        return Estimate(
-            "given environment directions", what="environment directions", value=light.directions, source="given"
-        )
+        return given("environment directions", light.directions)
 
     def picture(lights: tuple[DirectionalLight, ...]) -> Image:
         return np.concatenate(fitted.lit(lights, scattering)).astype(np.float32)
 
     count, change = lights_needed(light, picture)
-    return Estimate(
-        "environment directions",
-        {"change": change},
-        what="environment directions",
-        value=count,
-        source="measured",
-        tolerance=TOLERANCE,
-    )
+    return measured("environment directions", count, {"change": change}, tolerance=TOLERANCE)
 
 
 def _strengthened(
@@ -283,27 +267,21 @@ def _strengthened(
     as dark in any light.
     """
 
-    def measured(factor: float) -> HeldOut:
+    def tried(factor: float) -> HeldOut:
         stronger = tuple(light.scaled(factor) for light in lights)
         return held_out([frame.lit_by(stronger) for frame in frames], "multiple", "multiple", settings)
 
-    factor, found = 1.0, measured(1.0)
-    given = found
+    factor, found = 1.0, tried(1.0)
+    as_given = found
     while found.light > 1 + MISSING and factor * STEP <= STRONGEST:
-        stronger = measured(factor * STEP)
+        stronger = tried(factor * STEP)
         if stronger.error >= found.error or stronger.light >= found.light:
             break
         factor, found = factor * STEP, stronger
     if factor == 1.0:
-        return lights, given.error, ()
-    strength = Estimate(
-        "stronger light",
-        {"factor": factor, "asked_for": found.light, "asked_for_as_given": given.light, "error": found.error},
-        what="light strength",
-        value=f"{factor:.3g}",
-        source="measured",
-        tolerance=1 + MISSING,
-    )
+        return lights, as_given.error, ()
+    figures = {"factor": factor, "asked_for": found.light, "asked_for_as_given": as_given.light, "error": found.error}
+    strength = measured("light strength", f"{factor:.3g}", figures, tolerance=1 + MISSING)
     return tuple(light.scaled(factor) for light in lights), found.error, (strength,)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from smokelift.density import FittedDensity, reconstruct_density
 from smokelift.scene import CompleteScene, Domain
 from smokelift.setup.coarse import CoarseClip, CoarseFrame
-from smokelift.setup.estimate import Estimate
+from smokelift.setup.estimate import Estimate, given, measured
 from smokelift.setup.settings import Settings
 from smokelift.setup.velocity_grid import choose_coarsening, choose_levels
 from smokelift.velocity import VelocitySettings
@@ -86,7 +86,7 @@ def _levels(
 ) -> Estimate[int]:
     """How many grids velocities are estimated on, by the coarse densities of some frames and those after them."""
     if settings.levels is not None:
-        return Estimate("given velocity levels", what="velocity levels", value=settings.levels, source="given")
+        return given("velocity levels", settings.levels)
     ends = [(density(number), density(number + 1)) for number in numbers]
     pairs = [(before.density, after.density) for before, after in ends if before is not None and after is not None]
     return choose_levels(pairs, coarse, final, settings)
@@ -95,7 +95,7 @@ def _levels(
 def _inside(densities: Sequence[FittedDensity], scene: CompleteScene) -> Estimate[tuple[int, int, int]]:
     """The part of the box that is worked on."""
     share = float(np.mean([density.hull.mean() for density in densities]))
-    return Estimate("domain", {"hull_share": share}, what="domain", value=scene.domain.resolution, source="measured")
+    return measured("domain", scene.domain.resolution, {"hull_share": share})
 
 
 def _iterations(densities: Sequence[FittedDensity], settings: Settings) -> Estimate[int]:
@@ -105,7 +105,7 @@ def _iterations(densities: Sequence[FittedDensity], settings: Settings) -> Estim
     used = float(np.mean([density.figures["iterations"] for density in densities]))
     by_hand = fit != Settings.preset(settings.quality, settings.method).density
     return Estimate(
-        "given iterations" if by_hand else "iterations",
+        "iterations",
         {"iterations": used},
         what="iterations",
         value=most,

@@ -5,11 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from smokelift.density import AxisEstimate, clip_axis
-from smokelift.setup.estimate import UNDETERMINED, Estimate
+from smokelift.setup.estimate import Estimate, measured, undetermined
 from smokelift.setup.shot import Shot
-
-EXACT = 0.05
-"""Distance from the middle of the box, in standard deviations, below which a figure would look exact."""
 
 
 def placed(shot: Shot) -> Shot:
@@ -22,13 +19,7 @@ def placed(shot: Shot) -> Shot:
 
 def place_estimate(place: AxisEstimate) -> Estimate[str]:
     """The place of the smoke as an estimate by one of the cues."""
-    middle = abs(place.depth) < EXACT * place.deviation
-    where = "in the middle" if middle else "behind the middle" if place.depth >= 0 else "before the middle"
-    return Estimate(
-        f"axis depth {where} by {place.cue}",
-        {"depth": place.depth},
-        what="axis depth",
-        value=UNDETERMINED if place.cue == "box" else place.cue,
-        source="assumed" if place.cue == "box" else "measured",
-        spread=place.deviation,
-    )
+    kind, figures, spread = f"axis depth by {place.cue}", {"depth": place.depth}, place.deviation
+    if place.cue == "box":
+        return undetermined(kind, "axis depth", figures, spread=spread)
+    return measured(kind, place.cue, figures, what="axis depth", spread=spread)

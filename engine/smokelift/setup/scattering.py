@@ -15,10 +15,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
+from smokelift.checks import Figures
 from smokelift.density import DensitySettings
 from smokelift.scene import CompleteScene, Scattering
 from smokelift.setup.coarse import CoarseFrame
-from smokelift.setup.estimate import Estimate
+from smokelift.setup.estimate import Estimate, measured
 from smokelift.setup.held_out import held_out
 
 MODELS: tuple[Scattering, ...] = ("absorption", "unshadowed", "single", "multiple")
@@ -94,16 +95,10 @@ def _estimate(
     chosen: Scattering, richest: Scattering, errors: Mapping[Scattering, float], tolerance: float
 ) -> Estimate[str]:
     """The choice of a model beside the one that it is compared with: the richest, or of that the next cheaper one."""
-    kind, other = "cheaper scattering", richest
-    if chosen == richest:
-        kind, other = "richest scattering", MODELS[MODELS.index(richest) - 1]
-    measured = {f"error_{name}": value for name, value in errors.items()}
-    compared = {"error": errors[chosen], "other": other, "other_error": errors.get(other, 0.0)}
-    return Estimate(
-        kind if len(errors) > 1 else "scattering",
-        {**measured, **(compared if len(errors) > 1 else {})},
-        what="scattering",
-        value=chosen,
-        source="measured",
-        tolerance=tolerance,
-    )
+    other = MODELS[MODELS.index(richest) - 1] if chosen == richest else richest
+    figures = {f"error_{name}": value for name, value in errors.items()}
+    if len(errors) == 1:
+        return measured("scattering", chosen, figures, tolerance=tolerance)
+    compared: Figures = {"error": errors[chosen], "other": other, "other_error": errors[other]}
+    kind = "compared scattering"
+    return measured(kind, chosen, {**figures, **compared}, what="scattering", tolerance=tolerance)

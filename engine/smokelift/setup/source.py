@@ -9,15 +9,13 @@ the smoke, which stands in the same light. Figures: docs/experiments/smoke-colou
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.checks import Doubt
 from smokelift.footage.images import brightest_channel
 from smokelift.scene.checks import Vector
-from smokelift.setup.estimate import UNDETERMINED, Estimate
+from smokelift.setup.estimate import Estimate, measured, undetermined
 from smokelift.setup.smoke import SmokeSamples
 
 Array = NDArray[np.float64]
@@ -42,6 +40,9 @@ PIXELS = 50
 
 FAINTEST = 0.01
 """Linear value of the brightest channel at least: a darker source has no colour that 8 bits show."""
+
+WHITE: Vector = (1.0, 1.0, 1.0)
+"""Colour of grey smoke."""
 
 PLACES = 256
 """Points of the line that are compared with the light."""
@@ -95,25 +96,20 @@ def smoke_colour(samples: SmokeSamples, light: Array) -> tuple[Vector, Estimate[
     """
     line = _thickest(samples)
     if line is None:
-        return _grey("smoke colour unseen")
+        return WHITE, undetermined("smoke colour unseen", "smoke colour", tolerance=COLOURED)
     behind, seen = line
     sources = _sources(behind, seen)
     white = _degrees(sources, light)
     least = np.minimum(white, _degrees(sources, behind)) if behind.max() > FAINTEST else white
     if least.min() < COLOURED:
-        near = "near grey" if white.min() < COLOURED else "near the background's"
-        return _grey(f"smoke colour {near}", {"degrees": float(least.min())})
+        figures = {"degrees": float(least.min())}
+        return WHITE, undetermined("smoke colour near the light's", "smoke colour", figures, tolerance=COLOURED)
     # the palest that explains the clip
     own = sources[white.argmin()] / np.maximum(light, 1e-6)
     red, green, blue = (float(round(v, 3)) for v in own / own.max())
-    return (red, green, blue), Estimate(
-        "smoke colour",
-        {"degrees": float(white.min())},
-        what="smoke colour",
-        value=f"{red:.2f}, {green:.2f}, {blue:.2f}",
-        source="measured",
-        tolerance=COLOURED,
-    )
+    named = f"{red:.2f}, {green:.2f}, {blue:.2f}"
+    figures = {"degrees": float(white.min())}
+    return (red, green, blue), measured("smoke colour", named, figures, tolerance=COLOURED)
 
 
 def several_colours(samples: SmokeSamples) -> tuple[Doubt, ...]:
@@ -145,12 +141,6 @@ def _line_of_colours(colours: Array, behind: Array) -> Array:
     change = colours - behind
     axis = np.linalg.eigh(change.T @ change)[1][:, -1]
     return np.asarray(axis if np.sum(change @ axis) >= 0 else -axis)
-
-
-def _grey(kind: str, measured: Mapping[str, float] | None = None) -> tuple[Vector, Estimate[str]]:
-    return (1.0, 1.0, 1.0), Estimate(
-        kind, measured or {}, what="smoke colour", value=UNDETERMINED, source="assumed", tolerance=COLOURED
-    )
 
 
 def _thickest(samples: SmokeSamples) -> tuple[Array, Array] | None:

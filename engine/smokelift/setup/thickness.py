@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smokelift.footage.plate import Plate, noise_at
-from smokelift.setup.estimate import UNDETERMINED, Estimate
+from smokelift.setup.estimate import Estimate, measured, undetermined
 
 Array = NDArray[np.float64]
 
@@ -86,29 +86,19 @@ def smoke_thickness(frames: Sequence[Array]) -> tuple[Array | None, Estimate[str
     seen = np.array([frame for frame in frames if frame[1] > 0]).reshape(-1, 8)
     hidden, smoke, unsure, clear, missing, *added = (float(total) for total in seen.sum(0))
     if len(seen) < FRAMES or not (hidden > 0 and clear > 0):
-        return None, _undetermined("smoke thickness without texture")
+        return None, undetermined("smoke thickness without texture", "smoke thickness", tolerance=ERROR)
     rest = seen.sum(0) - seen
     others = rest[:, 5:].sum(1) / np.maximum(rest[:, 0], 1e-12)
     spread = np.sqrt((len(seen) - 1) * np.var(others)) / max(sum(added) / hidden, 1e-12)
     # what a background of smoke hides is missing from what the smoke before it seems to hide
     error = float(np.linalg.norm((spread, missing / clear * smoke / hidden, unsure / hidden)))
     if not error <= ERROR:
-        return None, _undetermined("uncertain smoke thickness", min(error, LARGEST_ERROR))
+        known = min(error, LARGEST_ERROR)
+        kind = "uncertain smoke thickness"
+        return None, undetermined(kind, "smoke thickness", spread=known, tolerance=ERROR)
     share = hidden / smoke
-    thickness = Estimate(
-        "smoke thickness",
-        {"hidden": share},
-        what="smoke thickness",
-        value=f"{share:.3f}",
-        source="measured",
-        spread=error,
-        tolerance=ERROR,
-    )
+    thickness = measured("smoke thickness", f"{share:.3f}", {"hidden": share}, spread=error, tolerance=ERROR)
     return np.maximum(np.array(added) / hidden, 0), thickness
-
-
-def _undetermined(kind: str, error: float | None = None) -> Estimate[str]:
-    return Estimate(kind, what="smoke thickness", value=UNDETERMINED, source="assumed", spread=error, tolerance=ERROR)
 
 
 class _Behind(NamedTuple):

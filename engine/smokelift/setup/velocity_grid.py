@@ -9,7 +9,7 @@ import numpy as np
 
 from smokelift.render import Volume
 from smokelift.scene import Domain
-from smokelift.setup.estimate import Estimate
+from smokelift.setup.estimate import Estimate, given, measured
 from smokelift.velocity import VelocitySettings, estimate_velocity
 from smokelift.velocity.settings import LEVELS
 
@@ -32,15 +32,12 @@ def choose_coarsening(domain: Domain, settings: VelocitySettings, finest: int) -
     finest
         Voxels along the longest side at most.
     """
-    what = "velocity grid coarsening"
     if settings.coarsening is not None:
-        return Estimate("given velocity grid", what=what, value=settings.coarsening, source="given")
+        return given("velocity grid coarsening", settings.coarsening)
     coarsening, longest, shortest = 0, max(domain.resolution), min(domain.resolution)
     while longest > finest and shortest >= 16:
         coarsening, longest, shortest = coarsening + 1, -(-longest // 2), -(-shortest // 2)
-    return Estimate(
-        "velocity grid", {"voxels": float(longest)}, what=what, value=coarsening, source="measured", tolerance=finest
-    )
+    return measured("velocity grid coarsening", coarsening, {"voxels": float(longest)}, tolerance=finest)
 
 
 def levels_for(motion: float) -> int:
@@ -65,13 +62,12 @@ def choose_levels(
     settings
         How velocities are estimated.
     """
-    what = "velocity levels"
     if not pairs:
-        return Estimate("velocity levels without motion", what=what, value=LEVELS, source="assumed")
+        return Estimate("velocity levels without motion", what="velocity levels", value=LEVELS, source="assumed")
     finer = coarse.voxel_size / final.voxel_size
     motion = finer * max(_motion(before, after, settings) for before, after in pairs)
     levels = levels_for(motion / 2 ** (settings.coarsening or 0))
-    return Estimate("velocity levels", {"voxels_a_frame": motion}, what=what, value=levels, source="measured")
+    return measured("velocity levels", levels, {"voxels_a_frame": motion})
 
 
 def _motion(before: Volume, after: Volume, settings: VelocitySettings) -> float:

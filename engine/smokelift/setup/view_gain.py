@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from smokelift.density import DensitySettings
 from smokelift.scene import CompleteScene
 from smokelift.setup.coarse import CoarseClip
-from smokelift.setup.estimate import Estimate
+from smokelift.setup.estimate import Estimate, measured
 from smokelift.setup.held_out import HeldOut, held_out
 from smokelift.setup.shot import ShotView
 
@@ -97,14 +97,9 @@ def balanced(
     error = tried(gain).error
     if error >= as_it_is - tolerance:
         return view, ()
-    estimate = Estimate(
-        "gain of a view",
-        {"view": number, "error": error, "error_as_it_is": as_it_is},
-        what=f"gain of view {number}",
-        value=", ".join(f"{value:.2f}" for value in gain),
-        source="measured",
-        tolerance=tolerance,
-    )
+    named = ", ".join(f"{value:.2f}" for value in gain)
+    figures = {"view": number, "error": error, "error_as_it_is": as_it_is}
+    estimate = measured("gain of a view", named, figures, what=f"gain of view {number}", tolerance=tolerance)
     return _over(view, gain), (estimate,)
 
 

@@ -82,7 +82,7 @@ def test_the_named_resolution_is_accepted(plume, shot, tmp_path, capsys, monkeyp
     little = SimpleNamespace(available=cost.memory_needed((23, 23, 31), workload(plume)))
     monkeypatch.setattr(cost.psutil, "virtual_memory", lambda: little)
     sentence = refused(capsys, "reconstruct", shot, "--out", tmp_path / "out", "--npz", *QUICK, status=3)
-    named = re.search(r"--resolution (\S+?)\.?$", sentence)
+    named = re.search(r"resolution that fits is (\S+?)\.?$", sentence)
     assert named
     arguments = ("--npz", "--frames", "0:1", "--resolution", named[1], *QUICK)
     assert command("reconstruct", shot, "--out", tmp_path / "out", *arguments) == 0

@@ -514,7 +514,7 @@ def test_anamorphic_pixels_become_square(tmp_path: Path, shape: Fraction) -> Non
         assert linear_to_srgb(clip.frame(0)[24, : edge - 3]).min() > 0.75
         assert linear_to_srgb(clip.frame(0)[24, edge + 3 :]).max() < 0.05
         (note,) = clip.notes
-        assert (note.kind, note.figures["scaled"]) == ("oblong pixels", (clip.size[0], 48))
+        assert (note.kind, note.figures["scaled"]) == ("scaled pictures", (clip.size[0], 48))
 
 
 def test_interlaced_video_is_of_one_moment(tmp_path: Path) -> None:

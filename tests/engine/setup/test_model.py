@@ -85,7 +85,7 @@ def test_a_backlit_silhouette_needs_no_light(silhouette, draft) -> None:
     choice = chosen(shot, "scattering")
     assert shot.scene.scattering == choice.value == "absorption"
     assert choice.figures["error_absorption"] <= choice.figures["error_unshadowed"] + choice.tolerance
-    assert (choice.kind, choice.figures["other"]) == ("cheaper scattering", "unshadowed")
+    assert (choice.kind, choice.figures["other"]) == ("compared scattering", "unshadowed")
 
 
 def test_thick_lit_smoke_needs_shadows(plume, draft) -> None:
@@ -103,7 +103,7 @@ def test_thick_white_smoke_scatters_light_many_times(white, plume, draft) -> Non
     choice = chosen(shot, "scattering")
     assert shot.scene.scattering == choice.value == "multiple"
     assert choice.figures["error_multiple"] < choice.figures["error_single"] - choice.tolerance
-    assert (choice.kind, choice.figures["other"]) == ("richest scattering", "single")
+    assert (choice.kind, choice.figures["other"]) == ("compared scattering", "single")
     forward = replace(plume.scene, medium=replace(plume.scene.medium, anisotropy=0.3))
     assert "error_multiple" not in chosen(shot_of(forward, draft), "scattering").figures
 

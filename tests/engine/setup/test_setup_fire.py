@@ -37,5 +37,5 @@ def test_a_color_of_fire_that_is_given_is_taken(plume, draft, tmp_path) -> None:
         shot = prepare_shot(clip.changed(burning), scene, draft)
     assert shot.scene.medium.flame_color == (1.0, 0.5, 0.2)
     (found,) = [choice for choice in shot.estimates if choice.what == "fire"]
-    assert found.kind == "fire of a given colour"
+    assert found.kind == "fire"
     assert [found.figures[name] for name in ("red", "green", "blue")] == [1.0, 0.5, 0.2]
