@@ -46,7 +46,7 @@ def main() -> None:
                 plates: Plates = known_plate(case.plate, case.clip)
                 clip = without_noise_light(case.clip, plates.noise)
             else:
-                found = find_backdrop(case.clip, None, None, case.lens)
+                found = find_backdrop(case.clip, None, None, () if case.lens is None else (case.lens,))
                 plates, clip = found.plates, found.clip
             seconds += time.process_time() - began
             rows.append(score(replace(case, clip=clip), plates))

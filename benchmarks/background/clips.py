@@ -14,7 +14,6 @@ from av.video.reformatter import Interpolation
 from scipy import ndimage
 
 from smokelift.checks import Remark
-from smokelift.footage.alignment import Lens
 from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import Look
 from smokelift.footage.images import Picture, linear_to_srgb, srgb_to_linear
@@ -113,15 +112,15 @@ class Case:
         The true pictures, linear.
     given
         Whether the background is given.
-    lens
-        Of a camera that may turn.
+    lens : (3, 3)
+        Of a camera that may turn, from directions to pixels.
     """
 
     clip: Clip
     plate: Picture
     clean: Picture
     given: bool
-    lens: Lens | None = None
+    lens: npt.NDArray[np.float64] | None = None
 
     def behind(self, number: int) -> Picture:
         """The true background of a frame, linear (rows, columns, 3)."""

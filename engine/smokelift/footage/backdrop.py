@@ -1,25 +1,23 @@
 """What stands behind the smoke of a clip, and how it is decided.
 
 In this order: what an alpha channel says; what the scene gives; one colour, if that is the likeliest by the whole file
-(`background_kind`); a panorama, if the camera turns (`turning`); else the picture that the clear frames show
-(`clear_picture`). The clip's noise is measured on what cannot be smoke, before all else (`noise`).
+(`background_kind`); else the picture that the clear frames show (`clear_picture`), steadied if the camera turns
+(`turning`). The clip's noise is measured on what cannot be smoke, before all else (`noise`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Literal
 
 import numpy as np
 
-from smokelift.footage.alignment import Lens
 from smokelift.footage.background_kind import LIMIT, Mask, colour_around, rank, within
 from smokelift.footage.behind_smoke import DETAIL
 from smokelift.footage.clear_picture import ClearPicture, clear_picture
 from smokelift.footage.clip import Clip
-from smokelift.footage.focal_length import FocalLength, focal_length
 from smokelift.footage.given_background import given_plates
 from smokelift.footage.images import Picture, linear_to_srgb
 from smokelift.footage.noise import (
@@ -31,22 +29,18 @@ from smokelift.footage.noise import (
     spread_about,
     white_noise,
 )
-from smokelift.footage.panorama import estimate_panorama
+from smokelift.footage.panorama import Panorama
 from smokelift.footage.plate import Plate, Plates, known_plate
 from smokelift.footage.proxy import Proxy
 from smokelift.footage.quantiser import median_quantiser
 from smokelift.footage.seen import median_of_seen
 from smokelift.footage.steady import cleared, uncovered, without_noise_light
-from smokelift.footage.turning import Turns, find_turns
+from smokelift.footage.turning import Array, find_turns
 from smokelift.footage.whole_plate import spread_out, whole_plate
 from smokelift.scene import Background, Camera
 
 NOISE_FRAMES = 16
 """Frames whose pixels tell the white noise."""
-
-TELEPHOTO = 3.0
-"""Focal length over the usual one that is supposed where no turn with the usual one explains the clip. The wider lens
-bends a pan more than the longer one does, so that either is found from one within a factor of about two."""
 
 MOSTLY = 0.5
 """Share of the picture that shows one colour, on the mean, from which on it is no texture that
@@ -58,7 +52,7 @@ TEXTURE = np.float32(6 / 255)
 NO_ERRORS = np.zeros((3, 3), np.float32)
 """Covariance of the errors of what is known."""
 
-Source = Literal["alpha", "given", "colour", "colour around one frame", "picture", "panorama"]
+Source = Literal["alpha", "given", "colour", "colour around one frame", "picture"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,10 +73,8 @@ class Backdrop:
         Linear, where one was found; black counts as such below half a step of 8 bit video.
     frames
         Of the file that decided on it, up to the next cut.
-    turns, focal
-        Of a camera that was found to turn; its focal length where it is measured.
-    lens_is_known
-        Whether the camera or the file says the focal length.
+    steadied
+        Of a camera that was found to turn: how, and the background of one that stands still in its mean pose.
     quantiser
         Of the file, if it says it and the background is not of one colour.
     cut
@@ -97,16 +89,21 @@ class Backdrop:
     background: Background | None = None
     colour: tuple[float, float, float] | None = None
     frames: int = 0
-    turns: Turns | None = None
-    focal: FocalLength | None = None
-    lens_is_known: bool = False
+    steadied: tuple[Panorama, Plate] | None = None
     quantiser: float | None = None
     cut: tuple[int, int] | None = None
     costs: dict[str, float] = field(default_factory=dict)
 
+    def still(self, clip: Clip) -> tuple[Clip, Plates]:
+        """Return the footage, changed in some way, and its backgrounds as a camera that stands still sees them."""
+        if self.steadied is None:
+            return clip, self.plates
+        panorama, plate = self.steadied
+        return cleared(panorama.steadied(clip), plate), plate
+
 
 def find_backdrop(
-    clip: Clip, camera: Camera | None, background: Background | None, lens: Lens | None = None
+    clip: Clip, camera: Camera | None, background: Background | None, lenses: Sequence[Array] = ()
 ) -> Backdrop:
     """Find what stands behind the smoke.
 
@@ -118,15 +115,17 @@ def find_backdrop(
         If it is known; one that moves allows no estimate but that of one colour.
     background
         What the scene says.
-    lens
-        Of the clip; without it the camera is taken to stand still unless it is known to move.
+    lenses : (3, 3)
+        That the clip may have, from directions to pixels, the likeliest first; without any the camera is taken to stand
+        still unless it is known to move.
 
     Raises
     ------
     ClipError
         If a frame cannot be read.
     ValueError
-        If a camera moves before a background of more than one colour that is not given, or turns too far.
+        If a camera moves, and not by a turn that is found, before a background of more than one colour that is not
+        given.
     """
     if clip.backdrop is not None:
         grey = (clip.backdrop,) * 3
@@ -136,8 +135,7 @@ def find_backdrop(
         quiet, plates = _before(clip, lambda of: given if of is clip else _given(background, camera, of))
         found = Backdrop("given", quiet, plates, background)
     else:
-        known = camera is not None or clip.lens is not None
-        found = _estimated(clip, lens, known, camera is not None and camera.moves)
+        found = _estimated(clip, lenses, camera is not None and camera.moves)
     shown = uncovered(found.plates, found.clip)
     return replace(found, clip=cleared(found.clip, shown), plates=shown)
 
@@ -159,7 +157,7 @@ def _given(background: Background | None, camera: Camera | None, clip: Clip) -> 
     return given
 
 
-def _estimated(clip: Clip, lens: Lens | None, lens_is_known: bool, moves: bool) -> Backdrop:
+def _estimated(clip: Clip, lenses: Sequence[Array], moves: bool) -> Backdrop:
     """The background of a clip of which nothing is given."""
     if len(clip) == len(clip.whole()) == 1 and (around := colour_around(clip.frame(0))) is not None:
         return Backdrop("colour around one frame", clip, known_plate(around, clip), frames=1)
@@ -185,24 +183,33 @@ def _estimated(clip: Clip, lens: Lens | None, lens_is_known: bool, moves: bool) 
     made = partial(Backdrop, clip=clip, frames=len(part.numbers), cut=cut, costs=found.costs)
     # black, and what is mostly one colour, is the same wherever the camera looks; else texture may pass by
     plain = found.colour is not None and (found.clear > MOSTLY or not found.colour.any())
-    if lens is not None and not plain:
-        turns, focal = _turned(clip, lens, lens_is_known)
+    if lenses and not plain:
+        turns = find_turns(clip, *lenses)
         if turns is not None:
-            made = partial(made, turns=turns, focal=focal, lens_is_known=lens_is_known, cut=None)
-            return made("panorama", plates=estimate_panorama(clip, turns), quantiser=median_quantiser(clip.path))
+            panorama = Panorama.around(turns)
+            steadied = panorama.steadied(clip)
+            part, cut = Proxy.of(steadied).shot(steadied)
+            plate = _picture(steadied, part, white)
+            made = partial(made, frames=len(part.numbers), steadied=(panorama, plate), cut=cut)
+            return made("picture", plates=panorama.plates(plate, clip), quantiser=median_quantiser(clip.path))
     if found.colour is not None:
         red, green, blue = (float(v) for v in found.colour)
         plate = _of_one_colour(clip, part, even, gains, found.colour, found.objects, white)
         return made("colour", plates=plate, colour=(red, green, blue))
+    return made("picture", plates=_picture(clip, part, white), quantiser=median_quantiser(clip.path))
+
+
+def _picture(clip: Clip, proxy: Proxy, white: Picture) -> Plate:
+    """The plate of the picture that the clear frames show."""
+    even, gains = proxy.evened()
     noise = _noise(even, median_of_seen(even.pictures), white)
     picture = clear_picture(even.pictures, even.seen, noise.averaged(even.scale**2), DETAIL / even.scale, masked=True)
-    plate = Plate(
-        whole_plate(clip, part, gains, picture),
+    return Plate(
+        whole_plate(clip, proxy, gains, picture),
         spread_out(picture.known, clip.size).astype(np.float32),
         _noise(even, picture.image, white),
         picture.errors,
     )
-    return made("picture", plates=plate, quantiser=median_quantiser(clip.path))
 
 
 def _of_one_colour(
@@ -242,14 +249,3 @@ def _noise(proxy: Proxy, background: Picture, white: Picture) -> Noise:
     deviations = proxy.encoded - linear_to_srgb(background)
     deviations[~proxy.seen] = np.nan
     return noise_of(white, spread_about(deviations), proxy.scale**2)
-
-
-def _turned(clip: Clip, lens: Lens, is_known: bool) -> tuple[Turns | None, FocalLength | None]:
-    """How the camera turned, and the focal length where it is measured since it is not known."""
-    if is_known:
-        return find_turns(clip, lens), None
-    turns = find_turns(clip, lens, FocalLength(TELEPHOTO, 0.0).of(lens))
-    focal = None if turns is None else focal_length(clip, turns)
-    if turns is None or focal is None or not focal.determined:
-        return turns, None
-    return find_turns(clip, focal.of(turns.lens)) or turns, focal

@@ -29,7 +29,7 @@ from smokelift.footage.images import (
     linear_picture,
 )
 from smokelift.footage.kept_frames import KeptFrames, keep
-from smokelift.footage.mask import Mask, Masked, Seen
+from smokelift.footage.mask import FrameMask, Mask, Masked, Seen
 from smokelift.footage.video import Video
 from smokelift.scene import ClipSource, SceneError
 from smokelift.scene.checks import file_path
@@ -158,9 +158,10 @@ class Clip:
             if said.mask is None:
                 return cls(path, KeptFrames(source), fps, frames)
             first, last = (min(n, source.count - 1) for n in frames or (0, source.count - 1))
-            masked = Masked(KeptFrames(source), Mask(said.mask, first, last))
+            hides = Mask(said.mask, first, last)
+            masked = Masked(KeptFrames(source), hides)
             clip = cls(path, KeptFrames(masked), fps, frames, masked=masked)
-            masked.mask.check(*clip.size)
+            hides.check(*clip.size)
             return clip
         except BaseException:
             source.close()
@@ -277,7 +278,7 @@ class Clip:
             add_weighted(image, weights, edges, sums)
 
     @property
-    def mask(self) -> Mask | None:
+    def mask(self) -> FrameMask | None:
         """What hides a part of the frames, if anything does."""
         return None if self._masked is None else self._masked.mask
 
@@ -416,14 +417,27 @@ class Clip:
         self,
         change: Callable[[int, Picture], Picture],
         keeps: Callable[[int, Callable[[], Picture]], bool] | None = None,
+        *,
+        size: tuple[int, int] | None = None,
+        mask: FrameMask | None = None,
     ) -> Clip:
-        """Return the clip with each frame, by its number, replaced by one of its size. The two share the open file.
+        """Return the clip with each frame, by its number, replaced by another. The two share the open file.
 
-        ``keeps`` says of a frame's number, and of what makes its `small` picture, that ``change`` leaves it as it is.
+        Parameters
+        ----------
+        change
+            Makes the new frame.
+        keeps
+            Says of a frame's number, and of what makes its `small` picture, that ``change`` leaves it as it is.
+        size
+            Width and height of the new frames; those of the old ones by default.
+        mask
+            What hides a part of the new frames; what hides the old ones by default.
         """
         last = self.first + len(self) - 1
         source = _Changed(self, self._source, change, keeps)
-        return Clip(self.path, source, self.fps, (self.first, last), self.size, self._masked)
+        masked = self._masked if mask is None else Masked(self._source, mask)
+        return Clip(self.path, source, self.fps, (self.first, last), size or self.size, masked)
 
     def close(self) -> None:
         """Close the file."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Protocol
 
 import numpy as np
@@ -67,32 +68,25 @@ class Plate:
 
 @dataclass(frozen=True, eq=False)
 class ChangingPlate:
-    """A background that is known frame by frame, behind a camera that moves or before a scene that does.
+    """A background that differs from frame to frame, behind a camera that moves or before a scene that does.
 
     Attributes
     ----------
-    clip
-        A clean plate a frame.
-    first
-        Its frame that is behind frame 0 of the footage.
-    size
-        Width and height of the footage in pixels.
+    whole
+        Makes that of a whole frame of the footage, counted from 0.
     noise
         Of the footage.
+    files
+        What it is read from.
     cuts
         What makes the part of the picture that is asked for, with the pixels of which each new one is the mean, applied
         in this order.
     """
 
-    clip: Clip
-    first: int
-    size: tuple[int, int]
+    whole: Callable[[int], Plate]
     noise: Noise
+    files: tuple[Path, ...] = ()
     cuts: tuple[tuple[Callable[[Picture], Picture], float], ...] = ()
-
-    def whole(self, frame: int) -> Picture:
-        """Return the whole background of a frame, linear, (rows, columns, 3)."""
-        return area_average(self.clip.frame(self.first + frame), *self.size)
 
     def at(self, frame: int) -> Plate:
         """Return the plate of a frame of the footage, counted from 0.
@@ -102,8 +96,7 @@ class ChangingPlate:
         ClipError
             If its picture cannot be read.
         """
-        width, height = self.size
-        plate = Plate(self.whole(frame), np.ones((height, width), np.float32), self.noise)
+        plate = replace(self.whole(frame), noise=self.noise)
         for cut, pixels in self.cuts:
             plate = plate.through(cut, pixels)
         return plate
@@ -193,7 +186,13 @@ def changing_plate(plates: Clip, clip: Clip, sample_count: int = 32) -> Changing
             f"{plates.path}: has {len(plates)} of the frames 0 to {last} that are needed; give a clean plate with a "
             "picture for every frame of the clip, or a color, as background."
         )
-    silent = ChangingPlate(plates, clip.first, clip.size, lasting_noise(0.0))
+    width, height = clip.size
+    known, no_noise = np.ones((height, width), np.float32), lasting_noise(0.0)
+
+    def whole(frame: int) -> Plate:
+        return Plate(area_average(plates.frame(clip.first + frame), width, height), known, no_noise)
+
+    silent = ChangingPlate(whole, no_noise, plates.files)
     return replace(silent, noise=noise_before(silent, clip, sample_count))
 
 

@@ -1,54 +1,195 @@
-"""How the camera turned in each frame of a clip, and whether it did at all.
+"""How the camera of a clip turned in each frame, found on what stands still.
 
-Every frame is laid on a key frame (`smokelift.footage.alignment`), the first on the clip's middle one. Where too little
-of the key frame is left in the picture, the last frame that was laid becomes the next key.
+A camera that turns about its centre maps one picture to another by K R K^-1, whatever the distance of what it shows
+(Szeliski and Shum, "Creating full view panoramic image mosaics and environment maps", 1997): three numbers a frame.
+Every frame is laid on the clip's middle one. Cells of the two pictures, band-passed and of one contrast everywhere, are
+correlated; the turn is fitted to their shifts with a weight that leaves out what moves by itself (Tukey's biweight),
+and they are compared again once the frame is turned.
 
-A camera moves if some frames show the same as the key only once they are turned. For a still camera the turn that is
-found is zero up to noise, so as much is the same with it as without it, however much smoke there is. The smoke's own
-motion is no turn, because smoke does not keep its shape from the middle of a clip to its ends. A camera that moves,
-but does not turn in its place, is refused (`smokelift.footage.parallax`).
-
-Most cameras stand still, and a few frames prove it: where as much as can be the same is the same as it stands, no turn
-is looked for.
-
-What the rest of the file shows around a clip is followed from its first and last frame, until the shot ends.
+Before a camera that stands still, cells that are found again are where they were; before one that turns, where the turn
+takes them. If they are elsewhere the camera travels or zooms, and the clip is refused.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from contextlib import suppress
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy import fft, ndimage
 from scipy.spatial.transform import Rotation
 
-from smokelift.footage.alignment import Lens, align, judged, level_size, levels, points_of, shift
-from smokelift.footage.clip import Clip, ClipError
-from smokelift.footage.images import Picture
-from smokelift.footage.parallax import travels
+from smokelift.footage.clip import Clip
+from smokelift.footage.images import Picture, blurred, channel_mean, linear_to_srgb
+from smokelift.footage.proxy import proxy_size
 from smokelift.scene import Camera, as_matrix
 
-HELD = 0.5
-"""Share of the cells with texture that have to show the same in most frames: less is no rigid background."""
+Array = NDArray[np.float64]
 
-MOVED = 0.5
-"""Frames in which at most this share of the same is the same without a turn show that the camera moved."""
+FINE, COARSE, AROUND = 0.8, 3.0, 6.0
+"""Standard deviations in pixels of the two Gaussians whose difference is compared, and of that over which its contrast
+is measured."""
 
-MOVING_FRAMES = 0.1
-"""Share of the frames that have to: a knock is not worth a mosaic."""
+FAINT = 3 / 255
+"""Contrast in sRGB values below which there is more noise than texture."""
+
+CELLS = 6
+"""Cells along the picture's longer side; others between them overlap them by half."""
+
+TEXTURE = 0.5
+"""Mean square of a cell, in units of its contrast and `FAINT` together, from which on the contrast is the greater."""
+
+SAME = 0.5
+"""Correlation of a cell in two pictures from which on it is found again: half of its variance is the same."""
+
+IN_PLACE = 0.5
+"""Pixels of a proxy up to which a cell is where it is expected."""
+
+ITERATIONS, CONVERGED = 5, 0.02
+"""Times that a frame is compared at most, and pixels of a step that is no more worth while: turns are no surer."""
+
+TUKEY, DEVIATION, MIN_SPREAD = 4.685, 1.4826, 0.02
+"""Standard deviations from which on a shift counts nothing (95 % efficiency on normal ones), the standard deviation of
+normal values over the median of their magnitudes, and the least one of shifts, in pixels."""
+
+MIN_CELLS, MIN_FOUND = 8, 0.2
+"""Cells with texture, and share of them that are found again, that can tell a turn: smoke may cover the others."""
+
+EXPLAINED, MOSTLY = 0.7, 0.5
+"""Share of the cells that are found again which are in place if the turn is right: .75 to 1 before cameras that turn,
+less in some frames of clips whose smoke fills the picture or whose camera travels (docs/experiments/turning-camera.md).
+Share of them that are in place before a camera that stands still."""
 
 FIRST_FRAMES = 12
 """Frames that are examined first: less than `MOVING_FRAMES` of a clip lie between two of them."""
 
+MOVING_FRAMES = 0.1
+"""Share of the frames that have to be moved: a knock is not worth a panorama."""
+
+UNEXPLAINED, LOST = 0.1, 12
+"""Share of the frames that no turn has to explain, and such frames on a side of the middle one after which none is
+looked for."""
+
+TEXTURE_EVERYWHERE, REFOUND = 1 / 3, 0.8
+"""Share of the cells that need texture before a camera is refused, since less may be smoke alone before something
+smooth, and share of those that are found again in most frames: .97 to 1 before cameras that travel, less of smoke."""
+
 MIN_OFFSET = 1.0
 """Pixels that the picture has to be off its mean place in some frame: less blurs it no more than a lens does."""
 
-IN_KEY = 0.6
-"""Share of the key frame's points that have to be in a picture that is laid on it."""
 
-BEYOND = 24
-"""Frames of the file before a clip, and as many after it, that are examined: the 32 of a plate are chosen of them."""
+@dataclass(frozen=True)
+class Laid:
+    """How a frame lies on the key frame.
+
+    Attributes
+    ----------
+    turn
+        Of directions of the key frame into those of the frame; x right, y down, z forward.
+    found
+        Share of the key frame's cells with texture that are found again.
+    in_place
+        Share of these that are where the turn takes them.
+    step : (3,)
+        By how much it would have to turn more, in the key frame.
+    """
+
+    turn: Rotation
+    found: float
+    in_place: float
+    step: Array
+
+    @property
+    def explained(self) -> bool:
+        """Whether the turn explains what is found again."""
+        return self.found >= MIN_FOUND and self.in_place >= EXPLAINED
+
+    @property
+    def stands(self) -> bool:
+        """Whether the turn explains most of it."""
+        return self.found >= MIN_FOUND and self.in_place >= MOSTLY
+
+
+class Key:
+    """The frame that others are laid on.
+
+    Parameters
+    ----------
+    picture : (rows, columns, 3)
+        Linear, of a proxy's size.
+    lens : (3, 3)
+        Of it, from directions to pixels.
+
+    Attributes
+    ----------
+    textured : (cells,) bool
+        Which cells have texture.
+    """
+
+    def __init__(self, picture: Picture, lens: Array) -> None:
+        self._lens, detail = lens, detail_of(picture)
+        self._shape = rows, columns = detail.shape
+        self._side = side = max(8, 2 * round(max(rows, columns) / CELLS / 2))
+        self._rows, self._columns = (np.arange(0, n - side + 1, side // 2) for n in (rows, columns))
+        fading = np.hanning(side + 2)[1:-1].astype(np.float32)
+        self._window = np.outer(fading, fading)
+        self._whole, cells = fft.rfft2(detail), self._cut(detail)
+        self._cells, self._power = fft.rfft2(cells), (cells**2).mean((1, 2))
+        self.textured = self._power > TEXTURE * (self._window**2).mean()
+        places = np.stack(np.meshgrid(self._columns, self._rows), -1).reshape(-1, 2) + side / 2
+        a, b = ((places - lens[:2, 2]) / lens[[0, 1], [0, 1]]).T
+        # a ray (a, b, 1) that turns by w moves by w x ray, and its place on the plane z = 1 by that less its drift
+        turned = np.stack([-a * b, 1 + a**2, -b, -1 - b**2, a * b, a], -1).reshape(-1, 2, 3)
+        self._slopes = turned * lens[[0, 1], [0, 1]][:, None]
+
+    def lay(self, detail: Picture, start: Rotation) -> Laid:
+        """Find how the camera turned to a picture, given by `detail_of`, from where it is thought to look."""
+        laid = self._turned(detail, start)
+        if laid.explained:
+            return laid
+        # it may have moved too far to be found from there: about how far, but for roll, the whole picture tells
+        (_,), ((across, down),) = _highest(fft.irfft2(np.conj(self._whole) * fft.rfft2(detail), self._shape)[None])
+        aside = [-np.arctan(down / self._lens[1, 1]), np.arctan(across / self._lens[0, 0]), 0.0]
+        found = self._turned(detail, Rotation.from_rotvec(aside))
+        return found if found.explained else laid
+
+    def _turned(self, detail: Picture, start: Rotation) -> Laid:
+        laid = self.compare(detail, start)
+        for _ in range(ITERATIONS - 1):
+            if np.abs(laid.step).max() * self._lens[0, 0] < CONVERGED:
+                break
+            laid = self.compare(detail, laid.turn * Rotation.from_rotvec(laid.step))
+        return laid
+
+    def compare(self, detail: Picture, turn: Rotation) -> Laid:
+        """Compare a picture, given by `detail_of`, with this one, when the camera turned so from one to the other."""
+        rows, columns = self._shape
+        y, x = np.mgrid[:rows, :columns] + 0.5
+        matrix = self._lens @ turn.as_matrix() @ np.linalg.inv(self._lens)
+        across, down, ahead = np.tensordot(matrix, [x, y, np.ones_like(x)], 1)
+        across, down = across / ahead, down / ahead
+        inside = (across > 1) & (across < columns - 1) & (down > 1) & (down < rows - 1) & (ahead > 0)
+        seen = ndimage.map_coordinates(detail, [down - 0.5, across - 0.5], order=1, mode="nearest") * inside
+        cells = self._cut(seen)
+        correlation = fft.irfft2(np.conj(self._cells) * fft.rfft2(cells), cells.shape[1:])
+        best, shifts = _highest(correlation / self._side**2)
+        compared = self.textured & (self._cut(inside).mean((1, 2)) > 0.9 * self._window.mean())
+        found = compared & (best > SAME * np.sqrt(self._power * (cells**2).mean((1, 2))))
+        weight, step = found.astype(np.float64), np.zeros(3)
+        for _ in range(ITERATIONS if found.any() else 0):
+            weighted = (self._slopes * weight[:, None, None]).reshape(-1, 3)
+            step = np.linalg.lstsq(weighted.T @ self._slopes.reshape(-1, 3), weighted.T @ shifts.ravel(), None)[0]
+            away = np.hypot(*(shifts - self._slopes @ step).T)
+            spread = max(DEVIATION * float(np.median(away[found])), MIN_SPREAD)
+            weight = found * np.maximum(1 - (away / (TUKEY * spread)) ** 2, 0) ** 2
+        in_place = int((found & (np.hypot(*shifts.T) < IN_PLACE)).sum()) / max(int(found.sum()), 1)
+        return Laid(turn, int(found.sum()) / max(int(compared.sum()), MIN_CELLS), in_place, step)
+
+    def _cut(self, picture: NDArray[Any]) -> Picture:
+        """The cells (cells, side, side) of a picture, each faded out towards its sides."""
+        cells = np.lib.stride_tricks.sliding_window_view(picture, (self._side,) * 2)
+        return np.asarray(cells[self._rows[:, None], self._columns] * self._window).reshape(-1, *(self._side,) * 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,23 +198,38 @@ class Turns:
 
     Attributes
     ----------
-    lens
-        Of the frames.
+    size
+        Width and height of its pictures.
+    lens : (3, 3)
+        From directions to pixels.
     rotations
         Turn directions of each frame into those of the camera's mean pose; x right, y down, z forward.
+    key, of_key
+        The frame that the others were laid on, and the rotation of its directions.
     """
 
-    lens: Lens
+    size: tuple[int, int]
+    lens: Array
     rotations: Rotation
+    key: Key
+    of_key: Rotation
 
     @property
     def farthest(self) -> float:
-        """Pixels by which the middle or a corner of the picture is off its mean place, at most."""
-        width, height = self.lens.size
-        places = np.array([self.lens.centre, (0, 0), (width, 0), (0, height), (width, height)])
-        rays = self.lens.rays(places)
-        seen = np.stack([self.lens.pixels(turn.apply(rays)) for turn in self.rotations])
-        return float(np.linalg.norm(seen - places, axis=-1).max())
+        """Pixels by which a corner of the picture is off its mean place, at most."""
+        width, height = self.size
+        corners = np.array([(0, 0), (width, 0), (0, height), (width, height)], np.float64)
+        away = [moved(corners, self.between(turn)) - corners for turn in self.rotations]
+        return float(np.linalg.norm(away, axis=-1).max())
+
+    def between(self, turn: Rotation) -> Array:
+        """Return the homography (3, 3) of places in a picture whose directions turn so."""
+        return np.asarray(self.lens @ turn.as_matrix() @ np.linalg.inv(self.lens))
+
+    def of(self, picture: Picture) -> Rotation | None:
+        """Return the rotation of another frame of the shot, from a linear picture of a proxy's size; None of others."""
+        laid = self.key.lay(detail_of(picture), Rotation.identity())
+        return self.of_key * laid.turn.inv() if laid.explained else None
 
     def carried(self, camera: Camera) -> Camera:
         """Return a camera that stands in the mean pose with a matrix for every frame."""
@@ -86,124 +242,97 @@ class Turns:
         return replace(camera, matrix=matrices[0], matrices=tuple(matrices))
 
 
-def find_turns(clip: Clip, *lenses: Lens) -> Turns | None:
+def find_turns(clip: Clip, *lenses: Array) -> Turns | None:
     """Find how the camera of a clip turned; None if it stood still or if nothing in the picture tells.
 
     Parameters
     ----------
     clip
         The footage.
-    lenses
-        Of its frames; of several that it may be, the first with which turns explain them is taken.
+    lenses : (3, 3)
+        Of its frames, from directions to pixels; of several that it may have, the first with which turns explain them
+        is taken.
 
     Raises
     ------
     ClipError
         If a frame cannot be read.
     ValueError
-        If the camera travels or zooms.
+        If the camera moves in another way.
     """
-    if len(clip) == 1 or _stands_still(clip, lenses[0]):
+    size, middle = proxy_size(*clip.size), len(clip) // 2
+    scale = np.diag([size[0] / clip.size[0], size[1] / clip.size[1], 1.0])
+    keys = [Key(clip.area_average(middle, *size), scale @ lens) for lens in lenses]
+    if keys[0].textured.sum() < MIN_CELLS or _stands_still(clip, keys[0], size):
         return None
-    middle = len(clip) // 2
-    ahead, back = range(middle + 1, len(clip)), range(middle - 1, -1, -1)
-    for lens in lenses:
-        found = dict(_followed(clip, lens, middle, ahead)) | dict(_followed(clip, lens, middle, back))
-        if np.median([each.same for each in found.values()]) >= HELD:
-            break
-    else:
-        if travels(clip, lens, {number for number, each in found.items() if each.same < HELD}):
-            raise ValueError(
-                "The camera travels or zooms, so near and far move unlike each other and no turn steadies the clip; "
-                "track it in Blender, and give its camera and a clean plate."
-            )
+    for lens, key in zip(lenses, keys, strict=True):
+        turns, moving, lost = _followed(clip, key, size)
+        if len(turns) == len(clip) and len(lost) <= UNEXPLAINED * len(clip):
+            rotations = Rotation.concatenate([turns[number] for number in range(len(clip))]).inv()
+            mean = rotations.mean().inv()
+            found = Turns(clip.size, lens, mean * rotations, key, mean)
+            return found if moving >= MOVING_FRAMES * len(clip) and found.farthest >= MIN_OFFSET else None
+    if keys[0].textured.mean() < TEXTURE_EVERYWHERE or 2 * sum(lost) < len(lost):
         return None
-    if np.mean([each.as_it_stands <= MOVED * each.same for each in found.values()]) < MOVING_FRAMES:
-        return None
-    found[middle] = _Found(Rotation.identity(), 1.0, 1.0)
-    rotations = Rotation.concatenate([found[number].turn for number in range(len(clip))])
-    turns = Turns(lens, rotations.mean().inv() * rotations)
-    return turns if turns.farthest >= MIN_OFFSET else None
+    raise ValueError(
+        "The picture moves as before a camera that travels or zooms, which no turn steadies: track it in Blender, and "
+        "give its camera and a clean plate; if it stood still, give a clean plate, or a color, as background."
+    )
 
 
-def file_turns(clip: Clip, turns: Turns) -> dict[int, Rotation]:
-    """Return how the camera turned in frames of a clip's file, by their numbers in it.
-
-    The clip's own are among them. Others are taken before and after it for as long as they show what it does, at which
-    the camera may look from anywhere in front of it.
-
-    Parameters
-    ----------
-    clip
-        The footage.
-    turns
-        Of its frames. The others' are into the same mean pose.
-    """
-    whole, first, last = clip.whole(), clip.first, clip.first + len(clip) - 1
-    found = {first + number: turn for number, turn in enumerate(turns.rotations)}
-    width, height = turns.lens.size
-    corners = turns.lens.rays(np.array([[0, 0], [width, 0], [0, height], [width, height]], np.float64))
-    sides = ((last, range(last + 1, len(whole))), (first, range(first - 1, -1, -1)))
-    for start, numbers in sides:
-        apart = -(-len(numbers) // BEYOND) or 1
-        with suppress(ClipError):  # what cannot be read ends the shot
-            for number, each in _followed(whole, turns.lens, start, numbers[::apart]):
-                turn = found[start] * each.turn
-                if each.same < HELD or (turn.apply(corners)[:, 2] <= 0).any():
-                    break
-                found[number] = turn
-    return found
+def _followed(clip: Clip, key: Key, size: tuple[int, int]) -> tuple[dict[int, Rotation], int, list[bool]]:
+    """How the camera turned from the key frame to others, as far as it is followed; how many of them show that it
+    moves; and of each that no turn explains whether a camera that travels would."""
+    middle, still = len(clip) // 2, Rotation.identity()
+    turns, moving, lost = {middle: still}, 0, list[bool]()
+    for numbers in (range(middle + 1, len(clip)), range(middle - 1, -1, -1)):
+        turn, before = still, len(lost)
+        for number in numbers:
+            detail = detail_of(clip.area_average(number, *size))
+            laid, stands = key.lay(detail, turn), key.compare(detail, still).stands
+            if laid.explained:
+                turn, moving = laid.turn, moving + (not stands)
+            else:
+                lost.append(laid.found >= REFOUND and not stands)
+            turns[number] = turn
+            if len(lost) - before == LOST:
+                break
+    return turns, moving, lost
 
 
-def _stands_still(clip: Clip, lens: Lens) -> bool:
-    """Whether none of the frames that are examined shows more of the same once it is turned."""
-    numbers = clip.spread(FIRST_FRAMES)
+def moved(places: Array, matrix: Array) -> Array:
+    """Return where a homography (3, 3) takes places (n, 2)."""
+    across, down, ahead = matrix @ np.column_stack([places, np.ones(len(places))]).T
+    return np.column_stack([across / ahead, down / ahead])
 
-    def seen(number: int) -> Picture:
-        return clip.area_average(number, *level_size(lens))
 
-    key = levels(seen(numbers.pop(len(numbers) // 2)), lens)
-    first, same = points_of(key), []
-    for number in numbers:
-        picture = seen(number)
-        stands = judged(first[-1], levels(picture, lens, 1)[0], Rotation.identity()).same
-        # a turn cannot make so much of more than all
-        same.append(stands if stands > MOVED else align(first, levels(picture, lens), Rotation.identity()).same)
-        if stands <= MOVED * same[-1]:
+def detail_of(picture: Picture) -> Picture:
+    """Return a linear picture (rows, columns, 3) in grey, band-passed, in units of the contrast around each pixel."""
+    grey = channel_mean(linear_to_srgb(picture))
+    detail = blurred(grey, FINE) - blurred(grey, COARSE)
+    return np.asarray(detail / np.sqrt(blurred(detail**2, AROUND) + FAINT**2), np.float32)
+
+
+def _stands_still(clip: Clip, key: Key, size: tuple[int, int]) -> bool:
+    """Whether most of some frames show all where it was, and a turn explains none of the others better."""
+    stands = list[bool]()
+    for number in set(clip.spread(FIRST_FRAMES)) - {len(clip) // 2}:
+        detail = detail_of(clip.area_average(number, *size))
+        stands.append(key.compare(detail, Rotation.identity()).stands)
+        if not stands[-1] and key.lay(detail, Rotation.identity()).explained:
             return False
-    return bool(np.median(same) >= HELD) if same else False
+    return 2 * sum(stands) >= len(stands)
 
 
-@dataclass(frozen=True, eq=False)
-class _Found:
-    """How a frame lies on the one from which it was followed, the clip's middle one mostly.
-
-    Attributes
-    ----------
-    turn
-        Of its directions into those of that frame.
-    same, as_it_stands
-        Share of the cells that show the same once it is turned, and as it stands.
-    """
-
-    turn: Rotation
-    same: float
-    as_it_stands: float
-
-
-def _followed(clip: Clip, lens: Lens, start: int, numbers: Iterable[int]) -> Iterator[tuple[int, _Found]]:
-    """Lay frames that follow one another on that from which they start, or on those that succeed it as the key."""
-    before = levels(clip.frame(start), lens)
-    key = first = points_of(before)
-    of_key = onto = Rotation.identity()  # the key into the first one; the key into the frame before
-    for number in numbers:
-        picture = levels(clip.frame(number), lens)
-        lain = align(key, picture, onto)
-        if lain.same < HELD:  # it may have moved too far to be found from where the one before was
-            lain = max(lain, align(key[-2:], picture[-2:], shift(before, picture) * onto), key=lambda each: each.same)
-        if lain.shared < IN_KEY:
-            key, of_key = points_of(before), of_key * onto.inv()
-            lain = align(key, picture, Rotation.identity())
-        onto, before = lain.turn, picture
-        stands = judged(first[-1], picture[-1], Rotation.identity())
-        yield number, _Found(of_key * onto.inv(), lain.same, stands.same)
+def _highest(peaks: Picture) -> tuple[Picture, Array]:
+    """The highest value (n,) of each periodic picture (n, rows, columns), and where its peak is, (n, 2) across and
+    down, by the parabola through it and its neighbours."""
+    count, rows, columns = peaks.shape
+    every, shifts = np.arange(count), []
+    down, across = np.divmod(peaks.reshape(count, -1).argmax(1), columns)
+    best = peaks[every, down, across]
+    for at, size, (x, y) in ((across, columns, (1, 0)), (down, rows, (0, 1))):
+        low, high = (peaks[every, (down + sign * y) % rows, (across + sign * x) % columns] for sign in (-1, 1))
+        bend = np.minimum(low - 2 * best + high, -np.finfo(np.float32).tiny)
+        shifts.append((at + size // 2) % size - size // 2 + 0.5 * (low - high) / bend)
+    return best, np.stack(shifts, -1)

@@ -63,13 +63,6 @@ SENTENCES: Mapping[str, str] = {
         "The camera moves, by up to {pixels:.0f} pixels: it is steadied against the background, as a camera that turns "
         "in its place, and has a matrix for every frame."
     ),
-    "focal length": (
-        "Focal length measured on how the picture turns: {millimetres:.0f} mm on {film:g} mm film, {deviation:.0%} "
-        "more or less."
-    ),
-    "focal length undetermined": (
-        "Focal length undetermined: the camera turns too little, or too little stands still, to show it."
-    ),
     "exposure": "The exposure of the clip changes by up to {change:.0%}: every frame is brought to the background's.",
     "background of one frame": (
         "One frame alone does not show what moves: the color around it counts as background, and all that has another "

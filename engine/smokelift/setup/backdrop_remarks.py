@@ -8,7 +8,6 @@ from smokelift.checks import Doubt, Remark
 from smokelift.footage.backdrop import Backdrop
 from smokelift.footage.clip import Clip
 from smokelift.footage.exposure import largest_change, small
-from smokelift.footage.lens import FILM_WIDTH
 from smokelift.footage.plate import Plate, Plates
 from smokelift.footage.quantiser import COARSE
 from smokelift.footage.steady import exposures
@@ -44,12 +43,12 @@ def backdrop_remarks(found: Backdrop) -> tuple[Remark, ...]:
         return (Remark("alpha channel", {"behind": "white" if clip.backdrop else "black"}),)
     if found.source == "given":
         return ()
-    if found.turns is None:
+    if found.steadied is None:
         assert isinstance(plates, Plate)
         return _still(plates, clip)
     unknown = [unknown_part(plates, clip, number) for number in clip.spread(EXPOSURE_SAMPLES)]
-    moved = Remark("turning camera", {"pixels": found.turns.farthest})
-    return (moved, *_focal(found), _picture(float(np.mean(unknown))))
+    moved = Remark("turning camera", {"pixels": found.steadied[0].turns.farthest})
+    return (moved, _picture(float(np.mean(unknown))))
 
 
 def backdrop_doubts(found: Backdrop) -> tuple[Doubt, ...]:
@@ -133,21 +132,6 @@ def what_helps(clip: Clip, plates: Plates, given: bool) -> Doubt:
     if change > LARGE_NOISE:
         return Doubt("no smoke before a changing background", {"codes": 255 * change})
     return Doubt("no smoke before an estimated background")
-
-
-def _focal(found: Backdrop) -> tuple[Remark, ...]:
-    """A remark on the focal length of a camera that turns, unless it is known."""
-    if found.lens_is_known or found.turns is None:
-        return ()
-    if found.focal is None:
-        return (Remark("focal length undetermined"),)
-    lens = found.turns.lens
-    millimetres = FILM_WIDTH * lens.focal[0] / max(lens.size)
-    return (
-        Remark(
-            "focal length", {"millimetres": millimetres, "film": FILM_WIDTH, "deviation": float(found.focal.deviation)}
-        ),
-    )
 
 
 def _still(plate: Plate, clip: Clip) -> tuple[Remark, ...]:

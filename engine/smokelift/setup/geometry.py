@@ -11,11 +11,10 @@ import numpy as np
 
 from smokelift.checks import Figures, Remark
 from smokelift.density.screen import view_frame
-from smokelift.footage.alignment import Array, Lens
 from smokelift.footage.clip import Clip
 from smokelift.footage.lens import FILM_DIAGONAL, FILM_WIDTH
 from smokelift.footage.plate import Plates
-from smokelift.footage.turning import Turns
+from smokelift.footage.turning import Array, Turns
 from smokelift.footage.working_picture import CameraError, working_picture
 from smokelift.scene import Box, Camera, Domain, Scene, as_matrix
 from smokelift.scene.projection import voxel_width
@@ -32,6 +31,10 @@ PICTURE_HEIGHT = 2.0
 LENS = 50 / FILM_WIDTH
 """Focal length over the longer side of the picture of an uncalibrated camera whose file says none: Blender's default
 lens."""
+
+OTHER_LENSES = (0.6, 2.0)
+"""Other focal lengths over the usual one that a camera which turns may have: that of phones, 26 to 30 mm, and 100 mm.
+Either is right within a factor of one and a half for all lenses from 20 to 150 mm."""
 
 MARGIN = 0.06
 """Margin on each side of an estimated box, as a fraction of its longer side."""
@@ -101,7 +104,7 @@ def find_geometry(
             "The scene gives a camera but no box; give the one that holds the smoke. It is found only for "
             "a perspective camera that does not move or look steeply up or down."
         )
-    focal = _focal(clip) if turns is None else turns.lens.focal[0]
+    focal = _focal(clip) if turns is None else float(turns.lens[0, 0])
     camera = known or _level(clip, focal)
     base, size, metres = _around(camera, samples)
     camera = _turning(camera, turns)
@@ -150,22 +153,22 @@ def _divided(
     return _resolved(clip, camera, grids, plates, samples.smoky, settings)
 
 
-def clip_lens(camera: Camera | None, clip: Clip) -> Lens | None:
-    """Return the lens of a clip from its camera, or the usual one; None if the camera has none, or moves as it says.
+def clip_lenses(camera: Camera | None, clip: Clip) -> tuple[Array, ...]:
+    """Return what may turn directions into pixels (3, 3): that of a clip's camera, or usual ones; none of a camera that
+    is orthographic or given as moving.
 
     Raises
     ------
     ValueError
         If the camera's picture has another shape than the clip's.
     """
-    if camera is None:
-        width, height = clip.size
-        focal = _focal(clip)
-        return Lens(clip.size, (focal, focal), (width / 2, height / 2))
-    if camera.type != "perspective" or camera.moves:
-        return None
-    camera = fitting(camera, clip)
-    return Lens(camera.size, (camera.fx, camera.fy), (camera.cx, camera.cy))
+    scales = (1.0, *OTHER_LENSES) if clip.lens is None else (1.0,)
+    cameras = [_level(clip, scale * _focal(clip)) for scale in scales] if camera is None else [fitting(camera, clip)]
+    return tuple(
+        np.array([[each.fx, 0, each.cx], [0, each.fy, each.cy], [0, 0, 1.0]])
+        for each in cameras
+        if each.type == "perspective" and not each.moves
+    )
 
 
 def _focal(clip: Clip) -> float:

@@ -19,7 +19,7 @@ from smokelift.setup.coarse import CoarseClip
 from smokelift.setup.estimate import Estimate
 from smokelift.setup.first_estimate import FirstEstimate, first_estimate
 from smokelift.setup.further_views import disagreement, open_view
-from smokelift.setup.geometry import Geometry, clip_lens, find_geometry
+from smokelift.setup.geometry import Geometry, clip_lenses, find_geometry
 from smokelift.setup.illumination import Illumination, first_light, light_remarks, measured_light, sunlight
 from smokelift.setup.medium import find_medium
 from smokelift.setup.model import choose_model, tried_frames
@@ -55,10 +55,10 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
     _expect(clip, scene)
     remarks = clip.remarks()
     # cameras that belong together are measured, and stand where they are said to
-    lens = None if scene.views else clip_lens(scene.camera, clip)
-    estimate = first_estimate(clip, scene.camera, scene.background, lens)
+    lenses = () if scene.views else clip_lenses(scene.camera, clip)
+    estimate = first_estimate(clip, scene.camera, scene.background, lenses)
     steadied, plates, samples = estimate.clip, estimate.plates, estimate.samples
-    geometry = find_geometry(steadied, scene, settings, plates, samples, estimate.found.turns)
+    geometry = find_geometry(steadied, scene, settings, plates, samples, estimate.turns)
     camera, domain = geometry.camera, geometry.domain
     if settings.axis_depth is not None:
         SmokeAxis.given(settings.axis_depth, camera, domain)  # refuse early what cannot be

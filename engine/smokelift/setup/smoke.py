@@ -12,10 +12,8 @@ from smokelift.footage.clip import REDUCED, Clip
 from smokelift.footage.exposure import largest_change, small
 from smokelift.footage.images import area_average
 from smokelift.footage.matte import matte
-from smokelift.footage.panorama import WidePicture
 from smokelift.footage.plate import Plates
 from smokelift.footage.steady import exposures
-from smokelift.footage.turning import Turns
 from smokelift.setup.thickness import seen_texture
 
 SAMPLES = 16
@@ -36,7 +34,7 @@ class SmokeSamples:
     bounds
         Left, top, right and bottom of ``covered`` in pixels of the camera's full picture.
     covered : (rows, columns) bool
-        Pixels with smoke in at least one sample; of a camera that turns as its mean pose would see them.
+        Pixels with smoke in at least one sample.
     unknown : (rows, columns) bool
         Pixels whose background is unknown, likewise.
     colours : (n, 3)
@@ -80,13 +78,20 @@ def unknown_part(plates: Plates, clip: Clip, number: int) -> NDArray[np.bool_]:
     return unknown if seen is None else unknown & seen
 
 
-def sample_smoke(clip: Clip, plates: Plates, turns: Turns | None = None) -> SmokeSamples:
-    """Find the smoke in frames spread over a clip, whose camera may turn and whose exposure may change."""
+def sample_smoke(clip: Clip, plates: Plates, corner: tuple[int, int] = (0, 0)) -> SmokeSamples:
+    """Find the smoke in frames spread over a clip, whose exposure may change.
+
+    Parameters
+    ----------
+    clip, plates
+        The footage, and what is behind the smoke.
+    corner
+        Left and top of its pictures in pixels of the camera's.
+    """
     width, height = clip.size
     scale = max(1.0, max(width, height) / REDUCED)
     columns, rows = clip.reduced_size
-    wide = None if turns is None else WidePicture.around(turns).resized(columns, rows)
-    covered, unknown = np.zeros((2, *((rows, columns) if wide is None else wide.size[::-1])), np.bool_)
+    covered, unknown = np.zeros((2, rows, columns), np.bool_)
     colours, behind, textures = [], [], []
     gains: dict[int, NDArray[np.float32]] = {}
     amounts: dict[int, int] = {}
@@ -97,18 +102,15 @@ def sample_smoke(clip: Clip, plates: Plates, turns: Turns | None = None) -> Smok
         gains[number] = gains_of(number, small(clip.reduced(number)))
         picture = clip.reduced(number) / gains[number]
         mask = matte(picture, plate).mask
-        for whole, part in ((covered, mask), (unknown, unknown_part(reduced, clip, number))):
-            whole |= part if wide is None else wide.spread_out(part.astype(np.float32), number) > 0.5
+        covered |= mask
+        unknown |= unknown_part(reduced, clip, number)
         colours.append(picture[mask])
         behind.append(plate.image[mask])
         if mask.any():
             amounts[number] = int(mask.sum())
             textures.append(seen_texture(picture, plate, mask))
     smoky = tuple(sorted(amounts, key=lambda number: -amounts[number]))
-    bounds = (0.0, 0.0, float(width), float(height))
-    if wide is not None:
-        corners = (wide.left, wide.top, wide.left + wide.size[0], wide.top + wide.size[1])
-        left, top, right, bottom = (scale * corner for corner in corners)
-        bounds = (left, top, right, bottom)
+    left, top = corner
+    bounds = (float(left), float(top), float(left + width), float(top + height))
     radiance = np.concatenate(colours), np.concatenate(behind)
     return SmokeSamples(scale, bounds, covered, unknown, *radiance, smoky, gains, tuple(textures))

@@ -8,12 +8,13 @@ import numpy as np
 from scipy import ndimage
 from scipy.spatial.transform import Rotation
 
-from smokelift.footage.alignment import Lens
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import linear_to_srgb, srgb_to_linear
+from smokelift.footage.turning import moved
 
-SIZE, MARGIN, COUNT = (160, 120), 40, 12
-LENS = Lens(SIZE, (200.0, 200.0), (80.0, 60.0))
+SIZE, MARGIN, COUNT = (240, 180), 60, 12
+LENS = np.array([[300.0, 0, 120], [0, 300, 90], [0, 0, 1]])
+"""From directions to pixels."""
 
 
 def wall(contrast: float = 1.0) -> np.ndarray:
@@ -32,14 +33,14 @@ def pictures(
     The smoke, up to so opaque, boils and rises over a third of the picture. Noise is in 8 bit codes.
     """
     y, x = np.mgrid[: SIZE[1], : SIZE[0]] + 0.5
-    rays = LENS.rays(np.column_stack([x.ravel(), y.ravel()]))
+    pixels = np.column_stack([x.ravel(), y.ravel()])
     random = np.random.default_rng(1)
-    boil = ndimage.gaussian_filter(random.standard_normal((len(turns), *plate.shape[:2])), (1, 4, 4))
+    boil = ndimage.gaussian_filter(random.standard_normal((len(turns), *plate.shape[:2])), (1, 6, 6))
     boil = np.clip(0.5 + 0.5 * boil / boil.std(), 0, 1)
-    boil[:, :, : MARGIN + 55] = boil[:, :, MARGIN + 105 :] = 0
+    boil[:, :, : MARGIN + 82] = boil[:, :, MARGIN + 158 :] = 0
     clear, smoky = [], []
     for n, turn in enumerate(turns):
-        place = LENS.pixels(turn.apply(rays)) + MARGIN - 0.5
+        place = moved(pixels, between(turn)) + MARGIN - 0.5
         at = [place[:, 1].reshape(y.shape), place[:, 0].reshape(y.shape)]
         behind = np.stack([ndimage.map_coordinates(plate[..., c], at, order=3, mode="nearest") for c in range(3)], -1)
         opacity = smoke * ndimage.map_coordinates(boil[n], at, order=1)[..., None]
@@ -70,13 +71,13 @@ def clip_of(frames: np.ndarray) -> Clip:
 
 def shake(pixels: float) -> Rotation:
     """Return turns by up to so many pixels about each axis, frame to mean pose."""
-    turns = np.random.default_rng(2).uniform(-1, 1, (COUNT, 3)) * pixels / LENS.focal[0]
+    turns = np.random.default_rng(2).uniform(-1, 1, (COUNT, 3)) * pixels / LENS[0, 0]
     return centred(Rotation.from_rotvec(turns))
 
 
 def pan(pixels: float) -> Rotation:
     """Return turns that pan over so many pixels, frame to mean pose."""
-    along = np.linspace(-0.5, 0.5, COUNT) * pixels / LENS.focal[0]
+    along = np.linspace(-0.5, 0.5, COUNT) * pixels / LENS[0, 0]
     return centred(Rotation.from_rotvec(np.outer(along, [0.1, 1.0, 0.05])))
 
 
@@ -87,6 +88,24 @@ def centred(turns: Rotation) -> Rotation:
 def off(found: Rotation, true: Rotation) -> float:
     """Return how far off a turn shows any corner of the picture, at most, in pixels."""
     width, height = SIZE
-    corners = LENS.rays(np.array([[0, 0], [width, 0], [0, height], [width, height]], float))
-    apart = [LENS.pixels(a.apply(corners)) - LENS.pixels(b.apply(corners)) for a, b in zip(found, true, strict=True)]
+    corners = np.array([[0, 0], [width, 0], [0, height], [width, height]], float)
+    apart = [moved(corners, between(a)) - moved(corners, between(b)) for a, b in zip(found, true, strict=True)]
     return float(np.abs(apart).max())
+
+
+def between(turn: Rotation) -> np.ndarray:
+    """Return the homography of a picture whose directions turn."""
+    return LENS @ turn.as_matrix() @ np.linalg.inv(LENS)
+
+
+def over_a_plain(pixels: float) -> np.ndarray:
+    """Return frames of a camera that goes sideways: what is near, below, moves by so many pixels, the far by none."""
+    plate = wall()
+    y, x = np.mgrid[: SIZE[1], : SIZE[0]] + float(MARGIN)
+    noise = np.random.default_rng(3)
+    frames = []
+    for along in np.linspace(-0.5, 0.5, COUNT) * pixels:
+        at = [y, x + along * (y - MARGIN) / SIZE[1]]
+        seen = np.stack([ndimage.map_coordinates(plate[..., c], at, order=3, mode="nearest") for c in range(3)], -1)
+        frames.append(linear_to_srgb(seen) + noise.normal(0, 1 / 255, seen.shape))
+    return srgb_to_linear(np.clip(np.stack(frames), 0, 1)).astype(np.float32)

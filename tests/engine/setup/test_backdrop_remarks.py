@@ -10,14 +10,13 @@ from scipy import ndimage
 from scipy.spatial.transform import Rotation
 
 from smokelift.checks import Doubt, Remark
-from smokelift.footage.alignment import Lens
 from smokelift.footage.backdrop import find_backdrop
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import linear_to_srgb, srgb_to_linear
 from smokelift.footage.matte import matte
 from smokelift.footage.noise import lasting_noise
-from smokelift.footage.panorama import PanoramaPlate
 from smokelift.footage.plate import Plate
+from smokelift.footage.turning import moved
 from smokelift.output.images import write_image
 from smokelift.scene import Background
 from smokelift.setup.backdrop_remarks import (
@@ -29,7 +28,7 @@ from smokelift.setup.backdrop_remarks import (
     smoke_in_plate,
     what_helps,
 )
-from smokelift.setup.geometry import clip_lens
+from smokelift.setup.geometry import clip_lenses
 from smokelift.setup.smoke import SmokeSamples, sample_smoke
 from tests.engine.footage.films import coded, puff, wall
 
@@ -96,46 +95,37 @@ def test_what_never_changes_before_one_colour_is_said(tmp_path) -> None:
     assert [remark.kind for remark in remarks] == ["black background", "background with objects"]
 
 
-def panned(folder, lens: Lens, pixels: float) -> Clip:
+def panned(folder, lens: np.ndarray, pixels: float) -> Clip:
     """Pictures of a wall, from a camera that pans over so many pixels."""
-    width, height = lens.size
+    width, height = 160, 120
     random = np.random.default_rng(0)
     fine = sum(ndimage.gaussian_filter(random.standard_normal((2 * height, 2 * width)), s) * s for s in (1.0, 3.0))
     y, x = np.mgrid[:height, :width] + 0.5
-    rays = lens.rays(np.column_stack([x.ravel(), y.ravel()]))
-    for n, along in enumerate(np.linspace(-0.5, 0.5, 8) * pixels / lens.focal[0]):
-        seen = (
-            lens.pixels(Rotation.from_rotvec([0, along, 0.2 * along]).apply(rays)) + np.array([width, height]) / 2 - 0.5
-        )
+    places = np.column_stack([x.ravel(), y.ravel()])
+    for n, along in enumerate(np.linspace(-0.5, 0.5, 8) * pixels / lens[0, 0]):
+        turn = Rotation.from_rotvec([0, along, 0.2 * along]).as_matrix()
+        seen = moved(places, lens @ turn @ np.linalg.inv(lens)) + np.array([width, height]) / 2 - 0.5
         grey = ndimage.map_coordinates(0.25 + 0.08 * fine, seen.T[::-1].reshape(2, *y.shape), order=3)
         write_image(folder / f"frame_{n:02d}.png", np.clip(grey, 0.01, 1).astype(np.float32))
     return Clip.open(folder / "frame_##.png", fps=24)
 
 
-def test_pictures_of_a_panning_camera_tell_background_and_focal_length(tmp_path) -> None:
+def test_pictures_of_a_panning_camera_tell_the_background(tmp_path) -> None:
     """Of a sequence of pictures as of a video; its lens is 34 mm, and 50 mm are supposed."""
-    true = Lens((160, 120), (150.0, 150.0), (80.0, 60.0))
+    true = np.array([[150.0, 0, 80], [0, 150, 60], [0, 0, 1]])
     clip = panned(tmp_path, true, 40)
-    supposed = clip_lens(None, clip)
-    assert supposed is not None
-    found = find_backdrop(clip, None, None, supposed)
-    assert isinstance(found.plates, PanoramaPlate)
-    assert found.turns is not None
-    assert found.turns.lens.focal[0] == pytest.approx(150, rel=0.03)
-    remarks = {remark.kind: remark.figures for remark in backdrop_remarks(found)}
-    assert remarks["focal length"]["millimetres"] == pytest.approx(34, abs=0.5)
-    assert not smoke_in_plate(sample_smoke(found.clip, found.plates, found.turns))
-    never_clear = replace(found.plates, confidence=np.zeros_like(found.plates.confidence))
-    (doubt,) = smoke_in_plate(sample_smoke(found.clip, never_clear, found.turns))
+    found = find_backdrop(clip, None, None, clip_lenses(None, clip))
+    assert found.steadied is not None
+    assert found.steadied[0].turns.lens[0, 0] == pytest.approx(0.6 * 160 * 50 / 36, rel=0.01)
+    assert "turning camera" in [remark.kind for remark in backdrop_remarks(found)]
+    panorama, plate = found.steadied
+    still, _ = found.still(found.clip)
+    samples = sample_smoke(still, plate, panorama.corner)
+    assert not samples.smoky
+    assert samples.unknown.mean() < 0.001
+    never_clear = replace(plate, confidence=np.zeros_like(plate.confidence))
+    (doubt,) = smoke_in_plate(sample_smoke(still, never_clear, panorama.corner))
     assert doubt.figures == {"share": 1}
-
-
-def test_a_focal_length_that_is_not_found_is_said(tmp_path) -> None:
-    lens = Lens((160, 120), (150.0, 150.0), (80.0, 60.0))
-    found = find_backdrop(panned(tmp_path, lens, 40), None, None, lens)
-    known, unknown = (replace(found, lens_is_known=is_known, focal=None) for is_known in (True, False))
-    said = [[remark.kind for remark in backdrop_remarks(each) if "focal" in remark.kind] for each in (known, unknown)]
-    assert said == [[], ["focal length undetermined"]]
 
 
 def test_a_cut_is_said_with_the_frames_of_each_side(tmp_path) -> None:
