@@ -17,6 +17,7 @@ from smokelift.checks import Remark
 from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import Look
 from smokelift.footage.images import Picture, linear_to_srgb, srgb_to_linear
+from smokelift.footage.stored_picture import LinearPicture
 
 FPS = 24.0
 BRIGHT = 0.75
@@ -140,9 +141,9 @@ class Frames:
     def __init__(self, codes: npt.NDArray[np.uint8]) -> None:
         self.codes, self.count = codes, len(codes)
 
-    def read(self, n: int) -> Picture:
+    def read(self, n: int) -> LinearPicture:
         """Return a frame, linear."""
-        return srgb_to_linear(self.codes[n].astype(np.float32) / np.float32(255))
+        return LinearPicture(srgb_to_linear(self.codes[n].astype(np.float32) / np.float32(255)))
 
     def damaged(self, first: int, last: int, look: Look | None = None) -> tuple[int, ...]:
         """None."""

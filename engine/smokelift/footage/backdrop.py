@@ -239,7 +239,7 @@ def _white_noise(clip: Clip, proxy: Proxy) -> Picture:
     blocks = []
     for number, gain in zip(part.numbers, gains, strict=True):
         n = number - clip.first
-        picture = clip.frame_through(n, linear_to_srgb) if (gain == 1).all() else linear_to_srgb(clip.frame(n) / gain)
+        picture = clip.stored(n).through(linear_to_srgb) if (gain == 1).all() else linear_to_srgb(clip.frame(n) / gain)
         blocks.append(some_blocks(clip.as_seen(n, picture)))
     return white_noise(np.stack(blocks))
 

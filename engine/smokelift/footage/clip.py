@@ -8,49 +8,25 @@ from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
-from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from smokelift.checks import Remark
-from smokelift.footage.exposure import small, small_size
+from smokelift.footage.exposure import small_size
 from smokelift.footage.frame_source import ClipError, DamagedFrameError, FrameSource, Look
 from smokelift.footage.image_sequence import ImageSequence
-from smokelift.footage.images import (
-    CodedPicture,
-    Edges,
-    Picture,
-    Transfer,
-    Value,
-    add_weighted,
-    area_average,
-    chequered_averages,
-    linear_picture,
-)
+from smokelift.footage.images import Picture, Transfer
 from smokelift.footage.kept_frames import KeptFrames, keep
 from smokelift.footage.mask import FrameMask, Mask, Masked, Seen
+from smokelift.footage.stored_picture import LinearPicture, StoredPicture
 from smokelift.footage.video import Video
 from smokelift.scene import ClipSource, SceneError
 from smokelift.scene.checks import file_path
 
 __all__ = ["Clip", "ClipError", "is_video"]
 
-AnyPicture = NDArray[Any]
-Image = TypeVar("Image", Picture, Picture | CodedPicture)
-
 CACHE_BYTES = 64 * 2**20
 """Memory for the linear frames of a clip that are kept: two of 1080p."""
-
-REDUCED = 320
-"""Pixels along the longer side of the frames on which smoke and exposure are examined."""
-
-REDUCED_BYTES = 32 * 2**20
-"""Memory for such frames that are kept: twenty-five at least."""
-
-
-def _whole(picture: AnyPicture) -> AnyPicture:
-    return picture
 
 
 class Clip:
@@ -97,13 +73,8 @@ class Clip:
             raise ClipError(f"{path}: frames {first} to {last} were asked for; it has 0 to {source.count - 1}")
         self.first = first
         self._count = last - first + 1
-        self._cache: OrderedDict[int, Picture] = OrderedDict()
-        self._reduced: OrderedDict[int, Picture] = OrderedDict()
-        if size is None:
-            image = self._kept_or_coded(0)
-            height, width = (image.codes if isinstance(image, CodedPicture) else image).shape[:2]
-            size = (width, height)
-        self.size = size
+        self._cache: OrderedDict[int, LinearPicture] = OrderedDict()
+        self.size = self.stored(0).size if size is None else size
 
     @classmethod
     def open(
@@ -222,60 +193,21 @@ class Clip:
         ClipError
             If there is no such frame, or most frames of the clip are damaged.
         """
-        image = self._kept_or_coded(n)
-        return self._remembered(n, image.linear()) if isinstance(image, CodedPicture) else image
+        return self._remembered(n, LinearPicture(self.stored(n).linear())).values
 
-    def area_average(
-        self, n: int, width: int, height: int, cut: Callable[[AnyPicture], AnyPicture] = _whole
-    ) -> Picture:
-        """Return frame ``n``, or a part of it, as means of light: `images.area_average`, which may be cheaper that way.
-
-        Parameters
-        ----------
-        n
-            As of `frame`.
-        width, height
-            Of what is returned, in pixels.
-        cut
-            As of `frame_through`.
+    def stored(self, n: int) -> StoredPicture:
+        """Return frame ``n`` as it is stored, of which a part or means cost less than the linear frame.
 
         Raises
         ------
         ClipError
             As `frame` does.
         """
-        image = self._kept_or_coded(n)
-        if isinstance(image, CodedPicture):
-            return CodedPicture(cut(image.codes), image.table).averaged(width, height)
-        return area_average(cut(image), width, height)
-
-    def chequered_averages(
-        self, n: int, width: int, height: int, cut: Callable[[AnyPicture], AnyPicture], first: int
-    ) -> tuple[Picture, Picture]:
-        """Return the `images.chequered_averages` of a part of frame ``n``, which ``cut`` takes as of `frame_through`.
-
-        Raises
-        ------
-        ClipError
-            As `frame` does.
-        """
-        image = self._kept_or_coded(n)
-        part = CodedPicture(cut(image.codes), image.table) if isinstance(image, CodedPicture) else cut(image)
-        return chequered_averages(part, width, height, first)
-
-    def add_weighted(self, n: int, weights: Picture, edges: tuple[Edges, Edges], sums: Picture) -> None:
-        """Add frame ``n``, times weights of its parts, to sums: `images.add_weighted`, which may be cheaper that way.
-
-        Raises
-        ------
-        ClipError
-            As `frame` does.
-        """
-        image = self._kept_or_coded(n)
-        if isinstance(image, CodedPicture):
-            image.add_weighted(weights, edges, sums)
-        else:
-            add_weighted(image, weights, edges, sums)
+        if n in self._cache:
+            self._cache.move_to_end(n)
+            return self._cache[n]
+        image = self._read(n)
+        return self._remembered(n, image) if isinstance(image, LinearPicture) else image
 
     @property
     def mask(self) -> FrameMask | None:
@@ -304,62 +236,10 @@ class Clip:
         seen = self.seen(n, columns, rows)
         return picture if seen is None else np.where(seen[..., None], picture, np.float32(np.nan))
 
-    def _kept_or_coded(self, n: int) -> Picture | CodedPicture:
-        """Frame ``n`` as it is stored, or linear if it is not stored in codes, or has been asked for lately."""
-        if n in self._cache:
-            self._cache.move_to_end(n)
-            return self._cache[n]
-        image = self._read(n, self._source.read)
-        return image if isinstance(image, CodedPicture) else self._remembered(n, image)
-
-    def _remembered(self, n: int, image: Picture) -> Picture:
+    def _remembered(self, n: int, image: LinearPicture) -> LinearPicture:
         """A linear frame, kept for the next caller."""
-        image.flags.writeable = False
-        self._cache[n] = image
-        while len(self._cache) > max(1, CACHE_BYTES // image.nbytes):
-            self._cache.popitem(last=False)
+        keep(self._cache, n, image, CACHE_BYTES)
         return image
-
-    def frame_through(
-        self, n: int, change: Callable[[Picture], NDArray[Value]], cut: Callable[[AnyPicture], AnyPicture] = _whole
-    ) -> NDArray[Value]:
-        """Return frame ``n`` with a function applied to every linear value by itself, which may be cheaper that way.
-
-        Parameters
-        ----------
-        n
-            As of `frame`.
-        change
-            Of linear values.
-        cut
-            Takes some of the pixels (rows, columns, 3), whatever their values are; without it all are taken.
-
-        Raises
-        ------
-        ClipError
-            As `frame` does.
-        """
-        image = self._cache[n] if n in self._cache else self._read(n, self._source.read)
-        return _through(image, change, cut)
-
-    def reduced(self, n: int) -> Picture:
-        """Return frame ``n`` as means of light, with `REDUCED` pixels along the longer side at most.
-
-        Raises
-        ------
-        ClipError
-            As `frame` does.
-        """
-        if n not in self._reduced:
-            keep(self._reduced, n, self.area_average(n, *self.reduced_size), REDUCED_BYTES)
-        return self._reduced[n]
-
-    @property
-    def reduced_size(self) -> tuple[int, int]:
-        """Width and height of a `reduced` frame."""
-        width, height = self.size
-        scale = max(1.0, max(self.size) / REDUCED)
-        return max(1, round(width / scale)), max(1, round(height / scale))
 
     def expect(self, whole: Iterable[int] = (), perhaps: Iterable[int] = ()) -> None:
         """Say which frames are asked for next: those decoded while `damaged` is determined are kept.
@@ -378,18 +258,18 @@ class Clip:
             some = [self.first + n for n in perhaps if n < len(self)]
             self._source.expect([self.first + n for n in whole], some)
 
-    def _read(self, n: int, read: Callable[[int], Image]) -> Image:
+    def _read(self, n: int) -> StoredPicture:
         """Return a frame from the file, or what stands in for it: the last sound one lasts on, as when one drops."""
         if not isinstance(n, int | np.integer) or not 0 <= n < self._count:
             raise ClipError(f"{self.path}: there is no frame {n!r}; there are 0 to {self._count - 1}")
         try:
-            return read(self.first + n)
+            return self._source.read(self.first + n)
         except DamagedFrameError as error:
             damage = error
         for other in (*reversed(range(n)), *range(n + 1, self._count)):
             if other not in self.damaged:
                 with suppress(DamagedFrameError):
-                    return read(self.first + other)
+                    return self._source.read(self.first + other)
         raise damage
 
     def __len__(self) -> int:
@@ -470,11 +350,11 @@ class _Changed:
     def notes(self) -> tuple[Remark, ...]:
         return self._source.notes
 
-    def read(self, n: int) -> Picture | CodedPicture:
+    def read(self, n: int) -> StoredPicture:
         image, number = self._source.read(n), n - self._clip.first
-        if self._keeps is not None and self._keeps(number, lambda: _small(image)):
+        if self._keeps is not None and self._keeps(number, lambda: image.averaged(*small_size(*image.size))):
             return image
-        return self._change(number, linear_picture(image))
+        return LinearPicture(self._change(number, image.linear()))
 
     def damaged(self, first: int, last: int, look: Look | None = None) -> tuple[int, ...]:
         clip = self._clip
@@ -484,21 +364,6 @@ class _Changed:
 
     def close(self) -> None:
         self._source.close()
-
-
-def _small(image: Picture | CodedPicture) -> Picture:
-    if isinstance(image, CodedPicture):
-        rows, columns = image.codes.shape[:2]
-        return image.averaged(*small_size(columns, rows))
-    return small(image)
-
-
-def _through(
-    image: Picture | CodedPicture, change: Callable[[Picture], NDArray[Value]], cut: Callable[[AnyPicture], AnyPicture]
-) -> NDArray[Value]:
-    if isinstance(image, CodedPicture):
-        return CodedPicture(cut(image.codes), image.table).through(change)
-    return change(cut(image))
 
 
 def numbered(frames: Sequence[int]) -> str:

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Protocol
 
 from smokelift.checks import Remark
-from smokelift.footage.images import CodedPicture, Picture
+from smokelift.footage.stored_picture import StoredPicture
 
-Look = Callable[[int, Callable[[int], Picture | CodedPicture]], None]
-"""What takes the number of a frame and a function that makes its picture, with sides divided by a number if it can."""
+Look = Callable[[int, Callable[[], StoredPicture]], None]
+"""What takes the number of a frame and a function that makes its picture."""
 
 DEFAULT_FPS = 24.0
 """Frames a second where neither the file nor the user gives any: the rate of film."""
@@ -55,8 +55,8 @@ class FrameSource(Protocol):
         """How the pictures are read where that is not the usual way."""
         ...
 
-    def read(self, n: int) -> Picture | CodedPicture:
-        """Return a frame, linear or with its way to that; raise `DamagedFrameError` if it cannot be decoded."""
+    def read(self, n: int) -> StoredPicture:
+        """Return a frame; raise `DamagedFrameError` if it cannot be decoded."""
         ...
 
     def damaged(self, first: int, last: int, look: Look | None = None) -> tuple[int, ...]:

@@ -10,8 +10,9 @@ from pathlib import Path
 from smokelift.checks import Remark
 from smokelift.footage import lens
 from smokelift.footage.frame_source import DEFAULT_FPS, ClipError, DamagedFrameError, Look
-from smokelift.footage.images import READABLE, ImageError, Picture, Transfer, area_average, read_layer, reduction
+from smokelift.footage.images import READABLE, ImageError, Transfer, area_average, read_layer, reduction
 from smokelift.footage.layer import Layer, backdrop_of, sample_numbers
+from smokelift.footage.stored_picture import LinearPicture, StoredPicture
 
 _OTHER_PATTERN = re.compile(r"[*?]|%\d*d")
 """How a shell or another program writes the number of a picture."""
@@ -62,7 +63,7 @@ class ImageSequence:
         small = tuple(round(side / reduction(width, height)) for side in (width, height))
         return (Remark("scaled pictures", {"size": (width, height), "scaled": small}),)
 
-    def read(self, n: int) -> Picture:
+    def read(self, n: int) -> StoredPicture:
         """Return a picture, or raise ClipError if it is damaged or of another size than the first."""
         image = self._layer(n).before(self.backdrop)
         self._shape = self._shape or image.shape
@@ -73,7 +74,7 @@ class ImageSequence:
             )
         height, width = image.shape[:2]
         divisor = reduction(width, height)
-        return image if divisor == 1 else area_average(image, round(width / divisor), round(height / divisor))
+        return LinearPicture(area_average(image, round(width / divisor), round(height / divisor)))
 
     def _layer(self, n: int) -> Layer:
         try:
@@ -100,7 +101,7 @@ class ImageSequence:
         except DamagedFrameError:
             return False
         if look is not None:
-            look(n, lambda divisor: _reduced(picture, divisor))
+            look(n, lambda: picture)
         return True
 
     def close(self) -> None:
@@ -141,8 +142,3 @@ def _numbered(path: Path) -> list[Path]:
             "first picture of those that belong together"
         )
     return [found.get(n) or path.with_name(f"{prefix}{n:0{len(number)}d}{suffix}") for n in range(start, last + 1)]
-
-
-def _reduced(picture: Picture, divisor: int) -> Picture:
-    rows, columns = picture.shape[:2]
-    return picture if divisor == 1 else area_average(picture, max(1, columns // divisor), max(1, rows // divisor))

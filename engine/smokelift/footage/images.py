@@ -13,7 +13,6 @@ import re
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, redirect_stdout
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal, TypeVar
@@ -31,7 +30,6 @@ from smokelift.scene import LARGEST_PICTURE
 
 Picture = npt.NDArray[np.float32]
 Transfer = Literal["srgb", "linear"]
-Edges = npt.NDArray[np.int32]
 Value = TypeVar("Value", np.float32, np.uint16)
 Number = TypeVar("Number", np.float32, np.float64)
 
@@ -50,78 +48,6 @@ LOOK_UPS = 2**16
 
 class ImageError(ValueError):
     """A picture that cannot be read or written."""
-
-
-@dataclass(frozen=True, eq=False)
-class CodedPicture:
-    """An opaque picture as the integers that it is stored in: a quarter of the memory, at 8 bits, of linear values.
-
-    Attributes
-    ----------
-    codes : (rows, columns, 3) uint8 or uint16
-        Row 0 at the top.
-    table : (n,) float32
-        Linear value of each code.
-    """
-
-    codes: npt.NDArray[np.uint8] | npt.NDArray[np.uint16]
-    table: Picture
-
-    @property
-    def nbytes(self) -> int:
-        """Memory that it takes; the table is that of many pictures."""
-        return self.codes.nbytes
-
-    def linear(self) -> Picture:
-        """Return the linear picture (rows, columns, 3)."""
-        return self.through(lambda values: values)
-
-    def through(self, change: Callable[[Picture], npt.NDArray[Value]]) -> npt.NDArray[Value]:
-        """Return the picture with a function applied to every linear value, which is called for each code once."""
-        return look_up(change(self.table), self.codes)
-
-    def averaged(self, width: int, height: int) -> Picture:
-        """Return the `area_average` of the linear picture, which is not made as a whole where codes have 8 bits."""
-        rows = self.codes.shape[0]
-        if not 1 <= height < rows:
-            return area_average(self.linear(), width, height)
-        return area_average(self.sum_lines(_weights(rows, height)), width, height)
-
-    def sum_lines(self, weights: scipy.sparse.csr_array) -> Picture:
-        """Return sums (n, columns, 3) of the lines of the linear picture, each of weights (n, rows)."""
-        if self.codes.dtype != np.uint8:
-            return _sum_lines(self.linear(), weights)
-        codes = np.asarray(self.codes, np.uint8)
-        return _core.sum_lines(codes, self.table, weights.indptr, weights.indices, weights.data)
-
-    def add_weighted(self, weights: Picture, edges: tuple[Edges, Edges], sums: Picture) -> None:
-        """Add the linear picture, times weights of its parts, to sums.
-
-        Parameters
-        ----------
-        weights : (m, n, 3)
-            Of the parts.
-        edges : (m + 1,), (n + 1,)
-            Row, and column, where each part begins, and where the last ends.
-        sums : (rows, columns, 3)
-            Changed.
-        """
-        if self.codes.dtype == np.uint8:
-            _core.add_weighted(np.asarray(self.codes, np.uint8), self.table, weights, *edges, sums)
-        else:
-            add_weighted(self.linear(), weights, edges, sums)
-
-
-def linear_picture(image: Picture | CodedPicture) -> Picture:
-    """Return a picture that may be as it is stored in linear light."""
-    return image.linear() if isinstance(image, CodedPicture) else image
-
-
-def add_weighted(picture: Picture, weights: Picture, edges: tuple[Edges, Edges], sums: Picture) -> None:
-    """Do to a linear picture what `CodedPicture.add_weighted` does."""
-    lines, columns = edges
-    for low, high, each in zip(lines[:-1], lines[1:], np.repeat(weights, np.diff(columns), axis=1), strict=True):
-        sums[low:high] += picture[low:high] * each
 
 
 def look_up(values: npt.NDArray[Value], codes: npt.NDArray[np.uint8] | npt.NDArray[np.uint16]) -> npt.NDArray[Value]:
@@ -364,43 +290,12 @@ def area_average(image: npt.ArrayLike, width: int, height: int) -> Picture:
     values = np.asarray(image, np.float32)
     rows, columns = values.shape[:2]
     if rows != height:
-        values = _sum_lines(values, _weights(rows, height))
+        values = sum_lines(values, area_weights(rows, height))
     if columns != width:
-        weights, shape = _weights(columns, width), (height, width, *values.shape[2:])
+        weights, shape = area_weights(columns, width), (height, width, *values.shape[2:])
         channels = values.reshape(height, columns, -1)
         values = _core.sum_columns(channels, weights.indptr, weights.indices, weights.data).reshape(shape)
     return np.ascontiguousarray(values)
-
-
-def chequered_averages(image: Picture | CodedPicture, width: int, height: int, first: int) -> tuple[Picture, Picture]:
-    """Resize a picture twice: by the pixels of either colour of a chequerboard, as `area_average` does by all of them.
-
-    Parameters
-    ----------
-    image : (rows, columns, 3)
-        Linear, or as it is stored.
-    width, height
-        The new size in pixels.
-    first
-        0 if the pixel at the top left belongs to the first of the two pictures, 1 if to the second.
-    """
-    rows, columns = (image.codes if isinstance(image, CodedPicture) else image).shape[:2]
-    sums, shares = [], []
-    for odd in (0, 1):
-        weights = _weights(rows, height).copy()
-        weights.data[weights.indices % 2 != odd] = 0
-        weights.eliminate_zeros()
-        sums.append(image.sum_lines(weights) if isinstance(image, CodedPicture) else _sum_lines(image, weights))
-        shares.append(np.repeat(_sum_lines(np.ones((rows, 1), np.float32), weights), columns, axis=1))
-
-    def average(colour: int) -> Picture:
-        """The mean of the pixels whose row and column add up to an even number, or to an odd one."""
-        light, share = sums[colour].copy(), shares[colour].copy()
-        light[:, 1::2], share[:, 1::2] = sums[1 - colour][:, 1::2], shares[1 - colour][:, 1::2]
-        weight = np.maximum(area_average(share, width, height), np.float32(1e-6))
-        return np.asarray(area_average(light, width, height) / weight[..., None], np.float32)
-
-    return average(first), average(1 - first)
 
 
 def brightest_channel(values: npt.NDArray[Number]) -> npt.NDArray[Number]:
@@ -423,8 +318,8 @@ def blurred(picture: Picture, deviation: float) -> Picture:
     return _core.blur_picture(picture, _gaussian(deviation))
 
 
-def _sum_lines(values: Picture, weights: scipy.sparse.csr_array) -> Picture:
-    """Sums (n, ...) of the lines of a picture (rows, ...), each of weights (n, rows)."""
+def sum_lines(values: Picture, weights: scipy.sparse.csr_array) -> Picture:
+    """Return sums (n, ...) of the lines of a picture (rows, ...), each of weights (n, rows)."""
     return np.asarray(weights @ values.reshape(len(values), -1)).reshape(-1, *values.shape[1:])
 
 
@@ -438,7 +333,7 @@ def _gaussian(deviation: float) -> npt.NDArray[np.float64]:
 
 
 @lru_cache
-def _weights(old: int, new: int) -> scipy.sparse.csr_array:
+def area_weights(old: int, new: int) -> scipy.sparse.csr_array:
     """Return the sparse (new, old) matrix whose rows are the weights of one new pixel."""
     if new > old:
         position = np.clip((np.arange(new) + 0.5) * (old / new) - 0.5, 0.0, old - 1.0)

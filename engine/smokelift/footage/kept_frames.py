@@ -9,9 +9,9 @@ from typing import TypeVar
 
 from smokelift.checks import Remark
 from smokelift.footage.frame_source import FrameSource, Look
-from smokelift.footage.images import CodedPicture, Picture
+from smokelift.footage.stored_picture import StoredPicture
 
-Image = TypeVar("Image", Picture, Picture | CodedPicture)
+Image = TypeVar("Image", bound=StoredPicture)
 
 KEPT_BYTES = 128 * 2**20
 """Memory for the frames of a file that are kept as they are stored: twenty of 1080p at 8 bits, for what looks at the
@@ -35,8 +35,8 @@ class KeptFrames:
 
     def __init__(self, source: FrameSource) -> None:
         self._source = source
-        self._kept: OrderedDict[int, Picture | CodedPicture] = OrderedDict()
-        self._decoded: dict[int, Callable[[int], Picture | CodedPicture]] = {}
+        self._kept: OrderedDict[int, StoredPicture] = OrderedDict()
+        self._decoded: dict[int, Callable[[], StoredPicture]] = {}
         self._damaged: dict[tuple[int, int], tuple[int, ...]] = {}
         self._expected = _Expected()
         self.count, self.fps, self.warning = source.count, source.fps, source.warning
@@ -46,11 +46,11 @@ class KeptFrames:
     def notes(self) -> tuple[Remark, ...]:
         return self._source.notes
 
-    def read(self, n: int) -> Picture | CodedPicture:
+    def read(self, n: int) -> StoredPicture:
         if n in self._kept:
             self._kept.move_to_end(n)
             return self._kept[n]
-        image = self._decoded[n](1) if n in self._decoded else self._source.read(n)
+        image = self._decoded[n]() if n in self._decoded else self._source.read(n)
         keep(self._kept, n, image, KEPT_BYTES)
         return image
 
@@ -66,9 +66,9 @@ class KeptFrames:
     def damaged(self, first: int, last: int, look: Look | None = None) -> tuple[int, ...]:
         expected = self._expected
 
-        def look_at(n: int, picture: Callable[[int], Picture | CodedPicture]) -> None:
+        def look_at(n: int, picture: Callable[[], StoredPicture]) -> None:
             if n in expected.whole and n not in self._kept:
-                keep(self._kept, n, picture(1), KEPT_BYTES)
+                keep(self._kept, n, picture(), KEPT_BYTES)
             if n in expected.perhaps and n not in self._kept:
                 self._decoded[n] = picture
             if look is not None:
@@ -84,7 +84,7 @@ class KeptFrames:
 
 def keep(kept: OrderedDict[int, Image], key: int, image: Image, most: int) -> None:
     """Put a picture, which is read-only from now on, beside the last ones in so many bytes."""
-    (image.codes if isinstance(image, CodedPicture) else image).flags.writeable = False
+    image.lock()
     kept[key] = image
     while len(kept) > max(1, most // image.nbytes):
         kept.popitem(last=False)

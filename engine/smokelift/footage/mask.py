@@ -23,7 +23,8 @@ from smokelift.checks import Remark
 from smokelift.footage.behind_smoke import push_pull
 from smokelift.footage.frame_source import ClipError, FrameSource, Look
 from smokelift.footage.image_sequence import ImageSequence, is_pattern
-from smokelift.footage.images import CodedPicture, Picture, area_average, linear_picture, read_image
+from smokelift.footage.images import Picture, area_average, read_image
+from smokelift.footage.stored_picture import StoredPicture
 from smokelift.footage.video import Video
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
@@ -100,7 +101,7 @@ class Mask:
         if not ImageSequence.reads(path):
             self._video = video = Video(path, "linear")
             self.files, self.count = video.files, video.count
-            self._read = lambda n: linear_picture(video.read(n))
+            self._read = lambda n: video.read(n).linear()
         elif is_pattern(path):
             self.files = ImageSequence(path, "linear", None).files
             self.count = len(self.files)
@@ -182,13 +183,13 @@ class Masked:
     def notes(self) -> tuple[Remark, ...]:
         return self.filmed.notes
 
-    def read(self, n: int) -> Picture | CodedPicture:
+    def read(self, n: int) -> StoredPicture:
         return self._continued(n, self.filmed.read(n))
 
     def damaged(self, first: int, last: int, look: Look | None = None) -> tuple[int, ...]:
-        def look_at(n: int, picture: Callable[[int], Picture | CodedPicture]) -> None:
+        def look_at(n: int, picture: Callable[[], StoredPicture]) -> None:
             if look is not None:
-                look(n, lambda divisor: self._continued(n, picture(divisor)))
+                look(n, lambda: self._continued(n, picture()))
 
         return self.filmed.damaged(first, last, look_at)
 
@@ -196,20 +197,9 @@ class Masked:
         self.filmed.close()
         self.mask.close()
 
-    def _continued(self, n: int, image: Picture | CodedPicture) -> Picture | CodedPicture:
-        rows, columns = (image.codes if isinstance(image, CodedPicture) else image).shape[:2]
-        seen = self.mask.seen(n, columns, rows)
-        if seen.all():
-            return image
-        around = continued(linear_picture(image), seen)
-        if isinstance(image, CodedPicture):
-            codes = image.codes.copy()
-            values = np.searchsorted(image.table, around).clip(max=len(image.table) - 1)
-            codes[~seen] = values.astype(codes.dtype)
-            return CodedPicture(codes, image.table)
-        whole = image.copy()
-        whole[~seen] = around
-        return whole
+    def _continued(self, n: int, image: StoredPicture) -> StoredPicture:
+        seen = self.mask.seen(n, *image.size)
+        return image if seen.all() else image.filled(~seen, continued(image.linear(), seen))
 
 
 def continued(picture: Picture, seen: Seen) -> Picture:

@@ -108,7 +108,7 @@ class _Shown:
         clip, turns = self._clip, self._panorama.turns
         if clip.first <= n < clip.first + len(clip):
             return turns.rotations[n - clip.first]
-        turn = turns.of(self._whole.area_average(n, *proxy_size(*clip.size)))
+        turn = turns.of(self._whole.stored(n).averaged(*proxy_size(*clip.size)))
         if turn is None:
             raise ClipError(f"{clip.path}: frame {n} does not show what the clip does")
         return turn

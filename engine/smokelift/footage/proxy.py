@@ -74,7 +74,7 @@ class Proxy:
             inside = first <= number <= last
             of, own = (clip, number - first) if inside else (whole, number)
             with suppress(*() if inside else (ClipError,)):
-                pictures[number] = of.area_average(own, columns, rows)
+                pictures[number] = of.stored(own).averaged(columns, rows)
                 shown = of.seen(own, columns, rows)
                 seen.append(np.ones((rows, columns), np.bool_) if shown is None else shown)
         scale = max(clip.size) / max(columns, rows)
@@ -155,7 +155,7 @@ def _cut(clip: Clip, last: int, first: int, before: Picture, after: Picture) -> 
     whole = clip.whole()
     while first - last > 1:
         middle = (last + first) // 2
-        picture = whole.area_average(middle, columns, rows)
+        picture = whole.stored(middle).averaged(columns, rows)
         if _alike(before, picture) >= _alike(picture, after):
             last = middle
         else:

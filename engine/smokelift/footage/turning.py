@@ -262,7 +262,7 @@ def find_turns(clip: Clip, *lenses: Array) -> Turns | None:
     """
     size, middle = proxy_size(*clip.size), len(clip) // 2
     scale = np.diag([size[0] / clip.size[0], size[1] / clip.size[1], 1.0])
-    keys = [Key(clip.area_average(middle, *size), scale @ lens) for lens in lenses]
+    keys = [Key(clip.stored(middle).averaged(*size), scale @ lens) for lens in lenses]
     if keys[0].textured.sum() < MIN_CELLS or _stands_still(clip, keys[0], size):
         return None
     for lens, key in zip(lenses, keys, strict=True):
@@ -288,7 +288,7 @@ def _followed(clip: Clip, key: Key, size: tuple[int, int]) -> tuple[dict[int, Ro
     for numbers in (range(middle + 1, len(clip)), range(middle - 1, -1, -1)):
         turn, before = still, len(lost)
         for number in numbers:
-            detail = detail_of(clip.area_average(number, *size))
+            detail = detail_of(clip.stored(number).averaged(*size))
             laid, stands = key.lay(detail, turn), key.compare(detail, still).stands
             if laid.explained:
                 turn, moving = laid.turn, moving + (not stands)
@@ -317,7 +317,7 @@ def _stands_still(clip: Clip, key: Key, size: tuple[int, int]) -> bool:
     """Whether most of some frames show all where it was, and a turn explains none of the others better."""
     stands = list[bool]()
     for number in set(clip.spread(FIRST_FRAMES)) - {len(clip) // 2}:
-        detail = detail_of(clip.area_average(number, *size))
+        detail = detail_of(clip.stored(number).averaged(*size))
         stands.append(key.compare(detail, Rotation.identity()).stands)
         if not stands[-1] and key.lay(detail, Rotation.identity()).explained:
             return False

@@ -36,7 +36,6 @@ from smokelift.footage.container import lacks_index, open_container
 from smokelift.footage.frame_source import DEFAULT_FPS, ClipError, DamagedFrameError, Look
 from smokelift.footage.images import (
     MAX_PIXELS,
-    CodedPicture,
     Picture,
     Transfer,
     area_average,
@@ -47,6 +46,7 @@ from smokelift.footage.images import (
     srgb_to_linear,
 )
 from smokelift.footage.layer import Layer, backdrop_of, sample_numbers
+from smokelift.footage.stored_picture import CodedPicture, LinearPicture, StoredPicture
 from smokelift.scene import LARGEST_PICTURE
 
 _EXACT = int(Interpolation.ACCURATE_RND | Interpolation.FULL_CHR_H_INT | Interpolation.FULL_CHR_H_INP)
@@ -240,19 +240,19 @@ class Video:
         """Close the file."""
         self._container.close()
 
-    def read(self, n: int) -> Picture | CodedPicture:
+    def read(self, n: int) -> StoredPicture:
         """Return a frame, or raise `DamagedFrameError`."""
         return self._shown_by(self._decode(self._shown[n]))
 
-    def _shown_by(self, frame: av.VideoFrame, divisor: int = 1) -> Picture | CodedPicture:
-        """What a frame shows; its sides are divided by a number if its pixels need no more than a table."""
+    def _shown_by(self, frame: av.VideoFrame) -> StoredPicture:
+        """What a frame shows."""
         if (
             _has_alpha(frame)
             or frame.interlaced_frame
             or primaries_name(self._stream.codec_context.color_primaries) is not None
         ):
-            return self._layer(frame).before(self.backdrop)
-        codes = self._codes(frame, divisor)
+            return LinearPicture(self._layer(frame).before(self.backdrop))
+        codes = self._codes(frame)
         upright = np.ascontiguousarray(_upright(codes, frame))
         return CodedPicture(upright, code_values(np.iinfo(codes.dtype).max, self._encoding(), _white(frame)))
 
@@ -268,7 +268,7 @@ class Video:
         def pass_on(time: int, frame: av.VideoFrame) -> None:
             for n in numbers.get(time, ()):
                 if look is not None:
-                    look(n, lambda divisor: self._shown_by(frame, divisor))
+                    look(n, lambda: self._shown_by(frame))
 
         from_start = self._failed and wanted[0] == self._times[0]  # and one frame at a time
         self._container.seek(wanted[0], stream=self._stream)
@@ -366,7 +366,7 @@ class Video:
         """How the codes stand for light; None is sRGB."""
         return self._transfer or ENCODINGS.get(self._stream.codec_context.color_trc)
 
-    def _codes(self, frame: av.VideoFrame, divisor: int = 1) -> npt.NDArray[Any]:
+    def _codes(self, frame: av.VideoFrame) -> npt.NDArray[Any]:
         """RGB, and alpha if there is any, in codes; of an interlaced frame the even lines."""
         wide = max(component.bits for component in frame.format.components) > 8
         alpha = _has_alpha(frame)
@@ -378,7 +378,7 @@ class Video:
             raise ClipError(
                 f"{self._path}: changes its picture size from {size[0]} x {size[1]} to {frame.width} x {frame.height}"
             )
-        width, height = (max(1, side // divisor) for side in self._size())
+        width, height = self._size()
         interlaced = bool(frame.interlaced_frame)
         shown = self._field(frame) if interlaced else frame
         way = _SHRINKING if width < size[0] else _GROWING

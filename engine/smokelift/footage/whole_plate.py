@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from smokelift.footage.behind_smoke import DETAIL_QUANTILE
 from smokelift.footage.clear_picture import ClearPicture
 from smokelift.footage.clip import Clip
-from smokelift.footage.images import Edges, Picture, area_average, linear_to_srgb, srgb_to_linear
+from smokelift.footage.images import Picture, area_average, linear_to_srgb, srgb_to_linear
 from smokelift.footage.proxy import Proxy
+from smokelift.footage.stored_picture import Edges
 
 STEP = 2
 """Every so manieth frame is read whole: half of those that are examined."""
@@ -83,7 +84,7 @@ def _mean(clip: Clip, numbers: tuple[int, ...], gains: Picture, shown: NDArray[n
     total = np.zeros((height, width, 3), np.float32)
     times = shown.sum(0, dtype=np.float32)[..., None]
     for number, gain, clear in zip(numbers, gains, shown, strict=True):
-        file.add_weighted(number, clear[..., None] / (gain * times), (down, across), total)
+        file.stored(number).add_weighted(clear[..., None] / (gain * times), (down, across), total)
     return total
 
 

@@ -51,8 +51,8 @@ class WorkingPicture:
         return area_average(self.part(picture), columns, rows)
 
     def of(self, clip: Clip, number: int) -> Picture:
-        """Return the small picture of a clip's frame; see `Clip.area_average`."""
-        return clip.area_average(number, *self.camera.size, self.part)
+        """Return the small picture of a clip's frame."""
+        return clip.stored(number).cut(self.part).averaged(*self.camera.size)
 
 
 class CameraError(ValueError):

@@ -91,7 +91,7 @@ def beside_clip(
     behind = cut(plate.image)
     renderer = optics.renderer(camera.resized(columns, rows), behind, density > 0)
     shown = renderer.image(density)
-    seen = view.clip.area_average(frame, columns, rows, cut)
+    seen = view.clip.stored(frame).cut(cut).averaged(columns, rows)
     shrink = max(1.0, max(working.width, working.height) / OUTLINE_PIXELS)
     small = working.resized(*(max(1, round(side / shrink)) for side in (working.width, working.height)))
     smoke = matte(small.of(view.clip, frame), plate.through(small.cut, small.pixels)).mask

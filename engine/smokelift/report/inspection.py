@@ -58,7 +58,7 @@ def inspection_page(shot: Shot, given: Scene, known: Sequence[Fact], remarks: It
     pixels = shot.clip.size[0] * shot.clip.size[1] / (columns * rows)
     whole = shot.views[0].plates.through(lambda full: area_average(full, columns, rows), pixels)
     plate = whole.at(number)
-    picture = shot.clip.area_average(number, columns, rows)
+    picture = shot.clip.stored(number).averaged(columns, rows)
     seen = matte(picture, plate)
     camera = shot.scene.camera.at(number).resized(columns, rows)
     unknown = unknown_part(whole, shot.clip, number)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from smokelift.footage.matte import matte
 from smokelift.footage.plate import Plate
+from smokelift.footage.stored_picture import chequered_averages
 from smokelift.footage.working_picture import CameraError, working_picture
 from smokelift.render import Image
 from smokelift.scene import Camera, CompleteScene, Domain, Light, Scattering
@@ -191,7 +192,7 @@ def _coarse_view(view: ShotView, number: int, domain: Domain) -> CoarseView:
     first = (working.top + working.left) % 2  # the colours are those of the whole picture's pixels
 
     def halves() -> tuple[Image, Image]:
-        return view.clip.chequered_averages(number, *working.camera.size, working.part, first)
+        return chequered_averages(view.clip.stored(number).cut(working.part), *working.camera.size, first)
 
     plate = view.plates.at(number).through(working.cut, working.pixels)
     return CoarseView(working.camera, plate, working.of(view.clip, number), halves)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.footage.clip import REDUCED, Clip
+from smokelift.footage.clip import Clip
 from smokelift.footage.exposure import largest_change, small
 from smokelift.footage.images import area_average
 from smokelift.footage.matte import matte
@@ -16,8 +16,8 @@ from smokelift.footage.plate import Plates
 from smokelift.footage.steady import exposures
 from smokelift.setup.thickness import seen_texture
 
-SAMPLES = 16
-"""Frames that are examined."""
+SAMPLES, LONGEST = 16, 320
+"""Frames that are examined, and pixels along their longer side."""
 
 UNKNOWN = 0.5
 """Confidence of a plate below which what is behind the smoke is unknown there."""
@@ -89,8 +89,8 @@ def sample_smoke(clip: Clip, plates: Plates, corner: tuple[int, int] = (0, 0)) -
         Left and top of its pictures in pixels of the camera's.
     """
     width, height = clip.size
-    scale = max(1.0, max(width, height) / REDUCED)
-    columns, rows = clip.reduced_size
+    scale = max(1.0, max(width, height) / LONGEST)
+    columns, rows = (max(1, round(side / scale)) for side in (width, height))
     covered, unknown = np.zeros((2, rows, columns), np.bool_)
     colours, behind, textures = [], [], []
     gains: dict[int, NDArray[np.float32]] = {}
@@ -99,8 +99,9 @@ def sample_smoke(clip: Clip, plates: Plates, corner: tuple[int, int] = (0, 0)) -
     gains_of = exposures(reduced)
     for number in clip.spread(SAMPLES):
         plate = reduced.at(number)
-        gains[number] = gains_of(number, small(clip.reduced(number)))
-        picture = clip.reduced(number) / gains[number]
+        seen = clip.stored(number).averaged(columns, rows)
+        gains[number] = gains_of(number, small(seen))
+        picture = seen / gains[number]
         mask = matte(picture, plate).mask
         covered |= mask
         unknown |= unknown_part(reduced, clip, number)

@@ -14,7 +14,8 @@ from PIL import Image
 
 from smokelift.checks import Remark
 from smokelift.footage.clip import Clip, ClipError
-from smokelift.footage.images import CodedPicture, Picture, area_average, linear_to_srgb, srgb_to_linear
+from smokelift.footage.images import Picture, area_average, linear_to_srgb, srgb_to_linear
+from smokelift.footage.stored_picture import CodedPicture, StoredPicture
 from smokelift.footage.video import Video
 from smokelift.output.images import write_image
 from smokelift.scene import ClipSource
@@ -225,29 +226,20 @@ def test_a_frame_through_a_function_is_the_function_of_the_frame(tmp_path: Path)
     for path in (video, tmp_path / "alpha.png"):
         with Clip.open(path) as clip, Clip.open(path) as other:
             last = len(clip) - 1
-            found = clip.frame_through(last, linear_to_srgb)
+            found = clip.stored(last).through(linear_to_srgb)
             assert found.dtype == np.float32
             assert np.array_equal(found, linear_to_srgb(other.frame(last)))
-            some = clip.frame_through(last, linear_to_srgb, lambda picture: picture[3:9, ::2])
+            some = clip.stored(last).cut(lambda picture: picture[3:9, ::2]).through(linear_to_srgb)
             assert np.array_equal(some, found[3:9, ::2])
             with pytest.raises(ClipError, match="no frame"):
-                clip.frame_through(last + 1, linear_to_srgb)
-
-
-def test_reduced_frames_are_means_of_light_and_kept(tmp_path: Path) -> None:
-    random = np.random.default_rng(4)
-    with Clip.open(encode(tmp_path / "wide.mp4", random.integers(0, 256, (2, 32, 700, 3), np.uint8))) as clip:
-        found = clip.reduced(1)
-        assert found.shape == (15, 320, 3)
-        assert np.array_equal(found, area_average(clip.frame(1), 320, 15))
-        assert clip.reduced(1) is found
+                clip.stored(last + 1)
 
 
 def test_frames_are_decoded_once_for_all_clips_of_a_file(ramp: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     read: list[int] = []
     own = Video.read
 
-    def counted(video: Video, n: int) -> Picture | CodedPicture:
+    def counted(video: Video, n: int) -> StoredPicture:
         read.append(n)
         return own(video, n)
 
@@ -312,7 +304,7 @@ def test_a_part_is_averaged_as_of_the_linear_frame(tmp_path: Path) -> None:
     with Clip.open(path) as clip, Clip.open(path) as other:
         whole = other.frame(1)
         for shown in (clip, clip.changed(lambda _, picture: picture / 1, lambda n, _: n == 1), other):
-            found = shown.area_average(1, 9, 5, lambda picture: picture[3:20, 7:50])
+            found = shown.stored(1).cut(lambda picture: picture[3:20, 7:50]).averaged(9, 5)
             assert np.array_equal(found, area_average(whole[3:20, 7:50], 9, 5))
 
 

@@ -16,15 +16,11 @@ from scipy import ndimage
 
 from smokelift import _core
 from smokelift.footage.images import (
-    CodedPicture,
     ImageError,
-    add_weighted,
     area_average,
     blurred,
     brightest_channel,
     channel_mean,
-    chequered_averages,
-    code_values,
     decode_integers,
     linear_to_srgb,
     read_image,
@@ -246,36 +242,6 @@ def test_a_damaged_exr_leaves_the_standard_streams_alone(tmp_path, capfd) -> Non
     assert capfd.readouterr() == ("", "")
 
 
-@pytest.mark.parametrize("size", [(7, 5), (31, 40), (64, 48), (80, 40)])
-def test_averages_of_codes_are_those_of_the_linear_picture_to_the_last_bit(size: tuple[int, int]) -> None:
-    random = np.random.default_rng(0)
-    for dtype in (np.uint8, np.uint16):
-        top = np.iinfo(dtype).max
-        picture = CodedPicture(random.integers(0, top, (48, 64, 3), dtype, endpoint=True), code_values(top))
-        for part in (np.s_[:], np.s_[3:41, 5:60]):
-            some = CodedPicture(picture.codes[part], picture.table)
-            assert np.array_equal(some.averaged(*size), area_average(picture.linear()[part], *size))
-    with pytest.raises(ValueError, match="at least one pixel"):
-        picture.averaged(4, 0)
-
-
-@pytest.mark.parametrize("size", [(7, 5), (31, 40), (64, 48), (80, 60)])
-@pytest.mark.parametrize("first", [0, 1])
-def test_averages_of_a_chequerboard_are_those_of_its_pixels_to_the_last_bit(size: tuple[int, int], first: int) -> None:
-    random = np.random.default_rng(0)
-    rows, columns = np.indices((48, 64))
-    for dtype in (np.uint8, np.uint16):
-        top = np.iinfo(dtype).max
-        picture = CodedPicture(random.integers(0, top, (48, 64, 3), dtype, endpoint=True), code_values(top))
-        linear = picture.linear()
-        for colour in (0, 1):
-            share = ((rows + columns) % 2 == (first + colour) % 2).astype(np.float32)
-            weight = np.maximum(area_average(share, *size), np.float32(1e-6))
-            expected = area_average(linear * share[..., None], *size) / weight[..., None]
-            for image in (picture, linear):
-                assert np.array_equal(chequered_averages(image, *size, first)[colour], expected)
-
-
 @pytest.mark.parametrize("channels", [1, 3, 7])
 def test_columns_are_summed_as_by_a_sparse_matrix_to_the_last_bit(channels: int) -> None:
     random = np.random.default_rng(0)
@@ -285,21 +251,6 @@ def test_columns_are_summed_as_by_a_sparse_matrix_to_the_last_bit(channels: int)
     turned = np.ascontiguousarray(np.swapaxes(values, 0, 1)).reshape(31, -1)
     expected = np.swapaxes((weights @ turned).reshape(12, 9, channels), 0, 1)
     assert np.array_equal(_core.sum_columns(values, weights.indptr, weights.indices, weights.data), expected)
-
-
-@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
-def test_codes_are_added_as_the_linear_picture_to_the_last_bit(dtype: type) -> None:
-    random, top = np.random.default_rng(0), np.iinfo(dtype).max
-    picture = CodedPicture(random.integers(0, top, (20, 36, 3), dtype, endpoint=True), code_values(top))
-    edges = np.array([0, 3, 3, 20], np.int32), np.array([0, 1, 18, 30, 36], np.int32)
-    weights, sums = random.random((3, 4, 3), np.float32), random.random((20, 36, 3), np.float32)
-    lines, columns = (np.diff(each) for each in edges)
-    expected = sums + picture.linear() * np.repeat(np.repeat(weights, lines, axis=0), columns, axis=1)
-    others = sums.copy()
-    picture.add_weighted(weights, edges, sums)
-    add_weighted(picture.linear(), weights, edges, others)
-    assert np.array_equal(sums, expected)
-    assert np.array_equal(others, expected)
 
 
 @pytest.mark.parametrize("shape", [(20, 41), (9, 30, 3), (3, 5, 2), (1, 1)])

@@ -13,9 +13,10 @@ from smokelift.checks import Remark
 from smokelift.footage.backdrop import find_backdrop
 from smokelift.footage.clip import Clip
 from smokelift.footage.frame_source import Look
-from smokelift.footage.images import CodedPicture, code_values, linear_to_srgb, srgb_to_linear
+from smokelift.footage.images import code_values, linear_to_srgb, srgb_to_linear
 from smokelift.footage.mask import Mask, Masked
 from smokelift.footage.plate import Plate
+from smokelift.footage.stored_picture import CodedPicture
 
 COUNT = 16
 SIZE = (80, 1280)

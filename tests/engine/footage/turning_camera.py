@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import linear_to_srgb, srgb_to_linear
+from smokelift.footage.stored_picture import LinearPicture
 from smokelift.footage.turning import moved
 
 SIZE, MARGIN, COUNT = (240, 180), 60, 12
@@ -58,8 +59,8 @@ class Frames:
     def __init__(self, frames: np.ndarray) -> None:
         self.frames, self.count = frames, len(frames)
 
-    def read(self, n: int) -> np.ndarray:
-        return self.frames[n].copy()
+    def read(self, n: int) -> LinearPicture:
+        return LinearPicture(self.frames[n].copy())
 
     def close(self) -> None:
         pass
