@@ -241,22 +241,12 @@ class Clip:
         keep(self._cache, n, image, CACHE_BYTES)
         return image
 
-    def expect(self, whole: Iterable[int] = (), perhaps: Iterable[int] = ()) -> None:
-        """Say which frames are asked for next: those decoded while `damaged` is determined are kept.
-
-        It has no effect on a clip whose frames are `changed`.
-
-        Parameters
-        ----------
-        whole
-            Numbers of frames.
-        perhaps
-            Numbers of frames of which some are asked for: they are kept as they are decoded, in `DECODED_BYTES` if that
-            holds them all, until other frames are expected.
+    def expect(self, numbers: Iterable[int] = ()) -> None:
+        """Say which frames are asked for next: those decoded while `damaged` is determined are kept, the first of these
+        numbers before the others. It has no effect on a clip whose frames are `changed`.
         """
         if isinstance(self._source, KeptFrames):
-            some = [self.first + n for n in perhaps if n < len(self)]
-            self._source.expect([self.first + n for n in whole], some)
+            self._source.expect([self.first + n for n in numbers if n < len(self)])
 
     def _read(self, n: int) -> StoredPicture:
         """Return a frame from the file, or what stands in for it: the last sound one lasts on, as when one drops."""

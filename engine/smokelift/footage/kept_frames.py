@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import TypeVar
 
 from smokelift.checks import Remark
@@ -22,14 +21,6 @@ DECODED_BYTES = 256 * 2**20
 takes half of that."""
 
 
-@dataclass(frozen=True)
-class _Expected:
-    """Frames of a source that are asked for next: for certain, or perhaps."""
-
-    whole: frozenset[int] = frozenset()
-    perhaps: frozenset[int] = frozenset()
-
-
 class KeptFrames:
     """The frames of a source, of which the last ones read are kept for all clips that share it."""
 
@@ -38,7 +29,7 @@ class KeptFrames:
         self._kept: OrderedDict[int, StoredPicture] = OrderedDict()
         self._decoded: dict[int, Callable[[], StoredPicture]] = {}
         self._damaged: dict[tuple[int, int], tuple[int, ...]] = {}
-        self._expected = _Expected()
+        self._expected = frozenset[int]()
         self.count, self.fps, self.warning = source.count, source.fps, source.warning
         self.files, self.lens, self.backdrop = source.files, source.lens, source.backdrop
 
@@ -49,27 +40,19 @@ class KeptFrames:
     def read(self, n: int) -> StoredPicture:
         if n in self._kept:
             self._kept.move_to_end(n)
-            return self._kept[n]
-        image = self._decoded[n]() if n in self._decoded else self._source.read(n)
-        keep(self._kept, n, image, KEPT_BYTES)
-        return image
+        else:
+            keep(self._kept, n, self._decoded[n]() if n in self._decoded else self._source.read(n), KEPT_BYTES)
+        return self._kept[n]
 
-    def expect(self, whole: Sequence[int], perhaps: Sequence[int]) -> None:
-        size = max((image.nbytes for image in self._kept.values()), default=0)
+    def expect(self, numbers: Sequence[int]) -> None:
+        """Keep frames as they are decoded while damage is looked for, as many as fit, until others are expected."""
+        size = max((image.nbytes for image in self._kept.values()), default=1)
         self._decoded.clear()
-        self._expected = _Expected(
-            # of larger pictures the first would be gone before the last is there
-            frozenset(whole if len(whole) * size <= KEPT_BYTES else ()),
-            frozenset(perhaps if len(perhaps) * size <= DECODED_BYTES else ()),
-        )
+        self._expected = frozenset(numbers[: DECODED_BYTES // size])
 
     def damaged(self, first: int, last: int, look: Look | None = None) -> tuple[int, ...]:
-        expected = self._expected
-
         def look_at(n: int, picture: Callable[[], StoredPicture]) -> None:
-            if n in expected.whole and n not in self._kept:
-                keep(self._kept, n, picture(), KEPT_BYTES)
-            if n in expected.perhaps and n not in self._kept:
+            if n in self._expected and n not in self._kept:
                 self._decoded[n] = picture
             if look is not None:
                 look(n, picture)

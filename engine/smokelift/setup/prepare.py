@@ -151,8 +151,8 @@ def _expect(clip: Clip, scene: Scene) -> None:
     """Say which frames are examined, so that each of them is decoded once."""
     examined, estimates = clip.spread(SAMPLES), scene.background is None
     # a velocity needs the frame after one with smoke, and a background more frames than the smoke
-    perhaps = {n + 1 for n in examined} | {n - clip.first for n in (proxy_frames(clip) if estimates else ())}
-    clip.expect(examined, {n for n in perhaps if n >= 0}.difference(examined))
+    others = {n + 1 for n in examined} | {n - clip.first for n in (proxy_frames(clip) if estimates else ())}
+    clip.expect([*examined, *sorted(n for n in others.difference(examined) if n >= 0)])
 
 
 def _further_views(
