@@ -189,21 +189,21 @@ def _estimated(clip: Clip, lenses: Sequence[Array], moves: bool) -> Backdrop:
             panorama = Panorama.around(turns)
             steadied = panorama.steadied(clip)
             part, cut = Proxy.of(steadied).shot(steadied)
-            plate = _picture(steadied, part, white)
+            plate = _picture(steadied, part, white, masked=False)
             made = partial(made, frames=len(part.numbers), steadied=(panorama, plate), cut=cut)
             return made("picture", plates=panorama.plates(plate, clip), quantiser=median_quantiser(clip.path))
     if found.colour is not None:
         red, green, blue = (float(v) for v in found.colour)
         plate = _of_one_colour(clip, part, even, gains, found.colour, found.objects, white)
         return made("colour", plates=plate, colour=(red, green, blue))
-    return made("picture", plates=_picture(clip, part, white), quantiser=median_quantiser(clip.path))
+    return made("picture", plates=_picture(clip, part, white, masked=True), quantiser=median_quantiser(clip.path))
 
 
-def _picture(clip: Clip, proxy: Proxy, white: Picture) -> Plate:
-    """The plate of the picture that the clear frames show."""
+def _picture(clip: Clip, proxy: Proxy, white: Picture, *, masked: bool) -> Plate:
+    """The plate of the picture that the clear frames show; ``masked`` is that of `clear_picture`."""
     even, gains = proxy.evened()
     noise = _noise(even, median_of_seen(even.pictures), white)
-    picture = clear_picture(even.pictures, even.seen, noise.averaged(even.scale**2), DETAIL / even.scale, masked=True)
+    picture = clear_picture(even.pictures, even.seen, noise.averaged(even.scale**2), DETAIL / even.scale, masked)
     return Plate(
         whole_plate(clip, proxy, gains, picture),
         spread_out(picture.known, clip.size).astype(np.float32),

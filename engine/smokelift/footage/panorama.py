@@ -21,6 +21,9 @@ from smokelift.footage.turning import Array, Turns, moved
 PADDING = 2
 """Pixels by which a frame is continued beyond its border, so that it is interpolated there as elsewhere."""
 
+WHOLE = 0.99
+"""Share of a pixel of the panorama that a frame shows at least."""
+
 
 @dataclass(frozen=True, eq=False)
 class Panorama:
@@ -93,7 +96,7 @@ class _Shown:
         clip = self._clip
         own = self._whole.seen(n, *clip.size)
         part = np.ones(clip.size[::-1], np.float32) if own is None else own.astype(np.float32)
-        return area_average(self.wide(n, part, 0) > HALF, width, height) >= HALF
+        return area_average(self.wide(n, part, 0) > WHOLE, width, height) >= HALF
 
     def wide(self, n: int, picture: Picture, padding: int = PADDING) -> Picture:
         """Return a picture (rows, columns, ...) of frame ``n`` of the file where it lies; 0 where it shows nothing."""
