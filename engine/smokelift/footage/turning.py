@@ -262,7 +262,8 @@ def find_turns(clip: Clip, *lenses: Array) -> Turns | None:
     """
     size, middle = proxy_size(*clip.size), len(clip) // 2
     scale = np.diag([size[0] / clip.size[0], size[1] / clip.size[1], 1.0])
-    keys = [Key(clip.stored(middle).averaged(*size), scale @ lens) for lens in lenses]
+    picture = clip.stored(middle).averaged(*size)
+    keys = [Key(picture, scale @ lens) for lens in lenses]
     if keys[0].textured.sum() < MIN_CELLS or _stands_still(clip, keys[0], size):
         return None
     for lens, key in zip(lenses, keys, strict=True):
