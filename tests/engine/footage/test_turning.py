@@ -75,7 +75,9 @@ def test_one_frame_shows_no_motion() -> None:
 
 def test_a_camera_that_travels_is_refused() -> None:
     """In one sentence that says what to do."""
-    with pytest.raises(ValueError, match=r"^The picture moves as .* travels .*: track it in Blender, .* as background\.$"):
+    with pytest.raises(
+        ValueError, match=r"^The picture moves as .* travels .*: track it in Blender, .* as background\.$"
+    ):
         find_turns(clip_of(over_a_plain(30)[::2]), LENS)
 
 
