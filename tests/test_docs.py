@@ -44,7 +44,6 @@ IN_WORK = {
     "flicker",
     "guided-simulation",
     "light-direction",
-    "moved-background",
     "scattering-selection",
     "smoke-colour",
     "smoke-thickness",
