@@ -17,8 +17,8 @@ It knows nothing of the engine but its command line and its files. From what kno
 - Interface: `properties` (the settings); `panel` (`automatic` for its numbers)
   with the sub-panels `results_panel`, `advanced_panel`, `look_panel`,
   `setup_panel`, `direct_panel` and `export`, each with its buttons (`subpanel` is what they share); other buttons in
-  `operators`, `box` and `editors` (`needs` says when they can be pressed); `drop`, `presets` and `preferences`, which
-  Blender calls so.
+  `operators`, `box`, `place` and `editors` (`needs` says when they can be pressed); `drop`, `presets` and
+  `preferences`, which Blender calls so.
 """
 
 from types import ModuleType
@@ -51,6 +51,7 @@ def _modules() -> tuple[ModuleType, ...]:
         look_panel,
         operators,
         panel,
+        place,
         preferences,
         presets,
         properties,
@@ -63,6 +64,6 @@ def _modules() -> tuple[ModuleType, ...]:
     )
 
     data = (preferences, properties, volume, follow, run)
-    buttons = (operators, box, editors, instances, undistort, drop, presets, usd)
+    buttons = (operators, box, place, editors, instances, undistort, drop, presets, usd)
     panels = (panel, results_panel, advanced_panel, look_panel, setup_panel, direct_panel, export)
     return (*data, *buttons, *panels, batch)

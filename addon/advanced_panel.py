@@ -20,11 +20,6 @@ class _Advanced(OfClip):
         row = layout.row()
         row.active = settings.camera_mode == "SCENE"
         draw_automatic(row, settings, "longest_side")
-        row = layout.row(heading="Known Depth")
-        row.prop(settings, "use_axis_depth", text="")
-        value = row.row()
-        value.active = settings.use_axis_depth
-        value.prop(settings, "axis_depth", text="")
         draw_automatic(layout, settings, "fps")
         for name in ("transfer", "speed"):
             layout.prop(settings, name)

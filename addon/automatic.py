@@ -1,12 +1,13 @@
 """Numbers that are chosen automatically where they are 0: a tick and a word in the panel in place of the 0."""
 
+from collections.abc import Callable
 from typing import Any
 
 import bpy
 from bpy.props import BoolProperty
 
 
-def automatic_unless(name: str, label: str, start: float) -> Any:
+def automatic_unless(name: str, label: str, start: float | Callable[[Any], float]) -> Any:
     """A tick for a number that is chosen automatically where it is 0; ticked, the number begins with ``start``.
 
     It keeps nothing of its own, so it cannot contradict the number.
@@ -15,15 +16,16 @@ def automatic_unless(name: str, label: str, start: float) -> Any:
         name=label,
         description=f"Choose {label} by hand; otherwise it is automatic",
         get=lambda settings: getattr(settings, name) > 0,
-        set=lambda settings, on: setattr(settings, name, start if on else 0),
+        set=lambda settings, on: setattr(settings, name, (start(settings) if callable(start) else start) if on else 0),
     )
 
 
-def draw_automatic(layout: bpy.types.UILayout, settings: bpy.types.bpy_struct, name: str) -> None:
-    """Draw a number with its tick ``use_NAME``."""
+def draw_automatic(layout: bpy.types.UILayout, settings: bpy.types.bpy_struct, name: str) -> bpy.types.UILayout:
+    """Draw a number with its tick ``use_NAME``; returns its row."""
     row = layout.row(heading=settings.bl_rna.properties[name].name)
     row.prop(settings, f"use_{name}", text="")
     if getattr(settings, f"use_{name}"):
         row.prop(settings, name, text="")
     else:
         row.label(text="Automatic")
+    return row

@@ -136,8 +136,8 @@ def _smoke(choices: argparse.Namespace) -> bpy.types.Object:
         settings.detail = choices.detail
     if choices.seed is not None:
         settings.seed = choices.seed
-    if choices.axis_depth is not None:
-        settings.use_axis_depth, settings.axis_depth = True, choices.axis_depth
+    if choices.distance is not None:
+        settings.distance = choices.distance
     if choices.output:
         settings.output = str(choices.output.absolute())
     if settings.clip is None:
@@ -177,10 +177,10 @@ def _parser() -> argparse.ArgumentParser:
         "--seed", type=_within(known["seed"], int), metavar="N", help="Variation: number of the plausible smoke, from 0"
     )
     parser.add_argument(
-        "--axis-depth",
-        type=float,
+        "--distance",
+        type=_within(known["distance"], float),
         metavar="METRES",
-        help="how far the smoke stands behind the middle of the box; negative: in front of it",
+        help="Distance: from the camera to the lower end of the smoke, level and straight ahead; 0: estimated",
     )
     parser.add_argument("--output", type=Path, help="folder for the results")
     parser.add_argument("--resume", action="store_true", help="resume the last unfinished run")

@@ -25,6 +25,12 @@ def in_scene(scene: bpy.types.Scene, obj: bpy.types.Object | None) -> bpy.types.
     return obj if obj is not None and obj.name in scene.objects else None
 
 
+def has_inlet(smoke: bpy.types.Object) -> bool:
+    """Whether an inlet says where the smoke enters, and so where it stands."""
+    settings = smoke.smokelift
+    return settings.camera_mode == "SCENE" and in_scene(scene_of(smoke), settings.inlet) is not None
+
+
 def box_corners(box: bpy.types.Object) -> list[Vector]:
     """The eight corners of a box in the world."""
     return [box.matrix_world @ Vector(corner) for corner in box.bound_box]
@@ -32,7 +38,7 @@ def box_corners(box: bpy.types.Object) -> list[Vector]:
 
 def domain_table(box: bpy.types.Object, rotation: Matrix, settings: bpy.types.PropertyGroup) -> dict[str, Any]:
     """The domain: the box in cubic voxels, a multiple of four along each side. It grows and keeps its floor."""
-    low, high = _sides(box, rotation)
+    low, high = sides_of(box, rotation)
     extent = high - low
     if min(extent) <= 1e-6 * max(*extent, 1e-6):
         raise ShotError("The box is flat: give it a width, a depth and a height.")
@@ -48,7 +54,7 @@ def domain_table(box: bpy.types.Object, rotation: Matrix, settings: bpy.types.Pr
     }
 
 
-def _sides(box: bpy.types.Object, rotation: Matrix) -> tuple[Vector, Vector]:
+def sides_of(box: bpy.types.Object, rotation: Matrix) -> tuple[Vector, Vector]:
     """The lowest and the highest corner of a box in the engine's world."""
     corners = [rotation.inverted() @ corner for corner in box_corners(box)]
     low = Vector(min(corner[axis] for corner in corners) for axis in range(3))
@@ -74,7 +80,7 @@ def keep_camera_outside(
 
     if camera["type"] != "perspective" or not any(inside(domain["min"], domain["max"], eye, 0.0) for eye in eyes):
         return domain
-    low, high = _sides(box, rotation)
+    low, high = sides_of(box, rotation)
     rounding = ROUNDING * max(high - low)
     if any(inside(low, high, eye, rounding) for eye in eyes):
         raise ShotError("The camera stands inside the smoke's box: move it out, or make the box smaller.")

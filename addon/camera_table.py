@@ -67,7 +67,8 @@ def camera_table(
     }
 
 
-def _camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> bpy.types.Object:
+def scene_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> bpy.types.Object:
+    """The scene's camera as it is evaluated; ShotError if there is none."""
     if scene.camera is None:
         raise ShotError("The scene has no camera: add one where the clip was filmed from, or choose Guess.")
     return scene.camera.evaluated_get(depsgraph)
@@ -110,7 +111,7 @@ def _sample_camera(
         for frame in frames:
             if frame != scene.frame_current:
                 scene.frame_set(frame)
-            camera = _camera(scene, depsgraph)
+            camera = scene_camera(scene, depsgraph)
             samples.append((camera_table(smoke, camera, depsgraph, rotation), _in_picture(scene, camera, corners)))
     return samples
 

@@ -6,8 +6,9 @@ import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
 from . import presets, shot_check, smoke_takes, volume
+from .automatic import draw_automatic
 from .blender_scene import frame_rate
-from .box_table import box_of
+from .box_table import box_of, has_inlet
 from .clip_table import clip_path
 from .job import ENDED
 from .proxy import lacks_proxy
@@ -106,6 +107,9 @@ def _draw_shot(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bp
         known = box_of(smoke) is not None
         layout.operator("smokelift.make_box", text="Frame Box" if known else "Make Box", icon="MESH_CUBE")
         layout.prop(settings, "inlet")
+    row = layout.row()
+    row.active = not has_inlet(smoke)  # that says it
+    draw_automatic(row, settings, "distance").operator("smokelift.place", text="", icon="EYEDROPPER")
     draw_closed(layout, settings)
     layout.prop(settings, "light_mode")
 

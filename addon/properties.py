@@ -16,9 +16,13 @@ from bpy.props import (
 
 from . import shot_check, volume
 from .automatic import automatic_unless
+from .box_table import box_of
 from .contract import BOX_VOXELS, FASTEST, SIDES, SLOWEST
 from .paths import PATH_OPTIONS
-from .smoke import free_folder
+from .smoke import free_folder, scene_of
+
+GUESSED_DISTANCE = 2.0
+"""Metres from which a distance is given by hand where there is no box."""
 
 SEEDS = 2**31
 """Numbers of variations: as many as Blender's whole numbers have from 0."""
@@ -41,6 +45,15 @@ def _box_chosen(settings: "SmokeliftSettings", context: bpy.types.Context) -> No
     if settings.box is not None:
         settings.camera_mode = "SCENE"
     _changed(settings, context)
+
+
+def _middle_of_box(settings: "SmokeliftSettings") -> float:
+    """Where a distance that is given by hand begins: at the middle of the box, if there is one before the camera."""
+    box, camera = box_of(settings.id_data), scene_of(settings.id_data).camera
+    if box is None or camera is None:
+        return GUESSED_DISTANCE
+    pose = camera.matrix_world
+    return max(0.0, -(box.matrix_world.translation - pose.translation).dot(pose.col[2].to_3d())) or GUESSED_DISTANCE
 
 
 def _speed_chosen(_settings: "SmokeliftSettings", _context: bpy.types.Context) -> None:
@@ -255,6 +268,16 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
         poll=_is_empty,
         update=_changed,
     )
+    distance: FloatProperty(
+        name="Distance",
+        description="Distance from the camera to the lower end of the smoke, level and straight ahead; automatic is "
+        "estimated. With Camera Guess it sets the scale",
+        subtype="DISTANCE",
+        default=0.0,
+        min=0.0,
+        update=_changed,
+    )
+    use_distance: automatic_unless("distance", "Distance", _middle_of_box)
     closed: _closed(
         "Sides of the box, along its own axes, that are solid: no air flows through them. -Z is a floor",
         update=_changed,
@@ -316,18 +339,6 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
         update=_changed,
     )
     use_longest_side: automatic_unless("longest_side", "Resolution", BOX_VOXELS)
-    use_axis_depth: BoolProperty(
-        name="Known Depth",
-        description="Give the smoke's distance behind the middle of the box; otherwise it is estimated",
-        update=_changed,
-    )
-    axis_depth: FloatProperty(
-        name="Depth",
-        description="Distance of the smoke behind the middle of the box, away from the camera; negative is nearer",
-        subtype="DISTANCE",
-        default=0.0,
-        update=_changed,
-    )
     fps: FloatProperty(
         name="Frame Rate",
         description="Frame rate at which the clip was filmed, if it plays in slow motion; automatic is the clip's own",

@@ -12,7 +12,7 @@ import bpy
 from mathutils import Matrix
 
 from .blender_scene import ShotError, at_frame
-from .box_table import box_corners, box_of, domain_table, in_scene, inlet_table, keep_camera_outside
+from .box_table import box_corners, box_of, domain_table, has_inlet, in_scene, inlet_table, keep_camera_outside
 from .camera_table import camera_over_frames
 from .clip_table import clip_table, start_frame
 from .contract import IMAGE_SUFFIXES, SIDES
@@ -75,8 +75,8 @@ def options(smoke: bpy.types.Object) -> list[str]:
     words += [f"--detail={settings.detail:g}", f"--seed={settings.seed}"]
     if settings.camera_mode == "SCENE" and not settings.longest_side:
         words += ["--resolution", "auto"]  # the engine measures the clip's detail
-    if settings.use_axis_depth:
-        words.append(f"--axis-depth={settings.axis_depth:g}")  # one word, for "-1e-05" alone is an option
+    if settings.distance and not has_inlet(smoke):
+        words.append(f"--distance={settings.distance:g}")
     return words
 
 

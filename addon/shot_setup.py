@@ -81,7 +81,7 @@ def set_up(smoke: bpy.types.Object, take: Take, index: dict[str, Any]) -> None:
         match_clip(smoke)
     if settings.set_up_camera:
         scene.camera = assumed_camera(smoke, index) or scene.camera
-        _add_background_clip(scene.camera.data, settings.clip)
+        show_clip_behind(scene.camera.data, settings.clip)
     if settings.set_up_light:
         scene.render.engine = "CYCLES"
         _scatter_as_fitted(scene, index)
@@ -141,7 +141,8 @@ def assumed_camera(smoke: bpy.types.Object, index: dict[str, Any]) -> bpy.types.
     return camera
 
 
-def _add_background_clip(camera: bpy.types.Camera, clip: bpy.types.MovieClip) -> None:
+def show_clip_behind(camera: bpy.types.Camera, clip: bpy.types.MovieClip) -> None:
+    """Show a clip in the view through a camera, behind everything."""
     camera.show_background_images = True
     if any(image.source == "MOVIE_CLIP" and image.clip == clip for image in camera.background_images):
         return

@@ -31,7 +31,7 @@ from typing import Any
 from . import toml
 from .contract import DIRECTIONS, INDEX_FILE
 
-OPTIONS = ("--quality", "--device", "--detail", "--seed", "--resolution", "--axis-depth")
+OPTIONS = ("--quality", "--device", "--detail", "--seed", "--resolution", "--distance")
 """The engine's options that a take may hold: those that decide the result."""
 
 TITLES = {"continue": "Continued", "retime": "Retimed", "loop": "Loop"}

@@ -1,4 +1,6 @@
-"""Errors of the depth at which smoke is placed by its floor contact, as the box reaches below it: a Markdown table.
+"""Errors of the depth at which smoke is placed, as the box reaches below it: a Markdown table.
+
+By the floor contact, and where the depth of its lower end is given: upright at that depth, and by the posterior.
 
     python -m benchmarks.accuracy.axis plume-1/truth.npz two-1/truth.npz crossing-1/truth.npz ...
 
@@ -26,9 +28,13 @@ from smokelift.render import Renderer
 from smokelift.scene import Camera, Domain, Medium
 
 FRAMES, OBSERVED = 24, 16
+LOWER_END = 0.1
+"""Share of the smoke's mass, from below, that is its lower end."""
+
 BOX = (-1.0, -1.0, 0.0), (1.0, 1.0, 3.0)
 CAMERAS = [(side, height) for side in (1, -1) for height in (1.0, 1.5, 2.5)]
 LOWERED = (0.0, 0.04, 0.08, 0.12, 0.17, 0.25)
+NAMES = ("the domain's axis", "upright at the lower end", "estimated", "estimated from the lower end")
 Array = npt.NDArray[np.float64]
 
 
@@ -71,7 +77,7 @@ def shots(truth: Truth) -> Iterator[Shot]:
 
 
 def errors(path: Path) -> Array:
-    """Return the errors (shots, lowered, 2) of a scene: of the domain's own axis and of the estimated one."""
+    """Return the errors (shots, lowered, 4) of a scene, of the axes that `NAMES` lists."""
     truth = Truth.load(path)
     h = truth.voxel_size
     table = []
@@ -80,9 +86,18 @@ def errors(path: Path) -> Array:
             below = round(lowered / h)
             low, shape = (*BOX[0][:2], BOX[0][2] - below * h), (*truth.shape[:2], truth.shape[2] + below)
             domain = Domain(low, BOX[1], shape)
-            estimated = estimate_axis(shot.amounts, shot.camera, domain).axis
-            table.append([error(shot, domain, axis) for axis in (SmokeAxis.upright(), estimated)])
-    return np.reshape(table, (-1, len(LOWERED), 2))
+            base = lower_end(shot)
+            estimates = (estimate_axis(shot.amounts, shot.camera, domain, base=known).axis for known in (None, base))
+            axes = (SmokeAxis.upright(), SmokeAxis.upright(base), *estimates)
+            table.append([error(shot, domain, axis) for axis in axes])
+    return np.reshape(table, (-1, len(LOWERED), len(NAMES)))
+
+
+def lower_end(shot: Shot) -> float:
+    """Return the mean depth (m) of the smoke's lower end."""
+    low = np.cumsum(shot.mass) <= LOWER_END * shot.mass.sum()
+    low[np.argmax(shot.mass > 0)] = True
+    return float(np.average(shot.depths[low], weights=shot.mass[low]))
 
 
 def error(shot: Shot, domain: Domain, found: SmokeAxis) -> float:
@@ -98,8 +113,7 @@ def main() -> None:
     parser.add_argument("truth", type=Path, nargs="+", help="truth.npz of a scene")
     with ProcessPoolExecutor() as pool:
         found = np.concatenate(list(pool.map(errors, parser.parse_args().truth)))
-    names = ["the domain's axis", "estimated"]
-    rows = [[name, *(f"{value:.3f}" for value in row)] for name, row in zip(names, found.mean(0).T, strict=True)]
+    rows = [[name, *(f"{value:.3f}" for value in row)] for name, row in zip(NAMES, found.mean(0).T, strict=True)]
     print(markdown(["floor lowered by (cm)", *(f"{100 * lowered:.0f}" for lowered in LOWERED)], rows))
 
 

@@ -192,7 +192,8 @@ def _reconstructed(clip: Clip, scene: CompleteScene, depth: float | None) -> tup
         domain=replace(scene.domain, resolution=RESOLUTION),
         background=scene.background,
     )
-    settings = replace(Settings.preset("draft"), detail=0.0, axis_depth=depth)
+    distance = None if depth is None else depth - scene.camera.position[1]
+    settings = replace(Settings.preset("draft"), detail=0.0, distance=distance)
     reconstruction = reconstruct(clip, known, settings)
     (frame,) = reconstruction
     return reconstruction.shot, frame

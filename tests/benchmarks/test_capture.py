@@ -83,7 +83,7 @@ def test_a_billboard_stands_where_it_is_told_and_a_blurred_one_is_smooth(known: 
     def shown(run: str) -> np.ndarray:
         return next(images(known, run, tmp_path, known.scored))[1]["camera00"][..., 0]
 
-    middle, behind, blurred = (shown(run) for run in ("billboard", "billboard:axis_depth=0.5", "blurred"))
+    middle, behind, blurred = (shown(run) for run in ("billboard", "billboard:depth=0.5", "blurred"))
     # the camera looks along -x, so what is further along +y, behind the middle for the input, is further to its right
     assert np.argwhere(behind > 0).mean(0)[1] - np.argwhere(middle > 0).mean(0)[1] > 20
     assert np.abs(np.diff(blurred, axis=0)).max() < 0.5 * np.abs(np.diff(middle, axis=0)).max()

@@ -162,6 +162,7 @@ def test_window(root, installed) -> None:
     assert report["looks_through"] == "CAMERA", "the view is not that of the camera that was set up"
     assert report["variation"] == 1, "the second run is no other variation"
     assert change(load(pictures / "view_3d_done.png"), load(pictures / "rendered.png"), middle) > 10
+    assert abs(report["distance"] - 7.4) < 0.1, "a click on the floor does not say how far that is"
 
 
 def test_trouble_at_the_window(root, installed) -> None:

@@ -71,11 +71,11 @@ def add_run_options(parser: argparse.ArgumentParser) -> None:
         "for each frame (default: the scene's, else none)",
     )
     parser.add_argument(
-        "--axis-depth",
+        "--distance",
         type=float,
         metavar="METRES",
-        help="how far the smoke stands behind the middle of the box, away from the camera; negative: in front of it "
-        "(default: estimated)",
+        help="level distance from the camera, straight ahead, to where the smoke stands, its lower end; sets the scale "
+        "where no box is given (default: estimated)",
     )
     parser.add_argument(
         "--detail",
@@ -126,9 +126,7 @@ def settings_of(options: argparse.Namespace) -> Settings:
     """Return the settings that the options of `add_run_options` say."""
     preset = Settings.preset(options.quality, options.method, options.resolution)
     detail = preset.detail if options.detail is None else options.detail
-    return replace(
-        preset, scattering=options.scattering, axis_depth=options.axis_depth, detail=detail, seed=options.seed
-    )
+    return replace(preset, scattering=options.scattering, distance=options.distance, detail=detail, seed=options.seed)
 
 
 def scene_of(options: argparse.Namespace) -> tuple[Scene, ClipSource]:

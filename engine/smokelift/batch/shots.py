@@ -34,7 +34,7 @@ OPTIONS = (
     "scattering",
     "frames",
     "mask",
-    "axis_depth",
+    "distance",
     "detail",
     "seed",
     "device",

@@ -50,23 +50,6 @@ class SmokeAxis:
         """One column of the same depth (m) at all heights."""
         return SmokeAxis.by_height(np.zeros(1), np.full(1, float(depth)))
 
-    @staticmethod
-    def given(depth: float, camera: Camera, domain: Domain) -> SmokeAxis:
-        """A depth that is known, at all heights.
-
-        Raises
-        ------
-        ValueError
-            If it is outside the domain.
-        """
-        reach = reach_along(domain, view_frame(camera)[1])
-        if abs(depth) >= reach:
-            raise ValueError(
-                f"The axis depth {depth:g} m is outside the box, which reaches {reach:.3g} m before and behind its "
-                "middle; give a number between."
-            )
-        return SmokeAxis.upright(depth)
-
     @property
     def several(self) -> bool:
         """Whether several columns are known."""
@@ -92,7 +75,26 @@ class SmokeAxis:
         return np.asarray(ndimage.map_coordinates(values, np.broadcast_arrays(rows, columns), order=1, mode="nearest"))
 
 
-Cue = Literal["box", "floor contact", "inlets"]
+def depth_at(distance: float, camera: Camera, domain: Domain) -> float:
+    """How far behind the domain's centre (m) is what stands at a level distance (m) ahead of a camera.
+
+    Raises
+    ------
+    ValueError
+        If it is outside the domain.
+    """
+    along = view_frame(camera)[1]
+    middle = float((np.array(domain.centre) - np.array(camera.position)) @ along)
+    reach = reach_along(domain, along)
+    if abs(distance - middle) >= reach:
+        raise ValueError(
+            f"The distance {distance:g} m is outside the box, which reaches from {middle - reach:.3g} to "
+            f"{middle + reach:.3g} m ahead of the camera; give a number between."
+        )
+    return distance - middle
+
+
+Cue = Literal["box", "floor contact", "inlets", "distance"]
 """What shows where the smoke stands; the box alone leaves it undetermined."""
 
 

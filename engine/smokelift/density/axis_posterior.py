@@ -3,7 +3,8 @@
 One picture of smoke looks the same whether the smoke is near and small or far and large. Its place comes from
 
 - the box, which is put around its smoke: the mean depth is normal about its middle;
-- the base, where a column begins: a marked inlet gives its depth, else its contact with the floor shows it;
+- the base, where a column begins: its distance or a marked inlet gives its depth, else its contact with the floor
+  shows it;
 - the way up: a column is upright or leans, and one that comes back to the middle across the picture does so in depth.
   What drifts across the picture drifts as far in depth, nobody knows where to: there the box alone speaks.
 
@@ -19,7 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.density.axis import Array, AxisEstimate, Cue, SmokeAxis
+from smokelift.density.axis import Array, AxisEstimate, Cue, SmokeAxis, depth_at
 from smokelift.density.observation import ObservedClip, apparent_optical_depth
 from smokelift.density.screen import Screen, reach_along, seen_at, upright_screen, view_frame
 from smokelift.footage.matte import matte
@@ -77,10 +78,16 @@ INERTIA = 0.5
 (docs/experiments/density-columns.md)."""
 
 
-def clip_axis(clip: ObservedClip) -> AxisEstimate | None:
+def clip_axis(clip: ObservedClip, distance: float | None = None) -> AxisEstimate | None:
     """The axis of a clip's smoke; None where there is none, where a camera travels, or where there are several.
 
-    What a camera that turns in its place sees is put into its middle picture.
+    What a camera that turns in its place sees is put into its middle picture. For one that travels the axis is known
+    only where the ``distance`` (m) is given at which the smoke stands ahead of it: that of its first picture.
+
+    Raises
+    ------
+    ValueError
+        If what stands at the distance is outside the box.
     """
     moments = [observations for frame in clip.spread(FRAMES) if (observations := clip.observe(frame))]
     if not moments or len(moments[0]) > 1:
@@ -88,23 +95,31 @@ def clip_axis(clip: ObservedClip) -> AxisEstimate | None:
     seen = [observations[0] for observations in moments]
     eyes = np.array([each.camera.matrix for each in seen])[:, :3, 3]
     if not np.allclose(eyes, eyes[0]):
-        return None
+        if distance is None:
+            return None
+        first, domain = seen[0].camera, clip.optics.domain
+        return estimate_axis([], first, domain, base=depth_at(distance, first, domain))
     camera, optics = seen[len(seen) // 2].camera, replace(clip.optics, domain=_coarse(clip.optics.domain))
     amounts = [
         apparent_optical_depth(each.image, each.plate, matte(each.image, each.plate).mask, optics) for each in seen
     ]
-    if not any(amount.any() for amount in amounts):
+    if distance is None and not any(amount.any() for amount in amounts):
         return None
     if clip.moves:
         points = np.add(*ray_through_pixels(camera))
         amounts = [
             seen_at(points, amount, each.camera).astype(np.float32) for amount, each in zip(amounts, seen, strict=True)
         ]
-    return estimate_axis(amounts, camera, optics.domain, clip.inlets)
+    base = None if distance is None else depth_at(distance, camera, clip.optics.domain)
+    return estimate_axis(amounts, camera, optics.domain, clip.inlets, base)
 
 
 def estimate_axis(
-    amounts: Sequence[NDArray[np.float32]], camera: Camera, domain: Domain, inlets: Sequence[Inlet] = ()
+    amounts: Sequence[NDArray[np.float32]],
+    camera: Camera,
+    domain: Domain,
+    inlets: Sequence[Inlet] = (),
+    base: float | None = None,
 ) -> AxisEstimate:
     """The axis of the smoke in some frames.
 
@@ -118,6 +133,8 @@ def estimate_axis(
         The box.
     inlets
         Where smoke is known to enter; else a floor contact is searched for.
+    base
+        Depth (m) at which the one column is known to stand; then neither counts.
 
     Returns
     -------
@@ -126,8 +143,10 @@ def estimate_axis(
     """
     screens = [screen for amount in amounts if (screen := upright_screen(amount, camera, domain)).values.any()]
     reach = reach_along(domain, view_frame(camera)[1])
+    cue: Cue
     if not screens:
-        return AxisEstimate(SmokeAxis.upright(), "box", 0.0, BOX_DEVIATION * reach)
+        cue, depth = ("box", 0.0) if base is None else ("distance", base)
+        return AxisEstimate(SmokeAxis.upright(depth), cue, depth, BOX_DEVIATION * reach)
     mean = replace(screens[0], values=np.mean([screen.values for screen in screens], 0))
     total = mean.values.sum(1)
     smoky = total > 0.02 * total.max()
@@ -135,7 +154,10 @@ def estimate_axis(
     aside = np.average(middle**2, weights=total)
     deviation = np.sqrt((BOX_COUNT * (BOX_DEVIATION * reach) ** 2 + aside) / (BOX_COUNT + 1))
     depths = np.linspace(-reach, reach, CANDIDATES)
-    if inlets:
+    if base is not None:
+        lowest, widths = int(np.argmax(smoky)), np.zeros_like(middle)
+        columns = [_Column(_at(depths, base), mean.heights[lowest], middle, widths, middle - middle[lowest])]
+    elif inlets:
         columns = _inlet_columns(inlets, mean, middle, depths, camera, domain)
     else:
         columns = _floor_column(screens, len(amounts), middle, depths, camera, domain)
@@ -146,9 +168,11 @@ def estimate_axis(
     known = [_posterior(column, depths, total, deviation, leans) for column in columns]
     error = np.sqrt(np.average(np.mean([variance for _, variance in known], 0), weights=total))
     axis = _axis(columns, [depth for depth, _ in known], mean)
-    depth = np.average(np.broadcast_to(axis.depths, mean.values.shape), weights=mean.values)
-    cue: Cue = "inlets" if inlets else "floor contact" if error < MAX_KNOWN_DEVIATION * deviation else "box"
-    return AxisEstimate(axis, cue, float(depth), float(error))
+    depth = float(np.average(np.broadcast_to(axis.depths, mean.values.shape), weights=mean.values))
+    cue = "floor contact" if error < MAX_KNOWN_DEVIATION * deviation else "box"
+    if base is not None or inlets:
+        cue = "inlets" if base is None else "distance"
+    return AxisEstimate(axis, cue, depth, float(error))
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,6 +225,11 @@ def _posterior(column: _Column, depths: Array, total: Array, box: float, leans: 
 def _normal(value: Array | float, deviation: Array | float) -> Array:
     """Logarithm of a normal density about zero, but for a constant."""
     return np.asarray(-np.square(value / deviation) / 2 - np.log(deviation))
+
+
+def _at(depths: Array, known: Array | float) -> Array:
+    """Log-likelihood of the candidates (k,) where a depth is known, to within one of them."""
+    return np.asarray(-(((depths - known) / (depths[1] - depths[0])) ** 2) / 2)
 
 
 def _floor_column(
@@ -282,7 +311,7 @@ def _inlet_columns(
             now[begun] = (INERTIA * now[begun] + part @ mean.laterals) / (INERTIA + part.sum(1))
         middles[:, row] = now
     drifts = middles - (places @ lateral)[:, None]
-    bases = -(((depths - (places @ along)[:, None]) / (depths[1] - depths[0])) ** 2) / 2
+    bases = _at(depths, (places @ along)[:, None])
     return [_Column(*column) for column in zip(bases, begins, middles, widths, drifts, strict=True)]
 
 

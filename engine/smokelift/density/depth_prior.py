@@ -91,20 +91,13 @@ class RoundDepth:
     ----------
     axis
         Where the smoke of one view stands in depth; None takes that of a clip, or the middle of the domain.
-    axis_depth
-        The same as one number, in metres behind the domain's centre, if the user says it.
     """
 
     axis: SmokeAxis | None = None
-    axis_depth: float | None = None
 
     def of_clip(self, clip: ObservedClip) -> RoundDepth:
         """Take the axis that the clip's smoke was found to have, unless one is given."""
-        if self.axis is not None:
-            return self
-        if self.axis_depth is not None:
-            return replace(self, axis=SmokeAxis.upright(self.axis_depth))
-        return self if clip.place is None else replace(self, axis=clip.place.axis)
+        return self if self.axis is not None or clip.place is None else replace(self, axis=clip.place.axis)
 
     def estimate(self, views: ViewSet) -> DepthEstimate:
         """Spread the pictures' smoke by the profiles."""

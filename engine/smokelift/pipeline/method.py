@@ -63,7 +63,7 @@ def _default(settings: Settings) -> Method:
 
 
 def _depth_prior(settings: Settings) -> DepthPrior:
-    smooth = RoundDepth(axis_depth=settings.axis_depth)
+    smooth = RoundDepth()
     return DetailedDepth(smooth, settings.detail, settings.seed) if settings.detail > 0 else smooth
 
 

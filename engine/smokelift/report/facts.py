@@ -29,6 +29,7 @@ def facts(shot: Shot, given: Scene, cost: Cost) -> tuple[Fact, ...]:
     plate = shot.views[0].plates.at(0)
     size = " x ".join(f"{high - low:.3g}" for low, high in zip(domain.min, domain.max, strict=True))
     has_camera, has_box = given.camera is not None, given.domain is not None
+    has_scale = has_box or shot.settings.distance is not None
     height = f"The picture is taken to be {PICTURE_HEIGHT:g} m high where the smoke is."
     return (
         _background(shot, given, plate),
@@ -41,7 +42,9 @@ def facts(shot: Shot, given: Scene, cost: Cost) -> tuple[Fact, ...]:
             has_camera,
             _said(shot, "assumed camera"),
         ),
-        _given_or_undetermined("scale", f"box of {size} m", has_box, f"{height} Give camera and box in metres."),
+        _given_or_undetermined(
+            "scale", f"box of {size} m", has_scale, f"{height} Give its distance, or camera and box, in metres."
+        ),
         _box(shot, has_box),
         _chosen(shot, "resolution", "grid", " x ".join(map(str, domain.resolution)), has_box),
         *_medium(shot, given.medium is not None),
@@ -161,9 +164,9 @@ def _light(shot: Shot, given: Scene) -> tuple[Fact, ...]:
 
 
 def _place(shot: Shot) -> Fact:
-    given, place = shot.settings.axis_depth, shot.place
+    given, place = shot.settings.distance, shot.place
     if given is not None:
-        return Fact("place in depth", f"{given:.2f} m behind the middle of the box", "given")
+        return Fact("place in depth", f"{given:.2f} m from the camera", "given")
     if len(shot.views) > 1:
         return Fact("place in depth", "as the cameras show it", "estimated")
     value = "the middle of the box"

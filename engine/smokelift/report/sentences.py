@@ -107,14 +107,14 @@ SENTENCES: Mapping[str, str] = {
     ),
     # where the camera stands, and where the smoke is
     "assumed camera": (
-        "Camera not given: a level {lens:.0f} mm lens on {film:g} mm film, the picture taken to be {height:g} m high "
+        "Camera not given: a level {lens:.0f} mm lens on {film:g} mm film, the picture taken to be {height:.3g} m high "
         "where the smoke is."
     ),
     "assumed camera with the file's lens": (
-        "Camera not given: level, {lens:g} mm as the file says, the picture taken to be {height:g} m high where the "
+        "Camera not given: level, {lens:g} mm as the file says, the picture taken to be {height:.3g} m high where the "
         "smoke is."
     ),
-    "assumed scale": "Box not given: the picture taken to be {height:g} m high where the smoke is.",
+    "assumed scale": "Box not given: the picture taken to be {height:.3g} m high where the smoke is.",
     "box around the smoke": "Domain around the smoke: {size:.2f x} m, {resolution} voxels.",
     "box over the picture": "Domain over all of the picture: {size:.2f x} m, {resolution} voxels.",
     "grown box": "The box grows to {size:.4g x} m, a whole number of cubic voxels along every side.",
@@ -131,11 +131,14 @@ SENTENCES: Mapping[str, str] = {
     # where in depth it stands
     "axis depth by box": (
         "Where the smoke stands in depth is undetermined: it is taken to be {depth:place}, give or take {spread:.2g} "
-        "m. If you know better, give the axis depth, an inlet or a second view."
+        "m. If you know better, give its distance, an inlet or a second view."
     ),
     "axis depth by floor contact": (
         "By its contact with the floor of the box the smoke stands {depth:place}, give or take {spread:.2g} m. If you "
-        "know better, give the axis depth, an inlet or a second view."
+        "know better, give its distance, an inlet or a second view."
+    ),
+    "axis depth by distance": (
+        "By the distance of its lower end the smoke stands {depth:place}, give or take {spread:.2g} m."
     ),
     "axis depth by inlets": "By the marked inlets the smoke stands {depth:place}, give or take {spread:.2g} m.",
     # the smoke as a medium, fire, and the light

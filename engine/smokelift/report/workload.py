@@ -65,7 +65,7 @@ def _shares(shot: Shot, settings: Settings) -> list[float]:
     if settings.method == "paper":  # its densities are anywhere in the box
         return [1.0]
     optics = replace(shot.optics, domain=_coarse(shot.optics.domain))
-    prior = RoundDepth(axis_depth=settings.axis_depth).of_clip(shot)
+    prior = RoundDepth().of_clip(shot)
     step = -(-len(shot.smoky) // LOOKED_AT) or 1
     moments = ((frame, shot.observe(frame)) for frame in shot.smoky[::step])
     seen = [ViewSet.of(observations, optics, frame) for frame, observations in moments if observations]

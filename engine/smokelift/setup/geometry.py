@@ -26,7 +26,8 @@ from smokelift.setup.smoke import SmokeSamples
 Shape = tuple[int, int, int]
 
 PICTURE_HEIGHT = 2.0
-"""Metres that an uncalibrated picture is taken to be high where the smoke is: the size of a person."""
+"""Metres that an uncalibrated picture is taken to be high where the smoke is, unless its distance is given: the size of
+a person."""
 
 LENS = 50 / FILM_WIDTH
 """Focal length over the longer side of the picture of an uncalibrated camera whose file says none: Blender's default
@@ -105,8 +106,8 @@ def find_geometry(
             "a perspective camera that does not move or look steeply up or down."
         )
     focal = _focal(clip) if turns is None else float(turns.lens[0, 0])
-    camera = known or _level(clip, focal)
-    base, size, metres = _around(camera, samples)
+    camera = known or _level(clip, focal, settings.distance)
+    base, size, metres = _around(camera, samples, settings.distance)
     camera = _turning(camera, turns)
 
     def grids(quality: Quality) -> tuple[Domain, ...]:
@@ -126,7 +127,9 @@ def find_geometry(
         "box around the smoke" if samples.smoky else "box over the picture",
         {"size": _size(domain), "resolution": domain.resolution},
     )
-    return Geometry(camera, domain, estimate, (_assumed(known, clip, focal), around), by_quality)
+    return Geometry(
+        camera, domain, estimate, (_assumed(known, clip, focal, metres * camera.size[1]), around), by_quality
+    )
 
 
 def _divided(
@@ -198,14 +201,17 @@ def fitting(camera: Camera, clip: Clip) -> Camera:
     return camera.resized(*clip.size)
 
 
-def _assumed(given: Camera | None, clip: Clip, focal: float) -> Remark:
-    """What is assumed of a camera, with its focal length in pixels, or of the scale where that alone is unknown."""
+def _assumed(given: Camera | None, clip: Clip, focal: float, height: float) -> Remark:
+    """What is assumed of a camera, with its focal length in pixels, or of the scale where that alone is unknown.
+
+    The picture is so many metres high where the smoke is.
+    """
     if given is not None:
-        return Remark("assumed scale", {"height": PICTURE_HEIGHT})
+        return Remark("assumed scale", {"height": height})
     if clip.lens is not None:
-        return Remark("assumed camera with the file's lens", {"height": PICTURE_HEIGHT, "lens": clip.lens})
+        return Remark("assumed camera with the file's lens", {"height": height, "lens": clip.lens})
     lens = FILM_WIDTH * focal / max(clip.size)
-    return Remark("assumed camera", {"height": PICTURE_HEIGHT, "lens": lens, "film": FILM_WIDTH})
+    return Remark("assumed camera", {"height": height, "lens": lens, "film": FILM_WIDTH})
 
 
 def _size(box: Box) -> tuple[float, ...]:
@@ -213,12 +219,18 @@ def _size(box: Box) -> tuple[float, ...]:
     return tuple(high - low for low, high in zip(box.min, box.max, strict=True))
 
 
-def _level(clip: Clip, focal: float) -> Camera:
-    """A level camera of a focal length in pixels that looks along +Y at the world's origin."""
+def _level(clip: Clip, focal: float, distance: float | None = None) -> Camera:
+    """A level camera of a focal length in pixels that looks along +Y at the smoke above the world's origin."""
     width, height = clip.size
-    distance = focal * PICTURE_HEIGHT / height
-    matrix = np.array([[1, 0, 0, 0], [0, 0, -1, -distance], [0, 1, 0, PICTURE_HEIGHT / 2], [0, 0, 0, 1]], np.float64)
+    metres = _pixel_at(distance, height, focal)
+    up = metres * height / 2
+    matrix = np.array([[1, 0, 0, 0], [0, 0, -1, -focal * metres], [0, 1, 0, up], [0, 0, 0, 1]], np.float64)
     return Camera("perspective", as_matrix(matrix), (width, height), focal, focal, width / 2, height / 2)
+
+
+def _pixel_at(distance: float | None, height: int, focal: float) -> float:
+    """Metres that a pixel of a picture so many pixels high shows where the smoke is; its distance (m) may be given."""
+    return PICTURE_HEIGHT / height if distance is None else distance / focal
 
 
 def _boxes(camera: Camera) -> bool:
@@ -238,14 +250,16 @@ def _ways(camera: Camera, x: Array, y: Array) -> Array:
     return np.asarray(np.stack(pixels, -1) @ turn.T)
 
 
-def _around(camera: Camera, samples: SmokeSamples) -> tuple[Array, Array, float]:
-    """The box around the smoke before a camera, upright where the picture of a level one is `PICTURE_HEIGHT` high.
+def _around(camera: Camera, samples: SmokeSamples, distance: float | None) -> tuple[Array, Array, float]:
+    """The box around the smoke before a camera, upright at a distance (m).
+
+    That is where the picture of a level one is `PICTURE_HEIGHT` high, unless it is given.
 
     Returns
     -------
     The middle of its floor (3,) and its size (3,) in metres, and the metres that a pixel of the picture shows there.
     """
-    metres = PICTURE_HEIGHT / camera.size[1]
+    metres = _pixel_at(distance, camera.size[1], camera.fy)
     distance = camera.fy * metres
     lateral, along, _ = view_frame(camera)
     eye = np.array(camera.matrix, np.float64)[:3, 3]

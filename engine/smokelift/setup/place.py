@@ -10,10 +10,10 @@ from smokelift.setup.shot import Shot
 
 
 def placed(shot: Shot) -> Shot:
-    """The shot with the place of its smoke, unless that is given or the method needs none."""
-    if shot.settings.method != "default" or shot.settings.axis_depth is not None:
+    """The shot with the place of its smoke, unless the method needs none."""
+    if shot.settings.method != "default":
         return shot
-    place = clip_axis(shot)
+    place = clip_axis(shot, shot.settings.distance)
     return shot if place is None else replace(shot, place=place, estimates=(*shot.estimates, place_estimate(place)))
 
 
@@ -22,4 +22,5 @@ def place_estimate(place: AxisEstimate) -> Estimate[str]:
     kind, figures, spread = f"axis depth by {place.cue}", {"depth": place.depth}, place.deviation
     if place.cue == "box":
         return undetermined(kind, "axis depth", figures, spread=spread)
-    return measured(kind, place.cue, figures, what="axis depth", spread=spread)
+    found = measured(kind, place.cue, figures, what="axis depth", spread=spread)
+    return replace(found, source="given") if place.cue == "distance" else found

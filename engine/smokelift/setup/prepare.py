@@ -9,7 +9,7 @@ from contextlib import suppress
 from dataclasses import replace
 
 from smokelift.checks import Remark, counted, require_kind
-from smokelift.density.axis import SmokeAxis
+from smokelift.density.axis import depth_at
 from smokelift.footage.clip import Clip
 from smokelift.footage.proxy import proxy_frames
 from smokelift.footage.working_picture import CameraError, WorkingPicture, working_picture
@@ -51,7 +51,7 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
     require_kind(scene, Scene, "scene", "a Scene (Scene() leaves all open, Scene.load reads a file)")
     require_kind(settings, Settings | None, "settings", "Settings (Settings.preset makes them)")
     settings = settings or Settings.preset()
-    _check(clip, scene)
+    _check(clip, scene, settings)
     _expect(clip, scene)
     remarks = clip.remarks()
     # cameras that belong together are measured, and stand where they are said to
@@ -60,8 +60,8 @@ def prepare_shot(clip: Clip, scene: Scene, settings: Settings | None = None) -> 
     steadied, plates, samples = estimate.clip, estimate.plates, estimate.samples
     geometry = find_geometry(steadied, scene, settings, plates, samples, estimate.turns)
     camera, domain = geometry.camera, geometry.domain
-    if settings.axis_depth is not None:
-        SmokeAxis.given(settings.axis_depth, camera, domain)  # refuse early what cannot be
+    if settings.distance is not None:
+        depth_at(settings.distance, camera, domain)  # refuse early what cannot be
     medium, coloured, taken = find_medium(scene.medium, estimate, scene.lights, camera, domain)
     asked = scene.scattering if settings.scattering == "auto" else settings.scattering
     light = first_light(scene.lights, asked, medium, samples)
@@ -129,8 +129,11 @@ def _complete(
     )
 
 
-def _check(clip: Clip, scene: Scene) -> None:
+def _check(clip: Clip, scene: Scene, settings: Settings) -> None:
     """Refuse what can be seen to be wrong before anything is examined."""
+    if settings.distance is not None and (scene.views or scene.inlets):
+        known = "further views show" if scene.views else "inlets say"
+        raise ValueError(f"The {known} where the smoke stands; leave the distance out.")
     moves = scene.camera is not None and scene.camera.moves
     if scene.views and (scene.camera is None or scene.domain is None):
         raise ValueError("Further views need the input's camera and the box, in the same metres as theirs; give both.")

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from smokelift.density import DensitySettings
 from smokelift.scene import SCATTERINGS, Scattering
-from smokelift.scene.checks import integer, items, number
+from smokelift.scene.checks import integer, items, number, positive
 from smokelift.scene.domain import LONGEST
 from smokelift.velocity import VelocitySettings
 
@@ -114,10 +114,10 @@ class Settings:
         frame takes as much as proves right (`smokelift.density.temporal_prior`). Beyond a half the velocity's errors
         smear the depth (docs/experiments/temporal-prior.md). Made-up detail is carried on whatever the share, unless it
         is 0. The paper's method takes all.
-    axis_depth
-        How far behind the domain's centre (metres, away from the camera) the middle of the smoke stands; None estimates
-        it from where the smoke meets the floor and from the light of coloured lamps, else takes the domain's centre.
-        Further views show it better than either.
+    distance
+        Level distance (metres) from the camera, straight ahead, to where the smoke stands: the lower end of it. Without
+        a box it sets the scale of the scene. None takes marked inlets or the contact with the floor, else the middle of
+        the box.
     detail
         How much of the fine structure along the rays, which no camera shows, is made up, from 0 to 1. At 0 the density
         is the smooth answer, which is best for measuring; at 1 it is a plausible smoke, with the clip's texture from
@@ -140,7 +140,7 @@ class Settings:
     scattering: Scattering | Literal["auto"] = "auto"
     selection: SelectionSettings = SelectionSettings()
     transport: float = 0.25
-    axis_depth: float | None = None
+    distance: float | None = None
     detail: float = 1.0
     seed: int = 0
     density: DensitySettings = field(default_factory=DensitySettings)
@@ -156,8 +156,8 @@ class Settings:
                 raise ValueError(f"{name} must be one of {', '.join(known)}, not {getattr(self, name)!r}.")
         for name in ("transport", "detail"):
             number(getattr(self, name), name, "a number from 0 to 1", lambda share: 0 <= share <= 1)
-        if self.axis_depth is not None:
-            number(self.axis_depth, "axis_depth", "a finite number of metres")
+        if self.distance is not None:
+            positive(self.distance, "distance", "a number of metres above 0")
         if self.method == "paper" and self.detail > 0:
             raise ValueError(f"The paper's method makes up no detail: detail must be 0 with it, not {self.detail}.")
         if not isinstance(self.seed, int) or self.seed < 0:

@@ -73,14 +73,14 @@ def test_options_override_the_file(saved, tmp_path) -> None:
     """Clip, frames, quality, detail in depth and its seed, place in depth, folder."""
     clip = tmp_path / "other.mp4"
     clip.write_bytes((EXAMPLE / "clip.mp4").read_bytes())
-    words = ("--clip", clip, "--frames", "1:2", "--quality", "fine", "--axis-depth", "-0.1")
+    words = ("--clip", clip, "--frames", "1:2", "--quality", "fine", "--distance", "6.9")
     words += ("--detail", "0.5", "--seed", "3")
     assert blender(saved, *words, "--output", tmp_path / "elsewhere").returncode == 0
     sequence = Sequence.open(tmp_path / "elsewhere" / "take_0001")
     assert sequence.scene.clip.path == clip
     assert sequence.scene.clip.frames == (1, 2)
     assert sequence.settings["quality"] == "fine"
-    assert sequence.settings["axis_depth"] == pytest.approx(-0.1)
+    assert sequence.settings["distance"] == pytest.approx(6.9)
     assert (sequence.settings["detail"], sequence.settings["seed"]) == (0.5, 3)
 
 
@@ -93,7 +93,8 @@ def test_options_override_the_file(saved, tmp_path) -> None:
         (("--frames=-1:3",), 2, "frames 0 to 47"),
         (("--frames", "5"), 2, "--frames"),
         (("--quality", "best"), 2, "--quality"),
-        (("--axis-depth", "far"), 2, "--axis-depth"),
+        (("--distance", "far"), 2, "--distance"),
+        (("--distance=-0.1",), 2, "a number from 0.0"),
         (("--detail", "1.5"), 2, "a number from 0.0 to 1.0"),
         (("--detail", "nan"), 2, "a number from 0.0 to 1.0"),
         (("--seed=-1",), 2, "a whole number from 0"),

@@ -432,14 +432,19 @@ def test_an_inlet(shot, tmp_path) -> None:
     assert engines(shot, tmp_path).inlets == ()
 
 
-def test_a_known_depth(shot) -> None:
-    """Said to the engine if it is known, in one word even where it is negative; zero is a depth as well."""
-    smoke(shot).smokelift.axis_depth = -0.25
-    assert not any(word.startswith("--axis-depth") for word in options(smoke(shot)))
-    smoke(shot).smokelift.use_axis_depth = True
-    assert "--axis-depth=-0.25" in options(smoke(shot))
-    smoke(shot).smokelift.axis_depth = 0.0
-    assert "--axis-depth=0" in options(smoke(shot))
+def test_a_distance(shot) -> None:
+    """Said to the engine if it is given, unless an inlet says it; by hand it begins at the middle of the box."""
+    settings = smoke(shot).smokelift
+    assert not any(word.startswith("--distance") for word in options(smoke(shot)))
+    bpy.context.view_layer.update()
+    settings.use_distance = True
+    assert "--distance=7" in options(smoke(shot))
+    settings.distance = 6.75
+    assert "--distance=6.75" in options(smoke(shot))
+    add_inlet(shot)
+    assert not any(word.startswith("--distance") for word in options(smoke(shot)))
+    settings.use_distance = False
+    assert settings.distance == 0.0
 
 
 def test_depth_detail_and_variation(shot) -> None:

@@ -78,10 +78,12 @@ def place(window: bpy.types.Window, region: bpy.types.Region) -> list[int]:
     return [region.x, window.height - region.y - region.height, region.width, region.height]
 
 
-def find(window: bpy.types.Window, area: bpy.types.Area, region: bpy.types.Region, command: str) -> Iterator[float]:
-    """Move the mouse down a region until the button under it is the one that runs a command."""
+def find(
+    window: bpy.types.Window, area: bpy.types.Area, region: bpy.types.Region, command: str, across: float = 1 / 3
+) -> Iterator[float]:
+    """Move the mouse down a region, at a share of its width, until the button under it is the one of a command."""
     manager = bpy.context.window_manager
-    x = region.x + region.width // 3
+    x = region.x + round(region.width * across)
     for y in range(window.height - region.y - region.height + 10, window.height - region.y - 5, 12):
         manager.clipboard = ""
         shell(f"xdotool mousemove {x} {y}")

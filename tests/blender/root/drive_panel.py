@@ -7,6 +7,8 @@ from itertools import pairwise
 from pathlib import Path
 
 import bpy
+from bpy_extras.view3d_utils import location_3d_to_region_2d
+from mathutils import Vector
 
 sys.path.insert(0, str(Path(__file__).parent))
 from artist import (
@@ -29,6 +31,12 @@ from artist import (
 
 TICK_SECONDS = 0.02
 DRAWINGS = 5
+EYEDROPPER = 0.85
+"""Where the button is in the width of the sidebar."""
+
+BASE = Vector((-0.2, 0.4, 0.0))
+"""On the floor of the box, 7.4 m from the camera."""
+
 SUB_PANELS = ("results", "advanced", "look", "set_up", "direct", "export")
 
 
@@ -73,6 +81,7 @@ def story() -> Iterator[float]:
     yield 8.0
     yield from picture("rendered")
     area.spaces.active.shading.type = "SOLID"
+    report["distance"] = yield from stands(window, area)
     yield from sub_panels(window, area)
     report["volumes"] = sum(obj.type == "VOLUME" for obj in window.scene.objects)
 
@@ -89,6 +98,25 @@ def qualities(window: bpy.types.Window, area: bpy.types.Area) -> Iterator[float]
     settings.longest_side = chosen
     region(area, "UI").active_panel_category = "View"
     yield 1.0
+
+
+def stands(window: bpy.types.Window, area: bpy.types.Area) -> Iterator[float]:
+    """Click on the floor in the picture, from a view that is not the camera's; returns the distance that this gives."""
+    settings, state = volume(window).smokelift, bpy.context.window_manager.smokelift
+    area.spaces.active.region_3d.view_perspective = "PERSP"
+    yield from find(window, area, region(area, "UI"), "bpy.ops.smokelift.place()", EYEDROPPER)
+    click()
+    yield 1.0
+    view = region(area, "WINDOW")
+    x, y = location_3d_to_region_2d(view, area.spaces.active.region_3d, BASE)
+    shell(f"xdotool mousemove {view.x + round(x)} {window.height - view.y - round(y)}").wait()
+    yield 1.0
+    yield from picture("eyedropper")
+    click()
+    yield 1.0
+    known, settings.distance = settings.distance, 0.0
+    yield from until(lambda: state.check_done)
+    return known
 
 
 def sub_panels(window: bpy.types.Window, area: bpy.types.Area) -> Iterator[float]:

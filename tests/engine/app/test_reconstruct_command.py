@@ -117,20 +117,20 @@ def test_one_picture_alone_is_enough_before_one_colour(plume, tmp_path, capsys) 
 
 
 def test_the_smoke_stands_where_the_command_says(shot, finished, tmp_path) -> None:
-    """The depth of its axis reaches the settings and the smoke, whose made-up detail moves the middle a little."""
-    assert command("reconstruct", shot, "--out", tmp_path / "out", "--npz", "--axis-depth", "-0.2", *QUICK) == 0
+    """Its distance reaches the settings and the smoke, whose made-up detail moves the middle a little."""
+    assert command("reconstruct", shot, "--out", tmp_path / "out", "--npz", "--distance", "3.8", *QUICK) == 0
     near, plain = Sequence.open(tmp_path / "out"), Sequence.open(finished)
-    assert (near.settings["axis_depth"], plain.settings["axis_depth"]) == (-0.2, None)
+    assert (near.settings["distance"], plain.settings["distance"]) == (3.8, None)
     y = np.arange(24) * 1.2 / 24
     moved = [np.average(y, weights=sequence.density(1).sum(axis=(0, 2))) for sequence in (near, plain)]
     assert moved[0] - moved[1] == pytest.approx(-0.2, abs=0.06)
 
 
-def test_a_depth_outside_the_box(shot, tmp_path, capsys) -> None:
+def test_a_distance_outside_the_box(shot, tmp_path, capsys) -> None:
     """One sentence, also before a run, and nothing is written."""
     for words in (("reconstruct", shot, "--out", tmp_path / "out", "--npz"), ("inspect", shot)):
-        sentence = refused(capsys, *words, "--axis-depth", "0.7", *QUICK)
-        assert "outside the box, which reaches 0.6 m" in sentence
+        sentence = refused(capsys, *words, "--distance", "4.7", *QUICK)
+        assert "outside the box, which reaches from 3.4 to 4.6 m" in sentence
     assert not (tmp_path / "out").exists()
 
 

@@ -74,7 +74,7 @@ def test_frames_in_the_wrong_order(shot, tmp_path, capsys) -> None:
         ("--quality", "best"),
         ("--resolution", "a,b,c"),
         ("--scattering", "many"),
-        ("--axis-depth", "far"),
+        ("--distance", "far"),
         ("--detail", "much"),
         ("--seed", "1.5"),
     ],

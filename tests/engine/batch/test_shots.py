@@ -36,7 +36,7 @@ name = "pipe 2"
 quality = "fine"
 frames = [10, 99]
 mask = "masks/pipe.png"
-axis_depth = -0.5
+distance = 1.5
 npz = false
 """,
     )
@@ -48,7 +48,7 @@ npz = false
     )
     assert first.directory == tmp_path / "there" / "steam"
     mask = tmp_path / "masks" / "pipe.png"
-    assert second.options == ("--quality=fine", "--frames=10:99", f"--mask={mask}", "--axis-depth=-0.5")
+    assert second.options == ("--quality=fine", "--frames=10:99", f"--mask={mask}", "--distance=1.5")
     assert second.name == "pipe 2"
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from smokelift.density.axis import SmokeAxis
+from smokelift.density.axis import SmokeAxis, depth_at
 from smokelift.density.axis_posterior import estimate_axis
 from smokelift.render import Renderer
 from smokelift.scene import Camera, Domain, Inlet, Medium
@@ -147,17 +147,38 @@ def test_known_inlets_need_no_contact() -> None:
     np.testing.assert_allclose(two.spread_at(*places), (0.0, 0.15), atol=0.02)
 
 
-@pytest.mark.parametrize("depth", [-0.9, 0.9])
-def test_a_depth_that_is_given_holds_at_all_heights(depth) -> None:
-    """Before and behind the middle, up to the sides of the box."""
-    np.testing.assert_array_equal(SmokeAxis.given(depth, FRONT, BOX).at(np.array([-1.5, 0.0, 1.5])), depth)
+@pytest.mark.parametrize("depth", [-0.3, 0.0, 0.3])
+def test_smoke_stands_where_its_lower_end_is_given(depth) -> None:
+    """At all heights if it goes straight up, even if it floats; the contact with the floor does not count."""
+    for smoke in (seen(column(depth, low=1.0)), rising(-depth)):
+        found = estimate_axis(smoke, FRONT, BOX, base=depth)
+        assert found.cue == "distance"
+        assert found.depth == pytest.approx(depth, abs=0.03)
+        np.testing.assert_allclose(found.axis.at(np.array([-1.2, 0.5])), depth, atol=0.04)
 
 
-@pytest.mark.parametrize("depth", [-1.0, 1.2])
-def test_a_depth_outside_the_box_is_refused(depth) -> None:
+def test_smoke_that_leans_comes_back_from_where_its_lower_end_is_given() -> None:
+    """As across the picture, so in depth."""
+    straight, leaning = (
+        estimate_axis(seen(column(0.4, lean)), FRONT, BOX, base=0.4).axis.at(np.array([-1.4, 0.4]))
+        for lean in (0.0, -0.3)
+    )
+    assert straight == pytest.approx([0.4, 0.4], abs=0.07)
+    assert leaning[1] < 0.3 < leaning[0]
+
+
+def test_a_distance_is_measured_level_and_straight_ahead() -> None:
+    """From the camera, however it is tilted."""
+    for height in (1.5, 4.0):
+        camera = Camera.look_at((0, -7, height), (0, 0, 1.5), fov_y_degrees=30, size=(75, 113))
+        assert depth_at(7.2, camera, BOX) == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize("distance", [6.0, 8.2])
+def test_a_distance_outside_the_box_is_refused(distance) -> None:
     """How far the box reaches is said."""
-    with pytest.raises(ValueError, match=rf"depth {depth:g} m is outside the box, which reaches 1 m"):
-        SmokeAxis.given(depth, FRONT, BOX)
+    with pytest.raises(ValueError, match=rf"distance {distance:g} m is outside the box, which reaches from 6 to 8 m"):
+        depth_at(distance, FRONT, BOX)
 
 
 NEAR_RIGHT, FAR_LEFT = Inlet((0.45, -0.3, 0.1), 0.25), Inlet((-0.35, 0.3, 0.5), 0.25)
@@ -204,8 +225,9 @@ def test_what_nothing_shows_is_as_uncertain_as_the_box_is_badly_centred() -> Non
     aside, central = (estimate_axis(seen(np.roll(floating, by, 0)), FRONT, BOX) for by in (6, -3))
     assert (aside.cue, aside.depth) == ("box", 0)
     assert 0.134 < central.deviation < 0.14 < aside.deviation < 0.6
-    nothing = estimate_axis([], FRONT, BOX)
-    assert (nothing.cue, nothing.deviation) == ("box", 0.165)
+    nothing, given = estimate_axis([], FRONT, BOX), estimate_axis([], FRONT, BOX, base=0.3)
+    assert (nothing.cue, nothing.depth, nothing.deviation) == ("box", 0, 0.165)
+    assert (given.cue, given.depth, given.deviation) == ("distance", 0.3, 0.165)
 
 
 def test_a_floor_contact_is_less_certain_the_less_of_it_is_believed() -> None:

@@ -73,7 +73,7 @@ def cut_off(scene: Scene, settings: Settings, out: Path, count: int) -> None:
 
 def axis_of(shot: Shot) -> SmokeAxis:
     """Where the default depth prior puts the smoke of a clip."""
-    axis = RoundDepth(axis_depth=shot.settings.axis_depth).of_clip(shot).axis
+    axis = RoundDepth().of_clip(shot).axis
     return axis or SmokeAxis.upright()
 
 
@@ -118,13 +118,13 @@ def test_density_is_carried_from_the_third_frame_on(by_themselves, all_carried) 
 
 
 def test_the_smoke_stands_where_the_settings_say(plume, draft) -> None:
-    """A given depth of the axis moves the smoke away from the camera, and what is given is not estimated."""
+    """A given distance moves the smoke away from the camera, and what is given is not estimated."""
     depth = view_frame(plume.scene.camera)[1]
     offset = (voxel_centres(plume.scene.domain) - np.array(plume.scene.domain.centre)) @ depth
     shift = 3 * plume.scene.domain.voxel_size
     places = []
-    for given in (0.0, shift):
-        settings = replace(draft, axis_depth=given, transport=0.0)
+    for given in (4.0, 4.0 + shift):
+        settings = replace(draft, distance=given, transport=0.0)
         first = frames_of(plume.scene.with_frames(0, 1), settings)[0].density
         places.append(float((first * offset).sum() / first.sum()))
     assert places[1] - places[0] == pytest.approx(shift, rel=0.2)

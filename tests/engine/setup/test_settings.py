@@ -77,7 +77,7 @@ def test_json_holds_all_settings(quality: Any, method: Any) -> None:
         ({"quality": "ultra"}, "quality must be one of draft, balanced, fine"),
         ({"transport": 1.5}, "transport must be a number from 0 to 1"),
         ({"transport": float("nan")}, "transport must be a number from 0 to 1"),
-        ({"axis_depth": float("inf")}, "axis_depth must be a finite number"),
+        ({"distance": float("inf")}, "distance must be a number of metres above 0"),
         ({"detail": -0.1}, "detail must be a number from 0 to 1, not -0.1"),
         ({"detail": float("nan")}, "detail must be a number from 0 to 1, not nan"),
         ({"detail": float("inf")}, "detail must be a number from 0 to 1, not inf"),
@@ -89,7 +89,8 @@ def test_json_holds_all_settings(quality: Any, method: Any) -> None:
         ({"resolution": (64, 64, "64")}, "resolution must be three whole numbers of at least 8 voxels"),
         ({"transport": None}, "transport must be a number from 0 to 1, not None"),
         ({"detail": "1"}, 'detail must be a number from 0 to 1, not "1"'),
-        ({"axis_depth": "0.1"}, 'axis_depth must be a finite number of metres, not "0.1"'),
+        ({"distance": "0.1"}, 'distance must be a number of metres above 0, not "0.1"'),
+        ({"distance": 0}, "distance must be a number of metres above 0, not 0"),
     ],
 )
 def test_bad_values_are_refused(values: dict[str, Any], words: str) -> None:
