@@ -58,7 +58,7 @@ NEAR = 10.0
 GOLDEN = (np.sqrt(5) - 1) / 2
 """Multiples of it, less their whole parts, are spread evenly however many there are."""
 
-FRESH, CARRIED = 0.6, 0.35
+FRESH, CARRIED = 0.6, 0.5
 """Shares of a step towards a picture that are made, for smoke that nothing is carried for and for what is carried: more
 of the second flickers (docs/experiments/stretched-noise.md)."""
 

@@ -133,11 +133,14 @@ class GradientFit:
         start = inside(hull, depth.density if initial is None else initial)
         # The terms take turns, so several cameras need as many times more iterations.
         iterations = settings.fit_iterations * len(cameras)
+        plausible = None
         if depth.detail is not None:
-            fresh = initial is None
+            plausible, fresh = depth.density, initial is None
             start = depth.detail.added(start, cameras, fresh=fresh)
             iterations *= 1 + fresh  # detail that is all new is far from the pictures
-        scaled = fit_multiplicative(cameras, start, iterations, settings.tolerance, within=where, recorded=True)
+        scaled = fit_multiplicative(
+            cameras, start, iterations, settings.tolerance, within=where, plausible=plausible, recorded=True
+        )
         expected, started = (float(values.ravel()[where].max()) for values in (depth.density, start))
         final = descend(
             cameras,

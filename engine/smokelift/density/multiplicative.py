@@ -10,6 +10,11 @@ with the colours as much as they count in the objective.
 Where shadows or thickness make the picture insensitive to s, the step is damped by the true sensitivity dL / d ln s,
 and where smoke and background look alike the picture says little, so the neighbours' step counts instead.
 
+Where detail in depth is made up, what a picture adds or takes is detail as well, about as deep as it is wide. Scaled
+evenly, all of a ray would share it: from the side a layer along the rays. So a step is scaled by p / rho where it adds
+smoke and by rho / p where it takes some, for a plausible smoke p: it goes to where that is denser and comes from where
+that is thinner.
+
 Of several pictures each has its turn, so that the density becomes the one nearest to the start that all agree with:
 multiplicative algebraic reconstruction (Gordon, Bender and Herman 1970).
 """
@@ -35,8 +40,18 @@ STEP_RANGE = (0.4, 2.5)
 RELAXATION = 0.9
 """Share of a step that is made."""
 
+MAX_UNEVENNESS = np.float32(2)
+"""Largest factor by which the plausible smoke scales a step. With it and `RELAXATION`, less than twice the step that a
+ray asks for is made, so that the iterations converge."""
+
 DAMPING = 0.4
 """Relative sensitivity at which the step is halved."""
+
+FAINT = 1e-6
+"""Share of the plausible smoke's largest density below which voxels are alike."""
+
+MIN_SCALE = 1e-30
+"""Lower bound of that density, so that no smoke at all is no division by zero."""
 
 PROBE = 1.05
 """Scale of the density for the difference quotient dL / d ln s."""
@@ -49,6 +64,7 @@ def fit_multiplicative(
     tolerance: float,
     *,
     within: NDArray[np.intp] | None = None,
+    plausible: Volume | None = None,
     recorded: bool = False,
 ) -> Fit:
     """Scale the smoke of every ray until the pictures match; returns the best density seen.
@@ -65,10 +81,12 @@ def fit_multiplicative(
         Stop when an iteration lowers the objective by less than this share.
     within : (n,), optional
         Voxels of the flat array outside which the density is known to be zero.
+    plausible : (nx, ny, nz), optional
+        Smoke towards whose distribution along the rays the steps lead; see the module. By default they are even.
     recorded
         Keep the renderers' records of the last iteration's pictures, for a descent that goes on from there.
     """
-    smoke, enough = _Smoke(density, within), noise_floor(terms)
+    smoke, enough = _Smoke(density, within, plausible), noise_floor(terms)
     places = smoke.places(terms)
     current = best = smoke.values()
     least, done, last = np.inf, 0, False
@@ -121,11 +139,12 @@ class _Smoke:
     Their values (n,) are what is computed with; one volume is filled with them again and again for the renderers.
     """
 
-    def __init__(self, density: Volume, within: NDArray[np.intp] | None) -> None:
+    def __init__(self, density: Volume, within: NDArray[np.intp] | None, plausible: Volume | None = None) -> None:
         values = density.ravel()
         self._where = np.flatnonzero(values) if within is None else within[values[within] != 0]
         self._values: Values = values[self._where]
         self._volume = np.zeros(density.shape, np.float32)
+        self._plausible = None if plausible is None else plausible.ravel()[self._where]
 
     def values(self) -> Values:
         """Values of the density."""
@@ -135,6 +154,14 @@ class _Smoke:
         """The volume (nx, ny, nz) with these values, until the next call."""
         self._volume.ravel()[self._where] = values
         return self._volume
+
+    def uneven(self, step: Values, values: Values) -> Values:
+        """A step (n,) in the logarithm of values, scaled towards the plausible smoke."""
+        if self._plausible is None:
+            return step
+        faint = np.float32(FAINT * self._plausible.max(initial=MIN_SCALE))
+        ratio = (self._plausible + faint) / (values + faint)
+        return np.asarray(step * np.minimum(np.where(step > 0, ratio, 1 / ratio), MAX_UNEVENNESS))
 
     def places(self, terms: Sequence[Term]) -> list[Places]:
         """Where the voxels lie in each term's picture."""
@@ -148,7 +175,8 @@ def _scaled(smoke: _Smoke, values: Values, places: Places, term: Term, image: Im
     transmittance = term.renderer.transmittance
     slope = _slope(smoke, values, term, image, transmittance)
     step = places.read(_log_scale(image, transmittance, slope, term))
-    return np.asarray(values * np.exp(RELAXATION * np.where(places.visible, step, np.float32(0))))
+    step = smoke.uneven(np.where(places.visible, step, np.float32(0)), values)
+    return np.asarray(values * np.exp(RELAXATION * step))
 
 
 def _slope(smoke: _Smoke, values: Values, term: Term, image: Image, transmittance: Image) -> Image:

@@ -308,6 +308,28 @@ def test_the_multiplicative_fit_gets_better(plume, small) -> None:
     assert [term.loss(term.renderer.image(fit.density) - term.view.image) for fit in fits] == losses
 
 
+@pytest.mark.parametrize("before", [0.5, 2.0])
+def test_steps_lead_towards_plausible_smoke(plume, small, before) -> None:
+    """Of smoke in two halves in depth, the half that plausible smoke has more of gains more and loses less.
+
+    The picture is met all the same.
+    """
+    truth = plume.densities[1]
+    plausible = truth.copy()
+    plausible[:, :12] *= 0.5
+    plausible[:, 12:] *= 1.5
+    term = term_of(small, Observation(small.camera, render(truth, small)))
+    even, uneven = (
+        fit_multiplicative([term], np.float32(before) * truth, 6, 0.0, plausible=each) for each in (None, plausible)
+    )
+    front, back = (
+        np.sum([fit.density[:, half] for fit in (even, uneven)], axis=(1, 2, 3))
+        for half in (slice(None, 12), slice(12, None))
+    )
+    assert back[1] / front[1] > 1.15 * back[0] / front[0]
+    assert uneven.loss < 0.1 * term.loss(term.renderer.image(np.float32(before) * truth) - term.view.image)
+
+
 @pytest.mark.parametrize(("scattering", "behind"), [("single", 0.0), ("absorption", 0.5)])
 def test_turns_meet_every_picture(plume, small, scattering, behind) -> None:
     """Each round brings both pictures nearer, whether or not smoke scatters light; no round changes nothing."""
