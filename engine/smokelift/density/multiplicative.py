@@ -11,9 +11,9 @@ Where shadows or thickness make the picture insensitive to s, the step is damped
 and where smoke and background look alike the picture says little, so the neighbours' step counts instead.
 
 Where detail in depth is made up, what a picture adds or takes is detail as well, about as deep as it is wide. Scaled
-evenly, all of a ray would share it: from the side a layer along the rays. So a step is scaled by p / rho where it adds
-smoke and by rho / p where it takes some, for a plausible smoke p: it goes to where that is denser and comes from where
-that is thinner.
+evenly, all of a ray would share it: from the side a layer along the rays. So a step that would scale smoke to rho is
+itself scaled, by p / rho where it adds smoke and by rho / p where it takes some, for a plausible smoke p: it goes to
+where that is denser and comes from where that is thinner.
 
 Of several pictures each has its turn, so that the density becomes the one nearest to the start that all agree with:
 multiplicative algebraic reconstruction (Gordon, Bender and Herman 1970).
@@ -160,7 +160,7 @@ class _Smoke:
         if self._plausible is None:
             return step
         faint = np.float32(FAINT * self._plausible.max(initial=MIN_SCALE))
-        ratio = (self._plausible + faint) / (values + faint)
+        ratio = (self._plausible + faint) / (values * np.exp(step) + faint)
         return np.asarray(step * np.minimum(np.where(step > 0, ratio, 1 / ratio), MAX_UNEVENNESS))
 
     def places(self, terms: Sequence[Term]) -> list[Places]:

@@ -327,7 +327,7 @@ def test_steps_lead_towards_plausible_smoke(plume, small, before) -> None:
         for half in (slice(None, 12), slice(12, None))
     )
     assert back[1] / front[1] > 1.15 * back[0] / front[0]
-    assert uneven.loss < 0.1 * term.loss(term.renderer.image(np.float32(before) * truth) - term.view.image)
+    assert uneven.loss < 1.2 * even.loss
 
 
 @pytest.mark.parametrize(("scattering", "behind"), [("single", 0.0), ("absorption", 0.5)])
