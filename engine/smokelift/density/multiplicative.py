@@ -160,8 +160,15 @@ class _Smoke:
         if self._plausible is None:
             return step
         faint = np.float32(FAINT * self._plausible.max(initial=MIN_SCALE))
-        ratio = (self._plausible + faint) / (values * np.exp(step) + faint)
-        return np.asarray(step * np.minimum(np.where(step > 0, ratio, 1 / ratio), MAX_UNEVENNESS))
+        scaled = np.exp(step)
+        scaled *= values
+        scaled += faint
+        gain = np.add(self._plausible, faint)
+        gain /= scaled
+        np.divide(1, gain, out=gain, where=step < 0)
+        np.minimum(gain, MAX_UNEVENNESS, out=gain)
+        gain *= step
+        return gain
 
     def places(self, terms: Sequence[Term]) -> list[Places]:
         """Where the voxels lie in each term's picture."""

@@ -312,7 +312,7 @@ def test_the_multiplicative_fit_gets_better(plume, small) -> None:
 def test_steps_lead_towards_plausible_smoke(plume, small, before) -> None:
     """Of smoke in two halves in depth, the half that plausible smoke has more of gains more and loses less.
 
-    The picture is met all the same.
+    The picture is fitted all the same.
     """
     truth = plume.densities[1]
     plausible = truth.copy()
