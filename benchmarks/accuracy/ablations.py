@@ -71,6 +71,7 @@ def leave_out(part: str, method: Method) -> Method:
     - depth: the initial density is even along the rays, without detail (settings leave out the detail alone)
     - sources: smoke that enters is taken for motion
     - projection: the predicted velocity keeps its divergence
+    - pictures: no motion in the pictures corrects the velocity
 
     Raises
     ------
@@ -89,7 +90,10 @@ def leave_out(part: str, method: Method) -> Method:
         return replace(method, velocity_estimator=replace(estimator, settings=settings))
     if part == "projection" and isinstance(estimator, CoarseToFine):
         return replace(method, velocity_estimator=UnprojectedPrediction(estimator.settings))
-    raise ValueError(f"without={part}: expected transport, hull, depth, sources or projection of the default method.")
+    if part == "pictures":
+        return replace(method, follows_picture=False)
+    parts = "transport, hull, depth, sources, projection or pictures"
+    raise ValueError(f"without={part}: expected {parts} of the default method.")
 
 
 def smear(views: ViewSet, fit: GradientFit) -> Volume:

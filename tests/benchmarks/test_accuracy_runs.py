@@ -51,6 +51,7 @@ def test_a_method_without_a_part_is_a_composition():
     assert leave_out("transport", usual) == replace(usual, temporal_prior=NothingCarried())
     assert leave_out("hull", usual) == replace(usual, density_fit=WithoutHull(usual.density_fit))
     assert leave_out("depth", usual) == replace(usual, depth_prior=EvenDepth())
+    assert leave_out("pictures", usual) == replace(usual, follows_picture=False)
     assert isinstance(run_method("draft", settings).depth_prior, DetailedDepth)
     assert isinstance(run_method("draft", replace(settings, detail=0.0)).depth_prior, RoundDepth)
     both = run_method("draft:without=projection,without=sources", settings).velocity_estimator

@@ -21,6 +21,7 @@ from smokelift.density.flame import flame_emission
 from smokelift.density.hull import project_voxels
 from smokelift.pipeline.clip_fit import clip_psnr
 from smokelift.pipeline.method import Method
+from smokelift.pipeline.seen_motion import Picture, followed_picture, with_seen_motion
 from smokelift.render import Volume
 from smokelift.render.blas import products_on_one_thread
 from smokelift.scene import Domain
@@ -54,6 +55,8 @@ class Frame:
     flame : (nx, ny, nz) float32, optional
         Emission of fire, radiance per metre of the color ``flame_color`` of the scene's medium; None where the clip
         shows no fire.
+    followed : (rows, columns), optional
+        What is followed of the picture to the next one; None where no camera stands still alone, or sees nothing.
     """
 
     number: int
@@ -64,6 +67,7 @@ class Frame:
     smooth: Volume | None = None
     steady: Volume | None = None
     flame: Volume | None = None
+    followed: Picture | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +78,7 @@ class Carried:
     ----------
     number
         Of the one before, from 1.
-    density, estimated, smooth, steady
+    density, estimated, smooth, steady, followed
         As in `Frame`.
     """
 
@@ -83,11 +87,12 @@ class Carried:
     estimated: Velocity
     smooth: Volume | None
     steady: Volume | None
+    followed: Picture | None = None
 
     @staticmethod
     def of(frame: Frame) -> Carried:
         """Return what the next frame needs of a frame."""
-        return Carried(frame.number, frame.density, frame.estimated, frame.smooth, frame.steady)
+        return Carried(frame.number, frame.density, frame.estimated, frame.smooth, frame.steady, frame.followed)
 
 
 def frames_after(before: Carried | None, shot: Shot, method: Method) -> Iterator[Frame]:
@@ -95,6 +100,9 @@ def frames_after(before: Carried | None, shot: Shot, method: Method) -> Iterator
     count = len(shot.clip)
     with products_on_one_thread():
         method = replace(method, depth_prior=method.depth_prior.of_clip(shot))
+    if before is not None and before.followed is None:  # a run that goes on
+        with products_on_one_thread():
+            before = replace(before, followed=_followed(_seen(before.number - 1, shot), shot, method))
     first: Frame | None = None
     for index in range(before.number if before else 0, count):
         with products_on_one_thread():
@@ -121,21 +129,27 @@ def _frame(index: int, before: Carried | None, shot: Shot, method: Method) -> Fr
         # what a moving camera does not see no picture corrects, so that its mass has to be kept
         moved = before.density if before.steady is None else before.steady
         carried = carry(moved, predicted, dt, domain.voxel_size, conserve=shot.moves)
-    fitted, taken_over = _density(index, before, carried, shot, method)
+    views = _seen(index, shot)
+    fitted, taken_over = _density(views, before, carried, shot, method)
+    followed = _followed(views, shot, method)
     flame = _flame(index, fitted.density, shot)
     fit = _fit_figures(index, fitted, shot)
     fit_done = time.perf_counter()
     if before is None:
         velocity = estimated = Velocity.zero(domain.resolution, domain.voxel_size, shot.scene.closed)
     else:
+        measured = _measured(before, fitted)
         estimated = method.velocity_estimator.estimate(
-            *_measured(before, fitted),
+            *measured,
             dt,
             domain.voxel_size,
             closed=shot.scene.closed,
             inflow=shot.scene.inflow(),
             prediction=predicted,
         )
+        if views is not None and before.followed is not None and followed is not None:
+            camera = views.views[0].camera
+            estimated = with_seen_motion(estimated, before.followed, followed, camera, domain, measured[1], dt)
         velocity = near_smoke(estimated, (before.density > 0) | (fitted.density > 0), dt, domain.voxel_size)
     done = time.perf_counter()
     figures = {
@@ -146,7 +160,20 @@ def _frame(index: int, before: Carried | None, shot: Shot, method: Method) -> Fr
         "seconds_density": fit_done - began,
         "seconds_velocity": done - fit_done,
     }
-    return Frame(index + 1, fitted.density, velocity, figures, estimated, fitted.smooth, fitted.steady, flame)
+    return Frame(index + 1, fitted.density, velocity, figures, estimated, fitted.smooth, fitted.steady, flame, followed)
+
+
+def _seen(index: int, shot: Shot) -> ViewSet | None:
+    """What the cameras saw in a frame, counted from 0; None if nothing of the domain."""
+    observations = shot.observe(index)
+    return ViewSet.of(observations, shot.optics, index) if observations else None
+
+
+def _followed(views: ViewSet | None, shot: Shot, method: Method) -> Picture | None:
+    """What is followed of the picture of a camera that stands still and sees the smoke alone."""
+    if views is None or not method.follows_picture or len(shot.views) > 1 or shot.moves:
+        return None
+    return followed_picture(views.views[0])
 
 
 def _fit_figures(index: int, fitted: FittedDensity, shot: Shot) -> dict[str, float]:
@@ -165,13 +192,11 @@ def _measured(before: Carried, fitted: FittedDensity) -> tuple[Volume, Volume]:
 
 
 def _density(
-    index: int, before: Carried | None, carried: Volume | None, shot: Shot, method: Method
+    views: ViewSet | None, before: Carried | None, carried: Volume | None, shot: Shot, method: Method
 ) -> tuple[FittedDensity, Mapping[str, float]]:
     """The density of a frame, and what was taken over of the carried one."""
-    observations = shot.observe(index)
-    if not observations:
+    if views is None:
         return _unseen(shot.optics.domain, carried), {}
-    views = ViewSet.of(observations, shot.optics, index)
     depth = method.depth_prior.estimate(views)
     if before is None or carried is None:
         return method.density_fit.fit(views, depth, None), {}
@@ -179,7 +204,7 @@ def _density(
     fitted = method.density_fit.fit(views, depth, start.density)
     if shot.moves:
         # what a moving camera does not see now it may have seen before
-        visible = project_voxels(observations[0].camera, shot.optics.domain).visible
+        visible = project_voxels(views.views[0].camera, shot.optics.domain).visible
         fitted = replace(fitted, density=np.where(visible, fitted.density, carried), steady=None)
     return fitted, start.figures
 

@@ -39,12 +39,16 @@ class Method:
         Finds the velocity between two densities, and predicts the next.
     temporal_prior
         What a frame takes over from the one before.
+    follows_picture
+        Whether the velocity is corrected by what moves in the picture, where one camera alone sees the smoke
+        (`pipeline.seen_motion`).
     """
 
     density_fit: DensityFit
     depth_prior: DepthPrior
     velocity_estimator: VelocityEstimator
     temporal_prior: TemporalPrior
+    follows_picture: bool = True
 
 
 def compose(settings: Settings) -> Method:
@@ -79,6 +83,7 @@ def _paper(settings: Settings) -> Method:
         depth_prior=OrthogonalCopy(),
         velocity_estimator=PaperVelocity(),
         temporal_prior=AllCarried(),
+        follows_picture=False,
     )
 
 

@@ -34,6 +34,7 @@ from smokelift.setup import illumination, scattering
 from smokelift.setup.coarse import LONGEST, coarse_domain, coarse_frame
 from smokelift.setup.estimate import Estimate
 from smokelift.setup.held_out import HeldOut
+from smokelift.setup.model import ALONE
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot, ShotView
@@ -425,3 +426,11 @@ def test_a_light_close_to_the_box_is_no_hindrance(plume, draft, tmp_path) -> Non
     near = replace(plume.scene, domain=domain, lights=(lamp,))
     densities = [density[:, :, :31] for density in plume.densities[:2]]
     assert shot_of(plume.write(tmp_path, densities, near), draft).estimates
+
+
+def test_a_velocity_that_one_camera_shows_is_smoother(plume, tracked, two_views, draft) -> None:
+    """Not where several do, or one that travels."""
+    usual = draft.velocity.smoothness
+    assert shot_of(plume.scene, draft).settings.velocity.smoothness == pytest.approx(ALONE * usual)
+    assert shot_of(two_views, draft).settings.velocity.smoothness == usual
+    assert shot_of(tracked, draft).settings.velocity.smoothness == usual

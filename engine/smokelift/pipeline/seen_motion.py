@@ -1,0 +1,186 @@
+"""The motion that a camera's pictures show, in the velocity of smoke that it alone saw.
+
+The velocity's grid is coarse, because the depth of the smoke is assumed. What moves across the picture is not: the clip
+shows it pixel by pixel. So the velocity is corrected in the picture: with q its mean along each ray, in pixels a
+frame, the correction d of every cell, about as wide as a voxel of the velocity, minimises
+
+    sum over pixels (r + g . d)^2 / mean |g|^2  +  sum over cells pixels (CURVATURE |laplacian d|^2 + REST |d|^2)
+
+    r = after(x) - before(x - q(x)),     g = gradient of (after(x) + before(x - q(x))) / 2
+
+where before and after are roots of optical depths, so that thin smoke counts too. It is given to all voxels of a ray
+alike. Then the velocity is averaged along the line of sight: where along it smoke moves faster the pictures do not
+show, and the mean over what is possible hardly changes (docs/experiments/velocity-one-view.md).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage, sparse
+from scipy.sparse.linalg import cg
+
+from smokelift.density import View
+from smokelift.render import Volume
+from smokelift.scene import Camera, Domain
+from smokelift.scene.projection import project
+from smokelift.transport import Velocity, on_faces
+from smokelift.velocity.line_of_sight import averaged_along
+from smokelift.velocity.pyramid import coarsen
+
+Picture = NDArray[np.float32]
+
+CURVATURE, REST = 0.05, 0.14
+"""Weights, for each pixel of a cell, of a correction's squared Laplacian from cell to cell and of its square
+(docs/experiments/velocity-one-view.md)."""
+
+TOLERANCE, MAX_STEPS = 1e-2, 50
+"""Residual, relative to the start's, at which the solution is taken, and steps at most."""
+
+ANYWHERE = 1e-3
+"""Share of the largest density that counts where there is none, so that rays beside the smoke have a mean too."""
+
+
+def followed_picture(view: View) -> Picture:
+    """What is followed of a camera's picture (rows, columns)."""
+    return np.sqrt(view.optical_depth)
+
+
+def with_seen_motion(
+    velocity: Velocity, before: Picture, after: Picture, camera: Camera, domain: Domain, density: Volume, dt: float
+) -> Velocity:
+    """A velocity that moves the smoke in the picture as the camera saw it move, averaged along the line of sight.
+
+    Parameters
+    ----------
+    velocity
+        On the density's grid or on one that was halved from it.
+    before, after
+        What `followed_picture` gives of two frames that follow one another.
+    camera
+        Of both pictures.
+    domain
+        Of the density.
+    density : (nx, ny, nz)
+        Of the second frame.
+    dt
+        Time between the frames in seconds.
+    """
+    middle = np.array(domain.centre)
+    ray = np.array(camera.matrix)[:3, 2] if camera.type == "orthographic" else middle - camera.position
+    smoke = after > 0
+    if smoke.any() and before.any():
+        while density.shape != velocity.shape:
+            density = coarsen(density)
+        screen, scale = _Screen.of(camera, domain, velocity.shape, velocity.voxel_size), dt / velocity.voxel_size
+        motion = screen.mean_motion(velocity.centres() * np.float32(scale), density)
+        correction = screen.lifted(_correction(screen, motion, before, after, smoke)) / np.float32(scale)
+        faces = zip(velocity.faces, on_faces(correction), strict=True)
+        velocity = velocity.with_faces(component + added for component, added in faces)
+    return averaged_along(velocity, (float(ray[0]), float(ray[1]), float(ray[2])))
+
+
+def _correction(
+    screen: _Screen, motion: NDArray[np.float64], before: Picture, after: Picture, smoke: NDArray[np.bool_]
+) -> NDArray[np.float32]:
+    """What the motion (cells, 2) of the picture lacks, in columns and rows a frame."""
+    columns, rows = (screen.pixels @ motion).T.reshape(2, *after.shape)
+    down, across = np.indices(after.shape)
+    carried = ndimage.map_coordinates(before, (down - rows, across - columns), order=1, mode="nearest")
+    gradient = [part.ravel() for part in np.gradient((carried + after) / 2)[::-1]]
+    steepness = float(np.mean(sum(part[smoke.ravel()] ** 2 for part in gradient)))
+    if steepness == 0:
+        return np.zeros(motion.shape, np.float32)
+    along = sparse.hstack([screen.pixels.multiply(part[:, None]) for part in gradient]).tocsr()
+    normal = (along.T @ along / steepness + sparse.block_diag([screen.stiffness] * 2)).tocsr()
+    right = along.T @ (carried - after).ravel() / steepness
+    found, _ = cg(normal, right, rtol=TOLERANCE, maxiter=MAX_STEPS, M=sparse.diags(1 / normal.diagonal()))
+    # sums may be taken in another order on another day, and a run has to be the same to the bit
+    return np.asarray(found.reshape(2, -1).T, np.float32)
+
+
+@dataclass(frozen=True, eq=False)
+class _Screen:
+    """Cells of a picture, about as wide as voxels of a grid are in it.
+
+    Attributes
+    ----------
+    shape
+        Of the grid.
+    pixels, voxels
+        Bilinear weights of the cells at every pixel and at every voxel's centre.
+    moved : (voxels, 2, 3)
+        Columns and rows that a voxel moves by in the picture for each voxel that it moves in the grid.
+    least : (voxels, 3, 2)
+        The least motion in the grid for each column and row.
+    stiffness
+        What a correction costs beside what it explains.
+    """
+
+    shape: tuple[int, int, int]
+    pixels: sparse.csr_matrix
+    voxels: sparse.csr_matrix
+    moved: NDArray[np.float64]
+    least: NDArray[np.float64]
+    stiffness: sparse.csr_matrix
+
+    @staticmethod
+    @lru_cache(maxsize=2)
+    def of(camera: Camera, domain: Domain, shape: tuple[int, int, int], voxel_size: float) -> _Screen:
+        """The cells for a grid from the domain's low corner on, its voxels so many metres wide."""
+        centres = np.array(domain.min) + (np.indices(shape).reshape(3, -1).T + 0.5) * voxel_size
+        at, _ = project(camera, centres)
+        halves = 0.5 * voxel_size * np.eye(3)
+        steps = [project(camera, centres + half)[0] - project(camera, centres - half)[0] for half in halves]
+        moved = np.stack(steps, -1)
+        width, height = camera.size
+        wide = float(np.median(np.linalg.norm(moved, axis=(1, 2)) / np.sqrt(2)))
+        counts = max(round(height / wide), 2), max(round(width / wide), 2)
+        rows, columns = np.indices((height, width)).reshape(2, -1) + 0.5
+        sizes = height / counts[0], width / counts[1]
+        pixels, voxels = (
+            _bilinear(down / sizes[0] - 0.5, across / sizes[1] - 0.5, counts)
+            for down, across in ((rows, columns), (at[:, 1], at[:, 0]))
+        )
+        laplacian = sparse.kronsum(*(_differences(count) for count in counts[::-1]))
+        stiffness = CURVATURE * laplacian @ laplacian + REST * sparse.identity(counts[0] * counts[1])
+        stiffness *= sizes[0] * sizes[1]
+        return _Screen(shape, pixels, voxels, moved, np.linalg.pinv(moved), stiffness.tocsr())
+
+    def mean_motion(self, motion: NDArray[np.float32], density: Volume) -> NDArray[np.float64]:
+        """Mean along the rays (cells, 2), in columns and rows a frame, of a motion (nx, ny, nz, 3) in voxels."""
+        weight = density.ravel() + ANYWHERE * float(density.max()) + np.finfo(np.float32).tiny
+        across = np.einsum("nij,nj->ni", self.moved, motion.reshape(-1, 3))
+        sums = self.voxels.T @ np.column_stack([weight[:, None] * across, weight])
+        return np.asarray(sums[:, :2] / np.maximum(sums[:, 2:], np.finfo(np.float64).tiny))
+
+    def lifted(self, motion: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The least motion (nx, ny, nz, 3) in voxels that looks like one of the picture, (cells, 2)."""
+        seen = self.voxels @ motion
+        return np.asarray(np.einsum("nij,nj->ni", self.least, seen).reshape(*self.shape, 3), np.float32)
+
+
+def _bilinear(rows: NDArray[np.float64], columns: NDArray[np.float64], counts: tuple[int, int]) -> sparse.csr_matrix:
+    """Weights (points, cells) that interpolate between cells; beyond the last it goes on as there."""
+    low, weights = [], []
+    for places, count in ((rows, counts[0]), (columns, counts[1])):
+        places = np.clip(places, 0, count - 1)
+        low.append(np.minimum(places.astype(np.intp), count - 2))
+        weights.append(places - low[-1])
+    points = np.arange(len(rows))
+    parts = [
+        ((abs(1 - i - weights[0]) * abs(1 - j - weights[1])), (low[0] + i) * counts[1] + low[1] + j)
+        for i in (0, 1)
+        for j in (0, 1)
+    ]
+    values, cells = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return sparse.csr_matrix((values, (np.tile(points, 4), cells)), (len(rows), counts[0] * counts[1]))
+
+
+def _differences(count: int) -> sparse.csr_matrix:
+    """Squared first differences of a row of cells, as a matrix."""
+    first = sparse.diags([-np.ones(count - 1), np.ones(count - 1)], [0, 1], shape=(count - 1, count))
+    return (first.T @ first).tocsr()

@@ -1,0 +1,96 @@
+"""The velocity that one camera's pictures correct: what it takes from them, and what it leaves."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import ndimage
+
+from smokelift.pipeline import compose
+from smokelift.pipeline.seen_motion import with_seen_motion
+from smokelift.scene import Camera, Domain, look_at_matrix
+from smokelift.scene.projection import project
+from smokelift.setup.settings import Settings
+from smokelift.transport import Velocity, on_faces
+from smokelift.transport import project as without_divergence
+
+DT = 1 / 24
+DOMAIN = Domain((-0.5, -0.5, 0.0), (0.5, 0.5, 1.5), (32, 32, 48))
+COARSE = (16, 16, 24)
+BOX = np.s_[5:-5, 5:-5, 6:-6]
+"""Away from the sides."""
+
+
+def camera(kind: str) -> Camera:
+    if kind == "perspective":
+        return Camera.look_at((0, -6, 0.75), (0, 0, 0.75), fov_y_degrees=15, size=(40, 60))
+    matrix = look_at_matrix((0, -6, 0.75), (0, 0, 0.75), (0, 0, 1))
+    return Camera("orthographic", matrix, (40, 60), 38.0, 38.0, 20.0, 30.0)
+
+
+def texture(seed: int = 0) -> np.ndarray:
+    """Smoke all over a picture, with waves of some pixels."""
+    noise = np.random.default_rng(seed).standard_normal((60, 40))
+    waves = ndimage.gaussian_filter(noise, 2.0)
+    return np.asarray(1 + 0.3 * waves / waves.std(), np.float32).clip(0.1)
+
+
+def seen(velocity: Velocity, across: float, up: float, kind: str) -> Velocity:
+    """The velocity corrected by a texture that moves so many pixels a frame to the right and upwards."""
+    before = texture()
+    after = ndimage.shift(before, (-up, across), order=3, mode="nearest")
+    density = np.ones(DOMAIN.resolution, np.float32)
+    return with_seen_motion(velocity, before, after, camera(kind), DOMAIN, density, DT)
+
+
+def rest() -> Velocity:
+    return Velocity.zero(COARSE, 2 * DOMAIN.voxel_size)
+
+
+@pytest.mark.parametrize("kind", ["perspective", "orthographic"])
+def test_smoke_at_rest_is_moved_as_the_picture_moves(kind: str) -> None:
+    """By metres that look as wide as the pixels, somewhat fewer; by none along the line of sight."""
+    found = seen(rest(), 0.6, 0.9, kind).centres()[BOX] * DT
+    (pixels, *_) = project(camera(kind), np.array([[0.0, 0.0, 0.75], [0.01, 0.0, 0.75]]))
+    pixel = 0.01 / float(pixels[1, 0] - pixels[0, 0])
+    assert 0.5 < found[..., 0].mean() / (0.6 * pixel) < 1
+    assert 0.5 < found[..., 2].mean() / (0.9 * pixel) < 1
+    assert abs(found[..., 1]).mean() < 0.1 * pixel
+
+
+def test_what_moves_as_the_picture_does_already_is_hardly_changed() -> None:
+    once = seen(rest(), 0.6, 0.9, "orthographic")
+    again = seen(once, 0.6, 0.9, "orthographic")
+    first, second = once.centres()[BOX], (again.centres() - once.centres())[BOX]
+    assert np.linalg.norm(second) < 0.4 * np.linalg.norm(first)
+
+
+def test_motion_along_the_line_of_sight_is_left() -> None:
+    """Towards the camera of parallel rays nothing moves in the picture."""
+    towards = np.zeros((*COARSE, 3), np.float32)
+    towards[..., 1] = -0.5
+    velocity = Velocity(on_faces(towards), 2 * DOMAIN.voxel_size)
+    found = seen(velocity, 0.0, 0.0, "orthographic").centres()[BOX]
+    np.testing.assert_allclose(found[..., 1], -0.5, atol=0.02)
+
+
+def test_it_has_no_divergence_and_keeps_what_is_known() -> None:
+    known = replace(rest(), closed=("z-",), figures={"trust": 0.5})
+    found = seen(known, 0.6, 0.9, "perspective")
+    assert without_divergence(found).figures["divergence"] < 1e-5
+    assert (found.closed, found.figures) == (("z-",), {"trust": 0.5})
+    assert not found.faces[2][..., 0].any()
+
+
+@pytest.mark.parametrize("picture", [np.zeros((60, 40), np.float32), np.ones((60, 40), np.float32)])
+def test_a_picture_without_smoke_or_structure_corrects_nothing(picture: np.ndarray) -> None:
+    density = np.zeros(DOMAIN.resolution, np.float32)
+    found = with_seen_motion(rest(), picture, picture, camera("perspective"), DOMAIN, density, DT)
+    assert not any(component.any() for component in found.faces)
+
+
+def test_the_paper_follows_no_picture() -> None:
+    assert compose(Settings.preset()).follows_picture
+    assert not compose(Settings.preset(method="paper")).follows_picture
