@@ -1,8 +1,9 @@
 """What is assumed of the smoke's depth, which one picture leaves undetermined.
 
 `RoundDepth` takes the smoke to be as deep as it is wide. Its answer is smooth; the default, `DetailedDepth`, gives it
-detail (`detailed_depth`). It spreads the smoke of one picture about an axis that comes from the whole clip. With
-several pictures the density is the product of their depth profiles, scaled in each horizontal layer to the optical
+detail (`detailed_depth`). It spreads the smoke of one picture about an axis that comes from the whole clip, first as
+much as explains the picture without shadows, then as much as explains it in the shadows that this casts. With several
+pictures the density is the product of their depth profiles, scaled in each horizontal layer to the optical
 depth of the view that shows most there. It need not look like any picture: the multiplicative fit scales ray by ray,
 and keeps of it only how the smoke of one ray relates to that of another.
 """
@@ -20,10 +21,11 @@ from smokelift.density.axis import SmokeAxis
 from smokelift.density.halves import MIN_COARSENED_VOXELS, any_of_two, every_second, spread_to_two, with_neighbours
 from smokelift.density.hull import Places, centres_of
 from smokelift.density.objective import Term
-from smokelift.density.observation import ObservedClip, View, ViewSet
+from smokelift.density.observation import ObservedClip, View, ViewSet, shadowed_optical_depth
 from smokelift.density.profile import EXPECTED, DepthProfile
 from smokelift.density.screen import view_frame
 from smokelift.render import Volume
+from smokelift.scene import SHADOWED
 from smokelift.scene.domain import box_around
 
 MIN_SHAPE = 0.05
@@ -100,7 +102,19 @@ class RoundDepth:
         return self if self.axis is not None or clip.place is None else replace(self, axis=clip.place.axis)
 
     def estimate(self, views: ViewSet) -> DepthEstimate:
-        """Spread the pictures' smoke by the profiles."""
+        """Spread the pictures' smoke by the profiles; of one picture before darkness again, as its shadows ask for."""
+        first = self._spread(views)
+        if len(views.views) > 1 or views.optics.scattering not in SHADOWED or not first.density.any():
+            return first
+        (view,), (renderer,) = views.views, first.views.renderers
+        if not view.before_darkness(views.optics.unshadowed_source()):
+            return first
+        image = renderer.image(first.density)
+        depth = shadowed_optical_depth(view, image, renderer.transmittance, views.optics)
+        return self._spread(replace(views, views=(replace(view, optical_depth=depth),)))
+
+    def _spread(self, views: ViewSet) -> DepthEstimate:
+        """Spread the views' optical depths by the profiles."""
         one = self.axis or SmokeAxis.upright()
         axes = [one] if len(views.views) == 1 else [_common_axis(view, views) for view in views.views]
         profiles = [

@@ -28,6 +28,18 @@ THINNEST_CLEAR = 0.05
 PATCH = 3
 """Pixels along a shaded side of smoke at least (docs/experiments/bright-background.md)."""
 
+GENTLE = 1.5
+"""Optical depth over ln(1 + r), r the share of the contrast that a pixel shows: right where that is about a half
+(docs/experiments/thick-smoke.md)."""
+
+DARK = 0.1
+"""Radiance of a dark background over the smoke's source radiance, at most: before a brighter one a picture itself tells
+smoke in shadow from thin smoke."""
+
+MIN_CONTRAST = 0.1
+"""Contrast of the background to the source radiance in shadow, over that without shadows, below which the latter tells
+more: in deep shadow noise would be taken for smoke."""
+
 ROUNDS = 2
 """Times that optical depth and the weight of the colours are found from each other."""
 
@@ -158,6 +170,10 @@ class View:
         """Colours (rows, columns, 3) as much as they count."""
         return colours if self.colours is None else self.colours.weighted(colours)
 
+    def before_darkness(self, source: NDArray[np.float64]) -> bool:
+        """Whether the background is dark beside a source radiance (3,) wherever smoke shows."""
+        return bool((self.plate.image[self.mask] <= DARK * source).all())
+
     @cached_property
     def noise(self) -> Image:
         """Standard deviation (rows, columns, 3) of the picture's noise, linear radiance."""
@@ -232,6 +248,38 @@ def apparent_optical_depth(
     if optics.scattering in SHADOWED:
         depth[_in_shadow(image, plate, mask, contrast)] = -np.log(THINNEST_CLEAR)
     return np.where(mask, depth, 0).astype(np.float32)
+
+
+def shadowed_optical_depth(
+    view: View, image: Image, transmittance: NDArray[np.float32], optics: Optics
+) -> NDArray[np.float32]:
+    """Optical depth (rows, columns) that explains a view's picture in the shadows of an estimate: GENTLE ln(1 + r).
+
+    The estimate's picture has the source radiance J = (image - T B) / (1 - T), and r is the share of the contrast B - J
+    that the view shows. If J were right the optical depth would be -ln(1 - r), which has no bound where r comes near to
+    1. But where the shadows fall is only assumed, so that J may be off by a factor of two.
+
+    Parameters
+    ----------
+    view
+        Whose `View.optical_depth` the estimate has.
+    image : (rows, columns, 3)
+        The estimate as the view's camera sees it before the view's plate.
+    transmittance : (rows, columns)
+        What the estimate lets through of the plate.
+    optics
+        How light travels through the domain.
+    """
+    plate, clear = view.plate.image, transmittance[..., None]
+    contrast = plate - (image - clear * plate) / np.maximum(1 - clear, 1e-6)
+    usual = plate - optics.unshadowed_source()
+    counted = view.weighted(contrast)
+    least = MIN_CONTRAST**2 * np.sum(usual * view.weighted(usual), -1)
+    seen = np.sum((plate - view.image) * counted, -1) + least * -np.expm1(-view.optical_depth)
+    share = seen / np.maximum(np.sum(contrast * counted, -1) + least, 1e-12)
+    known = (share > 0) & (view.optical_depth < -0.99 * np.log(THINNEST_CLEAR))  # else as thick as can be shown
+    depth = np.where(known, GENTLE * np.log1p(np.maximum(share, 0)), view.optical_depth)
+    return np.where(view.mask, depth, 0).astype(np.float32)
 
 
 def _in_shadow(image: Image, plate: Plate, mask: NDArray[np.bool_], contrast: NDArray[np.float64]) -> NDArray[np.bool_]:
