@@ -121,7 +121,7 @@ def _frame(index: int, before: Carried | None, shot: Shot, method: Method) -> Fr
         # what a moving camera does not see no picture corrects, so that its mass has to be kept
         moved = before.density if before.steady is None else before.steady
         carried = carry(moved, predicted, dt, domain.voxel_size, conserve=shot.moves)
-    fitted, taken_over = _density(index, before, carried, shot, method)
+    fitted, taken_over = _density(index, before, carried, predicted, shot, method)
     flame = _flame(index, fitted.density, shot)
     fit = _fit_figures(index, fitted, shot)
     fit_done = time.perf_counter()
@@ -165,7 +165,12 @@ def _measured(before: Carried, fitted: FittedDensity) -> tuple[Volume, Volume]:
 
 
 def _density(
-    index: int, before: Carried | None, carried: Volume | None, shot: Shot, method: Method
+    index: int,
+    before: Carried | None,
+    carried: Volume | None,
+    predicted: Velocity | None,
+    shot: Shot,
+    method: Method,
 ) -> tuple[FittedDensity, Mapping[str, float]]:
     """The density of a frame, and what was taken over of the carried one."""
     observations = shot.observe(index)
@@ -173,9 +178,13 @@ def _density(
         return _unseen(shot.optics.domain, carried), {}
     views = ViewSet.of(observations, shot.optics, index)
     depth = method.depth_prior.estimate(views)
-    if before is None or carried is None:
+    if before is None or carried is None or predicted is None:
         return method.density_fit.fit(views, depth, None), {}
-    start = method.temporal_prior.start(depth.views, depth, carried, before.density)
+    carried_smooth = None
+    if before.smooth is not None:
+        carried_smooth = carry(before.smooth, predicted, 1.0 / shot.clip.fps, shot.optics.domain.voxel_size)
+    start = method.temporal_prior.start(depth.views, depth, carried, before.density, carried_smooth)
+    del carried_smooth  # the fit needs the memory
     fitted = method.density_fit.fit(views, depth, start.density)
     if shot.moves:
         # what a moving camera does not see now it may have seen before
