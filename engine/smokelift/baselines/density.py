@@ -135,7 +135,14 @@ class FixedRateDescent:
 class AllCarried:
     """The paper's temporal prior: the fit starts from the carried density as it is."""
 
-    def start(self, views: ViewSet, depth: DepthEstimate, carried: Volume, before: Volume) -> Start:
+    def start(
+        self,
+        views: ViewSet,
+        depth: DepthEstimate,
+        carried: Volume,
+        before: Volume,
+        carried_smooth: Volume | None = None,
+    ) -> Start:
         """The carried density; see `smokelift.density.TemporalPrior`."""
         return Start(carried, {})
 

@@ -22,6 +22,7 @@ import smokelift._core as _core
 from smokelift.density.clip_texture import ClipTexture
 from smokelift.density.depth_prior import DepthEstimate, RoundDepth
 from smokelift.density.exemplar import Exemplar, enlarged, reduced
+from smokelift.density.isotropic import isotropic
 from smokelift.density.moment_levels import Level
 from smokelift.density.multiplicative import fit_multiplicative, take_turns
 from smokelift.density.objective import Term
@@ -252,6 +253,10 @@ class EveryView:
         rows = (np.arange(wanted.shape[1]) + 0.5) * scale
         fade = np.clip(np.minimum(rows, table.shape[1] - rows) * self.level.coarseness / ENDS, 0, 1)
         step = np.log(np.clip((wanted + faint) / (shown + faint), *STEP_RANGE))
+        # what a row of the smoke lacks it lacks from all azimuths: that is not detail
+        has = ndimage.gaussian_filter1d(shown.sum(0), 1)
+        lacks = np.log(np.clip((amounts + 1e-9) / (has + 1e-9), *STEP_RANGE)) * (shown > faint)
+        step = lacks + isotropic(step - lacks)
         step = (relaxation * fade * step).astype(np.float32)
         table.scale(now, np.ascontiguousarray(enlarged(step, scale, whole.shape)), degrees, corner)
 

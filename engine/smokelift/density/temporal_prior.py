@@ -50,6 +50,11 @@ LARGEST_GAIN = 3.0
 smoke has entered, or has moved otherwise than was predicted."""
 
 
+FAINT = np.float32(0.3)
+"""Mean densities of the smooth answer below which nothing is taken to have entered: filled in every frame, what fades
+at the support's edge shows a shell (docs/experiments/level-layers.md)."""
+
+
 @dataclass(frozen=True, eq=False)
 class Start:
     """Where the fit of a frame starts.
@@ -68,7 +73,14 @@ class Start:
 class TemporalPrior(Protocol):
     """What is taken over from the frame before."""
 
-    def start(self, views: ViewSet, depth: DepthEstimate, carried: Volume, before: Volume) -> Start:
+    def start(
+        self,
+        views: ViewSet,
+        depth: DepthEstimate,
+        carried: Volume,
+        before: Volume,
+        carried_smooth: Volume | None = None,
+    ) -> Start:
         """Where the fit starts.
 
         Parameters
@@ -79,6 +91,8 @@ class TemporalPrior(Protocol):
             What the depth prior says of them.
         carried, before : (nx, ny, nz)
             The density of the frame before, carried along by the predicted velocity, and as it was.
+        carried_smooth : (nx, ny, nz), optional
+            The smooth answer of the frame before, carried along too; None where nothing is made up.
         """
 
 
@@ -86,7 +100,14 @@ class TemporalPrior(Protocol):
 class NothingCarried:
     """Every frame starts from its own pictures."""
 
-    def start(self, views: ViewSet, depth: DepthEstimate, carried: Volume, before: Volume) -> Start:
+    def start(
+        self,
+        views: ViewSet,
+        depth: DepthEstimate,
+        carried: Volume,
+        before: Volume,
+        carried_smooth: Volume | None = None,
+    ) -> Start:
         """The depth prior's density; see `TemporalPrior`."""
         return Start(depth.density, {})
 
@@ -103,7 +124,14 @@ class BlendCarried:
 
     largest: float
 
-    def start(self, views: ViewSet, depth: DepthEstimate, carried: Volume, before: Volume) -> Start:
+    def start(
+        self,
+        views: ViewSet,
+        depth: DepthEstimate,
+        carried: Volume,
+        before: Volume,
+        carried_smooth: Volume | None = None,
+    ) -> Start:
         """The prior's density, mixed with the carried one; see `TemporalPrior`.
 
         Its figures are ``share`` of the density and ``amounts``, the share of the rays' optical depths, with
@@ -144,13 +172,16 @@ class BlendCarried:
 class GuidedSimulation:
     """The detail of the carried density, in the amounts of the depth prior's smooth answer.
 
-    With B a blur, the smooth answer rho_s, the prior's density rho_p and the carried one rho_c:
+    With B a blur, the smooth answer rho_s, that of the frame before carried rho_s', the prior's density rho_p, the
+    carried one rho_c and a faint density f:
 
-        start = kept rho_c B(rho_s)' / B(rho_c) + (1 - kept B(rho_s)' / B(rho_s)) rho_p,
-        B(rho_s)' = min(B(rho_s), LARGEST_GAIN B(rho_c))
+        start = kept rho_c b / B(rho_c) + (1 - kept b / B(rho_s)) rho_p,
+        b = min(B(rho_s), LARGEST_GAIN B(rho_c)) min(1, (LARGEST_GAIN rho_s' rho_s + f^2) / (rho_s^2 + f^2))
 
-    Detail is born where nothing is carried, at inlets above all, and moves on from there. In every frame `kept` leaves
-    some to be renewed (docs/experiments/every-view.md).
+    Detail is born where nothing is carried, at inlets above all, and moves on from there. A hole at an inlet is
+    narrower than the blur, and a gap may be detail: the smooth answer, which has no gaps, tells them apart
+    (docs/experiments/level-layers.md). In every frame `kept` leaves some to be renewed
+    (docs/experiments/every-view.md).
 
     Attributes
     ----------
@@ -163,7 +194,14 @@ class GuidedSimulation:
     largest: float
     kept: float = 0.97
 
-    def start(self, views: ViewSet, depth: DepthEstimate, carried: Volume, before: Volume) -> Start:
+    def start(
+        self,
+        views: ViewSet,
+        depth: DepthEstimate,
+        carried: Volume,
+        before: Volume,
+        carried_smooth: Volume | None = None,
+    ) -> Start:
         """The carried density in the smooth answer's amounts; see `TemporalPrior`.
 
         Its figure ``share`` is the share of the smoke that is taken over.
@@ -174,6 +212,10 @@ class GuidedSimulation:
         hull = views.hull[box]
         wanted, have = (_core.blur(values[box], GUIDED_BLUR, BLUR_REACH)[hull] for values in (depth.smooth, carried))
         reached = np.float32(self.kept) * np.minimum(wanted, np.float32(LARGEST_GAIN) * have)
+        if carried_smooth is not None:
+            came, smooth = (values[box][hull] for values in (carried_smooth, depth.smooth))
+            faint = (FAINT * smooth.mean()) ** 2 + TINY
+            reached *= np.minimum(1, (np.float32(LARGEST_GAIN) * came * smooth + faint) / (smooth**2 + faint))
         taken_over = carried[box][hull] * reached / np.maximum(have, TINY)
         started = taken_over + (1 - reached / np.maximum(wanted, TINY)) * depth.density[box][hull]
         total = float(started.sum(dtype=np.float64))

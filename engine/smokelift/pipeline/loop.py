@@ -130,7 +130,7 @@ def _frame(index: int, before: Carried | None, shot: Shot, method: Method) -> Fr
         moved = before.density if before.steady is None else before.steady
         carried = carry(moved, predicted, dt, domain.voxel_size, conserve=shot.moves)
     views = _seen(index, shot)
-    fitted, taken_over = _density(views, before, carried, shot, method)
+    fitted, taken_over = _density(views, before, carried, predicted, shot, method)
     followed = _followed(views, shot, method)
     flame = _flame(index, fitted.density, shot)
     fit = _fit_figures(index, fitted, shot)
@@ -192,15 +192,24 @@ def _measured(before: Carried, fitted: FittedDensity) -> tuple[Volume, Volume]:
 
 
 def _density(
-    views: ViewSet | None, before: Carried | None, carried: Volume | None, shot: Shot, method: Method
+    views: ViewSet | None,
+    before: Carried | None,
+    carried: Volume | None,
+    predicted: Velocity | None,
+    shot: Shot,
+    method: Method,
 ) -> tuple[FittedDensity, Mapping[str, float]]:
     """The density of a frame, and what was taken over of the carried one."""
     if views is None:
         return _unseen(shot.optics.domain, carried), {}
     depth = method.depth_prior.estimate(views)
-    if before is None or carried is None:
+    if before is None or carried is None or predicted is None:
         return method.density_fit.fit(views, depth, None), {}
-    start = method.temporal_prior.start(depth.views, depth, carried, before.density)
+    carried_smooth = None
+    if before.smooth is not None:
+        carried_smooth = carry(before.smooth, predicted, 1.0 / shot.clip.fps, shot.optics.domain.voxel_size)
+    start = method.temporal_prior.start(depth.views, depth, carried, before.density, carried_smooth)
+    del carried_smooth  # the fit needs the memory
     fitted = method.density_fit.fit(views, depth, start.density)
     if shot.moves:
         # what a moving camera does not see now it may have seen before

@@ -157,6 +157,25 @@ def test_detail_is_born_where_nothing_is_carried(moment, prior_start) -> None:
     np.testing.assert_allclose(little.density.sum(), prior_start.density[hull].sum(), rtol=0.02)
 
 
+def test_a_hole_that_smoke_entered_through_is_filled(moment, prior_start) -> None:
+    """It is narrower than the blur; where the smooth answer came along, a gap is detail and stays."""
+    smooth, holed = prior_start.smooth, moment.true.copy()
+    entrance = np.zeros_like(moment.views.hull)
+    row = int(smooth.sum((0, 1)).argmax())
+    entrance[:, :, row] = moment.views.hull[:, :, row]
+    holed[entrance] = 0
+    simulation = GuidedSimulation(LARGEST, kept=1.0)
+    gap, hole = (
+        simulation.start(moment.views, prior_start, holed, moment.before, came).density
+        for came in (smooth, np.where(entrance, np.float32(0), smooth))
+    )
+    np.testing.assert_array_equal(gap, guided(moment, prior_start, holed).density)
+    dense = entrance & (smooth > smooth[moment.views.hull].mean())
+    np.testing.assert_allclose(hole[dense], prior_start.density[dense], rtol=0.1)
+    assert gap[dense].sum() < 0.5 * hole[dense].sum()
+    np.testing.assert_array_equal(hole[~entrance], gap[~entrance])
+
+
 def test_a_simulation_works_about_the_hull_alone(moment, prior_start, monkeypatch) -> None:
     """What it finds there is what it finds in the whole box, to the bit."""
     hull = moment.views.hull.copy()

@@ -593,7 +593,9 @@ def test_every_part_of_a_method_can_be_exchanged(plume, draft) -> None:
     """The loop asks each part for what it is for: here the temporal prior, which puts every frame on the one before."""
 
     class Stubborn:
-        def start(self, views: Any, depth: Any, carried: np.ndarray, before: np.ndarray) -> Start:
+        def start(
+            self, views: Any, depth: Any, carried: np.ndarray, before: np.ndarray, carried_smooth: object = None
+        ) -> Start:
             return Start(before, {"stubborn": 1.0})
 
     class Idle:
