@@ -90,7 +90,8 @@ def _correction(
     columns, rows = (screen.pixels @ motion).T.reshape(2, *after.shape)
     down, across = np.indices(after.shape)
     carried = ndimage.map_coordinates(before, (down - rows, across - columns), order=1, mode="nearest")
-    gradient = [part.ravel() for part in np.gradient((carried + after) / 2)[::-1]]
+    mean = (carried + after) / 2  # correlated, since a picture may be a single row
+    gradient = [ndimage.correlate1d(mean, (-0.5, 0, 0.5), axis, mode="nearest").ravel() for axis in (1, 0)]
     steepness = float(np.mean(sum(part[smoke.ravel()] ** 2 for part in gradient)))
     if steepness == 0:
         return np.zeros(motion.shape, np.float32)

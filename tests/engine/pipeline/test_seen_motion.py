@@ -94,3 +94,13 @@ def test_a_picture_without_smoke_or_structure_corrects_nothing(picture: np.ndarr
 def test_the_paper_follows_no_picture() -> None:
     assert compose(Settings.preset()).follows_picture
     assert not compose(Settings.preset(method="paper")).follows_picture
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 9), (9, 1)])
+def test_a_picture_may_be_a_single_row_or_column(size: tuple[int, int]) -> None:
+    domain = Domain((-0.1, -0.1, 0.0), (0.1, 0.1, 0.2), (1, 1, 1))
+    before, after = np.random.default_rng(0).random((2, *size[::-1]), np.float32)
+    velocity = Velocity.zero(domain.resolution, domain.voxel_size)
+    seen_by = camera("perspective").resized(*size)
+    found = with_seen_motion(velocity, before, after, seen_by, domain, np.ones((1, 1, 1), np.float32), DT)
+    assert all(np.isfinite(component).all() for component in found.faces)
