@@ -61,7 +61,7 @@ GOLDEN = (np.sqrt(5) - 1) / 2
 
 FRESH, CARRIED = 0.6, 0.5
 """Shares of a step towards a picture that are made, for smoke that nothing is carried for and for what is carried: more
-of the second flickers (docs/experiments/stretched-noise.md)."""
+of the second flickers (docs/experiments/uneven-steps.md)."""
 
 STEP_RANGE = (0.3, 3.0)
 """Largest change of a ray's smoke in one step."""
