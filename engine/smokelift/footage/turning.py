@@ -67,9 +67,9 @@ FIRST_FRAMES = 12
 MOVING_FRAMES = 0.1
 """Share of the frames that have to be moved: a knock is not worth a panorama."""
 
-UNEXPLAINED, LOST = 0.1, 12
-"""Share of the frames that no turn has to explain, and such frames on a side of the middle one after which none is
-looked for."""
+UNEXPLAINED, LOST, MIN_LOST = 0.1, 12, 6
+"""Share of the frames that no turn has to explain, such frames on a side of the middle one after which none is
+looked for, and such frames before a camera that travels, at least."""
 
 TEXTURE_EVERYWHERE, REFOUND = 1 / 3, 0.8
 """Share of the cells that need texture before a camera is refused, since less may be smoke alone before something
@@ -273,7 +273,8 @@ def find_turns(clip: Clip, *lenses: Array) -> Turns | None:
             mean = rotations.mean().inv()
             found = Turns(clip.size, lens, mean * rotations, key, mean)
             return found if moving >= MOVING_FRAMES * len(clip) and found.farthest >= MIN_OFFSET else None
-    if keys[0].textured.mean() < TEXTURE_EVERYWHERE or 2 * sum(lost) < len(lost):
+    # in a few frames, or a part of them, smoke alone moves so
+    if keys[0].textured.mean() < TEXTURE_EVERYWHERE or sum(lost) < max(MIN_LOST, len(lost) / 2):
         return None
     raise ValueError(
         "The picture moves as before a camera that travels or zooms, which no turn steadies: track it in Blender, and "

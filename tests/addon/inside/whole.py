@@ -290,7 +290,7 @@ def test_a_clip_without_smoke_is_not_done(scene, tmp_path) -> None:
     (row,) = bpy.context.window_manager.smokelift.jobs
     assert row.outcome == "failed"
     assert "No smoke found" in row.sentence
-    assert "Check the background that is given (Clean Plate)" in row.sentence
+    assert "The background that is given may hold the smoke" in row.sentence
 
 
 def test_the_check_says_what_a_run_takes_and_assumes(shot, tmp_path) -> None:
