@@ -49,6 +49,12 @@ class Detail(Protocol):
             Whether nothing of it is carried on from the frame before.
         """
 
+    def amounts(self, density: Volume) -> NDArray[np.float32]:
+        """Return what the smooth answer decides of a density, (n,) at the voxels that may hold smoke.
+
+        The density (nx, ny, nz) is blurred over lobes, which are detail.
+        """
+
 
 @dataclass(frozen=True, eq=False)
 class DepthEstimate:

@@ -16,9 +16,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import ndimage
 
-import smokelift._core as _core
 from smokelift.density.clip_texture import ClipTexture
 from smokelift.density.depth_prior import DepthEstimate, RoundDepth
 from smokelift.density.exemplar import Exemplar, enlarged, reduced
@@ -28,7 +28,7 @@ from smokelift.density.multiplicative import fit_multiplicative, take_turns
 from smokelift.density.objective import Term
 from smokelift.density.observation import ObservedClip, ViewSet
 from smokelift.density.stretched_noise import StretchedNoise
-from smokelift.density.temporal_prior import BLUR_REACH, TINY
+from smokelift.density.temporal_prior import TINY
 from smokelift.density.turntable import Turntable
 from smokelift.render import Volume
 from smokelift.scene import Camera
@@ -43,6 +43,10 @@ SMOOTH_TOLERANCE = 0.02
 AMOUNTS = 0.5
 """Standard deviation of the blur that noise does not change, in standard deviations of the smoke's width: noise makes
 lobes, and leaves each where the smoke is (docs/experiments/every-view.md)."""
+
+GUIDED_AMOUNTS = 0.75
+"""Standard deviation, in the same unit, of the blur over which carried smoke gets the smooth answer's amounts: what is
+finer is the simulation's, on any grid (docs/experiments/guided-simulation.md)."""
 
 LARGEST_GAIN = 5.0
 """Bound of the factor that brings those amounts back."""
@@ -130,21 +134,9 @@ class DetailedDepth:
         noisy = np.zeros(smooth.shape, np.float32)
         where = level.views.where
         noisy.ravel()[where] = smooth.ravel()[where] * np.exp(noise.at(level))
-        return _with_amounts(noisy, smooth, level, AMOUNTS * texture.width)
-
-
-def _with_amounts(noisy: Volume, smooth: Volume, level: Level, blur: float) -> Volume:
-    """Noisy smoke with the amounts of the smooth answer, blurred by so many voxels; on the coarsest grid."""
-    coarser = level.coarser
-    if coarser is not None:
-        means = coarser.means(smooth, level)
-        return coarser.changed(noisy, level, lambda changed: _with_amounts(changed, means, coarser, blur / 2))
-    box = box_around(level.views.hull, 0)
-    amounts, now = (_core.blur(volume[box], blur, BLUR_REACH) for volume in (smooth, noisy))
-    result = np.zeros(smooth.shape, np.float32)
-    gain = np.minimum((amounts + TINY) / (now + TINY), np.float32(LARGEST_GAIN))
-    np.copyto(result[box], noisy[box] * gain, where=level.views.hull[box])
-    return result
+        amounts, now = (level.blurred(each, AMOUNTS * texture.width) for each in (smooth, noisy))
+        noisy.ravel()[where] *= np.minimum((amounts + TINY) / (now + TINY), np.float32(LARGEST_GAIN))
+        return noisy
 
 
 def _smooth_answer(level: Level, density: Volume) -> Volume:
@@ -189,6 +181,10 @@ class EveryView:
     def added(self, density: Volume, cameras: Sequence[Term], *, fresh: bool) -> Volume:
         """Scale a density towards the clip's texture and the cameras' pictures in turn; see `Detail`."""
         return self._rounds(density, cameras, self.texture.exemplars, self.azimuths(), fresh)
+
+    def amounts(self, density: Volume) -> NDArray[np.float32]:
+        """A density (n,) over the lobes of smoke; see `Detail`."""
+        return self.level.blurred(density, GUIDED_AMOUNTS * self.texture.width)
 
     def _rounds(
         self,

@@ -26,6 +26,9 @@ from smokelift.scene import Domain
 from smokelift.scene.domain import box_around
 from smokelift.scene.projection import voxel_width
 
+BLUR_REACH = 3.0
+"""Standard deviations up to which a blur reaches."""
+
 
 @dataclass(frozen=True, eq=False)
 class Level:
@@ -80,6 +83,16 @@ class Level:
         means = np.zeros(self.views.hull.shape, np.float32)
         means[box] = _core.means_of_two(density[fine], of.views.hull[fine])
         return means
+
+    def blurred(self, values: Volume, deviation: float) -> NDArray[np.float32]:
+        """A volume blurred by a Gaussian of so many voxels, (n,) at those that may hold smoke; on the coarsest grid."""
+        coarser = self.coarser
+        if coarser is not None:
+            means = np.zeros(coarser.views.hull.shape, np.float32)
+            means.ravel()[coarser.views.where] = coarser.blurred(coarser.means(values, self), deviation / 2)
+            return coarser.finer(means, self)
+        box = box_around(self.views.hull, round(BLUR_REACH * deviation))
+        return np.asarray(_core.blur(values[box], deviation, BLUR_REACH)[self.views.hull[box]])
 
     @cached_property
     def _box(self) -> tuple[slice, slice, slice]:

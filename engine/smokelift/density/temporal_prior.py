@@ -26,24 +26,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-import smokelift._core as _core
 from smokelift.density.depth_prior import DepthEstimate
 from smokelift.density.observation import View, ViewSet
 from smokelift.render import Image, Volume
-from smokelift.scene.domain import box_around
 
 TINY = np.finfo(np.float32).tiny
 """Smallest normal number, for divisions and logarithms."""
 
 MIN_DEPTH_SHARE = 1e-3
 """Optical depth, as a fraction of the largest, below which its logarithm means nothing."""
-
-GUIDED_BLUR = 5.0
-"""Standard deviation (voxels) of the blur whose result the smooth answer decides; what is finer is the simulation's
-(docs/experiments/guided-simulation.md)."""
-
-BLUR_REACH = 3.0
-"""Standard deviations up to which a blur reaches."""
 
 LARGEST_GAIN = 3.0
 """Bound of the factor by which carried smoke is made denser. Where that is too little the prior's smoke is added: there
@@ -172,8 +163,8 @@ class BlendCarried:
 class GuidedSimulation:
     """The detail of the carried density, in the amounts of the depth prior's smooth answer.
 
-    With B a blur, the smooth answer rho_s, that of the frame before carried rho_s', the prior's density rho_p, the
-    carried one rho_c and a faint density f:
+    With B the blur over lobes (`Detail.amounts`), the smooth answer rho_s, that of the frame before carried rho_s', the
+    prior's density rho_p, the carried one rho_c and a faint density f:
 
         start = kept rho_c b / B(rho_c) + (1 - kept b / B(rho_s)) rho_p,
         b = min(B(rho_s), LARGEST_GAIN B(rho_c)) min(1, (LARGEST_GAIN rho_s' rho_s + f^2) / (rho_s^2 + f^2))
@@ -206,22 +197,21 @@ class GuidedSimulation:
 
         Its figure ``share`` is the share of the smoke that is taken over.
         """
-        if depth.smooth is None or not views.hull.any():
+        if depth.smooth is None or depth.detail is None or not views.hull.any():
             return BlendCarried(self.largest).start(views, depth, carried, before)
-        box = box_around(views.hull, round(BLUR_REACH * GUIDED_BLUR))
-        hull = views.hull[box]
-        wanted, have = (_core.blur(values[box], GUIDED_BLUR, BLUR_REACH)[hull] for values in (depth.smooth, carried))
+        where = views.where
+        wanted, have = (depth.detail.amounts(values) for values in (depth.smooth, carried))
         reached = np.float32(self.kept) * np.minimum(wanted, np.float32(LARGEST_GAIN) * have)
         if carried_smooth is not None:
-            came, smooth = (values[box][hull] for values in (carried_smooth, depth.smooth))
+            came, smooth = (values.ravel()[where] for values in (carried_smooth, depth.smooth))
             faint = (FAINT * smooth.mean()) ** 2 + TINY
             reached *= np.minimum(1, (np.float32(LARGEST_GAIN) * came * smooth + faint) / (smooth**2 + faint))
-        taken_over = carried[box][hull] * reached / np.maximum(have, TINY)
-        started = taken_over + (1 - reached / np.maximum(wanted, TINY)) * depth.density[box][hull]
+        taken_over = carried.ravel()[where] * reached / np.maximum(have, TINY)
+        started = taken_over + (1 - reached / np.maximum(wanted, TINY)) * depth.density.ravel()[where]
         total = float(started.sum(dtype=np.float64))
         share = float(taken_over.sum(dtype=np.float64)) / total if total > 0 else 0.0
         density = np.zeros(views.hull.shape, np.float32)
-        density[box][hull] = started
+        density.ravel()[where] = started
         return Start(density, {"share": share})
 
 

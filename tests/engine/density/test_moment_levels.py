@@ -72,6 +72,22 @@ def test_what_stays_there_stays_here(shot, large) -> None:
     assert 8 * means.sum(dtype=np.float64) == pytest.approx(density.sum(dtype=np.float64), rel=1e-5)
 
 
+def test_a_blur_on_the_coarser_grid_is_about_the_same(shot, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Beside that of another density: at the hull's edge both fade. On a small grid it works about the hull alone."""
+    fine = level(shot)
+    density = np.where(fine.views.hull, np.float32(1) + np.indices(SHAPE, np.float32)[2] % 3, np.float32(0))
+    found = fine.blurred(density, 4.0)
+    with monkeypatch.context() as whole:
+        whole.setattr(module, "box_around", lambda voxels, margin: (slice(None),) * 3)
+        np.testing.assert_array_equal(found, fine.blurred(density, 4.0))
+    monkeypatch.setattr(module, "MIN_COARSENED_VOXELS", 2500)
+    large = level(shot)
+    assert large.coarser is not None
+    even = large.views.hull.astype(np.float32)
+    wanted, seen = (each.blurred(density, 4.0) / each.blurred(even, 4.0) for each in (fine, large))
+    np.testing.assert_allclose(seen, wanted, rtol=0.02)
+
+
 def test_values_between_middles_are_linear(shot, large) -> None:
     fine = level(shot)
     coarser = fine.coarser
