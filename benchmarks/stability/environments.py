@@ -32,7 +32,11 @@ MAX_EVENTS = 52
 ORDINARY_USER = 54321
 """A number that no user has, so that all of its processes are ours."""
 
+LARGEST_PIECE, PIECES = 2**17, 512
+"""What is larger (bytes) is an array and no piece of the heap, which keeps so many halves of it."""
+
 _CLONE_NEWNET = 0x40000000
+_M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3
 
 _BALLAST: list[bytes] = []
 
@@ -239,15 +243,22 @@ def _become_ordinary() -> None:
 
 
 def _fill_memory(left: int) -> None:
-    """Take all memory but so many bytes, also what the heap has and does not use."""
+    """Take all memory but so many bytes; small pieces stay to be had from the heap.
+
+    NumPy's iterators end the process where their buffers of 64 KiB cannot be had: they raise without the lock.
+    """
+    heap = ctypes.CDLL(None)
+    heap.mallopt(_M_MMAP_THRESHOLD, LARGEST_PIECE)
+    heap.mallopt(_M_TRIM_THRESHOLD, 2 * PIECES * LARGEST_PIECE)
+    pieces = [bytes(LARGEST_PIECE // 2) for _ in range(PIECES)]
+    del pieces
     pages = int(Path("/proc/self/statm").read_text().split()[0])
     most = pages * resource.getpagesize() + left + 2**20  # an array is a little larger than what it holds
     resource.setrlimit(resource.RLIMIT_AS, (most, most))
     kept_free = bytearray(left)
-    for size in (2**20, 2**16, 2**12):
-        with suppress(MemoryError):
-            while True:
-                _BALLAST.append(bytes(size))
+    with suppress(MemoryError):
+        while True:
+            _BALLAST.append(bytes(2**20))
     del kept_free
 
 
