@@ -24,6 +24,7 @@ from smokelift.density.objective import Term
 from smokelift.density.observation import ObservedClip, View, ViewSet, shadowed_optical_depth
 from smokelift.density.profile import EXPECTED, DepthProfile
 from smokelift.density.screen import view_frame
+from smokelift.density.wander import Wander
 from smokelift.render import Volume
 from smokelift.scene import SHADOWED
 from smokelift.scene.domain import box_around
@@ -99,9 +100,12 @@ class RoundDepth:
     ----------
     axis
         Where the smoke of one view stands in depth; None takes that of a clip, or the middle of the domain.
+    wander
+        How it wanders about that; None does not. Several views show where it stands.
     """
 
     axis: SmokeAxis | None = None
+    wander: Wander | None = None
 
     def of_clip(self, clip: ObservedClip) -> RoundDepth:
         """Take the axis that the clip's smoke was found to have, unless one is given."""
@@ -122,9 +126,11 @@ class RoundDepth:
     def _spread(self, views: ViewSet) -> DepthEstimate:
         """Spread the views' optical depths by the profiles."""
         one = self.axis or SmokeAxis.upright()
-        axes = [one] if len(views.views) == 1 else [_common_axis(view, views) for view in views.views]
+        single = len(views.views) == 1
+        axes = [one] if single else [_common_axis(view, views) for view in views.views]
+        wander = self.wander if single else None
         profiles = [
-            DepthProfile(view.optical_depth, view.camera, views.optics.domain, axis)
+            DepthProfile(view.optical_depth, view.camera, views.optics.domain, axis, wander, views.frame)
             for view, axis in zip(views.views, axes, strict=True)
         ]
         expected = replace(views, hull=_expected(views, profiles))

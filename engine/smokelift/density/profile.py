@@ -23,6 +23,7 @@ from scipy.special import gamma, gammainc
 from smokelift.density.axis import SmokeAxis
 from smokelift.density.hull import Places, centres_of
 from smokelift.density.screen import upright_rows, view_frame
+from smokelift.density.wander import Wander
 from smokelift.scene import Camera, Domain
 from smokelift.scene.projection import ray_through_pixels
 
@@ -123,15 +124,31 @@ class DepthProfile:
     camera, domain
         What is seen, from where.
     axis
-        Where in depth its middle is.
+        Where in depth its middle is, on the mean.
+    wander, frame
+        How the rays' middles scatter about it in a frame; None lets them stand on it. The profile is narrower then, so
+        that the smoke is as deep as without.
     """
 
-    def __init__(self, amount: NDArray[np.float32], camera: Camera, domain: Domain, axis: SmokeAxis) -> None:
+    def __init__(
+        self,
+        amount: NDArray[np.float32],
+        camera: Camera,
+        domain: Domain,
+        axis: SmokeAxis,
+        wander: Wander | None = None,
+        frame: int = 0,
+    ) -> None:
         self._camera, self._domain, self._axis = camera, domain, axis
         self._centre = np.array(domain.centre)
         self._lateral, self._depth, self._height = view_frame(camera)
         self._heights, self._spread = lateral_spread(amount, camera, domain)
         self._balls = ball_spread(amount, camera, domain)
+        self._narrowing = 1.0
+        self._aside = np.zeros_like(amount)
+        if wander is not None:
+            self._aside = self._scatter(amount, wander, frame)
+            self._narrowing = np.sqrt(max(0.0, 1 - wander.share**2))
 
     def at(self, places: Places, voxels: NDArray[np.bool_]) -> NDArray[np.float64]:
         """What is spread (1/m), of unit integral along the depth, at the marked voxels (n,), seen at `places`."""
@@ -159,7 +176,8 @@ class DepthProfile:
         meets = np.clip(-here / along, near, far)
         place = start + meets[..., None] * direction
         height, lateral = place @ self._height, place @ self._lateral
-        middle, width = self._axis.at(height, lateral), self._width(height, lateral, self._balls)
+        middle = self._axis.at(height, lateral) + self._aside
+        width = self._width(height, lateral, self._balls)
         ends = [(here + distance * along - middle) / width for distance in (near, far)]
         low, high = (np.sign(end) * gammainc(1 / FLATNESS, np.abs(end) ** FLATNESS) for end in ends)
         return np.where(missed, 0, (high - low) / 2).astype(np.float32)
@@ -170,17 +188,38 @@ class DepthProfile:
         offset = centres_of(voxels, self._domain) - self._centre
         height, lateral = offset @ self._height, offset @ self._lateral
         width = self._width(height, lateral, places.read(self._balls))
-        distance = np.abs(offset @ self._depth - self._axis.at(height, lateral))
+        middle = self._axis.at(height, lateral) + places.read(self._aside)
+        distance = np.abs(offset @ self._depth - middle)
         return np.exp(-((distance / width) ** FLATNESS)), width
 
     def _width(
         self, height: NDArray[np.float64], lateral: NDArray[np.float64], balls: NDArray[np.float32]
     ) -> NDArray[np.float64]:
         """A, in metres."""
+        scale = np.sqrt(gamma(1 / FLATNESS) / gamma(3 / FLATNESS))
+        return np.asarray(self._narrowing * self._deviation(height, lateral, balls) * scale)
+
+    def _deviation(
+        self, height: NDArray[np.float64], lateral: NDArray[np.float64], balls: NDArray[np.float32]
+    ) -> NDArray[np.float64]:
+        """Standard deviation (m) of the smoke in depth."""
         if self._axis.several:
             across = self._axis.width_at(height, lateral)
         else:
             across = np.interp(height, self._heights, self._spread)
         spread = np.sqrt(across * balls + (DISTANCE_SHARE * self._axis.spread_at(height, lateral)) ** 2)
-        scale = np.sqrt(gamma(1 / FLATNESS) / gamma(3 / FLATNESS))
-        return np.asarray(np.maximum(spread, self._domain.voxel_size) * scale)
+        return np.asarray(np.maximum(spread, self._domain.voxel_size))
+
+    def _scatter(self, amount: NDArray[np.float32], wander: Wander, frame: int) -> NDArray[np.float32]:
+        """How far (m) behind the axis each pixel's smoke has its middle, (rows, columns)."""
+        origin, direction = ray_through_pixels(self._camera)
+        start = origin - self._centre
+        place = start - (start @ self._depth)[..., None] / (direction @ self._depth)[..., None] * direction
+        height, lateral = place @ self._height, place @ self._lateral
+        # a lobe moves as one, so what is as deep as its surroundings on the mean tells how far
+        blur = wander.width * self._domain.voxel_size / _pixel_size(self._camera, self._domain)
+        weight = amount + 1e-6 * amount.max(initial=1e-30)
+        deep = ndimage.gaussian_filter(weight * self._deviation(height, lateral, self._balls), blur)
+        deep /= ndimage.gaussian_filter(weight, blur)
+        step = (height[..., None] * self._height + lateral[..., None] * self._lateral) / self._domain.voxel_size
+        return np.asarray(deep * wander.aside(step, frame), np.float32)

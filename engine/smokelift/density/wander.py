@@ -1,0 +1,84 @@
+"""Smoke that wanders in depth: where the middle of each ray's smoke stands beside the axis.
+
+The axis of one picture's smoke is a mean, and smoke about it is a lathe's work from the side. In true smoke the rays'
+middles scatter about it by a share of the smoke's depth (docs/experiments/wander.md). What scatters them are the lobes
+that roughen the pictures, so each octave of the scatter is as strong as the clip's detail is on its scale, and laminar
+smoke stays straight. It travels with the smoke.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+Array = NDArray[np.float64]
+
+SHARE = 0.5
+"""Standard deviation of the rays' middles over the smoke's in depth, where all octaves are of unit strength
+(docs/experiments/wander.md)."""
+
+NODES = (1.6, 0.8)
+"""Distances between nodes of the octaves, in standard deviations of the smoke's width: lobes, and half of them
+(docs/experiments/wander.md)."""
+
+LARGEST = 2.0
+"""Bound of the scatter, in its standard deviations: smoke stays where the domain is likely to hold it."""
+
+LATTICE = 32
+"""Nodes along each side of a lattice, which repeats."""
+
+NODE_DEVIATION = (151 / 315) ** 1.5
+"""Standard deviation of cubic B-splines with coefficients of unit variance in three dimensions: the squares of those
+that reach a place have the sum 151 / 315 along each, on the mean."""
+
+
+@dataclass(frozen=True, eq=False)
+class Wander:
+    """How the smoke of one camera's clip wanders.
+
+    Attributes
+    ----------
+    velocity : (3,)
+        Of the smoke, in voxels a frame.
+    width
+        Standard deviation of the smoke across its axis, in voxels.
+    roughness
+        Standard deviation of the logarithm of its density by octave, the coarsest first; see `stretched_noise`.
+    seed
+        Of another way to wander.
+    """
+
+    velocity: Array
+    width: float
+    roughness: tuple[float, ...]
+    seed: int
+
+    @property
+    def share(self) -> float:
+        """Standard deviation of the rays' middles, over that of the smoke in depth."""
+        return float(np.linalg.norm(self._shares))
+
+    def aside(self, places: Array, frame: int) -> Array:
+        """How far the rays' middles stand behind the axis, over the smoke's standard deviation in depth.
+
+        Parameters
+        ----------
+        places : (rows, columns, 3)
+            Where the pixels' rays cross an upright plane through the domain's centre, in voxels from there.
+        """
+        random = np.random.default_rng(self.seed)
+        at = np.moveaxis(places - frame * self.velocity, -1, 0)
+        aside = np.zeros(at.shape[1:])
+        for share, nodes in zip(self._shares, NODES, strict=False):
+            lattice = random.standard_normal((LATTICE,) * 3) / NODE_DEVIATION
+            nodes_at = at / (nodes * self.width) + random.uniform(0, LATTICE, (3, 1, 1))
+            aside += share * ndimage.map_coordinates(lattice, nodes_at, order=3, mode="grid-wrap", prefilter=False)
+        return np.asarray(np.clip(aside, -LARGEST * self.share, LARGEST * self.share))
+
+    @property
+    def _shares(self) -> Array:
+        """`share` by octave."""
+        return SHARE * np.array(self.roughness[: len(NODES)])
