@@ -33,32 +33,8 @@ SEVERAL_NUMBERS = re.compile(r"\d\s*%? / [-+(.]?\d")
 PAGE = 65
 """Lines of a decision record, at most: it is read on one page."""
 
-IN_WORK = {
-    "axis-uncertainty",
-    "background",
-    "bright-background",
-    "continuation",
-    "density-axis",
-    "environment-directions",
-    "every-view",
-    "flicker",
-    "guided-simulation",
-    "light-direction",
-    "scattering-selection",
-    "smoke-colour",
-    "smoke-thickness",
-    "stretched-noise",
-    "surroundings",
-    "unknown-background",
-    "unseen-seed",
-}
-"""Experiments whose subject is measured anew, and which are shortened with it: background, light and depth."""
-
-GUIDES = {"blender", "directing", "shooting", "tour", "troubleshooting"}
-"""Pages for artists, which are rewritten with the add-on."""
-
-RECORDS = [page for page in EXPERIMENTS if page.stem not in IN_WORK]
-MEASURED = [*RECORDS, *(page for page in sorted(DOCS.glob("*.md")) if page.stem not in GUIDES)]
+MEASURED = [*EXPERIMENTS, *sorted(DOCS.glob("*.md"))]
+"""Pages with figures."""
 
 
 def name(path: Path) -> str:
@@ -136,14 +112,20 @@ def test_an_experiment_has_its_four_parts(page: Path) -> None:
     assert parts == ["## Question", "## Setting", "## Table", "## Answer"]
 
 
-@pytest.mark.parametrize("page", RECORDS, ids=name)
+@pytest.mark.parametrize("page", EXPERIMENTS, ids=name)
 def test_an_experiment_fits_on_a_page(page: Path) -> None:
     assert len(page.read_text().splitlines()) <= PAGE
 
 
+def test_an_experiment_decides_something_that_is_there() -> None:
+    """The code, or a page other than the notebook's list, names it for what it chose or found."""
+    named = "".join(path.read_text() for path in (*PAGES, *SOURCES))
+    assert [page.stem for page in EXPERIMENTS if not re.search(rf"\b{page.stem}\.md", named)] == []
+
+
 def test_constants_that_records_chose_exist() -> None:
     code = "".join(path.read_text() for path in ENGINE.rglob("*.py"))
-    named = {(page.stem, constant) for page in RECORDS for constant in CONSTANT.findall(page.read_text())}
+    named = {(page.stem, constant) for page in EXPERIMENTS for constant in CONSTANT.findall(page.read_text())}
     assert {(page, constant) for page, constant in named if not re.search(rf"\b{constant}\b", code)} == set()
 
 
@@ -154,7 +136,7 @@ def test_a_cell_of_a_table_has_one_number(page: Path) -> None:
 
 
 def test_commits_that_pages_name_exist() -> None:
-    named = {commit for page in PAGES if page.stem not in IN_WORK for commit in COMMIT.findall(page.read_text())}
+    named = {commit for page in PAGES for commit in COMMIT.findall(page.read_text())}
     ended = subprocess.run(["git", "rev-list", "HEAD"], cwd=ROOT, capture_output=True, text=True, check=False)
     if ended.returncode or len(ended.stdout.split()) < 100:
         pytest.skip("this is no clone with the whole history")
