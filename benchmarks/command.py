@@ -9,7 +9,6 @@ from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks import charts
 from benchmarks.renderer.peers import PEERS
 from benchmarks.tables import size_text
 from smokelift.app.cli import BAD_INPUT, CANCELLED, DONE, NO_DEVICE
@@ -55,16 +54,13 @@ def run(options: argparse.Namespace, say: Reporter) -> None:
     Raises
     ------
     ValueError
-        Before anything runs, if a file cannot be written or read, or if a chart needs matplotlib and it is missing.
+        Before anything runs, if a file cannot be written or read.
     DeviceError
         If a GPU is asked for and there is none.
     """
-    chart: Path | None = getattr(options, "chart", None)
-    for path in (options.json, chart):
-        if path is not None and not path.absolute().parent.is_dir():
-            raise ValueError(f"{path}: the folder {path.parent} does not exist.")
-    if chart is not None:
-        charts.require_matplotlib()
+    path: Path | None = options.json
+    if path is not None and not path.absolute().parent.is_dir():
+        raise ValueError(f"{path}: the folder {path.parent} does not exist.")
 
     def save(results: dict[str, Any]) -> None:
         if options.json is not None:
@@ -90,14 +86,12 @@ def bench_parser() -> argparse.ArgumentParser:
         "--device", choices=("cpu", "gpu"), default="cpu", help="for Smokelift; all others use the processor"
     )
     _add_json(renderer)
-    _add_chart(renderer, "draw time against size and against the share of voxels with smoke (.png)")
 
-    velocity = subjects.add_parser("velocity", help="error against time, of both solvers and of whole estimates")
+    velocity = subjects.add_parser("velocity", help="error against time of whole estimates")
     velocity.set_defaults(run=_velocity)
     velocity.add_argument("truths", nargs="*", type=Path, metavar="TRUTH.npz", help="known scenes; one is built in")
     _add_shapes(velocity)
     _add_json(velocity)
-    _add_chart(velocity, "draw error against time (.png)")
 
     pipeline = subjects.add_parser("pipeline", help="whole runs, from a clip to files on disk")
     pipeline.set_defaults(run=_pipeline)
@@ -122,23 +116,17 @@ def _add_json(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", type=Path, metavar="FILE", help="write every figure")
 
 
-def _add_chart(parser: argparse.ArgumentParser, text: str) -> None:
-    parser.add_argument("--chart", type=Path, metavar="FILE", help=text)
-
-
 def _renderer(options: argparse.Namespace, say: Reporter, save: Save) -> None:
-    from benchmarks.renderer import chart, run, table
+    from benchmarks.renderer import run, table
 
     if options.device == "gpu" and device.available_gpu() is None:
         raise device.DeviceError("No GPU that Taichi can use was found (CUDA, Metal or Vulkan); leave --device away.")
     results = run.run(options.sizes, options.peers, options.device, say.note, save)
-    if options.chart is not None:
-        chart.draw(results, options.chart)
     say.finish(table.text(results), results)
 
 
 def _velocity(options: argparse.Namespace, say: Reporter, save: Save) -> None:
-    from benchmarks.velocity import chart, run, table
+    from benchmarks.velocity import run, table
 
     truths = []
     for path in options.truths:
@@ -150,8 +138,6 @@ def _velocity(options: argparse.Namespace, say: Reporter, save: Save) -> None:
             )
         truths.append((path.parent.name if path.name == "truth.npz" else path.stem, truth))
     results = run.run(options.sizes, truths, say.note, save)
-    if options.chart is not None:
-        chart.draw(results, options.chart)
     say.finish(table.text(results), results)
 
 

@@ -1,12 +1,11 @@
-"""What is found of baked smoke whose colour, fire and thickness are known, before several backgrounds.
+"""What is found of baked smoke whose colour and thickness are known, before several backgrounds.
 
-    python -m benchmarks.background.probes colour | fire | thickness SCENES/plume-1 SCENES/jet-2 ... [--every 2]
+    python -m benchmarks.background.probes colour | thickness SCENES/plume-1 SCENES/jet-2 ... [--every 2]
 
 A scene is a folder that `benchmarks.truth.picture` filled. Its radiance is multiplied by the colours of light and
 smoke, as single scattering does. *Colour*: scenes where the smoke's own colour was found, and the mean angle between it
-and the true one in degrees. *Fire*: share of the smoke's pixels that is taken for fire, a scene each. *Thickness*:
-source radiance over the true one, as texture shows it, as it is taken, and as it would be without texture; thin smoke
-has 0.3 of its optical depth.
+and the true one in degrees. *Thickness*: source radiance over the true one, as texture shows it, as it is taken, and as
+it would be without texture; thin smoke has 0.3 of its optical depth.
 """
 
 from __future__ import annotations
@@ -22,7 +21,6 @@ import numpy.typing as npt
 from benchmarks.background.clips import Smoke, backdrop, exposed, filmed, sky, wall
 from smokelift.footage.backdrop import find_backdrop
 from smokelift.footage.clip import Clip
-from smokelift.footage.fire import fire_share
 from smokelift.footage.images import Picture
 from smokelift.footage.plate import known_plate
 from smokelift.setup.estimate import UNDETERMINED
@@ -43,12 +41,6 @@ COLOURS = {
     "violet": (0.6, 0.25, 1.0),
     "green": (0.3, 1.0, 0.35),
 }
-
-FLAME = (1.0, 0.4, 0.08)
-"""Colour of the light that the lowest quarter of the smoke adds, up to 2.5."""
-
-STRENGTHS = (0.1, 0.3, 1.0)
-"""Brightness of the smoke that a flame is put into, over that of the scene."""
 
 THIN = 0.3
 """Share of the optical depth that thin smoke has."""
@@ -106,33 +98,9 @@ def _angles(smokes: Mapping[str, Smoke], light: Array, colour: Array, plate: Pic
     return f"{len(angles)} of {len(smokes)}" + (f", {np.mean(angles):.0f}" if angles else "")
 
 
-def _fire(smokes: Mapping[str, Smoke], plates: Plates) -> Iterator[list[str]]:
-    yield ["smoke", "flame", *plates]
-    cases = [(name, np.array(colour), False) for name, colour in COLOURS.items()]
-    cases += [(f"grey, {strength:g} as bright", np.full(3, strength), True) for strength in STRENGTHS]
-    for name, colour, burns in cases:
-        shares = [[_fire_share(smoke, colour, burns, plate) for smoke in smokes.values()] for plate in plates.values()]
-        yield [name, "yes" if burns else "no", *(", ".join(f"{share:.1%}" for share in each) for each in shares)]
-
-
-def _fire_share(smoke: Smoke, colour: Array, burns: bool, plate: Picture) -> float:
-    clip = _filmed(smoke, colour, plate, flame(smoke) if burns else None)
-    samples = sample_smoke(clip, known_plate(plate, clip))
-    return fire_share(samples.colours, samples.behind)
-
-
-def flame(smoke: Smoke) -> Picture:
-    """Light (frames, rows, columns, 3) of a fire at the base of the smoke."""
-    rows = smoke.radiance.shape[1]
-    height = (rows - np.arange(rows)) / rows
-    hot = np.exp(-((height / 0.25) ** 2))[:, None] * (1 - smoke.transmittance) ** 2
-    return np.asarray(2.5 * hot[..., None] * np.array(FLAME), np.float32)
-
-
-def _filmed(smoke: Smoke, colour: Array, plate: Picture, light: Picture | None = None) -> Clip:
-    """The clip of smoke of a colour before a plate, and of light that is added."""
-    pictures = smoke.radiance[..., None] * colour + smoke.transmittance[..., None] * plate
-    pictures = (pictures if light is None else pictures + light).astype(np.float32)
+def _filmed(smoke: Smoke, colour: Array, plate: Picture) -> Clip:
+    """The clip of smoke of a colour before a plate."""
+    pictures = (smoke.radiance[..., None] * colour + smoke.transmittance[..., None] * plate).astype(np.float32)
     return filmed(np.clip(exposed(pictures, np.ones(len(pictures))), 0, 1), "baked")
 
 
@@ -157,7 +125,7 @@ def _sources(smoke: Smoke, plate: Picture, given: bool) -> list[str]:
     return ["undetermined" if source is None else f"{source.mean() / true:.2f}", *(f"{each:.2f}" for each in taken)]
 
 
-PROBES = {"colour": _colour, "fire": _fire, "thickness": _thickness}
+PROBES = {"colour": _colour, "thickness": _thickness}
 
 if __name__ == "__main__":
     main()

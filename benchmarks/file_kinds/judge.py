@@ -1,4 +1,4 @@
-"""Whether a file is read as what was encoded, and how the command that reconstructs it ended."""
+"""Whether a file is read as what was encoded."""
 
 from __future__ import annotations
 
@@ -8,8 +8,6 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.file_kinds.film import FPS, Pictures
-from benchmarks.stability.forked import Ended
-from benchmarks.stability.judge import STATUSES
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import linear_to_srgb
 
@@ -51,20 +49,3 @@ def misread(kind: Kind) -> tuple[float, str]:
         return np.inf, f"shape {found.shape}, not {kind.shown.shape}"
     error = float(np.abs(found - kind.shown).mean((1, 2, 3)).max()) * 255
     return error, f"pictures differ by {error:.1f}" if error > kind.slack else ""
-
-
-def verdict(kind: Kind, ended: Ended, out: Path) -> str:
-    """Return in words what is wrong with how the command ended; "" if nothing is."""
-    lines = ended.errors.strip().splitlines()
-    if ended.hung:
-        return "hung"
-    if ended.status not in STATUSES or "Traceback" in ended.errors:
-        return f"status {ended.status}: {lines[-1] if lines else ''}"
-    if kind.works is not None and kind.works != (ended.status == 0):
-        return f"status {ended.status}: {lines[-1] if lines else ''}"
-    if ended.status and len(lines) != 1:
-        return f"{len(lines)} lines"
-    empty = bool(lines) and lines[-1].startswith("No smoke found")  # all its frames are there, and empty
-    if ended.status and not empty and out.exists() and any(out.iterdir()):
-        return "left files"
-    return ""

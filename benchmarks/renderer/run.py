@@ -38,7 +38,7 @@ LIGHTS = (1, 16)
 SWEEP_SIZE = 128
 """Voxels a side of the largest grid for the runs over shares and lights."""
 
-LIBRARIES = ("numpy", "taichi", "drjit", "torch", "jax", "mitsuba")
+LIBRARIES = ("numpy", "taichi", "drjit", "mitsuba")
 
 Say = Callable[[str], None]
 Array = NDArray[np.floating[Any]]

@@ -32,7 +32,7 @@ def text(results: dict[str, Any]) -> str:
     legend = (
         "ms: median of an iteration, image and gradient; in brackets the floor, a copy of ten volumes. x ours: "
         "relative to Smokelift just before and after. MiB, volumes: peak of memory beyond imports, density and "
-        "compiler (but JAX compiles again for each size). set-up: compiler, tables and warm-up. image, gradient: "
+        "compiler. set-up: compiler, tables and warm-up. image, gradient: "
         f"relative L2 error against float64; above {EXACT:g} a peer is not exact."
     )
     return printed(WIDTH, [table, legend, *_failures(results), *_ours_alone(results)])

@@ -8,7 +8,6 @@
 - ``forked``: one case after the other, each in a fork of a process that has loaded the engine
 - ``readers``: the functions that read a user's files, with the error that each may raise
 - ``judge``: what a command may do, and what not
-- ``fuzz``: a fuzzer for the readers that is guided by coverage
 
 ``python -m benchmarks.stability FOLDER --cases 100`` runs so many cases of every class and prints a table.
 """

@@ -1,4 +1,4 @@
-"""The two solvers on one linear problem, and whole estimates against known motion, at several sizes.
+"""Whole estimates against known motion, at several sizes.
 
 A size is measured on the known scenes of that size, or on the built-in one where there is none. Scenes are not
 resampled: a finer grid would show no finer detail, and a coarser one not what a solver makes at that size.
@@ -13,7 +13,6 @@ import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
@@ -22,7 +21,6 @@ from benchmarks import machine
 from benchmarks.errors import relative_error
 from benchmarks.tables import size_text
 from benchmarks.velocity.flow import built_in_pair
-from benchmarks.velocity.linear import LinearProblem, endless
 from benchmarks.velocity.pairs import Pair, frames_for_pairs, pair_of_truth
 from smokelift.baselines.velocity import PaperVelocity
 from smokelift.evaluation.truth import Truth
@@ -48,11 +46,7 @@ class Plan:
     Attributes
     ----------
     pairs
-        Number of pairs of densities; the first one makes the linear problem.
-    steps
-        Numbers of iterations of each solver on the linear problem.
-    reference
-        Most iterations of projected CG for its optimum.
+        Number of pairs of densities.
     iterations
         Numbers of iterations of projected CG in each solve of an estimate.
     primal_dual_iterations
@@ -62,8 +56,6 @@ class Plan:
     """
 
     pairs: int
-    steps: Mapping[str, tuple[int, ...]]
-    reference: int
     iterations: tuple[int, ...]
     primal_dual_iterations: tuple[int, ...]
     others: tuple[Mapping[str, Any], ...]
@@ -71,8 +63,6 @@ class Plan:
 
 USUAL = Plan(
     pairs=3,
-    steps={"projected-cg": (1, 2, 3, 5, 8, 12, 20, 40), "primal-dual": (1, 2, 5, 10, 20, 50, 100)},
-    reference=300,
     iterations=(2, 3, 5, 10, 20),
     primal_dual_iterations=(2, 5, 20, 100),
     others=({"linearisations": 1}, {"linearisations": 3}, {"levels": 1}, {"levels": 2}, {"method": "paper"}),
@@ -80,8 +70,6 @@ USUAL = Plan(
 
 SHORT = Plan(
     pairs=1,
-    steps={"projected-cg": (2, 5, 12, 25, 40), "primal-dual": (1, 2, 5, 10)},
-    reference=100,
     iterations=(2, 5, 10),
     primal_dual_iterations=(2,),
     others=({"linearisations": 1},),
@@ -90,27 +78,6 @@ SHORT = Plan(
 
 MANY_VOXELS = 1 << 20
 """Most voxels of a grid with the usual plan."""
-
-
-@dataclass(frozen=True)
-class Step:
-    """A solver after some iterations.
-
-    Attributes
-    ----------
-    solver, iterations
-        The solver, and its iterations from the velocity of the next coarser grid.
-    distance
-        Relative L2 distance from the optimum, in the smoke.
-    seconds, solves
-        Its time, in seconds and in Poisson solves.
-    """
-
-    solver: str
-    iterations: int
-    distance: float
-    seconds: float
-    solves: float
 
 
 @dataclass(frozen=True)
@@ -165,8 +132,8 @@ def run(
     -------
     dict
         ``date``, ``machine``, ``versions`` and ``sizes``: each with ``size``, ``scene`` (names, or "built-in"),
-        ``voxels_a_frame`` (mean motion in the smoke), ``poisson_ms``, ``start`` (distance of the initial velocity from
-        the optimum of the linear problem), ``steps`` (of `Step`) and ``estimates`` (of `Estimate`). Ready for JSON.
+        ``voxels_a_frame`` (mean motion in the smoke), ``poisson_ms`` and ``estimates`` (of `Estimate`). Ready for
+        JSON.
 
     Raises
     ------
@@ -192,8 +159,6 @@ def run(
             pairs = [built_in_pair(shape, seed) for seed in range(plan.pairs)]
         clock = _Clock(shape)
         row: dict[str, Any] = {"size": shape, "scene": name, "voxels_a_frame": _mean_motion(pairs)}
-        row["start"], steps = _steps(pairs[0], plan, clock, say)
-        row["steps"] = [asdict(step) for step in steps]
         row["estimates"] = [asdict(estimate) for estimate in _estimates(pairs, plan, clock, say)]
         row["poisson_ms"] = 1e3 * float(np.median(clock.units))
         results["sizes"].append(row)
@@ -229,20 +194,6 @@ class _Clock:
     def _unit(self) -> float:
         self.units.append(machine.poisson_seconds(self._shape))
         return self.units[-1]
-
-
-def _steps(pair: Pair, plan: Plan, clock: _Clock, say: Say) -> tuple[float, list[Step]]:
-    """Return the distance from the optimum at which the solvers begin, and those after some iterations."""
-    problem = LinearProblem.of_pair(pair)
-    say("  the linear problem's optimum")
-    optimum = problem.solve(endless("projected-cg", plan.reference))
-    steps = []
-    for name, counts in plan.steps.items():
-        for count in counts:
-            seconds, solves, found = clock.time(partial(problem.solve, endless(name, count)))
-            steps.append(Step(name, count, problem.distance(found, optimum), seconds, solves))
-            say(f"  {name}, {count}: {100 * steps[-1].distance:.2g} % from the optimum, {solves:.0f} solves")
-    return problem.distance(problem.start.centres(), optimum), steps
 
 
 def _estimates(pairs: Sequence[Pair], plan: Plan, clock: _Clock, say: Say) -> list[Estimate]:

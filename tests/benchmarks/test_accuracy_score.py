@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from benchmarks.accuracy import blind
-from benchmarks.accuracy.blind import FIRST, moments, trial
-from benchmarks.accuracy.drift import course, parts_of, watched
 from benchmarks.accuracy.scenes import KnownScene
 from benchmarks.accuracy.score import BLACK, score
 from benchmarks.accuracy.sheets import STRIP_FRAMES, strip_rows, write_orbits
@@ -107,53 +103,3 @@ def test_pages_and_strips_show_truth_and_runs_below_each_other(known, drawn_out,
     strips = strip_rows(known, runs, lambda *_: drawn_out)
     assert [label for label, _ in strips] == ["ball, frames 2 to 9: truth", "ball, frames 2 to 9: draft"]
     assert {len(tiles) for _, tiles in strips} == {STRIP_FRAMES}
-
-
-def test_a_blind_trial_shows_every_run_once_in_any_order(known, drawn_out) -> None:
-    orders = set()
-    for seed in range(4):
-        rng = np.random.default_rng(seed)
-        rows, order = trial(known, ["truth", drawn_out.name], drawn_out.parent, 5, rng)
-        assert sorted(order) == sorted(["truth", drawn_out.name])
-        assert [len(row) for row in rows] == [10, 10]
-        lit = {run: (row[5] > 8).mean() for run, row in zip(order, rows, strict=True)}
-        assert lit["truth"] < lit[drawn_out.name]  # from the side that is drawn out
-        orders.add(tuple(order))
-    assert len(orders) == 2
-
-
-def test_the_moments_of_a_blind_trial_differ(known) -> None:
-    for count in (1, 2, 6):
-        shown = moments(known, count, np.random.default_rng(0))
-        assert len(set(shown)) == count and set(shown) <= set(known.scored)
-    assert min(moments(known, 2, np.random.default_rng(0))) >= FIRST
-
-
-def test_the_key_of_a_blind_trial_lies_beside_its_sheets(known, drawn_out, tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr(blind, "baked_scene", lambda *_: known)
-    (tmp_path / "runs").mkdir()
-    (tmp_path / "runs" / "ball").symlink_to(drawn_out.parent)
-    words = [tmp_path / "sheets", tmp_path / "runs", "ball", "--runs", drawn_out.name, "--sheets", "2"]
-    monkeypatch.setattr("sys.argv", ["blind", *map(str, words)])
-    blind.main()
-    assert sorted(path.name for path in (tmp_path / "sheets").iterdir()) == ["01.png", "02.png"]
-    key = json.loads((tmp_path / "sheets_key.json").read_text())
-    assert key["01"]["frame"] != key["02"]["frame"]
-    assert {key["01"][letter] for letter in "AB"} == {"truth", drawn_out.name}
-
-
-def test_a_long_run_is_scored_by_its_parts(known, tmp_path) -> None:
-    """Smoke that is fast and thin in the second half only is so there only."""
-    parts = list(parts_of(known, 2))
-    assert [frame for part in parts for frame in part.scored] == list(known.scored)
-    for frame in range(FRAMES):
-        velocity = np.zeros((*SHAPE, 3), np.float32)
-        velocity[3, 4, 5] = (0, 3, 4) if frame >= FRAMES // 2 else (0, 0, 1)
-        share = 0.5 if frame >= FRAMES // 2 else 1
-        np.savez(tmp_path / f"{frame + 1:04d}.npz", velocity=velocity, density=share * known.truth.density(frame))
-    slow, quick = (course(part, known.truth, tmp_path) for part in parts)
-    assert (slow["fastest"], slow["fastest_ever"], quick["fastest_ever"]) == pytest.approx((1, 1, 5))
-    assert (slow["mass"], quick["mass_least"], quick["mass_largest"]) == pytest.approx((1, 0.5, 0.5))
-    assert quick["fastest_truth"] == 0
-    assert watched(parts[1]).scored == parts[1].scored  # it is short
-    assert watched(replace(known, scored=range(100))).scored == range(38, 62)

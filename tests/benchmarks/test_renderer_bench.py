@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks import charts
 from benchmarks.command import main
 from benchmarks.renderer import run, worker
 from benchmarks.renderer.peers import OURS, PEERS
@@ -25,23 +24,23 @@ def on_the_processor():
 
 @pytest.fixture
 def peers(monkeypatch):
-    """No processes: Dr.Jit is Smokelift, JAX is Smokelift with an error, PyTorch fails, Taichi is not installed.
+    """No processes: Dr.Jit is Smokelift, the paper is it with an error; Mitsuba fails or is not installed.
 
     The n-th run of Smokelift takes n ms an iteration, as on a machine that gets busier; the peers take 60.
     """
-    for key in ("drjit", "jax", "pytorch"):
+    for key in ("drjit", "paper", "mitsuba-4"):
         monkeypatch.setitem(PEERS, key, replace(PEERS[key], packages=()))
-    monkeypatch.setitem(PEERS, "taichi", replace(PEERS["taichi"], packages=("no_such_package",)))
+    monkeypatch.setitem(PEERS, "mitsuba-1", replace(PEERS["mitsuba-1"], packages=("no_such_package",)))
     runs = itertools.count(1)
 
     def run_here(peer: str, folder: Path, lights: int, device: str) -> worker.Result:
         assert device == "cpu"
-        if peer == "pytorch":
+        if peer == "mitsuba-4":
             return worker.Result(failure="Out of memory.")
         scene = bench_scene(np.load(folder / "density.npy"), np.load(folder / "target.npy"), lights)
         result, image, gradient = worker.measure(OURS, scene)
         np.save(folder / "image.npy", image)
-        np.save(folder / "gradient.npy", gradient * (1.01 if peer == "jax" else 1))
+        np.save(folder / "gradient.npy", gradient * (1.01 if peer == "paper" else 1))
         return replace(result, seconds=(1e-3 * next(runs) if peer == OURS else 0.06,) * 5)
 
     monkeypatch.setattr(run, "run_apart", run_here)
@@ -57,7 +56,7 @@ def bench(*words: object) -> int:
 
 def test_every_figure_in_json_and_in_the_table(peers, tmp_path, capsys):
     path = tmp_path / "bench.json"
-    assert bench("--sizes", "12,8", "--peers", "drjit,jax,pytorch,taichi", "--json", path) == 0
+    assert bench("--sizes", "12,8", "--peers", "drjit,paper,mitsuba-4,mitsuba-1", "--json", path) == 0
     results = json.loads(path.read_text())
     assert results["machine"]["cores"] > 0
     assert results["versions"]["numpy"] == np.__version__
@@ -66,7 +65,7 @@ def test_every_figure_in_json_and_in_the_table(peers, tmp_path, capsys):
     assert len(results["rows"]) == 2 * 2 * 5
     by_peer = {row["peer"]: row for row in results["rows"] if (row["size"], row["scene"]) == (8, "plume")}
 
-    ours, right, wrong = by_peer[OURS], by_peer["drjit"], by_peer["jax"]
+    ours, right, wrong = by_peer[OURS], by_peer["drjit"], by_peer["paper"]
     assert ours["exact"]
     assert ours["image_error"] < 1e-6
     assert ours["milliseconds"] == pytest.approx([1] * 5 + [2] * 5 + [3] * 5)
@@ -78,8 +77,8 @@ def test_every_figure_in_json_and_in_the_table(peers, tmp_path, capsys):
     assert wrong["ratio"] == pytest.approx(60 / 2.5)
     assert wrong["gradient_error"] == pytest.approx(0.01, rel=0.01)
     assert not wrong["exact"]
-    assert by_peer["pytorch"]["failure"] == "Out of memory."
-    assert by_peer["taichi"]["failure"] == "not installed: pip install no_such_package"
+    assert by_peer["mitsuba-4"]["failure"] == "Out of memory."
+    assert by_peer["mitsuba-1"]["failure"] == "not installed: pip install no_such_package"
 
     assert [row["share"] for row in results["shares"]] == list(run.SHARES)
     assert [row["lights"] for row in results["lights"]] == [1, 16]
@@ -87,19 +86,12 @@ def test_every_figure_in_json_and_in_the_table(peers, tmp_path, capsys):
 
     table = capsys.readouterr().out
     lines = {peer.title: [line for line in table.splitlines() if f"│ {peer.title} " in line] for peer in PEERS.values()}
-    assert all("not exact" in line for line in lines[PEERS["jax"].title])
+    assert all("not exact" in line for line in lines[PEERS["paper"].title])
     assert not any("not exact" in line for line in (*lines[PEERS[OURS].title], *lines[PEERS["drjit"].title]))
-    assert all("see below" in line for line in (*lines[PEERS["pytorch"].title], *lines[PEERS["taichi"].title]))
-    assert "PyTorch autograd, 8^3, 12^3: Out of memory." in table
-    assert "Taichi autodiff, 8^3, 12^3: not installed: pip install no_such_package" in table
+    assert all("see below" in line for line in (*lines[PEERS["mitsuba-4"].title], *lines[PEERS["mitsuba-1"].title]))
+    assert "Mitsuba 3 prbvolpath, 4 samples, 8^3, 12^3: Out of memory." in table
+    assert "Mitsuba 3 prbvolpath, 1 sample, 8^3, 12^3: not installed: pip install no_such_package" in table
     assert "16 directional lights" in table
-
-
-def test_chart_is_a_picture(peers, tmp_path):
-    pytest.importorskip("matplotlib")
-    path = tmp_path / "chart.png"
-    assert bench("--sizes", "8,10", "--peers", "jax,taichi", "--chart", path) == 0
-    assert path.read_bytes().startswith(b"\x89PNG")
 
 
 def test_results_so_far_stay_when_the_rest_is_cancelled(peers, tmp_path, monkeypatch):
@@ -121,7 +113,7 @@ def test_results_so_far_stay_when_the_rest_is_cancelled(peers, tmp_path, monkeyp
     [
         (("--sizes", "4"), "none below 8"),
         (("--sizes", "big"), "expected numbers of voxels"),
-        (("--peers", "jax,cuda"), "'cuda': expected some of smokelift, drjit"),
+        (("--peers", "paper,cuda"), "'cuda': expected some of smokelift, drjit"),
         (("--json", "/no/such/folder/a.json"), "the folder /no/such/folder does not exist"),
     ],
 )
@@ -135,12 +127,3 @@ def test_gpu_that_is_not_there(monkeypatch, capsys):
     monkeypatch.setattr(device, "available_gpu", lambda: None)
     assert bench("--device", "gpu") == 3
     assert "No GPU" in capsys.readouterr().err
-
-
-def test_chart_without_matplotlib_is_refused(monkeypatch, capsys):
-    def refuse() -> None:
-        raise ValueError("charts need matplotlib: pip install matplotlib.")
-
-    monkeypatch.setattr(charts, "require_matplotlib", refuse)
-    assert bench("--chart", "chart.png") == 2
-    assert "pip install matplotlib" in capsys.readouterr().err

@@ -1,10 +1,9 @@
-"""``python -m benchmarks velocity``: the two solvers, the figures, the table, the chart and what is refused."""
+"""``python -m benchmarks velocity``: the figures, the table and what is refused."""
 
 from __future__ import annotations
 
 import itertools
 import json
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,22 +14,19 @@ from benchmarks import machine
 from benchmarks.command import main
 from benchmarks.velocity import run
 from benchmarks.velocity.flow import built_in_pair
-from benchmarks.velocity.linear import LinearProblem, endless
-from benchmarks.velocity.table import estimate_name, solves_to_reach
+from benchmarks.velocity.table import estimate_name
 from smokelift.transport import Velocity
 
 SHAPE = (16, 16, 24)
 FRAMES = 6
 PLAN = run.Plan(
     pairs=1,
-    steps={"projected-cg": (2, 12), "primal-dual": (1, 5)},
-    reference=60,
     iterations=(1, 10),
     primal_dual_iterations=(3,),
     others=({"linearisations": 1}, {"method": "paper"}),
 )
 
-FEW = run.Plan(pairs=1, steps={}, reference=1, iterations=(1,), primal_dual_iterations=(), others=())
+FEW = run.Plan(pairs=1, iterations=(1,), primal_dual_iterations=(), others=())
 
 
 @pytest.fixture
@@ -43,7 +39,6 @@ def quick(monkeypatch):
 @pytest.fixture
 def idle(monkeypatch):
     """Nothing may be measured."""
-    monkeypatch.setattr(run, "LinearProblem", None)
     monkeypatch.setattr(run, "CoarseToFine", None)
 
 
@@ -72,16 +67,6 @@ def bench(*words: object) -> int:
         return leaving.code
 
 
-def test_both_solvers_come_to_the_same_optimum():
-    problem = LinearProblem.of_pair(built_in_pair(SHAPE, 0))
-    optimum = problem.solve(endless("projected-cg", 300))
-    for solver, counts in (("projected-cg", (1, 5, 20, 80)), ("primal-dual", (1, 5, 50, 400))):
-        distances = [problem.distance(problem.solve(endless(solver, count)), optimum) for count in counts]
-        assert distances == sorted(distances, reverse=True)
-        assert distances[0] > 0.2
-        assert distances[-1] < 0.01
-
-
 def test_every_figure_in_json_and_in_the_table(quick, tmp_path, capsys):
     path = tmp_path / "bench.json"
     assert bench("--sizes", "20x16x24,16x16x24", "--json", path) == 0
@@ -95,15 +80,6 @@ def test_every_figure_in_json_and_in_the_table(quick, tmp_path, capsys):
         assert row["scene"] == "built-in"
         assert row["poisson_ms"] > 0
         assert 0 < row["voxels_a_frame"] < 1
-        assert [(step["solver"], step["iterations"]) for step in row["steps"]] == [
-            ("projected-cg", 2),
-            ("projected-cg", 12),
-            ("primal-dual", 1),
-            ("primal-dual", 5),
-        ]
-        for solver in PLAN.steps:
-            distances = [step["distance"] for step in row["steps"] if step["solver"] == solver]
-            assert row["start"] > distances[0] > distances[1]
         estimates = {(row["setting"], row["value"]): row for row in row["estimates"]}
         assert list(estimates) == [
             ("iterations", 1),
@@ -117,7 +93,7 @@ def test_every_figure_in_json_and_in_the_table(quick, tmp_path, capsys):
         for estimate in estimates.values():
             assert 0 < estimate["error"] < 1
             assert estimate["errors"] == [estimate["error"]]
-        for timed in (*row["steps"], *estimates.values()):
+        for timed in estimates.values():
             assert timed["seconds"] > 0
             assert timed["solves"] > 0
     table = capsys.readouterr().out
@@ -165,14 +141,6 @@ def test_results_so_far_stay_when_the_rest_is_cancelled(quick, tmp_path, monkeyp
     assert [row["size"] for row in json.loads(path.read_text())["sizes"]] == [[16, 16, 24]]
 
 
-def test_chart_is_a_picture(quick, monkeypatch, tmp_path):
-    pytest.importorskip("matplotlib")
-    monkeypatch.setattr(run, "USUAL", replace(PLAN, reference=5, steps={"primal-dual": (1, 2)}, iterations=(1,)))
-    path = tmp_path / "chart.png"
-    assert bench("--sizes", "16x16x24", "--chart", path) == 0
-    assert path.read_bytes().startswith(b"\x89PNG")
-
-
 def test_a_time_is_paired_with_the_solves_around_it(monkeypatch):
     ticks, units = itertools.count(), iter([0.1, 0.3, 0.2])
     monkeypatch.setattr(run.time, "perf_counter", lambda: next(ticks))
@@ -180,16 +148,6 @@ def test_a_time_is_paired_with_the_solves_around_it(monkeypatch):
     seconds, solves, made = run._Clock(SHAPE).time(lambda: "made")
     assert (seconds, made) == (1, "made")  # twice is enough
     assert solves == pytest.approx((1 / 0.2 + 1 / 0.25) / 2)
-
-
-def test_time_to_a_goal_is_interpolated_between_what_was_measured():
-    def step(solver: str, distance: float, solves: float) -> dict[str, object]:
-        return {"solver": solver, "distance": distance, "solves": solves}
-
-    steps = [step("projected-cg", 0.2, 3), step("projected-cg", 0.05, 12), step("primal-dual", 0.3, 1)]
-    assert solves_to_reach({"steps": steps}, "projected-cg", 0.1) == pytest.approx(6)
-    assert solves_to_reach({"steps": steps}, "projected-cg", 0.25) == 3
-    assert solves_to_reach({"steps": steps}, "primal-dual", 0.1) is None
 
 
 @pytest.mark.parametrize(
@@ -211,7 +169,6 @@ def test_names_of_estimates(setting, value, name):
         (("--sizes", "64"), "expected numbers of voxels"),
         (("--sizes", "big"), "expected numbers of voxels"),
         (("--json", "/no/such/folder/a.json"), "the folder /no/such/folder does not exist"),
-        (("--chart", "/no/such/folder/a.png"), "the folder /no/such/folder does not exist"),
         (("/no/such/truth.npz",), "/no/such/truth.npz: no such file"),
     ],
 )
@@ -241,9 +198,3 @@ def test_a_file_that_is_no_truth_is_refused(tmp_path, capsys, idle):
     assert bench(path) == 2
     said = " ".join(capsys.readouterr().err.split())
     assert f"{path}: cannot be read: it is no NumPy archive (.npz), or cut short." in said
-
-
-def test_chart_without_matplotlib_is_refused(monkeypatch, capsys, idle):
-    monkeypatch.setitem(sys.modules, "matplotlib", None)
-    assert bench("--chart", "chart.png") == 2
-    assert "pip install matplotlib" in capsys.readouterr().err

@@ -71,10 +71,6 @@ OURS = "smokelift"
 PEERS = {
     OURS: Peer("Smokelift", "ours"),
     "drjit": Peer("Dr.Jit, loops and adjoint by hand", "drjit_loops", ("drjit",)),
-    "drjit-wavefront": Peer("Dr.Jit, wavefront, dr.backward", "drjit_wavefront", ("drjit",)),
-    "pytorch": Peer("PyTorch autograd", "pytorch", ("torch",)),
-    "jax": Peer("JAX, jit and grad", "jax_grad", ("jax",)),
-    "taichi": Peer("Taichi autodiff", "taichi_autodiff"),
     "paper": Peer("The paper's algorithms 2 and 3", "paper"),
     "mitsuba-1": Peer("Mitsuba 3 prbvolpath, 1 sample", "mitsuba_prbvolpath", ("mitsuba",), (1,), True),
     "mitsuba-4": Peer("Mitsuba 3 prbvolpath, 4 samples", "mitsuba_prbvolpath", ("mitsuba",), (4,), True),

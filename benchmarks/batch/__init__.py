@@ -1,1 +1,0 @@
-"""A batch on a cluster whose parts are killed while it runs."""
