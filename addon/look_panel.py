@@ -34,7 +34,7 @@ class SMOKELIFT_OT_use_look(NeedsResult, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         smoke = smoke_with_look(context.scene)
-        index = volume.shown_take(smoke).index()
+        index = volume.shown_take(smoke).read().index
         if index is None:
             self.report({"ERROR"}, "The smoke's files are missing: make it again.")
             return {"CANCELLED"}

@@ -204,8 +204,8 @@ def _draw_run(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy
     column.scale_y = 1.5
     if all(row.outcome in ENDED for row in own):
         begun = smoke_takes.unfinished(smoke)
-        if begun is not None and begun.frames():
-            text = iface_("Resume after Frame {:d}").format(begun.frames())
+        if begun is not None and begun.read().frames:
+            text = iface_("Resume after Frame {:d}").format(begun.read().frames)
             column.operator("smokelift.resume", text=text, translate=False, icon="FILE_REFRESH")
             column.operator("smokelift.run", text="Start Again", icon="PLAY")
         else:
@@ -223,7 +223,7 @@ def _draw_run(layout: bpy.types.UILayout, context: bpy.types.Context, smoke: bpy
         known = volume.provenance_note(smoke)
         if known:
             draw_text(layout, context, known, "INFO")
-        index = volume.shown_take(smoke).index()
+        index = volume.shown_take(smoke).read().index
         if index and index["complete"]:
             layout.operator("smokelift.vary", icon="MOD_NOISE")
             if lacks_proxy(smoke, index):

@@ -27,7 +27,7 @@ class SMOKELIFT_OT_show_take(NeedsClip, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         take = Take(Path(self.take))
-        if not take.frames():
+        if not take.read().frames:
             self.report({"ERROR"}, rpt_("There is no finished frame in {:s}.").format(str(take.directory)))
             return {"CANCELLED"}
         smoke_takes.present(active_smoke(context.scene), take)
@@ -83,7 +83,7 @@ class SMOKELIFT_OT_name_take(bpy.types.Operator):
     title: StringProperty(name="Name", options={"SKIP_SAVE"})
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
-        self.title = Take(Path(self.take)).title()
+        self.title = Take(Path(self.take)).read().title
         return context.window_manager.invoke_props_dialog(self)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -142,7 +142,7 @@ def _in_use(context: bpy.types.Context) -> set[Path]:
     shown = {take.directory for data in bpy.data.volumes if (take := volume.take_of(data)) is not None}
     rows = context.window_manager.smokelift.jobs
     queued = {Take(Path(row.take)) for row in rows if row.outcome not in ENDED}
-    read = {source for take in queued if (source := take.source()) is not None}
+    read = {source for take in queued if (source := take.read().source) is not None}
     return {directory.resolve() for directory in shown | {take.directory for take in queued | read}}
 
 
@@ -151,7 +151,7 @@ def _confirm(
 ) -> set[str]:
     """Ask before files are deleted; the question says how large they are."""
     if len(doomed) == 1:
-        message = rpt_("{:s} frees {:s}.").format(doomed[0].title(), freed(doomed))
+        message = rpt_("{:s} frees {:s}.").format(doomed[0].read().title, freed(doomed))
     else:
         message = rpt_("{:d} results free {:s}.").format(len(doomed), freed(doomed))
     manager = context.window_manager
@@ -174,7 +174,7 @@ class _Results(OfClip):
         column = layout.column(align=True)
         for take in found:
             row = column.row(align=True)
-            text = iface_("{:s}, {:d} fr., {:s}").format(take.title(), take.frames(), size(take.size()))
+            text = iface_("{:s}, {:d} fr., {:s}").format(take.read().title, take.read().frames, size(take.size()))
             row.operator("smokelift.show_take", text=text, depress=take == shown).take = str(take.directory)
             row.operator("smokelift.name_take", text="", icon="GREASEPENCIL").take = str(take.directory)
             row.operator("smokelift.remove_take", text="", icon="TRASH").take = str(take.directory)
@@ -183,7 +183,7 @@ class _Results(OfClip):
             column.operator("smokelift.switch_take", icon="FILE_REFRESH")
             other = volume.take_before(smoke)
             if other is not None:
-                text = iface_("Show {:s} Beside").format(other.title())
+                text = iface_("Show {:s} Beside").format(other.read().title)
                 column.operator("smokelift.show_beside", text=text, icon="MOD_MIRROR").take = str(other.directory)
         if found:
             draw_text(layout, context, iface_("In {:s}").format(str(smoke_takes.output_folder(smoke))), "FILE_FOLDER")

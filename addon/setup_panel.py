@@ -39,7 +39,7 @@ class SMOKELIFT_OT_set_up(NeedsClipAndResult, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         smoke = active_smoke(context.scene)
         take = volume.shown_take(smoke)
-        index = take.index()
+        index = take.read().index
         if index is None:
             text = rpt_("The files of the smoke in {:s} are missing: make it again.")
             self.report({"ERROR"}, text.format(str(take.directory)))

@@ -85,7 +85,7 @@ def update_moved_files(smoke: bpy.types.Object, take: Take) -> None:
         If its files are damaged.
     """
     settings = smoke.smokelift
-    if take.direction() is None:
+    if take.read().direction is None:
         files = {("clip", "path"): clip_path(settings.clip)}
         if settings.mask:
             files["clip", "mask"] = absolute(settings.mask)
@@ -100,12 +100,12 @@ def unfinished(smoke: bpy.types.Object) -> Take | None:
         return None
     newest = takes(output_folder(smoke))[-1:]
     candidates = [take for take in (volume.shown_take(smoke), *newest) if take is not None]
-    return next((take for take in candidates if take.resumable()), None)
+    return next((take for take in candidates if take.read().resumable), None)
 
 
 def present(smoke: bpy.types.Object, take: Take) -> None:
     """Show a take's finished frames, and the camera that the engine assumed if it did."""
-    index = take.index()
+    index = take.read().index
     if volume.show(smoke, take) and index is not None:
         shot_setup.assumed_camera(smoke, index)
         shot_setup.follow_range(smoke)

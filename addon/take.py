@@ -37,8 +37,8 @@ OPTIONS = ("--quality", "--device", "--detail", "--seed", "--resolution", "--dis
 TITLES = {"continue": "Continued", "retime": "Retimed", "loop": "Loop"}
 """What a take is called that is made of another one."""
 
-CACHED_FILES = 128
-"""Files, and directories, whose content is kept in memory: two a take, for more takes than a list shows at once."""
+CACHED = 128
+"""Takes whose files are kept in memory: more than a list shows at once."""
 
 _NUMBER = re.compile(r"-?\d+(\.\d+)?(:\d+)?")
 """A number or a range of frames; never an option."""
@@ -142,19 +142,10 @@ class Take:
                 f"{self.directory.parent} cannot be written to ({error.strerror}): choose another output folder."
             ) from error
 
-    def source(self) -> Take | None:
-        """The take that it is made of; None of one that is made from a clip, or whose request is damaged."""
-        there = self._request().get("source")
-        return Take(Path(os.path.normpath(self.directory.parent / there))) if isinstance(there, str) else None
-
-    def direction(self) -> str | None:
-        """What is done to the other take, a key of `DIRECTIONS`; None of one that is made from a clip, or damaged."""
-        found = self._request().get("direction")
-        return found if isinstance(found, str) and found in DIRECTIONS else None
-
-    def _request(self) -> dict[str, Any]:
-        """The content of its request file; nothing if that is missing or damaged."""
-        return _json(self.request_file)
+    def read(self) -> Snapshot:
+        """What its files say now; read again only when one of them has changed: the panel asks with every redraw."""
+        files = (self.request_file, self.directory / INDEX_FILE, self.scene_file)
+        return _snapshot_at(self, *map(_state, files))
 
     def update_moved_files(self, files: Mapping[tuple[str, str], Path]) -> None:
         """Write today's paths into its scene file for files that are not where they were: the project was moved.
@@ -190,11 +181,10 @@ class Take:
         TakeError
             If its files are missing or damaged, or hold an option that does not decide its result.
         """
-        request, direction, source = self._request(), self.direction(), self.source()
-        options = request.get("options")
-        if not isinstance(options, list) or ("direction" in request and (direction is None or source is None)):
+        now = self.read()
+        direction, source, options = now.direction, now.source, now.options
+        if options is None:
             raise TakeError(f"{self.request_file} is missing or damaged: make the smoke again.")
-        options = [str(word) for word in options]
         known = OPTIONS if direction is None else DIRECTIONS[direction]
         for word in options:
             # the file may come with somebody else's project, and must not choose what is written where
@@ -206,31 +196,6 @@ class Take:
         there = [(self.mesh_file, self.mesh_file.is_file()), (self.moving_mesh, bool(self._moving_files()))]
         meshes = [word for mesh, is_there in there if is_there for word in ("--mesh", str(mesh))]
         return [direction, str(source.directory), *run, *meshes]
-
-    def index(self) -> dict[str, Any] | None:
-        """The content of `sequence.json`, not to be changed; None before the engine writes it, or of a foreign one."""
-        index = _json(self.directory / INDEX_FILE)
-        return index if "complete" in index and isinstance(index.get("frames"), dict) else None
-
-    def frames(self) -> int:
-        """Number of finished frames."""
-        index = self.index()
-        return len(index["frames"]) if index else 0
-
-    def complete(self) -> bool:
-        """Whether all its frames are finished."""
-        index = self.index()
-        return bool(index and index["complete"])
-
-    def resumable(self) -> bool:
-        """Whether its run can go on: it started and is not complete."""
-        begun = self.direction() is not None or self.scene_file.is_file()
-        return begun and self.request_file.is_file() and not self.complete()
-
-    def title(self) -> str:
-        """The name that the artist gave it, or its number."""
-        given = str(self._request().get("title", ""))
-        return given or f"{TITLES.get(self.direction() or '', 'Take')} {int(self.directory.name.rpartition('_')[2])}"
 
     def give_title(self, title: str) -> None:
         """Give it a name.
@@ -261,23 +226,92 @@ class Take:
             file.unlink(missing_ok=True)
 
 
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """What the files of a take say at one time.
+
+    Attributes
+    ----------
+    direction
+        What is done to another take, a key of `DIRECTIONS`; None of one that is made from a clip, or damaged.
+    source
+        The other take; None of one that is made from a clip, or damaged.
+    options
+        The engine's further options; None where the request is missing or damaged.
+    title
+        The name that the artist gave it, or its number.
+    index
+        The content of `sequence.json`, not to be changed; None before the engine writes it, or of a foreign one.
+    begun
+        Whether it has what a run needs.
+    """
+
+    direction: str | None
+    source: Take | None
+    options: list[str] | None
+    title: str
+    index: dict[str, Any] | None
+    begun: bool
+
+    @property
+    def frames(self) -> int:
+        """Number of finished frames."""
+        return len(self.index["frames"]) if self.index else 0
+
+    @property
+    def complete(self) -> bool:
+        """Whether all frames are finished."""
+        return bool(self.index and self.index["complete"])
+
+    @property
+    def resumable(self) -> bool:
+        """Whether the run can go on: it started and is not complete."""
+        return self.begun and not self.complete
+
+
+State = tuple[int, int, int] | None
+"""Time, number and size of a file, by which a change is seen; None of one that is missing."""
+
+
+def _state(file: Path) -> State:
+    try:
+        found = file.stat()
+    except OSError:
+        return None
+    return found.st_mtime_ns, found.st_ino, found.st_size
+
+
+@lru_cache(CACHED)
+def _snapshot_at(take: Take, request_state: State, _index_state: State, scene_state: State) -> Snapshot:
+    """The snapshot of a take whose files are in these states."""
+    request, index = _json(take.request_file), _json(take.directory / INDEX_FILE)
+    direction, there, options = (request.get(key) for key in ("direction", "source", "options"))
+    if not isinstance(direction, str) or direction not in DIRECTIONS:
+        direction = None
+    source = Take(Path(os.path.normpath(take.directory.parent / there))) if isinstance(there, str) else None
+    if not isinstance(options, list) or ("direction" in request and (direction is None or source is None)):
+        options = None
+    number = take.directory.name.rpartition("_")[2].lstrip("0")
+    return Snapshot(
+        direction=direction,
+        source=source,
+        options=None if options is None else [str(word) for word in options],
+        title=str(request.get("title", "")) or f"{TITLES.get(direction or '', 'Take')} {number}",
+        index=index if "complete" in index and isinstance(index.get("frames"), dict) else None,
+        begun=request_state is not None and (direction is not None or scene_state is not None),
+    )
+
+
 def _json(file: Path) -> dict[str, Any]:
     """The object in a file; nothing if that is missing or damaged."""
     try:
-        state = file.stat()
-        return _json_at(file, state.st_mtime_ns, state.st_ino, state.st_size)
+        content = json.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):
         return {}
-
-
-@lru_cache(CACHED_FILES)
-def _json_at(file: Path, *_state: int) -> dict[str, Any]:
-    """The object in a file of this state: the panel reads it with every redraw."""
-    content = json.loads(file.read_text(encoding="utf-8"))
     return content if isinstance(content, dict) else {}
 
 
-@lru_cache(CACHED_FILES)
+@lru_cache(CACHED)
 def _size_at(directory: Path, _time: int) -> float:
     """Size of the files in a directory as of its last change (MB)."""
     with os.scandir(directory) as files:

@@ -38,7 +38,7 @@ def show(smoke: bpy.types.Object, take: Take) -> bpy.types.Object | None:
     -------
     The smoke, or None while no frame is finished.
     """
-    index = take.index()
+    index = take.read().index
     if not index or not index["frames"]:
         return None
     before = shown_take(smoke)
@@ -61,7 +61,7 @@ def shown_take(smoke: bpy.types.Object) -> Take | None:
 def shown_numbers(smoke: bpy.types.Object) -> list[int]:
     """The numbers of the finished frames of the take that a smoke shows."""
     take = shown_take(smoke)
-    index = take.index() if take is not None else None
+    index = take.read().index if take is not None else None
     return _numbers(index) if index else []
 
 
@@ -80,7 +80,7 @@ def scene_frame(smoke: bpy.types.Object, number: int) -> int:
 def _step(smoke: bpy.types.Object) -> tuple[int, float]:
     """The first number of the take on show, and frames of the scene for each."""
     take = shown_take(smoke)
-    index = take.index() if take is not None else None
+    index = take.read().index if take is not None else None
     if not index or not index["frames"]:
         return 1, 1.0
     ratio = _ratio(smoke, scene_of(smoke), index)
@@ -90,7 +90,7 @@ def _step(smoke: bpy.types.Object) -> tuple[int, float]:
 def go_to_smoke(smoke: bpy.types.Object) -> bool:
     """Go to the first frame that shows smoke unless the current one does, or will; returns whether there is any yet."""
     take, scene = shown_take(smoke), scene_of(smoke)
-    index = take.index() if take is not None else None
+    index = take.read().index if take is not None else None
     smoky = [int(n) for n, figures in index["frames"].items() if figures.get("mass", 1.0) > 0.0] if index else []
     if not smoky:
         return False
@@ -106,7 +106,7 @@ def take_before(smoke: bpy.types.Object) -> Take | None:
     """The take that a smoke showed before; None if it has no frames any more."""
     path = smoke.smokelift.before
     take = Take(absolute(path)) if path else None
-    return take if take is not None and take.frames() else None
+    return take if take is not None and take.read().frames else None
 
 
 def show_beside(smoke: bpy.types.Object, take: Take) -> bpy.types.Object | None:
@@ -116,11 +116,11 @@ def show_beside(smoke: bpy.types.Object, take: Take) -> bpy.types.Object | None:
     -------
     The copy, or None if no frame is finished.
     """
-    index = take.index()
+    index = take.read().index
     if not index or not index["frames"]:
         return None
     copy = smoke.copy()
-    copy.name = f"{smoke.name}, {take.title()}"
+    copy.name = f"{smoke.name}, {take.read().title}"
     copy.data = smoke.data.copy()
     copy.data.name = copy.name
     copy.smokelift.is_smoke = False
@@ -169,7 +169,7 @@ def _shown() -> Iterator[tuple[bpy.types.Scene, bpy.types.Object, dict[str, Any]
     for scene in bpy.data.scenes:
         for smoke in smokes(scene):
             take = shown_take(smoke)
-            index = take.index() if take is not None else None
+            index = take.read().index if take is not None else None
             if index and index["frames"]:
                 yield scene, smoke, index
 

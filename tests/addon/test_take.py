@@ -54,13 +54,13 @@ def test_a_take_knows_how_the_engine_is_called(tmp_path) -> None:
 def test_frames_and_completeness(tmp_path) -> None:
     """Nothing before the engine has written, then what it wrote."""
     take = begun(tmp_path)
-    assert (take.frames(), take.complete(), take.resumable()) == (0, False, True)
+    assert (take.read().frames, take.read().complete, take.read().resumable) == (0, False, True)
     with_sequence(take, 3, complete=False)
-    assert (take.frames(), take.complete(), take.resumable()) == (3, False, True)
+    assert (take.read().frames, take.read().complete, take.read().resumable) == (3, False, True)
     (take.directory / "sequence.json").write_text('{"complete": true, "frames": {"1": {}}}')
-    assert (take.frames(), take.complete(), take.resumable()) == (1, True, False)
+    assert (take.read().frames, take.read().complete, take.read().resumable) == (1, True, False)
     (take.directory / "sequence.json").write_text("half a fi")
-    assert (take.frames(), take.complete()) == (0, False)
+    assert (take.read().frames, take.read().complete) == (0, False)
 
 
 @pytest.mark.parametrize("foreign", ['{"format": 1}', '{"frames": [], "complete": true}', "[]", '{"frames": {}}'])
@@ -69,23 +69,23 @@ def test_the_index_of_another_program_is_none(tmp_path, foreign) -> None:
     take = begun(tmp_path)
     take.directory.mkdir()
     (take.directory / "sequence.json").write_text(foreign)
-    assert (take.index(), take.frames(), take.complete()) == (None, 0, False)
-    assert [found.frames() for found in takes(tmp_path)] == [0]
+    assert (take.read().index, take.read().frames, take.read().complete) == (None, 0, False)
+    assert [found.read().frames for found in takes(tmp_path)] == [0]
 
 
 def test_a_redraw_reads_no_file_that_has_not_changed(tmp_path, monkeypatch) -> None:
     """Neither index, request nor sizes; a frame more is seen at once."""
     take = begun(tmp_path)
     with_sequence(take, 3, complete=False)
-    before = (take.frames(), take.title(), take.size())
+    before = (take.read().frames, take.read().title, take.size())
     with monkeypatch.context() as blocked:
         blocked.setattr(Path, "read_text", None)
         blocked.setattr(os, "scandir", None)
-        assert (take.frames(), take.title(), take.size()) == before
+        assert (take.read().frames, take.read().title, take.size()) == before
     index = {"complete": True, "frames": {str(n): {} for n in range(1, 5)}}
     (take.directory / "sequence.json.tmp").write_text(json.dumps(index))
     (take.directory / "sequence.json.tmp").replace(take.directory / "sequence.json")
-    assert (take.frames(), take.complete()) == (4, True)
+    assert (take.read().frames, take.read().complete) == (4, True)
     assert take.size() > before[2]
 
 
@@ -94,7 +94,7 @@ def test_a_take_without_its_files_is_not_gone_on_with(tmp_path, lost) -> None:
     """Somebody tidied up."""
     take = begun(tmp_path)
     getattr(take, lost).unlink()
-    assert not take.resumable()
+    assert not take.read().resumable
 
 
 @pytest.mark.parametrize("damage", ["", "{", "[]", '{"options": 3}', "{}"])
@@ -119,19 +119,19 @@ def test_what_is_made_of_a_take(tmp_path) -> None:
     """It knows the other take, also after both were moved, and its obstacles; numbers may be below zero."""
     source = begun(tmp_path / "old" / "first")
     take = new_take(tmp_path / "old" / "second")
-    assert (take.direction(), take.source()) == (None, None)
+    assert (take.read().direction, take.read().source) == (None, None)
     take.write_directed("continue", source, ["--frames", "5", "--wind", "-1.5", "0", "0"], [b"mesh"])
     (tmp_path / "old").rename(tmp_path / "new")
     take, source = (Take(tmp_path / "new" / t.directory.relative_to(tmp_path / "old")) for t in (take, source))
-    assert (take.direction(), take.source(), take.title()) == ("continue", source, "Continued 1")
+    assert (take.read().direction, take.read().source, take.read().title) == ("continue", source, "Continued 1")
     arguments = take.arguments()
     assert arguments[:2] == ["continue", str(source.directory)]
     assert arguments[arguments.index("--mesh") + 1] == str(take.mesh_file)
     assert arguments[arguments.index("--wind") + 1] == "-1.5"
     assert "--resume" in arguments
-    assert take.resumable()
+    assert take.read().resumable
     take.give_title("Windy")
-    assert (take.title(), take.direction()) == ("Windy", "continue")
+    assert (take.read().title, take.read().direction) == ("Windy", "continue")
     take.remove()
     assert list(take.directory.parent.iterdir()) == []
 
@@ -211,4 +211,4 @@ def test_removing_takes_all_files_of_one_take(tmp_path) -> None:
         take.thumbnail_file.write_text("picture")
     first.remove()
     assert {path.name[:9] for path in tmp_path.iterdir()} == {"take_0002"}
-    assert second.frames() == 1
+    assert second.read().frames == 1

@@ -6,7 +6,7 @@ import json
 import math
 import platform
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
@@ -204,6 +204,37 @@ def without_folders(scene: Any) -> Any:
             for key, value in scene.items()
         }
     return [without_folders(value) for value in scene] if isinstance(scene, list) else scene
+
+
+def _scene(index: Index) -> Any:
+    """A scene as it is compared: the checksums of its files distinguish them, wherever a project was moved to."""
+    return without_folders(index.scene) if index.sources else index.scene
+
+
+def _own_settings(index: Index) -> dict[str, Any]:
+    """The settings of the whole run, without those of its parts, which follow from a scene too."""
+    return {key: value for key, value in index.settings.items() if not isinstance(value, dict)}
+
+
+def _versions(index: Index) -> dict[str, Any]:
+    """The versions of what changes a result, which a patch of Python does not."""
+    return {name: found for name, found in index.versions.items() if name != "python"}
+
+
+COMPARED: tuple[tuple[str, Callable[[Index], Any]], ...] = (
+    ("sources", lambda index: index.sources),
+    ("settings", _own_settings),
+    ("scene", _scene),
+    ("settings", lambda index: index.settings),
+    ("versions", _versions),
+)
+"""What has to be the same where a run goes on: the name that is said, and what of an index is compared. Causes come
+before what follows from them: another clip, say, makes another scene, and another scene other settings of a part."""
+
+
+def changed(before: Index, now: Index) -> str:
+    """Return in words the first thing of `COMPARED` that differs between two runs, or an empty string."""
+    return next(filter(None, (difference(name, of(before), of(now)) for name, of in COMPARED)), "")
 
 
 def difference(place: str, there: Any, now: Any) -> str:

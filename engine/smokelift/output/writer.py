@@ -30,9 +30,8 @@ from smokelift.output.index import (
     Index,
     Origins,
     SequenceError,
-    difference,
+    changed,
     plain,
-    without_folders,
 )
 from smokelift.output.layout import BACKGROUND, INDEX, LOCK, RESUME, frame_path, is_foreign, proxy_path
 from smokelift.output.lock import Lock
@@ -232,23 +231,10 @@ class SequenceWriter:
         if there is None:
             self._clear(INDEX)  # nothing else is written before it
             return
-        # another clip or quality, say, makes another scene, and another scene other settings of a part
-        for name in ("sources", "own settings", "scene", "settings", "versions"):
-            part = name.removeprefix("own ")
-            before, now = (getattr(index, part) for index in (there, self._index))
-            if name != part:
-                before, now = (
-                    {key: value for key, value in each.items() if not isinstance(value, dict)} for each in (before, now)
-                )
-            if part == "scene" and there.sources:  # their checksums tell files apart, wherever a project was moved to
-                before, now = without_folders(before), without_folders(now)
-            # a patch of Python changes no result
-            changed = difference(part, before, now | {"python": before.get("python")} if part == "versions" else now)
-            if changed:
-                raise SequenceError(
-                    f"{self.directory}: was begun differently and cannot be resumed: {changed}; choose another "
-                    "directory"
-                )
+        if what := changed(there, self._index):
+            raise SequenceError(
+                f"{self.directory}: was begun differently and cannot be resumed: {what}; choose another directory"
+            )
         self._clear("*")
         frames = there.frames
         if not there.complete:

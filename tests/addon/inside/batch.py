@@ -53,7 +53,7 @@ def test_a_shot_from_the_command_line(saved, tmp_path) -> None:
     assert [line for line in lines if line.startswith("frame ")][-1] == "frame 4 of 4"
     assert any("4 frames made in" in line for line in lines)
     take = Take(saved.parent / "smokelift" / "clip" / "take_0001")
-    assert take.complete()
+    assert take.read().complete
     quietly(lambda: bpy.ops.wm.open_mainfile(filepath=str(saved)))
     scene = bpy.context.scene
     assert volume.shown_take(smoke(scene)) == take
@@ -162,9 +162,9 @@ def test_cancelled_and_gone_on_with(running, saved, number) -> None:
     assert running.returncode == 130
     assert "finished frames stay" in said
     take = Take(saved.parent / "smokelift" / "clip" / "take_0001")
-    there = take.frames()
+    there = take.read().frames
     assert 3 <= there < 48
-    assert take.resumable()
+    assert take.read().resumable
     written = first_frame(take)
     with subprocess.Popen(
         command(saved, "--resume"), stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True

@@ -272,9 +272,9 @@ def test_smoke_goes_around_a_mesh(result, acting, tmp_path) -> None:
     assert (row.outcome, row.done, row.total) == ("done", FRAMES + 3, FRAMES + 3), row.sentence
     source, take = takes(tmp_path / "out")
     assert volume.shown_take(result) == take
-    assert (take.title(), take.source(), take.complete()) == ("Continued 2", source, True)
+    assert (take.read().title, take.read().source, take.read().complete) == ("Continued 2", source, True)
     assert result.data.frame_duration == FRAMES + 3
-    assert source.complete()
+    assert source.read().complete
     made = Sequence.open(take.directory)
     inside = Box((-0.3, -0.3, 1.2), (0.3, 0.3, 1.8)).voxels(made.scene.domain)
     assert not made.density(FRAMES + 3)[inside].any()
@@ -295,14 +295,14 @@ def test_a_loop_repeats_and_slow_motion_lasts(result, tmp_path) -> None:
     assert bpy.ops.smokelift.direct() == {"FINISHED"}
     assert result.data.frame_duration == 2 * FRAMES - 1
     assert result.data.velocity_scale == 1.0  # its files hold the velocity that is seen
-    assert [take.title() for take in takes(tmp_path / "out")] == ["Take 1", "Loop 2", "Retimed 3"]
+    assert [take.read().title for take in takes(tmp_path / "out")] == ["Take 1", "Loop 2", "Retimed 3"]
 
 
 def test_a_stopped_run_is_resumed_after_its_project_was_moved(result, tmp_path) -> None:
     """The other take lies beside it."""
     result.smokelift.directing.frames = 3
     take = smoke_takes.write_directed(result)
-    written = continue_sequence(open_source(take.source().directory), take.directory, Continuation(3))
+    written = continue_sequence(open_source(take.read().source.directory), take.directory, Continuation(3))
     assert [next(written)[0] for _ in range(FRAMES + 1)][-1] == FRAMES + 1
     written.close()
     (tmp_path / "out").rename(tmp_path / "moved")
@@ -418,7 +418,7 @@ def test_duplicates_have_folders_of_their_own(shot, result, tmp_path, output) ->
     made = [smoke_takes.write_directed(obj) for obj in (other, result, other)]
     assert [take.directory.parent == kept for take in made] == [False, True, False]
     assert made[0].directory.parent == made[2].directory.parent
-    assert made[0].source() == made[1].source() == volume.shown_take(result)
+    assert made[0].read().source == made[1].read().source == volume.shown_take(result)
     assert (result.data, other.data == data) == (data, False)
 
 

@@ -91,7 +91,7 @@ def test_a_deleted_smoke_is_made_no_more(scene, clip, tmp_path) -> None:
     row.take, row.smoke_uid = str(take.directory), uid
     run.work(bpy.context)
     assert rows[0].outcome == "cancelled"
-    assert take.resumable()
+    assert take.read().resumable
 
 
 @pytest.mark.parametrize("change", [None, "location", "name", "vertex"])
@@ -144,9 +144,9 @@ def test_results_are_picked_named_and_deleted(shot, tmp_path) -> None:
     first, second = with_takes(shot, tmp_path / "out", 2)
     assert bpy.ops.smokelift.show_take(take=str(first.directory)) == {"FINISHED"}
     assert volume.shown_take(smoke(shot)) == first
-    assert first.title() == "Take 1"
+    assert first.read().title == "Take 1"
     assert bpy.ops.smokelift.name_take(take=str(first.directory), title="Slow and thick") == {"FINISHED"}
-    assert Take(first.directory).title() == "Slow and thick"
+    assert Take(first.directory).read().title == "Slow and thick"
     assert first.arguments()[0] == "reconstruct"
     with pytest.raises(RuntimeError, match="show another one first"):
         bpy.ops.smokelift.remove_take(take=str(first.directory))
@@ -214,7 +214,7 @@ def test_results_stay_with_a_file_that_is_saved_elsewhere(scene, clip, tmp_path,
     assert kept(tmp_path / "moved" / folder.relative_to(tmp_path / "project"))
     (tmp_path / "moved").rename(tmp_path / "project")
     bpy.ops.wm.open_mainfile(filepath=str(second))
-    assert smoke_takes.write_take(smoke(bpy.context.scene)).title() == "Take 2"
+    assert smoke_takes.write_take(smoke(bpy.context.scene)).read().title == "Take 2"
 
 
 def with_masses(folder: Path, masses: list[float], planned: int = 0) -> Take:

@@ -135,7 +135,7 @@ def test_cycles_scatters_light_as_often_as_what_was_fitted(shot, tmp_path, model
     """What the artist sets after that stays."""
     take = made(tmp_path)
     volume.show(smoke(shot), take)
-    index = take.index()
+    index = take.read().index
     index["scene"]["medium"]["scattering"] = model
     shot.cycles.volume_bounces, shot.cycles.max_bounces = 3, 4
     shot_setup.set_up(smoke(shot), take, index)

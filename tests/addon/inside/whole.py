@@ -235,10 +235,10 @@ def test_running_twice_makes_a_second_take_and_one_smoke(shot, kept, tmp_path) -
     assert smoke(shot) == first
     assert [obj for obj in shot.objects if obj.type == "VOLUME"] == [first]
     assert volume.shown_take(smoke(shot)) == Take(tmp_path / "out" / "take_0002")
-    assert Take(tmp_path / "out" / "take_0001").complete()
+    assert Take(tmp_path / "out" / "take_0001").read().complete
     assert bpy.ops.smokelift.remove_takes() == {"FINISHED"}
     assert not (tmp_path / "out" / "take_0001").exists()
-    assert Take(tmp_path / "out" / "take_0002").complete()
+    assert Take(tmp_path / "out" / "take_0002").read().complete
 
 
 def test_another_variation(shot, kept, tmp_path) -> None:
@@ -329,7 +329,7 @@ def test_going_on_with_what_was_stopped(shot, tmp_path) -> None:
     assert bpy.ops.smokelift.resume() == {"FINISHED"}
     (row,) = bpy.context.window_manager.smokelift.jobs
     assert (row.outcome, row.done, row.total) == ("done", 4, 4)
-    assert take.complete()
+    assert take.read().complete
     assert smoke(shot).data.frame_duration == 4
     assert smoke_takes.unfinished(smoke(shot)) is None
     with pytest.raises(RuntimeError, match="No stopped run to resume"):
@@ -360,7 +360,7 @@ def test_going_on_where_the_output_is_not_beside_the_file(shot, tmp_path, saved_
     assert bpy.ops.smokelift.resume() == {"FINISHED"}
     (row,) = bpy.context.window_manager.smokelift.jobs
     assert (row.outcome, row.done) == ("done", 2), row.sentence
-    assert stopped.complete()
+    assert stopped.read().complete
 
 
 def test_going_on_after_the_project_was_moved(shot, tmp_path) -> None:
@@ -458,7 +458,7 @@ def test_two_smokes_through_an_hour_of_work(shot, tmp_path) -> None:
     assert bpy.ops.smokelift.resume() == {"FINISHED"}
     row = bpy.context.window_manager.smokelift.jobs[-1]
     assert (row.outcome, row.done) == ("done", 2), row.sentence
-    assert stopped.complete()
+    assert stopped.read().complete
 
     left.smokelift.output, right.smokelift.output = (str(folder) for folder in folders)
     for obj in (left, right):
@@ -472,7 +472,7 @@ def test_two_smokes_through_an_hour_of_work(shot, tmp_path) -> None:
     for obj in smokes(bpy.context.scene):
         take = volume.shown_take(obj)
         assert take.directory.is_relative_to(moved)
-        assert take.complete()
+        assert take.read().complete
     assert len(smokes(bpy.context.scene)) == 2
 
 
@@ -562,7 +562,7 @@ def test_cycles_and_the_engine_agree_on_all_orders_of_scattering(shot, kept, tmp
     """The same thick white smoke by two renderers; scattered once it has hardly half the light."""
     take = made(shot, tmp_path / "out", kept)
     density = Sequence.open(take.directory).density(LAST - FIRST + 1)
-    index = take.index()
+    index = take.read().index
     medium = index["scene"]["medium"] | {"extinction": 15.0, "albedo": 0.95, "scattering": "multiple"}
     (take.directory / "sequence.json").write_text(json.dumps(index | {"scene": index["scene"] | {"medium": medium}}))
     smoke_takes.present(smoke(shot), take)
