@@ -117,6 +117,12 @@ def test_docstrings_have_their_noun() -> None:
     assert {path: each for path, each in found.items() if each} == {}
 
 
+def test_types_of_arrays_have_one_module() -> None:
+    aliases = re.compile(r"^(?:Array|Doubles|Floats|Mask|Values) = (?:npt\.)?NDArray\[np\.\w+\]$", re.MULTILINE)
+    found = {name(path) for path in FILES if aliases.search(path.read_text(encoding="utf-8"))}
+    assert {path for path in found if path.endswith(".py")} == {"engine/smokelift/checks/array_types.py"}
+
+
 @pytest.mark.parametrize("sentence", ["It is told.", "first_look(clip)", "LEAST_SHARE = 0.3", "looked\n    at"])
 def test_a_word_is_found(sentence: str) -> None:
     assert banned(sentence)

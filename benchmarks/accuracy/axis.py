@@ -21,6 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from benchmarks.tables import markdown
+from smokelift.checks.array_types import Doubles
 from smokelift.density.axis import SmokeAxis
 from smokelift.density.axis_posterior import estimate_axis
 from smokelift.evaluation.truth import Truth
@@ -35,7 +36,6 @@ BOX = (-1.0, -1.0, 0.0), (1.0, 1.0, 3.0)
 CAMERAS = [(side, height) for side in (1, -1) for height in (1.0, 1.5, 2.5)]
 LOWERED = (0.0, 0.04, 0.08, 0.12, 0.17, 0.25)
 NAMES = ("the domain's axis", "upright at the lower end", "estimated", "estimated from the lower end")
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -53,9 +53,9 @@ class Shot:
 
     camera: Camera
     amounts: list[npt.NDArray[np.float32]]
-    heights: Array
-    mass: Array
-    depths: Array
+    heights: Doubles
+    mass: Doubles
+    depths: Doubles
 
 
 def shots(truth: Truth) -> Iterator[Shot]:
@@ -76,7 +76,7 @@ def shots(truth: Truth) -> Iterator[Shot]:
         yield Shot(camera, seen, heights, mass, side * mean)
 
 
-def errors(path: Path) -> Array:
+def errors(path: Path) -> Doubles:
     """Return the errors (shots, lowered, 4) of a scene, of the axes that `NAMES` lists."""
     truth = Truth.load(path)
     h = truth.voxel_size

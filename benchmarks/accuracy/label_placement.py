@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from smokelift.checks.array_types import Doubles
 
 DIRECTIONS = 16
 """Around a point, in which its label is tried."""
@@ -21,7 +20,7 @@ OVER_LABEL, OVER_OBSTACLE, OUTSIDE = 1e3, 1.0, 1e6
 the point costs 1."""
 
 
-def place_labels(points: Array, sizes: Array, obstacles: Array, bounds: Array) -> Array:
+def place_labels(points: Doubles, sizes: Doubles, obstacles: Doubles, bounds: Doubles) -> Doubles:
     """Return the lower left corners of labels, near their points and apart from each other.
 
     Each label tries places around its point and takes the cheapest, given the others', until none moves: coordinate
@@ -64,7 +63,7 @@ def place_labels(points: Array, sizes: Array, obstacles: Array, bounds: Array) -
     return np.asarray(chosen[:, :2])
 
 
-def _common(boxes: Array, others: Array) -> Array:
+def _common(boxes: Doubles, others: Doubles) -> Doubles:
     """Areas (..., others) that boxes (..., 4) share with others (others, 4)."""
     low = np.maximum(boxes[..., None, :2], others[:, :2])
     high = np.minimum(boxes[..., None, 2:], others[:, 2:])

@@ -16,9 +16,9 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from benchmarks.background.clips import Smoke, backdrop, exposed, filmed, sky, wall
+from smokelift.checks.array_types import Doubles
 from smokelift.footage.backdrop import find_backdrop
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import Picture
@@ -28,7 +28,6 @@ from smokelift.setup.smoke import sample_smoke
 from smokelift.setup.source import smoke_colour, source_radiance
 from smokelift.setup.thickness import smoke_thickness
 
-Array = npt.NDArray[np.float64]
 Plates = Mapping[str, Picture]
 
 LIGHTS = {"white": (1.0, 1.0, 1.0), "4 degrees warm": (1.0, 0.93, 0.84), "10 degrees warm": (1.0, 0.82, 0.64)}
@@ -85,7 +84,7 @@ def _colour(smokes: Mapping[str, Smoke], plates: Plates) -> Iterator[list[str]]:
             ]
 
 
-def _angles(smokes: Mapping[str, Smoke], light: Array, colour: Array, plate: Picture) -> str:
+def _angles(smokes: Mapping[str, Smoke], light: Doubles, colour: Doubles, plate: Picture) -> str:
     angles = []
     behind: Picture = (plate * light).astype(np.float32)
     for smoke in smokes.values():
@@ -98,7 +97,7 @@ def _angles(smokes: Mapping[str, Smoke], light: Array, colour: Array, plate: Pic
     return f"{len(angles)} of {len(smokes)}" + (f", {np.mean(angles):.0f}" if angles else "")
 
 
-def _filmed(smoke: Smoke, colour: Array, plate: Picture) -> Clip:
+def _filmed(smoke: Smoke, colour: Doubles, plate: Picture) -> Clip:
     """The clip of smoke of a colour before a plate."""
     pictures = (smoke.radiance[..., None] * colour + smoke.transmittance[..., None] * plate).astype(np.float32)
     return filmed(np.clip(exposed(pictures, np.ones(len(pictures))), 0, 1), "baked")

@@ -7,8 +7,9 @@ from scipy import ndimage
 from scipy.spatial.transform import Rotation
 
 from benchmarks.background.clips import Case, Smoke, filmed, wall
+from smokelift.checks.array_types import Doubles
 from smokelift.footage.images import Picture, area_average, linear_to_srgb
-from smokelift.footage.turning import Array, moved
+from smokelift.footage.turning import moved
 
 FOV_DEGREES = 30.0
 """Vertical field of view of the cameras of `benchmarks.truth.picture`."""
@@ -35,7 +36,7 @@ def panned(smoke: Smoke, share: float) -> Case:
     return seen_turning(smoke, lens, turns)
 
 
-def lens_of(smoke: Smoke) -> Array:
+def lens_of(smoke: Smoke) -> Doubles:
     """The lens (3, 3) of a scene's front pictures, from directions to pixels."""
     _, rows, columns = smoke.radiance.shape
     focal = 0.5 * rows / np.tan(np.radians(FOV_DEGREES / 2))
@@ -48,7 +49,7 @@ def ahead(smoke: Smoke) -> Picture:
     return wall((3 * rows, 3 * columns))[rows : 2 * rows, columns : 2 * columns]
 
 
-def seen_turning(smoke: Smoke, lens: Array, turns: Rotation) -> Case:
+def seen_turning(smoke: Smoke, lens: Doubles, turns: Rotation) -> Case:
     """The clip of a camera that turns, frame to mean pose, before a wall three times as wide and high as the picture.
 
     What the smoke looks like through each pixel is the same wherever the camera looks: it turns about its centre.
@@ -70,7 +71,7 @@ def seen_turning(smoke: Smoke, lens: Array, turns: Rotation) -> Case:
     return Case(filmed(linear_to_srgb(seen), "turning"), np.stack(plates), seen, False, lens)
 
 
-def _at(picture: Picture, down: Array, across: Array, beyond: float = 0) -> Picture:
+def _at(picture: Picture, down: Doubles, across: Doubles, beyond: float = 0) -> Picture:
     """A picture's values at some places, and another value beyond it."""
     values = ndimage.map_coordinates(picture, [down, across], order=1, cval=beyond, output=np.float32)
     return np.asarray(values)

@@ -16,8 +16,8 @@ from benchmarks.accuracy.scenes import baked_scene
 from benchmarks.direct.clips import true_moment
 from benchmarks.direct.continuation import tile
 from benchmarks.truth.scenes import BOX_MIN, BOX_SIZE
+from smokelift.checks.array_types import Mask
 from smokelift.direct import Ball, Mesh, MovingMesh, Turbulence, fit_simulation, spun_up
-from smokelift.direct.constraint import Mask
 from smokelift.direct.obstacles import Obstacles
 from smokelift.direct.surroundings import Surroundings
 from smokelift.output.sheet import write_sheet

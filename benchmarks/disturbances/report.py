@@ -10,14 +10,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from benchmarks import charts, tables
 from benchmarks.disturbances.measure import Figures
 from benchmarks.disturbances.table import DISTURBANCES
+from smokelift.checks.array_types import Doubles
 from smokelift.setup.settings import METHODS
 
-Floats = npt.NDArray[np.float64]
 Key = tuple[str, float, str, str]
 """Disturbance, strength, scene, method."""
 
@@ -80,11 +79,11 @@ class Results:
         """Return a figure; NaN if it was not measured."""
         return float(self._rows.get(_stored(key), {}).get(figure) or math.nan)
 
-    def values(self, name: str, strength: float, method: str, figure: str) -> Floats:
+    def values(self, name: str, strength: float, method: str, figure: str) -> Doubles:
         """Return a figure of every scene."""
         return np.array([self.value((name, strength, scene, method), figure) for scene in self.scenes(name, method)])
 
-    def changes(self, name: str, strength: float, method: str) -> Floats:
+    def changes(self, name: str, strength: float, method: str) -> Doubles:
         """Return the new views' PSNR of every scene less that of the default undisturbed (dB)."""
         rest = DISTURBANCES[name].undisturbed
         undisturbed = [self.value((name, rest, scene, METHODS[0]), "psnr_new") for scene in self.scenes(name, method)]
@@ -123,13 +122,13 @@ def losing(strengths: Sequence[float], changes: Sequence[float], undisturbed: fl
     return found
 
 
-def mean(values: Floats) -> float:
+def mean(values: Doubles) -> float:
     """Return the mean over the scenes on which something was measured; NaN without any."""
     measured = values[~np.isnan(values)]
     return float(measured.mean()) if measured.size else math.nan
 
 
-def curves(results: Results, name: str, method: str, figure: str) -> Floats:
+def curves(results: Results, name: str, method: str, figure: str) -> Doubles:
     """Return a disturbance's curves (scenes, strengths): of ``psnr_new`` the changes, else the figure; NaN for none."""
     each = [
         results.changes(name, strength, method)
@@ -145,9 +144,9 @@ def draw(results: Results, figure: str, label: str, path: Path) -> None:
 
     Nothing is drawn where none has it: a scene counts once the default is measured on it undisturbed.
     """
-    shown: dict[str, dict[str, Floats]] = {}
+    shown: dict[str, dict[str, Doubles]] = {}
     for name in DISTURBANCES:
-        found: dict[str, Floats] = {method: curves(results, name, method, figure) for method in METHODS}
+        found: dict[str, Doubles] = {method: curves(results, name, method, figure) for method in METHODS}
         if measured := {method: lines for method, lines in found.items() if not np.isnan(lines).all()}:
             shown[name] = measured
     if not shown:
@@ -168,7 +167,7 @@ def draw(results: Results, figure: str, label: str, path: Path) -> None:
     charts.save(sheet, path, dpi=75)
 
 
-def _panel(plot: Any, results: Results, name: str, lines: dict[str, Floats], figure: str) -> None:
+def _panel(plot: Any, results: Results, name: str, lines: dict[str, Doubles], figure: str) -> None:
     """Draw one disturbance."""
     disturbance = DISTURBANCES[name]
     at = np.arange(len(disturbance.strengths)) if disturbance.labels else np.array(disturbance.strengths)
@@ -247,5 +246,5 @@ def table(results: Results) -> str:
     return tables.markdown(head, lines)
 
 
-def _mean_and_worst(changes: Floats) -> list[str]:
+def _mean_and_worst(changes: Doubles) -> list[str]:
     return ["", ""] if math.isnan(mean(changes)) else [f"{mean(changes):+.1f}", f"{np.nanmin(changes):+.1f}"]

@@ -19,6 +19,7 @@ import numpy.typing as npt
 from benchmarks.errors import relative_error
 from benchmarks.tables import markdown
 from smokelift.baselines.renderer import PaperRenderer
+from smokelift.checks.array_types import Doubles
 from smokelift.render import Renderer, Volume
 from smokelift.scene import Camera, DirectionalLight, Domain, Medium
 from tests.engine import paper_reference, renderer_reference
@@ -30,7 +31,6 @@ CAMERA = Camera.look_at((1.7, -1.9, 1.3), (0.0, 0.0, 0.0), fov_y_degrees=28, siz
 SUN = DirectionalLight((0.57, 0.45, -0.68), (9.0, 9.0, 9.0))
 BLACK = np.zeros(3, np.float32)
 
-Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
 
@@ -48,7 +48,7 @@ def compare(
     setup: tuple[Any, ...],
     density: Volume,
     voxels: npt.NDArray[np.int64],
-    weights: Array,
+    weights: Doubles,
 ) -> tuple[float, float, float]:
     """Compare the gradient of a weighted sum over a picture with the complex step of its reference.
 
@@ -59,7 +59,7 @@ def compare(
         is added everywhere.
     """
 
-    def slope(direction: Array) -> float:
+    def slope(direction: Doubles) -> float:
         return float(np.sum(weights * reference(density + 1e-30j * direction, *setup)).imag / 1e-30)
 
     expected = np.zeros(len(voxels))

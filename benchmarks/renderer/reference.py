@@ -16,12 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.renderer.scene import BenchScene
+from smokelift.checks.array_types import Doubles
 from smokelift.scene.projection import ray_through_pixels
 
-Array = NDArray[np.float64]
 
-
-def image_and_gradient(scene: BenchScene) -> tuple[Array, Array]:
+def image_and_gradient(scene: BenchScene) -> tuple[Doubles, Doubles]:
     """Return the image (rows, columns, 3) and the derivative (n, n, n) of the sum of (image - target)^2."""
     h, light = scene.domain.voxel_size, scene.light
     bundles = _bundles(scene)
@@ -41,13 +40,13 @@ def image_and_gradient(scene: BenchScene) -> tuple[Array, Array]:
     return image, scene.medium.extinction * (of_kappa[1:-1, 1:-1, 1:-1] + shadows)
 
 
-def image(scene: BenchScene) -> Array:
+def image(scene: BenchScene) -> Doubles:
     """Return the image (rows, columns, 3) alone."""
     kappa = np.pad(scene.medium.extinction * scene.density.astype(np.float64), 1)
     return _image(scene, _bundles(scene), kappa, np.pad(_inscatter(scene), 1, mode="edge"))
 
 
-def light_optical_depth(kappa: Array, voxel_size: float, direction: Array) -> Array:
+def light_optical_depth(kappa: Doubles, voxel_size: float, direction: Doubles) -> Doubles:
     """Return the optical depth from a parallel light, travelling in a direction (3,), to every voxel."""
     axis = int(np.argmax(np.abs(direction)))
     field = np.moveaxis(kappa, axis, 0)
@@ -68,13 +67,13 @@ def light_optical_depth(kappa: Array, voxel_size: float, direction: Array) -> Ar
     return np.moveaxis(depth, 0, axis)
 
 
-def _blend(plane: Array, f: float, g: float) -> Array:
+def _blend(plane: Doubles, f: float, g: float) -> Doubles:
     """Weigh every 2 x 2 cell of a plane; f and g belong to the lower index."""
     across = f * plane[:-1] + (1 - f) * plane[1:]
     return np.asarray(g * across[:, :-1] + (1 - g) * across[:, 1:])
 
 
-def _inscatter(scene: BenchScene) -> Array:
+def _inscatter(scene: BenchScene) -> Doubles:
     """In-scattered radiance J of every voxel for unit irradiance."""
     h, travel, g = scene.domain.voxel_size, np.array(scene.light.direction), scene.medium.anisotropy
     axes = [low + (np.arange(n) + 0.5) * h for low, n in zip(scene.domain.min, scene.domain.resolution, strict=True)]
@@ -95,10 +94,10 @@ class _Bundle:
     axis: int
     travel: int
     pixels: NDArray[np.bool_]
-    base: Array
-    slope: Array
-    eye: Array
-    step: Array
+    base: Doubles
+    slope: Doubles
+    eye: Doubles
+    step: Doubles
 
 
 def _bundles(scene: BenchScene) -> list[_Bundle]:
@@ -124,15 +123,15 @@ class _Samples:
     rays: NDArray[np.intp]
     cell: NDArray[np.intp]
     width: int
-    weights: tuple[Array, Array, Array, Array]
+    weights: tuple[Doubles, Doubles, Doubles, Doubles]
 
-    def gather(self, plane: Array) -> Array:
+    def gather(self, plane: Doubles) -> Doubles:
         """Interpolate in a padded plane."""
         flat = plane.ravel()
         corners = zip(self.weights, (0, 1, self.width, self.width + 1), strict=True)
         return np.asarray(sum(w * flat[self.cell + offset] for w, offset in corners))
 
-    def scatter(self, values: Array, plane: Array) -> None:
+    def scatter(self, values: Doubles, plane: Doubles) -> None:
         """Add values into a padded plane: the transpose of `gather`."""
         corners = zip(self.weights, (0, 1, self.width, self.width + 1), strict=True)
         for w, offset in corners:
@@ -152,7 +151,7 @@ def _crossings(bundle: _Bundle, planes: Iterable[int], shape: tuple[int, ...]) -
         yield k, _Samples(rays, cell[:, 0] * columns + cell[:, 1], columns, weights)
 
 
-def _image(scene: BenchScene, bundles: list[_Bundle], kappa: Array, glow: Array) -> Array:
+def _image(scene: BenchScene, bundles: list[_Bundle], kappa: Doubles, glow: Doubles) -> Doubles:
     width, height = scene.camera.size
     scattered, transmittance = np.zeros((height, width)), np.ones((height, width))
     for bundle in bundles:
@@ -169,12 +168,12 @@ def _image(scene: BenchScene, bundles: list[_Bundle], kappa: Array, glow: Array)
 
 def _pull_back(
     bundle: _Bundle,
-    kappa: Array,
-    glow: Array,
-    of_scattered: Array,
-    of_transmittance: Array,
-    of_kappa: Array,
-    of_glow: Array,
+    kappa: Doubles,
+    glow: Doubles,
+    of_scattered: Doubles,
+    of_transmittance: Doubles,
+    of_kappa: Doubles,
+    of_glow: Doubles,
 ) -> None:
     """Add derivatives with respect to the padded kappa and J, from those of the two images.
 
@@ -198,7 +197,7 @@ def _pull_back(
         behind[rays] = opacity * lit + (1 - opacity) * behind[rays]
 
 
-def _fold(padded: Array) -> Array:
+def _fold(padded: Doubles) -> Doubles:
     """The transpose of padding with the nearest voxel's value."""
     for axis in range(3):
         planes = np.moveaxis(padded, axis, 0)

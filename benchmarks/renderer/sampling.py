@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.renderer.scene import BenchScene
+from smokelift.checks.array_types import Array
 from smokelift.render.camera_rays import LATERAL, camera_rays
 
-Floats = NDArray[np.float32]
 Ints = NDArray[np.int32]
 
 
@@ -45,11 +45,11 @@ class RayTable:
 
     pixel: Ints
     count: Ints
-    step: Floats
-    b: Floats
-    db: Floats
-    c: Floats
-    dc: Floats
+    step: Array
+    b: Array
+    db: Array
+    c: Array
+    dc: Array
     first: Ints
     next: Ints
     across: Ints
@@ -114,7 +114,7 @@ class LightTable:
     axis: int
     planes: range
     window: Ints
-    weight: Floats
+    weight: Array
     columns: tuple[int, int]
     step: float
 
@@ -140,7 +140,7 @@ def light_table(scene: BenchScene) -> LightTable:
     )
 
 
-def phase_volume(scene: BenchScene) -> Floats:
+def phase_volume(scene: BenchScene) -> Array:
     """Return albedo x Henyey-Greenstein phase function from the light to the camera, 1/sr, at every voxel."""
     h, g = scene.domain.voxel_size, scene.medium.anisotropy
     centres = (low + (np.arange(n) + 0.5) * h for low, n in zip(scene.domain.min, scene.domain.resolution, strict=True))

@@ -16,7 +16,6 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 from scipy import ndimage
 
 from benchmarks.errors import relative_error
@@ -24,6 +23,7 @@ from benchmarks.machine import poisson_seconds
 from benchmarks.tables import markdown
 from benchmarks.velocity.pairs import away_from, near_smoke
 from smokelift.baselines.velocity import PaperVelocity
+from smokelift.checks.array_types import Array
 from smokelift.evaluation.truth import Truth
 from smokelift.scene import Side
 from smokelift.transport import advect
@@ -33,8 +33,6 @@ PAIRS = range(6, 38, 4)
 CHAIN = range(6, 22)
 SETTLED = 8
 """Frames of a chain that are not scored: its first estimates have no prediction yet."""
-
-Array = npt.NDArray[np.float32]
 
 
 @dataclass(frozen=True)

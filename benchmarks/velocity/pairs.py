@@ -5,16 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy import ndimage
 
+from smokelift.checks.array_types import Mask
 from smokelift.evaluation.truth import Truth
 from smokelift.transport import Array
 
 SMOKE = 0.01
 """Share of the largest density from which a voxel counts as smoke."""
-
-Mask = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)

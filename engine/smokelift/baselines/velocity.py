@@ -13,9 +13,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from smokelift.checks.array_types import Mask
 from smokelift.scene import Side
 from smokelift.transport import StaggeredGrid, Velocity
-from smokelift.velocity.estimator import Density, Estimate, Mask, checked, motion_weight, predict_velocity
+from smokelift.velocity.estimator import Density, Estimate, checked, motion_weight, predict_velocity
 from smokelift.velocity.linearisation import Regularisation, least_squares, linearise
 from smokelift.velocity.preparation import without_noise
 from smokelift.velocity.pyramid import Level

@@ -6,13 +6,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
+from smokelift.checks.array_types import Doubles
 from smokelift.density.screen import reach_along, view_frame
 from smokelift.scene import Camera, Domain
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,14 +31,14 @@ class SmokeAxis:
         Lateral standard deviation (m) of the column that shows there, of several; zero of a single one.
     """
 
-    heights: Array
-    laterals: Array
-    depths: Array
-    spreads: Array
-    widths: Array
+    heights: Doubles
+    laterals: Doubles
+    depths: Doubles
+    spreads: Doubles
+    widths: Doubles
 
     @staticmethod
-    def by_height(heights: Array, depths: Array) -> SmokeAxis:
+    def by_height(heights: Doubles, depths: Doubles) -> SmokeAxis:
         """One column, whose depth (n,) depends on the height (n,) alone."""
         nothing = np.zeros((len(depths), 1))
         return SmokeAxis(heights, np.zeros(1), np.reshape(depths, (-1, 1)), nothing, nothing)
@@ -55,19 +53,19 @@ class SmokeAxis:
         """Whether several columns are known."""
         return len(self.laterals) > 1
 
-    def at(self, heights: Array, laterals: Array | float = 0.0) -> Array:
+    def at(self, heights: Doubles, laterals: Doubles | float = 0.0) -> Doubles:
         """Depths at some heights and lateral places."""
         return self._read(self.depths, heights, laterals)
 
-    def spread_at(self, heights: Array, laterals: Array | float = 0.0) -> Array:
+    def spread_at(self, heights: Doubles, laterals: Doubles | float = 0.0) -> Doubles:
         """Spreads at some heights and lateral places."""
         return self._read(self.spreads, heights, laterals)
 
-    def width_at(self, heights: Array, laterals: Array | float = 0.0) -> Array:
+    def width_at(self, heights: Doubles, laterals: Doubles | float = 0.0) -> Doubles:
         """Widths at some heights and lateral places."""
         return self._read(self.widths, heights, laterals)
 
-    def _read(self, values: Array, heights: Array, laterals: Array | float) -> Array:
+    def _read(self, values: Doubles, heights: Doubles, laterals: Doubles | float) -> Doubles:
         if not self.several:
             return np.asarray(np.interp(heights, self.heights, values[:, 0]))
         rows = np.interp(heights, self.heights, np.arange(len(self.heights)))

@@ -20,7 +20,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from smokelift.density.axis import Array, AxisEstimate, Cue, SmokeAxis, depth_at
+from smokelift.checks.array_types import Doubles
+from smokelift.density.axis import AxisEstimate, Cue, SmokeAxis, depth_at
 from smokelift.density.observation import ObservedClip, apparent_optical_depth
 from smokelift.density.screen import Screen, reach_along, seen_at, upright_screen, view_frame
 from smokelift.footage.matte import matte
@@ -191,14 +192,14 @@ class _Column:
         By height, lateral distance (m) of its axis from its base.
     """
 
-    base: Array
+    base: Doubles
     begins: float
-    middles: Array
-    widths: Array
-    drifts: Array
+    middles: Doubles
+    widths: Doubles
+    drifts: Doubles
 
 
-def _posterior(column: _Column, depths: Array, total: Array, box: float, leans: float) -> tuple[Array, Array]:
+def _posterior(column: _Column, depths: Doubles, total: Doubles, box: float, leans: float) -> tuple[Doubles, Doubles]:
     """Mean and variance (n,) of a column's depth by height, from candidates (k,) for the depth of its base.
 
     The depth of its mean has a standard deviation ``box`` (m) about the middle. It leans with a probability ``leans``.
@@ -222,18 +223,18 @@ def _posterior(column: _Column, depths: Array, total: Array, box: float, leans: 
     return depth * trusted, variance * trusted**2 + box**2 * (1 - trusted)
 
 
-def _normal(value: Array | float, deviation: Array | float) -> Array:
+def _normal(value: Doubles | float, deviation: Doubles | float) -> Doubles:
     """Logarithm of a normal density about zero, but for a constant."""
     return np.asarray(-np.square(value / deviation) / 2 - np.log(deviation))
 
 
-def _at(depths: Array, known: Array | float) -> Array:
+def _at(depths: Doubles, known: Doubles | float) -> Doubles:
     """Log-likelihood of the candidates (k,) where a depth is known, to within one of them."""
     return np.asarray(-(((depths - known) / (depths[1] - depths[0])) ** 2) / 2)
 
 
 def _floor_column(
-    screens: Sequence[Screen], frames: int, middle: Array, depths: Array, camera: Camera, domain: Domain
+    screens: Sequence[Screen], frames: int, middle: Doubles, depths: Doubles, camera: Camera, domain: Domain
 ) -> list[_Column]:
     """The column that stands on the floor; none where too few of the frames show a contact.
 
@@ -288,7 +289,7 @@ def _floor_contact(
 
 
 def _inlet_columns(
-    inlets: Sequence[Inlet], mean: Screen, middle: Array, depths: Array, camera: Camera, domain: Domain
+    inlets: Sequence[Inlet], mean: Screen, middle: Doubles, depths: Doubles, camera: Camera, domain: Domain
 ) -> list[_Column]:
     """The columns above inlets, followed upwards in the mean picture where there are several.
 
@@ -315,12 +316,12 @@ def _inlet_columns(
     return [_Column(*column) for column in zip(bases, begins, middles, widths, drifts, strict=True)]
 
 
-def _likelihood(places: Array, middles: Array, widths: Array) -> Array:
+def _likelihood(places: Doubles, middles: Doubles, widths: Doubles) -> Doubles:
     """Likelihood of columns where there is smoke at some lateral places; never quite zero."""
     return np.asarray(np.exp(-(((places - middles) / widths) ** 2) / 2) + 1e-9)
 
 
-def _axis(columns: Sequence[_Column], known: Sequence[Array], mean: Screen) -> SmokeAxis:
+def _axis(columns: Sequence[_Column], known: Sequence[Doubles], mean: Screen) -> SmokeAxis:
     """The axis of columns by their depths (n,); where several may hold the smoke at a place, their mean."""
     if len(columns) == 1:
         return SmokeAxis.by_height(mean.heights, known[0])

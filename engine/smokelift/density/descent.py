@@ -18,11 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.blas import saxpy
 
+from smokelift.checks.array_types import Array
 from smokelift.density.objective import Fit, Term, noise_floor, objective
 from smokelift.render import Image, Volume
-
-Values = NDArray[np.float32]
-"""Numbers of the hull's voxels, (n,)."""
 
 MEMORY = 3
 """Steps that the direction remembers: as good as six, for half the memory (docs/experiments/density-descent.md)."""
@@ -100,7 +98,7 @@ def descend(
         residuals = problem.residuals(current)
     loss, enough = objective(terms, residuals), noise_floor(terms)
     curvature = _Curvature()
-    gradient: Values | None = None
+    gradient: Array | None = None
     step: _Step | None = None
     done = idle = 0
     while done < iterations and loss > enough and idle < patience:
@@ -148,18 +146,18 @@ class _Problem:
     where: NDArray[np.intp]
     volume: Volume
     slopes: Volume
-    scale: Values
+    scale: Array
 
-    def show(self, density: Values) -> None:
+    def show(self, density: Array) -> None:
         """Write a density of the hull's voxels into the volume."""
         self.volume.ravel()[self.where] = density
 
-    def residuals(self, density: Values) -> tuple[Image, ...]:
+    def residuals(self, density: Array) -> tuple[Image, ...]:
         """What the pictures of a density differ by from those that are to be fitted."""
         self.show(density)
         return tuple(term.renderer.image(self.volume, keep_record=True) - term.view.image for term in self.terms)
 
-    def gradient(self, residuals: tuple[Image, ...]) -> Values:
+    def gradient(self, residuals: tuple[Image, ...]) -> Array:
         """Derivative of the objective in units of the scale, for the density whose residuals are the last."""
         parts = (
             term.renderer.gradient(term.image_gradient(residual), out=self.slopes).ravel().take(self.where)
@@ -174,20 +172,20 @@ class _Problem:
 class _Step:
     """Where a step arrives: its density, how far it moved in units of the scale, and what is left there."""
 
-    density: Values
-    moved: Values
+    density: Array
+    moved: Array
     residuals: tuple[Image, ...]
     loss: float
 
 
 def _step(
     problem: _Problem,
-    current: Values,
+    current: Array,
     loss: float,
-    gradient: Values,
-    direction: Values,
+    gradient: Array,
+    direction: Array,
     length: float,
-    bounds: tuple[Values, Values],
+    bounds: tuple[Array, Array],
 ) -> _Step | None:
     """Step against a direction, shortened until the objective falls sufficiently; None if it never does."""
     for _ in range(SHORTENINGS):
@@ -211,20 +209,20 @@ class _Curvature:
     """The objective's second derivatives, as far as its last steps show them."""
 
     def __init__(self) -> None:
-        self._steps: deque[tuple[Values, Values, float]] = deque(maxlen=MEMORY)
+        self._steps: deque[tuple[Array, Array, float]] = deque(maxlen=MEMORY)
 
     @property
     def known(self) -> bool:
         """Whether a step has shown any."""
         return bool(self._steps)
 
-    def learn(self, moved: Values, change: Values) -> None:
+    def learn(self, moved: Array, change: Array) -> None:
         """Remember a step and what it changed in the gradient, unless the objective is not convex along it."""
         product = _dot(moved, change)
         if product > 0:
             self._steps.append((moved, change, product))
 
-    def newton(self, gradient: Values) -> Values:
+    def newton(self, gradient: Array) -> Array:
         """Newton's step for a gradient, which is overwritten; where nothing is known, the gradient itself."""
         shares = []
         for moved, change, product in reversed(self._steps):
@@ -238,5 +236,5 @@ class _Curvature:
         return gradient
 
 
-def _dot(a: Values, b: Values) -> float:
+def _dot(a: Array, b: Array) -> float:
     return float(np.vdot(a, b))

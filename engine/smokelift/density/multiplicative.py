@@ -27,12 +27,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from smokelift.checks.array_types import Array
 from smokelift.density.hull import Places
 from smokelift.density.objective import Fit, Term, noise_floor, objective
 from smokelift.render import Image, Volume
-
-Values = NDArray[np.float32]
-"""Densities of some voxels, (n,)."""
 
 STEP_RANGE = (0.4, 2.5)
 """Largest change of a ray's smoke in one iteration."""
@@ -142,20 +140,20 @@ class _Smoke:
     def __init__(self, density: Volume, within: NDArray[np.intp] | None, plausible: Volume | None = None) -> None:
         values = density.ravel()
         self._where = np.flatnonzero(values) if within is None else within[values[within] != 0]
-        self._values: Values = values[self._where]
+        self._values: Array = values[self._where]
         self._volume = np.zeros(density.shape, np.float32)
         self._plausible = None if plausible is None else plausible.ravel()[self._where]
 
-    def values(self) -> Values:
+    def values(self) -> Array:
         """Values of the density."""
         return self._values
 
-    def volume_of(self, values: Values) -> Volume:
+    def volume_of(self, values: Array) -> Volume:
         """The volume (nx, ny, nz) with these values, until the next call."""
         self._volume.ravel()[self._where] = values
         return self._volume
 
-    def uneven(self, step: Values, values: Values) -> Values:
+    def uneven(self, step: Array, values: Array) -> Array:
         """A step (n,) in the logarithm of values, scaled towards the plausible smoke."""
         if self._plausible is None:
             return step
@@ -177,7 +175,7 @@ class _Smoke:
         return [term.view.projection.places(filled) for term in terms]
 
 
-def _scaled(smoke: _Smoke, values: Values, places: Places, term: Term, image: Image) -> Values:
+def _scaled(smoke: _Smoke, values: Array, places: Places, term: Term, image: Image) -> Array:
     """Values whose picture is nearer to a term's, from those that render to `image`."""
     transmittance = term.renderer.transmittance
     slope = _slope(smoke, values, term, image, transmittance)
@@ -186,7 +184,7 @@ def _scaled(smoke: _Smoke, values: Values, places: Places, term: Term, image: Im
     return np.asarray(values * np.exp(RELAXATION * step))
 
 
-def _slope(smoke: _Smoke, values: Values, term: Term, image: Image, transmittance: Image) -> Image:
+def _slope(smoke: _Smoke, values: Array, term: Term, image: Image, transmittance: Image) -> Image:
     """dL / d ln s (rows, columns, 3) of a density, whose image and transmittance are given."""
     if term.renderer.absorbs_only:  # L = T B and ln T is proportional to s
         return np.asarray(image * np.log(np.maximum(transmittance, 1e-30))[..., None])

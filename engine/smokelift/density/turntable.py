@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import smokelift._core as _core
+from smokelift.checks.array_types import Doubles
 from smokelift.density.screen import seen_at, view_frame
 from smokelift.scene import Camera, Domain, as_matrix
 
-Array = NDArray[np.float64]
 Volume = NDArray[np.float32]
 Picture = NDArray[np.float32]
 """(columns, voxels along the axis), a pixel a voxel, upwards."""
@@ -30,9 +30,9 @@ class Turntable:
         Its centre is on the axis.
     """
 
-    lateral: Array
-    depth: Array
-    height: Array
+    lateral: Doubles
+    depth: Doubles
+    height: Doubles
     domain: Domain
 
     @staticmethod
@@ -107,7 +107,7 @@ class Turntable:
         """Multiply an upright volume along the rays of a turned view by exponentials of a picture; see `project`."""
         _core.scale_turned(upright, *self._turned(degrees, corner), logarithm)
 
-    def _right(self, degrees: float) -> Array:
+    def _right(self, degrees: float) -> Doubles:
         turn = np.radians(degrees)
         return np.asarray(np.cos(turn) * self.lateral + np.sin(turn) * self.depth)
 

@@ -15,11 +15,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-import numpy.typing as npt
 
+from smokelift.checks.array_types import Mask
 from smokelift.transport import Array, Faces, StaggeredGrid, without_divergence
 
-Mask = npt.NDArray[np.bool_]
 FaceMasks = tuple[Mask, Mask, Mask]
 
 

@@ -18,7 +18,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from smokelift.direct.constraint import Mask
+from smokelift.checks.array_types import Mask
 from smokelift.direct.moment import Moment
 from smokelift.transport import Array, advect
 

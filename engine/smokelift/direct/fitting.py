@@ -20,7 +20,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from smokelift.direct.constraint import Mask
+from smokelift.checks.array_types import Mask
 from smokelift.direct.fire import fit_fire
 from smokelift.direct.inflow import Inflow, find_inflow
 from smokelift.direct.moment import Moment

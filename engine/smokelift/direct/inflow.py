@@ -10,7 +10,8 @@ from itertools import pairwise
 import numpy as np
 from scipy import ndimage
 
-from smokelift.direct.constraint import FaceMasks, Mask, faces_of
+from smokelift.checks.array_types import Mask
+from smokelift.direct.constraint import FaceMasks, faces_of
 from smokelift.direct.moment import Moment
 from smokelift.scene.domain import box_around
 from smokelift.transport import Array, ResidualMeans, advect, faces_in

@@ -15,11 +15,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from smokelift.direct.constraint import Mask
+from smokelift.checks.array_types import Doubles, Mask
 from smokelift.scene import Domain
 from smokelift.scene.checks import LARGEST, Vector
 
-Values = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
 
 HEADER, RECORD = 84, np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -48,7 +47,7 @@ class Crossings(NamedTuple):
     face: Integers
     side: Integers
     triangle: Integers
-    weights: Values
+    weights: Doubles
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +139,7 @@ def enclosed(crossings: list[Crossings], domain: Domain) -> Mask:
     return enclosed
 
 
-def _crossings(places: Values, shape: tuple[int, ...]) -> Crossings:
+def _crossings(places: Doubles, shape: tuple[int, ...]) -> Crossings:
     """Where triangles (n, 3, 3), in voxels from the centre of the first, cross columns along the last axis."""
     limit = np.array(shape[:2]) - 1
     low = np.clip(np.ceil(places[:, :, :2].min(axis=1)), 0, limit + 1).astype(np.int64)
@@ -180,7 +179,7 @@ def _pairs(triangles: Integers, low: Integers, size: Integers) -> tuple[Integers
     return triangle, low[triangle] + np.stack(np.divmod(within, size[triangle, 1]), axis=-1)
 
 
-def _crossed(corners: Values, triangle: Integers, column: Integers, shape: tuple[int, ...]) -> Crossings:
+def _crossed(corners: Doubles, triangle: Integers, column: Integers, shape: tuple[int, ...]) -> Crossings:
     """Pairs of a triangle, with its corners (k, 3, 3), and a column (k, 2) that cross."""
     areas, left = zip(*(_side(corners[:, k, :2], corners[:, (k + 1) % 3, :2], column) for k in range(3)), strict=True)
     total = areas[0] + areas[1] + areas[2]
@@ -197,7 +196,7 @@ def _crossed(corners: Values, triangle: Integers, column: Integers, shape: tuple
     )
 
 
-def _side(start: Values, end: Values, point: npt.NDArray[np.int64]) -> tuple[Values, Mask]:
+def _side(start: Doubles, end: Doubles, point: npt.NDArray[np.int64]) -> tuple[Doubles, Mask]:
     """Twice the area of edges (n, 2) with a point, and whether it is on their left.
 
     Two triangles that share an edge find the same, so that a column on it crosses one of them.

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from scipy import ndimage
 
-from smokelift.direct.constraint import Mask
+from smokelift.checks.array_types import Mask
 from smokelift.direct.mesh import ORDERS, Crossings, Mesh, enclosed
 from smokelift.scene import Domain
 from smokelift.scene.checks import Vector

@@ -8,7 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from smokelift.direct.constraint import Mask, faces_between, faces_of, project_with_given_faces
+from smokelift.checks.array_types import Mask
+from smokelift.direct.constraint import faces_between, faces_of, project_with_given_faces
 from smokelift.direct.mesh import Mesh
 from smokelift.direct.moving_mesh import MovingMesh
 from smokelift.scene import Box as Space

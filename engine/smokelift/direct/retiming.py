@@ -8,20 +8,18 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
+from smokelift.checks.array_types import Doubles
 from smokelift.direct.interpolation import interpolate
 from smokelift.direct.moment import Moment, read_moment
 from smokelift.direct.writing import Written, directed_writer, simulated_figures
 from smokelift.output.sequence import Sequence
 
-Values = npt.NDArray[np.float64]
-
 STEPS = 64
 """Steps a frame of the trapezoidal rule that integrates 1 / speed over a ramp."""
 
 
-def playback(count: int, speeds: tuple[float, ...]) -> tuple[Values, Values]:
+def playback(count: int, speeds: tuple[float, ...]) -> tuple[Doubles, Doubles]:
     """Return the times of a clip that are shown at some speeds, one after the other.
 
     Parameters

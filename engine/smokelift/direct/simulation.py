@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from smokelift.direct.constraint import Mask
+from smokelift.checks.array_types import Mask
 from smokelift.direct.fire import Fire
 from smokelift.direct.inflow import Inflow
 from smokelift.direct.moment import Moment

@@ -11,8 +11,8 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from smokelift.checks.array_types import Doubles
 from smokelift.transport import Array, Velocity
 
 MODES = 64
@@ -21,16 +21,14 @@ MODES = 64
 OCTAVES = 1.0
 """Over which the sizes of the waves are spread, about that asked for. The flow makes smaller eddies by itself."""
 
-Values = npt.NDArray[np.float64]
-
 
 class _Modes(NamedTuple):
     """Waves ``across cos(number . x + phase + rate t)``: vectors (MODES, 3) in 1/m and 1, and (MODES,) in 1/s."""
 
-    number: Values
-    across: Values
-    phase: Values
-    rate: Values
+    number: Doubles
+    across: Doubles
+    phase: Doubles
+    rate: Doubles
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from smokelift.checks import counted
-from smokelift.direct.constraint import Mask
+from smokelift.checks.array_types import Mask
 from smokelift.direct.moment import Moment
 from smokelift.output.checksum import checksum
 from smokelift.output.index import Origins

@@ -9,12 +9,11 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from smokelift.checks.array_types import Array
 from smokelift.output.archive import VELOCITY, Shape, read_arrays
 from smokelift.scene import SIDES, Side
 from smokelift.scene.domain import checked_sides
 from smokelift.transport import Velocity, face_shapes
-
-Array = npt.NDArray[np.float32]
 
 
 class TruthError(ValueError):

@@ -14,7 +14,8 @@ from typing import Literal
 
 import numpy as np
 
-from smokelift.footage.background_kind import LIMIT, Mask, colour_around, rank, within
+from smokelift.checks.array_types import Doubles, Mask
+from smokelift.footage.background_kind import LIMIT, colour_around, rank, within
 from smokelift.footage.behind_smoke import DETAIL
 from smokelift.footage.clear_picture import ClearPicture, clear_picture
 from smokelift.footage.clip import Clip
@@ -35,7 +36,7 @@ from smokelift.footage.proxy import Proxy
 from smokelift.footage.quantiser import median_quantiser
 from smokelift.footage.seen import median_of_seen
 from smokelift.footage.steady import cleared, uncovered, without_noise_light
-from smokelift.footage.turning import Array, find_turns
+from smokelift.footage.turning import find_turns
 from smokelift.footage.whole_plate import spread_out, whole_plate
 from smokelift.scene import Background, Camera
 
@@ -103,7 +104,7 @@ class Backdrop:
 
 
 def find_backdrop(
-    clip: Clip, camera: Camera | None, background: Background | None, lenses: Sequence[Array] = ()
+    clip: Clip, camera: Camera | None, background: Background | None, lenses: Sequence[Doubles] = ()
 ) -> Backdrop:
     """Find what stands behind the smoke.
 
@@ -157,7 +158,7 @@ def _given(background: Background | None, camera: Camera | None, clip: Clip) -> 
     return given
 
 
-def _estimated(clip: Clip, lenses: Sequence[Array], moves: bool) -> Backdrop:
+def _estimated(clip: Clip, lenses: Sequence[Doubles], moves: bool) -> Backdrop:
     """The background of a clip of which nothing is given."""
     if len(clip) == len(clip.whole()) == 1 and (around := colour_around(clip.frame(0))) is not None:
         return Backdrop("colour around one frame", clip, known_plate(around, clip), frames=1)

@@ -15,8 +15,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smokelift.checks.array_types import Mask
 from smokelift.footage.behind_smoke import DETAIL
 from smokelift.footage.images import Picture, area_average, blurred, channel_mean, linear_to_srgb, srgb_to_linear
 from smokelift.footage.noise import EIGHT_BIT_STEP, block_means, spread_about
@@ -67,8 +67,6 @@ AROUND, MIN_SIDE_SHARE = np.float32(2 / 255), 0.5
 """Difference in sRGB values up to which a block has the colour around a single picture, and share of the blocks along
 its sides that have to, on three of them: 0.56 to 1 of 18 frames of public clips before one colour, 0.2 at most of
 others but for stages in the dark (docs/experiments/background.md)."""
-
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)

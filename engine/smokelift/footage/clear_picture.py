@@ -18,8 +18,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from smokelift.checks.array_types import Mask
 from smokelift.footage.behind_smoke import (
     DRIFT,
     ISLAND,
@@ -70,8 +70,6 @@ LIKE_SURROUNDINGS = 3 * DRIFT
 MIN_CHANGE_SHARE = 1 / 4
 """Range of smoke over time, as a share of its difference from the background: what is steadier is a chair or a jacket.
 """
-
-Mask = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)

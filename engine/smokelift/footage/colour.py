@@ -12,7 +12,8 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-Values = npt.NDArray[np.float32]
+from smokelift.checks.array_types import Array
+
 Encoding = Literal["srgb", "linear", "hlg", "pq"]
 
 ENCODINGS: Mapping[int, Encoding] = {8: "linear", 16: "pq", 18: "hlg"}
@@ -35,7 +36,7 @@ _HLG_WHITE = 0.75
 _PQ_WHITE = 203 / 10_000
 
 
-def hlg_to_linear(signal: npt.ArrayLike) -> Values:
+def hlg_to_linear(signal: npt.ArrayLike) -> Array:
     """Decode hybrid log-gamma (BT.2100, inverse OETF: light at the camera, not on a screen)."""
     a, b, c = _HLG
 
@@ -46,7 +47,7 @@ def hlg_to_linear(signal: npt.ArrayLike) -> Values:
     return np.asarray(scene(e) / scene(np.array(_HLG_WHITE)), np.float32)
 
 
-def pq_to_linear(signal: npt.ArrayLike) -> Values:
+def pq_to_linear(signal: npt.ArrayLike) -> Array:
     """Decode the perceptual quantiser (BT.2100 and SMPTE ST 2084, EOTF)."""
     m1, m2, c1, c2, c3 = _PQ
     e = np.maximum(np.asarray(signal, np.float64), 0.0) ** (1 / m2)
@@ -59,12 +60,12 @@ def primaries_name(primaries: int) -> str | None:
     return _PRIMARIES[primaries][0] if primaries in _PRIMARIES else None
 
 
-def to_bt709(linear: Values, primaries: int) -> Values:
+def to_bt709(linear: Array, primaries: int) -> Array:
     """Bring linear colours [row, column, rgb] to BT.709; what it cannot show is clipped at 0."""
     if primaries not in _PRIMARIES:
         return linear
     matrix = np.linalg.solve(_to_xyz(_BT709), _to_xyz(_PRIMARIES[primaries][1])).astype(np.float32)
-    converted: Values = np.maximum(linear @ matrix.T, np.float32(0.0))
+    converted: Array = np.maximum(linear @ matrix.T, np.float32(0.0))
     return converted
 
 

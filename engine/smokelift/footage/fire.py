@@ -9,9 +9,9 @@ continued there. Figures: docs/experiments/fire.md.
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 from scipy import ndimage
 
+from smokelift.checks.array_types import Mask
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import Picture, brightest_channel
 from smokelift.footage.matte import matte
@@ -41,8 +41,6 @@ CLIPPED = 0.95
 
 COLOUR_FRAMES = 8
 """Frames from which the colour of fire is taken, at most."""
-
-Mask = npt.NDArray[np.bool_]
 
 
 def fire_share(colours: Picture, behind: Picture) -> float:

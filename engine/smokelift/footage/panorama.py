@@ -10,13 +10,14 @@ import numpy as np
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
+from smokelift.checks.array_types import Doubles
 from smokelift.footage.clip import Clip, ClipError
 from smokelift.footage.images import Picture, area_average
 from smokelift.footage.mask import HALF, Seen, continued
 from smokelift.footage.noise import lasting_noise
 from smokelift.footage.plate import ChangingPlate, Plate, noise_before
 from smokelift.footage.proxy import proxy_size
-from smokelift.footage.turning import Array, Turns, moved
+from smokelift.footage.turning import Turns, moved
 
 PADDING = 2
 """Pixels by which a frame is continued beyond its border, so that it is interpolated there as elsewhere."""
@@ -117,7 +118,7 @@ class _Shown:
         return turn
 
 
-def reprojected(picture: Picture, matrix: Array, size: tuple[int, int]) -> Picture:
+def reprojected(picture: Picture, matrix: Doubles, size: tuple[int, int]) -> Picture:
     """Return a picture (rows, columns, ...) as a homography shows it, by cubic interpolation; 0 where it shows nothing.
 
     Parameters
@@ -137,5 +138,5 @@ def reprojected(picture: Picture, matrix: Array, size: tuple[int, int]) -> Pictu
     return np.maximum(np.asarray(turned, np.float32), 0)
 
 
-def _shift(across: float, down: float) -> Array:
+def _shift(across: float, down: float) -> Doubles:
     return np.array([[1, 0, across], [0, 1, down], [0, 0, 1.0]])

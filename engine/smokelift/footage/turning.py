@@ -20,12 +20,11 @@ from numpy.typing import NDArray
 from scipy import fft, ndimage
 from scipy.spatial.transform import Rotation
 
+from smokelift.checks.array_types import Doubles
 from smokelift.footage.clip import Clip
 from smokelift.footage.images import Picture, blurred, channel_mean, linear_to_srgb
 from smokelift.footage.proxy import proxy_size
 from smokelift.scene import Camera, as_matrix
-
-Array = NDArray[np.float64]
 
 FINE, COARSE, AROUND = 0.8, 3.0, 6.0
 """Standard deviations in pixels of the two Gaussians whose difference is compared, and of that over which its contrast
@@ -98,7 +97,7 @@ class Laid:
     turn: Rotation
     found: float
     in_place: float
-    step: Array
+    step: Doubles
 
     @property
     def explained(self) -> bool:
@@ -127,7 +126,7 @@ class Key:
         Which cells have texture.
     """
 
-    def __init__(self, picture: Picture, lens: Array) -> None:
+    def __init__(self, picture: Picture, lens: Doubles) -> None:
         self._lens, detail = lens, detail_of(picture)
         self._shape = rows, columns = detail.shape
         self._side = side = max(8, 2 * round(max(rows, columns) / CELLS / 2))
@@ -209,7 +208,7 @@ class Turns:
     """
 
     size: tuple[int, int]
-    lens: Array
+    lens: Doubles
     rotations: Rotation
     key: Key
     of_key: Rotation
@@ -222,7 +221,7 @@ class Turns:
         away = [moved(corners, self.between(turn)) - corners for turn in self.rotations]
         return float(np.linalg.norm(away, axis=-1).max())
 
-    def between(self, turn: Rotation) -> Array:
+    def between(self, turn: Rotation) -> Doubles:
         """Return the homography (3, 3) of places in a picture whose directions turn so."""
         return np.asarray(self.lens @ turn.as_matrix() @ np.linalg.inv(self.lens))
 
@@ -242,7 +241,7 @@ class Turns:
         return replace(camera, matrix=matrices[0], matrices=tuple(matrices))
 
 
-def find_turns(clip: Clip, *lenses: Array) -> Turns | None:
+def find_turns(clip: Clip, *lenses: Doubles) -> Turns | None:
     """Find how the camera of a clip turned; None if it stood still or if nothing in the picture tells.
 
     Parameters
@@ -302,7 +301,7 @@ def _followed(clip: Clip, key: Key, size: tuple[int, int]) -> tuple[dict[int, Ro
     return turns, moving, lost
 
 
-def moved(places: Array, matrix: Array) -> Array:
+def moved(places: Doubles, matrix: Doubles) -> Doubles:
     """Return where a homography (3, 3) takes places (n, 2)."""
     across, down, ahead = matrix @ np.column_stack([places, np.ones(len(places))]).T
     return np.column_stack([across / ahead, down / ahead])
@@ -326,7 +325,7 @@ def _stands_still(clip: Clip, key: Key, size: tuple[int, int]) -> bool:
     return 2 * sum(stands) >= len(stands)
 
 
-def _highest(peaks: Picture) -> tuple[Picture, Array]:
+def _highest(peaks: Picture) -> tuple[Picture, Doubles]:
     """The highest value (n,) of each periodic picture (n, rows, columns), and where its peak is, (n, 2) across and
     down, by the parabola through it and its neighbours."""
     count, rows, columns = peaks.shape

@@ -25,13 +25,12 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
+from smokelift.checks.array_types import Array
 from smokelift.output.archive import FLAME
 from smokelift.output.atomic import atomic_path
 from smokelift.scene import Domain
 from smokelift.scene.domain import box_around
 from smokelift.transport import StaggeredGrid, at_centres, faces_in
-
-Array = npt.NDArray[np.float32]
 
 VELOCITY_MARGIN = 2
 """Voxels around the smoke in which velocity is kept: motion blur reads it beyond the edge."""

@@ -19,9 +19,10 @@ import numpy as np
 from smokelift.density import FittedDensity, ViewSet
 from smokelift.density.flame import flame_emission
 from smokelift.density.hull import project_voxels
+from smokelift.footage.images import Picture
 from smokelift.pipeline.clip_fit import clip_psnr
 from smokelift.pipeline.method import Method
-from smokelift.pipeline.seen_motion import Picture, followed_picture, with_seen_motion
+from smokelift.pipeline.seen_motion import followed_picture, with_seen_motion
 from smokelift.render import Volume
 from smokelift.render.blas import products_on_one_thread
 from smokelift.scene import Domain

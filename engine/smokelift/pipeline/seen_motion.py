@@ -24,14 +24,13 @@ from scipy import ndimage, sparse
 from scipy.sparse.linalg import cg
 
 from smokelift.density import View
+from smokelift.footage.images import Picture
 from smokelift.render import Volume
 from smokelift.scene import Camera, Domain
 from smokelift.scene.projection import project
 from smokelift.transport import Velocity, on_faces
 from smokelift.velocity.line_of_sight import averaged_along
 from smokelift.velocity.pyramid import coarsen
-
-Picture = NDArray[np.float32]
 
 CURVATURE, REST = 0.05, 0.14
 """Weights, for each pixel of a cell, of a correction's squared Laplacian from cell to cell and of its square

@@ -16,10 +16,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from smokelift.checks.array_types import Doubles
 from smokelift.scene import Camera, Domain
 from smokelift.scene.projection import ray_through_pixels, world_to_pixel
-
-Array = NDArray[np.float64]
 
 LATERAL = ((1, 2), (0, 2), (0, 1))
 """The two other axes of each axis."""
@@ -52,7 +51,7 @@ class Rays:
     length: NDArray[np.float32]
     planes: NDArray[np.int32]
     axes: tuple[int, ...]
-    to_pixel: Array
+    to_pixel: Doubles
 
 
 @lru_cache(maxsize=32)
@@ -90,8 +89,8 @@ def camera_rays(camera: Camera, domain: Domain) -> Rays:
 
 
 def _plane_range(
-    offset: Array, slope: Array, lateral: NDArray[np.int64], count: NDArray[np.int64]
-) -> tuple[Array, Array]:
+    offset: Doubles, slope: Doubles, lateral: NDArray[np.int64], count: NDArray[np.int64]
+) -> tuple[Doubles, Doubles]:
     """First and last plane, in ascending order, where the bilinear footprint meets the grid.
 
     The footprint is open, so positions are kept a thousandth of a voxel inside (-1, n): float32 then rounds to

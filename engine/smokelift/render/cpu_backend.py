@@ -10,14 +10,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 import smokelift._core as _core
+from smokelift.checks.array_types import Array
 from smokelift.render.diffuse_light import DiffuseLight
 from smokelift.render.light_sweeps import ParallelSweep, PointSweep
 from smokelift.render.plan import RenderPlan
-
-Floats = NDArray[np.float32]
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,9 +69,9 @@ class CpuBackend:
         self._support, self._rays = self.ray_support.support, self.ray_support.rays
         # what no sweep touches is never given memory
         self._medium = _core.zeros((x + 2, y + 2, z + 2, channels + 1))
-        self._gradient: Floats | None = None
-        self._scratch: Floats | None = None
-        self._record: Floats | None = None
+        self._gradient: Array | None = None
+        self._scratch: Array | None = None
+        self._record: Array | None = None
         pixels = plan.rays.length.shape
         self._scattered = np.zeros((*pixels, channels), np.float32)
         self._depth = np.zeros(pixels, np.float32)
@@ -83,7 +81,7 @@ class CpuBackend:
         if channels and not plan.shadows:
             _core.shade(self._medium, self._support, self._phase, self._lights)
 
-    def image(self, density: Floats, keep_record: bool) -> tuple[Floats, Floats]:
+    def image(self, density: Array, keep_record: bool) -> tuple[Array, Array]:
         """Scattered radiance (rows, columns, channels) and optical depth (rows, columns)."""
         plan = self._plan
         density = np.asarray(density, np.float32).transpose(self._axes)
@@ -98,7 +96,7 @@ class CpuBackend:
         _core.march(self._medium, self._support, self._rays, self._scattered, self._depth, record)
         return self._scattered, self._depth
 
-    def gradient(self, scattered_gradient: Floats, transmittance_gradient: Floats, out: Floats | None = None) -> Floats:
+    def gradient(self, scattered_gradient: Array, transmittance_gradient: Array, out: Array | None = None) -> Array:
         """Pull derivatives by the last recorded picture back to the density (nx, ny, nz); uses the record up."""
         plan = self._plan
         if self._gradient is None:

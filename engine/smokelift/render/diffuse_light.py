@@ -10,12 +10,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 import smokelift._core as _core
+from smokelift.checks.array_types import Array
 from smokelift.render.plan import RenderPlan
-
-Floats = NDArray[np.float32]
 
 BLOCKS = 24
 """Blocks along the longest side of a domain, about: coarse grids show what fine ones show."""
@@ -48,17 +46,17 @@ class DiffuseLight:
         last = np.floor((corner + count - 0.5) / size - 0.5).astype(int) + 1
         shape, offset = (last - first + 1).tolist(), (corner - size * first).tolist()
         self._blocks = _core.Blocks(shape=shape, size=size, offset=offset)
-        self._means: Floats | None = None
-        self._radiance: Floats | None = None
+        self._means: Array | None = None
+        self._radiance: Array | None = None
 
-    def add(self, medium: Floats) -> None:
+    def add(self, medium: Array) -> None:
         """Add to the radiance that the voxels scatter what they scatter of scattered light."""
         self._means = _core.average(medium, self._support, self._blocks)
         parts = [_core.diffuse(_of(self._means, part), albedo, self._edge) for albedo, part in self._alike]
         self._radiance = np.concatenate(parts)
         self._interpolate(self._radiance, self._albedo, medium)
 
-    def pull_back(self, medium: Floats, gradient: Floats) -> None:
+    def pull_back(self, medium: Array, gradient: Array) -> None:
         """Add to a derivative by extinction and scattered radiance what it says of them through the light added.
 
         The medium is left as it was before `add`.
@@ -79,7 +77,7 @@ class DiffuseLight:
             means_gradient[1:][part] = part_gradient[1:]
         _core.average_adjoint(medium, self._support, self._blocks, means_gradient, gradient)
 
-    def _interpolate(self, radiance: Floats, factor: float, medium: Floats) -> None:
+    def _interpolate(self, radiance: Array, factor: float, medium: Array) -> None:
         """Add a multiple of what the voxels scatter of the blocks' radiance, each channel by its share."""
         _core.add_interpolated(self._shares * radiance, factor, self._blocks, medium, self._support)
 
@@ -88,6 +86,6 @@ def _channels(albedos: Sequence[float]) -> list[tuple[float, slice]]:
     return [(albedo, slice(FIELDS * number, FIELDS * (number + 1))) for number, albedo in enumerate(albedos)]
 
 
-def _of(means: Floats, channels: slice) -> Floats:
+def _of(means: Array, channels: slice) -> Array:
     """The mean extinction, and fields of what some channels emit."""
     return np.concatenate([means[:1], means[1:][channels]])

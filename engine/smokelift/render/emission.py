@@ -15,14 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from smokelift.checks.array_types import Mask
 from smokelift.render.camera_rays import LATERAL, camera_rays
 from smokelift.render.optics import Optics
 from smokelift.render.renderer import Image, Volume
 from smokelift.scene import Camera
 from smokelift.scene.domain import box_around
 from smokelift.scene.projection import project
-
-Mask = NDArray[np.bool_]
 
 
 def emitted(flame: Volume, density: Volume, camera: Camera, optics: Optics) -> Image:

@@ -19,11 +19,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from smokelift.checks.array_types import Doubles, Indices
 from smokelift.footage.images import ImageError, read_image
 from smokelift.scene import DirectionalLight, EnvironmentLight
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 """Weights of linear red, green and blue (ITU-R BT.709)."""
@@ -139,18 +137,18 @@ class EnvironmentCells:
         return [stratum[order[:cut]], stratum[order[cut:]]]
 
 
-def _concentration(weight: Array, moment: Array) -> Array:
+def _concentration(weight: Doubles, moment: Doubles) -> Doubles:
     """|moment|^2 / weight of the first one, two, ... cells: their weight less their scatter."""
-    total: Array = np.square(np.cumsum(moment, axis=0)).sum(-1) / np.cumsum(weight)
+    total: Doubles = np.square(np.cumsum(moment, axis=0)).sum(-1) / np.cumsum(weight)
     return total
 
 
-def _first_largest(values: Array) -> int:
+def _first_largest(values: Doubles) -> int:
     """The first of the values that are the largest but for rounding."""
     return int(np.argmax(values >= values.max() * (1 - ROUNDING)))
 
 
-def _gather(picture: NDArray[np.float32]) -> tuple[Array, Array]:
+def _gather(picture: NDArray[np.float32]) -> tuple[Doubles, Doubles]:
     """Sum a picture up over `CELLS`.
 
     Returns

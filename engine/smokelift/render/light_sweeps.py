@@ -12,13 +12,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smokelift.checks.array_types import Doubles
 from smokelift.render.camera_rays import LATERAL
 from smokelift.scene import DirectionalLight, Domain, FiniteLight, PointLight
 from smokelift.scene.checks import Vector
 
-Array = NDArray[np.float64]
 Box = tuple[int, int, int]
 
 DARKEST = 1e-18
@@ -48,8 +47,8 @@ class ParallelSweep:
         Length of a ray between two planes, m.
     """
 
-    direction: Array
-    energy: Array
+    direction: Doubles
+    energy: Doubles
     axis: int
     travel: int
     first: int
@@ -102,8 +101,8 @@ class PointSweep:
         the first such axis if there are several.
     """
 
-    position: Array
-    energy: Array
+    position: Doubles
+    energy: Doubles
     voxel_size: float
     faces: tuple[Face, ...]
 
@@ -121,7 +120,7 @@ class Lighting:
     """
 
     lights: tuple[ParallelSweep | PointSweep, ...]
-    colour: Array
+    colour: Doubles
 
     @property
     def channels(self) -> int:
@@ -171,7 +170,7 @@ def _colour(light: FiniteLight) -> tuple[float, float, float]:
     return light.irradiance if isinstance(light, DirectionalLight) else light.intensity
 
 
-def _channels(colours: Array) -> tuple[Array, Array]:
+def _channels(colours: Doubles) -> tuple[Doubles, Doubles]:
     """Split colours (lights, 3) into energies (lights, channels) and the channels' colours (channels, 3)."""
     first = colours[0]
     share = colours @ first / (first @ first)
@@ -180,7 +179,7 @@ def _channels(colours: Array) -> tuple[Array, Array]:
     return np.eye(3), colours
 
 
-def _parallel(light: DirectionalLight, energy: Array, domain: Domain, corner: Box) -> ParallelSweep:
+def _parallel(light: DirectionalLight, energy: Doubles, domain: Domain, corner: Box) -> ParallelSweep:
     direction = np.array(light.direction, np.float64)
     direction /= np.linalg.norm(direction)
     axis = int(np.argmax(np.abs(direction)))
@@ -197,7 +196,7 @@ def _parallel(light: DirectionalLight, energy: Array, domain: Domain, corner: Bo
     )
 
 
-def _point(light: PointLight, energy: Array, domain: Domain, corner: Box, shape: Box) -> PointSweep:
+def _point(light: PointLight, energy: Doubles, domain: Domain, corner: Box, shape: Box) -> PointSweep:
     light.require_place(domain)
     h = domain.voxel_size
     position = (np.array(light.position) - np.array(domain.min)) / h - 0.5 - np.array(corner)
@@ -211,7 +210,7 @@ def _point(light: PointLight, energy: Array, domain: Domain, corner: Box, shape:
     return PointSweep(position, energy / h**2, h, tuple(faces))
 
 
-def _face(light: Array, shape: Box, axis: int, travel: int, far: float) -> Face | None:
+def _face(light: Doubles, shape: Box, axis: int, travel: int, far: float) -> Face | None:
     at = float(light[axis])
     if travel > 0:
         first, last = max(0, math.ceil(at + CLOSEST)), shape[axis] - 1

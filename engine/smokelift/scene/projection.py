@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smokelift.checks.array_types import Doubles
 from smokelift.scene.camera import Camera
 from smokelift.scene.domain import Box, Domain
 
-Array = NDArray[np.float64]
 
-
-def world_to_pixel(camera: Camera) -> Array:
+def world_to_pixel(camera: Camera) -> Doubles:
     """Homogeneous 3x4 map from world points (m) to (x depth, y depth, depth) in pixels."""
     matrix = np.array(camera.matrix, np.float64)
     rotation, eye = matrix[:3, :3], matrix[:3, 3]
@@ -24,7 +22,7 @@ def world_to_pixel(camera: Camera) -> Array:
     return np.asarray(rows)
 
 
-def project(camera: Camera, points: Array) -> tuple[Array, Array]:
+def project(camera: Camera, points: Doubles) -> tuple[Doubles, Doubles]:
     """Project world points (..., 3) to pixels.
 
     Returns
@@ -41,7 +39,7 @@ def project(camera: Camera, points: Array) -> tuple[Array, Array]:
     return homogeneous[..., :2] / safe[..., None], depth
 
 
-def ray_through_pixels(camera: Camera) -> tuple[Array, Array]:
+def ray_through_pixels(camera: Camera) -> tuple[Doubles, Doubles]:
     """Origins and unit directions, each (rows, columns, 3), in world space, of the rays through pixel centres."""
     width, height = camera.size
     x = (np.arange(width) + 0.5 - camera.cx) / camera.fx

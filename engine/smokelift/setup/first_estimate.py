@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from smokelift.checks import Doubt, Remark
+from smokelift.checks.array_types import Doubles
 from smokelift.footage.backdrop import Backdrop, find_backdrop
 from smokelift.footage.clip import Clip
 from smokelift.footage.plate import Plate, Plates
 from smokelift.footage.steady import steady
-from smokelift.footage.turning import Array, Turns
+from smokelift.footage.turning import Turns
 from smokelift.render import Image
 from smokelift.scene import Background, Camera
 from smokelift.setup.backdrop_remarks import (
@@ -79,7 +80,7 @@ class FirstEstimate:
 
 
 def first_estimate(
-    clip: Clip, camera: Camera | None, background: Background | None, lenses: Sequence[Array]
+    clip: Clip, camera: Camera | None, background: Background | None, lenses: Sequence[Doubles]
 ) -> FirstEstimate:
     """Estimate what a clip shows; the parameters and errors are those of `find_backdrop`."""
     found = find_backdrop(clip, camera, background, lenses)

@@ -10,11 +10,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from smokelift.checks import Figures, Remark
+from smokelift.checks.array_types import Doubles
 from smokelift.density.screen import view_frame
 from smokelift.footage.clip import Clip
 from smokelift.footage.lens import FILM_DIAGONAL, FILM_WIDTH
 from smokelift.footage.plate import Plates
-from smokelift.footage.turning import Array, Turns
+from smokelift.footage.turning import Turns
 from smokelift.footage.working_picture import CameraError, working_picture
 from smokelift.scene import Box, Camera, Domain, Scene, as_matrix
 from smokelift.scene.projection import voxel_width
@@ -156,7 +157,7 @@ def _divided(
     return _resolved(clip, camera, grids, plates, samples.smoky, settings)
 
 
-def clip_lenses(camera: Camera | None, clip: Clip) -> tuple[Array, ...]:
+def clip_lenses(camera: Camera | None, clip: Clip) -> tuple[Doubles, ...]:
     """Return what may turn directions into pixels (3, 3): that of a clip's camera, or usual ones; none of a camera that
     is orthographic or given as moving.
 
@@ -243,14 +244,14 @@ def _boxes(camera: Camera) -> bool:
     return bool(up[2] == 1 and np.all(ahead > 0))
 
 
-def _ways(camera: Camera, x: Array, y: Array) -> Array:
+def _ways(camera: Camera, x: Doubles, y: Doubles) -> Doubles:
     """Directions (n, 3) in the world to what shows at some pixels; ``fy`` long along the way that the camera looks."""
     turn = np.array(camera.matrix, np.float64)[:3, :3]
     pixels = [(x - camera.cx) * camera.fy / camera.fx, camera.cy - y, np.full(x.shape, -camera.fy)]
     return np.asarray(np.stack(pixels, -1) @ turn.T)
 
 
-def _around(camera: Camera, samples: SmokeSamples, distance: float | None) -> tuple[Array, Array, float]:
+def _around(camera: Camera, samples: SmokeSamples, distance: float | None) -> tuple[Doubles, Doubles, float]:
     """The box around the smoke before a camera, upright at a distance (m).
 
     That is where the picture of a level one is `PICTURE_HEIGHT` high, unless it is given.
@@ -276,12 +277,12 @@ def _around(camera: Camera, samples: SmokeSamples, distance: float | None) -> tu
     return base, np.array([across, across, up]), metres
 
 
-def _filled(floor: Array, size: Array, resolution: Shape) -> Domain:
+def _filled(floor: Doubles, size: Doubles, resolution: Shape) -> Domain:
     """The box of so many voxels that holds one of a size in metres about the middle of its floor."""
     return _standing_on(floor, float((size / resolution).max()), resolution)
 
 
-def _grids(floor: Array, size: Array, allowed: int, multiple: int) -> tuple[Domain, ...]:
+def _grids(floor: Doubles, size: Doubles, allowed: int, multiple: int) -> tuple[Domain, ...]:
     """A box of a size in metres about the middle of its floor, with every number of voxels, the fewest first.
 
     Where multiples of so many cubes do not fill it, it grows upward and to all sides.
@@ -301,7 +302,7 @@ def _grown(given: Box, domain: Domain) -> tuple[Remark, ...]:
     return (Remark("grown box", {"size": _size(domain)}),)
 
 
-def _standing_on(floor: Array, voxel: float, resolution: Shape) -> Domain:
+def _standing_on(floor: Doubles, voxel: float, resolution: Shape) -> Domain:
     """The box of voxels of a size in metres about the middle of its floor."""
     size = np.array(resolution) * voxel
     low = floor - size * (0.5, 0.5, 0)

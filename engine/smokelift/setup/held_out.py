@@ -16,13 +16,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from smokelift.checks.array_types import Doubles
 from smokelift.density import DensitySettings, FittedDensity, Observation, reconstruct_density
 from smokelift.density.hull import project_voxels, reached
 from smokelift.render import Image, Optics, scene_optics
 from smokelift.scene import FiniteLight, Scattering
 from smokelift.setup.coarse import CoarseFrame, CoarseView
-
-Array = NDArray[np.float64]
 
 FAINTEST = 1e-3
 """Power of a channel's light over that of the brightest one, below which the channel has no strength of its own."""
@@ -48,7 +47,7 @@ class HeldOut:
 
     error: float
     light: float = 1.0
-    colours: Array = field(default_factory=lambda: np.ones((1, 3)))
+    colours: Doubles = field(default_factory=lambda: np.ones((1, 3)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +65,7 @@ class HalfFit:
     frames: Sequence[CoarseFrame]
     densities: Sequence[FittedDensity]
 
-    def lit(self, lights: tuple[FiniteLight, ...], scattering: Scattering) -> list[Array]:
+    def lit(self, lights: tuple[FiniteLight, ...], scattering: Scattering) -> list[Doubles]:
         """Light (n, 3) that the densities scatter to the pixels that they reach, of each camera."""
 
         def shown(frame: CoarseFrame, view: CoarseView, fitted: FittedDensity) -> Image:
@@ -76,7 +75,7 @@ class HalfFit:
         return self._pixels(shown)
 
     @cached_property
-    def added(self) -> list[Array]:
+    def added(self) -> list[Doubles]:
         """Light (n, 3) of each camera's held-out pixels beside the background that the smoke lets through."""
 
         def rest(frame: CoarseFrame, view: CoarseView, fitted: FittedDensity) -> Image:
@@ -106,7 +105,7 @@ class HalfFit:
         colours = np.where(lit, np.maximum(product, 0) / np.maximum(power, 1e-30), whole)
         return HeldOut(error, float(product.sum() / power.sum()), colours)
 
-    def _pixels(self, picture: Callable[[CoarseFrame, CoarseView, FittedDensity], Image]) -> list[Array]:
+    def _pixels(self, picture: Callable[[CoarseFrame, CoarseView, FittedDensity], Image]) -> list[Doubles]:
         """Pixels (n, 3) of pictures that the smoke's voxels can change, of each camera, all moments in a row."""
         return [
             np.concatenate(

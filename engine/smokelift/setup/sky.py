@@ -15,14 +15,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from smokelift.checks.array_types import Doubles
 from smokelift.density import DensitySettings
 from smokelift.scene import CompleteScene, DirectionalLight, Light
 from smokelift.setup.coarse import CoarseFrame
 from smokelift.setup.held_out import HalfFit, fit_half
-
-Array = NDArray[np.float64]
 
 DIRECTIONS = 48
 """Directions that are tried first, spread evenly: neighbours are about 30 degrees apart."""
@@ -73,10 +71,10 @@ class Sky:
         Share of that, in squares, that the sun explains.
     """
 
-    towards: Array
+    towards: Doubles
     sun: float
     ambient: float
-    colour: Array
+    colour: Doubles
     spread: float
     shading: float
     explained: float
@@ -99,13 +97,13 @@ class Sky:
         return (*((sun,) if self.sun > 0 else ()), *(ambient if self.ambient > 0 else ()))
 
 
-def directional(towards: Array, irradiance: Array) -> DirectionalLight:
+def directional(towards: Doubles, irradiance: Doubles) -> DirectionalLight:
     """Light of an irradiance (3,) from a direction (3,)."""
     (x, y, z), (red, green, blue) = (-towards).tolist(), irradiance.tolist()
     return DirectionalLight((x, y, z), (red, green, blue))
 
 
-def light_around(radiance: Array) -> tuple[DirectionalLight, ...]:
+def light_around(radiance: Doubles) -> tuple[DirectionalLight, ...]:
     """Light from everywhere of a radiance (3,), in W/m^2/sr."""
     return tuple(directional(-np.array(side), 4 * np.pi * radiance / len(SIDES)) for side in SIDES)
 
@@ -139,7 +137,7 @@ def find_sky(frames: Sequence[CoarseFrame], scene: CompleteScene, settings: Dens
     return sky
 
 
-def sphere(count: int) -> Array:
+def sphere(count: int) -> Doubles:
     """Return unit vectors (count, 3), spread evenly over the sphere along a spiral that turns by the golden angle.
 
     Examples
@@ -153,7 +151,7 @@ def sphere(count: int) -> Array:
     return np.stack((radius * np.cos(angle), radius * np.sin(angle), z), -1)
 
 
-def strengths(sums: Array, rest: Array) -> tuple[Array, Array, Array]:
+def strengths(sums: Doubles, rest: Doubles) -> tuple[Doubles, Doubles, Doubles]:
     """How strong a sun from each direction and light from everywhere are: least squares without negative parts.
 
     Two unknowns need no solver: both, or one alone where the other would take light away (Lawson and Hanson, "Solving
@@ -182,17 +180,17 @@ def strengths(sums: Array, rest: Array) -> tuple[Array, Array, Array]:
     return sun, ambient, sun * of_sun + ambient * of_around
 
 
-def _explained(fit: HalfFit, colour: Array) -> Sky:
+def _explained(fit: HalfFit, colour: Doubles) -> Sky:
     """The sky that explains best what the densities add to the held-out pixels."""
     added = [pixels.mean(-1) for pixels in fit.added]
     cameras = range(len(added))
 
-    def pictures(towards: Array) -> list[Array]:
+    def pictures(towards: Doubles) -> list[Doubles]:
         """Pixels (directions, n) of each camera in light from each direction alone, of irradiance 1."""
         lit = [fit.lit((directional(each, colour),), "single") for each in towards]
         return [np.array([picture[camera].mean(-1) for picture in lit]) for camera in cameras]
 
-    def sums_of(suns: list[Array]) -> Array:
+    def sums_of(suns: list[Doubles]) -> Doubles:
         """Sums as in `strengths`, of each camera: (3, cameras, directions)."""
         parts = zip(suns, everywhere, added, strict=True)
         return np.stack([(np.sum(lit**2, 1), lit @ around, lit @ seen) for lit, around, seen in parts], 1)
@@ -222,7 +220,7 @@ def _explained(fit: HalfFit, colour: Array) -> Sky:
     )
 
 
-def _ring(about: Array, degrees: float) -> Array:
+def _ring(about: Doubles, degrees: float) -> Doubles:
     """Six directions (6, 3) so far from another."""
     across = np.cross(about, np.eye(3)[np.argmin(np.abs(about))])
     across /= np.linalg.norm(across)

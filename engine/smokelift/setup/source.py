@@ -10,15 +10,13 @@ the smoke, which stands in the same light. Figures: docs/experiments/smoke-colou
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from smokelift.checks import Doubt
+from smokelift.checks.array_types import Doubles
 from smokelift.footage.images import brightest_channel
 from smokelift.scene.checks import Vector
 from smokelift.setup.estimate import Estimate, measured, undetermined
 from smokelift.setup.smoke import SmokeSamples
-
-Array = NDArray[np.float64]
 
 BEYOND = 0.1
 """Share by which the source radiance exceeds the 99th percentile of the smoke's. That smoke then has an optical depth
@@ -48,7 +46,7 @@ PLACES = 256
 """Points of the line that are compared with the light."""
 
 
-def source_radiance(samples: SmokeSamples, measured: Array | None = None) -> Array:
+def source_radiance(samples: SmokeSamples, measured: Doubles | None = None) -> Doubles:
     """Return the source radiance (3,) of the smoke; white where the clip shows none.
 
     Thick smoke shows it: the brightest smoke where smoke brightens its background, the darkest where it darkens it.
@@ -77,7 +75,7 @@ def source_radiance(samples: SmokeSamples, measured: Array | None = None) -> Arr
     return np.asarray(np.maximum(farthest + BEYOND * np.linalg.norm(farthest) * axis, 0))
 
 
-def smoke_colour(samples: SmokeSamples, light: Array) -> tuple[Vector, Estimate[str]]:
+def smoke_colour(samples: SmokeSamples, light: Doubles) -> tuple[Vector, Estimate[str]]:
     """Find the smoke's own colour.
 
     Parameters
@@ -130,7 +128,7 @@ def several_colours(samples: SmokeSamples) -> tuple[Doubt, ...]:
     return (Doubt("smoke of several colours", {"degrees": off}),)
 
 
-def _line_of_colours(colours: Array, behind: Array) -> Array:
+def _line_of_colours(colours: Doubles, behind: Doubles) -> Doubles:
     """Direction (3,), of length 1, in which smoke changes what is behind it: the one that explains most of the change.
 
     Parameters
@@ -143,7 +141,7 @@ def _line_of_colours(colours: Array, behind: Array) -> Array:
     return np.asarray(axis if np.sum(change @ axis) >= 0 else -axis)
 
 
-def _thickest(samples: SmokeSamples) -> tuple[Array, Array] | None:
+def _thickest(samples: SmokeSamples) -> tuple[Doubles, Doubles] | None:
     """Background and colour of the thickest smoke that is not clipped; None if there is too little of it."""
     clear = brightest_channel(samples.colours) < CLIPPED
     if clear.sum() < max(PIXELS, 0.1 * len(clear)):
@@ -158,7 +156,7 @@ def _thickest(samples: SmokeSamples) -> tuple[Array, Array] | None:
     return (start, np.maximum(seen, 0)) if seen.max() >= FAINTEST else None
 
 
-def _sources(behind: Array, seen: Array) -> Array:
+def _sources(behind: Doubles, seen: Doubles) -> Doubles:
     """Source radiances (n, 3) that the line allows: from the smoke that is seen to where a channel is negative."""
     change = seen - behind
     falling = change < 0
@@ -166,7 +164,7 @@ def _sources(behind: Array, seen: Array) -> Array:
     return np.asarray(np.maximum(behind + np.geomspace(1, max(most, 1), PLACES)[:, None] * change, 0))
 
 
-def _degrees(colours: Array, other: Array) -> Array:
+def _degrees(colours: Doubles, other: Doubles) -> Doubles:
     """Angle of colours (n, 3) from another."""
     length = np.linalg.norm(colours, axis=-1) * np.linalg.norm(other)
     return np.asarray(np.degrees(np.arccos(np.clip(colours @ other / np.maximum(length, 1e-12), -1, 1))))

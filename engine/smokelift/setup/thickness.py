@@ -19,10 +19,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from smokelift.checks.array_types import Doubles
 from smokelift.footage.plate import Plate, noise_at
 from smokelift.setup.estimate import Estimate, measured, undetermined
-
-Array = NDArray[np.float64]
 
 BLOCK = 8
 """Pixels along a block, inside which smoke is taken to let the same share of all light through."""
@@ -45,7 +44,7 @@ FRAMES = 3
 """Smallest number of frames that their deviation is estimated from."""
 
 
-def seen_texture(picture: NDArray[np.float32], plate: Plate, smoke: NDArray[np.bool_]) -> Array:
+def seen_texture(picture: NDArray[np.float32], plate: Plate, smoke: NDArray[np.bool_]) -> Doubles:
     """Compare the texture of a frame with that of its background.
 
     Parameters
@@ -78,7 +77,7 @@ def seen_texture(picture: NDArray[np.float32], plate: Plate, smoke: NDArray[np.b
     return np.array([*sums, *added[smoky].sum(0)])
 
 
-def smoke_thickness(frames: Sequence[Array]) -> tuple[Array | None, Estimate[str]]:
+def smoke_thickness(frames: Sequence[Doubles]) -> tuple[Doubles | None, Estimate[str]]:
     """Return the source radiance (3,) that the sums of `seen_texture` of frames show, None if none; and the thickness.
 
     The deviation is estimated by leaving one frame out after the other (the jackknife).
@@ -106,10 +105,10 @@ class _Behind(NamedTuple):
     the power of the texture, the mean confidence, and whether the texture is its own and stands out from noise.
     """
 
-    differences: tuple[Array, Array]
-    light: Array
-    power: Array
-    confidence: Array
+    differences: tuple[Doubles, Doubles]
+    light: Doubles
+    power: Doubles
+    confidence: Doubles
     known: NDArray[np.bool_]
 
 
@@ -125,12 +124,12 @@ def _behind(plate: Plate) -> _Behind:
     return _Behind(differences, _blocks(behind), power, confidence, known)
 
 
-def _differences(picture: Array) -> tuple[Array, Array]:
+def _differences(picture: Doubles) -> tuple[Doubles, Doubles]:
     """Differences of neighbouring pixels, down and across."""
     return np.diff(picture, axis=0), np.diff(picture, axis=1)
 
 
-def _texture(one: tuple[Array, Array], other: tuple[Array, Array]) -> Array:
+def _texture(one: tuple[Doubles, Doubles], other: tuple[Doubles, Doubles]) -> Doubles:
     """Products of the differences of neighbouring pixels, the mean over each block and the channels."""
     (down, across), (other_down, other_across) = one, other
     products = np.zeros((len(across), down.shape[1]))
@@ -139,7 +138,7 @@ def _texture(one: tuple[Array, Array], other: tuple[Array, Array]) -> Array:
     return _blocks(products)
 
 
-def _blocks(values: Array) -> Array:
+def _blocks(values: Doubles) -> Doubles:
     """Means over whole blocks; what is left at the right and at the bottom does not count."""
     rows, columns = (n // BLOCK for n in values.shape[:2])
     whole = np.ascontiguousarray(values[: rows * BLOCK, : columns * BLOCK])

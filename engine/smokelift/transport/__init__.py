@@ -1,8 +1,8 @@
 """Staggered grids and what is carried on them: advection and pressure projection."""
 
+from smokelift.checks.array_types import Array
 from smokelift.transport.advection import advect, advect_cells
 from smokelift.transport.grid import (
-    Array,
     Faces,
     ResidualMeans,
     StaggeredGrid,

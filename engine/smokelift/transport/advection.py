@@ -10,16 +10,9 @@ import numpy.typing as npt
 
 import smokelift._core as _core
 from smokelift.checks import numbers, require_kind
+from smokelift.checks.array_types import Array
 from smokelift.scene.domain import box_around
-from smokelift.transport.grid import (
-    Array,
-    StaggeredGrid,
-    Velocity,
-    at_centres,
-    faces_in,
-    finite,
-    require_same_shape,
-)
+from smokelift.transport.grid import StaggeredGrid, Velocity, at_centres, faces_in, finite, require_same_shape
 
 Carried = TypeVar("Carried", npt.NDArray[np.floating[Any]], Velocity)
 

@@ -11,13 +11,12 @@ from dataclasses import InitVar, dataclass, field, replace
 from typing import NamedTuple, Self
 
 import numpy as np
-import numpy.typing as npt
 
 from smokelift.checks import numbers, shown
+from smokelift.checks.array_types import Array
 from smokelift.scene import SIDES, Side
 from smokelift.scene.checks import LARGEST, SMALLEST
 
-Array = npt.NDArray[np.float32]
 Faces = tuple[Array, Array, Array]
 VoxelBox = tuple[slice, slice, slice]
 

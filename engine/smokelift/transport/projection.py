@@ -9,8 +9,9 @@ import numpy as np
 
 import smokelift._core as _core
 from smokelift.checks import require_kind
+from smokelift.checks.array_types import Array
 from smokelift.scene import Side
-from smokelift.transport.grid import Array, StaggeredGrid, Velocity, sides_in_order
+from smokelift.transport.grid import StaggeredGrid, Velocity, sides_in_order
 
 
 def project(velocity: Velocity, closed: Iterable[Side] | None = None) -> Velocity:

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 import smokelift._core as _core
+from smokelift.checks.array_types import Mask
 from smokelift.scene import Side
 from smokelift.transport import (
     Array,
@@ -20,15 +21,7 @@ from smokelift.transport import (
     advect_cells,
     sides_in_order,
 )
-from smokelift.velocity.estimator import (
-    Density,
-    Estimate,
-    Mask,
-    checked,
-    coarsened,
-    motion_weight,
-    predict_velocity,
-)
+from smokelift.velocity.estimator import Density, Estimate, checked, coarsened, motion_weight, predict_velocity
 from smokelift.velocity.linearisation import Linearisation, Regularisation, least_squares, linearise
 from smokelift.velocity.momentum import Centre, Prediction, fit_centre
 from smokelift.velocity.preparation import PreparedPair, prepare

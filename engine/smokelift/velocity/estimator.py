@@ -12,6 +12,7 @@ from scipy import ndimage
 
 import smokelift._core as _core
 from smokelift.checks import numbers, require_kind
+from smokelift.checks.array_types import Mask
 from smokelift.scene import Side
 from smokelift.transport import (
     Array,
@@ -30,7 +31,6 @@ from smokelift.transport import (
 from smokelift.velocity.pyramid import coarsen_faces, prolonged
 
 Density = npt.NDArray[np.floating[Any]]
-Mask = npt.NDArray[np.bool_]
 
 REACH = 1
 """Coarse voxels around a box that its fine velocity depends on: see `prolonged`."""

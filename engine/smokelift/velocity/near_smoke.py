@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 
+from smokelift.checks.array_types import Mask
 from smokelift.scene.domain import box_around
 from smokelift.transport import Array, Velocity, VoxelBox, advect, face_shapes, faces_in
-from smokelift.velocity.estimator import Mask, refined_in
+from smokelift.velocity.estimator import refined_in
 
 MIN_SLAB_VOXELS = 4_000_000
 """Voxels of a box around smoke, above which it is cut into slabs: each is as narrow as the smoke is there."""

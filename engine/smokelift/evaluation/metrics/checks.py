@@ -8,13 +8,11 @@ import numpy as np
 import numpy.typing as npt
 
 from smokelift.checks import numbers
+from smokelift.checks.array_types import Doubles, Mask
 from smokelift.transport import StaggeredGrid
 
-Array = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
 
-
-def finite(values: npt.ArrayLike) -> Array:
+def finite(values: npt.ArrayLike) -> Doubles:
     """Return an array of float64; ValueError if it holds anything but finite numbers."""
     if isinstance(values, StaggeredGrid):
         raise ValueError("a velocity must be an array of vectors at voxel centres: velocity.centres(), not a Velocity")
@@ -24,7 +22,7 @@ def finite(values: npt.ArrayLike) -> Array:
     return array
 
 
-def pair(a: npt.ArrayLike, b: npt.ArrayLike) -> tuple[Array, Array]:
+def pair(a: npt.ArrayLike, b: npt.ArrayLike) -> tuple[Doubles, Doubles]:
     """Return two arrays of float64; ValueError if a value is not finite, or they are empty or differ in shape."""
     first, second = finite(a), finite(b)
     if first.shape != second.shape:

@@ -10,7 +10,8 @@ import numpy.typing as npt
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy import fft
 
-from smokelift.evaluation.metrics.checks import Array, finite, relative
+from smokelift.checks.array_types import Doubles
+from smokelift.evaluation.metrics.checks import finite, relative
 
 PATCH = 7
 """Pixels along a patch: the finest structure with its surroundings; a patch of scale 4 spans a lobe."""
@@ -44,8 +45,8 @@ class PatchStatistics:
         Standard deviations, [scale, direction].
     """
 
-    quantiles: Array
-    spread: Array
+    quantiles: Doubles
+    spread: Doubles
 
     @staticmethod
     def of(picture: npt.ArrayLike) -> PatchStatistics:
@@ -89,7 +90,7 @@ class PatchStatistics:
         away, spread = (values[:, DIRECTIONS:].ravel() for values in self._beside(reference))
         return _mean_ratio(away, spread)
 
-    def _beside(self, reference: PatchStatistics) -> tuple[Array, Array]:
+    def _beside(self, reference: PatchStatistics) -> tuple[Doubles, Doubles]:
         """Distances on every direction, and the reference's spread there, [scale, direction]."""
         return np.sqrt(np.mean((self.quantiles - reference.quantiles) ** 2, axis=2)), reference.spread
 
@@ -109,7 +110,7 @@ def mean_gradient(picture: npt.ArrayLike) -> float:
 
 
 @lru_cache(maxsize=1)
-def _basis() -> Array:
+def _basis() -> Doubles:
     """Random directions, then all waves but the constant one: each size and direction of detail has one of its own.
 
     They are made where they are used: on import, linear algebra would begin threads of its own.
@@ -120,11 +121,11 @@ def _basis() -> Array:
     return np.concatenate([random, waves[:, 1:]], axis=1)
 
 
-def _mean_ratio(values: Array, references: Array) -> float:
+def _mean_ratio(values: Doubles, references: Doubles) -> float:
     return float(np.mean([relative(*pair) for pair in zip(values.tolist(), references.tolist(), strict=True)]))
 
 
-def _averaged(picture: Array, scale: int) -> Array:
+def _averaged(picture: Doubles, scale: int) -> Doubles:
     """Means of squares of so many pixels; what is missing at the end is black."""
     rows, columns = (-(-count // scale) for count in picture.shape)
     whole = np.zeros((rows * scale, columns * scale))
@@ -132,7 +133,7 @@ def _averaged(picture: Array, scale: int) -> Array:
     return np.asarray(whole.reshape(rows, scale, columns, scale).mean((1, 3)))
 
 
-def _patches(picture: Array) -> Array:
+def _patches(picture: Doubles) -> Doubles:
     """The patches around pixels with smoke near them, each without its mean, [patch, pixel]; one of zeros if none."""
     around = sliding_window_view(np.pad(picture, PATCH // 2), (PATCH, PATCH))
     rows, columns = np.nonzero(around.max((2, 3)) > SMOKE_SHARE * picture.max())
@@ -141,7 +142,7 @@ def _patches(picture: Array) -> Array:
     return chosen - chosen.mean(1, keepdims=True) if len(chosen) else np.zeros((1, PATCH**2))
 
 
-def _quantiles(values: Array) -> Array:
+def _quantiles(values: Doubles) -> Doubles:
     """Quantiles of each row (rows, columns), interpolated linearly, shape (rows, `QUANTILES`)."""
     ordered = np.sort(values.astype(np.float32), axis=1)
     place = (np.arange(QUANTILES) + 0.5) / QUANTILES * (values.shape[1] - 1)

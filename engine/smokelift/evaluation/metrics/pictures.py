@@ -7,7 +7,8 @@ import math
 import numpy.typing as npt
 from scipy import ndimage
 
-from smokelift.evaluation.metrics.checks import Array, counted, pair
+from smokelift.checks.array_types import Doubles
+from smokelift.evaluation.metrics.checks import counted, pair
 from smokelift.transport import require_positive
 
 
@@ -62,9 +63,9 @@ def ssim(a: npt.ArrayLike, b: npt.ArrayLike, peak: float = 1.0) -> float:
     if first.ndim not in (2, 3) or min(first.shape[:2]) < 11:
         raise ValueError(f"ssim needs pictures of at least 11 x 11 pixels, not of shape {first.shape}")
 
-    def smooth(picture: Array) -> Array:
+    def smooth(picture: Doubles) -> Doubles:
         sigma = (1.5, 1.5, 0.0)[: picture.ndim]
-        blurred: Array = ndimage.gaussian_filter(picture, sigma, truncate=5 / 1.5)
+        blurred: Doubles = ndimage.gaussian_filter(picture, sigma, truncate=5 / 1.5)
         return blurred[5:-5, 5:-5]
 
     mean_a, mean_b = smooth(first), smooth(second)

@@ -5,18 +5,16 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
 import smokelift._core as _core
+from smokelift.checks.array_types import Array
 from smokelift.render.diffuse_light import DiffuseLight
 from smokelift.render.gpu import camera_kernels as camera
 from smokelift.render.gpu import light_kernels as light
 from smokelift.render.gpu import taichi_runtime as taichi
 from smokelift.render.light_sweeps import Face, ParallelSweep, PointSweep
 from smokelift.render.plan import RenderPlan
-
-Floats = NDArray[np.float32]
 
 
 class GpuBackend:
@@ -49,7 +47,7 @@ class GpuBackend:
         if self._channels and not plan.shadows:
             self._shade()
 
-    def image(self, density: Floats, keep_record: bool) -> tuple[Floats, Floats]:
+    def image(self, density: Array, keep_record: bool) -> tuple[Array, Array]:
         """Scattered radiance (rows, columns, channels) and optical depth (rows, columns)."""
         plan = self._plan
         camera.pack(taichi.upload(density[self._box]), self._marked, self._medium, plan.medium.extinction)
@@ -69,7 +67,7 @@ class GpuBackend:
             )  # fmt: skip
         return taichi.download(self._scattered)[..., : self._channels], taichi.download(self._depth)
 
-    def gradient(self, scattered_gradient: Floats, transmittance_gradient: Floats, out: Floats | None = None) -> Floats:
+    def gradient(self, scattered_gradient: Array, transmittance_gradient: Array, out: Array | None = None) -> Array:
         """Pull derivatives by the last recorded picture back to the density (nx, ny, nz); uses the record up."""
         plan = self._plan
         if self._gradient is None:
