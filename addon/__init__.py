@@ -37,7 +37,7 @@ def unregister() -> None:
 
 
 def _modules() -> tuple[ModuleType, ...]:
-    """Those with something to register, each after those it needs; panels in the order of the tab."""
+    """Modules with something to register, each after those it needs; panels in the order of the tab."""
     from . import (
         advanced_panel,
         batch,

@@ -40,14 +40,14 @@ class _Advanced(OfClip):
 
 
 class SMOKELIFT_PT_view_advanced(_Advanced, bpy.types.Panel):
-    """In the 3D View."""
+    """The panel in the 3D View."""
 
     bl_space_type = "VIEW_3D"
     bl_parent_id = "SMOKELIFT_PT_view"
 
 
 class SMOKELIFT_PT_clip_advanced(_Advanced, bpy.types.Panel):
-    """In the Movie Clip Editor."""
+    """The panel in the Movie Clip Editor."""
 
     bl_space_type = "CLIP_EDITOR"
     bl_parent_id = "SMOKELIFT_PT_clip"

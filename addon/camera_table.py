@@ -70,7 +70,9 @@ def camera_table(
 def scene_camera(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> bpy.types.Object:
     """The scene's camera as it is evaluated; ShotError if there is none."""
     if scene.camera is None:
-        raise ShotError("The scene has no camera: add one where the clip was filmed from, or choose Guess.")
+        raise ShotError(
+            "The scene has no camera: add one where the clip was filmed from, or choose Camera From the Clip."
+        )
     return scene.camera.evaluated_get(depsgraph)
 
 

@@ -8,13 +8,13 @@ DONE, BAD_INPUT, CANCELLED = 0, 2, 130
 """Exit statuses of the command line; 3 is a missing device or too little memory."""
 
 INDEX_FILE = "sequence.json"
-"""In a sequence's directory: scene, settings and finished frames."""
+"""File in a sequence's directory with scene, settings and finished frames."""
 
 MADE_UP = "made up"
 """Origin, in the sequence's provenance, of what no camera shows and clips do not determine."""
 
 FRAME_FILE = "smoke_{:04d}.vdb"
-"""In a sequence's directory, by frame number from 1."""
+"""File of a frame in a sequence's directory, by its number from 1."""
 
 PROXY_FILE = "proxy_{:04d}.vdb"
 """There too, and in a folder with an export: the coarse copy of a frame."""
@@ -23,10 +23,10 @@ PROXY_VOXELS = 4_000_000
 """Voxels of a box from which on a run writes coarse copies."""
 
 EXPORT_FILE = "export.json"
-"""In a folder with an export: what was exported."""
+"""File in a folder with an export that says what was exported."""
 
 ASSET_FILE = "smoke.blend"
-"""In a folder with an export: the add-on's own file, which the engine leaves alone."""
+"""File in a folder with an export: the add-on's own, which the engine leaves alone."""
 
 QUALITIES = ("draft", "balanced", "fine", "final")
 """How much of the clip's detail is kept."""

@@ -138,14 +138,14 @@ def _draw_ticked(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, 
 
 
 class SMOKELIFT_PT_view_direct(_Direct, bpy.types.Panel):
-    """In the 3D View."""
+    """The panel in the 3D View."""
 
     bl_space_type = "VIEW_3D"
     bl_parent_id = "SMOKELIFT_PT_view"
 
 
 class SMOKELIFT_PT_clip_direct(_Direct, bpy.types.Panel):
-    """In the Movie Clip Editor."""
+    """The panel in the Movie Clip Editor."""
 
     bl_space_type = "CLIP_EDITOR"
     bl_parent_id = "SMOKELIFT_PT_clip"

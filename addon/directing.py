@@ -160,7 +160,7 @@ def _kind(obj: bpy.types.Object) -> str:
 
 
 def _world_to_smoke(smoke: bpy.types.Object) -> Matrix:
-    """From the world to the smoke's own space, without what its position corrects for Cycles."""
+    """Transform from the world to the smoke's own space, without what its position corrects for Cycles."""
     basis = smoke.matrix_basis  # with the correction
     return (smoke.matrix_world @ basis.inverted() @ Matrix.Translation(-smoke.delta_location) @ basis).inverted()
 

@@ -14,7 +14,7 @@ _NAMES = ("output", "results", "before", "plate", "mask")
 """Settings of a smoke that hold a path."""
 
 _OWN = ("results", "before")
-"""Those that the add-on sets: an absolute one becomes relative with the first save."""
+"""Paths that the add-on sets: an absolute one becomes relative with the first save."""
 
 _places: list[tuple[bpy.types.PropertyGroup, str, Path]] = []
 """Where the relative paths lead while a file is saved: settings, name and absolute path."""

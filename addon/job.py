@@ -321,7 +321,7 @@ def _read(stream: IO[bytes], lines: queue.Queue[bytes | None]) -> None:
 
 
 def _quiet_flags() -> int:
-    """On Windows: no console window, and a low priority."""
+    """Flags that give no console window and a low priority on Windows."""
     if sys.platform == "win32":
         return subprocess.CREATE_NO_WINDOW | subprocess.BELOW_NORMAL_PRIORITY_CLASS
     return 0

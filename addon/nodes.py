@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import bpy
 
 SPACING = 200.0
-"""From one column or row of nodes to the next."""
+"""Distance from one column or row of nodes to the next."""
 
 
 class Input(NamedTuple):

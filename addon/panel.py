@@ -186,7 +186,7 @@ def _brief_disk(megabytes: float) -> str:
 
 
 def _brief_share(share: float) -> str:
-    """In percent; nothing below 0, where it is unknown."""
+    """A share in percent; nothing below 0, where it is unknown."""
     if share < 0.0:
         return ""
     return f"{share:.1%}" if 0.0005 <= share < 0.00995 else f"{share:.0%}"
@@ -295,13 +295,13 @@ def draw_text(layout: bpy.types.UILayout, context: bpy.types.Context, text: str,
 
 
 class SMOKELIFT_PT_view(_Main, bpy.types.Panel):
-    """In the 3D View."""
+    """The panel in the 3D View."""
 
     bl_space_type = "VIEW_3D"
 
 
 class SMOKELIFT_PT_clip(_Main, bpy.types.Panel):
-    """In the Movie Clip Editor."""
+    """The panel in the Movie Clip Editor."""
 
     bl_space_type = "CLIP_EDITOR"
 

@@ -7,7 +7,7 @@ import bpy
 
 # Blender 4.5 and later need this option for // as the .blend's folder; older ones do not know it.
 PATH_OPTIONS = {"ANIMATABLE"} | ({"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) else set())
-"""Of properties that hold a path."""
+"""Options of properties that hold a path."""
 
 
 def absolute(path: str, library: bpy.types.Library | None = None) -> Path:

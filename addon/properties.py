@@ -21,7 +21,7 @@ from .contract import BOX_VOXELS, FASTEST, SIDES, SLOWEST
 from .paths import PATH_OPTIONS
 from .smoke import free_folder, scene_of
 
-GUESSED_DISTANCE = 2.0
+USUAL_DISTANCE = 2.0
 """Metres from which a distance is given by hand where there is no box."""
 
 SEEDS = 2**31
@@ -51,9 +51,9 @@ def _middle_of_box(settings: "SmokeliftSettings") -> float:
     """Where a distance that is given by hand begins: at the middle of the box, if there is one before the camera."""
     box, camera = box_of(settings.id_data), scene_of(settings.id_data).camera
     if box is None or camera is None:
-        return GUESSED_DISTANCE
+        return USUAL_DISTANCE
     pose = camera.matrix_world
-    return max(0.0, -(box.matrix_world.translation - pose.translation).dot(pose.col[2].to_3d())) or GUESSED_DISTANCE
+    return max(0.0, -(box.matrix_world.translation - pose.translation).dot(pose.col[2].to_3d())) or USUAL_DISTANCE
 
 
 def _speed_chosen(_settings: "SmokeliftSettings", _context: bpy.types.Context) -> None:
@@ -249,7 +249,11 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
         name="Camera",
         description="Where the clip was filmed from",
         items=[
-            ("GUESS", "Guess", "Assume a level camera with an ordinary lens and a box around the smoke, and add it"),
+            (
+                "ESTIMATE",
+                "From the Clip",
+                "Assume a level camera with an ordinary lens and a box around the smoke, and add it",
+            ),
             ("SCENE", "Scene Camera", "The scene's camera with its lens, sensor and shift, tracked or still"),
         ],
         update=_changed,
@@ -271,7 +275,7 @@ class SmokeliftSettings(bpy.types.PropertyGroup):
     distance: FloatProperty(
         name="Distance",
         description="Distance from the camera to the lower end of the smoke, level and straight ahead; automatic is "
-        "estimated. With Camera Guess it sets the scale",
+        "estimated. With Camera From the Clip it sets the scale",
         subtype="DISTANCE",
         default=0.0,
         min=0.0,

@@ -23,7 +23,7 @@ SENTENCES = {
         "sides; choose Frames {first} to {before} or {after} to {last}."
     ),
 }
-"""By kind, with the figures that the engine gives."""
+"""Sentences by kind, with the figures that the engine gives."""
 
 FRAME_NUMBERS = ("before", "after", "first", "last")
 """Figures that the engine counts from 0, and the panel from 1."""

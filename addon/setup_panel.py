@@ -75,14 +75,14 @@ class _SetUp(OfClip):
 
 
 class SMOKELIFT_PT_view_set_up(_SetUp, bpy.types.Panel):
-    """In the 3D View."""
+    """The panel in the 3D View."""
 
     bl_space_type = "VIEW_3D"
     bl_parent_id = "SMOKELIFT_PT_view"
 
 
 class SMOKELIFT_PT_clip_set_up(_SetUp, bpy.types.Panel):
-    """In the Movie Clip Editor."""
+    """The panel in the Movie Clip Editor."""
 
     bl_space_type = "CLIP_EDITOR"
     bl_parent_id = "SMOKELIFT_PT_clip"

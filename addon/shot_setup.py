@@ -15,7 +15,7 @@ from .compositing import composite, take_composite_away
 from .kept import set_and_remember, set_unless_changed
 from .plate import play_beside, show_plate
 from .projection import project, show_card
-from .smoke import GUESSED_CAMERA, scene_of, smokes
+from .smoke import ASSUMED_CAMERA, scene_of, smokes
 from .take import Take
 
 NAME = "Smokelift"
@@ -124,12 +124,12 @@ def assumed_camera(smoke: bpy.types.Object, index: dict[str, Any]) -> bpy.types.
     Its place and its lens stay where the artist changed them.
     """
     settings, scene = smoke.smokelift, scene_of(smoke)
-    if settings.camera_mode != "GUESS":
+    if settings.camera_mode != "ESTIMATE":
         return None
     table = index["scene"]["camera"]
     camera = settings.assumed_camera
     if camera is None or camera.type != "CAMERA" or camera.name not in scene.objects:
-        camera = bpy.data.objects.new(GUESSED_CAMERA, bpy.data.cameras.new(GUESSED_CAMERA))
+        camera = bpy.data.objects.new(ASSUMED_CAMERA, bpy.data.cameras.new(ASSUMED_CAMERA))
         camera.data.sensor_fit, camera.data.sensor_width = "AUTO", SENSOR_WIDTH
         scene.collection.objects.link(camera)
     settings.assumed_camera = camera
@@ -154,7 +154,7 @@ def show_clip_behind(camera: bpy.types.Camera, clip: bpy.types.MovieClip) -> Non
 
 
 def _scatter_as_fitted(scene: bpy.types.Scene, index: dict[str, Any]) -> None:
-    """As many bounces in smoke as the model has that the smoke was fitted with; Blender's default is one scattering."""
+    """Let light bounce in smoke as often as in the model that the smoke was fitted with; Blender's default is one scattering."""
     bounces = BOUNCES if _scattering(index) == "multiple" else 0
     set_unless_changed(scene, "volume_bounces", scene.cycles, "volume_bounces", bounces)
     if scene.cycles.volume_bounces == bounces:  # bounces of all kinds together end a path too

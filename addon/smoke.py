@@ -9,7 +9,7 @@ from mathutils import Matrix
 
 from . import preferences
 
-GUESSED_CAMERA = "Smokelift Camera"
+ASSUMED_CAMERA = "Smokelift Camera"
 """Name of a camera that stands where the engine assumed the clip's."""
 
 

@@ -41,7 +41,7 @@ def write_take(smoke: bpy.types.Object) -> Take:
         If the shot is unusable, or the folder cannot be written to.
     """
     tables = shot_tables(smoke)
-    if smoke.smokelift.camera_mode == "GUESS":
+    if smoke.smokelift.camera_mode == "ESTIMATE":
         hide_default_cube(scene_of(smoke))
     take = _next_take(smoke)
     take.write(tables, engine_options(smoke))

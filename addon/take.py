@@ -83,7 +83,7 @@ class Take:
 
     @property
     def moving_mesh(self) -> Path:
-        """The same where they move: the pattern of numbered files."""
+        """Obstacles that move: the pattern of numbered files."""
         return self.directory.with_name(f"{self.directory.name}_####.stl")
 
     def _moving_files(self) -> list[Path]:

@@ -84,7 +84,7 @@ class Inflow:
             here[inlets] = entering[inlets]
 
     def cropped(self) -> Inflow:
-        """The same, in the smallest box."""
+        """Inflow in the smallest box."""
         box = box_around(self.voxels, 0)
         if not self.voxels.any():
             box = (slice(0, 1),) * 3  # a moment has a voxel at least

@@ -112,7 +112,7 @@ def test_bad_input(shot, words, status, said, capsys) -> None:
 
 
 def test_no_clip(scene, capsys) -> None:
-    """Whoever forgot it is told how to give one."""
+    """Whoever forgot it reads how to give one."""
     assert batch.main([]) == 2
     assert "--clip" in capsys.readouterr().err
 
@@ -196,7 +196,7 @@ def test_the_command_shows_its_result(saved, tmp_path) -> None:
     scene = bpy.context.scene
     bpy.ops.mesh.primitive_cube_add()
     bpy.context.object.name = "Cube"
-    smoke(scene).smokelift.camera_mode = "GUESS"
+    smoke(scene).smokelift.camera_mode = "ESTIMATE"
     bpy.ops.wm.save_mainfile()
     assert blender(saved, "--save").returncode == 0
     quietly(lambda: bpy.ops.wm.open_mainfile(filepath=str(saved)))

@@ -182,7 +182,7 @@ def test_only_what_differs_from_the_clip_is_said(shot) -> None:
 
 
 def test_waiting_is_seen(shot, tmp_path) -> None:
-    """How long the clip has been read; and in Direct how far the run has come, whose bar is out of sight above it."""
+    """How long the clip has been read; and in Direct how far the run has come, whose bar is not seen above it."""
     state = bpy.context.window_manager.smokelift
     state.check_smoke, state.check_seconds = smoke(shot).session_uid, 12
     assert "Reading the clip: 12 s    " in drawn(shot, panel.SMOKELIFT_PT_view)
@@ -240,7 +240,7 @@ def test_what_was_found_is_five_lines_in_the_panels_words(shot) -> None:
 def test_the_resolution_is_seen_when_it_is_guessed(shot) -> None:
     """With the cost, whatever the camera is."""
     state = bpy.context.window_manager.smokelift
-    smoke(shot).smokelift.camera_mode = "GUESS"
+    smoke(shot).smokelift.camera_mode = "ESTIMATE"
     know_costs(shot)
     state.check_smoke, state.check_done = smoke(shot).session_uid, True
     assert any(text.startswith("48 x 48 x 64 voxels") for text in drawn(shot, panel.SMOKELIFT_PT_view))
@@ -303,7 +303,7 @@ def test_a_box_that_is_moved_is_estimated_anew(shot) -> None:
     smoke(shot).smokelift.box.scale.x *= 1.1
     bpy.context.view_layer.update()
     assert not shot_check.is_checked(state, smoke(shot))
-    smoke(shot).smokelift.camera_mode = "GUESS"
+    smoke(shot).smokelift.camera_mode = "ESTIMATE"
     state.check_smoke, state.check_place = smoke(shot).session_uid, shot_check.place(smoke(shot))
     smoke(shot).smokelift.box.scale.x *= 1.1
     bpy.context.view_layer.update()

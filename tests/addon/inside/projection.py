@@ -52,7 +52,7 @@ def filmed(scene: bpy.types.Scene, folder: Path, table: dict | None = None, plat
     file.write_text(json.dumps(index))
     settings = smoke(scene).smokelift
     settings.clip = bpy.data.movieclips.load(str(folder / "clip_0001.png"))
-    settings.camera_mode, settings.light_mode, settings.plate_place = "GUESS", "SCENE", "PROJECTION"
+    settings.camera_mode, settings.light_mode, settings.plate_place = "ESTIMATE", "SCENE", "PROJECTION"
     volume.show(smoke(scene), take)
     smoke(scene).hide_render = True
     scene.cycles.samples, scene.cycles.use_denoising = 16, False
@@ -145,7 +145,7 @@ def test_a_camera_that_moved_projects_each_frame_from_its_place(scene, tmp_path)
 
 
 def filmed_by_the_scene(scene: bpy.types.Scene, folder: Path, table: dict) -> bpy.types.Scene:
-    """`filmed` with a plate for every frame, and without the ticks that need a guessed camera."""
+    """`filmed` with a plate for every frame, and without the ticks that need an assumed camera."""
     smoke(scene).smokelift.set_up_camera = False
     return filmed(scene, folder, table, plates=6)
 

@@ -342,9 +342,9 @@ def test_paths_beside_the_blend(shot, tmp_path) -> None:
     assert tables["background"]["image"] == str(tmp_path / "plate.png")
 
 
-def test_guessing_leaves_camera_and_box_to_the_engine(shot, tmp_path) -> None:
+def test_a_camera_from_the_clip_leaves_camera_and_box_to_the_engine(shot, tmp_path) -> None:
     """Then none is needed."""
-    smoke(shot).smokelift.camera_mode, shot.camera, smoke(shot).smokelift.box = "GUESS", None, None
+    smoke(shot).smokelift.camera_mode, shot.camera, smoke(shot).smokelift.box = "ESTIMATE", None, None
     tables = shot_tables(smoke(shot))
     assert "camera" not in tables
     assert "domain" not in tables
@@ -371,11 +371,11 @@ def test_a_resolution_of_ones_own(shot, tmp_path) -> None:
 
 
 def test_a_resolution_that_is_left_open_is_measured(shot) -> None:
-    """In the scene's box; a box that is guessed always is, and a number of one's own never."""
+    """In the scene's box; a box that is assumed always is, and a number of one's own never."""
     assert options(smoke(shot))[-2:] == ["--resolution", "auto"]
     smoke(shot).smokelift.longest_side = 40
     assert "--resolution" not in options(smoke(shot))
-    smoke(shot).smokelift.longest_side, smoke(shot).smokelift.camera_mode = 0, "GUESS"
+    smoke(shot).smokelift.longest_side, smoke(shot).smokelift.camera_mode = 0, "ESTIMATE"
     assert "--resolution" not in options(smoke(shot))
 
 
@@ -411,7 +411,7 @@ def test_closed_sides(shot, tmp_path) -> None:
     smoke(shot).smokelift.closed = {"x+", "z-"}
     assert engines(shot, tmp_path).closed == ("x+", "z-")
     smoke(shot).smokelift.closed = {"z-"}
-    smoke(shot).smokelift.camera_mode = "GUESS"
+    smoke(shot).smokelift.camera_mode = "ESTIMATE"
     add(shot, "Lamp", bpy.data.lights.new("Lamp", "POINT"))
     assert shot_tables(smoke(shot))["domain"] == {"closed": ["z-"]}
     found = engines(shot, tmp_path)
@@ -457,7 +457,7 @@ def test_depth_detail_and_variation(shot) -> None:
 def test_an_inlet_needs_a_box_of_its_own(shot) -> None:
     """In a box that is found it would stand anywhere."""
     add_inlet(shot)
-    smoke(shot).smokelift.camera_mode = "GUESS"
+    smoke(shot).smokelift.camera_mode = "ESTIMATE"
     assert "inlet" not in shot_tables(smoke(shot))
 
 

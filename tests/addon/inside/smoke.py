@@ -268,7 +268,7 @@ def test_a_range_of_the_artist_stays(scene, clip, tmp_path) -> None:
 
 
 def test_a_run_hides_the_default_cube_also_without_a_window(scene, clip, tmp_path) -> None:
-    """Where the camera is guessed, and the smoke stands in the middle."""
+    """Where the camera is assumed, and the smoke stands in the middle."""
     cube = add(scene, "Cube", bpy.data.meshes.new("Cube"))
     corners = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
     cube.data.from_pydata(corners, [], [(0, 1, 3, 2), (4, 6, 7, 5)])

@@ -77,7 +77,7 @@ def test_in_real_time_at_another_frame_rate(shot, tmp_path, fps, wanted) -> None
 
 
 def test_frame_by_frame_at_another_frame_rate(shot, tmp_path) -> None:
-    """As Blender plays the clip itself, unless told otherwise; motion blur follows what is seen."""
+    """As Blender plays the clip itself, unless it is set otherwise; motion blur follows what is seen."""
     shot.render.fps = 48
     volume.show(smoke(shot), made(tmp_path))
     assert [plays(shot, frame) for frame in (0, 1, 6, 7)] == [None, 1, 6, None]
@@ -436,16 +436,16 @@ def test_nothing_of_the_session_is_saved(shot, tmp_path) -> None:
     assert len(bpy.context.window_manager.smokelift.jobs) == 0
 
 
-# the camera that is guessed
+# the camera that is assumed
 
 
 @pytest.mark.parametrize("size", [(256, 384), (384, 256)])
-def test_a_guessed_camera_is_made(shot, tmp_path, size) -> None:
+def test_an_assumed_camera_is_made(shot, tmp_path, size) -> None:
     """With the engine's lens and place; the scene's own camera stays the scene's."""
     from bpy_extras.object_utils import world_to_camera_view
 
     own = shot.camera
-    smoke(shot).smokelift.camera_mode = "GUESS"
+    smoke(shot).smokelift.camera_mode = "ESTIMATE"
     shot.render.resolution_x, shot.render.resolution_y = size
     camera = Camera.look_at((0.0, -5.0, 1.0), (0.0, 0.0, 1.0), fov_y_degrees=30.0, size=size)
     take = made(tmp_path)
@@ -468,9 +468,9 @@ def test_a_guessed_camera_is_made(shot, tmp_path, size) -> None:
     assert replace(camera, size=size) == camera
 
 
-def test_a_guessed_camera_that_was_changed_stays(shot, tmp_path) -> None:
+def test_an_assumed_camera_that_was_changed_stays(shot, tmp_path) -> None:
     """Under any name: its place and its lens, each on its own."""
-    smoke(shot).smokelift.camera_mode = "GUESS"
+    smoke(shot).smokelift.camera_mode = "ESTIMATE"
     takes = [made(tmp_path, number=number) for number in (1, 2)]
     for take, distance in zip(takes, (5.0, 8.0), strict=True):
         index = json.loads((take.directory / "sequence.json").read_text())
