@@ -154,7 +154,7 @@ def show_clip_behind(camera: bpy.types.Camera, clip: bpy.types.MovieClip) -> Non
 
 
 def _scatter_as_fitted(scene: bpy.types.Scene, index: dict[str, Any]) -> None:
-    """Let light bounce in smoke as often as in the model that the smoke was fitted with; Blender's default is one scattering."""
+    """Let light bounce in smoke as often as in the model that the smoke was fitted with; by default it does once."""
     bounces = BOUNCES if _scattering(index) == "multiple" else 0
     set_unless_changed(scene, "volume_bounces", scene.cycles, "volume_bounces", bounces)
     if scene.cycles.volume_bounces == bounces:  # bounces of all kinds together end a path too
