@@ -261,16 +261,14 @@ SMOKELIFT_INLINE void BlockTransport::follow_rows(int axis, int way, const float
         for (int step = 0; step < steps; ++step) {
             const std::size_t first = (std::size_t(line) * steps + (way > 0 ? step : steps - 1 - step)) * run;
             visit(first, run, arriving);
-            const float *const passed = crossing.passed.data() + first;
-            const float *const escaped = crossing.escaped.data() + first;
-            const float *const slanted = crossing.slanted.data() + first;
+            const Crossing::Row block = crossing.from(first);
             const float *const mean = emission + first, *const rise = mean + (1 + axis) * all;
             const float *const across[2] = {mean + (1 + LATERAL[axis][0]) * all,
                                             mean + (1 + LATERAL[axis][1]) * all};
             by_lanes(run, [&](int i) SMOKELIFT_INLINE_LAMBDA {
-                const Lanes through = at(passed + i), emitted = length * at(escaped + i);
+                const Lanes through = at(block.passed + i), emitted = length * at(block.escaped + i);
                 at(leaving + i) = through * at(arriving + i) +
-                                  (emitted * at(mean + i) + rising * at(slanted + i) * at(rise + i));
+                                  (emitted * at(mean + i) + rising * at(block.slanted + i) * at(rise + i));
                 for (int side = 0; side < 2; ++side)
                     at(leaving + (1 + side) * run + i) =
                         through * at(arriving + (1 + side) * run + i) + emitted * at(across[side] + i);
@@ -294,14 +292,12 @@ SMOKELIFT_INLINE void BlockTransport::follow_along_z(int way, const float *emiss
     float *const sources = memory.data(), *const arriving = sources + CARRIED * run;
     for (int row = 0; row < rows; row += ROWS) {
         const std::size_t first = std::size_t(std::min(row, rows - ROWS)) * pitch;
-        const float *const passed = crossing.passed.data() + first;
-        const float *const escaped = crossing.escaped.data() + first;
-        const float *const slanted = crossing.slanted.data() + first;
+        const Crossing::Row block = crossing.from(first);
         const float *const mean = emission + first, *const x = mean + all, *const y = x + all;
         const float *const rise = y + all;
         by_lanes(run, [&](int i) SMOKELIFT_INLINE_LAMBDA {
-            const Lanes emitted = length * at(escaped + i);
-            at(sources + i) = emitted * at(mean + i) + rising * at(slanted + i) * at(rise + i);
+            const Lanes emitted = length * at(block.escaped + i);
+            at(sources + i) = emitted * at(mean + i) + rising * at(block.slanted + i) * at(rise + i);
             at(sources + run + i) = emitted * at(x + i);
             at(sources + 2 * run + i) = emitted * at(y + i);
         });
@@ -312,7 +308,7 @@ SMOKELIFT_INLINE void BlockTransport::follow_along_z(int way, const float *emiss
                 for (int part = 0; part < CARRIED; ++part) {
                     const int place = part * run + r * pitch + z;
                     arriving[place] = beams[part][r];
-                    beams[part][r] = passed[r * pitch + z] * beams[part][r] + sources[place];
+                    beams[part][r] = block.passed[r * pitch + z] * beams[part][r] + sources[place];
                 }
             }
         }
@@ -347,14 +343,13 @@ SMOKELIFT_INLINE void BlockTransport::follow_diagonals(int way, const float *emi
         for (int line = 0; line < DIAGONALS; ++line)
             arriving[line] = beams + line * size - way * (DIAGONAL_Y[line] * pitch + DIAGONAL_Z[line]);
         visit(first, plane, arriving);
-        const float *const passed = crossing.passed.data() + first;
-        const float *const escaped = crossing.escaped.data() + first;
-        const float *const slanted = crossing.slanted.data() + first;
+        const Crossing::Row block = crossing.from(first);
         const float *const mean = emission + first, *const x = mean + all, *const y = x + all;
         const float *const z = y + all;
         by_lanes(plane, [&](int i) SMOKELIFT_INLINE_LAMBDA {
-            const Lanes through = at(passed + i), emitted = length * at(escaped + i) * at(mean + i);
-            const Lanes slope = rising * at(slanted + i);
+            const Lanes through = at(block.passed + i),
+                        emitted = length * at(block.escaped + i) * at(mean + i);
+            const Lanes slope = rising * at(block.slanted + i);
             for (int line = 0; line < DIAGONALS; ++line) {
                 const Lanes rise =
                     at(x + i) + float(DIAGONAL_Y[line]) * at(y + i) + float(DIAGONAL_Z[line]) * at(z + i);
@@ -383,15 +378,14 @@ void BlockTransport::through_axis(int axis, const float *emission, float *mean) 
     follow_axis(
         axis, -1, emission, [&](std::size_t first, int count, const float *back) SMOKELIFT_INLINE_LAMBDA {
             const float *const forth = arrived + first;
-            const float *const escaped = crossing.escaped.data() + first;
-            const float *const slanted = crossing.slanted.data() + first;
+            const Crossing::Row block = crossing.from(first);
             float *const of_mean = mean + first, *const along = of_mean + (1 + axis) * all;
             float *const across[2] = {of_mean + (1 + LATERAL[axis][0]) * all,
                                       of_mean + (1 + LATERAL[axis][1]) * all};
             by_lanes(count, [&](int i) SMOKELIFT_INLINE_LAMBDA {
-                const Lanes share = weight * at(escaped + i);
+                const Lanes share = weight * at(block.escaped + i);
                 at(of_mean + i) = share * (at(forth + i) + at(back + i));
-                at(along + i) = of_slope * at(slanted + i) * (at(forth + i) - at(back + i));
+                at(along + i) = of_slope * at(block.slanted + i) * (at(forth + i) - at(back + i));
                 for (int side = 0; side < 2; ++side)
                     at(across[side] + i) =
                         share * (at(forth + (1 + side) * all + i) + at(back + (1 + side) * count + i));

@@ -10,7 +10,9 @@ from __future__ import annotations
 
 import argparse
 import hashlib
+import os
 import re
+import shutil
 import subprocess
 import sys
 import tarfile
@@ -26,6 +28,12 @@ DIST = ROOT / "dist"
 LARGEST_ZIP, LARGEST_INSTALLED = 100e6, 250e6
 """Bytes of an extension."""
 
+LICENCE = re.compile(r"licen[cs]e|copying|notice", re.IGNORECASE)
+"""How files are called that hold a licence."""
+
+DEBIAN = Path(os.environ.get("SMOKELIFT_BLENDER_ROOT", Path.home() / ".cache" / "smokelift-tests" / "trixie"))
+"""The root with a Blender that `make test-blender` builds."""
+
 
 class NotReadyError(RuntimeError):
     """What stands against a release."""
@@ -38,7 +46,7 @@ def main() -> int:
     quick: bool = parser.parse_args().quick
     steps: list[Callable[[], str]] = [clean_checkout, changelog_has_the_version]
     if not quick:
-        steps += [zips_are_small_and_whole, sdist_builds_alone, checksums]
+        steps += [zips_are_small_and_whole, licences_are_carried, blender_takes_the_zips, sdist_builds_alone, checksums]
     failed = 0
     for step in steps:
         try:
@@ -86,6 +94,36 @@ def zips_are_small_and_whole(folder: Path = DIST) -> str:
         if path.stat().st_size > LARGEST_ZIP or installed > LARGEST_INSTALLED:
             raise NotReadyError(f"{path.name} has {path.stat().st_size / 1e6:.0f} MB, {installed / 1e6:.0f} installed.")
     return f"{len(zips)} zips: {', '.join(f'{path.name} {path.stat().st_size / 1e6:.0f} MB' for path in zips)}"
+
+
+def licences_are_carried(folder: Path = DIST) -> str:
+    """Every package in a zip carries the text of its licence, and so does the zip."""
+    packages = set()
+    for path in sorted(folder.glob(f"smokelift*-{VERSION}-*.zip")):
+        with zipfile.ZipFile(path) as archive:
+            names = archive.namelist()
+        if "LICENSE" not in names:
+            raise NotReadyError(f"{path.name} has no LICENSE.")
+        for about in {name.partition(".dist-info/")[0] for name in names if ".dist-info/" in name}:
+            if not any(LICENCE.search(name) for name in names if name.startswith(f"{about}.dist-info/")):
+                raise NotReadyError(f"{path.name} carries {about.rpartition('/')[2]} without its licence.")
+            packages.add(about.rpartition("/")[2].partition("-")[0])
+    return f"licences of {len(packages)} packages: {', '.join(sorted(packages))}"
+
+
+def blender_takes_the_zips(folder: Path = DIST) -> str:
+    """A real Blender finds no fault in any zip: one that can be called, else that of `make test-blender`."""
+    command = [shutil.which("blender") or ""]
+    if not command[0]:
+        if not (DEBIAN / "usr" / "bin" / "blender").exists():
+            raise NotReadyError("no Blender was found: run make test-blender as root, which installs one.")
+        command = [str(ROOT / "tests" / "blender" / "root" / "enter.sh"), str(DEBIAN), str(ROOT), "blender"]
+    zips = sorted(folder.glob(f"smokelift*-{VERSION}-*.zip"))
+    for path in zips:
+        said = _run([*command, "--command", "extension", "validate", str(path)], ROOT, dict(os.environ))
+        if re.search("error", said, re.IGNORECASE):
+            raise NotReadyError(f"Blender refuses {path.name}: {said.strip()[-500:]}")
+    return f"Blender's own validation of {len(zips)} zips"
 
 
 def sdist_builds_alone() -> str:

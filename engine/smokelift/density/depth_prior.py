@@ -22,7 +22,7 @@ from smokelift.density.halves import MIN_COARSENED_VOXELS, any_of_two, every_sec
 from smokelift.density.hull import Places, centres_of
 from smokelift.density.objective import Term
 from smokelift.density.observation import ObservedClip, View, ViewSet, shadowed_optical_depth
-from smokelift.density.profile import EXPECTED, DepthProfile
+from smokelift.density.profile import PROFILE_CUT, DepthProfile
 from smokelift.density.screen import view_frame
 from smokelift.density.wander import Wander
 from smokelift.render import Volume
@@ -162,7 +162,7 @@ def _marked(voxels: NDArray[np.bool_], views: ViewSet, profiles: Sequence[DepthP
     found = np.zeros(np.count_nonzero(voxels), np.bool_)
     for view, profile in zip(views.views, profiles, strict=True):
         places = view.projection.places(voxels)
-        found |= places.visible & (profile.shape(places, voxels) > EXPECTED)
+        found |= places.visible & (profile.shape(places, voxels) > PROFILE_CUT)
     expected = np.zeros(voxels.shape, np.bool_)
     expected[voxels] = found
     return expected

@@ -58,13 +58,13 @@ FRESH_ROUNDS = 4
 AZIMUTHS = 5
 """Azimuths in a round (docs/experiments/every-view.md)."""
 
-NEAR = 10.0
+OWN_PICTURE_DEGREES = 10.0
 """Degrees from a camera within which its own picture says what is seen."""
 
 GOLDEN = (np.sqrt(5) - 1) / 2
 """Multiples of it, less their whole parts, are spread evenly however many there are."""
 
-FRESH, CARRIED = 0.6, 0.5
+FRESH_STEP, CARRIED_STEP = 0.6, 0.5
 """Shares of a step towards a picture that are made, for smoke that nothing is carried for and for what is carried: more
 of the second flickers (docs/experiments/uneven-steps.md)."""
 
@@ -216,7 +216,7 @@ class EveryView:
         box[table.axis] = slice(None)  # rays turn about the axis, along which all of the grid stays
         kept = tuple(box)
         first, second = (span.start for span in kept if span != slice(None))
-        smooth, relaxation = table.upright(self.smooth[kept]), self.strength * (FRESH if fresh else CARRIED)
+        smooth, relaxation = table.upright(self.smooth[kept]), self.strength * (FRESH_STEP if fresh else CARRIED_STEP)
         for exemplar in exemplars:
             for _ in range(FRESH_ROUNDS if fresh else 1):
                 turned = np.array(table.upright(density[kept]))
@@ -277,10 +277,10 @@ class EveryView:
 def unseen_sides(turntable: Turntable, cameras: Sequence[Camera]) -> bool:
     """Whether there are sides that no camera is near to, over a degree at least: fewer are hardly ever come by."""
     seen_from = [turntable.degrees(camera) for camera in cameras]
-    return any(_unseen(degrees, seen_from, NEAR + 0.5) for degrees in range(180))
+    return any(_unseen(degrees, seen_from, OWN_PICTURE_DEGREES + 0.5) for degrees in range(180))
 
 
-def _unseen(degrees: float, cameras: Sequence[float], near: float = NEAR) -> bool:
+def _unseen(degrees: float, cameras: Sequence[float], near: float = OWN_PICTURE_DEGREES) -> bool:
     """Whether no camera, in degrees, is near to an azimuth."""
     return all(_apart(degrees, camera) >= near for camera in cameras)
 

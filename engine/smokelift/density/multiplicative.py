@@ -45,7 +45,7 @@ ray asks for is made, so that the iterations converge."""
 DAMPING = 0.4
 """Relative sensitivity at which the step is halved."""
 
-FAINT = 1e-6
+MIN_DENSITY_SHARE = 1e-6
 """Share of the plausible smoke's largest density below which voxels are alike."""
 
 MIN_SCALE = 1e-30
@@ -157,7 +157,7 @@ class _Smoke:
         """A step (n,) in the logarithm of values, scaled towards the plausible smoke."""
         if self._plausible is None:
             return step
-        faint = np.float32(FAINT * self._plausible.max(initial=MIN_SCALE))
+        faint = np.float32(MIN_DENSITY_SHARE * self._plausible.max(initial=MIN_SCALE))
         scaled = np.exp(step)
         scaled *= values
         scaled += faint

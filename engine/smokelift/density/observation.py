@@ -28,11 +28,11 @@ THINNEST_CLEAR = 0.05
 PATCH = 3
 """Pixels along a shaded side of smoke at least (docs/experiments/bright-background.md)."""
 
-GENTLE = 1.5
+SHADED_DEPTH = 1.5
 """Optical depth over ln(1 + r), r the share of the contrast that a pixel shows: right where that is about a half
 (docs/experiments/thick-smoke.md)."""
 
-DARK = 0.1
+MAX_DARK_RADIANCE = 0.1
 """Radiance of a dark background over the smoke's source radiance, at most: before a brighter one a picture itself tells
 smoke in shadow from thin smoke."""
 
@@ -172,7 +172,7 @@ class View:
 
     def before_darkness(self, source: NDArray[np.float64]) -> bool:
         """Whether the background is dark beside a source radiance (3,) wherever smoke shows."""
-        return bool((self.plate.image[self.mask] <= DARK * source).all())
+        return bool((self.plate.image[self.mask] <= MAX_DARK_RADIANCE * source).all())
 
     @cached_property
     def noise(self) -> Image:
@@ -253,7 +253,7 @@ def apparent_optical_depth(
 def shadowed_optical_depth(
     view: View, image: Image, transmittance: NDArray[np.float32], optics: Optics
 ) -> NDArray[np.float32]:
-    """Optical depth (rows, columns) that explains a view's picture in the shadows of an estimate: GENTLE ln(1 + r).
+    """Optical depth (rows, columns) that explains a view's picture in an estimate's shadows: SHADED_DEPTH ln(1 + r).
 
     The estimate's picture has the source radiance J = (image - T B) / (1 - T), and r is the share of the contrast B - J
     that the view shows. If J were right the optical depth would be -ln(1 - r), which has no bound where r comes near to
@@ -278,7 +278,7 @@ def shadowed_optical_depth(
     seen = np.sum((plate - view.image) * counted, -1) + least * -np.expm1(-view.optical_depth)
     share = seen / np.maximum(np.sum(contrast * counted, -1) + least, 1e-12)
     known = (share > 0) & (view.optical_depth < -0.99 * np.log(THINNEST_CLEAR))  # else as thick as can be shown
-    depth = np.where(known, GENTLE * np.log1p(np.maximum(share, 0)), view.optical_depth)
+    depth = np.where(known, SHADED_DEPTH * np.log1p(np.maximum(share, 0)), view.optical_depth)
     return np.where(view.mask, depth, 0).astype(np.float32)
 
 

@@ -4,8 +4,8 @@ One picture says how much smoke lies along a ray, not where. The profile
 
     rho(x, y, z) = m(x, z) g(y),   g(y) = exp(-(|y - y0| / A)^q)
 
-keeps the picture m as it is and spreads it about the smoke's axis y0. Where g is below `EXPECTED` no smoke is expected,
-and what is spread is g - `EXPECTED`: smoke that is cut off shows a shell from the side. For a distribution of that form
+keeps the picture m as it is and spreads it about the smoke's axis y0. Where g is below `PROFILE_CUT` no smoke is
+expected, and what is spread is g - `PROFILE_CUT`: smoke that is cut off shows a shell. For a distribution of that form
 and standard deviation sigma, A = sigma sqrt(Gamma(1/q) / Gamma(3/q)). Its width sigma is the geometric mean of two that
 the picture shows: the spread of the smoke's row, right for what rises as a column, and that of balls which fill the
 silhouette (inflated outlines: Igarashi, Matsuoka and Tanaka 1999), right for what is longer than it is thick in any
@@ -31,7 +31,7 @@ FLATNESS = 3.5
 """q: between a Gaussian (2) and a box; 3 to 4 were equally good over four scenes
 (docs/experiments/density-profile.md)."""
 
-EXPECTED = 0.03
+PROFILE_CUT = 0.03
 """Share of the profile's peak from which smoke is expected. It is there 1.4 times as wide as it is assumed to be, which
 is how far its width may be wrong (docs/experiments/every-view.md)."""
 
@@ -153,9 +153,9 @@ class DepthProfile:
     def at(self, places: Places, voxels: NDArray[np.bool_]) -> NDArray[np.float64]:
         """What is spread (1/m), of unit integral along the depth, at the marked voxels (n,), seen at `places`."""
         profile, width = self._shape_and_width(places, voxels)
-        steep = np.log(1 / EXPECTED)
-        area = gamma(1 + 1 / FLATNESS) * gammainc(1 / FLATNESS, steep) - EXPECTED * steep ** (1 / FLATNESS)
-        return np.asarray(np.maximum(profile - EXPECTED, 0) / (2 * area * width))
+        steep = np.log(1 / PROFILE_CUT)
+        area = gamma(1 + 1 / FLATNESS) * gammainc(1 / FLATNESS, steep) - PROFILE_CUT * steep ** (1 / FLATNESS)
+        return np.asarray(np.maximum(profile - PROFILE_CUT, 0) / (2 * area * width))
 
     def shape(self, places: Places, voxels: NDArray[np.bool_]) -> NDArray[np.float64]:
         """The profile g at the marked voxels (n,), 1 in the middle."""

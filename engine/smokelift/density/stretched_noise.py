@@ -18,10 +18,10 @@ import smokelift._core as _core
 from smokelift.density.exemplar import Picture, reduced
 from smokelift.density.moment_levels import Level
 
-COARSEST = 2.0
+MAX_NODE_DISTANCE = 2.0
 """Distance between nodes of the coarsest octave, in standard deviations of the smoke's width: a lobe is as large."""
 
-FINEST = 3.5
+MIN_NODE_DISTANCE = 3.5
 """Voxels between nodes of the finest octave, at least: finer ones flicker (docs/experiments/stretched-noise.md)."""
 
 STRETCH = 0.2
@@ -62,8 +62,8 @@ def roughness(pictures: Sequence[Picture], width: float) -> tuple[float, ...]:
     tuple
         Standard deviation of the logarithm of the density by octave, the coarsest first.
     """
-    octaves = max(1, 1 + int(np.log2(COARSEST * width / FINEST)))
-    blurs = [COARSEST * width / 2**octave / np.sqrt(6) for octave in range(octaves)]
+    octaves = max(1, 1 + int(np.log2(MAX_NODE_DISTANCE * width / MIN_NODE_DISTANCE)))
+    blurs = [MAX_NODE_DISTANCE * width / 2**octave / np.sqrt(6) for octave in range(octaves)]
     return tuple(float(np.sqrt(np.log1p(_energy(pictures, blur) / _unit_energy(blur, width)))) for blur in blurs)
 
 
@@ -127,8 +127,8 @@ class StretchedNoise:
             noise, *motions = (_finer(values, level.coarser, level) for values in (coarse_noise, *coarse_motion))
             motion = np.stack(motions)
         while octaves < len(self.strengths):
-            spacing = COARSEST * self.width / 2**octaves
-            if octaves and spacing < FINEST * size:
+            spacing = MAX_NODE_DISTANCE * self.width / 2**octaves
+            if octaves and spacing < MIN_NODE_DISTANCE * size:
                 break
             if octaves:  # drawn out by the motion of nodes twice as far apart
                 reach = np.float32(2 * STRETCH * spacing)

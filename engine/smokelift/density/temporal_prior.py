@@ -41,7 +41,7 @@ LARGEST_GAIN = 3.0
 smoke has entered, or has moved otherwise than was predicted."""
 
 
-FAINT = np.float32(0.3)
+MIN_NEW_DENSITY = np.float32(0.3)
 """Mean densities of the smooth answer below which nothing is taken to have entered: filled in every frame, what fades
 at the support's edge shows a shell (docs/experiments/level-layers.md)."""
 
@@ -204,7 +204,7 @@ class GuidedSimulation:
         reached = np.float32(self.kept) * np.minimum(wanted, np.float32(LARGEST_GAIN) * have)
         if carried_smooth is not None:
             came, smooth = (values.ravel()[where] for values in (carried_smooth, depth.smooth))
-            faint = (FAINT * smooth.mean()) ** 2 + TINY
+            faint = (MIN_NEW_DENSITY * smooth.mean()) ** 2 + TINY
             reached *= np.minimum(1, (np.float32(LARGEST_GAIN) * came * smooth + faint) / (smooth**2 + faint))
         taken_over = carried.ravel()[where] * reached / np.maximum(have, TINY)
         started = taken_over + (1 - reached / np.maximum(wanted, TINY)) * depth.density.ravel()[where]

@@ -40,7 +40,7 @@ voxel, which is within its error."""
 TRIALS = 6
 """Steps of the secant method at most: the centre's height is nearly linear in the buoyancy."""
 
-FLAT = 1e-6
+MIN_HEIGHT_DIFFERENCE = 1e-6
 """Voxels of difference in height, at most, that are rounding."""
 
 PRECISION = 0.01
@@ -128,7 +128,7 @@ def _root(function: Callable[[float], float], start: float) -> float:
     before, at_before, now = 0.0, function(0.0), start
     for _ in range(TRIALS):
         at_now = function(now)
-        if abs(at_now - at_before) <= FLAT:
+        if abs(at_now - at_before) <= MIN_HEIGHT_DIFFERENCE:
             return 0.0
         before, now, at_before = now, now - at_now * (now - before) / (at_now - at_before), at_now
         if abs(now - before) <= PRECISION * abs(now):

@@ -17,13 +17,13 @@ from smokelift.direct.moment import Moment
 from smokelift.direct.surroundings import Surroundings
 from smokelift.scene import SIDES, Box, CompleteScene, Domain, EnvironmentLight, PointLight, Side
 from smokelift.scene.checks import Vector
-from smokelift.scene.domain import LONGEST, box_around
+from smokelift.scene.domain import MAX_SIDE_VOXELS, box_around
 from smokelift.transport import Array, Velocity, advect, at_centres
 
 BLOCK = 8
 """Voxels by which a side moves: few steps change the box, and counts with small factors transform fast."""
 
-MARGIN = 4
+MARGIN_VOXELS = 4
 """Voxels of clear air between smoke and an open side. Pressure is zero there, which bends the flow nearby."""
 
 SEEN = np.float32(1e-3)
@@ -83,7 +83,7 @@ class Growth:
                 break
             fastest = float(np.abs(moment.velocity.faces[axis]).max()) * dt / box.voxel_size
             clear = box.resolution[axis] - smoke[axis].stop if is_high else smoke[axis].start
-            blocks = math.ceil((MARGIN + fastest - clear) / BLOCK)
+            blocks = math.ceil((MARGIN_VOXELS + fastest - clear) / BLOCK)
             if blocks > 0 and self._fits(larger := _moved(grown, side, blocks)):
                 grown = larger
         return grown
@@ -115,7 +115,7 @@ class Growth:
         return Box((low[0], low[1], low[2]), (high[0], high[1], high[2]))
 
     def _fits(self, box: Domain) -> bool:
-        small = math.prod(box.resolution) <= self.voxels and max(box.resolution) <= LONGEST
+        small = math.prod(box.resolution) <= self.voxels and max(box.resolution) <= MAX_SIDE_VOXELS
         return small and not any(box.contains(point) for point in self.outside)
 
 

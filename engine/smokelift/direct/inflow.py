@@ -24,10 +24,10 @@ PROMINENT = 0.25
 """Share of the strongest inlet's smoke that lasts in an inlet at least, where the weaker half of the moments counts:
 inlets of one scene are of one kind, and what a wrong velocity leaves is scattered and moves on."""
 
-FAINT = 0.01
+MIN_DENSITY_SHARE = 0.01
 """Share of the largest density below which a voxel is not in the smoke."""
 
-MARGIN = 1
+MARGIN_VOXELS = 1
 """Voxels around an inlet that belong to it: its smoke is taken from the clip until it is outside."""
 
 
@@ -109,7 +109,7 @@ def find_inflow(moments: Sequence[Moment], dt: float, marked: Mask | None = None
     """
     voxels = _detect_inlets(moments, dt) if marked is None else marked
     if voxels.any():
-        voxels = ndimage.binary_dilation(voxels, ndimage.generate_binary_structure(3, 3), MARGIN)
+        voxels = ndimage.binary_dilation(voxels, ndimage.generate_binary_structure(3, 3), MARGIN_VOXELS)
     return Inflow(voxels, moments)
 
 
@@ -120,7 +120,7 @@ def _detect_inlets(moments: Sequence[Moment], dt: float) -> Mask:
     middle = len(moments) // 2
     halves = [_means(part).mean for part in (changes[:middle], changes[middle:]) if part]
     densest = changes[-1][1]
-    entering = SourceDetection().weight(means, densest > FAINT * densest.max()) < MOTION
+    entering = SourceDetection().weight(means, densest > MIN_DENSITY_SHARE * densest.max()) < MOTION
     given = np.zeros_like(densest)
     for moment in moments:
         given += _given_away(moment)

@@ -33,7 +33,7 @@ MOMENTS, FIRST_FRAMES = 6, 4
 """Frames that are scored, spread over the clip, and the first ones, which have hardly any before them to start from
 and are left out."""
 
-OUTLINE, MARGIN = 0.08, 2
+OUTLINE_SHARE, OUTLINE_MARGIN = 0.08, 2
 """Share of the truth's largest value from which on a pixel is within its outline, and the pixels around that are, too:
 a linear interpolation and a pixel's rounding reach no farther."""
 
@@ -149,7 +149,7 @@ def _pictures(orbit: Orbit, density: Volume, azimuths: tuple[int, ...]) -> list[
 def _outline(pictures: list[Array]) -> npt.NDArray[np.bool_]:
     """Pixels (rows, columns) of the turntable's screen that show smoke at any azimuth, with a margin."""
     brightest = np.max(pictures, axis=0)
-    return np.asarray(ndimage.binary_dilation(brightest > OUTLINE * brightest.max(), iterations=MARGIN))
+    return np.asarray(ndimage.binary_dilation(brightest > OUTLINE_SHARE * brightest.max(), iterations=OUTLINE_MARGIN))
 
 
 def _outside(picture: Array, outline: npt.NDArray[np.bool_]) -> float | None:

@@ -17,7 +17,7 @@ from smokelift.output.viewer import Viewer
 from smokelift.render import Image
 from smokelift.scene import Camera, Scene
 
-LONGEST_SIDE = 480
+MAX_COMPARED_SIDE = 480
 """Pixels of a compared picture at most: larger ones are averaged over areas. Finer than any usual grid."""
 
 INPUT = "input"
@@ -108,8 +108,8 @@ def open_views(
 
 
 def at_most(camera: Camera) -> Camera:
-    """Return a camera with at most `LONGEST_SIDE` pixels."""
-    scale = min(1.0, LONGEST_SIDE / max(camera.size))
+    """Return a camera with at most `MAX_COMPARED_SIDE` pixels."""
+    scale = min(1.0, MAX_COMPARED_SIDE / max(camera.size))
     return camera.resized(*(max(1, round(side * scale)) for side in camera.size))
 
 

@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 
 from smokelift.checks.array_types import Doubles, Mask
-from smokelift.footage.background_kind import LIMIT, colour_around, rank, within
+from smokelift.footage.background_kind import MAX_DEVIATION, colour_around, rank, within
 from smokelift.footage.behind_smoke import DETAIL
 from smokelift.footage.clear_picture import ClearPicture, clear_picture
 from smokelift.footage.clip import Clip
@@ -224,7 +224,7 @@ def _of_one_colour(
         own = np.median(even.pictures[:, objects], axis=0)
         image[objects] = own
         clear = np.zeros(even.seen.shape, np.bool_)
-        limit = LIMIT * noise.averaged(even.scale**2).total
+        limit = MAX_DEVIATION * noise.averaged(even.scale**2).total
         clear[:, objects] = within(even.encoded[:, objects] - linear_to_srgb(own), limit)
         known = np.ones(objects.shape, np.bool_)
         picture = whole_plate(clip, part, gains, ClearPicture(image, known, clear, known.astype(np.float32), NO_ERRORS))

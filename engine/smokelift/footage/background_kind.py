@@ -26,14 +26,14 @@ from smokelift.footage.seen import median_of_seen
 BLOCKS = 64
 """Blocks along the longer side: means over some pixels, of which white noise is gone."""
 
-LIMIT = 3.0
+MAX_DEVIATION = 3.0
 """Standard deviations of noise up to which a block is as its background."""
 
-LASTING = np.float32(2 / 255)
+MAX_LASTING_NOISE = np.float32(2 / 255)
 """Noise of such means that is not white, in sRGB values, at most: of H.264 at crf 45 it is less than half of that
 (docs/experiments/background.md)."""
 
-STAYS, SWITCHES = 0.98, 0.03
+STAY_PROBABILITY, SWITCH_PROBABILITY = 0.98, 0.03
 """Probability that smoke stays as it is from one frame to the next of those that are examined, and that a block
 becomes clear or smoke. What ranks the backgrounds are jumps; these only break ties."""
 
@@ -41,29 +41,29 @@ OBJECT = 0.1
 """Probability of a block to be an object before one colour, a nozzle, a floor or a logo, and share of all blocks that
 are at most. Of public clips those on one colour have up to .02 (docs/clips.md)."""
 
-SHOWN = 0.25
+MIN_SHOWN_SHARE = 0.25
 """Share of the blocks that show the one colour at some time, at least."""
 
-STILL = 0.9
+MIN_STILL_SHARE = 0.9
 """Share of the frames in which an object is as it mostly is, within half of the limit: smoke wavers more."""
 
-WHOLE = 0.99
+MIN_SEEN_SHARE = 0.99
 """Share of a block that is seen, at least."""
 
 CANDIDATES = 4
 """Colours that are tried: those that most of all blocks have."""
 
-EMPTY = 0.98
+MIN_BLACK_SHARE = 0.98
 """Share of the blocks that are black in a frame that is black everywhere."""
 
-CLEAREST = 8
+CLEAR_FRAMES = 8
 """Frames of which the clearest view of each pixel is taken."""
 
-SHARPEST, SHARP = 0.99, np.float32(15 / 255)
+DETAIL_QUANTILE, MAX_MIST_DETAIL = 0.99, np.float32(15 / 255)
 """Quantile of the detail of what stands still before black, in sRGB values, and how much of it mist has at most: 1 to
 13 of 255 in 26 clips of smoke; walls and stages in the dark have 17 to 40 (docs/experiments/background.md)."""
 
-AROUND, MIN_SIDE_SHARE = np.float32(2 / 255), 0.5
+MAX_SIDE_DIFFERENCE, MIN_SIDE_SHARE = np.float32(2 / 255), 0.5
 """Difference in sRGB values up to which a block has the colour around a single picture, and share of the blocks along
 its sides that have to, on three of them: 0.56 to 1 of 18 frames of public clips before one colour, 0.2 at most of
 others but for stages in the dark (docs/experiments/background.md)."""
@@ -106,13 +106,13 @@ def rank(proxy: Proxy, white: Picture) -> Ranking:
     jump = -float(np.log(2 * limit.mean()))
     goes_on = _goes_on(values, limit, jump)
     empty = within(values, limit)
-    empty = empty & (empty.mean(1) > EMPTY)[:, None]
+    empty = empty & (empty.mean(1) > MIN_BLACK_SHARE)[:, None]
     picture = np.full(values.shape[1], np.inf)
     for value in values:
         picture = np.minimum(picture, _cost(within(values - value, limit) | empty, goes_on, jump))
     best = float(picture.mean()) + jump
     costs, colour, found, share = {"picture": best}, None, np.zeros(values.shape[1], np.bool_), 0.0
-    still = within(values - median_of_seen(values), limit / 2).mean(0) >= STILL
+    still = within(values - median_of_seen(values), limit / 2).mean(0) >= MIN_STILL_SHARE
     for candidate in _candidates(values, limit):
         clear = within(values - candidate, limit)
         shows = clear.any(0)
@@ -126,7 +126,7 @@ def rank(proxy: Proxy, white: Picture) -> Ranking:
         sides = -sum(part * np.log(max(part, 1e-6)) for part in (brighter, 1 - brighter))
         total = float(cost.mean()) + sides * float((~clear).sum(0).mean())
         costs[", ".join(f"{255 * v:.0f}" for v in candidate)] = total
-        if total < best and stands.mean() <= OBJECT and shows.mean() >= SHOWN:
+        if total < best and stands.mean() <= OBJECT and shows.mean() >= MIN_SHOWN_SHARE:
             best, found, share = total, stands & still, float(clear.mean())
             colour = srgb_to_linear(values[clear].mean(0, dtype=np.float64))
             colour[linear_to_srgb(colour) < EIGHT_BIT_STEP / 2] = 0
@@ -143,7 +143,7 @@ def colour_around(picture: Picture) -> tuple[float, float, float] | None:
     blocks = linear_to_srgb(linear)
     sides = [(values[0], values[-1], values[:, 0], values[:, -1]) for values in (blocks, linear)]
     colour = np.median(np.concatenate(sides[0]), axis=0)
-    alike = [(np.abs(side - colour) <= AROUND).all(-1) for side in sides[0]]
+    alike = [(np.abs(side - colour) <= MAX_SIDE_DIFFERENCE).all(-1) for side in sides[0]]
     if sum(side.mean() >= MIN_SIDE_SHARE for side in alike) < 3:
         return None
     red, green, blue = (float(v) for v in np.median(np.concatenate(sides[1])[np.concatenate(alike)], axis=0))
@@ -160,12 +160,12 @@ def _goes_on(values: Picture, limit: Picture, jump: float) -> Picture:
     size = np.abs(changes).mean(-1)
     usual = float(size[~alike].mean()) if not alike.all() else 1.0
     change = np.log(max(usual / float(limit.mean()), 1)) + size / usual
-    return np.asarray(np.where(alike, -np.log(STAYS), np.minimum(change, jump)), np.float32)
+    return np.asarray(np.where(alike, -np.log(STAY_PROBABILITY), np.minimum(change, jump)), np.float32)
 
 
 def _cost(clear: Mask, goes_on: Picture, jump: float) -> Picture:
     """What blocks (n,) cost that may be clear in some frames (frames, n), with the likeliest states."""
-    switch, leave = -np.log(SWITCHES), -np.log(1 - SWITCHES)
+    switch, leave = -np.log(SWITCH_PROBABILITY), -np.log(1 - SWITCH_PROBABILITY)
     is_clear, is_smoke = np.where(clear[0], 0, np.inf), np.full(clear.shape[1], jump)
     for now, going in zip(clear[1:], goes_on, strict=True):
         before = is_clear
@@ -185,7 +185,7 @@ def _blocks(proxy: Proxy) -> tuple[Picture, tuple[int, int]]:
 
 def _limit(values: Picture, white: Picture) -> Picture:
     """Deviation (3,) up to which blocks show the background that most frames of each agree on."""
-    limit = np.asarray(LIMIT * np.hypot(white, EIGHT_BIT_STEP), np.float32)
+    limit = np.asarray(MAX_DEVIATION * np.hypot(white, EIGHT_BIT_STEP), np.float32)
     most, usual = np.zeros(values.shape[1]), values[0].copy()
     for value in values:
         count = within(values - value, limit).sum(0)
@@ -193,8 +193,8 @@ def _limit(values: Picture, white: Picture) -> Picture:
         most[more], usual[more] = count[more], value[more]
     near = within(values - usual, limit)[..., None]
     usual = np.where(near, values, 0).sum(0) / near.sum(0)
-    spread = spread_about(values - usual, np.hypot(LASTING, white).max())
-    return np.asarray(LIMIT * np.maximum(spread, np.hypot(white, EIGHT_BIT_STEP)), np.float32)
+    spread = spread_about(values - usual, np.hypot(MAX_LASTING_NOISE, white).max())
+    return np.asarray(MAX_DEVIATION * np.maximum(spread, np.hypot(white, EIGHT_BIT_STEP)), np.float32)
 
 
 def _candidates(values: Picture, limit: Picture) -> list[Picture]:
@@ -216,10 +216,12 @@ def _candidates(values: Picture, limit: Picture) -> list[Picture]:
 def _sharp(proxy: Proxy, white: Picture) -> bool:
     """Whether the clearest view of a picture has edges, as what stands before black has, and mist has not."""
     # smoke brightens black; one frame may be astray
-    some = proxy.pictures[:: -(-len(proxy.pictures) // CLEAREST)]
+    some = proxy.pictures[:: -(-len(proxy.pictures) // CLEAR_FRAMES)]
     clearest = np.sort([channel_mean(linear_to_srgb(picture)) for picture in some], axis=0)[min(1, len(some) - 1)]
     detail = np.abs(clearest - blurred(clearest, DETAIL))[proxy.seen.any(0)]
-    return bool(np.quantile(detail, SHARPEST) > SHARP + LIMIT * float(white.max()) / proxy.scale)
+    return bool(
+        np.quantile(detail, DETAIL_QUANTILE) > MAX_MIST_DETAIL + MAX_DEVIATION * float(white.max()) / proxy.scale
+    )
 
 
 def within(deviations: Picture, limit: Picture) -> Mask:
@@ -242,5 +244,7 @@ def _visible(proxy: Proxy, shape: tuple[int, int]) -> Mask:
     if proxy.seen.all():
         return np.ones(shape[0] * shape[1], np.bool_)
     rows, columns = shape
-    shown = np.stack([area_average(seen.astype(np.float32), columns, rows).ravel() > WHOLE for seen in proxy.seen])
+    shown = np.stack(
+        [area_average(seen.astype(np.float32), columns, rows).ravel() > MIN_SEEN_SHARE for seen in proxy.seen]
+    )
     return np.asarray(shown.all(0) if shown.all(0).any() else shown.any(0))

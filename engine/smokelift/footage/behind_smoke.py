@@ -46,7 +46,7 @@ NEAR_SMOKE = 0.1
 SHIFTS = (-1 / 2, -1 / 3, -1 / 6, 1 / 6, 1 / 3, 1 / 2)
 """Where the outline of the unknown is laid on what is known, to the right, in widths of the picture."""
 
-LARGEST = 480
+MAX_ERROR_SIDE = 480
 """Pixels along the longer side at most of the picture that errors are measured on; larger ones are reduced to it."""
 
 
@@ -157,8 +157,8 @@ def continuation_errors(image: Picture, known: npt.NDArray[np.bool_]) -> Picture
     if known.all():
         return np.zeros((3, 3), np.float32)
     height, width = known.shape
-    if max(height, width) > LARGEST:
-        height, width = (max(1, round(LARGEST * side / max(height, width))) for side in (height, width))
+    if max(height, width) > MAX_ERROR_SIDE:
+        height, width = (max(1, round(MAX_ERROR_SIDE * side / max(height, width))) for side in (height, width))
         image, known = area_average(image, width, height), area_average(known.astype(np.float32), width, height) > 0.999
     encoded = linear_to_srgb(image)
     total, count = np.zeros((3, 3)), 0

@@ -7,7 +7,7 @@ from pathlib import Path
 import av
 from av.container import InputContainer
 
-ENOUGH = 2**25
+OPENING_BYTES = 2**25
 """Bytes that a file is opened with: the contexts of its decoders, and some frames to know them by."""
 
 MAX_BOXES = 1000
@@ -33,7 +33,7 @@ def open_container(path: Path, form: str | None = None, **options: str) -> Input
     MemoryError
         If there is hardly any memory left, where PyAV would end the process.
     """
-    bytes(ENOUGH)  # given back at once, untouched: Python says that memory lacks, where PyAV would not
+    bytes(OPENING_BYTES)  # given back at once, untouched: Python says that memory lacks, where PyAV would not
     container: InputContainer = av.open(
         f"file:{path.absolute()}", format=form, options={"protocol_whitelist": "file", **options}
     )

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from smokelift.footage.images import Picture, area_average
 from smokelift.footage.seen import median_of_seen
 
-LONGEST = 160
+COMPARED_SIDE = 160
 """Pixels along the longer side of the pictures that are compared: noise is averaged out, and there are thousands."""
 
 USABLE = (0.005, 0.9)
@@ -78,7 +78,7 @@ def small(picture: Picture) -> Picture:
 
 def small_size(width: int, height: int) -> tuple[int, int]:
     """Return width and height of the `small` picture of one of a width and a height."""
-    scale = max(1.0, max(height, width) / LONGEST)
+    scale = max(1.0, max(height, width) / COMPARED_SIDE)
     return max(1, round(width / scale)), max(1, round(height / scale))
 
 

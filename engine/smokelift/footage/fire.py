@@ -18,7 +18,7 @@ from smokelift.footage.matte import matte
 from smokelift.footage.plate import Plate, Plates
 from smokelift.scene.checks import Vector
 
-BRIGHT = 0.5
+MIN_FLAME_RED = 0.5
 """Linear red that fire adds to what is behind it, at least: exposed for its surroundings it is clipped or nearly so."""
 
 WARM = 0.75
@@ -30,13 +30,13 @@ DARKER = 1 / 3
 MIN_FIRE_SHARE, MIN_SMOKE_SHARE = 0.002, 0.1
 """Shares of the smoke's pixels that are fire, and that have another colour, at least: fire lights the smoke near it."""
 
-FAINTEST = 0.01
+MIN_COLOURED_VALUE = 0.01
 """Linear value of the largest channel of a pixel whose colour counts: 8 bits show no colour in darker ones."""
 
 GLOW = 0.01
 """Width of the edge that still glows, as a share of the picture's longer side."""
 
-CLIPPED = 0.95
+CLIPPED_VALUE = 0.95
 """Linear value from which on a channel may have been larger."""
 
 COLOUR_FRAMES = 8
@@ -56,7 +56,7 @@ def fire_share(colours: Picture, behind: Picture) -> float:
     fire = _hot(colours, behind)
     brightest = brightest_channel(colours)
     # a core that is clipped to yellow or white does not show its color
-    other = ~_warm(colours) & (brightest > FAINTEST) & (brightest < CLIPPED)
+    other = ~_warm(colours) & (brightest > MIN_COLOURED_VALUE) & (brightest < CLIPPED_VALUE)
     if fire.mean() < MIN_FIRE_SHARE or other.mean() < MIN_SMOKE_SHARE:
         return 0.0
     added = brightest_channel(colours - behind)
@@ -98,7 +98,7 @@ def fire_colour(clip: Clip, light: Clip) -> Vector:
         picture, added = clip.frame(number), light.frame(number)
         weighted = added * added.max(-1, keepdims=True)
         whole += weighted.sum((0, 1), dtype=np.float64)
-        certain += weighted[picture.max(-1) < CLIPPED].sum(0, dtype=np.float64)
+        certain += weighted[picture.max(-1) < CLIPPED_VALUE].sum(0, dtype=np.float64)
     total = certain if certain.any() else whole
     red, green, blue = (float(value) for value in (total / total.max()).round(3))
     return red, green, blue
@@ -119,7 +119,7 @@ def _doused(picture: Picture, plate: Plate) -> Picture:
 
 def _hot(colours: Picture, behind: Picture) -> Mask:
     """Where light of a fire's colour and strength is added."""
-    return _warm(colours) & (colours[..., 0] - behind[..., 0] > BRIGHT)
+    return _warm(colours) & (colours[..., 0] - behind[..., 0] > MIN_FLAME_RED)
 
 
 def _warm(colours: Picture) -> Mask:
@@ -129,7 +129,7 @@ def _warm(colours: Picture) -> Mask:
 
 def _fire(picture: Picture, behind: Picture, smoke: Mask) -> Mask:
     """Fire with its glow, and with its core, which is clipped to yellow and white."""
-    joined = smoke & (_warm(picture) | (picture[..., 0] - behind[..., 0] > BRIGHT))
+    joined = smoke & (_warm(picture) | (picture[..., 0] - behind[..., 0] > MIN_FLAME_RED))
     fire = ndimage.binary_propagation(_hot(picture, behind) & smoke, mask=joined)
     width = max(1, round(GLOW * max(picture.shape[:2])))
     return np.asarray(ndimage.binary_dilation(ndimage.binary_fill_holes(fire), iterations=width))

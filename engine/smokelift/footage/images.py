@@ -36,7 +36,7 @@ Number = TypeVar("Number", np.float32, np.float64)
 MAX_PIXELS = 2**28
 """Pixels of a picture, at most."""
 
-LONGEST_SIDE = 4096
+MAX_PICTURE_SIDE = 4096
 """Pixels along the longer side of a clip's pictures; larger ones are reduced while they are read. The finest grid has
 144 voxels along a side, so smoke on a twentieth of the picture still has more pixels than voxels."""
 
@@ -172,8 +172,8 @@ def read_layer(path: str | Path, transfer: Transfer | None = None) -> tuple[Pict
 
 
 def reduction(width: int, height: int) -> int:
-    """Return by how much the sides of a picture are divided, so that none exceeds `LONGEST_SIDE`."""
-    return -(-max(width, height) // LONGEST_SIDE)
+    """Return by how much the sides of a picture are divided, so that none exceeds `MAX_PICTURE_SIDE`."""
+    return -(-max(width, height) // MAX_PICTURE_SIDE)
 
 
 def _require_size(path: Path, width: int, height: int) -> None:

@@ -28,7 +28,7 @@ SMOOTHING = 1.5
 MAX_SMOOTHING = 4.0
 """Standard deviation of that Gaussian in noise, in pixels, at most: more hides the smoke's own shape."""
 
-FAINTEST = 1.5
+MIN_DEVIATION = 1.5
 """Deviation from which on a pixel around certain smoke counts as smoke, in units of noise; with twice as much it counts
 fully (docs/experiments/faint-rim.md)."""
 
@@ -56,10 +56,10 @@ class Matte:
     def share(self) -> Picture:
         """How certain a pixel (rows, columns) shows smoke, from 0 to 1.
 
-        It is 1 in the mask, and around it as much as the deviation is above `FAINTEST`.
+        It is 1 in the mask, and around it as much as the deviation is above `MIN_DEVIATION`.
         """
-        share = np.clip(self.deviation / FAINTEST - 1, 0, 1)
-        share[~_around_certain(self.deviation, FAINTEST)] = 0
+        share = np.clip(self.deviation / MIN_DEVIATION - 1, 0, 1)
+        share[~_around_certain(self.deviation, MIN_DEVIATION)] = 0
         return np.asarray(share)
 
 

@@ -22,7 +22,7 @@ from smokelift.footage.turning import Turns, moved
 PADDING = 2
 """Pixels by which a frame is continued beyond its border, so that it is interpolated there as elsewhere."""
 
-WHOLE = 0.99
+MIN_SEEN_SHARE = 0.99
 """Share of a pixel of the panorama that a frame shows at least."""
 
 
@@ -97,7 +97,7 @@ class _Shown:
         clip = self._clip
         own = self._whole.seen(n, *clip.size)
         part = np.ones(clip.size[::-1], np.float32) if own is None else own.astype(np.float32)
-        return area_average(self.wide(n, part, 0) > WHOLE, width, height) >= HALF
+        return area_average(self.wide(n, part, 0) > MIN_SEEN_SHARE, width, height) >= HALF
 
     def wide(self, n: int, picture: Picture, padding: int = PADDING) -> Picture:
         """Return a picture (rows, columns, ...) of frame ``n`` of the file where it lies; 0 where it shows nothing."""

@@ -18,7 +18,7 @@ from smokelift.footage.clip import Clip, ClipError
 from smokelift.footage.exposure import gain_of, sample_gains, small
 from smokelift.footage.images import Picture, brightest_channel, linear_to_srgb
 
-LONGEST = 480
+PROXY_SIDE = 480
 """Pixels along the longer side: the lengths in pixels of `behind_smoke` hold at some hundred
 (docs/experiments/background.md)."""
 
@@ -26,7 +26,7 @@ OF_FILE, OF_CLIP = 32, 32
 """Frames of the file and of the clip, at most: a half of them is enough for a median, a third for a false-alarm rate of
 1e-3 where every second pair of smoke's samples is alike."""
 
-STILL = np.float32(4 / 255)
+MAX_STILL_CHANGE = np.float32(4 / 255)
 """Change of a pixel, in sRGB values, up to which it has not changed."""
 
 SAME_SHOT, STEADY = 0.25, 0.5
@@ -139,7 +139,7 @@ class Proxy:
 
 def proxy_size(width: int, height: int) -> tuple[int, int]:
     """Return width and height of the pictures of a proxy."""
-    scale = max(1.0, max(width, height) / LONGEST)
+    scale = max(1.0, max(width, height) / PROXY_SIDE)
     return max(1, round(width / scale)), max(1, round(height / scale))
 
 
@@ -168,7 +168,7 @@ def _alike(one: Picture, other: Picture) -> float:
     encoded = linear_to_srgb(one)
 
     def share(picture: Picture) -> float:
-        return float((brightest_channel(np.abs(linear_to_srgb(picture) - encoded)) < STILL).mean())
+        return float((brightest_channel(np.abs(linear_to_srgb(picture) - encoded)) < MAX_STILL_CHANGE).mean())
 
     found = share(other)
     return found if found >= STEADY else max(found, share(other / gain_of(other, one)))

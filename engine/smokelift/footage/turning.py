@@ -26,18 +26,18 @@ from smokelift.footage.images import Picture, blurred, channel_mean, linear_to_s
 from smokelift.footage.proxy import proxy_size
 from smokelift.scene import Camera, as_matrix
 
-FINE, COARSE, AROUND = 0.8, 3.0, 6.0
+FINE_SIGMA, COARSE_SIGMA, CONTRAST_SIGMA = 0.8, 3.0, 6.0
 """Standard deviations in pixels of the two Gaussians whose difference is compared, and of that over which its contrast
 is measured."""
 
-FAINT = 3 / 255
+MIN_CONTRAST = 3 / 255
 """Contrast in sRGB values below which there is more noise than texture."""
 
 CELLS = 6
 """Cells along the picture's longer side; others between them overlap them by half."""
 
 TEXTURE = 0.5
-"""Mean square of a cell, in units of its contrast and `FAINT` together, from which on the contrast is the greater."""
+"""Mean square of a cell, in units of its contrast and `MIN_CONTRAST` together, from which on contrast is greater."""
 
 SAME = 0.5
 """Correlation of a cell in two pictures from which on it is found again: half of its variance is the same."""
@@ -310,8 +310,8 @@ def moved(places: Doubles, matrix: Doubles) -> Doubles:
 def detail_of(picture: Picture) -> Picture:
     """Return a linear picture (rows, columns, 3) in grey, band-passed, in units of the contrast around each pixel."""
     grey = channel_mean(linear_to_srgb(picture))
-    detail = blurred(grey, FINE) - blurred(grey, COARSE)
-    return np.asarray(detail / np.sqrt(blurred(detail**2, AROUND) + FAINT**2), np.float32)
+    detail = blurred(grey, FINE_SIGMA) - blurred(grey, COARSE_SIGMA)
+    return np.asarray(detail / np.sqrt(blurred(detail**2, CONTRAST_SIGMA) + MIN_CONTRAST**2), np.float32)
 
 
 def _stands_still(clip: Clip, key: Key, size: tuple[int, int]) -> bool:

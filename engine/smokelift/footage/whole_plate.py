@@ -22,7 +22,7 @@ from smokelift.footage.stored_picture import Edges
 STEP = 2
 """Every so manieth frame is read whole: half of those that are examined."""
 
-AROUND = 16
+DETAIL_MARGIN = 16
 """Pixels of the proxy around what is unknown whose detail bounds that of the unknown."""
 
 
@@ -54,7 +54,7 @@ def whole_plate(clip: Clip, proxy: Proxy, gains: Picture, found: ClearPicture) -
         return whole
     rows, columns = (np.flatnonzero(~known.all(axis)) for axis in (1, 0))
     (top, down), (left, right) = (
-        (max(0, int(lines[0]) - AROUND), min(n, int(lines[-1]) + 1 + AROUND))
+        (max(0, int(lines[0]) - DETAIL_MARGIN), min(n, int(lines[-1]) + 1 + DETAIL_MARGIN))
         for lines, n in ((rows, known.shape[0]), (columns, known.shape[1]))
     )
     small = np.s_[top:down, left:right]

@@ -18,7 +18,7 @@ from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
 from smokelift.setup.smoke import unknown_part
 
-CLEAN, NOISY = 2.0, 6.0
+CLEAN_NOISE, HEAVY_NOISE = 2.0, 6.0
 """Noise in 8 bit codes up to which a clip is called clean, and from which noisy: thin smoke is lost in it
 (docs/experiments/background.md)."""
 
@@ -128,7 +128,7 @@ def _exposure(shot: Shot, plate: Plate) -> Fact:
 
 def _noise(plate: Plate) -> Fact:
     codes = 255 * float(plate.noise.total.max())
-    kind = "clean" if codes <= CLEAN else "noisy: thin smoke is lost in it" if codes >= NOISY else "usual"
+    kind = "clean" if codes <= CLEAN_NOISE else "noisy: thin smoke is lost in it" if codes >= HEAVY_NOISE else "usual"
     lasting = 255 * float(plate.noise.lasting.max())
     return Fact("noise", f"{kind}, {codes:.1f} of 255", "measured", f"{lasting:.1f} of it is shared by neighbours.")
 

@@ -10,7 +10,7 @@ from smokelift.density import RoundDepth, ViewSet
 from smokelift.scene import Domain
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot
-from smokelift.setup.smoke import SAMPLES
+from smokelift.setup.smoke import SAMPLE_FRAMES
 
 MAX_SIDE_VOXELS = 96
 """Voxels along the longest side of the grid on which the smoke is found, at most: it takes a rim of one of them
@@ -49,7 +49,7 @@ class Workload:
     def of(shot: Shot, settings: Settings) -> Workload:
         """Measure the smoke of some frames of a shot that was prepared with settings, on a coarse grid."""
         shares = _shares(shot, settings)
-        smoky = len(shot.smoky) / len(shot.spread(SAMPLES))
+        smoky = len(shot.smoky) / len(shot.spread(SAMPLE_FRAMES))
         return Workload(
             settings=settings,
             frames=shot.length,

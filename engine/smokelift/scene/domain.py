@@ -15,7 +15,7 @@ from smokelift.scene.checks import SceneError, Vector, integer, items, positive,
 Side = Literal["x-", "x+", "y-", "y+", "z-", "z+"]
 SIDES: tuple[Side, ...] = ("x-", "x+", "y-", "y+", "z-", "z+")
 
-LONGEST = 4096
+MAX_SIDE_VOXELS = 4096
 """Voxels along a side of a box, at most: 32 bits know a place along a longer side too roughly."""
 
 
@@ -92,8 +92,8 @@ class Domain(Box):
     def __post_init__(self) -> None:
         """Check every value and store plain tuples."""
         super().__post_init__()
-        key, expected = "resolution", f"three whole numbers [nx, ny, nz], all at least 1 and at most {LONGEST}"
-        counts = tuple(integer(v, key, expected, 1, LONGEST) for v in items(self.resolution, 3, key, expected))
+        key, expected = "resolution", f"three whole numbers [nx, ny, nz], all at least 1 and at most {MAX_SIDE_VOXELS}"
+        counts = tuple(integer(v, key, expected, 1, MAX_SIDE_VOXELS) for v in items(self.resolution, 3, key, expected))
         set_fields(self, resolution=counts)
         edges = [(high - low) / n for low, high, n in zip(self.min, self.max, counts, strict=True)]
         if max(edges) > 1.001 * min(edges):

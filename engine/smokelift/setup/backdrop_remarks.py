@@ -11,7 +11,7 @@ from smokelift.footage.exposure import largest_change, small
 from smokelift.footage.plate import Plate, Plates
 from smokelift.footage.quantiser import COARSE
 from smokelift.footage.steady import exposures
-from smokelift.setup.smoke import SAMPLES, SmokeSamples, unknown_part
+from smokelift.setup.smoke import SAMPLE_FRAMES, SmokeSamples, unknown_part
 
 BLACK = 0.001
 """Linear radiance below which a background is called black."""
@@ -29,7 +29,7 @@ that crosses all of a picture has no two straight edges. A generated clip with b
 over all of their rows (docs/clips.md). Each frame shows most of that picture, while a puff that passes fills a strip in
 the course of time."""
 
-FEW = 4
+MIN_SAME_FRAMES = 4
 """Frames from which on smoke hardly looks the same in all by chance: half of its pairs of successive samples do."""
 
 LARGE_NOISE = 6 / 255
@@ -55,7 +55,7 @@ def backdrop_doubts(found: Backdrop) -> tuple[Doubt, ...]:
     """Why a background may be wrong."""
     if found.source == "colour around one frame":
         return (Doubt("background of one frame"),)
-    few = found.source == "picture" and 1 < found.frames < FEW
+    few = found.source == "picture" and 1 < found.frames < MIN_SAME_FRAMES
     compressed = found.quantiser is not None and found.quantiser >= COARSE
     return (
         *((Doubt("background of few frames", {"frames": found.frames}),) if few else ()),
@@ -118,7 +118,7 @@ def nothing_seen(
     """
     if samples.smoky:
         return ()
-    nothing = Doubt("no smoke examined", {"frames": len(clip.spread(SAMPLES))})
+    nothing = Doubt("no smoke examined", {"frames": len(clip.spread(SAMPLE_FRAMES))})
     return (nothing, *(cuts or (what_helps(clip, plates, given),)))
 
 

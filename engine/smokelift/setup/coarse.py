@@ -19,7 +19,7 @@ from smokelift.scene import Camera, CompleteScene, Domain, Light, Scattering
 from smokelift.scene.projection import voxel_width
 from smokelift.setup.shot import ShotView
 
-LONGEST = 32
+COARSE_SIDE = 32
 """Voxels along the longest side at most: a few per cent of the work of 96, with every large shadow in its place."""
 
 SHORTEST = 4
@@ -121,10 +121,10 @@ class CoarseClip:
     _frames: dict[tuple[int, int], CoarseFrame | None] = field(default_factory=dict)
 
     def frame(self, number: int, times: int = 1) -> CoarseFrame | None:
-        """A frame on a grid so many times finer than `LONGEST` asks for; None if it does not show the domain."""
+        """A frame on a grid so many times finer than `COARSE_SIDE` asks for; None if it does not show the domain."""
         key = number, times
         if key not in self._frames:
-            self._frames[key] = coarse_frame(self.views, number, self.scene, times * LONGEST)
+            self._frames[key] = coarse_frame(self.views, number, self.scene, times * COARSE_SIDE)
         return self._frames[key]
 
     def smoky(self, numbers: Sequence[int]) -> dict[int, CoarseFrame]:
@@ -133,7 +133,7 @@ class CoarseClip:
         return {number: frame for number, frame in frames.items() if frame is not None and frame.shows_smoke}
 
 
-def coarse_domain(domain: Domain, pixels: float, most_voxels: int = LONGEST) -> Domain:
+def coarse_domain(domain: Domain, pixels: float, most_voxels: int = COARSE_SIDE) -> Domain:
     """The box with fewer voxels: a whole number of fine ones in each if that is possible, else a little less of it.
 
     Parameters
@@ -163,7 +163,7 @@ def coarse_domain(domain: Domain, pixels: float, most_voxels: int = LONGEST) -> 
 
 
 def coarse_frame(
-    views: Sequence[ShotView], number: int, scene: CompleteScene, most_voxels: int = LONGEST
+    views: Sequence[ShotView], number: int, scene: CompleteScene, most_voxels: int = COARSE_SIDE
 ) -> CoarseFrame | None:
     """Make a frame coarse; None if one of the cameras does not see the domain.
 

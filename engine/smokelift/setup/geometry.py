@@ -38,13 +38,13 @@ OTHER_LENSES = (0.6, 2.0)
 """Other focal lengths over the usual one that a camera which turns may have: that of phones, 26 to 30 mm, and 100 mm.
 Either is right within a factor of one and a half for all lenses from 20 to 150 mm."""
 
-MARGIN = 0.06
+BOX_MARGIN = 0.06
 """Margin on each side of an estimated box, as a fraction of its longer side."""
 
 NARROWEST = 0.25
 """Width over height of an estimated box at least, and the reverse."""
 
-COARSEST = 32
+MIN_SIDE_VOXELS = 32
 """Voxels along the longest side at least: with fewer there is nothing more to save."""
 
 DETAIL_FRAMES = 3
@@ -151,7 +151,7 @@ def _divided(
     def grids(quality: Quality) -> tuple[Domain, ...]:
         if isinstance(box, Domain):
             return _same_shape(box, LIMITS[quality].voxels(_pixels(still, box)))
-        (coarsest,) = _grids(floor, size, COARSEST, 1)
+        (coarsest,) = _grids(floor, size, MIN_SIDE_VOXELS, 1)
         return _grids(floor, size, LIMITS[quality].voxels(_pixels(still, coarsest)), 1)
 
     return _resolved(clip, camera, grids, plates, samples.smoky, settings)
@@ -288,7 +288,7 @@ def _grids(floor: Doubles, size: Doubles, allowed: int, multiple: int) -> tuple[
     Where multiples of so many cubes do not fill it, it grows upward and to all sides.
     """
     grids = []
-    for longest in range(COARSEST, max(allowed, COARSEST) + 1, 4):
+    for longest in range(MIN_SIDE_VOXELS, max(allowed, MIN_SIDE_VOXELS) + 1, 4):
         voxel = float(size.max() / longest)
         x, y, z = (max(8, multiple * math.ceil(side / voxel / multiple - 1e-6)) for side in size)
         grids.append(_standing_on(floor, voxel, (x, y, z)))
@@ -323,7 +323,7 @@ def _covered(samples: SmokeSamples) -> tuple[float, float, float, float]:
     first_x, first_y, last_x, last_y = samples.bounds
     left, right = (float(v) * samples.scale + first_x for v in (left, right))
     top, bottom = (float(v) * samples.scale + first_y for v in (top, bottom))
-    margin = MARGIN * max(right - left, bottom - top)
+    margin = BOX_MARGIN * max(right - left, bottom - top)
     left, right = max(left - margin, first_x), min(right + margin, last_x)
     return left, right, max(top - margin, first_y), min(bottom + margin, last_y)
 
@@ -333,7 +333,7 @@ def _same_shape(domain: Domain, most: int) -> tuple[Domain, ...]:
     common = math.gcd(*domain.resolution)
     x, y, z = (n // common for n in domain.resolution)
     longest = max(x, y, z)
-    fewest = -(-min(COARSEST, max(domain.resolution)) // longest)
+    fewest = -(-min(MIN_SIDE_VOXELS, max(domain.resolution)) // longest)
     return tuple(
         replace(domain, resolution=(x * times, y * times, z * times))
         for times in range(fewest, max(most // longest, fewest) + 1)

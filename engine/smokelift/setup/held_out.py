@@ -23,7 +23,7 @@ from smokelift.render import Image, Optics, scene_optics
 from smokelift.scene import FiniteLight, Scattering
 from smokelift.setup.coarse import CoarseFrame, CoarseView
 
-FAINTEST = 1e-3
+MIN_CHANNEL_POWER = 1e-3
 """Power of a channel's light over that of the brightest one, below which the channel has no strength of its own."""
 
 BLACK = np.zeros(3, np.float32)
@@ -101,7 +101,7 @@ class HalfFit:
         if not power.sum() > 0:
             return HeldOut(error, 1.0, np.ones_like(power))
         whole = np.maximum(product.sum(1, keepdims=True) / np.maximum(power.sum(1, keepdims=True), 1e-30), 0)
-        lit = power > FAINTEST * power.max(1, keepdims=True)
+        lit = power > MIN_CHANNEL_POWER * power.max(1, keepdims=True)
         colours = np.where(lit, np.maximum(product, 0) / np.maximum(power, 1e-30), whole)
         return HeldOut(error, float(product.sum() / power.sum()), colours)
 

@@ -25,21 +25,21 @@ from smokelift.scene import SHADOWED, DirectionalLight, EnvironmentLight, Light,
 from smokelift.setup.coarse import CoarseClip, CoarseFrame
 from smokelift.setup.estimate import UNDETERMINED, Estimate, given, measured, undetermined
 from smokelift.setup.held_out import HalfFit, HeldOut, fit_half, held_out
-from smokelift.setup.scattering import NEARER, choose_scattering, tries_multiple
+from smokelift.setup.scattering import MAX_ERROR_RATIO, choose_scattering, tries_multiple
 from smokelift.setup.settings import Settings
 from smokelift.setup.sky import AMBIENT, directional, find_sky, light_around
 from smokelift.setup.smoke import SmokeSamples
-from smokelift.setup.source import FAINTEST, source_radiance
+from smokelift.setup.source import MIN_SOURCE_VALUE, source_radiance
 from smokelift.setup.thickness import smoke_thickness
 
 STEP = 1.25
 """Ratio of one strength of given lights to the next that is tried: smoke nearly as bright as its light allows differs
 by as much in optical depth."""
 
-STRONGEST = 8.0
+MAX_STRENGTH = 8.0
 """Largest strength that is tried. Light given in other units than the picture's is a mistake, not a measurement."""
 
-MISSING = 0.05
+MAX_MISSING_LIGHT = 0.05
 """Light that may be missing before the given one is contradicted: blocks of multiple scattering are themselves up to as
 much too dark (docs/experiments/multiple-scattering.md)."""
 
@@ -48,10 +48,10 @@ DOUBTFUL = 0.12
 likely wrong: from there on the mass was off by 1.5 and more in 38 of 42 clips, below in 34 of 86
 (docs/experiments/surroundings.md)."""
 
-EVEN = 0.1
+MAX_COLOUR_SPREAD = 0.1
 """Spread of a background of one colour at most, as a share of its mean."""
 
-QUIET = 2 / 255
+MAX_QUIET_NOISE = 2 / 255
 """Noise up to which what is left is not the noise's."""
 
 
@@ -217,10 +217,10 @@ def light_remarks(light: Illumination, samples: SmokeSamples, noise: Noise) -> t
     scattered = next((each for each in light.measured if each.what == "scattering"), None)
     error = 0.0 if scattered is None else scattered.figures.get(f"error_{scattered.value}", 0.0)
     assert isinstance(error, float)
-    if error < DOUBTFUL or not len(samples.behind) or noise.total.max() > QUIET:
+    if error < DOUBTFUL or not len(samples.behind) or noise.total.max() > MAX_QUIET_NOISE:
         return (taken,)
     low, high = np.percentile(samples.behind.max(-1), (5, 95))
-    if high < FAINTEST or high - low > EVEN * high:
+    if high < MIN_SOURCE_VALUE or high - low > MAX_COLOUR_SPREAD * high:
         return (taken,)
     return taken, Doubt("likely wrong light", {"error": error})
 
@@ -273,7 +273,7 @@ def _strengthened(
 
     factor, found = 1.0, tried(1.0)
     as_given = found
-    while found.light > 1 + MISSING and factor * STEP <= STRONGEST:
+    while found.light > 1 + MAX_MISSING_LIGHT and factor * STEP <= MAX_STRENGTH:
         stronger = tried(factor * STEP)
         if stronger.error >= found.error or stronger.light >= found.light:
             break
@@ -281,7 +281,7 @@ def _strengthened(
     if factor == 1.0:
         return lights, as_given.error, ()
     figures = {"factor": factor, "asked_for": found.light, "asked_for_as_given": as_given.light, "error": found.error}
-    strength = measured("light strength", f"{factor:.3g}", figures, tolerance=1 + MISSING)
+    strength = measured("light strength", f"{factor:.3g}", figures, tolerance=1 + MAX_MISSING_LIGHT)
     return tuple(light.scaled(factor) for light in lights), found.error, (strength,)
 
 
@@ -301,7 +301,7 @@ def _surroundings(
     assert isinstance(error, float)
     views = [frame.views[0] for frame in frames]
     behind = np.concatenate([view.plate.image[view.smoke] for view in views]).mean(0, dtype=np.float64)
-    if error <= tolerance or behind.max() < FAINTEST:
+    if error <= tolerance or behind.max() < MIN_SOURCE_VALUE:
         return None
 
     def left(radiance: NDArray[np.float64]) -> HeldOut:
@@ -312,7 +312,7 @@ def _surroundings(
     wanted = radiance * left(radiance).colours[0]
     coloured = wanted * radiance.mean() / max(wanted.mean(), 1e-30)
     found = left(coloured).error
-    if not found < min(NEARER * error, error - tolerance):
+    if not found < min(MAX_ERROR_RATIO * error, error - tolerance):
         return None
     compared: Figures = {"error": found, "error_single": found, "other": scattered.value, "other_error": error}
     return light_around(coloured), replace(

@@ -17,7 +17,7 @@ from smokelift.setup.settings import Settings
 from smokelift.setup.velocity_grid import choose_coarsening, choose_levels
 from smokelift.velocity import VelocitySettings
 
-ALONE = 10.0
+ONE_VIEW_SMOOTHNESS = 10.0
 """Factor on the velocity's smoothness where a camera that stands still alone sees the smoke: what moves is mixed along
 its rays then, and a depth that is assumed anew in every frame moves as well (docs/experiments/velocity-one-view.md)."""
 
@@ -57,7 +57,7 @@ def choose_model(
     coarsened = choose_coarsening(scene.domain, settings.velocity, settings.selection.velocity_side)
     velocity = replace(settings.velocity, coarsening=coarsened.value)
     several = bool(scene.views) or scene.camera.moves
-    smoothness = velocity.smoothness if several else ALONE * velocity.smoothness
+    smoothness = velocity.smoothness if several else ONE_VIEW_SMOOTHNESS * velocity.smoothness
     if not frames:
         return Model(replace(velocity, levels=velocity.grids, smoothness=smoothness), ())
 

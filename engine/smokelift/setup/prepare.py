@@ -26,7 +26,7 @@ from smokelift.setup.model import choose_model, tried_frames
 from smokelift.setup.place import placed
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot, ShotView
-from smokelift.setup.smoke import SAMPLES
+from smokelift.setup.smoke import SAMPLE_FRAMES
 from smokelift.setup.view_gain import balanced
 
 
@@ -152,7 +152,7 @@ def _check(clip: Clip, scene: Scene, settings: Settings) -> None:
 
 def _expect(clip: Clip, scene: Scene) -> None:
     """Say which frames are examined, so that each of them is decoded once."""
-    examined, estimates = clip.spread(SAMPLES), scene.background is None
+    examined, estimates = clip.spread(SAMPLE_FRAMES), scene.background is None
     # a velocity needs the frame after one with smoke, and a background more frames than the smoke
     others = {n + 1 for n in examined} | {n - clip.first for n in (proxy_frames(clip) if estimates else ())}
     clip.expect([*examined, *sorted(n for n in others.difference(examined) if n >= 0)])

@@ -25,12 +25,12 @@ from smokelift.setup.held_out import held_out
 MODELS: tuple[Scattering, ...] = ("absorption", "unshadowed", "single", "multiple")
 """Models of scattering, from the cheapest to the richest."""
 
-NEARER = 0.75
+MAX_ERROR_RATIO = 0.75
 """Error of one model over that of another of which it is no special case, below which it is taken. Multiple over single
 scattering: 0.01 to 0.63 where paths were traced, but for smoke that either model fits, and 0.82 and more where light
 is scattered once (docs/experiments/scattering-selection.md)."""
 
-SETTLED = 64
+MAX_DESCENT_STEPS = 64
 """Steps of descent that a fit may take where models are distinguished that differ little: enough for every fit to end
 by itself. One that is cut off has the error of the steps which it lacks (docs/experiments/scattering-selection.md)."""
 
@@ -70,12 +70,12 @@ def choose_scattering(
     errors = {richest: error(richest, richest)}
     if richest == "single" and tries_multiple(frames[0].scene):
         errors["multiple"] = error("multiple", "multiple")
-        if errors["multiple"] < NEARER * errors["single"]:
+        if errors["multiple"] < MAX_ERROR_RATIO * errors["single"]:
             richest = "multiple"
         # else the errors may be those of the coarse grid: either model seems to fit the smoke, or neither does
         elif (larger := finer()) is not None and larger.scene.domain != frames[0].scene.domain:
             frames, known = [larger.lit_by(frames[0].scene.lights)], {}
-            settings = replace(settings, descent_iterations=max(SETTLED, settings.descent_iterations))
+            settings = replace(settings, descent_iterations=max(MAX_DESCENT_STEPS, settings.descent_iterations))
             return choose_scattering(frames, "single", settings, tolerance, known, lambda: None)
     chosen = richest
     for model in MODELS[: MODELS.index(richest)]:

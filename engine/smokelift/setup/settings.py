@@ -10,7 +10,7 @@ from typing import Any, Literal
 from smokelift.density import DensitySettings
 from smokelift.scene import SCATTERINGS, Scattering
 from smokelift.scene.checks import integer, items, number, positive
-from smokelift.scene.domain import LONGEST
+from smokelift.scene.domain import MAX_SIDE_VOXELS
 from smokelift.velocity import VelocitySettings
 
 MethodName = Literal["default", "paper"]
@@ -47,7 +47,7 @@ LIMITS: Mapping[Quality, GridLimit] = {
     "draft": GridLimit(0, 64, 64),
     "balanced": GridLimit(1 / 3, 96, 128),
     "fine": GridLimit(1 / 2, 144, 256),
-    "final": GridLimit(1, 0, LONGEST),
+    "final": GridLimit(1, 0, MAX_SIDE_VOXELS),
 }
 """Limits of each quality. What a share loses is much the same whatever the clip's size; the bounds keep the time of a
 frame, which goes with the voxels, from growing with the size of the clip (docs/experiments/resolution-selection.md)."""

@@ -25,13 +25,13 @@ from smokelift.setup.held_out import HalfFit, fit_half
 DIRECTIONS = 48
 """Directions that are tried first, spread evenly: neighbours are about 30 degrees apart."""
 
-NARROWER = (14.0, 7.0)
+REFINING_DEGREES = (14.0, 7.0)
 """Degrees from the best one of the six directions that are tried next, and from the best of those."""
 
 ROUNDS = 3
 """Fits of the densities, each in the light that the one before led to."""
 
-SIDES = ((1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, -1.0))
+AXES = ((1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, -1.0))
 """Directions of travel that stand for all: 14 find no other density (docs/experiments/surroundings.md)."""
 
 
@@ -105,7 +105,7 @@ def directional(towards: Doubles, irradiance: Doubles) -> DirectionalLight:
 
 def light_around(radiance: Doubles) -> tuple[DirectionalLight, ...]:
     """Light from everywhere of a radiance (3,), in W/m^2/sr."""
-    return tuple(directional(-np.array(side), 4 * np.pi * radiance / len(SIDES)) for side in SIDES)
+    return tuple(directional(-np.array(side), 4 * np.pi * radiance / len(AXES)) for side in AXES)
 
 
 def find_sky(frames: Sequence[CoarseFrame], scene: CompleteScene, settings: DensitySettings) -> Sky | None:
@@ -205,7 +205,7 @@ def _explained(fit: HalfFit, colour: Doubles) -> Sky:
     everywhere = [lit.mean(0) for lit in suns]
     sums = sums_of(suns)
     rest = np.array([(around @ around, around @ seen) for around, seen in zip(everywhere, added, strict=True)]).T
-    for angle in NARROWER:
+    for angle in REFINING_DEGREES:
         ring = _ring(tried[best_of([*cameras])[0]], angle)
         tried, sums = np.concatenate([tried, ring]), np.concatenate([sums, sums_of(pictures(ring))], -1)
     best, sun, ambient, explained = best_of([*cameras])

@@ -16,7 +16,7 @@ from smokelift.footage.plate import Plates
 from smokelift.footage.steady import exposures
 from smokelift.setup.thickness import seen_texture
 
-SAMPLES, LONGEST = 16, 320
+SAMPLE_FRAMES, SAMPLE_SIDE = 16, 320
 """Frames that are examined, and pixels along their longer side."""
 
 UNKNOWN = 0.5
@@ -89,7 +89,7 @@ def sample_smoke(clip: Clip, plates: Plates, corner: tuple[int, int] = (0, 0)) -
         Left and top of its pictures in pixels of the camera's.
     """
     width, height = clip.size
-    scale = max(1.0, max(width, height) / LONGEST)
+    scale = max(1.0, max(width, height) / SAMPLE_SIDE)
     columns, rows = (max(1, round(side / scale)) for side in (width, height))
     covered, unknown = np.zeros((2, rows, columns), np.bool_)
     colours, behind, textures = [], [], []
@@ -97,7 +97,7 @@ def sample_smoke(clip: Clip, plates: Plates, corner: tuple[int, int] = (0, 0)) -
     amounts: dict[int, int] = {}
     reduced = plates.through(lambda whole: area_average(whole, columns, rows), scale**2)
     gains_of = exposures(reduced)
-    for number in clip.spread(SAMPLES):
+    for number in clip.spread(SAMPLE_FRAMES):
         plate = reduced.at(number)
         seen = clip.stored(number).averaged(columns, rows)
         gains[number] = gains_of(number, small(seen))

@@ -18,7 +18,7 @@ from smokelift.scene.checks import Vector
 from smokelift.setup.estimate import Estimate, measured, undetermined
 from smokelift.setup.smoke import SmokeSamples
 
-BEYOND = 0.1
+SOURCE_EXCESS = 0.1
 """Share by which the source radiance exceeds the 99th percentile of the smoke's. That smoke then has an optical depth
 of about 2.4, not an infinite one."""
 
@@ -27,16 +27,16 @@ COLOURED = 12.0
 Grey world and its kin are 5 to 6 degrees wrong on the mean, and 10 in the worst quarter of pictures (Gijsenij, Gevers
 and van de Weijer, "Computational color constancy: survey and experiments", 2011)."""
 
-THICKEST = 90
+THICK_PERCENTILE = 90
 """Percentile of the change from which on smoke is measured: the thickest is nearest to the source."""
 
-CLIPPED = 0.95
+CLIPPED_VALUE = 0.95
 """Linear value from which on a channel may have been larger."""
 
 PIXELS = 50
 """Smallest number of smoke pixels that have a colour."""
 
-FAINTEST = 0.01
+MIN_SOURCE_VALUE = 0.01
 """Linear value of the brightest channel at least: a darker source has no colour that 8 bits show."""
 
 WHITE: Vector = (1.0, 1.0, 1.0)
@@ -67,12 +67,12 @@ def source_radiance(samples: SmokeSamples, measured: Doubles | None = None) -> D
         bound = np.percentile(samples.colours[changes == brightens], 99 if brightens else 1, axis=0)
         return np.maximum(measured, bound) if brightens else np.minimum(measured, bound)
     if not brightens:
-        return np.asarray((1 - BEYOND) * np.percentile(samples.colours, 1, axis=0))
+        return np.asarray((1 - SOURCE_EXCESS) * np.percentile(samples.colours, 1, axis=0))
     # on the line of colours: the brightest of each channel may be other smoke, and together a colour that none shows
     colours, behind = samples.colours.astype(np.float64), samples.behind.astype(np.float64)
     axis, start = _line_of_colours(colours, behind), behind.mean(0)
     farthest = start + (np.percentile(colours @ axis, 99) - start @ axis) * axis
-    return np.asarray(np.maximum(farthest + BEYOND * np.linalg.norm(farthest) * axis, 0))
+    return np.asarray(np.maximum(farthest + SOURCE_EXCESS * np.linalg.norm(farthest) * axis, 0))
 
 
 def smoke_colour(samples: SmokeSamples, light: Doubles) -> tuple[Vector, Estimate[str]]:
@@ -98,7 +98,7 @@ def smoke_colour(samples: SmokeSamples, light: Doubles) -> tuple[Vector, Estimat
     behind, seen = line
     sources = _sources(behind, seen)
     white = _degrees(sources, light)
-    least = np.minimum(white, _degrees(sources, behind)) if behind.max() > FAINTEST else white
+    least = np.minimum(white, _degrees(sources, behind)) if behind.max() > MIN_SOURCE_VALUE else white
     if least.min() < COLOURED:
         figures = {"degrees": float(least.min())}
         return WHITE, undetermined("smoke colour near the light's", "smoke colour", figures, tolerance=COLOURED)
@@ -116,10 +116,10 @@ def several_colours(samples: SmokeSamples) -> tuple[Doubt, ...]:
     Before black all light of smoke of one colour has that colour, however thick it is. What is off the one colour that
     explains the most of the light is another colour's. White that is clipped has none.
     """
-    shown = samples.colours[samples.colours.min(-1, initial=1.0) < CLIPPED].astype(np.float64)
-    if len(shown) < PIXELS or np.percentile(samples.behind.max(-1), THICKEST) >= FAINTEST:
+    shown = samples.colours[samples.colours.min(-1, initial=1.0) < CLIPPED_VALUE].astype(np.float64)
+    if len(shown) < PIXELS or np.percentile(samples.behind.max(-1), THICK_PERCENTILE) >= MIN_SOURCE_VALUE:
         return ()
-    if np.percentile(shown.max(-1), THICKEST) < FAINTEST:
+    if np.percentile(shown.max(-1), THICK_PERCENTILE) < MIN_SOURCE_VALUE:
         return ()
     along = np.linalg.eigvalsh(shown.T @ shown)
     off = float(np.degrees(np.arcsin(np.sqrt(along[:-1].sum().clip(0) / along.sum()))))
@@ -143,17 +143,17 @@ def _line_of_colours(colours: Doubles, behind: Doubles) -> Doubles:
 
 def _thickest(samples: SmokeSamples) -> tuple[Doubles, Doubles] | None:
     """Background and colour of the thickest smoke that is not clipped; None if there is too little of it."""
-    clear = brightest_channel(samples.colours) < CLIPPED
+    clear = brightest_channel(samples.colours) < CLIPPED_VALUE
     if clear.sum() < max(PIXELS, 0.1 * len(clear)):
         return None
     colours, behind = (values[clear].astype(np.float64) for values in (samples.colours, samples.behind))
     change, axis = colours - behind, _line_of_colours(colours, behind)
     # a small error of the line is all of a dark colour: only the thickest pixels show that
     amount = change @ axis if samples.brightens else np.linalg.norm(change, axis=-1)
-    thick = amount >= np.percentile(amount, THICKEST)
+    thick = amount >= np.percentile(amount, THICK_PERCENTILE)
     start = np.maximum(behind[thick].mean(0), 0)
     seen = start + amount[thick].mean() * axis if samples.brightens else colours[thick].mean(0)
-    return (start, np.maximum(seen, 0)) if seen.max() >= FAINTEST else None
+    return (start, np.maximum(seen, 0)) if seen.max() >= MIN_SOURCE_VALUE else None
 
 
 def _sources(behind: Doubles, seen: Doubles) -> Doubles:

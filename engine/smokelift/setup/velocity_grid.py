@@ -16,7 +16,7 @@ from smokelift.velocity.settings import LEVELS
 FASTEST = 99
 """Percentile of the smoke's speed that counts as the largest: single wisps may be wrong."""
 
-MARGIN = 1.25
+REACH_FACTOR = 1.25
 """Factor by which grids reach further than the motion that is found, since coarse densities show less than there is."""
 
 
@@ -45,7 +45,7 @@ def levels_for(motion: float) -> int:
 
     Every linearisation reaches a voxel of its own grid, so grids 1, 2, 4, ... voxels wide reach 2^levels - 1 together.
     """
-    return min(max(int(np.ceil(np.log2(MARGIN * motion + 1) - 1e-9)), 1), LEVELS)
+    return min(max(int(np.ceil(np.log2(REACH_FACTOR * motion + 1) - 1e-9)), 1), LEVELS)
 
 
 def choose_levels(

@@ -24,7 +24,7 @@ from smokelift.setup.shot import ShotView
 STEP = 1.2
 """Ratio of one gain to the next that is tried; between them it is where a parabola has its lowest point."""
 
-LARGEST = 8.0
+MAX_GAIN = 8.0
 """Largest gain that is tried, and the inverse of the smallest: three stops."""
 
 RATIO, RATIO_UNLIT = 1.2, 1.35
@@ -106,7 +106,7 @@ def balanced(
 def _best(error_of: Callable[[float], float], at_one: float) -> float:
     """The gain of the least error, from 1 on downhill."""
     errors = {0: at_one}
-    last = int(math.log(LARGEST) / math.log(STEP))
+    last = int(math.log(MAX_GAIN) / math.log(STEP))
 
     def error(step: int) -> float:
         if step not in errors:

@@ -11,7 +11,7 @@ import pytest
 from scipy import ndimage
 
 from smokelift.density import DensitySettings, DetailedDepth, GradientFit, RoundDepth, ViewSet, moment_levels
-from smokelift.density.detailed_depth import NEAR, EveryView
+from smokelift.density.detailed_depth import OWN_PICTURE_DEGREES, EveryView
 from smokelift.footage.clip import Clip
 from smokelift.scene import Scene
 from smokelift.setup.prepare import prepare_shot
@@ -137,8 +137,8 @@ def test_no_azimuth_is_near_to_a_camera(two_views) -> None:
     table = detail.texture.turntable
     cameras = [table.degrees(view.camera) for view in views.views]
     degrees = np.array([degrees for _, degrees in islice(detail.azimuths(), 60)])
-    assert min(abs((each - camera + 90) % 180 - 90) for each in degrees for camera in cameras) >= NEAR
-    assert np.diff(np.sort(degrees)).max() < 2.5 * NEAR
+    assert min(abs((each - camera + 90) % 180 - 90) for each in degrees for camera in cameras) >= OWN_PICTURE_DEGREES
+    assert np.diff(np.sort(degrees)).max() < 2.5 * OWN_PICTURE_DEGREES
 
 
 @pytest.mark.parametrize("count", [1, 2])

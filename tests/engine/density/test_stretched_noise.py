@@ -5,7 +5,7 @@ import pytest
 from scipy import ndimage
 
 import smokelift._core as _core
-from smokelift.density.stretched_noise import COARSEST, STRETCH, StretchedNoise, roughness
+from smokelift.density.stretched_noise import MAX_NODE_DISTANCE, STRETCH, StretchedNoise, roughness
 
 WIDTH = 8.0
 NONE = (0.0, 0.0, 0.0)
@@ -106,7 +106,9 @@ def test_the_coarsest_octave_is_as_wide_as_lobes() -> None:
     """Neighbours closer than its nodes agree, and voxels further apart do not."""
     shape = (64, 16, 16)
     noise = StretchedNoise(np.zeros(3), 4.0, (1.0,), 0).at(level(shape)).reshape(shape)
-    near, far = (np.corrcoef(noise[:-by].ravel(), noise[by:].ravel())[0, 1] for by in (2, int(3 * COARSEST * 4.0)))
+    near, far = (
+        np.corrcoef(noise[:-by].ravel(), noise[by:].ravel())[0, 1] for by in (2, int(3 * MAX_NODE_DISTANCE * 4.0))
+    )
     assert near > 0.85
     assert abs(far) < 0.5
 

@@ -10,7 +10,7 @@ import pytest
 from smokelift.direct import DISSOLVED, Ball, Continuation, Fan, Moment, Turbulence, continue_sequence, open_source
 from smokelift.direct.growth import (
     BLOCK,
-    MARGIN,
+    MARGIN_VOXELS,
     Growth,
     cut_sides,
     dissolved,
@@ -47,7 +47,7 @@ def test_a_side_moves_before_smoke_arrives_there():
     small = blob((0.0, 0.0, 1.5), 0.1)
     assert grown(at_rest(0 * small)) == grown(at_rest(small)) == ((0, 0),) * 3
     near = np.zeros_like(small)
-    near[-MARGIN - 1, 8, 12] = 1.0
+    near[-MARGIN_VOXELS - 1, 8, 12] = 1.0
     assert grown(at_rest(near)) == ((0, 0),) * 3
     assert grown(at_rest(np.roll(near, 1, axis=0)))[0] == (0, BLOCK)
     # fast smoke is expected

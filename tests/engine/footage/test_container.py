@@ -108,7 +108,7 @@ def test_memory_that_lacks_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     path = tmp_path / "picture.png"
     write_image(path, FRAMES[0])
     container.open_container(path).close()
-    monkeypatch.setattr(container, "ENOUGH", 2**62)
+    monkeypatch.setattr(container, "OPENING_BYTES", 2**62)
     with pytest.raises(MemoryError):
         container.open_container(path)
 

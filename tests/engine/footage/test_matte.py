@@ -9,7 +9,7 @@ import pytest
 from films import HEIGHT, WIDTH, film, overlap, plate_of, wall
 
 from smokelift.footage.images import srgb_to_linear
-from smokelift.footage.matte import FAINTEST, MAX_SMOOTHING, SMOOTHING, matte, smoothing
+from smokelift.footage.matte import MAX_SMOOTHING, MIN_DEVIATION, SMOOTHING, matte, smoothing
 from smokelift.footage.noise import Noise, lasting_noise
 from smokelift.footage.plate import Plate, known_plate
 from smokelift.footage.steady import without_noise_light
@@ -68,6 +68,6 @@ def test_a_faint_rim_counts_as_far_as_it_is_certain(noise: float) -> None:
     found = matte(srgb_to_linear((values / 255).astype(np.float32)), plate)
     share = found.share.mean(0)
     assert (found.share[found.mask] == 1).all()
-    np.testing.assert_allclose(share[:120], np.clip(light[0, :120] / noise / FAINTEST - 1, 0, 1), atol=0.2)
+    np.testing.assert_allclose(share[:120], np.clip(light[0, :120] / noise / MIN_DEVIATION - 1, 0, 1), atol=0.2)
     assert np.diff(share[45:95:5]).max() < 0.02
     assert not found.share[:, 105:].any()

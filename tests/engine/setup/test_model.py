@@ -31,10 +31,10 @@ from smokelift.scene import (
     look_at_matrix,
 )
 from smokelift.setup import illumination, scattering
-from smokelift.setup.coarse import LONGEST, coarse_domain, coarse_frame
+from smokelift.setup.coarse import COARSE_SIDE, coarse_domain, coarse_frame
 from smokelift.setup.estimate import Estimate
 from smokelift.setup.held_out import HeldOut
-from smokelift.setup.model import ALONE
+from smokelift.setup.model import ONE_VIEW_SMOOTHNESS
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import Settings
 from smokelift.setup.shot import Shot, ShotView
@@ -135,7 +135,7 @@ def test_models_that_coarse_frames_do_not_tell_apart_are_tried_on_finer_ones(
         errors = {"single": 0.05, "multiple": near if voxels == 8 else 0.01}
         return HeldOut(errors[judge] if fitted == judge else 0.4)
 
-    monkeypatch.setattr("smokelift.setup.coarse.LONGEST", 8)
+    monkeypatch.setattr("smokelift.setup.coarse.COARSE_SIDE", 8)
     for module in (scattering, illumination):
         monkeypatch.setattr(module, "held_out", known)
     choice = chosen(shot_of(plume.scene, draft), "scattering")
@@ -252,7 +252,7 @@ def test_a_coarse_box_stays_in_the_box(resolution, pixels) -> None:
     x, y, z = resolution
     domain = Domain((0.0, 0.0, 0.0), (0.1 * x, 0.1 * y, 0.1 * z), resolution)
     coarse = coarse_domain(domain, pixels)
-    assert max(coarse.resolution) <= max(LONGEST, 4)
+    assert max(coarse.resolution) <= max(COARSE_SIDE, 4)
     assert coarse.voxel_size >= domain.voxel_size * (1 - 1e-6)
     assert np.all(np.array(coarse.min) >= np.array(domain.min) - 1e-9)
     assert np.all(np.array(coarse.max) <= np.array(domain.max) + 1e-9)
@@ -431,6 +431,6 @@ def test_a_light_close_to_the_box_is_no_hindrance(plume, draft, tmp_path) -> Non
 def test_a_velocity_that_one_camera_shows_is_smoother(plume, tracked, two_views, draft) -> None:
     """Not where several do, or one that travels."""
     usual = draft.velocity.smoothness
-    assert shot_of(plume.scene, draft).settings.velocity.smoothness == pytest.approx(ALONE * usual)
+    assert shot_of(plume.scene, draft).settings.velocity.smoothness == pytest.approx(ONE_VIEW_SMOOTHNESS * usual)
     assert shot_of(two_views, draft).settings.velocity.smoothness == usual
     assert shot_of(tracked, draft).settings.velocity.smoothness == usual

@@ -26,7 +26,7 @@ from smokelift.scene import (
 )
 from smokelift.scene.projection import project
 from smokelift.setup.estimate import UNDETERMINED
-from smokelift.setup.geometry import COARSEST
+from smokelift.setup.geometry import MIN_SIDE_VOXELS
 from smokelift.setup.prepare import prepare_shot
 from smokelift.setup.settings import LIMITS
 from smokelift.setup.shot import Shot
@@ -126,7 +126,7 @@ def test_the_domain_holds_the_smoke(estimated, passing, draft) -> None:
     domain = estimated.scene.domain
     edges = (np.array(domain.max) - domain.min) / domain.resolution
     np.testing.assert_allclose(edges, edges[0], rtol=1e-6)
-    assert COARSEST <= max(domain.resolution) <= LIMITS[draft.quality].most + 4
+    assert MIN_SIDE_VOXELS <= max(domain.resolution) <= LIMITS[draft.quality].most + 4
     pixels, depth = project(estimated.scene.camera, domain.corners())
     assert (depth > 0).all()
     with Clip.open(passing.clip) as clip:
