@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from benchmarks.errors import relative_error
 from benchmarks.tables import markdown
-from smokelift.baselines.renderer import PaperRenderer
+from smokelift.baselines.paper_renderer import PaperRenderer
 from smokelift.checks.array_types import Doubles
 from smokelift.render import Renderer, Volume
 from smokelift.scene import Camera, DirectionalLight, Domain, Medium

@@ -11,11 +11,11 @@ import pytest
 from addon import contract
 from smokelift.app import cli
 from smokelift.app.commands import continue_, loop, retime
-from smokelift.direct import writing
+from smokelift.direct import new_sequence
 from smokelift.footage.images import READABLE
 from smokelift.output.export import ASSET, NOTE
 from smokelift.output.layout import INDEX, frame_path, proxy_path
-from smokelift.output.proxy import MIN_PROXY_VOXELS
+from smokelift.output.proxy_files import MIN_PROXY_VOXELS
 from smokelift.report.provenance import Origin
 from smokelift.scene import SIDES, EnvironmentLight, SceneError
 from smokelift.setup.settings import LIMITS, QUALITIES, Settings
@@ -79,7 +79,7 @@ def test_directions() -> None:
             needed = ["--frames", "9"] if direction == "continue" else ["--speed", "2"] if direction == "retime" else []
             parser.parse_args([direction, "take", "--out", "new", *needed, option, *words])
     assert (contract.SLOWEST, contract.FASTEST) == retime.SPEEDS
-    assert contract.SHORTEST == writing.SHORTEST
+    assert contract.SHORTEST == new_sequence.SHORTEST
 
 
 def test_pictures() -> None:

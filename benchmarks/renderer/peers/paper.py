@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from benchmarks.renderer.peers import Iteration
 from benchmarks.renderer.scene import BenchScene
-from smokelift.baselines.renderer import PaperRenderer
+from smokelift.baselines.paper_renderer import PaperRenderer
 
 Volume = NDArray[np.float32]
 

@@ -2,9 +2,9 @@
 
     rho <- max(0, rho - rate * densityGrad),   densityGrad = sum_views sum_pixels 2 (L - I) gradRec
 
-Picture and record are the paper's own too (`smokelift.baselines.renderer`). Two slips of the listing are mended (the
-sign of the difference, which ascends as printed, and the missing rho >= 0); the fixed rate, the start from thin fog
-and the imposed side view, where no other is given, are the paper's. Its derivative is none voxel by voxel, so in thick
+Picture and record are the paper's own too (`smokelift.baselines.paper_renderer`). Two slips of the listing are mended
+(the sign of the difference, which ascends as printed, and the missing rho >= 0); the fixed rate, the start from thin
+fog and the imposed side view, where no other is given, are the paper's. Its derivative is none voxel by voxel, so in thick
 smoke the loss falls at first and then rises without bound, at any rate; hence one thing that the listing has not: the
 best density seen is kept.
 """
@@ -31,7 +31,7 @@ from smokelift.render import DeviceError, Image, Volume, device
 from smokelift.scene import orbit
 
 if TYPE_CHECKING:
-    from smokelift.baselines.renderer import PaperRenderer
+    from smokelift.baselines.paper_renderer import PaperRenderer
 
 FOG_DEPTH = 0.1
 """Optical depth of the fog across the domain that the fit starts from: thin, because dense media have local minima."""
@@ -90,7 +90,7 @@ class FixedRateDescent:
 
     def fit(self, views: ViewSet, depth: DepthEstimate, initial: Volume | None) -> FittedDensity:
         """Find a density anywhere in the domain; see `smokelift.density.DensityFit`."""
-        from smokelift.baselines.renderer import PaperRenderer  # here, because Taichi takes long to import
+        from smokelift.baselines.paper_renderer import PaperRenderer  # here, because Taichi takes long to import
 
         if not views.hull.any():
             return empty_density(views)

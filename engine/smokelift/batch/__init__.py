@@ -5,9 +5,9 @@ What is finished is on the storage and nowhere else, so every part of a batch ma
 
 from smokelift.batch.cluster import run_on_cluster
 from smokelift.batch.local import Room, run_here
-from smokelift.batch.plan import Remaining, duration, remaining_work
 from smokelift.batch.record import Frames, Record, ShotState, finished_frames, read_record, read_state
 from smokelift.batch.report import write_report
+from smokelift.batch.schedule import Remaining, duration, remaining_work
 from smokelift.batch.shots import Shot, read_shots
 from smokelift.batch.work import finish_shot, look_at_shot
 

@@ -6,12 +6,12 @@ from smokelift.direct.looping import loop_length, loop_sequence, steady_part, us
 from smokelift.direct.mesh import Mesh
 from smokelift.direct.moment import Moment, complete_velocity, read_moment
 from smokelift.direct.moving_mesh import MovingMesh
+from smokelift.direct.new_sequence import open_source
 from smokelift.direct.obstacles import Ball, Box
 from smokelift.direct.retiming import playback, retime_sequence
 from smokelift.direct.simulation import Simulation
 from smokelift.direct.surroundings import Fan
 from smokelift.direct.turbulence import Turbulence
-from smokelift.direct.writing import open_source
 
 __all__ = [
     "DISSOLVED",

@@ -23,10 +23,10 @@ from smokelift.direct.growth import (
     moves,
 )
 from smokelift.direct.moment import Moment, read_moment
+from smokelift.direct.new_sequence import SHORTEST, Written, directed_writer, simulated_figures, write_copy
 from smokelift.direct.obstacles import Ball, Box, Obstacle, Obstacles, require_place
 from smokelift.direct.surroundings import Fan, Surroundings
 from smokelift.direct.turbulence import Turbulence
-from smokelift.direct.writing import SHORTEST, Written, directed_writer, simulated_figures, write_copy
 from smokelift.output.resume import ResumeState
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
@@ -97,7 +97,7 @@ def continue_sequence(
     Parameters
     ----------
     sequence
-        See `smokelift.direct.writing.open_source`.
+        See `smokelift.direct.new_sequence.open_source`.
     out
         Directory to write to.
     continuation

@@ -13,7 +13,7 @@ import numpy as np
 
 from smokelift.direct.interpolation import interpolate
 from smokelift.direct.moment import Moment, read_moment
-from smokelift.direct.writing import SHORTEST, Written, directed_writer, simulated_figures, write_copy
+from smokelift.direct.new_sequence import SHORTEST, Written, directed_writer, simulated_figures, write_copy
 from smokelift.output.sequence import Sequence
 from smokelift.scene import SIDES, Side
 from smokelift.transport import Array, Velocity
@@ -43,7 +43,7 @@ def steady_part(sequence: Sequence, overlap: int | None = None) -> tuple[int, in
     Parameters
     ----------
     sequence
-        See `smokelift.direct.writing.open_source`.
+        See `smokelift.direct.new_sequence.open_source`.
     overlap
         Frames that the start and the end share; None for `usual_overlap`.
     """
@@ -102,7 +102,7 @@ def loop_sequence(
     Parameters
     ----------
     sequence
-        See `smokelift.direct.writing.open_source`.
+        See `smokelift.direct.new_sequence.open_source`.
     out
         Directory to write to.
     first, last

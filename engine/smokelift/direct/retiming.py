@@ -12,7 +12,7 @@ import numpy as np
 from smokelift.checks.array_types import Doubles
 from smokelift.direct.interpolation import interpolate
 from smokelift.direct.moment import Moment, read_moment
-from smokelift.direct.writing import Written, directed_writer, simulated_figures
+from smokelift.direct.new_sequence import Written, directed_writer, simulated_figures
 from smokelift.output.sequence import Sequence
 
 STEPS = 64
@@ -52,7 +52,7 @@ def retime_sequence(
     Parameters
     ----------
     sequence
-        See `smokelift.direct.writing.open_source`.
+        See `smokelift.direct.new_sequence.open_source`.
     out
         Directory to write to.
     speeds

@@ -10,7 +10,7 @@ where a is the ambient velocity: wind and turbulence, which all air has in addit
 is nothing else.
 
 Buoyancy b and dissipation d are those of the clip (`smokelift.direct.fitting`), as are what enters
-(`smokelift.direct.inflow`) and how fire burns (`smokelift.direct.fire`), which lifts nothing beside what b has of it.
+(`smokelift.direct.inflow`) and how fire burns (`smokelift.direct.burning`), which lifts nothing beside what b has.
 Advection keeps the mass. There is no viscosity, and MacCormack's correction keeps the eddies that the clip has.
 """
 
@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from smokelift.checks.array_types import Mask
-from smokelift.direct.fire import Fire
+from smokelift.direct.burning import Fire
 from smokelift.direct.inflow import Inflow
 from smokelift.direct.moment import Moment
 from smokelift.direct.obstacles import Solid

@@ -30,7 +30,7 @@ from smokelift.output.atomic import atomic_path
 from smokelift.output.host import HOSTS, HostName
 from smokelift.output.index import SequenceError
 from smokelift.output.layout import INDEX, frame_path, proxy_path
-from smokelift.output.proxy import write_proxy
+from smokelift.output.proxy_files import write_proxy
 from smokelift.output.sequence import Sequence
 from smokelift.output.usd import UsdVolume, usd_text
 from smokelift.output.vdb import vdb_module, write_vdb

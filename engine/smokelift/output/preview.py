@@ -21,7 +21,7 @@ from smokelift.output.framing import Framing
 from smokelift.output.images import eight_bit
 from smokelift.output.sequence import Sequence
 from smokelift.output.sheet import write_sheet
-from smokelift.output.video import write_video
+from smokelift.output.video_file import write_video
 from smokelift.output.viewer import Viewer
 from smokelift.render import Image
 from smokelift.scene import Background, Camera, CompleteScene, orbit

@@ -35,7 +35,7 @@ from smokelift.output.index import (
 )
 from smokelift.output.layout import BACKGROUND, INDEX, LOCK, RESUME, frame_path, is_foreign, proxy_path
 from smokelift.output.lock import Lock
-from smokelift.output.proxy import MIN_PROXY_VOXELS, write_proxy
+from smokelift.output.proxy_files import MIN_PROXY_VOXELS, write_proxy
 from smokelift.output.resume import ResumeState
 from smokelift.output.vdb import VdbUnavailable, checked_volume, vdb_module, write_vdb
 from smokelift.scene import Background, CompleteScene, Domain, scene_to_dict

@@ -18,7 +18,7 @@ from smokelift.transport.grid import (
     require_same_shape,
     sides_in_order,
 )
-from smokelift.transport.projection import divergence, outflow, project, without_divergence
+from smokelift.transport.pressure import divergence, outflow, project, without_divergence
 
 __all__ = [
     "Array",

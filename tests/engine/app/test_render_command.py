@@ -10,7 +10,7 @@ from smokelift.footage.clip import Clip
 from smokelift.footage.images import read_image
 from smokelift.output.images import eight_bit
 from smokelift.output.sequence import Sequence
-from smokelift.output.video import write_video
+from smokelift.output.video_file import write_video
 from smokelift.render import render
 from smokelift.scene import Camera, Scene, orbit
 

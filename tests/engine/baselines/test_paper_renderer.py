@@ -6,7 +6,7 @@ import numpy as np
 import paper_reference as reference
 import pytest
 
-from smokelift.baselines.renderer import PaperRenderer
+from smokelift.baselines.paper_renderer import PaperRenderer
 from smokelift.render import Renderer
 from smokelift.scene import Camera, DirectionalLight, Domain, Medium, PointLight
 

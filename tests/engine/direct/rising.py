@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from smokelift.direct import Ball, Moment, Simulation
-from smokelift.direct.fire import Fire
+from smokelift.direct.burning import Fire
 from smokelift.direct.inflow import Inflow
 from smokelift.direct.physics import Physics
 from smokelift.direct.surroundings import Surroundings

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from smokelift.direct import Ball, fit_simulation
-from smokelift.direct.fire import Fire, fit_fire
+from smokelift.direct.burning import Fire, fit_fire
 from smokelift.direct.obstacles import Obstacles
 from smokelift.direct.surroundings import Surroundings
 from tests.engine.direct.rising import DOMAIN, DT, LEFT, at_rest, blob, course, plume

@@ -16,7 +16,7 @@ from smokelift.footage import container
 from smokelift.footage.clip import Clip, ClipError
 from smokelift.footage.images import ImageError, read_image
 from smokelift.output.images import write_image
-from smokelift.output.video import write_video
+from smokelift.output.video_file import write_video
 
 FRAMES = [np.full((16, 32, 3), value, np.float32) for value in (0.1, 0.3, 0.5)]
 

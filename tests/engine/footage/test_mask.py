@@ -17,7 +17,7 @@ from smokelift.footage.mask import Mask, continued
 from smokelift.footage.plate import Plate, known_plate
 from smokelift.footage.steady import cleared, uncovered
 from smokelift.output.images import write_image
-from smokelift.output.video import write_video
+from smokelift.output.video_file import write_video
 
 SIDE = 44
 """Column from which on the mask of the block is black; smoke stays to the left of it."""

@@ -12,7 +12,7 @@ from smokelift.output import vdb
 from smokelift.output.export import ExportSettings, export_sequence
 from smokelift.output.index import SequenceError
 from smokelift.output.layout import INDEX
-from smokelift.output.proxy import TIMES, write_proxies
+from smokelift.output.proxy_files import TIMES, write_proxies
 from smokelift.output.resume import ResumeState
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from small_sequence import SCENE, SETTINGS, frame, names, needs_vdb, write
 
-from smokelift.output import proxy, vdb, writer
+from smokelift.output import proxy_files, vdb, writer
 from smokelift.output.index import SequenceError
 from smokelift.output.sequence import Sequence
 from smokelift.output.writer import SequenceWriter
@@ -19,7 +19,7 @@ from smokelift.scene import Domain
 def test_a_coarser_box_keeps_the_mass() -> None:
     domain = Domain((0, 0, 0), (0.5, 0.7, 0.9), (5, 7, 9))
     rho = np.random.default_rng(1).random((5, 7, 9)).astype(np.float32)
-    coarse, wide = proxy.coarser(rho, domain, 3)
+    coarse, wide = proxy_files.coarser(rho, domain, 3)
     assert coarse.shape == wide.shape == (2, 3, 3)
     assert wide.max == pytest.approx((0.6, 0.9, 0.9))
     assert coarse.sum() * 27 == pytest.approx(rho.sum(), rel=1e-5)
@@ -45,15 +45,15 @@ def test_a_small_sequence_has_none_until_they_are_made(tmp_path: Path) -> None:
     write(tmp_path, [1, 2])
     before = {name: (tmp_path / name).read_bytes() for name in names(tmp_path)}
     assert not any(name.startswith("proxy") for name in before)
-    assert list(proxy.write_proxies(Sequence.open(tmp_path))) == [1, 2]
+    assert list(proxy_files.write_proxies(Sequence.open(tmp_path))) == [1, 2]
     assert {name: (tmp_path / name).read_bytes() for name in before} == before
-    coarse = np.zeros([-(-n // proxy.TIMES) for n in SCENE.domain.resolution], np.float32)
+    coarse = np.zeros([-(-n // proxy_files.TIMES) for n in SCENE.domain.resolution], np.float32)
     vdb.vdb_module().read(str(tmp_path / "proxy_0002.vdb"), gridname="density").copyToArray(coarse)
-    assert coarse.sum() * proxy.TIMES**3 == pytest.approx(Sequence.open(tmp_path).density(2).sum(), rel=1e-2)
+    assert coarse.sum() * proxy_files.TIMES**3 == pytest.approx(Sequence.open(tmp_path).density(2).sum(), rel=1e-2)
 
 
 @needs_vdb
 def test_nothing_to_copy(tmp_path: Path) -> None:
     write(tmp_path, [])
     with pytest.raises(SequenceError, match="no finished frame"):
-        list(proxy.write_proxies(Sequence.open(tmp_path)))
+        list(proxy_files.write_proxies(Sequence.open(tmp_path)))

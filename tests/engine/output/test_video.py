@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from smokelift.footage.clip import Clip
-from smokelift.output.video import write_video
+from smokelift.output.video_file import write_video
 
 
 @pytest.mark.parametrize("name", ["video.mp4", "video.mkv", "video.mov", "video.webm"])

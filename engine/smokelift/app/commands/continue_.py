@@ -26,7 +26,7 @@ from smokelift.direct import (
     continue_sequence,
     open_source,
 )
-from smokelift.direct.writing import Written
+from smokelift.direct.new_sequence import Written
 from smokelift.output.index import Index
 from smokelift.output.layout import INDEX
 from smokelift.output.sequence import Sequence

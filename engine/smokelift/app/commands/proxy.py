@@ -9,7 +9,7 @@ from typing import Any
 from smokelift.app.options import named_path
 from smokelift.app.progress import Reporter
 from smokelift.checks import Remark
-from smokelift.output.proxy import MIN_PROXY_VOXELS, TIMES, write_proxies
+from smokelift.output.proxy_files import MIN_PROXY_VOXELS, TIMES, write_proxies
 from smokelift.output.sequence import Sequence
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
-from smokelift.evaluation.metrics.checks import counted, finite, pair, relative
+from smokelift.evaluation.metrics.inputs import counted, finite, pair, relative
 from smokelift.evaluation.metrics.volumes import volume_error
 from smokelift.transport import require_positive
 

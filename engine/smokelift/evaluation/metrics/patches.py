@@ -11,7 +11,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from scipy import fft
 
 from smokelift.checks.array_types import Doubles
-from smokelift.evaluation.metrics.checks import finite, relative
+from smokelift.evaluation.metrics.inputs import finite, relative
 
 PATCH = 7
 """Pixels along a patch: the finest structure with its surroundings; a patch of scale 4 spans a lobe."""

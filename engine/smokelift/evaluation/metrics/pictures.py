@@ -8,7 +8,7 @@ import numpy.typing as npt
 from scipy import ndimage
 
 from smokelift.checks.array_types import Doubles
-from smokelift.evaluation.metrics.checks import counted, pair
+from smokelift.evaluation.metrics.inputs import counted, pair
 from smokelift.transport import require_positive
 
 

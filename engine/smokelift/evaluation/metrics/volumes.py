@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from smokelift.evaluation.metrics.checks import counted, finite, pair, relative
+from smokelift.evaluation.metrics.inputs import counted, finite, pair, relative
 from smokelift.transport import require_positive
 
 
