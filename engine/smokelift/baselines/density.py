@@ -5,8 +5,8 @@
 Picture and record are the paper's own too (`smokelift.baselines.paper_renderer`). Two slips of the listing are mended
 (the sign of the difference, which ascends as printed, and the missing rho >= 0); the fixed rate, the start from thin
 fog and the imposed side view, where no other is given, are the paper's. Its derivative is none voxel by voxel, so in
-thick smoke the loss falls at first and then rises without bound, at any rate; hence one thing that the listing has not: the
-best density seen is kept.
+thick smoke the loss falls at first and then rises without bound, at any rate; hence one thing that the listing has
+not: the best density seen is kept.
 """
 
 from __future__ import annotations
