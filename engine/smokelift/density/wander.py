@@ -11,10 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
-Array = NDArray[np.float64]
+from smokelift.checks.array_types import Doubles
 
 SHARE = 0.5
 """Standard deviation of the rays' middles over the smoke's in depth, where all octaves are of unit strength
@@ -51,7 +50,7 @@ class Wander:
         Of another way to wander.
     """
 
-    velocity: Array
+    velocity: Doubles
     width: float
     roughness: tuple[float, ...]
     seed: int
@@ -61,7 +60,7 @@ class Wander:
         """Standard deviation of the rays' middles, over that of the smoke in depth."""
         return float(np.linalg.norm(self._shares))
 
-    def aside(self, places: Array, frame: int) -> Array:
+    def aside(self, places: Doubles, frame: int) -> Doubles:
         """How far the rays' middles stand behind the axis, over the smoke's standard deviation in depth.
 
         Parameters
@@ -79,6 +78,6 @@ class Wander:
         return np.asarray(np.clip(aside, -LARGEST * self.share, LARGEST * self.share))
 
     @property
-    def _shares(self) -> Array:
+    def _shares(self) -> Doubles:
         """`share` by octave."""
         return SHARE * np.array(self.roughness[: len(NODES)])
