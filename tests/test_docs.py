@@ -28,7 +28,7 @@ FUNCTION = re.compile(r"\b([\w/]+\.py):(\w+)")
 FILE = re.compile(r"\b(\w+(?:/\w+)+\.(?:py|cpp|h))\b")
 CONSTANT = re.compile(r"`([A-Z][A-Z_]+)`")
 COMMIT = re.compile(r"\b(?=[0-9a-f]*\d)(?=[0-9a-f]*[a-f])[0-9a-f]{7,8}\b")
-SEVERAL_NUMBERS = re.compile(r"\d\s*%? / [-+(.]?\d")
+SEVERAL_NUMBERS = re.compile(r"\d\s*%? / [-+(.]?\d|^ *[-+]?[\d.]+ ?%?(?:[,;] [-+]?[\d.]+ ?%?)+ *$")
 
 PAGE = 65
 """Lines of a decision record, at most: it is read on one page."""

@@ -226,7 +226,7 @@ def table(results: Results) -> str:
         if disturbance.labels or np.isnan(ours).all():
             continue
         measured = [x for x, each in zip(disturbance.strengths, ours.T, strict=True) if not np.isnan(each).all()]
-        lost = ", ".join(f"{strength:.2g}" for strength in _lost(results, name)) or "nowhere"
+        lost = " and ".join(f"{strength:.2g}" for strength in _lost(results, name)) or "nowhere"
         known = [f"{disturbance.title}, {disturbance.unit}", f"{min(measured):.3g} to {max(measured):.3g}", lost]
         for strength in disturbance.common or (None,):
             line = [*known, "" if strength is None else f"{strength:.2g}"]
