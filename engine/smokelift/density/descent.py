@@ -206,7 +206,12 @@ def _step(
 
 
 class _Curvature:
-    """The objective's second derivatives, as far as its last steps show them."""
+    """The objective's second derivatives, as far as its last steps show them (Nocedal, "Updating quasi-Newton matrices
+    with limited storage", 1980).
+
+    Of each of the last `MEMORY` steps it keeps s, the step itself, y, the change of the gradient along it, and their
+    product ys = 1 / rho.
+    """
 
     def __init__(self) -> None:
         self._steps: deque[tuple[Array, Array, float]] = deque(maxlen=MEMORY)
@@ -216,24 +221,25 @@ class _Curvature:
         """Whether a step has shown any."""
         return bool(self._steps)
 
-    def learn(self, moved: Array, change: Array) -> None:
+    def learn(self, s: Array, y: Array) -> None:
         """Remember a step and what it changed in the gradient, unless the objective is not convex along it."""
-        product = _dot(moved, change)
-        if product > 0:
-            self._steps.append((moved, change, product))
+        ys = _dot(s, y)
+        if ys > 0:
+            self._steps.append((s, y, ys))
 
-    def newton(self, gradient: Array) -> Array:
-        """Newton's step for a gradient, which is overwritten; where nothing is known, the gradient itself."""
-        shares = []
-        for moved, change, product in reversed(self._steps):
-            shares.append(_dot(moved, gradient) / product)
-            gradient = saxpy(change, gradient, a=-shares[-1])
+    def newton(self, q: Array) -> Array:
+        """Newton's step for a gradient q, which is overwritten; where nothing is known, the gradient itself."""
+        alphas = []
+        for s, y, ys in reversed(self._steps):
+            alphas.append(_dot(s, q) / ys)
+            q = saxpy(y, q, a=-alphas[-1])
         if self._steps:
-            _, change, product = self._steps[-1]
-            gradient *= np.float32(product / _dot(change, change))
-        for (moved, change, product), share in zip(self._steps, reversed(shares), strict=True):
-            gradient = saxpy(moved, gradient, a=share - _dot(change, gradient) / product)
-        return gradient
+            _, y, ys = self._steps[-1]
+            q *= np.float32(ys / _dot(y, y))
+        for (s, y, ys), alpha in zip(self._steps, reversed(alphas), strict=True):
+            beta = _dot(y, q) / ys
+            q = saxpy(s, q, a=alpha - beta)
+        return q
 
 
 def _dot(a: Array, b: Array) -> float:
