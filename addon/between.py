@@ -69,7 +69,6 @@ def drive_between(smoke: bpy.types.Object, place: str, seconds: float) -> None:
 
 def _group() -> bpy.types.NodeTree:
     tree = new_group(NAME, "GeometryNodeTree", _BETWEEN.mark, _INPUTS, [("Smoke", "NodeSocketGeometry")])
-    tree.is_modifier = True
     given = add_node(tree, "NodeGroupInput", 0, 0).outputs
     later = add_node(tree, "GeometryNodeObjectInfo", 1, 3, given["Next Frame"]).outputs["Geometry"]
 

@@ -11,7 +11,7 @@ import bpy
 from mathutils import Matrix, Vector
 
 from .box_table import engine_to_world
-from .nodes import Input, feed, new_group, own_group
+from .nodes import Input, feed, file_group
 from .plate import plate_image, play_beside
 from .smoke import scene_of
 from .take import Take
@@ -166,7 +166,7 @@ def _insert(tree: bpy.types.NodeTree, shown: bpy.types.NodeSocket) -> bpy.types.
         layers = layers or tree.nodes.new("CompositorNodeRLayers")
         render = layers.outputs["Image"]
     node = tree.nodes.new("CompositorNodeGroup")
-    node.node_tree = _group()
+    node.node_tree = file_group(GROUP, "CompositorNodeTree", MARK, _INPUTS, [("Image", "NodeSocketColor")], _build)
     node.name = node.label = GROUP
     node.width = 200.0
     node.location = render.node.location + Vector((render.node.width + 60.0, 0.0))
@@ -215,15 +215,6 @@ def _source(
     source.location = node.location + Vector((-300.0, down))
     tree.links.new(source.outputs["Image"], socket)
     return source
-
-
-def _group() -> bpy.types.NodeTree:
-    """The node group: the file's own, which the artist may have changed, else a new one."""
-    tree = own_group(MARK)
-    if tree is None:
-        tree = new_group(GROUP, "CompositorNodeTree", MARK, _INPUTS, [("Image", "NodeSocketColor")])
-        _build(tree)
-    return tree
 
 
 def _build(tree: bpy.types.NodeTree) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty, IntProperty
 
-from .nodes import Input, add_node, feed, get_input, new_group, own_group, set_input
+from .nodes import Input, add_node, feed, file_group, get_input, set_input
 from .paths import absolute, relative
 
 GROUP = "Smokelift Instances"
@@ -90,7 +90,9 @@ def scatter(obj: bpy.types.Object, width: float, count: int, step: int, repeat: 
     points = bpy.data.objects.new(name, mesh)
     points.location = obj.location
     modifier = points.modifiers.new(GROUP, "NODES")
-    modifier.node_group = _group()
+    modifier.node_group = file_group(
+        GROUP, "GeometryNodeTree", MARK, _INPUTS, [("Instances", "NodeSocketGeometry")], _build
+    )
     set_input(modifier, "Times", times)
     set_input(modifier, "Frames Apart", step)
     return points
@@ -106,16 +108,6 @@ def remove_scattered(points: bpy.types.Object) -> None:
     bpy.data.collections.remove(times)
     if group.users == 0:
         bpy.data.node_groups.remove(group)
-
-
-def _group() -> bpy.types.NodeTree:
-    """The node group: the file's own, which the artist may have changed, else a new one."""
-    tree = own_group(MARK)
-    if tree is None:
-        tree = new_group(GROUP, "GeometryNodeTree", MARK, _INPUTS, [("Instances", "NodeSocketGeometry")])
-        tree.is_modifier = True
-        _build(tree)
-    return tree
 
 
 def _build(tree: bpy.types.NodeTree) -> None:

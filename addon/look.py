@@ -10,7 +10,7 @@ from typing import Any
 import bpy
 
 from .kept import set_and_remember, set_unless_changed
-from .nodes import Input, add_node, new_group, own_group
+from .nodes import Input, add_node, file_group
 
 NODE = "Smokelift"
 """Name of the node that holds the values; a material without it is the artist's own."""
@@ -247,18 +247,9 @@ def _new_material(name: str) -> bpy.types.Material:
 
 def _add_group(tree: bpy.types.NodeTree) -> bpy.types.ShaderNode:
     node = tree.nodes.new("ShaderNodeGroup")
-    node.node_tree = _group()
+    node.node_tree = file_group(GROUP, "ShaderNodeTree", MARK, _INPUTS, [("Volume", "NodeSocketShader")], _build)
     node.width = 220.0
     return node
-
-
-def _group() -> bpy.types.NodeTree:
-    """The node group: the file's own, which the artist may have changed, else a new one."""
-    tree = own_group(MARK)
-    if tree is None:
-        tree = new_group(GROUP, "ShaderNodeTree", MARK, _INPUTS, [("Volume", "NodeSocketShader")])
-        _build(tree)
-    return tree
 
 
 class _Formulas:

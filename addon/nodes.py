@@ -1,6 +1,6 @@
 """Node groups that the add-on makes: their sockets, and the nodes in them."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import bpy
@@ -41,6 +41,8 @@ def new_group(
     """
     tree = bpy.data.node_groups.new(name, kind)
     tree[mark] = True
+    if kind == "GeometryNodeTree":
+        tree.is_modifier = True
     for item in inputs:
         socket = tree.interface.new_socket(
             item.name, description=item.description, in_out="INPUT", socket_type=item.kind
@@ -50,6 +52,25 @@ def new_group(
                 setattr(socket, attribute, value)
     for output, output_kind in outputs:
         tree.interface.new_socket(output, in_out="OUTPUT", socket_type=output_kind)
+    return tree
+
+
+def file_group(
+    name: str,
+    kind: str,
+    mark: str,
+    inputs: Sequence[Input],
+    outputs: Sequence[tuple[str, str]],
+    build: Callable[[bpy.types.NodeTree], None],
+) -> bpy.types.NodeTree:
+    """The file's own node group, which the artist may have changed, else a new one with the nodes that `build` adds.
+
+    The other parameters are those of `new_group`.
+    """
+    tree = own_group(mark)
+    if tree is None:
+        tree = new_group(name, kind, mark, inputs, outputs)
+        build(tree)
     return tree
 
 

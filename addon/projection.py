@@ -11,7 +11,7 @@ from mathutils import Matrix, Vector
 
 from .box_table import engine_to_world
 from .kept import set_unless_changed
-from .nodes import Input, add_node, new_group, own_group
+from .nodes import Input, add_node, file_group
 from .plate import play_beside, show_plate
 from .smoke import scene_of
 from .take import Take
@@ -173,7 +173,8 @@ def _new_material() -> bpy.types.Material:
     rays, clear = new("ShaderNodeLightPath", 400.0, down=-320.0), new("ShaderNodeBsdfTransparent", 400.0)
     shader = new("ShaderNodeEmission", 400.0, MATERIAL, down=120.0)
     place = new("ShaderNodeGroup", 900.0, f"{MATERIAL} Place", down=120.0)
-    place.node_tree = _group()
+    outputs = [("Vector", "NodeSocketVector"), ("In Front", "NodeSocketFloat")]
+    place.node_tree = file_group(MATERIAL, "ShaderNodeTree", MARK, _INPUTS, outputs, _build)
     place.width = 180.0
     projector = new("ShaderNodeTexCoord", 1100.0, PROJECTOR, down=120.0)
     tree.links.new(projector.outputs["Object"], place.inputs["Point"])
@@ -184,16 +185,6 @@ def _new_material() -> bpy.types.Material:
     tree.links.new(mix.outputs[0], output.inputs["Surface"])
     material.cycles.emission_sampling = "NONE"
     return material
-
-
-def _group() -> bpy.types.NodeTree:
-    """The node group that finds a point in the plate: the own one of the file, which may be changed, else a new one."""
-    tree = own_group(MARK)
-    if tree is None:
-        outputs = [("Vector", "NodeSocketVector"), ("In Front", "NodeSocketFloat")]
-        tree = new_group(MATERIAL, "ShaderNodeTree", MARK, _INPUTS, outputs)
-        _build(tree)
-    return tree
 
 
 def _build(tree: bpy.types.NodeTree) -> None:

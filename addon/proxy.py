@@ -55,7 +55,6 @@ def fit_proxy(smoke: bpy.types.Object, take: Take, numbers: list[int]) -> None:
 
 def _group() -> bpy.types.NodeTree:
     tree = new_group(NAME, "GeometryNodeTree", _PROXY.mark, _INPUTS, [("Shown", "NodeSocketGeometry")])
-    tree.is_modifier = True
     given = add_node(tree, "NodeGroupInput", 0, 0)
     shown = add_node(tree, "GeometryNodeObjectInfo", 1, 0, given.outputs["Proxy"])
     add_node(tree, "NodeGroupOutput", 2, 0, shown.outputs["Geometry"])
