@@ -32,7 +32,7 @@ FRAMES = 3
 def main() -> None:
     """Write the frames unless they are there, and print the figures."""
     take = Take(Path(sys.argv[1]).resolve() / "take_0001")
-    if take.index() is None:
+    if take.read().index is None:
         _write(take)
     for kind in ("smoke", "proxy"):
         megabytes = (take.directory / f"{kind}_0001.vdb").stat().st_size / 1e6
