@@ -1,5 +1,7 @@
 #include "pictures.h"
 
+#include "exponential.h"
+
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -9,8 +11,9 @@ namespace smokelift {
 namespace {
 
 constexpr std::size_t READS_PER_TASK = 1 << 16;
-constexpr int RUN = 32;             // voxels along z that are projected together
-constexpr double MIN_DEPTH = 1e-12; // m; a voxel in the plane of the eye is in no picture
+constexpr std::size_t SCALED_PER_TASK = 1 << 13; // their steps stay in the cache
+constexpr int RUN = 32;                          // voxels along z that are projected together
+constexpr double MIN_DEPTH = 1e-12;              // m; a voxel in the plane of the eye is in no picture
 
 // Homogeneous pixel coordinates along a row of voxels.
 struct PixelRow {
@@ -43,11 +46,6 @@ SMOKELIFT_INLINE Place place_of(const PictureMap &map, const PixelRow &line, int
 
 SMOKELIFT_INLINE int pixel(float place, int count) {
     return static_cast<int>(std::clamp(std::nearbyint(place), 0.0f, float(count - 1)));
-}
-
-int first_marked(const unsigned char *row, int n) {
-    const void *found = std::memchr(row, 1, std::size_t(n));
-    return found ? int(static_cast<const unsigned char *>(found) - row) : n;
 }
 
 SMOKELIFT_CLONES
@@ -158,7 +156,37 @@ void read_range(const double *__restrict picture, int rows, int columns, const f
     }
 }
 
+SMOKELIFT_INLINE float exponential(float x) {
+    const float less = attenuation(x < 0 ? -x : x).transmittance;
+    return x < 0 ? less : 1 / less;
+}
+
+SMOKELIFT_CLONES
+void scale_evenly(const float *__restrict steps, const bool *__restrict visible, float share,
+                  const float *__restrict values, float *__restrict scaled, std::size_t count) {
+    for (std::size_t n = 0; n < count; ++n)
+        scaled[n] = values[n] * exponential(visible[n] ? share * steps[n] : 0.0f);
+}
+
+SMOKELIFT_CLONES
+void scale_unevenly(const float *__restrict steps, const bool *__restrict visible, const RayScale &scale,
+                    const float *__restrict plausible, const float *__restrict values,
+                    float *__restrict scaled, std::size_t count) {
+    const float share = scale.share, faint = scale.faint, most = scale.most;
+    for (std::size_t n = 0; n < count; ++n) {
+        const float step = visible[n] ? steps[n] : 0.0f;
+        const float wanted = plausible[n] + faint, reached = values[n] * exponential(step) + faint;
+        const float gain = step < 0 ? reached / wanted : wanted / reached;
+        scaled[n] = values[n] * exponential(share * step * (gain < most ? gain : most));
+    }
+}
+
 } // namespace
+
+int first_marked(const unsigned char *row, int n) {
+    const void *found = std::memchr(row, 1, std::size_t(n));
+    return found ? int(static_cast<const unsigned char *>(found) - row) : n;
+}
 
 std::vector<std::size_t> count_marked(Mask voxels, Workers &workers) {
     std::vector<std::size_t> first(voxels.n[0] + 1, 0);
@@ -208,6 +236,31 @@ double nearest_depth(const PictureMap &map, Workers &workers) {
     std::vector<double> nearest(map.shape()[0]);
     workers.run(map.shape()[0], [&](int i) { nearest[i] = nearest_in_plane(map, i); });
     return *std::min_element(nearest.begin(), nearest.end());
+}
+
+void scale_along_rays(const RayScale &scale, const SeenAt &places, const float *values, std::size_t count,
+                      float *scaled, Workers &workers) {
+    workers.run(int((count + SCALED_PER_TASK - 1) / SCALED_PER_TASK), [&](int task) {
+        const std::size_t begin = task * SCALED_PER_TASK, most = std::min(count - begin, SCALED_PER_TASK);
+        float steps[SCALED_PER_TASK];
+        read_range(scale.logarithm, scale.rows, scale.columns, places.rows + begin, places.columns + begin, 0,
+                   most, steps);
+        const bool *visible = places.visible + begin;
+        if (scale.plausible)
+            scale_unevenly(steps, visible, scale, scale.plausible + begin, values + begin, scaled + begin,
+                           most);
+        else
+            scale_evenly(steps, visible, scale.share, values + begin, scaled + begin, most);
+    });
+}
+
+void write_at(const std::int64_t *where, const float *values, std::size_t count, float factor, float *volume,
+              Workers &workers) {
+    workers.run(int((count + READS_PER_TASK - 1) / READS_PER_TASK), [&](int task) {
+        const std::size_t begin = task * READS_PER_TASK, end = std::min(count, begin + READS_PER_TASK);
+        for (std::size_t n = begin; n < end; ++n)
+            volume[where[n]] = factor * values[n];
+    });
 }
 
 void read_bilinearly(const double *picture, int rows, int columns, const float *at_rows,

@@ -26,6 +26,15 @@ struct Places {
     bool *visible;
 };
 
+// The same, to be read.
+struct SeenAt {
+    const float *rows, *columns;
+    const bool *visible;
+};
+
+// Where in a row of voxels the first is marked; its end if none is.
+int first_marked(const unsigned char *row, int n);
+
 // The first of the marked voxels in each plane across x, and how many there are at the end.
 std::vector<std::size_t> count_marked(Mask voxels, Workers &workers);
 
@@ -41,6 +50,27 @@ void mark_shown(const PictureMap &map, const unsigned char *picture, bool *shown
 
 // Least depth of the voxels before the camera; infinite if there are none.
 double nearest_depth(const PictureMap &map, Workers &workers);
+
+// How the smoke of voxels is scaled along the rays of a picture.
+struct RayScale {
+    const double *logarithm; // (rows, columns): of each pixel's factor
+    int rows, columns;
+    // Smoke towards which a step leads: one that would scale a value to v is multiplied by plausible / v
+    // where it adds smoke and by v / plausible where it takes some, by `most` at most. Without it steps are
+    // even.
+    const float *plausible;
+    float faint; // what counts beside both
+    float most;
+    float share; // of the step that is made
+};
+
+// Scales values (count) at some places in the picture; those outside stay as they are.
+void scale_along_rays(const RayScale &scale, const SeenAt &places, const float *values, std::size_t count,
+                      float *scaled, Workers &workers);
+
+// Writes values (count), times a factor, to indices of a volume that are all different.
+void write_at(const std::int64_t *where, const float *values, std::size_t count, float factor, float *volume,
+              Workers &workers);
 
 // A picture (rows, columns) read bilinearly at some places; the nearest pixel's value outside.
 void read_bilinearly(const double *picture, int rows, int columns, const float *at_rows,

@@ -1,4 +1,5 @@
 #include "codes.h"
+#include "depth_profile.h"
 #include "halves.h"
 #include "lattice.h"
 #include "patches.h"
@@ -14,6 +15,7 @@ namespace {
 using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
 using Codes = py::array_t<unsigned char, 0>;
 using Integers = py::array_t<int, py::array::c_style | py::array::forcecast>;
+using Indices = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>;
 using Marks = py::array_t<bool, py::array::c_style | py::array::forcecast>;
 
 std::vector<double> values_of(const Doubles &a) {
@@ -58,13 +60,64 @@ void require_parts(const Integers &first, py::ssize_t parts, py::ssize_t whole) 
 
 const unsigned char *bytes_of(const Marks &a) { return reinterpret_cast<const unsigned char *>(a.data()); }
 
+void require_spans(const Integers &spans, const Shape &n) {
+    require_fit(spans.ndim() == 3 && spans.shape(0) == n[0] && spans.shape(1) == n[1] && spans.shape(2) == 2);
+    for (py::ssize_t at = 0; at < spans.size(); ++at)
+        require_fit(spans.data()[at] >= 0 && spans.data()[at] <= n[2]);
+}
+
 Mask mask_of(const Marks &voxels) {
     require_fit(voxels.ndim() == 3);
     return {bytes_of(voxels), {int(voxels.shape(0)), int(voxels.shape(1)), int(voxels.shape(2))}};
 }
 
+HeightTable table_of(const std::array<Doubles, 3> &table) {
+    const auto &[heights, laterals, values] = table;
+    require_fit(values.ndim() == 2 && values.shape(0) == heights.size() &&
+                values.shape(1) == laterals.size());
+    return {values_of(heights), values_of(laterals), values.data()};
+}
+
 void register_places(py::module_ &module) {
     using namespace py::literals;
+
+    module.def(
+        "depth_profile",
+        [](const Marks &voxels, const std::array<Doubles, 3> &places,
+           const std::array<std::array<double, 3>, 3> &directions, const std::array<Array, 2> &at,
+           const std::array<Doubles, 3> &middle, const std::array<Doubles, 3> &across,
+           const std::array<Doubles, 3> &apart, const Doubles &balls, const Doubles &aside, double flatness,
+           double least, double scale) {
+            const Mask mask = mask_of(voxels);
+            require_fit(balls.ndim() == 2 && balls.size() > 0 && aside.ndim() == 2 &&
+                        aside.shape(0) == balls.shape(0) && aside.shape(1) == balls.shape(1));
+            const DepthProfile profile{{values_of(places[0]), values_of(places[1]), values_of(places[2])},
+                                       directions,
+                                       table_of(middle),
+                                       table_of(across),
+                                       table_of(apart),
+                                       balls.data(),
+                                       aside.data(),
+                                       int(balls.shape(0)),
+                                       int(balls.shape(1)),
+                                       flatness,
+                                       least,
+                                       scale};
+            for (int axis = 0; axis < 3; ++axis)
+                require_fit(int(profile.places[axis].size()) == mask.n[axis]);
+            const auto first = released([&](Workers &workers) { return count_marked(mask, workers); });
+            const auto count = py::ssize_t(first.back());
+            require_fit(at[0].size() == count && at[1].size() == count);
+            Array shapes(count), widths(count);
+            float *const shape = shapes.mutable_data(), *const width = widths.mutable_data();
+            const SeenAt seen_at{at[0].data(), at[1].data(), nullptr};
+            released([&](Workers &workers) {
+                find_profile(profile, mask, first, seen_at, shape, width, workers);
+            });
+            return py::make_tuple(shapes, widths);
+        },
+        "voxels"_a, "places"_a, "directions"_a, "at"_a, "middle"_a, "across"_a, "apart"_a, "balls"_a,
+        "aside"_a, "flatness"_a, "least"_a, "scale"_a);
 
     module.def(
         "marked",
@@ -109,6 +162,47 @@ void register_places(py::module_ &module) {
         .def_property_readonly("nearest", [](const PictureMap &map) {
             return released([&](Workers &workers) { return nearest_depth(map, workers); });
         });
+
+    module.def(
+        "scale_along_rays",
+        [](const Array &values, const std::optional<Array> &plausible, const Doubles &logarithm,
+           const Array &rows, const Array &columns, const Marks &visible, float faint, float most,
+           float share) {
+            const auto count = values.size();
+            require_fit(logarithm.ndim() == 2 && logarithm.size() > 0 && rows.size() == count &&
+                        columns.size() == count && visible.size() == count &&
+                        (!plausible || plausible->size() == count));
+            const RayScale scale{logarithm.data(),
+                                 int(logarithm.shape(0)),
+                                 int(logarithm.shape(1)),
+                                 plausible ? plausible->data() : nullptr,
+                                 faint,
+                                 most,
+                                 share};
+            const SeenAt seen_at{rows.data(), columns.data(), visible.data()};
+            Array scaled(count);
+            float *const result = scaled.mutable_data();
+            released([&](Workers &workers) {
+                scale_along_rays(scale, seen_at, values.data(), std::size_t(count), result, workers);
+            });
+            return scaled;
+        },
+        "values"_a, "plausible"_a, "logarithm"_a, "rows"_a, "columns"_a, "visible"_a, "faint"_a, "most"_a,
+        "share"_a);
+
+    module.def(
+        "write_at",
+        [](py::array_t<float, py::array::c_style> &volume, const Indices &where, const Array &values,
+           float factor) {
+            require_fit(where.size() == values.size());
+            const std::int64_t *const at = where.data();
+            require_fit(where.size() == 0 || (at[0] >= 0 && at[where.size() - 1] < volume.size()));
+            float *const result = volume.mutable_data();
+            released([&](Workers &workers) {
+                write_at(at, values.data(), std::size_t(values.size()), factor, result, workers);
+            });
+        },
+        py::arg("volume").noconvert(), "where"_a, "values"_a, "factor"_a);
 
     module.def(
         "read_bilinearly",
@@ -323,29 +417,46 @@ void register_turning(py::module_ &module) {
         "lattice"_a, "places"_a);
 
     module.def(
-        "project_turned",
-        [](const Array &volume, double first, std::array<double, 2> steps, int columns) {
+        "filled_spans",
+        [](const Array &volume) {
             const In voxels = view(volume);
+            py::array_t<int> spans({volume.shape(0), volume.shape(1), py::ssize_t(2)});
+            int *const result = spans.mutable_data();
+            released([&](Workers &workers) { find_filled(voxels, result, workers); });
+            return spans;
+        },
+        "volume"_a);
+
+    module.def(
+        "project_turned",
+        [](const Array &volume, const Integers &spans, double first, std::array<double, 2> steps,
+           int columns) {
+            const In voxels = view(volume);
+            require_spans(spans, voxels.n);
             require_fit(columns > 0);
             Array picture({py::ssize_t(columns), volume.shape(2)});
             float *const result = picture.mutable_data();
             const Turned turned{first, steps[0], steps[1], columns};
-            released([&](Workers &workers) { project_turned(voxels, turned, result, workers); });
+            released(
+                [&](Workers &workers) { project_turned(voxels, spans.data(), turned, result, workers); });
             return picture;
         },
-        "volume"_a, "first"_a, "steps"_a, "columns"_a);
+        "volume"_a, "spans"_a, "first"_a, "steps"_a, "columns"_a);
 
     module.def(
         "scale_turned",
-        [](py::array_t<float, py::array::c_style> &volume, double first, std::array<double, 2> steps,
-           const Array &logarithm) {
+        [](py::array_t<float, py::array::c_style> &volume, const Integers &spans, double first,
+           std::array<double, 2> steps, const Array &logarithm) {
             const Shape n{int(volume.shape(0)), int(volume.shape(1)), int(volume.shape(2))};
+            require_spans(spans, n);
             require_fit(logarithm.ndim() == 2 && logarithm.shape(0) > 0 && logarithm.shape(1) == n[2]);
             const Out voxels{volume.mutable_data(), n};
             const Turned turned{first, steps[0], steps[1], int(logarithm.shape(0))};
-            released([&](Workers &workers) { scale_turned(voxels, turned, logarithm.data(), workers); });
+            released([&](Workers &workers) {
+                scale_turned(voxels, spans.data(), turned, logarithm.data(), workers);
+            });
         },
-        py::arg("volume").noconvert(), "first"_a, "steps"_a, "logarithm"_a);
+        py::arg("volume").noconvert(), "spans"_a, "first"_a, "steps"_a, "logarithm"_a);
 }
 
 // The patches about some places, which have to lie in a picture (rows, columns).

@@ -12,7 +12,8 @@ namespace smokelift {
 namespace {
 
 constexpr int taps = 3;   // a square's shadow is at most sqrt(2) pixels wide
-constexpr int chunk = 32; // voxels of a column at a time
+constexpr int chunk = 64; // voxels of a column at a time
+constexpr std::size_t columns_a_task = 4096;
 
 double ramp(double x) { return x > 0 ? x * x / 2 : 0; }
 
@@ -28,24 +29,19 @@ struct Taps {
     std::array<float, taps> weights;
 };
 
-std::vector<Taps> find_taps(const Shape &n, const Turned &turned) {
+Taps taps_of(const Turned &turned, int i, int j) {
     const double thinnest = 1e-3; // of a square seen from its side
     const double a = std::max(std::abs(turned.step_x), thinnest),
                  b = std::max(std::abs(turned.step_y), thinnest);
-    std::vector<Taps> found;
-    for (int i = 0; i < n[0]; ++i)
-        for (int j = 0; j < n[1]; ++j) {
-            const double centre = turned.first + i * turned.step_x + j * turned.step_y;
-            Taps one{int(std::lround(centre)) - 1, {}};
-            for (int t = 0; t < taps; ++t) {
-                const double at = one.first + t - centre;
-                const int column = one.first + t;
-                if (column >= 0 && column < turned.columns)
-                    one.weights[t] = float(shadow_up_to(at + 0.5, a, b) - shadow_up_to(at - 0.5, a, b));
-            }
-            found.push_back(one);
-        }
-    return found;
+    const double centre = turned.first + i * turned.step_x + j * turned.step_y;
+    Taps one{int(std::lround(centre)) - 1, {}};
+    for (int t = 0; t < taps; ++t) {
+        const double at = one.first + t - centre;
+        const int column = one.first + t;
+        if (column >= 0 && column < turned.columns)
+            one.weights[t] = float(shadow_up_to(at + 0.5, a, b) - shadow_up_to(at - 0.5, a, b));
+    }
+    return one;
 }
 
 int chunks_of(int nz) { return (nz + chunk - 1) / chunk; }
@@ -67,35 +63,67 @@ void multiply_by_exponential(const float *__restrict logarithm, float *__restric
 
 } // namespace
 
-void project_turned(In volume, const Turned &turned, float *picture, Workers &workers) {
+void find_filled(In volume, int *spans, Workers &workers) {
     const auto [nx, ny, nz] = volume.n;
-    const std::vector<Taps> all = find_taps(volume.n, turned);
-    std::fill_n(picture, std::size_t(turned.columns) * nz, 0.0f);
-    workers.run(chunks_of(nz), [&, nx = nx, ny = ny, nz = nz](int part) {
-        const int k = part * chunk, count = std::min(chunk, nz - k);
-        for (int i = 0; i < nx; ++i)
-            for (int j = 0; j < ny; ++j) {
-                const Taps &one = all[std::size_t(i) * ny + j];
-                for (int t = 0; t < taps; ++t)
-                    if (one.weights[t] != 0)
-                        add(volume.row(i, j) + k, one.weights[t],
-                            picture + std::size_t(one.first + t) * nz + k, count);
-            }
+    workers.run(nx, [&, ny = ny, nz = nz](int i) {
+        for (int j = 0; j < ny; ++j) {
+            const float *const row = volume.row(i, j);
+            int first = 0, end = nz;
+            while (first < nz && row[first] == 0)
+                ++first;
+            while (end > first && row[end - 1] == 0)
+                --end;
+            int *const span = spans + 2 * (std::size_t(i) * ny + j);
+            span[0] = first, span[1] = end;
+        }
     });
 }
 
-void scale_turned(Out volume, const Turned &turned, const float *logarithm, Workers &workers) {
+void project_turned(In volume, const int *spans, const Turned &turned, float *picture, Workers &workers) {
     const auto [nx, ny, nz] = volume.n;
-    const std::vector<Taps> all = find_taps(volume.n, turned);
+    struct Filled {
+        int i, j;
+        Taps taps;
+    };
+    std::vector<Filled> filled;
+    for (int i = 0; i < nx; ++i)
+        for (int j = 0; j < ny; ++j)
+            if (const int *span = spans + 2 * (std::size_t(i) * ny + j); span[0] < span[1])
+                filled.push_back({i, j, {}});
+    workers.run(int((filled.size() + columns_a_task - 1) / columns_a_task), [&](int task) {
+        const std::size_t begin = std::size_t(task) * columns_a_task;
+        for (std::size_t n = begin; n < std::min(filled.size(), begin + columns_a_task); ++n)
+            filled[n].taps = taps_of(turned, filled[n].i, filled[n].j);
+    });
+    std::fill_n(picture, std::size_t(turned.columns) * nz, 0.0f);
+    workers.run(chunks_of(nz), [&, ny = ny, nz = nz](int part) {
+        for (const auto &[i, j, one] : filled) {
+            const int *const span = spans + 2 * (std::size_t(i) * ny + j);
+            const int k = std::max(part * chunk, span[0]), end = std::min((part + 1) * chunk, span[1]);
+            for (int t = 0; t < taps && k < end; ++t)
+                if (one.weights[t] != 0)
+                    add(volume.row(i, j) + k, one.weights[t], picture + std::size_t(one.first + t) * nz + k,
+                        end - k);
+        }
+    });
+}
+
+void scale_turned(Out volume, const int *spans, const Turned &turned, const float *logarithm,
+                  Workers &workers) {
+    const auto [nx, ny, nz] = volume.n;
     workers.run(nx, [&, ny = ny, nz = nz](int i) {
         std::vector<float> read(nz);
         for (int j = 0; j < ny; ++j) {
-            const Taps &one = all[std::size_t(i) * ny + j];
-            std::fill(read.begin(), read.end(), 0.0f);
+            const int *const span = spans + 2 * (std::size_t(i) * ny + j);
+            const int k = span[0], count = span[1] - k;
+            if (count <= 0)
+                continue;
+            const Taps one = taps_of(turned, i, j);
+            std::fill_n(read.begin(), count, 0.0f);
             for (int t = 0; t < taps; ++t)
                 if (one.weights[t] != 0)
-                    add(logarithm + std::size_t(one.first + t) * nz, one.weights[t], read.data(), nz);
-            multiply_by_exponential(read.data(), volume.row(i, j), nz);
+                    add(logarithm + std::size_t(one.first + t) * nz + k, one.weights[t], read.data(), count);
+            multiply_by_exponential(read.data(), volume.row(i, j) + k, count);
         }
     });
 }

@@ -433,6 +433,51 @@ class PictureMap:
     def nearest(self) -> float:
         """Least depth (m) of the voxels before the camera; infinite if there are none."""
 
+Table = tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.float64]]
+"""Heights (n,) and lateral places (m,) in metres, both ascending, and values (n, m), linear between."""
+
+def depth_profile(
+    voxels: Mask,
+    places: list[npt.NDArray[np.float64]],
+    directions: list[npt.NDArray[np.float64]],
+    at: list[Array],
+    middle: Table,
+    across: Table,
+    apart: Table,
+    balls: Array,
+    aside: Array,
+    flatness: float,
+    least: float,
+    scale: float,
+) -> tuple[Array, Array]:
+    """exp(-(|depth - middle - aside| / width)^flatness) and width = scale max(least, (across balls + apart^2)^(1/2)).
+
+    Both (n,) at the marked voxels. ``places`` are those of the voxels along x, y and z in metres from a centre,
+    ``directions`` lateral, depth and height; ``at`` rows and columns (n,) where the pictures ``balls`` and
+    ``aside`` are read.
+    """
+
+def scale_along_rays(
+    values: Array,
+    plausible: Array | None,
+    logarithm: npt.NDArray[np.floating[Any]],
+    rows: Array,
+    columns: Array,
+    visible: Mask,
+    faint: float,
+    most: float,
+    share: float,
+) -> Array:
+    """Values (n,) of voxels at places of a picture (rows, columns), times exponentials of what it holds there.
+
+    Of every step a share is made. A step that leads to a value v is multiplied by p / v where it adds something and by
+    v / p where it takes something, at most by ``most``, for p the plausible value, ``faint`` added to both; without
+    plausible values by 1. Those that are not visible stay.
+    """
+
+def write_at(volume: Array, where: npt.NDArray[np.int64], values: Array, factor: float) -> None:
+    """Write values (n,), times a factor, to ascending indices of a volume's elements."""
+
 def read_bilinearly(picture: npt.NDArray[np.floating[Any]], rows: Array, columns: Array) -> Array:
     """A picture (rows, columns) at places (n,) in pixels; the nearest pixel's value outside."""
 
@@ -494,15 +539,24 @@ def interleave(
 def at_ranks(values: Array, ranks: Sequence[int]) -> Array:
     """Values (len(ranks), ...) that have some ranks, from 0, along the first axis of values, none of which is NaN."""
 
-def project_turned(volume: Array, first: float, steps: tuple[float, float], columns: int) -> Array:
+def filled_spans(volume: Array) -> npt.NDArray[np.int32]:
+    """Of every column of voxels (i, j) the first that is not zero and the end of those that are not, (nx, ny, 2)."""
+
+def project_turned(
+    volume: Array, spans: npt.NDArray[np.int32], first: float, steps: tuple[float, float], columns: int
+) -> Array:
     """The picture (columns, nz) of a volume that is turned about its last axis, a pixel a voxel.
+
+    It is zero outside the spans; see `filled_spans`.
 
     The column of voxels (i, j) is centred on first + i steps[0] + j steps[1], in pixels. A pixel gets what it covers of
     the voxels' shadows, so that even smoke makes an even picture from every angle.
     """
 
-def scale_turned(volume: Array, first: float, steps: tuple[float, float], logarithm: Array) -> None:
-    """Multiply a volume by exponentials of a picture (columns, nz), read with the weights of `project_turned`."""
+def scale_turned(
+    volume: Array, spans: npt.NDArray[np.int32], first: float, steps: tuple[float, float], logarithm: Array
+) -> None:
+    """Multiply a volume in its spans by exponentials of a picture (columns, nz), read as `project_turned` weighs it."""
 
 def unfold(picture: Array, at: npt.NDArray[np.int32], size: int) -> Array:
     """Pixels (size * size, n) of the square patches about places (2, n), all of which lie in the picture."""

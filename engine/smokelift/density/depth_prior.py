@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from smokelift.density.axis import SmokeAxis
 from smokelift.density.halves import MIN_COARSENED_VOXELS, any_of_two, every_second, spread_to_two, with_neighbours
-from smokelift.density.hull import Places, centres_of
+from smokelift.density.hull import Places, centres_of, project_voxels
 from smokelift.density.objective import Term
 from smokelift.density.observation import ObservedClip, View, ViewSet, shadowed_optical_depth
 from smokelift.density.profile import PROFILE_CUT, DepthProfile
@@ -113,15 +113,23 @@ class RoundDepth:
 
     def estimate(self, views: ViewSet) -> DepthEstimate:
         """Spread the pictures' smoke by the profiles; of one picture before darkness again, as its shadows ask for."""
-        first = self._spread(views)
-        if len(views.views) > 1 or views.optics.scattering not in SHADOWED or not first.density.any():
-            return first
-        (view,), (renderer,) = views.views, first.views.renderers
+        if len(views.views) > 1 or views.optics.scattering not in SHADOWED or not views.hull.any():
+            return self._spread(views)
+        (view,) = views.views
         if not view.before_darkness(views.optics.unshadowed_source()):
-            return first
+            return self._spread(views)
+        coarser = _coarser(views)  # shadows need no single voxels
+        first = (self if coarser is views else self._halved())._spread(coarser)
+        if not first.density.any():
+            return self._spread(views)
+        (renderer,) = first.views.renderers
         image = renderer.image(first.density)
         depth = shadowed_optical_depth(view, image, renderer.transmittance, views.optics)
         return self._spread(replace(views, views=(replace(view, optical_depth=depth),)))
+
+    def _halved(self) -> RoundDepth:
+        """The prior of a grid half as fine."""
+        return replace(self, wander=None if self.wander is None else self.wander.halved())
 
     def _spread(self, views: ViewSet) -> DepthEstimate:
         """Spread the views' optical depths by the profiles."""
@@ -137,6 +145,15 @@ class RoundDepth:
         density = _spread(expected, profiles)
         np.divide(density, np.float32(views.optics.medium.extinction), out=density, where=expected.hull)
         return DepthEstimate(density, tuple(p.share_inside() for p in profiles), expected)
+
+
+def _coarser(views: ViewSet) -> ViewSet:
+    """The views against a grid half as fine, where the smoke has many voxels."""
+    if np.count_nonzero(views.hull) <= MIN_COARSENED_VOXELS:
+        return views
+    optics = replace(views.optics, domain=views.optics.domain.halved())
+    seen = tuple(replace(view, projection=project_voxels(view.camera, optics.domain)) for view in views.views)
+    return ViewSet(seen, any_of_two(views.hull), optics, views.frame)
 
 
 def _expected(views: ViewSet, profiles: Sequence[DepthProfile]) -> NDArray[np.bool_]:
@@ -184,7 +201,7 @@ def _common(
     views: ViewSet,
     profiles: Sequence[DepthProfile],
     seen_at: Sequence[Places],
-    single: Sequence[NDArray[np.float64]],
+    single: Sequence[NDArray[np.float32]],
 ) -> NDArray[np.float64]:
     """What several profiles have in common (n,), layer by layer as much as the view that shows most."""
     hull = views.hull

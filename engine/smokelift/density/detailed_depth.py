@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +30,7 @@ from smokelift.density.objective import Term
 from smokelift.density.observation import ObservedClip, ViewSet
 from smokelift.density.stretched_noise import StretchedNoise
 from smokelift.density.temporal_prior import TINY
-from smokelift.density.turntable import Turntable
+from smokelift.density.turntable import Spans, Turntable, filled_spans
 from smokelift.density.wander import Wander
 from smokelift.render import Volume
 from smokelift.scene import Camera
@@ -149,9 +150,20 @@ def _smooth_answer(level: Level, density: Volume) -> Volume:
     """A density in the amounts that the cameras' pictures show; those of a large grid are found on the coarsest."""
     coarser = level.coarser
     if coarser is None:
-        within = level.views.where
-        return fit_multiplicative(level.terms(), density, SMOOTH_ITERATIONS, SMOOTH_TOLERANCE, within=within).density
+        fitted = fit_multiplicative(level.terms(), density, SMOOTH_ITERATIONS, SMOOTH_TOLERANCE, within=level.views)
+        return fitted.density
     return coarser.changed(density, level, lambda means: _smooth_answer(coarser, means))
+
+
+class _Upright(NamedTuple):
+    """Smoke on a turntable, upright, and the spans outside which there is none."""
+
+    values: Volume
+    spans: Spans
+
+    @staticmethod
+    def of(values: Volume) -> _Upright:
+        return _Upright(values, filled_spans(values))
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,21 +228,22 @@ class EveryView:
         box[table.axis] = slice(None)  # rays turn about the axis, along which all of the grid stays
         kept = tuple(box)
         first, second = (span.start for span in kept if span != slice(None))
-        smooth, relaxation = table.upright(self.smooth[kept]), self.strength * (FRESH_STEP if fresh else CARRIED_STEP)
+        smooth = _Upright.of(table.upright(self.smooth[kept]))
+        relaxation = self.strength * (FRESH_STEP if fresh else CARRIED_STEP)
         for exemplar in exemplars:
             for _ in range(FRESH_ROUNDS if fresh else 1):
-                turned = np.array(table.upright(density[kept]))
+                turned = _Upright.of(table.upright(density[kept]))
                 for _ in range(AZIMUTHS):
                     self._step(turned, smooth, exemplar, next(azimuths), (first, second), relaxation)
                 changed = np.zeros(hull.shape, np.float32)
-                np.copyto(changed[kept], table.lying(turned), where=hull[kept])
-                density = take_turns(cameras, changed, 1, within=self.level.views.where)
+                np.copyto(changed[kept], table.lying(turned.values), where=hull[kept])
+                density = take_turns(cameras, changed, 1, within=self.level.views)
         return density
 
     def _step(
         self,
-        now: Volume,
-        smooth: Volume,
+        now: _Upright,
+        smooth: _Upright,
         exemplar: Exemplar,
         azimuth: tuple[int, float],
         corner: tuple[int, int],
@@ -240,10 +253,8 @@ class EveryView:
         table, scale = self.texture.turntable, exemplar.scale
         thickness = np.float32(self.level.views.optics.medium.extinction * table.domain.voxel_size)
         turn, degrees = azimuth
-        whole = table.project(now, degrees, corner)
-        shown, known = (
-            reduced(thickness * picture, scale) for picture in (whole, table.project(smooth, degrees, corner))
-        )
+        whole, expected = (table.project(each.values, degrees, corner, each.spans) for each in (now, smooth))
+        shown, known = (reduced(thickness * picture, scale) for picture in (whole, expected))
         if not shown.any():
             return
         wanted = exemplar.towards(shown, turn)
@@ -260,7 +271,8 @@ class EveryView:
         lacks = np.log(np.clip((amounts + 1e-9) / (has + 1e-9), *STEP_RANGE)) * (shown > faint)
         step = lacks + isotropic(step - lacks)
         step = (relaxation * fade * step).astype(np.float32)
-        table.scale(now, np.ascontiguousarray(enlarged(step, scale, whole.shape)), degrees, corner)
+        step = np.ascontiguousarray(enlarged(step, scale, whole.shape))
+        table.scale(now.values, step, degrees, corner, now.spans)
 
     def azimuths(self) -> Iterator[tuple[int, float]]:
         """Numbers and degrees of azimuths that no camera is near to, spread evenly over all frames."""

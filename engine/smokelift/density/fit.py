@@ -139,7 +139,7 @@ class GradientFit:
             start = depth.detail.added(start, cameras, fresh=fresh)
             iterations *= 1 + fresh  # detail that is all new is far from the pictures
         scaled = fit_multiplicative(
-            cameras, start, iterations, settings.tolerance, within=where, plausible=plausible, recorded=True
+            cameras, start, iterations, settings.tolerance, within=views, plausible=plausible, recorded=True
         )
         expected, started = (float(values.ravel()[where].max()) for values in (depth.density, start))
         final = descend(

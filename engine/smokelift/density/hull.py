@@ -71,16 +71,16 @@ class Projection:
 
 def voxel_centres(domain: Domain) -> NDArray[np.float64]:
     """World positions (nx, ny, nz, 3) of the voxel centres."""
-    return np.stack(np.meshgrid(*_axes(domain), indexing="ij"), -1)
+    return np.stack(np.meshgrid(*voxel_axes(domain), indexing="ij"), -1)
 
 
 def centres_of(voxels: NDArray[np.bool_], domain: Domain) -> NDArray[np.float64]:
     """World positions (n, 3) of the centres of the marked voxels."""
-    places = [axis[index] for axis, index in zip(_axes(domain), _core.marked(voxels), strict=True)]
+    places = [axis[index] for axis, index in zip(voxel_axes(domain), _core.marked(voxels), strict=True)]
     return np.stack(places, -1)
 
 
-def _axes(domain: Domain) -> list[NDArray[np.float64]]:
+def voxel_axes(domain: Domain) -> list[NDArray[np.float64]]:
     """World coordinates of the voxel centres along x, y and z."""
     h = domain.voxel_size
     return [low + (np.arange(n) + 0.5) * h for low, n in zip(domain.min, domain.resolution, strict=True)]
@@ -89,7 +89,7 @@ def _axes(domain: Domain) -> list[NDArray[np.float64]]:
 @lru_cache(maxsize=8)
 def project_voxels(camera: Camera, domain: Domain) -> Projection:
     """Project every voxel centre of a domain."""
-    projected = _core.PictureMap(world_to_pixel(camera), _axes(domain), camera.size)
+    projected = _core.PictureMap(world_to_pixel(camera), voxel_axes(domain), camera.size)
     near = projected.nearest if camera.type == "perspective" else 1.0
     # the diagonal of a voxel is its largest width from any side
     footprint = max(camera.fx, camera.fy) * domain.voxel_size * np.sqrt(3) / near

@@ -54,7 +54,7 @@ class Level:
         views = self.views
         if np.count_nonzero(views.hull) <= MIN_COARSENED_VOXELS:
             return None
-        optics = replace(views.optics, domain=_halved(views.optics.domain))
+        optics = replace(views.optics, domain=views.optics.domain.halved())
         seen = tuple(View.of(_shrunk(view, optics.domain), optics) for view in views.views)
         inside = tuple(area_average(share, *view.camera.size) for share, view in zip(self.inside, seen, strict=True))
         return Level(ViewSet(seen, any_of_two(views.hull), optics, views.frame), inside, 2 * self.coarseness)
@@ -106,14 +106,6 @@ class Level:
             slice(2 * span.start, min(2 * span.stop, count)) for span, count in zip(self._box, shape, strict=True)
         )
         return fine, self._box
-
-
-def _halved(domain: Domain) -> Domain:
-    """The domain with voxels twice as wide; along an odd number of them it is larger by one."""
-    x, y, z = ((count + 1) // 2 for count in domain.resolution)
-    edge = 2 * domain.voxel_size
-    a, b, c = (low + count * edge for low, count in zip(domain.min, (x, y, z), strict=True))
-    return Domain(domain.min, (a, b, c), (x, y, z))
 
 
 def _shrunk(view: View, domain: Domain) -> Observation:

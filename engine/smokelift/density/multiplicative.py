@@ -27,9 +27,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+import smokelift._core as _core
 from smokelift.checks.array_types import Array
-from smokelift.density.hull import Places
 from smokelift.density.objective import Fit, Term, noise_floor, objective
+from smokelift.density.observation import ViewSet
 from smokelift.render import Image, Volume
 
 STEP_RANGE = (0.4, 2.5)
@@ -38,7 +39,7 @@ STEP_RANGE = (0.4, 2.5)
 RELAXATION = 0.9
 """Share of a step that is made."""
 
-MAX_UNEVENNESS = np.float32(2)
+MAX_UNEVENNESS = 2.0
 """Largest factor by which the plausible smoke scales a step. With it and `RELAXATION`, less than twice the step that a
 ray asks for is made, so that the iterations converge."""
 
@@ -61,7 +62,7 @@ def fit_multiplicative(
     iterations: int,
     tolerance: float,
     *,
-    within: NDArray[np.intp] | None = None,
+    within: ViewSet | None = None,
     plausible: Volume | None = None,
     recorded: bool = False,
 ) -> Fit:
@@ -77,15 +78,14 @@ def fit_multiplicative(
         At most so many, in each of which every term has a turn.
     tolerance
         Stop when an iteration lowers the objective by less than this share.
-    within : (n,), optional
-        Voxels of the flat array outside which the density is known to be zero.
+    within
+        The views of the terms, outside whose hull the density is known to be zero.
     plausible : (nx, ny, nz), optional
         Smoke towards whose distribution along the rays the steps lead; see the module. By default they are even.
     recorded
         Keep the renderers' records of the last iteration's pictures, for a descent that goes on from there.
     """
-    smoke, enough = _Smoke(density, within, plausible), noise_floor(terms)
-    places = smoke.places(terms)
+    smoke, enough = _Smoke(terms, density, within, plausible), noise_floor(terms)
     current = best = smoke.values()
     least, done, last = np.inf, 0, False
     left: tuple[Image, ...] = ()
@@ -100,16 +100,14 @@ def fit_multiplicative(
             best, least, left = current, loss, residuals
         if last or loss <= enough or (done > 2 and gained < tolerance * loss):
             break
-        for turn, (term, place) in enumerate(zip(terms, places, strict=True)):
+        for turn, term in enumerate(terms):
             image = images[0] if turn == 0 else term.renderer.image(smoke.volume_of(current))
-            current = _scaled(smoke, current, place, term, image)
+            current = _scaled(smoke, current, turn, term, image)
     kept = left if recorded and last and best is current else ()
     return Fit(smoke.volume_of(best), least, left, done, kept)
 
 
-def take_turns(
-    terms: Sequence[Term], density: Volume, rounds: int, *, within: NDArray[np.intp] | None = None
-) -> Volume:
+def take_turns(terms: Sequence[Term], density: Volume, rounds: int, *, within: ViewSet | None = None) -> Volume:
     """Scale the smoke of every ray towards each picture in turn, whatever the others lose by it.
 
     Parameters
@@ -120,75 +118,67 @@ def take_turns(
         Start; voxels at zero stay there.
     rounds
         Turns of each.
-    within : (n,), optional
+    within
         As of `fit_multiplicative`.
     """
-    smoke = _Smoke(density, within)
-    places, values = smoke.places(terms), smoke.values()
+    smoke = _Smoke(terms, density, within)
+    values = smoke.values()
     for _ in range(rounds):
-        for term, place in zip(terms, places, strict=True):
-            values = _scaled(smoke, values, place, term, term.renderer.image(smoke.volume_of(values)))
+        for turn, term in enumerate(terms):
+            values = _scaled(smoke, values, turn, term, term.renderer.image(smoke.volume_of(values)))
     return smoke.volume_of(values)
 
 
 class _Smoke:
-    """The voxels of a density that hold smoke, which change while the others stay at zero.
+    """The voxels of a density that may hold smoke, which change while the others stay at zero.
 
     Their values (n,) are what is computed with; one volume is filled with them again and again for the renderers.
     """
 
-    def __init__(self, density: Volume, within: NDArray[np.intp] | None, plausible: Volume | None = None) -> None:
-        values = density.ravel()
-        self._where = np.flatnonzero(values) if within is None else within[values[within] != 0]
-        self._values: Array = values[self._where]
+    def __init__(
+        self, terms: Sequence[Term], density: Volume, within: ViewSet | None, plausible: Volume | None = None
+    ) -> None:
+        if within is None:
+            self._where = np.flatnonzero(density)
+            places = tuple(term.view.projection.places(density > 0) for term in terms)
+        else:
+            self._where, places = within.where, within.places
+        self._places = places
+        self._values: Array = density.ravel().take(self._where)
         self._volume = np.zeros(density.shape, np.float32)
-        self._plausible = None if plausible is None else plausible.ravel()[self._where]
+        self._plausible = None if plausible is None else plausible.ravel().take(self._where)
+        self._faint = (
+            0.0 if self._plausible is None else MIN_DENSITY_SHARE * float(self._plausible.max(initial=MIN_SCALE))
+        )
 
     def values(self) -> Array:
-        """Values of the density."""
+        """Array of the density."""
         return self._values
 
-    def volume_of(self, values: Array) -> Volume:
-        """The volume (nx, ny, nz) with these values, until the next call."""
-        self._volume.ravel()[self._where] = values
+    def volume_of(self, values: Array, factor: float = 1.0) -> Volume:
+        """The volume (nx, ny, nz) with these values, times a factor, until the next call."""
+        _core.write_at(self._volume, self._where, values, factor)
         return self._volume
 
-    def uneven(self, step: Array, values: Array) -> Array:
-        """A step (n,) in the logarithm of values, scaled towards the plausible smoke."""
-        if self._plausible is None:
-            return step
-        faint = np.float32(MIN_DENSITY_SHARE * self._plausible.max(initial=MIN_SCALE))
-        scaled = np.exp(step)
-        scaled *= values
-        scaled += faint
-        gain = np.add(self._plausible, faint)
-        gain /= scaled
-        np.divide(1, gain, out=gain, where=step < 0)
-        np.minimum(gain, MAX_UNEVENNESS, out=gain)
-        gain *= step
-        return gain
-
-    def places(self, terms: Sequence[Term]) -> list[Places]:
-        """Where the voxels lie in each term's picture."""
-        filled = np.zeros(self._volume.shape, np.bool_)
-        filled.ravel()[self._where] = True
-        return [term.view.projection.places(filled) for term in terms]
+    def scaled(self, values: Array, turn: int, logarithm: NDArray[np.float32]) -> Array:
+        """Array scaled along the rays of a term by a share of the steps (rows, columns) in their logarithm."""
+        places, uneven = self._places[turn], (self._faint, MAX_UNEVENNESS)
+        at = (places.rows, places.columns, places.visible)
+        return _core.scale_along_rays(values, self._plausible, logarithm, *at, *uneven, RELAXATION)
 
 
-def _scaled(smoke: _Smoke, values: Array, places: Places, term: Term, image: Image) -> Array:
-    """Values whose picture is nearer to a term's, from those that render to `image`."""
+def _scaled(smoke: _Smoke, values: Array, turn: int, term: Term, image: Image) -> Array:
+    """Array whose picture is nearer to that of a term, whose turn it is, from those that render to `image`."""
     transmittance = term.renderer.transmittance
     slope = _slope(smoke, values, term, image, transmittance)
-    step = places.read(_log_scale(image, transmittance, slope, term))
-    step = smoke.uneven(np.where(places.visible, step, np.float32(0)), values)
-    return np.asarray(values * np.exp(RELAXATION * step))
+    return smoke.scaled(values, turn, _log_scale(image, transmittance, slope, term))
 
 
 def _slope(smoke: _Smoke, values: Array, term: Term, image: Image, transmittance: Image) -> Image:
     """dL / d ln s (rows, columns, 3) of a density, whose image and transmittance are given."""
     if term.renderer.absorbs_only:  # L = T B and ln T is proportional to s
         return np.asarray(image * np.log(np.maximum(transmittance, 1e-30))[..., None])
-    return np.asarray((term.renderer.image(smoke.volume_of(values * np.float32(PROBE))) - image) / np.log(PROBE))
+    return np.asarray((term.renderer.image(smoke.volume_of(values, PROBE)) - image) / np.log(PROBE))
 
 
 def _log_scale(image: Image, transmittance: Image, slope: Image, term: Term) -> NDArray[np.float32]:

@@ -14,7 +14,7 @@ from scipy import ndimage
 from smokelift.checks import radiance, require_kind
 from smokelift.density.axis import AxisEstimate
 from smokelift.density.colour_weight import ColourWeight
-from smokelift.density.hull import Projection, common_hull, project_voxels, reached
+from smokelift.density.hull import Places, Projection, common_hull, project_voxels, reached
 from smokelift.footage.matte import SMOKE_THRESHOLD, matte
 from smokelift.footage.noise import EIGHT_BIT_NOISE
 from smokelift.footage.plate import Plate, noise_at
@@ -205,6 +205,11 @@ class ViewSet:
     def where(self) -> NDArray[np.intp]:
         """The hull's voxels (n,) in an array of all. To read an array at them leaves the memory between untouched."""
         return np.flatnonzero(self.hull)
+
+    @cached_property
+    def places(self) -> tuple[Places, ...]:
+        """Where the hull's voxels lie in each view's picture, in the same order."""
+        return tuple(view.projection.places(self.hull) for view in self.views)
 
     @cached_property
     def renderers(self) -> tuple[Renderer, ...]:

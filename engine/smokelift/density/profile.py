@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.special import gamma, gammainc
 
+import smokelift._core as _core
 from smokelift.density.axis import SmokeAxis
-from smokelift.density.hull import Places, centres_of
+from smokelift.density.hull import Places, voxel_axes
 from smokelift.density.screen import upright_rows, view_frame
 from smokelift.density.wander import Wander
 from smokelift.scene import Camera, Domain
@@ -30,6 +31,9 @@ from smokelift.scene.projection import ray_through_pixels
 FLATNESS = 3.5
 """q: between a Gaussian (2) and a box; 3 to 4 were equally good over four scenes
 (docs/experiments/density-profile.md)."""
+
+SCALE = float(np.sqrt(gamma(1 / FLATNESS) / gamma(3 / FLATNESS)))
+"""A in standard deviations."""
 
 PROFILE_CUT = 0.03
 """Share of the profile's peak from which smoke is expected. It is there 1.4 times as wide as it is assumed to be, which
@@ -148,16 +152,16 @@ class DepthProfile:
         self._aside = np.zeros_like(amount)
         if wander is not None:
             self._aside = self._scatter(amount, wander, frame)
-            self._narrowing = np.sqrt(max(0.0, 1 - wander.share**2))
+            self._narrowing = float(np.sqrt(1 - wander.share**2))
 
-    def at(self, places: Places, voxels: NDArray[np.bool_]) -> NDArray[np.float64]:
+    def at(self, places: Places, voxels: NDArray[np.bool_]) -> NDArray[np.float32]:
         """What is spread (1/m), of unit integral along the depth, at the marked voxels (n,), seen at `places`."""
         profile, width = self._shape_and_width(places, voxels)
         steep = np.log(1 / PROFILE_CUT)
         area = gamma(1 + 1 / FLATNESS) * gammainc(1 / FLATNESS, steep) - PROFILE_CUT * steep ** (1 / FLATNESS)
-        return np.asarray(np.maximum(profile - PROFILE_CUT, 0) / (2 * area * width))
+        return np.asarray(np.maximum(profile - np.float32(PROFILE_CUT), 0) / (np.float32(2 * area) * width))
 
-    def shape(self, places: Places, voxels: NDArray[np.bool_]) -> NDArray[np.float64]:
+    def shape(self, places: Places, voxels: NDArray[np.bool_]) -> NDArray[np.float32]:
         """The profile g at the marked voxels (n,), 1 in the middle."""
         return self._shape_and_width(places, voxels)[0]
 
@@ -184,20 +188,30 @@ class DepthProfile:
 
     def _shape_and_width(
         self, places: Places, voxels: NDArray[np.bool_]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        offset = centres_of(voxels, self._domain) - self._centre
-        height, lateral = offset @ self._height, offset @ self._lateral
-        width = self._width(height, lateral, places.read(self._balls))
-        middle = self._axis.at(height, lateral) + places.read(self._aside)
-        distance = np.abs(offset @ self._depth - middle)
-        return np.exp(-((distance / width) ** FLATNESS)), width
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """The profile g and its A (m) at the marked voxels (n,): compiled, since there are millions on a large grid."""
+        axis, offsets = self._axis, zip(voxel_axes(self._domain), self._centre, strict=True)
+        across = self._heights, np.zeros(1), self._spread[:, None]
+        return _core.depth_profile(
+            voxels,
+            [along - middle for along, middle in offsets],
+            [self._lateral, self._depth, self._height],
+            at=[places.rows, places.columns],
+            middle=(axis.heights, axis.laterals, axis.depths),
+            across=(axis.heights, axis.laterals, axis.widths) if axis.several else across,
+            apart=(axis.heights, axis.laterals, DISTANCE_SHARE * axis.spreads),
+            balls=self._balls,
+            aside=self._aside,
+            flatness=FLATNESS,
+            least=self._domain.voxel_size,
+            scale=self._narrowing * SCALE,
+        )
 
     def _width(
         self, height: NDArray[np.float64], lateral: NDArray[np.float64], balls: NDArray[np.float32]
     ) -> NDArray[np.float64]:
         """A, in metres."""
-        scale = np.sqrt(gamma(1 / FLATNESS) / gamma(3 / FLATNESS))
-        return np.asarray(self._narrowing * self._deviation(height, lateral, balls) * scale)
+        return np.asarray(self._narrowing * self._deviation(height, lateral, balls) * SCALE)
 
     def _deviation(
         self, height: NDArray[np.float64], lateral: NDArray[np.float64], balls: NDArray[np.float32]

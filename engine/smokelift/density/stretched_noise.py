@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -113,29 +114,37 @@ class StretchedNoise:
 
     def at(self, level: Level) -> NDArray[np.float32]:
         """Noise (n,) at the voxels that may hold smoke."""
-        noise, *_ = self._sum(level, np.random.default_rng(self.seed))
-        return noise
+        return self._sum(level, np.random.default_rng(self.seed)).noise
 
-    def _sum(self, level: Level, random: np.random.Generator) -> tuple[NDArray[np.float32], NDArray[np.float32], int]:
-        """The sum (n,) of the octaves that a grid holds, the motion (3, n) in voxels so far and the octaves' number."""
+    def _sum(self, level: Level, random: np.random.Generator) -> _Octaves:
+        """The octaves that a grid holds, and the motion that draws out the next, whose nodes are half as far apart."""
         hull, size, octaves = level.views.hull, level.coarseness, 0
         places = size * _core.marked(hull).astype(np.float32)
         places += ((size - 1) / 2 - self.moved[:, None]).astype(np.float32)
         noise, motion = np.zeros(places.shape[1], np.float32), np.zeros_like(places)
         if level.coarser is not None:
-            coarse_noise, coarse_motion, octaves = self._sum(level.coarser, random)
-            noise, *motions = (_finer(values, level.coarser, level) for values in (coarse_noise, *coarse_motion))
+            coarse = self._sum(level.coarser, random)
+            octaves = coarse.number
+            noise, *motions = (_finer(values, level.coarser, level) for values in (coarse.noise, *coarse.motion))
             motion = np.stack(motions)
         while octaves < len(self.strengths):
             spacing = MAX_NODE_DISTANCE * self.width / 2**octaves
             if octaves and spacing < MIN_NODE_DISTANCE * size:
                 break
-            if octaves:  # drawn out by the motion of nodes twice as far apart
-                reach = np.float32(2 * STRETCH * spacing)
-                motion = motion + reach * np.stack([_octave(places + motion, 2 * spacing, random) for _ in range(3)])
-            noise = noise + np.float32(self.strengths[octaves]) * _octave(places + motion, spacing, random)
+            noise += np.float32(self.strengths[octaves]) * _octave(places + motion, spacing, random)
             octaves += 1
-        return noise, motion, octaves
+            if octaves < len(self.strengths):
+                reach = np.float32(STRETCH * spacing)
+                motion += reach * np.stack([_octave(places + motion, spacing, random) for _ in range(3)])
+        return _Octaves(noise, motion, octaves)
+
+
+class _Octaves(NamedTuple):
+    """The sum (n,) of some octaves of noise, the motion (3, n) in voxels that draws out the next, their number."""
+
+    noise: NDArray[np.float32]
+    motion: NDArray[np.float32]
+    number: int
 
 
 def _finer(values: NDArray[np.float32], coarser: Level, level: Level) -> NDArray[np.float32]:

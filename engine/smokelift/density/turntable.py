@@ -15,6 +15,8 @@ from smokelift.scene import Camera, Domain, as_matrix
 Volume = NDArray[np.float32]
 Picture = NDArray[np.float32]
 """(columns, voxels along the axis), a pixel a voxel, upwards."""
+Spans = NDArray[np.int32]
+"""First voxel and end of each column of voxels, (n, m, 2)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,25 +89,36 @@ class Turntable:
         return seen_at(points, picture, camera).astype(np.float32)
 
     def upright(self, volume: Volume) -> Volume:
-        """A volume (nx, ny, nz) with its axis last, upwards; made so that the inverse is a view."""
+        """A copy of a volume (nx, ny, nz) with its axis last, upwards."""
         turned = np.moveaxis(volume, self.axis, -1)
-        return np.ascontiguousarray(turned if self.height[self.axis] > 0 else turned[..., ::-1])
+        return np.array(turned if self.height[self.axis] > 0 else turned[..., ::-1], order="C")
 
     def lying(self, upright: Volume) -> Volume:
         """The inverse of `upright`."""
         turned = upright if self.height[self.axis] > 0 else upright[..., ::-1]
         return np.ascontiguousarray(np.moveaxis(turned, -1, self.axis))
 
-    def project(self, upright: Volume, degrees: float, corner: tuple[int, int] = (0, 0)) -> Picture:
+    def project(
+        self, upright: Volume, degrees: float, corner: tuple[int, int] = (0, 0), spans: Spans | None = None
+    ) -> Picture:
         """Sums (columns, voxels along the axis) of an upright volume, or part of it, along the rays of a turned view.
 
-        ``corner`` is the part's first column of voxels.
+        ``corner`` is the part's first column of voxels, ``spans`` what `filled_spans` says if that is known.
         """
-        return _core.project_turned(upright, *self._turned(degrees, corner), self.shape[0])
+        spans = filled_spans(upright) if spans is None else spans
+        return _core.project_turned(upright, spans, *self._turned(degrees, corner), self.shape[0])
 
-    def scale(self, upright: Volume, logarithm: Picture, degrees: float, corner: tuple[int, int] = (0, 0)) -> None:
+    def scale(
+        self,
+        upright: Volume,
+        logarithm: Picture,
+        degrees: float,
+        corner: tuple[int, int] = (0, 0),
+        spans: Spans | None = None,
+    ) -> None:
         """Multiply an upright volume along the rays of a turned view by exponentials of a picture; see `project`."""
-        _core.scale_turned(upright, *self._turned(degrees, corner), logarithm)
+        spans = filled_spans(upright) if spans is None else spans
+        _core.scale_turned(upright, spans, *self._turned(degrees, corner), logarithm)
 
     def _right(self, degrees: float) -> Doubles:
         turn = np.radians(degrees)
@@ -119,3 +132,8 @@ class Turntable:
         middles = [(corner[n] - (self.domain.resolution[axis] - 1) / 2) for n, axis in enumerate((a, b))]
         first = middles[0] * steps[0] + middles[1] * steps[1] + (self.shape[0] - 1) / 2
         return first, steps
+
+
+def filled_spans(upright: Volume) -> Spans:
+    """Where the columns of an upright volume are not zero: there alone is something to be done."""
+    return _core.filled_spans(upright)

@@ -8,7 +8,7 @@ smoke stays straight. It travels with the smoke.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import ndimage
@@ -22,6 +22,9 @@ SHARE = 0.5
 NODES = (1.6, 0.8)
 """Distances between nodes of the octaves, in standard deviations of the smoke's width: lobes, and half of them
 (docs/experiments/wander.md)."""
+
+LARGEST_SHARE = 0.9
+"""Bound of the standard deviation of the rays' middles over the smoke's: what is left of it is each ray's own."""
 
 LARGEST = 2.0
 """Bound of the scatter, in its standard deviations: smoke stays where the domain is likely to hold it."""
@@ -60,6 +63,10 @@ class Wander:
         """Standard deviation of the rays' middles, over that of the smoke in depth."""
         return float(np.linalg.norm(self._shares))
 
+    def halved(self) -> Wander:
+        """How the smoke wanders on a grid half as fine."""
+        return replace(self, velocity=self.velocity / 2, width=self.width / 2)
+
     def aside(self, places: Doubles, frame: int) -> Doubles:
         """How far the rays' middles stand behind the axis, over the smoke's standard deviation in depth.
 
@@ -80,4 +87,5 @@ class Wander:
     @property
     def _shares(self) -> Doubles:
         """`share` by octave."""
-        return SHARE * np.array(self.roughness[: len(NODES)])
+        shares = SHARE * np.array(self.roughness[: len(NODES)])
+        return shares * (LARGEST_SHARE / max(float(np.linalg.norm(shares)), LARGEST_SHARE))

@@ -211,7 +211,7 @@ def _part(velocity: npt.ArrayLike | StaggeredGrid, box: tuple[slice, ...], domai
         part = np.stack(at_centres(faces_in(velocity.faces, box)), axis=-1)
     else:
         centres = np.ascontiguousarray(velocity, np.float32)
-        shape, finite, part = centres.shape, bool(np.isfinite(centres).all()), centres[box]
+        shape, finite, part = centres.shape, bool(np.isfinite(centres).all()), centres[box].copy()
     if shape != (*domain.shape, 3):
         raise ValueError(f"velocity {shape} does not fit the domain's {domain.shape} voxels")
     if not finite:
@@ -220,12 +220,12 @@ def _part(velocity: npt.ArrayLike | StaggeredGrid, box: tuple[slice, ...], domai
 
 
 def _near(rho: Array, velocity: Array) -> Array:
-    """The velocity that is stored: the one near smoke."""
+    """The velocity that is stored, written over the one given: there is none away from smoke."""
     near = rho > 0.0
     if near.any():
         near = ndimage.maximum_filter(near, 2 * VELOCITY_MARGIN + 1, mode="constant")
-    stored = np.where(near[..., None], velocity, np.float32(0.0))
-    return np.clip(stored, -_LIMIT, _LIMIT, out=stored)
+    np.copyto(velocity, np.float32(0.0), where=~near[..., None])
+    return np.clip(velocity, -_LIMIT, _LIMIT, out=velocity)
 
 
 def _index(box: tuple[slice, ...], first: tuple[int, ...]) -> tuple[int, ...]:

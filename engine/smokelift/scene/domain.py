@@ -140,6 +140,13 @@ class Domain(Box):
         x, y, z = (slice(first, first + n) for first, n in zip(starts, self.resolution, strict=True))
         return x, y, z
 
+    def halved(self) -> Domain:
+        """The box with voxels twice as wide; along an odd number of them it is larger by one."""
+        x, y, z = ((count + 1) // 2 for count in self.resolution)
+        edge = 2 * self.voxel_size
+        a, b, c = (low + count * edge for low, count in zip(self.min, (x, y, z), strict=True))
+        return Domain(self.min, (a, b, c), (x, y, z))
+
     def offsets(self, point: Vector) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Return the metres from a point to the voxels' centres along x, y and z, ready to be broadcast."""
         places = zip(self.min, point, self.resolution, strict=True)

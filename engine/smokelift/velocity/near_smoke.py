@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+import smokelift._core as _core
 from smokelift.checks.array_types import Mask
 from smokelift.scene.domain import box_around
 from smokelift.transport import Array, Velocity, VoxelBox, advect, face_shapes, faces_in
@@ -43,7 +44,11 @@ def carry(density: Array, velocity: Velocity, dt: float, voxel_size: float, *, c
     reach = _reach(velocity, dt / voxel_size)
     x, y, z = density.shape
     for box, source in _boxes(density > 0, reach, whole=conserve):
-        moved = advect(density[source], refined_in(velocity, (x, y, z), source), dt, conserve=conserve)
+        along = refined_in(velocity, (x, y, z), source)
+        if conserve:
+            moved = advect(density[source], along, dt, conserve=True)
+        else:
+            moved = _core.advect_cells(density[source], along.displacement(dt).faces, True)
         inner = tuple(slice(a.start - b.start, a.stop - b.start) for a, b in zip(box, source, strict=True))
         # memory is given where something is written: where the smoke is, not all over its box
         np.copyto(result[box], moved[inner], where=moved[inner] > 0)

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import smokelift._core as _core
 from smokelift.density import (
     DensitySettings,
     FittedDensity,
@@ -20,7 +21,7 @@ from smokelift.density import (
 )
 from smokelift.density.axis import SmokeAxis
 from smokelift.density.descent import descend
-from smokelift.density.hull import common_hull, project_voxels, visual_hull
+from smokelift.density.hull import Places, common_hull, project_voxels, visual_hull
 from smokelift.density.multiplicative import fit_multiplicative, take_turns
 from smokelift.density.objective import Term
 from smokelift.density.profile import DepthProfile, inflated
@@ -328,6 +329,23 @@ def test_steps_lead_towards_plausible_smoke(plume, small, before) -> None:
     )
     assert back[1] / front[1] > 1.15 * back[0] / front[0]
     assert uneven.loss < 1.2 * even.loss
+
+
+@pytest.mark.parametrize("even", [True, False])
+def test_compiled_steps_are_those_of_the_formula(even) -> None:
+    """What is not visible stays, a gain has its bound, and steps may be of either sign."""
+    random = np.random.default_rng(0)
+    values, plausible = random.lognormal(size=(2, 20000)).astype(np.float32)
+    rows, columns = random.uniform(-1, 10, (2, 20000)).astype(np.float32)
+    visible, picture = random.random(20000) > 0.1, random.normal(size=(10, 10)).astype(np.float32)
+    step = np.where(visible, Places(rows, columns, visible).read(picture), 0)
+    if not even:
+        gain = (plausible + 0.1) / (values * np.exp(step) + 0.1)
+        step *= np.minimum(np.where(step < 0, 1 / gain, gain), 2)
+    at = (picture, rows, columns, visible)
+    found = _core.scale_along_rays(values, None if even else plausible, *at, 0.1, 2.0, 0.9)
+    np.testing.assert_allclose(found, values * np.exp(0.9 * step), rtol=1e-5)
+    np.testing.assert_array_equal(found[~visible], values[~visible])
 
 
 @pytest.mark.parametrize(("scattering", "behind"), [("single", 0.0), ("absorption", 0.5)])

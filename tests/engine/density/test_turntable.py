@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from smokelift.density.turntable import Turntable
+from smokelift.density.turntable import Turntable, filled_spans
 from smokelift.scene import Camera, Domain, orbit
 from smokelift.scene.projection import project
 
@@ -92,3 +92,21 @@ def test_a_projection_and_its_scale_are_adjoint() -> None:
     assert changed == pytest.approx(float((turntable.project(part, 33.0, (5, 3)) * step).sum()), rel=2e-3)
     whole[:5], whole[20:], whole[:, :3], whole[:, 12:] = 0, 0, 0, 0
     np.testing.assert_allclose(turntable.project(part, 33.0, (5, 3)), turntable.project(whole, 33.0), atol=1e-5)
+
+
+def test_only_columns_that_hold_something_are_worked_on() -> None:
+    """Where they are said to, between their first and last voxel that is not zero; the result is the same."""
+    volume = np.zeros((5, 4, 9), np.float32)
+    volume[1, 2, 3:6] = 1
+    volume[1, 2, 4] = 0
+    volume[4, 0, 8] = 2
+    spans = filled_spans(volume)
+    assert {tuple(map(int, at)): tuple(spans[at]) for at in np.ndindex(5, 4) if np.diff(spans[at])[0]} == {
+        (1, 2): (3, 6),
+        (4, 0): (8, 9),
+    }
+    turntable = Turntable.before(CAMERA, Domain((0, 0, 0), (5, 4, 9), (5, 4, 9)))
+    everywhere = np.broadcast_to(np.array([0, 9], np.int32), (5, 4, 2))
+    pictures = [turntable.project(volume, 33.0, spans=each) for each in (None, everywhere)]
+    np.testing.assert_array_equal(*pictures)
+    assert pictures[0].sum() == pytest.approx(4)

@@ -1,0 +1,45 @@
+"""The profile of smoke in depth, as compiled for millions of voxels."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from smokelift.density.axis import SmokeAxis
+from smokelift.density.hull import project_voxels
+from smokelift.density.profile import DepthProfile
+from smokelift.scene import Camera, Domain
+
+DOMAIN = Domain((-1, -1, 0), (1, 1, 3), (32, 32, 48))
+HEIGHTS = np.linspace(-1.2, 1.2, 20)
+
+
+def axis_of(columns: int, random: np.random.Generator) -> SmokeAxis:
+    if columns == 1:
+        return SmokeAxis.by_height(HEIGHTS, random.uniform(-0.2, 0.2, 20))
+    tables = random.uniform(0, 0.2, (3, 20, columns)) + np.array([-0.1, 0, 0.1])[:, None, None]
+    return SmokeAxis(HEIGHTS, np.linspace(-0.8, 0.8, columns), *tables)
+
+
+@pytest.mark.parametrize("position", [(0.3, -6, 1.2), (0, -3, 6)])
+@pytest.mark.parametrize("columns", [1, 9])
+def test_smoke_is_spread_about_its_axis(position, columns) -> None:
+    """A ray through the middle of the box meets 1 at the axis, less on both sides of it, and in all about one."""
+    random = np.random.default_rng(0)
+    camera = Camera.look_at(position, (0, 0, 1.5), fov_y_degrees=35, size=(60, 80))
+    amount = np.ones((80, 60), np.float32)
+    amount[:, :20] = amount[:, 40:] = 0
+    axis = axis_of(columns, random)
+    profile = DepthProfile(amount, camera, DOMAIN, axis)
+    everywhere = np.ones(DOMAIN.resolution, np.bool_)
+    places = project_voxels(camera, DOMAIN).places(everywhere)
+    shape = profile.shape(places, everywhere).reshape(DOMAIN.resolution)
+    density = profile.at(places, everywhere).reshape(DOMAIN.resolution)
+    assert shape.max() == pytest.approx(1, abs=1e-3)
+    if position[2] < 2:  # level rays go along y
+        middle = shape[16, :, 24]
+        depth = -0.96875 + 0.0625 * np.argmax(middle)
+        assert depth == pytest.approx(float(axis.at(np.array([0.03]), np.array([0.03]))[0]), abs=0.07)
+        assert (np.diff(middle[: np.argmax(middle)]) >= 0).all()
+        assert (np.diff(middle[np.argmax(middle) :]) <= 0).all()
+        assert density[16, :, 24].sum() * DOMAIN.voxel_size == pytest.approx(1, abs=0.1)
